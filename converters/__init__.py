@@ -1,0 +1,1 @@
+"""Converters: the iGibson dataset and plain URDF to MJCF."""

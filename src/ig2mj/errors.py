@@ -1,0 +1,56 @@
+"""Errors a user can cause.
+
+Every message is one line and names the file, the element in it and what would mend it.
+The command line prints that line and exits with status 2.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class Ig2mjError(Exception):
+    """Base of all errors that a user can cause."""
+
+
+class InputError(Ig2mjError):
+    """A file the user gave is missing, broken or not what it claims to be.
+
+    Attributes:
+      file: path of the file, as the user would find it.
+      element: what in the file is wrong (a link, a joint, a line), or ''.
+      mend: what would put it right, or ''.
+    """
+
+    def __init__(self, file: object, problem: str, *, element: str = "", mend: str = ""):
+        self.file, self.problem, self.element, self.mend = str(file), problem, element, mend
+        where = f"{self.file}: {element}" if element else self.file
+        text = f"{where}: {problem}" + (f" ({mend})" if mend else "")
+        super().__init__(" ".join(text.split()))
+
+
+class ManifestError(InputError):
+    """A scene's manifest.json does not fit its schema or its scene.xml."""
+
+
+class UnknownNameError(Ig2mjError):
+    """A name (object, state, predicate, scene, ...) that does not exist; lists near matches."""
+
+    def __init__(self, kind: str, name: str, known: Iterable[str]):
+        self.kind, self.name = kind, name
+        near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
+        hint = f"; near matches: {', '.join(near)}" if near else ""
+        super().__init__(f"no {kind} is named '{name}'{hint}")
+
+
+class AbilityError(Ig2mjError):
+    """A state or predicate was asked of an object whose category does not have it."""
+
+
+class EngineError(Ig2mjError):
+    """An engine cannot run the scene, or a step of it went wrong."""
+
+
+class MissingDependencyError(Ig2mjError):
+    """An optional package or system library is absent; the message gives the command that installs it."""
