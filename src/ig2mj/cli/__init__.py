@@ -1,1 +1,185 @@
+"""The command `ig2mj`: finds the sub-command, imports only that one, and turns errors into one line.
 
+A sub-command is one file of this package, named after it, and one line of `COMMANDS` below. Its file holds either
+`run`, a function whose typed parameters are the command line (tyro reads them, and the docstring gives the help):
+
+    def run(
+        scene: Annotated[pathlib.Path, tyro.conf.Positional],
+        json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    ) -> int | None:
+        \"\"\"What `ig2mj inspect` does.
+
+        Args:
+          scene: folder of a converted scene.
+          json: print JSON instead of tables.
+        \"\"\"
+
+or, where it has sub-commands itself (`ig2mj convert scene`), a table of such functions:
+
+    SUBCOMMANDS = {"scene": convert_scene, "object": convert_object}
+
+Rules for such a file:
+  - Heavy imports (jax, mujoco, coacd) stand inside the functions, so that `--help` stays fast.
+  - A function returns its exit status; None means 0.
+  - What the user did wrong is raised as `ig2mj.errors.Ig2mjError`: printed as one line on stderr, status 2. A package
+    that is absent (ModuleNotFoundError) and an OSError are treated the same way.
+  - Results go to stdout, progress and remarks to stderr, so that `--json` can be piped.
+  - The name of a parameter that is a Python keyword: `Annotated[Vec3, tyro.conf.arg(name="from")]`.
+
+Exit statuses: 0 done, 1 something failed (a check, or an error of ig2mj itself), 2 bad input or bad usage, 3 converted
+with models skipped (`convert`), 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import inspect
+import os
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from ig2mj.errors import Ig2mjError
+
+#: Sub-command -> what it does, in the order of `ig2mj --help`. The module is `ig2mj.cli.<sub-command>`.
+COMMANDS: dict[str, str] = {
+    "convert": "turn an iGibson scene or a URDF object into MJCF",
+    "view": "open a scene in MuJoCo's viewer, or write a picture of it",
+    "inspect": "list a scene's objects, joints, abilities and rooms",
+    "homes": "build our own dataset of household objects and homes",
+    "doctor": "tell what this machine can run, and how to mend what it cannot",
+}
+
+_USAGE = "usage: ig2mj [--debug] [--version] COMMAND ..."
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Console script: runs the sub-command named in `argv` (default: the process's arguments) and exits."""
+    sys.exit(call(sys.argv[1:] if argv is None else argv))
+
+
+def call(argv: Sequence[str]) -> int:
+    """Runs one command line and returns its exit status. `--debug`, anywhere in it, lets tracebacks through."""
+    args = [a for a in argv if a != "--debug"]
+    debug = len(args) < len(argv)
+    try:
+        status = _dispatch(args)
+        sys.stdout.flush()
+        return status
+    except SystemExit as e:  # tyro's own exits: 0 after --help, 2 on bad usage
+        return _exit_status(e.code)
+    except KeyboardInterrupt:
+        if debug:
+            raise
+        print("interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:  # `ig2mj inspect | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 141
+    except Exception as e:
+        if debug:
+            raise
+        line, status = describe_error(e)
+        print(f"error: {line}", file=sys.stderr)
+        return status
+
+
+def describe_error(error: Exception) -> tuple[str, int]:
+    """One line for an error, and the exit status it leads to."""
+    if isinstance(error, Ig2mjError):
+        return " ".join(str(error).split()), 2
+    if isinstance(error, ModuleNotFoundError) and error.name and not error.name.startswith("ig2mj"):
+        return f"the Python package '{error.name}' is not installed ({_install_hint(error.name)})", 2
+    if isinstance(error, OSError):
+        where = f"{error.filename}: " if error.filename else ""
+        return f"{where}{error.strerror or error}", 2
+    text = " ".join(str(error).split())
+    return f"ig2mj failed with {type(error).__name__}: {text} (run it again with --debug for the traceback)", 1
+
+
+def _dispatch(args: list[str]) -> int:
+    if not args or args[0] in ("-h", "--help", "help"):
+        print(_help())
+        return 0 if args else 2
+    if args[0] == "--version":
+        from importlib.metadata import version
+
+        print(f"ig2mj {version('ig2mj')}")
+        return 0
+    name, rest = args[0], args[1:]
+    if name not in COMMANDS:
+        return _unknown("command", name, COMMANDS, "ig2mj --help")
+    module = importlib.import_module(f"ig2mj.cli.{name}")
+    subcommands: Mapping[str, Callable[..., Any]] | None = getattr(module, "SUBCOMMANDS", None)
+    if subcommands is None:
+        return _run(module.run, f"ig2mj {name}", rest)
+    if not rest or rest[0] in ("-h", "--help"):
+        print(_nested_help(name, module.__doc__, subcommands))
+        return 0 if rest else 2
+    if rest[0] not in subcommands:
+        return _unknown(f"command of 'ig2mj {name}'", rest[0], subcommands, f"ig2mj {name} --help")
+    return _run(subcommands[rest[0]], f"ig2mj {name} {rest[0]}", rest[1:])
+
+
+def _run(function: Callable[..., Any], prog: str, args: list[str]) -> int:
+    import tyro
+
+    return _exit_status(tyro.cli(function, prog=prog, args=args))
+
+
+def _exit_status(value: object) -> int:
+    """A command's return value, or a SystemExit's code, as exit status. None is 0; a text is printed, and is 1."""
+    if value is None:
+        return 0
+    if isinstance(value, int):
+        return int(value)
+    print(value, file=sys.stderr)
+    return 1
+
+
+def _help() -> str:
+    lines = [
+        _USAGE,
+        "",
+        "iGibson 2.0's household scenes, object states and predicates on MuJoCo and JAX.",
+        "",
+        "commands:",
+    ]
+    lines += [f"  {name:<12} {text}" for name, text in COMMANDS.items()]
+    lines += ["", "options:"]
+    lines += [f"  {'--debug':<12} show the traceback of an error", f"  {'--version':<12} print the version"]
+    lines += ["", "`ig2mj COMMAND --help` lists a command's options; `ig2mj doctor` tells what this machine can run."]
+    return "\n".join(lines)
+
+
+def _nested_help(name: str, doc: str | None, subcommands: Mapping[str, Callable[..., Any]]) -> str:
+    summary = [COMMANDS.get(name, ""), ""] if not doc else [doc.strip().splitlines()[0], ""]
+    lines = [f"usage: ig2mj {name} COMMAND ...", "", *summary, "commands:"]
+    for sub, function in subcommands.items():
+        text = (inspect.getdoc(function) or "").split("\n", 1)[0]
+        lines.append(f"  {sub:<12} {text}")
+    return "\n".join([*lines, "", f"`ig2mj {name} COMMAND --help` lists a command's options."])
+
+
+def _unknown(kind: str, name: str, known: Mapping[str, Any], help_command: str) -> int:
+    near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
+    hint = f"did you mean {' or '.join(near)}?" if near else f"`{help_command}` lists them"
+    print(f"error: '{name}' is no {kind} ({hint})", file=sys.stderr)
+    return 2
+
+
+def _install_hint(module: str) -> str:
+    """The command that installs a missing package: the extra of ig2mj that names it, else the package itself."""
+    from importlib.metadata import PackageNotFoundError, requires
+
+    package = module.partition(".")[0].replace("_", "-").lower()
+    try:
+        wanted = requires("ig2mj") or []
+    except PackageNotFoundError:
+        wanted = []
+    for requirement in wanted:
+        if requirement.lower().replace("_", "-").startswith(package) and "extra ==" in requirement:
+            extra = requirement.split("extra ==")[1].strip(" '\"")
+            return f'pip install "ig2mj[{extra}]"'
+    return f"pip install {package}"
