@@ -63,10 +63,13 @@ class Inertial:
 
 @dataclasses.dataclass
 class Link:
+    """com: centre of mass by iGibson's rule in the link frame; `scaling.scale_model` fills it (see `inertia`)."""
+
     name: str
     collisions: list[Shape] = dataclasses.field(default_factory=list)
     visuals: list[Shape] = dataclasses.field(default_factory=list)
     inertial: Inertial | None = None
+    com: np.ndarray | None = None
 
 
 @dataclasses.dataclass
