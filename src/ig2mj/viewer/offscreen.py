@@ -1,0 +1,262 @@
+"""Pictures of a model without a display: EGL, else OSMesa, else Warp's ray caster.
+
+    image = render(model, data, "kitchen_camera", width=640, height=480)
+    image = render(model, data, FreeView.around(model, azimuth=120))
+
+A backend is used only after it has really drawn a picture in a process of its own (`available_backends`), because a
+broken OpenGL driver may abort the process that tries it. OpenGL pictures take about 10 ms; the ray caster needs no
+OpenGL at all and takes seconds. One process can use only one of EGL and OSMesa: the first that was used stays.
+"""
+
+from __future__ import annotations
+
+import atexit
+import collections
+import dataclasses
+import functools
+import importlib
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from ig2mj.errors import EngineError, MissingDependencyError, UnknownNameError
+
+BACKENDS = ("egl", "osmesa", "warp")
+"""In the order in which they are tried."""
+
+VISIBLE_GROUPS = (0, 1, 2)
+"""Geom groups drawn unless asked otherwise, as in MuJoCo's viewer: visual geoms yes, collision geoms (3) no."""
+
+INSTALL_HINT = "apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6"
+
+_PROBE = "import sys; from ig2mj.viewer import offscreen; offscreen._probe_main(sys.argv[1])"
+_PROBE_XML = """<mujoco><visual><headlight ambient="1 1 1"/></visual><worldbody>
+<geom type="box" size=".5 .5 .5" rgba="1 0 0 1"/></worldbody></mujoco>"""
+
+
+@dataclasses.dataclass(frozen=True)
+class FreeView:
+    """A camera that stands anywhere.
+
+    Attributes:
+      lookat: the point in the middle of the picture, world frame, metres.
+      distance: from the camera to that point, metres.
+      azimuth: direction of view about +z, degrees; 0 looks along +x, 90 along +y.
+      elevation: of the direction of view above the horizon, degrees; -90 looks straight down.
+      height: None for a perspective picture; metres of world from the lower to the upper edge for an orthographic one.
+    """
+
+    lookat: tuple[float, float, float]
+    distance: float
+    azimuth: float = 90.0
+    elevation: float = -45.0
+    height: float | None = None
+
+    @classmethod
+    def around(cls, model: mujoco.MjModel, azimuth: float = 90.0, elevation: float = -45.0) -> FreeView:
+        """Sees the whole model, by its `statistic` centre and extent."""
+        x, y, z = (float(c) for c in model.stat.center)
+        return cls((x, y, z), 1.5 * float(model.stat.extent), azimuth, elevation)
+
+
+def render(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    camera: int | str | FreeView | None = None,
+    *,
+    width: int = 640,
+    height: int = 480,
+    groups: Sequence[int] = VISIBLE_GROUPS,
+    segmentation: bool = False,
+    backend: str | None = None,
+) -> np.ndarray:
+    """Draws one picture of the state in `data` (positions must be up to date: mj_forward or mj_kinematics was called).
+
+    Args:
+      camera: name or number of a camera of the model, a FreeView, or None for the model's default free view.
+      width, height: pixels.
+      groups: geom groups that are drawn. Sites follow group 0.
+      segmentation: return which geom is seen at each pixel, not its colour.
+      backend: one of BACKENDS; None takes the first of `available_backends()`.
+
+    Returns:
+      uint8 [height, width, 3], row 0 on top; with `segmentation` int32 [height, width] of geom ids, -1 for none.
+
+    Raises:
+      UnknownNameError: no camera has that name. MissingDependencyError: nothing here can draw.
+    """
+    view = _resolve_camera(model, camera)
+    name = backend or default_backend()
+    if name == "warp":
+        from ig2mj.viewer import warp_snapshot
+
+        return warp_snapshot.render(
+            model, data, view, width=width, height=height, groups=groups, segmentation=segmentation
+        )
+    return _render_gl(model, data, view, width, height, groups, segmentation, name)
+
+
+def default_backend() -> str:
+    """The backend that `render` uses: the one that MUJOCO_GL names where it works, else the first that does."""
+    order = list(BACKENDS)
+    wished = os.environ.get("MUJOCO_GL", "").strip().lower()
+    if _loaded_gl is not None:
+        return _loaded_gl
+    if wished in order:
+        order.sort(key=lambda b: b != wished)
+    for name in order:
+        if probe(name) is None:
+            return name
+    raise MissingDependencyError(f"no way to draw pictures works here; for OpenGL without a display: {INSTALL_HINT}")
+
+
+def available_backends() -> dict[str, str | None]:
+    """Tries every backend in a process of its own. Value None: it drew; else one line that says what went wrong."""
+    return {name: probe(name) for name in BACKENDS}
+
+
+@functools.cache
+def probe(backend: str, timeout_s: float = 120.0) -> str | None:
+    """None if `backend` draws a small picture in a fresh process; else the reason. Remembered for this process."""
+    if backend not in BACKENDS:
+        raise UnknownNameError("rendering backend", backend, BACKENDS)
+    environment = os.environ | {"MUJOCO_GL": "disable" if backend == "warp" else backend}
+    environment.pop("PYOPENGL_PLATFORM", None)
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", _PROBE, backend],
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=timeout_s,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return f"did not draw within {timeout_s:.0f} s"
+    if done.returncode == 0:
+        return None
+    if done.returncode < 0:
+        return f"was killed by signal {-done.returncode} while drawing"
+    lines = [line.strip() for line in done.stderr.splitlines() if line.strip()]
+    return lines[-1] if lines else f"failed with status {done.returncode}"
+
+
+def _probe_main(backend: str) -> None:
+    """What the process of `probe` does; exits 0 only if the box is really in the picture."""
+    model = mujoco.MjModel.from_xml_string(_PROBE_XML)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    image = render(model, data, FreeView((0, 0, 0), 3.0), width=32, height=32, backend=backend)
+    close()
+    red = image[16, 16]
+    if not (red[0] > 60 and red[0] > 2 * red[1]):
+        sys.exit(f"drew a wrong picture (middle pixel {red.tolist()}, not red)")
+
+
+def _resolve_camera(model: mujoco.MjModel, camera: int | str | FreeView | None) -> int | FreeView:
+    if camera is None:
+        free = mujoco.MjvCamera()
+        mujoco.mjv_defaultFreeCamera(model, free)
+        x, y, z = (float(c) for c in free.lookat)
+        return FreeView((x, y, z), free.distance, free.azimuth, free.elevation)
+    if isinstance(camera, FreeView):
+        return camera
+    if isinstance(camera, str):
+        number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, camera)
+        if number < 0:
+            raise UnknownNameError("camera", camera, [model.camera(i).name for i in range(model.ncam)])
+        return number
+    if not 0 <= camera < model.ncam:
+        raise UnknownNameError("camera", str(camera), [str(i) for i in range(model.ncam)])
+    return camera
+
+
+# ---------------------------------------------------------------------------------------------------- OpenGL
+
+_loaded_gl: str | None = None
+_renderers: collections.OrderedDict[tuple[int, int, int], mujoco.Renderer] = collections.OrderedDict()
+_MAX_RENDERERS = 3  # each holds its model's meshes and textures on the GL side
+
+
+def _use_gl(backend: str) -> None:
+    """Makes `mujoco.Renderer` use this backend, whatever MUJOCO_GL was when MuJoCo was imported."""
+    global _loaded_gl
+    if _loaded_gl == backend:
+        return
+    if _loaded_gl is not None:
+        raise EngineError(f"this process already draws with {_loaded_gl}; {backend} needs a process of its own")
+    from mujoco.rendering.classic import gl_context
+
+    try:
+        module = importlib.import_module(f"mujoco.{backend}")
+    except (ImportError, AttributeError, OSError) as e:
+        raise MissingDependencyError(f"{backend} does not load: {e}; try: {INSTALL_HINT}") from e
+    gl_context.GLContext = module.GLContext
+    _loaded_gl = backend
+
+
+def _render_gl(model, data, view, width, height, groups, segmentation, backend) -> np.ndarray:
+    _use_gl(backend)
+    renderer = _renderer_for(model, width, height)
+    option = mujoco.MjvOption()
+    option.geomgroup[:] = [g in groups for g in range(len(option.geomgroup))]
+    option.sitegroup[:] = 0
+    option.sitegroup[0] = 0 in groups
+    keep = (model.vis.global_.fovy, model.vis.global_.orthographic)
+    try:
+        if isinstance(view, FreeView):
+            camera = mujoco.MjvCamera()
+            camera.lookat[:] = view.lookat
+            camera.distance, camera.azimuth, camera.elevation = view.distance, view.azimuth, view.elevation
+            if view.height is not None:
+                camera.orthographic = 1
+                model.vis.global_.orthographic = 1
+                model.vis.global_.fovy = view.height
+        else:
+            camera = view
+        if segmentation:
+            renderer.enable_segmentation_rendering()
+        renderer.update_scene(data, camera, option)
+        image = renderer.render()
+    finally:
+        model.vis.global_.fovy, model.vis.global_.orthographic = keep
+        renderer.disable_segmentation_rendering()
+    if segmentation:
+        return np.where(image[..., 1] == int(mujoco.mjtObj.mjOBJ_GEOM), image[..., 0], -1).astype(np.int32)
+    return image.copy()
+
+
+def _renderer_for(model: mujoco.MjModel, width: int, height: int) -> mujoco.Renderer:
+    key = (id(model), width, height)
+    known = _renderers.get(key)
+    if known is not None and known.model is model:
+        _renderers.move_to_end(key)
+        return known
+    while len(_renderers) >= _MAX_RENDERERS:
+        _renderers.popitem(last=False)[1].close()
+    size = model.vis.global_
+    keep = (size.offwidth, size.offheight)
+    size.offwidth, size.offheight = max(width, keep[0]), max(height, keep[1])
+    try:
+        renderer = mujoco.Renderer(model, height, width, max_geom=2 * model.ngeom + model.nsite + 1000)
+    finally:
+        size.offwidth, size.offheight = keep
+    _renderers[key] = renderer
+    _close_at_exit()
+    return renderer
+
+
+@functools.cache
+def _close_at_exit() -> None:
+    """Once, after the first context: EGL's own exit hook exists then, and hooks run last in, first out."""
+    atexit.register(close)
+
+
+def close() -> None:
+    """Frees all OpenGL contexts; the next picture makes new ones."""
+    while _renderers:
+        _renderers.popitem()[1].close()
