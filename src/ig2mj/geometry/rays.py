@@ -1,0 +1,204 @@
+"""Rays against convex pieces: where does a ray ENTER a piece, for every piece on the line and not just the nearest.
+
+iGibson's adjacency states rest on Bullet's rays (spec/states.md 4.4): a ray that starts inside a convex shape does not
+hit it, nothing occludes anything, and a hit means that the ray enters the shape at 0 <= t <= length. Hence the basic
+function here is the interval [t_in, t_out] of a whole line inside a shape; whether a ray enters, forwards or
+backwards, follows from it. An empty interval is (inf, -inf). t counts in multiples of the direction's length.
+
+Shapes are in their own frame: capsules and cylinders lie along z; `size` is MuJoCo's geom_size (radius, half length);
+polyhedra are half-spaces (n, d) with n.x <= d, |n| = 1, padded with (0, 0, 0, 1). `inflate` (metres) grows a shape;
+Bullet's rays see hulls grown by 1.75 mm (spec section 24).
+
+A NaN in an origin, a direction or a pose yields no hit.
+"""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from ig2mj.geometry.poses import quat_rotate_inverse
+from ig2mj.scene.tables import PieceKind
+
+AnyArray = Array | np.ndarray
+Interval = tuple[Float[Array, "*b"], Float[Array, "*b"]]
+
+PARALLEL = 1e-9
+"""Below this slope a ray counts as parallel to a face: over 1 m it would approach by less than a nanometre."""
+
+
+def rays_hit_pieces(
+    origins: Float[AnyArray, "*#b R 3"],
+    directions: Float[AnyArray, "*#b R 3"],
+    lengths: Float[AnyArray, "*#b R"],
+    piece_pos: Float[AnyArray, "*#b K 3"],
+    piece_quat: Float[AnyArray, "*#b K 4"],
+    piece_kind: Int[AnyArray, "K"],
+    piece_size: Float[AnyArray, "K 3"],
+    piece_planes: Float[AnyArray, "K N 4"],
+    inflate: float = 0.0,
+) -> Float[Array, "*b R K"]:
+    """Entry parameter t of every ray into every piece; inf where the ray does not enter it within its length.
+
+    `piece_pos` and `piece_quat` are world poses. The kinds, sizes and planes are `SceneTables.piece_*`. Memory is
+    b x R x K numbers; for chosen pairs of object and target see `ig2mj.geometry.targets`.
+    """
+    origin = quat_rotate_inverse(piece_quat[..., None, :, :], origins[..., :, None, :] - piece_pos[..., None, :, :])
+    direction = quat_rotate_inverse(piece_quat[..., None, :, :], directions[..., :, None, :])
+    low, high = piece_interval(piece_kind, piece_size, piece_planes, origin, direction, inflate)
+    return entry(low, high, lengths[..., :, None])
+
+
+def entry(
+    low: Float[AnyArray, "*#b"], high: Float[AnyArray, "*#b"], length: Float[AnyArray, "*#b"] | float
+) -> Float[Array, "*b"]:
+    """t at which a ray from t = 0 to `length` enters [low, high], or inf; starting inside is no entry."""
+    return jnp.where(enters(low, high, length), low, jnp.inf)
+
+
+def enters(
+    low: Float[AnyArray, "*#b"], high: Float[AnyArray, "*#b"], length: Float[AnyArray, "*#b"] | float
+) -> Bool[Array, "*b"]:
+    """Whether the ray along the line's direction enters the shape at 0 <= t <= length."""
+    return (low >= 0.0) & (low <= length) & (low <= high)
+
+
+def enters_backwards(
+    low: Float[AnyArray, "*#b"], high: Float[AnyArray, "*#b"], length: Float[AnyArray, "*#b"] | float
+) -> Bool[Array, "*b"]:
+    """The same for the ray against the line's direction: one interval answers both."""
+    return (high <= 0.0) & (-high <= length) & (low <= high)
+
+
+def piece_interval(
+    kind: Int[AnyArray, "*#b"],
+    size: Float[AnyArray, "*#b 3"],
+    planes: Float[AnyArray, "*#b N 4"],
+    origin: Float[AnyArray, "*#b 3"],
+    direction: Float[AnyArray, "*#b 3"],
+    inflate: float = 0.0,
+) -> Interval:
+    """Interval of a line inside pieces of mixed kinds, in the pieces' frames.
+
+    Kinds known while tracing (a numpy array) cost nothing where they do not occur.
+    """
+    present = set(PieceKind) if isinstance(kind, Array) else {PieceKind(k) for k in np.unique(kind)}
+    shapes = {
+        PieceKind.SPHERE: lambda: sphere_interval(origin, direction, size[..., 0] + inflate),
+        PieceKind.CAPSULE: lambda: capsule_interval(origin, direction, size[..., 0] + inflate, size[..., 1]),
+        PieceKind.CYLINDER: lambda: cylinder_interval(
+            origin, direction, size[..., 0] + inflate, size[..., 1] + inflate
+        ),
+        PieceKind.POLYHEDRON: lambda: polyhedron_interval(origin, direction, planes, inflate),
+    }
+    shape = jnp.broadcast_shapes(kind.shape, origin.shape[:-1], direction.shape[:-1])
+    low, high = jnp.full(shape, jnp.inf), jnp.full(shape, -jnp.inf)
+    for k in sorted(present):
+        inside_low, inside_high = shapes[k]()
+        low, high = jnp.where(kind == k, inside_low, low), jnp.where(kind == k, inside_high, high)
+    return low, high
+
+
+def sphere_interval(
+    origin: Float[AnyArray, "*#b 3"], direction: Float[AnyArray, "*#b 3"], radius: Float[AnyArray, "*#b"] | float
+) -> Interval:
+    """Interval of a line inside a sphere about the frame's origin."""
+    return _quadratic_interval(
+        jnp.sum(direction * direction, axis=-1),
+        jnp.sum(origin * direction, axis=-1),
+        jnp.sum(origin * origin, axis=-1),
+        radius,
+    )
+
+
+def cylinder_interval(
+    origin: Float[AnyArray, "*#b 3"],
+    direction: Float[AnyArray, "*#b 3"],
+    radius: Float[AnyArray, "*#b"] | float,
+    half: Float[AnyArray, "*#b"] | float,
+) -> Interval:
+    """Interval of a line inside a cylinder along z."""
+    o, d = origin[..., :2], direction[..., :2]
+    side = _quadratic_interval(jnp.sum(d * d, axis=-1), jnp.sum(o * d, axis=-1), jnp.sum(o * o, axis=-1), radius)
+    top = _half_space_interval(direction[..., 2], half - origin[..., 2])
+    bottom = _half_space_interval(-direction[..., 2], half + origin[..., 2])
+    return _intersect(side, _intersect(top, bottom))
+
+
+def capsule_interval(
+    origin: Float[AnyArray, "*#b 3"],
+    direction: Float[AnyArray, "*#b 3"],
+    radius: Float[AnyArray, "*#b"] | float,
+    half: Float[AnyArray, "*#b"] | float,
+) -> Interval:
+    """Interval of a line inside a capsule along z.
+
+    The capsule is the union of a cylinder and two spheres; as it is convex the interval reaches from the first of
+    their entries to the last of their exits.
+    """
+    low, high = cylinder_interval(origin, direction, radius, half)
+    for sign in (1.0, -1.0):
+        centre = jnp.stack([jnp.zeros_like(jnp.asarray(half))] * 2 + [sign * jnp.asarray(half)], axis=-1)
+        cap_low, cap_high = sphere_interval(origin - centre, direction, radius)
+        # A line that misses this part has the interval (inf, -inf), which leaves the union as it is.
+        low, high = jnp.minimum(low, cap_low), jnp.maximum(high, cap_high)
+    return low, high
+
+
+def polyhedron_interval(
+    origin: Float[AnyArray, "*#b 3"],
+    direction: Float[AnyArray, "*#b 3"],
+    planes: Float[AnyArray, "*#b N 4"],
+    inflate: float = 0.0,
+) -> Interval:
+    """Interval of a line inside the intersection of half-spaces; (-inf, inf) where all planes are padding."""
+    slope = jnp.sum(planes[..., :3] * direction[..., None, :], axis=-1)
+    room = planes[..., 3] + inflate - jnp.sum(planes[..., :3] * origin[..., None, :], axis=-1)
+    low, high = _half_space_interval(slope, room)
+    return _tidy(jnp.max(low, axis=-1), jnp.min(high, axis=-1))
+
+
+def _half_space_interval(slope: Float[AnyArray, "*#b"], room: Float[AnyArray, "*#b"]) -> Interval:
+    """Where slope * t <= room."""
+    parallel = jnp.abs(slope) < PARALLEL
+    t = room / jnp.where(parallel, 1.0, slope)
+    outside = parallel & ~(room >= 0.0)
+    low = jnp.where(parallel | (slope > 0.0), -jnp.inf, t)
+    high = jnp.where(parallel | (slope < 0.0), jnp.inf, t)
+    return jnp.where(outside, jnp.inf, low), jnp.where(outside, -jnp.inf, high)
+
+
+def _quadratic_interval(
+    a: Float[AnyArray, "*#b"],
+    b: Float[AnyArray, "*#b"],
+    c: Float[AnyArray, "*#b"],
+    radius: Float[AnyArray, "*#b"] | float,
+) -> Interval:
+    """Where |o + t d| <= radius, with a = d.d, b = o.d, c = o.o.
+
+    A line with a = 0 (along a cylinder's axis) is inside for ever or never.
+    """
+    parallel = a < PARALLEL * PARALLEL
+    safe = jnp.where(parallel, 1.0, a)
+    # (radius^2 - distance of the line from the centre^2) / a
+    reach = (radius * radius - (c - b * b / safe)) / safe
+    meets = reach > 0.0
+    root = jnp.sqrt(jnp.where(meets, reach, 1.0))
+    low = jnp.where(meets, -b / safe - root, jnp.inf)
+    high = jnp.where(meets, -b / safe + root, -jnp.inf)
+    within = c <= radius * radius
+    return (
+        jnp.where(parallel, jnp.where(within, -jnp.inf, jnp.inf), low),
+        jnp.where(parallel, jnp.where(within, jnp.inf, -jnp.inf), high),
+    )
+
+
+def _intersect(a: Interval, b: Interval) -> Interval:
+    return _tidy(jnp.maximum(a[0], b[0]), jnp.minimum(a[1], b[1]))
+
+
+def _tidy(low: Float[Array, "*b"], high: Float[Array, "*b"]) -> Interval:
+    """Empty intervals in their one form, (inf, -inf), so that a union by min and max is right."""
+    empty = low > high
+    return jnp.where(empty, jnp.inf, low), jnp.where(empty, -jnp.inf, high)

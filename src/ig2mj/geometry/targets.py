@@ -1,0 +1,243 @@
+"""Rays from chosen objects against the pieces of chosen target objects: the adjacency behind on_top, under, inside,
+next_to.
+
+Only the pairs a task names are computed, and of the target only its real pieces. Both are known before tracing, so
+`RayTargets` lays the work out once on the host: entry e is one (pair, piece); entries of one kind and one number of
+half-spaces stand together; half-spaces are kept in the frame of the BODY the piece rides on. Inside the step, arrays
+have the shape [W, R, E] with the entries last, and the loop over half-spaces is unrolled into one fused pass, so
+nothing of size E x N is ever stored.
+
+Axes: W worlds, P pairs, R lines, B bodies, K pieces of the scene, E entries.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from ig2mj.geometry import rays
+from ig2mj.geometry.poses import quat_to_matrix
+from ig2mj.scene.tables import PieceKind, SceneTables
+
+AnyArray = Array | np.ndarray
+
+PLANE_STEPS = (6, 12, 24, 48, 96, 192, 384, 768)
+"""Polyhedra are grouped by number of half-spaces, rounded up to one of these: a box is not charged for 60 faces."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class EntryGroup:
+    """Entries that are computed alike.
+
+    Attributes:
+      kind: their shape. pair, body: of each entry. pos, rotation: pose of the piece in its body (primitives only;
+      rotation maps piece axes to body axes). size: MuJoCo's geom_size. planes: half-spaces in the body's frame, with
+      their number first, so that planes[n] is one half-space of every entry; zero of them for primitives.
+    """
+
+    kind: PieceKind
+    pair: Int[np.ndarray, "E"]
+    body: Int[np.ndarray, "E"]
+    pos: Float[np.ndarray, "E 3"]
+    rotation: Float[np.ndarray, "E 3 3"]
+    size: Float[np.ndarray, "E 3"]
+    planes: Float[np.ndarray, "N E 4"]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RayTargets:
+    """Which pieces the rays of each pair are held against. Built once per scene and list of pairs.
+
+    Attributes:
+      num_pairs: P. groups: the entries. slots: for each pair the positions of its entries in the joined groups, padded
+      with the number of entries, [P, most entries of a pair].
+    """
+
+    num_pairs: int
+    groups: tuple[EntryGroup, ...]
+    slots: Int[np.ndarray, "P S"]
+
+    @classmethod
+    def build(cls, tables: SceneTables, targets: Int[np.ndarray, "P"]) -> RayTargets:
+        """Lay out the work for P pairs, `targets` being the object index whose pieces each pair's rays may enter."""
+        return cls.from_pieces(
+            np.asarray(targets),
+            tables.piece_object,
+            tables.piece_body,
+            tables.piece_pos,
+            tables.piece_quat,
+            tables.piece_kind,
+            tables.piece_size,
+            tables.piece_planes,
+        )
+
+    @classmethod
+    def from_pieces(
+        cls,
+        targets: Int[np.ndarray, "P"],
+        piece_object: Int[np.ndarray, "K"],
+        piece_body: Int[np.ndarray, "K"],
+        piece_pos: Float[np.ndarray, "K 3"],
+        piece_quat: Float[np.ndarray, "K 4"],
+        piece_kind: Int[np.ndarray, "K"],
+        piece_size: Float[np.ndarray, "K 3"],
+        piece_planes: Float[np.ndarray, "K N 4"],
+    ) -> RayTargets:
+        """As `build`, from the pieces' tables one by one."""
+        owned = [np.flatnonzero(piece_object == target) for target in targets]
+        pair = np.concatenate([np.full(len(o), p) for p, o in enumerate(owned)] or [np.zeros(0)]).astype(int)
+        piece = np.concatenate([*owned, np.zeros(0)]).astype(int)
+        steps = _plane_steps(piece_kind, piece_planes)
+        rotation = _matrices(piece_quat)
+        groups, order = [], []
+        for kind, step in sorted({(int(piece_kind[k]), int(steps[k])) for k in piece}):
+            members = np.flatnonzero((piece_kind[piece] == kind) & (steps[piece] == step))
+            k = piece[members]
+            order.append(members)
+            groups.append(
+                EntryGroup(
+                    kind=PieceKind(kind),
+                    pair=pair[members],
+                    body=piece_body[k],
+                    pos=piece_pos[k].astype(np.float32),
+                    rotation=rotation[k].astype(np.float32),
+                    size=piece_size[k].astype(np.float32),
+                    planes=_planes_in_body(piece_planes[k], piece_pos[k], rotation[k], step),
+                )
+            )
+        slots = _slots(pair[np.concatenate([*order, np.zeros(0, int)])], len(targets))
+        return cls(num_pairs=len(targets), groups=tuple(groups), slots=slots)
+
+
+def lines_enter_targets(
+    targets: RayTargets,
+    body_pos: Float[AnyArray, "W B 3"],
+    body_quat: Float[AnyArray, "W B 4"],
+    origins: Float[AnyArray, "W P 3"],
+    directions: Float[AnyArray, "R 3"],
+    lengths: Float[AnyArray, "R"],
+    inflate: float = 0.0,
+) -> tuple[Bool[Array, "W P R"], Bool[Array, "W P R"]]:
+    """Whether the rays from each pair's origin enter any piece of its target: (along +direction, along -direction).
+
+    Both ways cost as much as one. `directions` are unit vectors in world axes, the same for all pairs; `lengths` in
+    metres. False for targets without pieces and wherever a pose or an origin is NaN.
+    """
+    low, high = _intervals(targets, body_pos, body_quat, origins, directions, inflate)
+    return (
+        _any_of_pair(targets, rays.enters(low, high, lengths[:, None])),
+        _any_of_pair(targets, rays.enters_backwards(low, high, lengths[:, None])),
+    )
+
+
+def rays_enter_targets(
+    targets: RayTargets,
+    body_pos: Float[AnyArray, "W B 3"],
+    body_quat: Float[AnyArray, "W B 4"],
+    origins: Float[AnyArray, "W P 3"],
+    directions: Float[AnyArray, "R 3"],
+    lengths: Float[AnyArray, "R"],
+    inflate: float = 0.0,
+) -> Bool[Array, "W P R"]:
+    """As `lines_enter_targets`, forwards only."""
+    low, high = _intervals(targets, body_pos, body_quat, origins, directions, inflate)
+    return _any_of_pair(targets, rays.enters(low, high, lengths[:, None]))
+
+
+def _intervals(
+    targets: RayTargets,
+    body_pos: Float[AnyArray, "W B 3"],
+    body_quat: Float[AnyArray, "W B 4"],
+    origins: Float[AnyArray, "W P 3"],
+    directions: Float[AnyArray, "R 3"],
+    inflate: float,
+) -> tuple[Float[Array, "W R E"], Float[Array, "W R E"]]:
+    """Interval of every line inside every entry's piece, entries in the order of the joined groups."""
+    worlds, lines = origins.shape[0], directions.shape[0]
+    if not targets.groups:
+        return jnp.zeros((worlds, lines, 0)), jnp.zeros((worlds, lines, 0))
+    found = [_group_interval(g, body_pos, body_quat, origins, directions, inflate) for g in targets.groups]
+    return jnp.concatenate([f[0] for f in found], axis=-1), jnp.concatenate([f[1] for f in found], axis=-1)
+
+
+def _group_interval(
+    group: EntryGroup,
+    body_pos: Float[AnyArray, "W B 3"],
+    body_quat: Float[AnyArray, "W B 4"],
+    origins: Float[AnyArray, "W P 3"],
+    directions: Float[AnyArray, "R 3"],
+    inflate: float,
+) -> tuple[Float[Array, "W R E"], Float[Array, "W R E"]]:
+    bodies, place = np.unique(group.body, return_inverse=True)
+    axes = quat_to_matrix(jnp.asarray(body_quat)[:, bodies])  # [W, bodies, 3, 3], columns are the body's axes
+    offset = origins[:, group.pair] - jnp.asarray(body_pos)[:, group.body]  # [W, E, 3], world axes
+    columns = [[axes[:, :, i, j][:, place] for i in range(3)] for j in range(3)]
+    o = [sum(column[i] * offset[..., i] for i in range(3))[:, None, :] for column in columns]
+    d = [sum(column[i][:, None, :] * directions[:, i, None] for i in range(3)) for column in columns]
+    if group.kind is PieceKind.POLYHEDRON:
+        return _unrolled_polyhedra(group.planes, o, d, inflate)
+    origin = jnp.stack(o, axis=-1) - group.pos
+    # A vector in piece axes is rotation^T v, which is v @ rotation.
+    origin = jnp.einsum("wrei,eij->wrej", origin, group.rotation)
+    direction = jnp.einsum("wrei,eij->wrej", jnp.stack(d, axis=-1), group.rotation)
+    kinds = np.full(len(group.pair), group.kind)
+    return rays.piece_interval(kinds, group.size, np.zeros((1, 0, 4), np.float32), origin, direction, inflate)
+
+
+def _unrolled_polyhedra(
+    planes: Float[np.ndarray, "N E 4"], o: list, d: list, inflate: float
+) -> tuple[Float[Array, "W R E"], Float[Array, "W R E"]]:
+    """`rays.polyhedron_interval` with one half-space of every entry after the other."""
+    low, high = jnp.full(d[0].shape, -jnp.inf), jnp.full(d[0].shape, jnp.inf)
+    for plane in planes:
+        slope = plane[:, 0] * d[0] + plane[:, 1] * d[1] + plane[:, 2] * d[2]
+        room = plane[:, 3] + inflate - (plane[:, 0] * o[0] + plane[:, 1] * o[1] + plane[:, 2] * o[2])
+        parallel = jnp.abs(slope) < rays.PARALLEL
+        t = room / jnp.where(parallel, 1.0, slope)
+        blocked = parallel & ~(room >= 0.0)
+        low = jnp.maximum(low, jnp.where(blocked, jnp.inf, jnp.where(parallel | (slope > 0.0), -jnp.inf, t)))
+        high = jnp.minimum(high, jnp.where(parallel | (slope < 0.0), jnp.inf, t))
+    return low, high
+
+
+def _any_of_pair(targets: RayTargets, hit: Bool[Array, "W R E"]) -> Bool[Array, "W P R"]:
+    padded = jnp.concatenate([hit, jnp.zeros((*hit.shape[:2], 1), bool)], axis=-1)
+    return jnp.swapaxes(jnp.any(padded[:, :, targets.slots], axis=-1), 1, 2)
+
+
+def _plane_steps(kind: Int[np.ndarray, "K"], planes: Float[np.ndarray, "K N 4"]) -> Int[np.ndarray, "K"]:
+    """Number of half-spaces of each polyhedron rounded up to a step; 0 for the other kinds."""
+    count = np.any(planes[..., :3] != 0.0, axis=-1).sum(axis=-1)
+    steps = np.array([*PLANE_STEPS, max(planes.shape[1], PLANE_STEPS[-1] + 1)])
+    return np.where(kind == PieceKind.POLYHEDRON, np.minimum(steps[np.searchsorted(steps, count)], planes.shape[1]), 0)
+
+
+def _planes_in_body(
+    planes: Float[np.ndarray, "E N 4"],
+    pos: Float[np.ndarray, "E 3"],
+    rotation: Float[np.ndarray, "E 3 3"],
+    step: int,
+) -> Float[np.ndarray, "M E 4"]:
+    """The first `step` half-spaces of each piece, those in use sorted to the front, moved into the body's frame."""
+    unused = np.all(planes[..., :3] == 0.0, axis=-1)
+    front = np.argsort(unused, axis=1, kind="stable")
+    planes = np.take_along_axis(planes, front[..., None], axis=1)[:, :step].astype(np.float64)
+    normal = np.einsum("eij,enj->eni", rotation, planes[..., :3])
+    offset = planes[..., 3] + np.einsum("eni,ei->en", normal, pos)
+    moved = np.concatenate([normal, offset[..., None]], axis=-1).astype(np.float32)
+    return np.ascontiguousarray(moved.transpose(1, 0, 2))
+
+
+def _slots(pair: Int[np.ndarray, "E"], num_pairs: int) -> Int[np.ndarray, "P S"]:
+    members = [np.flatnonzero(pair == p) for p in range(num_pairs)]
+    slots = np.full((num_pairs, max((len(m) for m in members), default=0)), len(pair))
+    for row, m in zip(slots, members, strict=True):
+        row[: len(m)] = m
+    return slots
+
+
+def _matrices(quat: Float[np.ndarray, "K 4"]) -> Float[np.ndarray, "K 3 3"]:
+    return np.asarray(quat_to_matrix(np.asarray(quat, np.float32)), np.float64)
