@@ -57,3 +57,19 @@ def shared_data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"needs the test data in {folder}, which is no part of the repository")
     return folder
+
+
+@pytest.fixture(scope="session")
+def tiny_home_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a small home in the project's format, see tests/tiny_home.py."""
+    from tiny_home import write_tiny_home
+
+    return write_tiny_home(tmp_path_factory.mktemp("homes") / "tiny")
+
+
+@pytest.fixture(scope="session")
+def tiny_home(tiny_home_folder: Path):
+    """The small home, loaded. Nothing of a Scene changes during a run, so tests share it."""
+    import ig2mj
+
+    return ig2mj.load_scene(tiny_home_folder)

@@ -9,8 +9,13 @@ F finger links of all agents.
 
 from __future__ import annotations
 
+import jax
+import numpy as np
 from flax import struct
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Bool, Float
+
+Array = jax.Array | np.ndarray
+"""The native engine gives numpy arrays, the MJX engines JAX's; jitted functions take both."""
 
 
 @struct.dataclass

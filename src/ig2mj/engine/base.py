@@ -1,0 +1,156 @@
+"""The `Engine` protocol: what every physics engine offers to the parts above it, and the data it takes and gives.
+
+Nothing above this package asks which engine it has. Two things differ between engines, and both are stated by
+attributes:
+
+- `pure` engines (MJX) have a `Physics` that is a pytree; all methods but `export` may be called under `jax.jit`,
+  `lax.scan` and sharding, and return new pytrees. The native engine (C MuJoCo) has a stateful handle: `step`, `write`
+  and `load` change it in place and return the same handle. Code that always goes on with the returned physics, and
+  never uses the old one again, is right for both.
+- `num_worlds` is fixed when the engine is made.
+
+Axes: W worlds, O objects, B bodies, U units (see `ig2mj.engine.layout`), E equality constraints, nq, nv, nu, na as in
+MuJoCo.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Protocol, runtime_checkable
+
+from flax import struct
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.scene.tables import SceneTables
+
+PHYSICS_TIMESTEP = 1 / 120
+"""Seconds. iGibson's physics step (spec/dataset_format.md section 7)."""
+
+SUBSTEPS = 4
+"""Physics steps in a control step: iGibson renders and acts at 30 Hz (spec/states.md section 0)."""
+
+TOUCH_TOLERANCE = 0.003
+"""Metres. Surfaces this close touch (spec/states.md section 24)."""
+
+BOX_RULES = ("tight", "igibson")
+"""How `aabb_low` and `aabb_high` are made.
+
+"tight": smallest world box around the collision geometry. "igibson": each body's box in its own frame, rotated into the
+world and enclosed, plus Bullet's margin (spec/states.md 4.2 and 24).
+"""
+
+Physics = Any
+"""An engine's physics state of all worlds; opaque to everyone but the engine."""
+
+
+@struct.dataclass
+class Snapshot:
+    """Physics of one world, or of a batch of worlds (every array then begins with the world axis).
+
+    It is what an engine needs to go on exactly where the world stood, and the form in which worlds go to files, to
+    pools of initial states and from one engine to another. Arrays are numpy's or JAX's.
+
+    Attributes:
+      tree_asleep: MuJoCo's sleep state per kinematic tree: negative awake, else the next tree of its sleeping island.
+      eq_data: parameters of equality constraints, per world (design section 2, fact 9).
+      touching: remembered contact of units, see `ig2mj.engine.layout`.
+      The others are MuJoCo's fields of the same name; time has shape ().
+    """
+
+    qpos: Float[Array, "*W nq"]
+    qvel: Float[Array, "*W nv"]
+    act: Float[Array, "*W na"]
+    ctrl: Float[Array, "*W nu"]
+    qacc_warmstart: Float[Array, "*W nv"]
+    eq_active: Bool[Array, "*W E"]
+    eq_data: Float[Array, "*W E 11"]
+    mocap_pos: Float[Array, "*W M 3"]
+    mocap_quat: Float[Array, "*W M 4"]
+    time: Float[Array, "*W"]
+    tree_asleep: Int[Array, "*W T"]
+    touching: Bool[Array, "*W U U"]
+
+
+@struct.dataclass
+class Write:
+    """A change to physics that is no simulation: teleports, joint positions, grasps. Leave out (None) what stays.
+
+    What is written moves at once, its velocity becomes zero, and it wakes together with the sleeping island it is part
+    of. A fixed object cannot be moved: its row of `object_mask` is ignored.
+
+    Attributes:
+      object_mask, object_pos, object_quat: teleports of objects: frame of the main body, world frame, w-x-y-z. Bodies
+        that hang on the object by no joint (split-off floating links) go along rigidly.
+      qpos_mask, qpos: single coordinates, at MuJoCo's addresses (joints). Applied after the teleports.
+      eq_active, eq_data: the whole of these two fields.
+    """
+
+    object_mask: Bool[Array, "W O"] | None = None
+    object_pos: Float[Array, "W O 3"] | None = None
+    object_quat: Float[Array, "W O 4"] | None = None
+    qpos_mask: Bool[Array, "W nq"] | None = None
+    qpos: Float[Array, "W nq"] | None = None
+    eq_active: Bool[Array, "W E"] | None = None
+    eq_data: Float[Array, "W E 11"] | None = None
+
+
+@runtime_checkable
+class Engine(Protocol):
+    """Physics of `num_worlds` worlds that share one scene.
+
+    Attributes:
+      name: "native", "warp" or "jax".
+      pure: the methods are pure functions that JAX can trace (see the module's text).
+      num_worlds: W.
+      tables: constants of the scene.
+      substeps, timestep: a control step is `substeps` physics steps of `timestep` seconds.
+    """
+
+    name: str
+    pure: bool
+    num_worlds: int
+    tables: SceneTables
+    substeps: int
+    timestep: float
+
+    def reset(self) -> Physics:
+        """All worlds at the scene's initial state (its first keyframe, else its zero pose), everything awake."""
+        ...
+
+    def step(self, physics: Physics, ctrl: Float[Array, "W nu"] | None = None) -> tuple[Physics, PhysicsView]:
+        """One control step of every world.
+
+        Args:
+          physics: as returned by the last call.
+          ctrl: controls held during the step; None keeps those of the step before.
+
+        Returns:
+          The physics after the step and its view: poses, contacts and boxes of the same instant, forces of the steps
+          that led to it.
+
+        Raises:
+          EngineError: (native engine) a world's state is not finite any more.
+        """
+        ...
+
+    def view(self, physics: Physics) -> PhysicsView:
+        """The view of the present state. After `step` the same as it returned; after `write`, with no forces."""
+        ...
+
+    def write(self, physics: Physics, write: Write) -> Physics:
+        """Applies a change and brings everything derived up to date; what it moves wakes."""
+        ...
+
+    def export(self, physics: Physics, world: int) -> Snapshot:
+        """One world as a snapshot without the world axis, in numpy arrays that share no memory with the engine."""
+        ...
+
+    def load(self, physics: Physics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> Physics:
+        """Replaces worlds by snapshots.
+
+        Args:
+          physics: as returned by the last call.
+          snapshot: with the world axis: row w goes to world w. Without it: goes to every world.
+          mask: the worlds to replace; None: all.
+        """
+        ...

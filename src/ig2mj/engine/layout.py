@@ -1,0 +1,141 @@
+"""`ModelLayout`: how a compiled model's trees, joints and geoms belong to the scene's objects. Shared by the engines.
+
+A *unit* is the part of an object that sleeps and wakes as one: its static part, or one kinematic tree of it (a fixed
+cabinet with two drawers has three units). Touching is remembered per pair of units, because two units that sleep have
+no contacts in MuJoCo (design section 2, fact 7), and an object may be half awake.
+
+Axes: O objects, U units, T trees, B bodies, G geoms, L annotated links, E equality constraints.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Int
+
+from ig2mj.scene.tables import SceneTables
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ModelLayout:
+    """Index arrays, all on the host.
+
+    Attributes:
+      object_qposadr, object_dofadr: addresses of the free joint of the object's main body, -1 for fixed objects.
+      object_trees: [O, T] the object owns bodies of the tree.
+      extra_object, extra_qposadr, extra_dofadr: free joints of bodies split off an object.
+      unit_object, unit_tree: owner and tree of each unit; tree -1: the object's static part.
+      body_unit, geom_unit: unit of each body and geom; -1: no object's (the world, agents).
+      collides: [G] the geom takes part in contacts and belongs to an object.
+      link_of_geom: [G] annotated link whose geom it is, -1 none.
+      link_tree: [L] tree of the link's body, -1: static.
+      qpos_tree, qpos_dof: [nq] tree and first degree of freedom of the joint that owns the coordinate.
+      qpos_ndof: [nq] number of degrees of freedom of that joint.
+      grasp_equality, grasp_agent, grasp_object: equality constraints between an agent's body and an object's.
+    """
+
+    object_qposadr: Int[np.ndarray, "O"]
+    object_dofadr: Int[np.ndarray, "O"]
+    object_trees: Bool[np.ndarray, "O T"]
+    extra_object: Int[np.ndarray, "X"]
+    extra_qposadr: Int[np.ndarray, "X"]
+    extra_dofadr: Int[np.ndarray, "X"]
+    unit_object: Int[np.ndarray, "U"]
+    unit_tree: Int[np.ndarray, "U"]
+    body_unit: Int[np.ndarray, "B"]
+    geom_unit: Int[np.ndarray, "G"]
+    collides: Bool[np.ndarray, "G"]
+    link_of_geom: Int[np.ndarray, "G"]
+    link_tree: Int[np.ndarray, "L"]
+    qpos_tree: Int[np.ndarray, "nq"]
+    qpos_dof: Int[np.ndarray, "nq"]
+    qpos_ndof: Int[np.ndarray, "nq"]
+    grasp_equality: Int[np.ndarray, "Y"]
+    grasp_agent: Int[np.ndarray, "Y"]
+    grasp_object: Int[np.ndarray, "Y"]
+
+    @property
+    def num_units(self) -> int:
+        return len(self.unit_object)
+
+
+def make_layout(model: mujoco.MjModel, tables: SceneTables) -> ModelLayout:
+    """Derives the layout of a compiled scene."""
+    body_object, num_objects = tables.body_object, tables.num_objects
+    body_tree = np.asarray(model.body_treeid)
+    owned = body_object >= 0
+
+    object_trees = np.zeros((num_objects, model.ntree), bool)
+    moving = owned & (body_tree >= 0)
+    object_trees[body_object[moving], body_tree[moving]] = True
+
+    pairs = np.stack([body_object, body_tree], 1)
+    units = np.unique(pairs[owned], axis=0) if owned.any() else np.zeros((0, 2), int)
+    number = {tuple(pair): k for k, pair in enumerate(units.tolist())}
+    body_unit = np.array([number.get(tuple(pair), -1) for pair in pairs.tolist()], int)
+
+    free = np.flatnonzero(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
+    free = free[body_object[model.jnt_bodyid[free]] >= 0]
+    free_body = model.jnt_bodyid[free]
+    is_root = tables.object_root[body_object[free_body]] == free_body
+    object_qposadr, object_dofadr = np.full(num_objects, -1), np.full(num_objects, -1)
+    object_qposadr[body_object[free_body[is_root]]] = model.jnt_qposadr[free[is_root]]
+    object_dofadr[body_object[free_body[is_root]]] = model.jnt_dofadr[free[is_root]]
+    extra = free[~is_root]
+
+    geom_body = np.asarray(model.geom_bodyid)
+    collides = ((model.geom_contype != 0) | (model.geom_conaffinity != 0)) & (body_unit[geom_body] >= 0)
+    link_of_geom = np.full(model.ngeom, -1)
+    with_geom = np.flatnonzero(tables.link_geom >= 0)
+    link_of_geom[tables.link_geom[with_geom]] = with_geom
+
+    width = np.where(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE, 7, 1)
+    width[model.jnt_type == mujoco.mjtJoint.mjJNT_BALL] = 4
+    joint_ndof = np.select([width == 7, width == 4], [6, 3], 1)
+    owner = np.repeat(np.arange(model.njnt), width)
+
+    equality, agent, grasped = _grasps(model, tables)
+    return ModelLayout(
+        object_qposadr=object_qposadr,
+        object_dofadr=object_dofadr,
+        object_trees=object_trees,
+        extra_object=body_object[model.jnt_bodyid[extra]],
+        extra_qposadr=np.asarray(model.jnt_qposadr)[extra],
+        extra_dofadr=np.asarray(model.jnt_dofadr)[extra],
+        unit_object=units[:, 0],
+        unit_tree=units[:, 1],
+        body_unit=body_unit,
+        geom_unit=body_unit[geom_body],
+        collides=collides,
+        link_of_geom=link_of_geom,
+        link_tree=body_tree[tables.link_body],
+        qpos_tree=body_tree[model.jnt_bodyid[owner]],
+        qpos_dof=np.asarray(model.jnt_dofadr)[owner],
+        qpos_ndof=joint_ndof[owner],
+        grasp_equality=equality,
+        grasp_agent=agent,
+        grasp_object=grasped,
+    )
+
+
+def _grasps(model: mujoco.MjModel, tables: SceneTables) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Welds and connects that join an agent to an object: equality ids, agents, objects."""
+    agent_of_root = {int(model.body_rootid[b]): a for a, b in enumerate(tables.agent_body)}
+    agent_of_root |= {
+        int(model.body_rootid[b]): int(a) for b, a in zip(tables.finger_body, tables.finger_agent, strict=True)
+    }
+    rows = []
+    for e in range(model.neq):
+        if model.eq_type[e] not in (mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_CONNECT):
+            continue
+        ids = (int(model.eq_obj1id[e]), int(model.eq_obj2id[e]))
+        if model.eq_objtype[e] == mujoco.mjtObj.mjOBJ_SITE:
+            ids = (int(model.site_bodyid[ids[0]]), int(model.site_bodyid[ids[1]]))
+        for one, other in (ids, ids[::-1]):
+            agent, held = agent_of_root.get(int(model.body_rootid[one])), int(tables.body_object[other])
+            if agent is not None and held >= 0:
+                rows.append((e, agent, held))
+    table = np.array(rows, int).reshape(-1, 3)
+    return table[:, 0], table[:, 1], table[:, 2]
