@@ -1,0 +1,77 @@
+# `make demo` and `make test` do all set-up themselves; only python3 (3.11 or newer) and a network are needed.
+# Set-up leaves stamps in .venv/, so that a second call starts at once.
+
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+JOBS ?= 2
+PYTEST_ARGS ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-slow test-gpu check format bench clean distclean
+
+help:
+	@echo "make demo       convert the small home, run it, print what stands where, leave a picture and a report"
+	@echo "make test       the quick tests (JOBS=$(JOBS) processes)"
+	@echo "make test-slow  the tests that take long"
+	@echo "make test-gpu   the tests that need a CUDA device"
+	@echo "make check      ruff and pyright"
+	@echo "make format     let ruff put the code in order"
+	@echo "make bench      the benchmarks"
+	@echo "make setup      only the set-up: .venv and OpenGL libraries"
+	@echo "make clean      remove what runs and builds left; make distclean removes .venv too"
+
+setup: $(VENV)/.installed $(VENV)/.gl
+
+$(VENV)/.created:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	    { echo "error: $(PYTHON) is older than 3.11; name a newer one: make PYTHON=python3.12 ..." >&2; exit 2; }
+	@if [ ! -x $(BIN)/python ]; then \
+	    if uv --version >/dev/null 2>&1; then uv venv -q --python "$$(command -v $(PYTHON))" $(VENV); \
+	    else $(PYTHON) -m venv $(VENV) || \
+	        { echo "error: no venv here; install uv, or on Debian: apt-get install python3-venv" >&2; exit 2; }; \
+	    fi; fi
+	@touch $@
+
+# The package itself is installed in place, so only a change of pyproject.toml calls for a new installation.
+$(VENV)/.installed: $(VENV)/.created pyproject.toml
+	@echo "installing ig2mj and what it needs into $(VENV) (some minutes the first time)"
+	@if uv --version >/dev/null 2>&1; then uv pip install -q --python $(BIN)/python -e '.[dev]'; \
+	else $(BIN)/python -m pip install -q --disable-pip-version-check -e '.[dev]'; fi
+	@touch $@
+
+# OpenGL without a display. Pictures work without it too (Warp's ray caster), so that a failure here is no error.
+$(VENV)/.gl: $(VENV)/.created scripts/system_gl.sh
+	@sh scripts/system_gl.sh
+	@touch $@
+
+demo: setup
+	@$(BIN)/ig2mj demo
+
+test: setup
+	@$(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m "not slow and not gpu" $(PYTEST_ARGS)
+
+test-slow: setup
+	@$(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m "slow and not gpu" --timeout 1800 $(PYTEST_ARGS)
+
+test-gpu: setup
+	@JAX_PLATFORMS=cuda,cpu $(BIN)/python -m pytest -m gpu --timeout 1800 $(PYTEST_ARGS)
+
+check: setup
+	@$(BIN)/ruff check
+	@$(BIN)/ruff format --check
+	@PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright
+
+format: setup
+	@$(BIN)/ruff check --fix
+	@$(BIN)/ruff format
+
+bench: setup
+	@set -e; for b in benchmarks/*.py; do echo "== $$b"; $(BIN)/python "$$b"; done
+
+clean:
+	rm -rf build dist out *.egg-info .pytest_cache .ruff_cache .hypothesis MUJOCO_LOG.TXT
+	find src converters tests benchmarks -name __pycache__ -type d -prune -exec rm -rf {} + 2>/dev/null || true
+
+distclean: clean
+	rm -rf $(VENV)
