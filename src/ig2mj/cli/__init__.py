@@ -34,13 +34,14 @@ from __future__ import annotations
 
 import difflib
 import importlib
-import inspect
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from inspect import getdoc
 from typing import Any
 
 from ig2mj.errors import Ig2mjError
+from ig2mj.install_hint import pip_install_module
 
 #: Sub-command -> what it does, in the order of `ig2mj --help`. The module is `ig2mj.cli.<sub-command>`.
 COMMANDS: dict[str, str] = {
@@ -90,7 +91,7 @@ def describe_error(error: Exception) -> tuple[str, int]:
     if isinstance(error, Ig2mjError):
         return " ".join(str(error).split()), 2
     if isinstance(error, ModuleNotFoundError) and error.name and not error.name.startswith("ig2mj"):
-        return f"the Python package '{error.name}' is not installed ({_install_hint(error.name)})", 2
+        return f"the Python package '{error.name}' is not installed ({pip_install_module(error.name)})", 2
     if isinstance(error, OSError):
         where = f"{error.filename}: " if error.filename else ""
         return f"{where}{error.strerror or error}", 2
@@ -157,7 +158,7 @@ def _nested_help(name: str, doc: str | None, subcommands: Mapping[str, Callable[
     summary = [COMMANDS.get(name, ""), ""] if not doc else [doc.strip().splitlines()[0], ""]
     lines = [f"usage: ig2mj {name} COMMAND ...", "", *summary, "commands:"]
     for sub, function in subcommands.items():
-        text = (inspect.getdoc(function) or "").split("\n", 1)[0]
+        text = (getdoc(function) or "").split("\n", 1)[0]
         lines.append(f"  {sub:<12} {text}")
     return "\n".join([*lines, "", f"`ig2mj {name} COMMAND --help` lists a command's options."])
 
@@ -167,19 +168,3 @@ def _unknown(kind: str, name: str, known: Mapping[str, Any], help_command: str) 
     hint = f"did you mean {' or '.join(near)}?" if near else f"`{help_command}` lists them"
     print(f"error: '{name}' is no {kind} ({hint})", file=sys.stderr)
     return 2
-
-
-def _install_hint(module: str) -> str:
-    """The command that installs a missing package: the extra of ig2mj that names it, else the package itself."""
-    from importlib.metadata import PackageNotFoundError, requires
-
-    package = module.partition(".")[0].replace("_", "-").lower()
-    try:
-        wanted = requires("ig2mj") or []
-    except PackageNotFoundError:
-        wanted = []
-    for requirement in wanted:
-        if requirement.lower().replace("_", "-").startswith(package) and "extra ==" in requirement:
-            extra = requirement.split("extra ==")[1].strip(" '\"")
-            return f'pip install "ig2mj[{extra}]"'
-    return f"pip install {package}"

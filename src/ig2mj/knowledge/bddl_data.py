@@ -7,6 +7,7 @@ import importlib.util
 import pathlib
 
 from ig2mj.errors import MissingDependencyError
+from ig2mj.install_hint import pip_install
 
 
 @functools.cache
@@ -20,5 +21,5 @@ def bddl_folder() -> pathlib.Path:
     """
     spec = importlib.util.find_spec("bddl")  # of a top-level package: finds it without running it
     if spec is None or not spec.submodule_search_locations:
-        raise MissingDependencyError("the Python package 'bddl' is not installed (pip install bddl==1.0.1)")
+        raise MissingDependencyError(f"the Python package 'bddl' is not installed ({pip_install('bddl==1.0.1')})")
     return pathlib.Path(next(iter(spec.submodule_search_locations)))

@@ -1,0 +1,65 @@
+"""`ig2mj doctor`: what this machine can run, and the one line that mends each thing that is missing."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import tyro
+
+
+def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
+    """Tell what this machine can run, and how to mend what it cannot.
+
+    Exits 0 if everything that ig2mj needs is there, even where optional things are missing; else 1.
+
+    Args:
+      json: print JSON instead of a table.
+    """
+    from rich.console import Console
+
+    from ig2mj.diagnosis import diagnose, healthy
+
+    stderr = Console(stderr=True)
+    with stderr.status("looking at this machine") as status:
+        checks = diagnose(lambda text: status.update(text))
+    ok = healthy(checks)
+    if json:
+        _print_json(checks, ok)
+    else:
+        _print_table(checks, ok)
+    return 0 if ok else 1
+
+
+def _print_json(checks, ok: bool) -> None:
+    import dataclasses
+    import json
+    from importlib.metadata import version
+
+    report = {"ig2mj": version("ig2mj"), "ok": ok, "checks": [dataclasses.asdict(c) for c in checks]}
+    print(json.dumps(report, indent=1))
+
+
+def _print_table(checks, ok: bool) -> None:
+    from rich.console import Console
+    from rich.markup import escape
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, show_header=False)
+    table.add_column(no_wrap=True)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    group = ""
+    for check in checks:
+        if check.group != group:
+            group = check.group
+            table.add_row("", f"[bold]{group}[/bold]", "")
+        mark = "[green]ok[/green]" if check.ok else ("[red]BAD[/red]" if check.required else "[yellow]--[/yellow]")
+        table.add_row(mark, f"  {escape(check.name)}", escape(check.found))
+        if check.mend:
+            table.add_row("", "", f"[cyan]-> {escape(check.mend)}[/cyan]")
+    console = Console(highlight=False)
+    console.print(table)
+    if ok:
+        console.print("\nEverything that ig2mj needs is here. [yellow]--[/yellow] marks optional things.")
+    else:
+        console.print("\n[red]Something that ig2mj needs is missing[/red]: mend the lines marked BAD.")
