@@ -1,0 +1,56 @@
+"""JSON that Python wrote: with NaN, Infinity and -Infinity, as iGibson's own files have it."""
+
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+from typing import Any
+
+import numpy as np
+
+from ig2mj.errors import InputError
+
+from .xml_reader import read_bytes
+
+MAX_JSON_BYTES = 64 * 2**20
+
+
+def decode_json(text: str | bytes, file: object, element: str = "") -> Any:
+    """Raises InputError: no JSON, or nested too deeply."""
+    try:
+        return json.loads(text)
+    except RecursionError as e:
+        raise InputError(file, "is JSON that is nested too deeply", element=element) from e
+    except ValueError as e:
+        raise InputError(file, f"is no valid JSON: {e}", element=element) from e
+
+
+def read_json(file: str | os.PathLike, kind: type) -> Any:
+    """A JSON file whose top is a `kind` (dict or list). Raises InputError."""
+    value = decode_json(read_bytes(pathlib.Path(file), MAX_JSON_BYTES).removeprefix(b"\xef\xbb\xbf"), file)
+    if not isinstance(value, kind):
+        raise InputError(file, f"holds a {type(value).__name__} instead of a {kind.__name__}")
+    return value
+
+
+def vector(value: Any, count: int, file: object, element: str) -> np.ndarray:
+    """A list of `count` finite numbers -> [count]. Raises InputError."""
+    if (
+        not isinstance(value, list)
+        or len(value) != count
+        or not all(isinstance(v, int | float) and not isinstance(v, bool) for v in value)
+    ):
+        raise InputError(file, f"is not a list of {count} numbers", element=element)
+    try:
+        array = np.array(value, dtype=float)
+    except OverflowError:
+        array = np.array([np.inf])
+    if not np.all(np.isfinite(array)):
+        raise InputError(file, "has a number that is not finite", element=element)
+    return array
+
+
+def scalar(value: Any, file: object, element: str) -> float:
+    """One finite number. Raises InputError."""
+    return float(vector([value], 1, file, element)[0])
