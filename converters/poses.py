@@ -52,3 +52,8 @@ def is_identity(rotation: np.ndarray) -> bool:
 def apply(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
     """points [n, 3] moved by a 4x4."""
     return points @ pose[:3, :3].T + pose[:3, 3]
+
+
+def quat_from_rotation(rotation: np.ndarray) -> np.ndarray:
+    """Quaternion w, x, y, z (w >= 0) of a [3, 3]."""
+    return Rotation.from_matrix(rotation).as_quat(canonical=True)[[3, 0, 1, 2]]
