@@ -29,6 +29,16 @@ class InputError(Ig2mjError):
         text = f"{where}: {problem}" + (f" ({mend})" if mend else "")
         super().__init__(" ".join(text.split()))
 
+    def __reduce__(self):
+        """So that it survives the way back from a worker process."""
+        fields = {"file": self.file, "problem": self.problem, "element": self.element, "mend": self.mend}
+        return (_rebuild_input_error, (type(self), fields))
+
+
+def _rebuild_input_error(kind: type[InputError], fields: dict[str, str]) -> InputError:
+    file, problem = fields.pop("file"), fields.pop("problem")
+    return kind(file, problem, **fields)
+
 
 class ManifestError(InputError):
     """A scene's manifest.json does not fit its schema or its scene.xml."""
