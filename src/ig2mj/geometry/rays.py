@@ -14,6 +14,8 @@ A NaN in an origin, a direction or a pose yields no hit.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
@@ -24,8 +26,8 @@ from ig2mj.scene.tables import PieceKind
 AnyArray = Array | np.ndarray
 Interval = tuple[Float[Array, "*b"], Float[Array, "*b"]]
 
-PARALLEL = 1e-9
-"""Below this slope a ray counts as parallel to a face: over 1 m it would approach by less than a nanometre."""
+UNBOUNDED = 1e30
+"""Stands for infinity where it is multiplied with slopes that may be zero."""
 
 
 def rays_hit_pieces(
@@ -152,21 +154,43 @@ def polyhedron_interval(
     planes: Float[AnyArray, "*#b N 4"],
     inflate: float = 0.0,
 ) -> Interval:
-    """Interval of a line inside the intersection of half-spaces; (-inf, inf) where all planes are padding."""
-    slope = jnp.sum(planes[..., :3] * direction[..., None, :], axis=-1)
-    room = planes[..., 3] + inflate - jnp.sum(planes[..., :3] * origin[..., None, :], axis=-1)
-    low, high = _half_space_interval(slope, room)
-    return _tidy(jnp.max(low, axis=-1), jnp.min(high, axis=-1))
+    """Interval of a line inside the intersection of half-spaces; (-1e30, 1e30) where all planes are padding."""
+    return clip_line(
+        [[planes[..., n, i] for i in range(4)] for n in range(planes.shape[-2])],
+        [origin[..., i] for i in range(3)],
+        [direction[..., i] for i in range(3)],
+        inflate,
+    )
+
+
+def clip_line(planes: Sequence[Sequence], origin: Sequence, direction: Sequence, inflate: float = 0.0) -> Interval:
+    """`polyhedron_interval` on components: `planes` lists (nx, ny, nz, d), `origin` and `direction` list x, y, z.
+
+    The loop is unrolled into one elementwise pass that stores nothing per half-space. The bounds are kept as fractions
+    with positive denominators and compared crosswise, so that it holds no division (XLA would store the quotients) and
+    a line parallel to a face needs no threshold: slope 0 with negative room makes the upper bound -inf.
+    """
+    shape = jnp.broadcast_shapes(*(jnp.shape(x) for x in (*origin, *direction, *(planes[0] if planes else ()))))
+    low, low_by = jnp.full(shape, -UNBOUNDED), jnp.ones(shape)
+    high, high_by = jnp.full(shape, UNBOUNDED), jnp.ones(shape)
+    for nx, ny, nz, offset in planes:
+        slope = nx * direction[0] + ny * direction[1] + nz * direction[2]
+        room = offset + inflate - (nx * origin[0] + ny * origin[1] + nz * origin[2])
+        entering = slope < 0.0
+        tighter = entering & (-room * low_by > -slope * low)
+        low, low_by = jnp.where(tighter, -room, low), jnp.where(tighter, -slope, low_by)
+        tighter = ~entering & (room * high_by < slope * high)
+        high, high_by = jnp.where(tighter, room, high), jnp.where(tighter, slope, high_by)
+    return _tidy(low / low_by, jnp.where(high_by > 0.0, high / jnp.where(high_by > 0.0, high_by, 1.0), -jnp.inf))
 
 
 def _half_space_interval(slope: Float[AnyArray, "*#b"], room: Float[AnyArray, "*#b"]) -> Interval:
     """Where slope * t <= room."""
-    parallel = jnp.abs(slope) < PARALLEL
-    t = room / jnp.where(parallel, 1.0, slope)
-    outside = parallel & ~(room >= 0.0)
-    low = jnp.where(parallel | (slope > 0.0), -jnp.inf, t)
-    high = jnp.where(parallel | (slope < 0.0), jnp.inf, t)
-    return jnp.where(outside, jnp.inf, low), jnp.where(outside, -jnp.inf, high)
+    parallel = slope == 0.0
+    slope = jnp.where(parallel, 1.0, slope)
+    t = jnp.where(parallel, jnp.where(room >= 0.0, jnp.inf, -jnp.inf), room / slope)
+    leaving = slope > 0.0
+    return jnp.where(leaving, -jnp.inf, t), jnp.where(leaving, t, jnp.inf)
 
 
 def _quadratic_interval(
@@ -179,7 +203,7 @@ def _quadratic_interval(
 
     A line with a = 0 (along a cylinder's axis) is inside for ever or never.
     """
-    parallel = a < PARALLEL * PARALLEL
+    parallel = a == 0.0
     safe = jnp.where(parallel, 1.0, a)
     # (radius^2 - distance of the line from the centre^2) / a
     reach = (radius * radius - (c - b * b / safe)) / safe
@@ -200,5 +224,5 @@ def _intersect(a: Interval, b: Interval) -> Interval:
 
 def _tidy(low: Float[Array, "*b"], high: Float[Array, "*b"]) -> Interval:
     """Empty intervals in their one form, (inf, -inf), so that a union by min and max is right."""
-    empty = low > high
+    empty = (low > high) | (high == -jnp.inf)
     return jnp.where(empty, jnp.inf, low), jnp.where(empty, -jnp.inf, high)
