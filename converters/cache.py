@@ -1,0 +1,90 @@
+"""Results of geometry work, kept between runs in the user's cache folder, by content.
+
+A key is a hash of everything the result depends on. Entries are written to a temporary file and moved into place, so
+a reader never sees half of one; an entry that does not read is taken as absent.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import pathlib
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import platformdirs
+
+VERSION = 1
+"""Raise it whenever the code that makes the cached results changes what they are."""
+
+ENVIRONMENT = "IG2MJ_CACHE_DIR"
+"""Environment variable that names another folder."""
+
+
+def folder() -> pathlib.Path:
+    """Where entries are kept. Not made until the first entry is stored."""
+    root = os.environ.get(ENVIRONMENT) or platformdirs.user_cache_dir("ig2mj")
+    return pathlib.Path(root) / "hulls"
+
+
+def key_of(*parts: Any) -> str:
+    """Hash of arrays, numbers, strings, None, and lists, tuples and dicts of them, in order, with `VERSION`."""
+    digest = hashlib.sha256(f"{VERSION}".encode())
+    for part in parts:
+        _feed(digest, part)
+    return digest.hexdigest()
+
+
+def _feed(digest: Any, part: Any) -> None:
+    if isinstance(part, np.ndarray):
+        digest.update(f"array {part.dtype.str} {part.shape};".encode())
+        digest.update(np.ascontiguousarray(part).tobytes())
+    elif isinstance(part, Mapping):
+        digest.update(f"dict {len(part)};".encode())
+        for name in sorted(part):
+            _feed(digest, name)
+            _feed(digest, part[name])
+    elif isinstance(part, list | tuple):
+        digest.update(f"list {len(part)};".encode())
+        for item in part:
+            _feed(digest, item)
+    else:
+        digest.update(f"{type(part).__name__} {part!r};".encode())
+
+
+def load(key: str) -> tuple[dict[str, Any], dict[str, np.ndarray]] | None:
+    """The entry's facts and arrays, or None if there is none that reads."""
+    try:
+        with np.load(_path(key), allow_pickle=False) as file:
+            arrays = {name: file[name] for name in file.files}
+        facts = json.loads(arrays.pop("facts").tobytes().decode())
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+        return None
+    return (facts, arrays) if isinstance(facts, dict) and facts.get("key") == key else None
+
+
+def store(key: str, facts: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:
+    """Keeps an entry. A folder that cannot be written is no error: the work is done again next time."""
+    path = _path(key)
+    text = np.frombuffer(json.dumps({**facts, "key": key}).encode(), np.uint8)
+    temporary = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as file:
+            temporary = file.name
+            np.savez_compressed(file, facts=text, **arrays)
+        pathlib.Path(temporary).replace(path)
+    except OSError:
+        if temporary is not None:
+            with contextlib.suppress(OSError):
+                pathlib.Path(temporary).unlink()
+
+
+def _path(key: str) -> pathlib.Path:
+    return folder() / key[:2] / f"{key}.npz"
