@@ -1,0 +1,95 @@
+"""Every category that can be built: its real size and mass, the function that builds it, how many models of it.
+
+Families (homes/families/*.py) each export `CATEGORIES`, a list of `Entry`; this module gathers them and builds models.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import random
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from ig2mj.errors import UnknownNameError
+
+from .halves import add_halves
+from .materials import Material
+from .model import HouseholdObject, ObjectBuilder
+
+Family = Callable[..., None]
+AG_MASS = 5.0  # kg: lighter free objects may be held by assisted grasping (`enable_ag`)
+
+
+@dataclasses.dataclass(frozen=True)
+class Entry:
+    """One line of the catalogue.
+
+    Attributes:
+      category: iGibson's category name.
+      build: the family function; called as build(builder, **options).
+      size: real (depth x, width y, height z) in metres as it stands; the front looks along +x.
+      mass: kilograms of a model of that size, contents included.
+      count: how many models.
+      fixed: furniture that is screwed or too heavy to be free in a scene.
+      rest: "any" (put down on any stable side) or "upright" (only as built).
+      vary: each edge is multiplied by a random factor of 1 +- vary; uniform: all three by the same.
+      flesh: material of the cut faces; given for sliceable categories, whose models then come with halves.
+      options: further keyword arguments of `build`.
+    """
+
+    category: str
+    build: Family
+    size: tuple[float, float, float]
+    mass: float
+    count: int = 3
+    fixed: bool = False
+    rest: str = "any"
+    vary: float = 0.08
+    uniform: bool = False
+    flesh: Callable[[random.Random], Material] | None = None
+    options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+
+    @property
+    def enable_ag(self) -> bool:
+        return not self.fixed and self.mass <= AG_MASS
+
+
+@functools.cache
+def catalogue() -> dict[str, Entry]:
+    """All entries by category name, in alphabetical order."""
+    from .families import FAMILIES
+
+    entries: dict[str, Entry] = {}
+    for family in FAMILIES:
+        for entry in family.CATEGORIES:
+            assert entry.category not in entries, f"category {entry.category} stands in two families"
+            entries[entry.category] = entry
+    return dict(sorted(entries.items()))
+
+
+def find(category: str) -> Entry:
+    """The entry of a category. Raises UnknownNameError."""
+    entries = catalogue()
+    if category not in entries:
+        raise UnknownNameError("category", category, entries)
+    return entries[category]
+
+
+def build_model(entry: Entry, index: int, seed: int = 0) -> HouseholdObject:
+    """The category's model number `index`, with its halves where it is sliceable. Same arguments, same model."""
+    rng = random.Random(f"{seed}/{entry.category}/{index}")
+    if entry.uniform:
+        factor = rng.uniform(1 - entry.vary, 1 + entry.vary)
+        size = tuple(edge * factor for edge in entry.size)
+    else:
+        size = tuple(edge * rng.uniform(1 - entry.vary, 1 + entry.vary) for edge in entry.size)
+    builder = ObjectBuilder(entry.category, "", size, rng, index, entry.rest)
+    entry.build(builder, **entry.options)
+    model = builder.finish()
+    # iGibson's task sampler takes only models named articulated_* where a small object must open.
+    moving = any(joint.openable for joint in model.joints) and not entry.fixed
+    model.model = f"{'articulated_' if moving else ''}{entry.category}_{index:02d}"
+    if entry.flesh:
+        add_halves(model, entry.flesh(rng))
+    return model
