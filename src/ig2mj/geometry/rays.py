@@ -155,20 +155,24 @@ def polyhedron_interval(
     inflate: float = 0.0,
 ) -> Interval:
     """Interval of a line inside the intersection of half-spaces; (-1e30, 1e30) where all planes are padding."""
-    return clip_line(
+    low, low_by, high, high_by = clip_line(
         [[planes[..., n, i] for i in range(4)] for n in range(planes.shape[-2])],
         [origin[..., i] for i in range(3)],
         [direction[..., i] for i in range(3)],
         inflate,
     )
+    return _tidy(low / low_by, jnp.where(high_by > 0.0, high / jnp.where(high_by > 0.0, high_by, 1.0), -jnp.inf))
 
 
-def clip_line(planes: Sequence[Sequence], origin: Sequence, direction: Sequence, inflate: float = 0.0) -> Interval:
-    """`polyhedron_interval` on components: `planes` lists (nx, ny, nz, d), `origin` and `direction` list x, y, z.
+def clip_line(
+    planes: Sequence[Sequence], origin: Sequence, direction: Sequence, inflate: float = 0.0
+) -> tuple[Float[Array, "*b"], Float[Array, "*b"], Float[Array, "*b"], Float[Array, "*b"]]:
+    """Interval of a line inside half-spaces as two fractions: (low, low's divisor, high, high's divisor).
 
-    The loop is unrolled into one elementwise pass that stores nothing per half-space. The bounds are kept as fractions
-    with positive denominators and compared crosswise, so that it holds no division (XLA would store the quotients) and
-    a line parallel to a face needs no threshold: slope 0 with negative room makes the upper bound -inf.
+    `planes` lists (nx, ny, nz, d), `origin` and `direction` list x, y, z; all of them broadcast. The loop is unrolled
+    into one elementwise pass that stores nothing per half-space. The divisors are positive and bounds are compared
+    crosswise, so that it holds no division (XLA would store every quotient) and a line parallel to a face needs no
+    threshold: slope 0 with negative room makes the divisor of high 0, its numerator negative: -inf.
     """
     shape = jnp.broadcast_shapes(*(jnp.shape(x) for x in (*origin, *direction, *(planes[0] if planes else ()))))
     low, low_by = jnp.full(shape, -UNBOUNDED), jnp.ones(shape)
@@ -181,7 +185,20 @@ def clip_line(planes: Sequence[Sequence], origin: Sequence, direction: Sequence,
         low, low_by = jnp.where(tighter, -room, low), jnp.where(tighter, -slope, low_by)
         tighter = ~entering & (room * high_by < slope * high)
         high, high_by = jnp.where(tighter, room, high), jnp.where(tighter, slope, high_by)
-    return _tidy(low / low_by, jnp.where(high_by > 0.0, high / jnp.where(high_by > 0.0, high_by, 1.0), -jnp.inf))
+    return low, low_by, high, high_by
+
+
+def fractions_enter(
+    low: Float[Array, "*#b"],
+    low_by: Float[Array, "*#b"],
+    high: Float[Array, "*#b"],
+    high_by: Float[Array, "*#b"],
+    length: Float[AnyArray, "*#b"],
+) -> tuple[Bool[Array, "*b"], Bool[Array, "*b"]]:
+    """`enters` and `enters_backwards` on what `clip_line` returns, again without a division."""
+    meets = low * high_by <= high * low_by
+    forwards = meets & (low >= 0.0) & (low <= length * low_by)
+    return forwards, meets & (high <= 0.0) & (-high <= length * high_by)
 
 
 def _half_space_interval(slope: Float[AnyArray, "*#b"], room: Float[AnyArray, "*#b"]) -> Interval:

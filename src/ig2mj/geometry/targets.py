@@ -16,7 +16,7 @@ import dataclasses
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from ig2mj.geometry import rays
 from ig2mj.geometry.poses import quat_to_matrix
@@ -26,6 +26,8 @@ AnyArray = Array | np.ndarray
 
 PLANE_STEPS = (6, 12, 24, 48, 96, 192, 384, 768)
 """Polyhedra are grouped by number of half-spaces, rounded up to one of these: a box is not charged for 60 faces."""
+
+FORWARDS, BACKWARDS = np.uint8(1), np.uint8(2)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -126,11 +128,8 @@ def lines_enter_targets(
     Both ways cost as much as one. `directions` are unit vectors in world axes, the same for all pairs; `lengths` in
     metres. False for targets without pieces and wherever a pose or an origin is NaN.
     """
-    low, high = _intervals(targets, body_pos, body_quat, origins, directions, inflate)
-    return (
-        _any_of_pair(targets, rays.enters(low, high, lengths[:, None])),
-        _any_of_pair(targets, rays.enters_backwards(low, high, lengths[:, None])),
-    )
+    sides = _sides(targets, body_pos, body_quat, origins, directions, lengths, inflate)
+    return (sides & FORWARDS) > 0, (sides & BACKWARDS) > 0
 
 
 def rays_enter_targets(
@@ -143,61 +142,35 @@ def rays_enter_targets(
     inflate: float = 0.0,
 ) -> Bool[Array, "W P R"]:
     """As `lines_enter_targets`, forwards only."""
-    low, high = _intervals(targets, body_pos, body_quat, origins, directions, inflate)
-    return _any_of_pair(targets, rays.enters(low, high, lengths[:, None]))
+    return lines_enter_targets(targets, body_pos, body_quat, origins, directions, lengths, inflate)[0]
 
 
-def fall_contact(
-    targets: RayTargets,
-    body_pos: Float[AnyArray, "W B 3"],
-    body_quat: Float[AnyArray, "W B 4"],
-    points: Float[AnyArray, "W D 3"],
-    fall: Float[AnyArray, "W D"],
-    inflate: float = 0.0,
-) -> Float[Array, "W D P"]:
-    """How far below each of D points that fall straight down by `fall` metres it first touches each target.
-
-    0 where it touches at once (a point inside a piece, unlike a ray, does); inf where it does not on its way, and where
-    something is NaN. Memory is W x D x E numbers.
-    """
-    down = np.array([[0.0, 0.0, -1.0]], np.float32)
-
-    def of_point(point: Float[Array, "W 3"]) -> tuple[Float[Array, "W E"], Float[Array, "W E"]]:
-        origins = jnp.broadcast_to(point[:, None], (point.shape[0], targets.num_pairs, 3))
-        low, high = _intervals(targets, body_pos, body_quat, origins, down, inflate)
-        return low[:, 0], high[:, 0]
-
-    low, high = jax.vmap(of_point, in_axes=1, out_axes=1)(jnp.asarray(points))
-    touches = (low <= fall[..., None]) & (high >= 0.0) & (low <= high)
-    reach = jnp.where(touches, jnp.maximum(low, 0.0), jnp.inf)
-    padded = jnp.concatenate([reach, jnp.full((*reach.shape[:2], 1), jnp.inf)], axis=-1)
-    return jnp.min(padded[:, :, targets.slots], axis=-1, initial=jnp.inf)
-
-
-def _intervals(
+def _sides(
     targets: RayTargets,
     body_pos: Float[AnyArray, "W B 3"],
     body_quat: Float[AnyArray, "W B 4"],
     origins: Float[AnyArray, "W P 3"],
     directions: Float[AnyArray, "R 3"],
+    lengths: Float[AnyArray, "R"],
     inflate: float,
-) -> tuple[Float[Array, "W R E"], Float[Array, "W R E"]]:
-    """Interval of every line inside every entry's piece, entries in the order of the joined groups."""
-    worlds, lines = origins.shape[0], directions.shape[0]
-    if not targets.groups:
-        return jnp.zeros((worlds, lines, 0)), jnp.zeros((worlds, lines, 0))
-    found = [_group_interval(g, body_pos, body_quat, origins, directions, inflate) for g in targets.groups]
-    return jnp.concatenate([f[0] for f in found], axis=-1), jnp.concatenate([f[1] for f in found], axis=-1)
+) -> UInt8[Array, "W P R"]:
+    """FORWARDS and BACKWARDS bits of every pair and line, any piece of the target counting."""
+    none = jnp.zeros((origins.shape[0], directions.shape[0], 1), jnp.uint8)  # what padded slots point to
+    found = [_group_sides(g, body_pos, body_quat, origins, directions, lengths, inflate) for g in targets.groups]
+    of_entries = jnp.concatenate([*found, none], axis=-1)[:, :, targets.slots]
+    return jnp.swapaxes(jnp.bitwise_or.reduce(of_entries, axis=-1), 1, 2)
 
 
-def _group_interval(
+def _group_sides(
     group: EntryGroup,
     body_pos: Float[AnyArray, "W B 3"],
     body_quat: Float[AnyArray, "W B 4"],
     origins: Float[AnyArray, "W P 3"],
     directions: Float[AnyArray, "R 3"],
+    lengths: Float[AnyArray, "R"],
     inflate: float,
-) -> tuple[Float[Array, "W R E"], Float[Array, "W R E"]]:
+) -> UInt8[Array, "W R E"]:
+    """The bits for every entry. One array rather than two, or XLA goes through the half-spaces twice."""
     bodies, place = np.unique(group.body, return_inverse=True)
     axes = quat_to_matrix(jnp.asarray(body_quat)[:, bodies])  # [W, bodies, 3, 3], columns are the body's axes
     offset = origins[:, group.pair] - jnp.asarray(body_pos)[:, group.body]  # [W, E, 3], world axes
@@ -205,20 +178,21 @@ def _group_interval(
     o = [sum(column[i] * offset[..., i] for i in range(3))[:, None, :] for column in columns]
     d = [sum(column[i][:, None, :] * directions[:, i, None] for i in range(3)) for column in columns]
     if group.kind is PieceKind.POLYHEDRON:
-        # The barrier keeps the half-spaces one array; as separate constants they cost five times the time on a CPU.
+        # The barrier keeps the half-spaces one array (as separate constants they cost five times the time on a CPU)
+        # and the gathers above from being repeated.
         planes, o, d = jax.lax.optimization_barrier((jnp.asarray(group.planes), o, d))
-        return rays.clip_line([list(plane) for plane in planes], o, d, inflate)
-    origin = jnp.stack(o, axis=-1) - group.pos
-    # A vector in piece axes is rotation^T v, which is v @ rotation.
-    origin = jnp.einsum("wrei,eij->wrej", origin, group.rotation)
-    direction = jnp.einsum("wrei,eij->wrej", jnp.stack(d, axis=-1), group.rotation)
-    kinds = np.full(len(group.pair), group.kind)
-    return rays.piece_interval(kinds, group.size, np.zeros((1, 0, 4), np.float32), origin, direction, inflate)
-
-
-def _any_of_pair(targets: RayTargets, hit: Bool[Array, "W R E"]) -> Bool[Array, "W P R"]:
-    padded = jnp.concatenate([hit, jnp.zeros((*hit.shape[:2], 1), bool)], axis=-1)
-    return jnp.swapaxes(jnp.any(padded[:, :, targets.slots], axis=-1), 1, 2)
+        clipped = rays.clip_line([list(plane) for plane in planes], o, d, inflate)
+        forwards, backwards = rays.fractions_enter(*clipped, lengths[:, None])
+    else:
+        # A vector in piece axes is rotation^T v, which is v @ rotation.
+        origin = jnp.einsum("wrei,eij->wrej", jnp.stack(o, axis=-1) - group.pos, group.rotation)
+        direction = jnp.einsum("wrei,eij->wrej", jnp.stack(d, axis=-1), group.rotation)
+        kinds = np.full(len(group.pair), group.kind)
+        no_planes = np.zeros((1, 0, 4), np.float32)
+        low, high = rays.piece_interval(kinds, group.size, no_planes, origin, direction, inflate)
+        forwards = rays.enters(low, high, lengths[:, None])
+        backwards = rays.enters_backwards(low, high, lengths[:, None])
+    return forwards * FORWARDS | backwards * BACKWARDS
 
 
 def _plane_steps(kind: Int[np.ndarray, "K"], planes: Float[np.ndarray, "K N 4"]) -> Int[np.ndarray, "K"]:
