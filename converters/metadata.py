@@ -9,7 +9,7 @@ import numpy as np
 
 from ig2mj.errors import InputError
 
-from .description import MetaLink, Metadata, ObjectPart, StableOrientation
+from .description import Metadata, MetaLink, ObjectPart, StableOrientation
 from .json_reader import read_json, scalar, vector
 from .poses import wxyz
 
