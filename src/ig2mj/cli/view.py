@@ -1,0 +1,132 @@
+"""`ig2mj view SCENE`: opens a scene in MuJoCo's viewer, or writes a picture of it without a display."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import Annotated
+
+import tyro
+
+Vec3 = tuple[float, float, float]
+
+
+def run(
+    scene: Annotated[pathlib.Path, tyro.conf.Positional],
+    picture: pathlib.Path | None = None,
+    camera: str | None = None,
+    eye: Annotated[Vec3 | None, tyro.conf.arg(name="from", metavar="X Y Z")] = None,
+    target: Annotated[Vec3 | None, tyro.conf.arg(name="at", metavar="X Y Z")] = None,
+    size: Annotated[tuple[int, int], tyro.conf.arg(metavar="W H")] = (1280, 960),
+    seconds: float = 0.0,
+    collision: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    paused: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+) -> None:
+    """Open a scene in MuJoCo's viewer, or write a picture of it.
+
+    In the window: Space pauses, Enter lists the keys.
+
+    Args:
+      scene: folder of a converted scene, its scene.xml, or the name of a home that comes with ig2mj.
+      picture: write this picture file instead of opening a window; needs no display.
+      camera: picture: from this camera of the scene.
+      eye: picture: from this point (metres).
+      target: picture: towards this point (metres).
+      size: picture: width and height in pixels.
+      seconds: let this much time pass before the picture or the window.
+      collision: draw the collision geometry instead of the visual one (picture only; key 3 in the window).
+      paused: open the window paused.
+    """
+    import mujoco
+
+    from ig2mj.scene.scene import load_scene
+
+    _check(picture, camera, eye, target, size, seconds)
+    home = load_scene(scene)
+    data = mujoco.MjData(home.model)
+
+    def reset() -> None:
+        if home.model.nkey:
+            mujoco.mj_resetDataKeyframe(home.model, data, 0)
+        else:
+            mujoco.mj_resetData(home.model, data)
+        mujoco.mj_forward(home.model, data)
+
+    reset()
+    timestep = home.model.opt.timestep
+    for _ in range(round(seconds / timestep)):
+        mujoco.mj_step(home.model, data)
+    if picture is not None:
+        _write_picture(home, data, picture, _view(home.model, camera, eye, target), size, collision)
+        return
+    from ig2mj.viewer.interactive import open_viewer
+
+    substeps = max(1, round(1 / 30 / timestep))
+    open_viewer(
+        home,
+        data,
+        lambda: mujoco.mj_step(home.model, data, nstep=substeps),
+        reset=reset,
+        step_time=substeps * timestep,
+        paused=paused,
+    )
+
+
+def _check(picture, camera, eye, target, size, seconds) -> None:
+    import math
+
+    from ig2mj.errors import Ig2mjError
+
+    numbers = [*(eye or ()), *(target or ()), seconds]
+    if camera is not None and (eye or target):
+        raise Ig2mjError("give either --camera or --from and --at")
+    if (eye is None) != (target is None):
+        raise Ig2mjError("--from and --at belong together")
+    if eye is not None and eye == target:
+        raise Ig2mjError("--from and --at are the same point")
+    if not all(math.isfinite(n) for n in numbers) or seconds < 0:
+        raise Ig2mjError("--from, --at and --seconds must be finite, and --seconds not negative")
+    if not all(1 <= n <= 8192 for n in size):
+        raise Ig2mjError("--size must be between 1 and 8192 pixels")
+    if picture is None and (camera is not None or eye is not None):
+        raise Ig2mjError("--camera, --from and --at are for --picture; in the window the mouse moves the camera")
+    if picture is not None:
+        from PIL import Image
+
+        if picture.suffix.lower() not in Image.registered_extensions():
+            raise Ig2mjError(f"{picture}: is no kind of picture that can be written (use .png or .jpg)")
+        if not picture.parent.is_dir():
+            raise Ig2mjError(f"{picture}: the folder {picture.parent} does not exist")
+
+
+def _view(model, camera: str | None, eye: Vec3 | None, target: Vec3 | None):
+    """A camera's name, or a free view: from a point, or of the whole scene."""
+    import math
+
+    from ig2mj.viewer.offscreen import FreeView
+
+    if camera is not None:
+        return camera
+    if eye is None or target is None:
+        return FreeView.around(model)
+    dx, dy, dz = (t - e for t, e in zip(target, eye, strict=True))
+    flat = math.hypot(dx, dy)
+    return FreeView(
+        lookat=target,
+        distance=math.hypot(flat, dz),
+        azimuth=math.degrees(math.atan2(dy, dx)) if flat > 0 else 90.0,
+        elevation=math.degrees(math.atan2(dz, flat)),
+    )
+
+
+def _write_picture(home, data, file: pathlib.Path, view, size: tuple[int, int], collision: bool) -> None:
+    import sys
+
+    from PIL import Image
+
+    from ig2mj.viewer.offscreen import VISIBLE_GROUPS, default_backend, render
+
+    groups = (3,) if collision else VISIBLE_GROUPS
+    backend = default_backend()
+    image = render(home.model, data, view, width=size[0], height=size[1], groups=groups, backend=backend)
+    Image.fromarray(image).save(file)
+    print(f"wrote {file} ({size[0]} x {size[1]}, drawn with {backend})", file=sys.stderr)

@@ -1,0 +1,192 @@
+"""The interactive viewer: MuJoCo's own window, run at real time, with overlays and a few keys of ours.
+
+MuJoCo's passive viewer draws; the simulation steps here, in the thread that called. Objects can be dragged with the
+mouse as in MuJoCo's viewer (double-click, then Ctrl and a mouse button).
+"""
+
+from __future__ import annotations
+
+import os
+import queue
+import sys
+import time
+import warnings
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ig2mj.errors import EngineError, MissingDependencyError
+from ig2mj.scene.scene import Scene
+from ig2mj.viewer.overlays import Overlay, default_overlays
+
+#: Keys that switch overlays on and off, in their order. MuJoCo's viewer uses 0 to 5 for groups of geoms, and nearly
+#: all letters.
+OVERLAY_KEYS = "6789"
+#: GLFW's codes of the other keys.
+_SPACE, _SLASH, _ENTER, _BACKSPACE, _RIGHT = 32, 47, 257, 259, 262
+_NO_DISPLAY = "a window needs a display: set DISPLAY, or write a picture with `ig2mj view SCENE --picture out.png`"
+
+
+class ViewerState:
+    """What the keys change: running or paused, help shown, overlays on.
+
+    Attributes:
+      overlays: in the order of their keys. shown: whether each is on. paused, help: as they say.
+      steps: control steps asked for with the right arrow while paused. reset: go back to the start.
+    """
+
+    def __init__(self, overlays: Sequence[Overlay], paused: bool = False):
+        self.overlays = list(overlays)
+        self.shown = [True] * len(self.overlays)
+        self.paused, self.help, self.steps, self.reset = paused, False, 0, False
+
+    def press(self, key: int) -> None:
+        """Does what a key (GLFW code) stands for; other keys are MuJoCo's."""
+        if key == _SPACE:
+            self.paused = not self.paused
+        elif key == _RIGHT and self.paused:
+            self.steps += 1
+        elif key == _BACKSPACE:
+            self.reset = True
+        elif key in (_ENTER, _SLASH):
+            self.help = not self.help
+        elif 0 < key < 128 and chr(key) in OVERLAY_KEYS[: len(self.overlays)]:
+            index = OVERLAY_KEYS.index(chr(key))
+            self.shown[index] = not self.shown[index]
+
+    def wants_step(self) -> bool:
+        """Whether the next control step is to be done; uses up one that was asked for by key."""
+        if self.paused and self.steps:
+            self.steps -= 1
+            return True
+        return not self.paused
+
+    def key_help(self) -> list[tuple[str, str]]:
+        """Key and what it does, for the window and for the shell."""
+        rows = [
+            ("Space", "pause, go on"),
+            ("Right arrow", "one step, while paused"),
+            ("Backspace", "back to the start"),
+        ]
+        rows += [(k, f"{o.title} on, off") for k, o in zip(OVERLAY_KEYS, self.overlays, strict=False)]
+        return [*rows, ("Enter or ?", "this list"), ("F1", "MuJoCo's keys"), ("Esc", "free camera")]
+
+    def texts(self, data: mujoco.MjData) -> list[Any]:
+        """The corner texts as `Handle.set_texts` takes them."""
+        rows = [line for o, on in zip(self.overlays, self.shown, strict=True) if on for line in o.lines(data)]
+        if self.paused:
+            rows.append(("paused", "Space goes on"))
+        font, corner = mujoco.mjtFontScale.mjFONTSCALE_150, mujoco.mjtGridPos
+        help_rows = self.key_help() if self.help else [("Enter or ?", "keys")]
+        return [
+            (font, corner.mjGRID_TOPRIGHT, *_columns(rows)),
+            (font, corner.mjGRID_BOTTOMLEFT, *_columns(help_rows)),
+        ]
+
+    def draw_labels(self, data: mujoco.MjData, scene: mujoco.MjvScene) -> None:
+        """Replaces the user geoms of `scene` by the labels of the overlays that are on."""
+        scene.ngeom = 0
+        for overlay, on in zip(self.overlays, self.shown, strict=True):
+            for label in overlay.labels(data) if on else ():
+                if scene.ngeom >= scene.maxgeom:
+                    return
+                geom = scene.geoms[scene.ngeom]
+                mujoco.mjv_initGeom(
+                    geom,
+                    mujoco.mjtGeom.mjGEOM_LABEL,
+                    np.zeros(3),
+                    np.array(label.pos, dtype=float),
+                    np.eye(3).ravel(),
+                    np.array(label.rgba, dtype=np.float32),
+                )
+                geom.label = label.text[:99]  # mjvGeom holds 100 bytes
+                scene.ngeom += 1
+
+
+def open_viewer(
+    scene: Scene,
+    data: mujoco.MjData,
+    step: Callable[[], None],
+    *,
+    reset: Callable[[], None] | None = None,
+    overlays: Sequence[Overlay] | None = None,
+    step_time: float = 1 / 30,
+    paused: bool = False,
+    key_callback: Callable[[int], None] | None = None,
+) -> None:
+    """Opens the window and runs the simulation until it is closed.
+
+    Args:
+      scene: what is shown.
+      data: the state that is drawn; `step` changes it in place.
+      step: does one control step. reset: brings back the start (key Backspace).
+      overlays: what is written over the picture; None: `default_overlays(scene)`.
+      step_time: simulated seconds of one control step; steps are paced to real time.
+      paused: begin paused.
+      key_callback: is told of every key (GLFW code) that is pressed, in this thread.
+
+    Raises:
+      MissingDependencyError: there is no display.
+    """
+    state = ViewerState(default_overlays(scene) if overlays is None else overlays, paused)
+    keys: queue.SimpleQueue[int] = queue.SimpleQueue()
+    with _launch(scene.model, data, keys.put) as handle:
+        handle.cam.lookat[:] = scene.model.stat.center
+        handle.cam.distance = 1.5 * scene.model.stat.extent
+        due = time.monotonic()
+        held = 0
+        while handle.is_running():
+            while not keys.empty():
+                key = keys.get()
+                state.press(key)
+                if key_callback is not None:
+                    key_callback(key)
+            with handle.lock():
+                if state.reset and reset is not None:
+                    reset()
+                state.reset = False
+                held = _drag(scene.model, data, handle.perturb, held)
+                if state.wants_step():
+                    step()
+                state.draw_labels(data, handle.user_scn)
+                texts = state.texts(data)
+            handle.set_texts(texts)
+            handle.sync()
+            due = max(due + step_time, time.monotonic() - step_time)  # never hurry after a pause
+            time.sleep(max(0.0, due - time.monotonic()))
+
+
+def _launch(model: mujoco.MjModel, data: mujoco.MjData, key_callback: Callable[[int], None]):
+    """MuJoCo's passive viewer, with one-line errors where there can be no window."""
+    if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+        raise MissingDependencyError(_NO_DISPLAY)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # glfw warns, and then says so again
+        import glfw
+        import mujoco.viewer
+
+        if not glfw.init():
+            raise MissingDependencyError(_NO_DISPLAY)
+    try:
+        return mujoco.viewer.launch_passive(model, data, key_callback=key_callback, show_right_ui=False)
+    except RuntimeError as e:
+        if "mjpython" in str(e):
+            raise MissingDependencyError("on macOS the viewer runs under mjpython: mjpython -m ig2mj view ...") from e
+        raise EngineError(f"MuJoCo's viewer does not open: {e}") from e
+
+
+def _drag(model: mujoco.MjModel, data: mujoco.MjData, perturb: mujoco.MjvPerturb, held: int) -> int:
+    """Applies the force of the mouse; takes away the one of the body held before. Returns the body held now, or 0."""
+    if held:
+        data.xfrc_applied[held] = 0
+    if not (perturb.active and perturb.select > 0):
+        return 0
+    mujoco.mjv_applyPerturbPose(model, data, perturb, 0)
+    mujoco.mjv_applyPerturbForce(model, data, perturb)
+    return int(perturb.select)
+
+
+def _columns(rows: Sequence[tuple[str, str]]) -> tuple[str, str]:
+    return "\n".join(a for a, _ in rows), "\n".join(b for _, b in rows)

@@ -1,0 +1,108 @@
+"""What can be written over the picture of the interactive viewer: object names, rooms, the clock.
+
+An overlay is anything with a `title` and the methods `labels` (texts that hang at points of the world) and `lines`
+(rows of two texts in a corner of the window). The viewer asks every overlay that is switched on once a picture. A new
+one, say for states, is a class like those below, handed to `interactive.open_viewer(..., overlays=[...])`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from typing import Protocol, runtime_checkable
+
+import mujoco
+import numpy as np
+
+from ig2mj.scene.scene import Scene
+
+#: Categories of building parts: large, many and obvious, so that their names only hide the rest.
+UNNAMED_CATEGORIES = frozenset({"walls", "floors", "ceilings"})
+
+
+@dataclasses.dataclass(frozen=True)
+class Label:
+    """A text at a point: pos world frame (metres), rgba 0..1."""
+
+    pos: tuple[float, float, float]
+    text: str
+    rgba: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+
+
+@runtime_checkable
+class Overlay(Protocol):
+    """What the viewer asks of an overlay. `data` holds the state that is about to be drawn."""
+
+    title: str
+
+    def labels(self, data: mujoco.MjData) -> Sequence[Label]: ...
+
+    def lines(self, data: mujoco.MjData) -> Sequence[tuple[str, str]]: ...
+
+
+class ObjectNames:
+    """The name of every object above its main body; parked objects and building parts are left out."""
+
+    title = "object names"
+
+    def __init__(self, scene: Scene):
+        shown = [o for o in scene.manifest.objects if not o.parked and o.category not in UNNAMED_CATEGORIES]
+        self._names = [o.name for o in shown]
+        self._bodies = np.array([scene.model.body(o.bodies[0]).id for o in shown], dtype=int)
+        self._centres = np.array([o.base_link_offset for o in shown], dtype=float).reshape(-1, 3)
+        self._lift = np.array([0.5 * min(o.bounding_box) + 0.02 for o in shown], dtype=float)
+
+    def labels(self, data: mujoco.MjData) -> list[Label]:
+        rotations = data.xmat[self._bodies].reshape(-1, 3, 3)
+        points = data.xpos[self._bodies] + np.einsum("nij,nj->ni", rotations, self._centres)
+        points[:, 2] += self._lift
+        return [Label((p[0], p[1], p[2]), n) for p, n in zip(points.tolist(), self._names, strict=True)]
+
+    def lines(self, data: mujoco.MjData) -> list[tuple[str, str]]:
+        return []
+
+
+class RoomNames:
+    """The name of every room instance on its floor, and the number of rooms."""
+
+    title = "rooms"
+
+    def __init__(self, scene: Scene):
+        self._labels: list[Label] = []
+        if scene.rooms is None:
+            return
+        resolution, room_map = scene.rooms.resolution, scene.rooms.room_map
+        half = np.array(room_map.shape)[::-1] / 2
+        for index, name in enumerate(scene.rooms.names):
+            cells = np.argwhere(room_map == index + 1)[:, ::-1]  # row is y, column is x
+            if len(cells):
+                inside = cells[np.argmin(np.sum((cells - cells.mean(axis=0)) ** 2, axis=1))]
+                x, y = ((inside + 0.5 - half) * resolution).tolist()
+                self._labels.append(Label((x, y, 0.05), name, (1.0, 0.85, 0.3, 1.0)))
+
+    def labels(self, data: mujoco.MjData) -> list[Label]:
+        return self._labels
+
+    def lines(self, data: mujoco.MjData) -> list[tuple[str, str]]:
+        return []
+
+
+class Clock:
+    """Simulated time, contacts, and how many movable things are awake."""
+
+    title = "clock"
+
+    def __init__(self, scene: Scene):
+        self._trees = scene.model.ntree
+
+    def labels(self, data: mujoco.MjData) -> list[Label]:
+        return []
+
+    def lines(self, data: mujoco.MjData) -> list[tuple[str, str]]:
+        awake = int(np.sum(data.tree_asleep < 0))
+        return [("time", f"{data.time:.1f} s"), ("awake", f"{awake} of {self._trees}"), ("contacts", str(data.ncon))]
+
+
+def default_overlays(scene: Scene) -> list[Overlay]:
+    """Names, rooms and clock."""
+    return [ObjectNames(scene), RoomNames(scene), Clock(scene)]
