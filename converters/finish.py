@@ -1,0 +1,102 @@
+"""The end of every conversion: warnings gathered, manifest written, the result checked and reported."""
+
+from __future__ import annotations
+
+import dataclasses
+import importlib.metadata
+import pathlib
+import time
+from collections.abc import Collection, Mapping, Sequence
+from typing import Any
+
+import mujoco
+
+from ig2mj.scene.manifest import Manifest, check_manifest, save_manifest
+
+from .checks import CheckResult, run_checks
+from .description import RoomMaps
+from .joint_rules import openable_ends
+from .model_builder import ModelBuilder
+from .model_task import BuiltModel
+from .options import ConvertOptions
+from .report import ReportInput, write_report
+
+
+@dataclasses.dataclass
+class Outcome:
+    """What a conversion did.
+
+    Attributes:
+      objects: how many. skipped: missing models that were left out, one line each.
+      checks: of the finished model; [] without a report. warnings: how many there are.
+      timings: stage -> seconds.
+    """
+
+    objects: int
+    skipped: list[str]
+    checks: list[CheckResult]
+    warnings: int
+    timings: dict[str, float]
+
+
+def version_record(options: ConvertOptions) -> dict[str, Any]:
+    """Converter, engine and options: with the source's hashes all that decides the output's bytes."""
+    return {
+        "converter": f"ig2mj {importlib.metadata.version('ig2mj')}",
+        "mujoco": mujoco.__version__,
+        "options": options.record(),
+    }
+
+
+def finish(
+    folder: pathlib.Path,
+    model: mujoco.MjModel,
+    manifest: Manifest,
+    built: Mapping[str, BuiltModel],
+    builder: ModelBuilder,
+    options: ConvertOptions,
+    *,
+    kind: str,
+    timings: dict[str, float],
+    overlaps_allowed: Collection[frozenset[str]] = (),
+    warnings: Sequence[str] = (),
+    skipped: Sequence[str] = (),
+    rooms: RoomMaps | None = None,
+) -> Outcome:
+    """Writes `manifest.json`, runs the checks, writes the report.
+
+    Args:
+      model: as loaded from the written file. built: object name -> the model it is an instance of.
+      timings: stage -> seconds so far; the checks' are added.
+      warnings: about the whole scene.
+    """
+    check_manifest(manifest)
+    save_manifest(manifest, folder / "manifest.json")
+    warnings = [*warnings, *builder.textures.warnings, *builder.warnings.get("", [])]
+    per_object = {name: _object_warnings(name, model_built, builder) for name, model_built in built.items()}
+    checks: list[CheckResult] = []
+    if options.report:
+        start = time.perf_counter()
+        checks = run_checks(model, manifest, overlaps_allowed)
+        timings["checks"] = time.perf_counter() - start
+        given = ReportInput(
+            kind=kind,
+            hulls={name: model_built.hulls for name, model_built in built.items()},
+            checks=checks,
+            warnings=warnings,
+            object_warnings={name: lines for name, lines in per_object.items() if lines},
+            skipped=skipped,
+            timings=timings,
+            rooms=rooms,
+            encrypted=[name for name, model_built in built.items() if model_built.encrypted],
+        )
+        write_report(folder, model, manifest, given, options.renderer, options.view)
+    count = len(warnings) + sum(len(lines) for lines in per_object.values())
+    return Outcome(len(manifest.objects), list(skipped), checks, count, timings)
+
+
+def _object_warnings(name: str, built: BuiltModel, builder: ModelBuilder) -> list[str]:
+    lines = [*built.assembly.warnings, *openable_ends(built.assembly)[1], *builder.warnings.get(name, [])]
+    if built.encrypted:
+        lines.append("visuals are encrypted: the collision hulls are drawn instead")
+    return list(dict.fromkeys(lines))

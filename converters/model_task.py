@@ -1,0 +1,122 @@
+"""The work on one model at one scale: read, scale, decompose, weigh, plan. What a process pool is given."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import pathlib
+import time
+
+import numpy as np
+
+from .assembly import Assembly, assemble
+from .dataset import Dataset
+from .description import Instance, ObjectModel, SceneDescription
+from .hulls import decompose_link
+from .inertia import link_inertials
+from .pieces import HullOptions, LinkHulls
+from .scaling import instance_scale, scale_model
+
+
+@dataclasses.dataclass
+class BuiltModel:
+    """A model at a scale, ready to be written as often as the scene holds it.
+
+    Attributes:
+      hulls: link -> its collision geometry. encrypted: visuals were replaced by hulls.
+      file_hash: of the URDF and its meshes. seconds: the work took.
+    """
+
+    assembly: Assembly
+    hulls: dict[str, LinkHulls]
+    encrypted: bool
+    file_hash: str
+    seconds: float
+
+
+@dataclasses.dataclass(frozen=True)
+class ModelTask:
+    """One model at one scale out of a dataset. Equal tasks give equal results, so instances share them."""
+
+    root: str
+    scene: SceneDescription = dataclasses.field(compare=False, repr=False)
+    instance: Instance = dataclasses.field(compare=False, repr=False)
+    key: tuple
+    hulls: HullOptions
+    bullet_inertia: bool
+
+    @property
+    def label(self) -> str:
+        """What the progress bar says."""
+        return f"{self.instance.category}/{self.instance.model}"
+
+
+def model_task(
+    dataset: Dataset, scene: SceneDescription, instance: Instance, hulls: HullOptions, bullet_inertia: bool
+) -> ModelTask:
+    """The task that builds an instance's model."""
+    bare = SceneDescription(name=scene.name, file=scene.file, instances=[])
+    key = (
+        instance.kind,
+        instance.category,
+        instance.model,
+        _rounded(instance.bounding_box),
+        _rounded(instance.scale),
+    )
+    return ModelTask(str(dataset.root), bare, instance, key, hulls, bullet_inertia)
+
+
+def run_task(task: ModelTask) -> BuiltModel:
+    """Does the work of a task. Raises InputError as the readers do."""
+    dataset = _dataset(task.root)
+    instance = task.instance
+    model = dataset.instance_model(task.scene, instance)
+    scale = instance_scale(instance, model)
+    weighed = instance.kind != "building" and model.metadata.bbox_size is not None
+    density = dataset.density(instance.category) if weighed else None
+    return build_model(model, scale, density, task.hulls, task.bullet_inertia, igibson_visuals=True)
+
+
+def build_model(
+    model: ObjectModel,
+    scale: np.ndarray,
+    density: float | None,
+    hulls: HullOptions,
+    bullet_inertia: bool,
+    *,
+    igibson_visuals: bool,
+) -> BuiltModel:
+    """From a model as read to one ready to be written (see `scale_model`, `decompose_link`, `link_inertials`)."""
+    start = time.perf_counter()
+    scaled = scale_model(model, scale)
+    decomposed = {name: decompose_link(link.collisions, hulls) for name, link in scaled.links.items()}
+    inertials = link_inertials(scaled, density, bullet_inertia)
+    pieces = {name: found.pieces for name, found in decomposed.items()}
+    assembly = assemble(scaled, scale, pieces, inertials, igibson_visuals=igibson_visuals)
+    for name, found in decomposed.items():
+        assembly.warnings += [f"link '{name}': {line}" for line in found.warnings]
+        if model.links[name].collisions and not found.pieces:
+            assembly.warnings.append(f"link '{name}' has no usable collision geometry")
+    encrypted = any(shape.encrypted for link in model.links.values() for shape in link.visuals)
+    return BuiltModel(assembly, decomposed, encrypted, _file_hash(model), time.perf_counter() - start)
+
+
+def _file_hash(model: ObjectModel) -> str:
+    """First 16 hex digits of a hash over the URDF and the mesh files it names, by content, in document order."""
+    digest = hashlib.sha256()
+    shapes = (s for link in model.links.values() for s in (*link.collisions, *link.visuals))
+    files = dict.fromkeys([model.file, *(shape.file for shape in shapes if shape.file is not None)])
+    for file in files:
+        digest.update(hashlib.sha256(pathlib.Path(file).read_bytes()).digest())
+    return digest.hexdigest()[:16]
+
+
+@functools.lru_cache(maxsize=2)
+def _dataset(root: str) -> Dataset:
+    return Dataset(root)
+
+
+def _rounded(values: np.ndarray | None) -> tuple[float, ...] | None:
+    """To 1e-6 (section 8, step 5), so that instances which differ by rounding share a model."""
+    return None if values is None else tuple(round(float(v), 6) for v in values)

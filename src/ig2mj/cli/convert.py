@@ -1,0 +1,201 @@
+"""`ig2mj convert scene|object`: iGibson scenes and URDF objects to MJCF."""
+
+from __future__ import annotations
+
+import contextlib
+import json as json_module
+import pathlib
+import sys
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+if TYPE_CHECKING:
+    from ig2mj_converters.finish import Outcome
+    from ig2mj_converters.options import ConvertOptions
+
+Flag = tyro.conf.FlagCreatePairsOff
+
+#: Exit status of a conversion that left models out (`--skip-missing`).
+SKIPPED = 3
+
+
+def convert_scene(
+    dataset: pathlib.Path,
+    scene: str,
+    out: pathlib.Path,
+    urdf: pathlib.Path | None = None,
+    jobs: int = 1,
+    seed: int = 0,
+    skip_missing: Annotated[bool, Flag] = False,
+    fixed_furniture: Annotated[bool, Flag] = False,
+    only_rooms: tuple[str, ...] = (),
+    only_categories: tuple[str, ...] = (),
+    max_hulls: int = 16,
+    max_hull_vertices: int = 32,
+    bullet_inertia: Annotated[bool, Flag] = False,
+    ceiling_collision: Annotated[bool, Flag] = False,
+    no_cache: Annotated[bool, Flag] = False,
+    no_report: Annotated[bool, Flag] = False,
+    json: Annotated[bool, Flag] = False,
+) -> int:
+    """Converts a scene of a dataset in iGibson's layout: OUT/scene.xml, manifest.json, meshes/, rooms.npz, report.html.
+
+    Exit status: 0 converted; 2 bad input, one line on stderr; 3 converted without the models that were missing.
+
+    Args:
+      dataset: root of the dataset (holds objects/, scenes/ and metadata/).
+      scene: name of a folder in scenes/.
+      out: folder for the result; an earlier result there is replaced when everything went well.
+      urdf: scene file to use instead of the default one.
+      jobs: processes that work on the models.
+      seed: chooses models named "random", and seeds convex decomposition.
+      skip_missing: leave out models that the dataset lacks.
+      fixed_furniture: fix cabinets, shelves, tables and desks to the floor, as BEHAVIOR does.
+      only_rooms: keep objects of these rooms (kitchen_0) or kinds of room (kitchen); building parts always stay.
+      only_categories: keep objects of these categories; building parts always stay.
+      max_hulls: most convex pieces per link; more are merged.
+      max_hull_vertices: most vertices per piece.
+      bullet_inertia: inertia of each link's box, as Bullet computes it, instead of that of its hulls.
+      ceiling_collision: let ceilings collide.
+      no_cache: do not use the cache of convex decompositions.
+      no_report: no checks, no report.json and report.html.
+      json: print what was done as JSON.
+    """
+    from ig2mj_converters.convert_scene import convert_scene as convert
+
+    options = _options(
+        seed=seed,
+        fixed_furniture=fixed_furniture,
+        only_rooms=only_rooms or None,
+        only_categories=only_categories or None,
+        skip_missing=skip_missing,
+        ceiling_collision=ceiling_collision,
+        max_hulls=max_hulls,
+        max_hull_vertices=max_hull_vertices,
+        bullet_inertia=bullet_inertia,
+        jobs=jobs,
+        cache=not no_cache,
+        report=not no_report,
+    )
+    with _progress(f"converting {scene}") as options_with:
+        outcome = convert(dataset, scene, out, urdf=urdf, options=options_with(options))
+    return _tell(outcome, out, "scene.xml", json)
+
+
+def convert_object(
+    urdf: pathlib.Path,
+    category: str,
+    out: pathlib.Path,
+    model: str | None = None,
+    bbox: tuple[float, float, float] | None = None,
+    seed: int = 0,
+    max_hulls: int = 16,
+    max_hull_vertices: int = 32,
+    bullet_inertia: Annotated[bool, Flag] = False,
+    no_cache: Annotated[bool, Flag] = False,
+    no_report: Annotated[bool, Flag] = False,
+    json: Annotated[bool, Flag] = False,
+) -> int:
+    """Converts one URDF object, iGibson's or any other: OUT/object.xml, manifest.json, meshes/, report.html.
+
+    Exit status: 0 converted; 2 bad input, one line on stderr.
+
+    Args:
+      urdf: the object's URDF.
+      category: what it is, in iGibson's names (apple, fridge, ...): decides what it can do.
+      out: folder for the result; an earlier result there is replaced when everything went well.
+      model: name of the object; default the file's.
+      bbox: wanted size in the axes of its base link, metres; default the size it has.
+      seed: seeds convex decomposition.
+      max_hulls: most convex pieces per link; more are merged.
+      max_hull_vertices: most vertices per piece.
+      bullet_inertia: inertia of each link's box, as Bullet computes it, instead of that of its hulls.
+      no_cache: do not use the cache of convex decompositions.
+      no_report: no checks, no report.json and report.html.
+      json: print what was done as JSON.
+    """
+    from ig2mj_converters.convert_object import convert_object as convert
+
+    options = _options(
+        seed=seed,
+        max_hulls=max_hulls,
+        max_hull_vertices=max_hull_vertices,
+        bullet_inertia=bullet_inertia,
+        cache=not no_cache,
+        report=not no_report,
+    )
+    with _progress(f"converting {urdf.name}") as options_with:
+        outcome = convert(urdf, category, out, model=model, bounding_box=bbox, options=options_with(options))
+    return _tell(outcome, out, "object.xml", json)
+
+
+SUBCOMMANDS = {"scene": convert_scene, "object": convert_object}
+
+
+def _options(**given: Any) -> ConvertOptions:
+    """Conversion options from the command line, and the renderer for the report's pictures."""
+    from ig2mj_converters.options import ConvertOptions
+
+    from ig2mj.errors import InputError
+
+    for name, least in (("jobs", 1), ("max_hulls", 1), ("max_hull_vertices", 8)):
+        if given.get(name, least) < least:
+            element = "--" + name.replace("_", "-")
+            raise InputError("command line", f"is {given[name]}, must be at least {least}", element=element)
+    if given["report"]:
+        from ig2mj.viewer.offscreen import FreeView, render
+
+        given |= {"renderer": render, "view": FreeView}
+    return ConvertOptions(**given)
+
+
+@contextlib.contextmanager
+def _progress(title: str) -> Iterator[Any]:
+    """A progress bar on stderr; yields a function that makes options report to it."""
+    import dataclasses
+
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    columns = (
+        TextColumn("[bold]{task.description}"),
+        BarColumn(bar_width=24),
+        MofNCompleteColumn(),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[text]}"),
+    )
+    with Progress(*columns, console=Console(file=sys.stderr), transient=True) as bar:
+        task = bar.add_task(title, total=None, text="")
+
+        def report(text: str, done: int, total: int) -> None:
+            bar.update(task, completed=done, total=total, text=text)
+
+        yield lambda options: dataclasses.replace(options, progress=report)
+
+
+def _tell(outcome: Outcome, out: pathlib.Path, main_file: str, as_json: bool) -> int:
+    """Prints what was done and where it lies; the exit status."""
+    failed = [check for check in outcome.checks if not check.passed]
+    if as_json:
+        told = {
+            "out": str(out),
+            "objects": outcome.objects,
+            "skipped": outcome.skipped,
+            "warnings": outcome.warnings,
+            "checks": {check.name: {"passed": check.passed, "summary": check.summary} for check in outcome.checks},
+            "seconds": {stage: round(seconds, 3) for stage, seconds in outcome.timings.items()},
+        }
+        print(json_module.dumps(told, indent=1))
+    else:
+        seconds = sum(outcome.timings.values())
+        what = "1 object" if outcome.objects == 1 else f"{outcome.objects} objects"
+        print(f"{out / main_file}: {what}, {outcome.warnings} warnings, {seconds:.1f} s")
+        for line in outcome.skipped:
+            print(f"  skipped, not in the dataset: {line}")
+        for check in failed:
+            print(f"  check {check.name}: {check.summary}")
+        if outcome.checks:
+            print(f"  report: {out / 'report.html'}")
+    return SKIPPED if outcome.skipped else 0
