@@ -34,12 +34,12 @@ def length(v: Float[AnyArray, "*b d"]) -> Float[Array, "*b"]:
 def quat_normalize(q: Quat) -> Float[Array, "*b 4"]:
     """Quaternion of unit length; a zero quaternion becomes the identity."""
     zero = jnp.sum(jnp.square(q), axis=-1, keepdims=True) <= TINY
-    return jnp.where(zero, jnp.array([1.0, 0.0, 0.0, 0.0]), normalize(q))
+    return jnp.where(zero, np.array([1.0, 0.0, 0.0, 0.0], np.float32), normalize(q))
 
 
 def quat_conjugate(q: Quat) -> Float[Array, "*b 4"]:
     """Inverse rotation."""
-    return q * jnp.array([1.0, -1.0, -1.0, -1.0])
+    return jnp.multiply(q, np.array([1.0, -1.0, -1.0, -1.0], np.float32))
 
 
 def quat_multiply(a: Quat, b: Quat) -> Float[Array, "*b 4"]:
@@ -61,7 +61,7 @@ def quat_rotate(q: Quat, v: Vec) -> Float[Array, "*b 3"]:
     """`v` turned by `q`."""
     w, u = q[..., :1], q[..., 1:]
     twice = 2.0 * jnp.cross(u, v)
-    return v + w * twice + jnp.cross(u, twice)
+    return jnp.add(v, w * twice) + jnp.cross(u, twice)
 
 
 def quat_rotate_inverse(q: Quat, v: Vec) -> Float[Array, "*b 3"]:

@@ -63,14 +63,14 @@ def enters(
     low: Float[AnyArray, "*#b"], high: Float[AnyArray, "*#b"], length: Float[AnyArray, "*#b"] | float
 ) -> Bool[Array, "*b"]:
     """Whether the ray along the line's direction enters the shape at 0 <= t <= length."""
-    return (low >= 0.0) & (low <= length) & (low <= high)
+    return jnp.logical_and(low >= 0.0, (low <= length) & (low <= high))
 
 
 def enters_backwards(
     low: Float[AnyArray, "*#b"], high: Float[AnyArray, "*#b"], length: Float[AnyArray, "*#b"] | float
 ) -> Bool[Array, "*b"]:
     """The same for the ray against the line's direction: one interval answers both."""
-    return (high <= 0.0) & (-high <= length) & (low <= high)
+    return jnp.logical_and(high <= 0.0, (-high <= length) & (low <= high))
 
 
 def piece_interval(
@@ -175,7 +175,8 @@ def clip_line(
     threshold: slope 0 with negative room makes the divisor of high 0, its numerator negative: -inf.
     """
     shape = jnp.broadcast_shapes(*(jnp.shape(x) for x in (*origin, *direction, *(planes[0] if planes else ()))))
-    low, low_by = jnp.full(shape, -UNBOUNDED), jnp.ones(shape)
+    spoilt = 0.0 * sum((*origin[1:], *direction), start=origin[0])  # NaN where any of them is
+    low, low_by = jnp.broadcast_to(spoilt - UNBOUNDED, shape), jnp.ones(shape)
     high, high_by = jnp.full(shape, UNBOUNDED), jnp.ones(shape)
     for nx, ny, nz, offset in planes:
         slope = nx * direction[0] + ny * direction[1] + nz * direction[2]

@@ -145,6 +145,30 @@ def rays_enter_targets(
     return lines_enter_targets(targets, body_pos, body_quat, origins, directions, lengths, inflate)[0]
 
 
+def fall_contact(
+    targets: RayTargets,
+    body_pos: Float[AnyArray, "W B 3"],
+    body_quat: Float[AnyArray, "W B 4"],
+    points: Float[AnyArray, "W N 3"],
+    distances: Float[AnyArray, "W N"],
+    inflate: float = 0.0,
+) -> Float[Array, "W N P"]:
+    """How far every point falls straight down before it meets each target, metres; inf where not within its distance.
+
+    Unlike for rays, a point that is inside a piece already meets it at 0. With `inflate` the points are balls of that
+    radius, exactly so above faces (half-spaces are moved outwards, so edges of a polyhedron stay sharp).
+    """
+    none = jnp.full((*points.shape[:2], 1), jnp.inf)
+    down = np.array([[0.0, 0.0, -1.0]], np.float32)
+    found = []
+    for group in targets.groups:
+        origin, direction = _in_body_frames(group, body_pos, body_quat, points[:, :, None], down)
+        low, low_by, high, high_by = _clip(group, origin, direction, inflate)
+        reaches = (low * high_by <= high * low_by) & (low <= distances[..., None] * low_by) & (high >= 0.0)
+        found.append(jnp.where(reaches, jnp.maximum(low / low_by, 0.0), jnp.inf))
+    return jnp.min(jnp.concatenate([*found, none], axis=-1)[:, :, targets.slots], axis=-1, initial=jnp.inf)
+
+
 def _sides(
     targets: RayTargets,
     body_pos: Float[AnyArray, "W B 3"],
@@ -171,28 +195,45 @@ def _group_sides(
     inflate: float,
 ) -> UInt8[Array, "W R E"]:
     """The bits for every entry. One array rather than two, or XLA goes through the half-spaces twice."""
+    origin, direction = _in_body_frames(group, body_pos, body_quat, origins[:, None, group.pair], directions)
+    clipped = _clip(group, origin, direction, inflate)
+    forwards, backwards = rays.fractions_enter(*clipped, lengths[:, None])
+    return forwards * FORWARDS | backwards * BACKWARDS
+
+
+def _in_body_frames(
+    group: EntryGroup,
+    body_pos: Float[AnyArray, "W B 3"],
+    body_quat: Float[AnyArray, "W B 4"],
+    origins: Float[AnyArray, "W #R #E 3"],
+    directions: Float[AnyArray, "#R 3"],
+) -> tuple[list, list]:
+    """Components x, y, z of origins and directions, each [W, R or 1, E], in the frame of each entry's body."""
     bodies, place = np.unique(group.body, return_inverse=True)
     axes = quat_to_matrix(jnp.asarray(body_quat)[:, bodies])  # [W, bodies, 3, 3], columns are the body's axes
-    offset = origins[:, group.pair] - jnp.asarray(body_pos)[:, group.body]  # [W, E, 3], world axes
-    columns = [[axes[:, :, i, j][:, place] for i in range(3)] for j in range(3)]
-    o = [sum(column[i] * offset[..., i] for i in range(3))[:, None, :] for column in columns]
-    d = [sum(column[i][:, None, :] * directions[:, i, None] for i in range(3)) for column in columns]
+    offset = origins - jnp.asarray(body_pos)[:, None, group.body]
+    columns = [[axes[:, None, :, i, j][:, :, place] for i in range(3)] for j in range(3)]
+    origin = [
+        column[0] * offset[..., 0] + column[1] * offset[..., 1] + column[2] * offset[..., 2] for column in columns
+    ]
+    x, y, z = (directions[:, i, None] for i in range(3))
+    return origin, [column[0] * x + column[1] * y + column[2] * z for column in columns]
+
+
+def _clip(group: EntryGroup, origin: list, direction: list, inflate: float) -> tuple[Array, Array, Array, Array]:
+    """The lines' intervals inside the entries' pieces as fractions (see `rays.clip_line`), each [W, R, E]."""
     if group.kind is PieceKind.POLYHEDRON:
         # The barrier keeps the half-spaces one array (as separate constants they cost five times the time on a CPU)
-        # and the gathers above from being repeated.
-        planes, o, d = jax.lax.optimization_barrier((jnp.asarray(group.planes), o, d))
-        clipped = rays.clip_line([list(plane) for plane in planes], o, d, inflate)
-        forwards, backwards = rays.fractions_enter(*clipped, lengths[:, None])
-    else:
-        # A vector in piece axes is rotation^T v, which is v @ rotation.
-        origin = jnp.einsum("wrei,eij->wrej", jnp.stack(o, axis=-1) - group.pos, group.rotation)
-        direction = jnp.einsum("wrei,eij->wrej", jnp.stack(d, axis=-1), group.rotation)
-        kinds = np.full(len(group.pair), group.kind)
-        no_planes = np.zeros((1, 0, 4), np.float32)
-        low, high = rays.piece_interval(kinds, group.size, no_planes, origin, direction, inflate)
-        forwards = rays.enters(low, high, lengths[:, None])
-        backwards = rays.enters_backwards(low, high, lengths[:, None])
-    return forwards * FORWARDS | backwards * BACKWARDS
+        # and the gathers before from being repeated for each of them.
+        planes, origin, direction = jax.lax.optimization_barrier((jnp.asarray(group.planes), origin, direction))
+        return rays.clip_line([list(plane) for plane in planes], origin, direction, inflate)
+    # A vector in piece axes is rotation^T v, which is v @ rotation.
+    o = jnp.einsum("wrei,eij->wrej", jnp.stack(origin, axis=-1) - group.pos, group.rotation)
+    d = jnp.einsum("wrei,eij->wrej", jnp.stack(direction, axis=-1), group.rotation)
+    kinds = np.full(len(group.pair), group.kind)
+    low, high = rays.piece_interval(kinds, group.size, np.zeros((1, 0, 4), np.float32), o, d, inflate)
+    bound = jnp.float32(rays.UNBOUNDED)  # infinity times a divisor is fine, infinity against infinity is not
+    return jnp.clip(low, -bound, bound), jnp.ones_like(low), jnp.clip(high, -bound, bound), jnp.ones_like(high)
 
 
 def _plane_steps(kind: Int[np.ndarray, "K"], planes: Float[np.ndarray, "K N 4"]) -> Int[np.ndarray, "K"]:
