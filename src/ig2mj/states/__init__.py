@@ -1,1 +1,23 @@
+"""Extended states: temperature, wetness, dust, stains, switches, cuts, as JAX arrays updated by pure functions.
 
+A state is one file; `update.update` calls them in their one order; `world.ExtendedStates` holds what they keep.
+"""
+
+from ig2mj.states.model import StateModel
+from ig2mj.states.options import StateOptions
+from ig2mj.states.relations import Memo, RelationPlan, Relations
+from ig2mj.states.update import initial_states, update
+from ig2mj.states.world import ExtendedStates, Swap, WorldState
+
+__all__ = [
+    "ExtendedStates",
+    "Memo",
+    "RelationPlan",
+    "Relations",
+    "StateModel",
+    "StateOptions",
+    "Swap",
+    "WorldState",
+    "initial_states",
+    "update",
+]

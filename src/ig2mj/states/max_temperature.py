@@ -1,0 +1,49 @@
+"""MaxTemperature, Celsius: the highest temperature so far. Cooked and Burnt are read from it."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+from jaxtyping import Bool, Float
+
+from ig2mj.engine.view import Array
+from ig2mj.states.model import StateModel
+
+
+def initial(num_worlds: int, num_objects: int) -> Float[Array, "W O"]:
+    """-inf before the first update (iGibson's max_temperature.py)."""
+    return jnp.full((num_worlds, num_objects), -jnp.inf, jnp.float32)
+
+
+def update(
+    model: StateModel, max_temperature: Float[Array, "W O"], temperature: Float[Array, "W O"]
+) -> Float[Array, "W O"]:
+    """Takes this step's temperature into account."""
+    return jnp.where(model.parameters.thermal, jnp.maximum(max_temperature, temperature), max_temperature)
+
+
+def set_cooked(
+    model: StateModel, max_temperature: Float[Array, "W O"], objects: Bool[Array, "#W O"], value: bool
+) -> Float[Array, "W O"]:
+    """Makes the masked objects Cooked, max(T_max, T_cook), or not, min(T_max, T_cook - 1) (paper table A.5).
+
+    The temperature stays: an object that is hotter than T_cook now is cooked again after the next update. In the
+    paper's rules an object that is burnt already does not become Cooked by this.
+    """
+    return _set(max_temperature, jnp.asarray(model.parameters.cook_temperature), objects, value)
+
+
+def set_burnt(
+    model: StateModel, max_temperature: Float[Array, "W O"], objects: Bool[Array, "#W O"], value: bool
+) -> Float[Array, "W O"]:
+    """Makes the masked objects Burnt, max(T_max, T_burn), or not, min(T_max, T_burn - 1) (paper table A.5)."""
+    return _set(max_temperature, jnp.asarray(model.parameters.burn_temperature), objects, value)
+
+
+def _set(
+    max_temperature: Float[Array, "W O"], threshold: Float[Array, "O"], objects: Bool[Array, "#W O"], value: bool
+) -> Float[Array, "W O"]:
+    if value:
+        changed = jnp.maximum(max_temperature, threshold)
+    else:
+        changed = jnp.minimum(max_temperature, threshold - 1.0)
+    return jnp.where(objects & jnp.isfinite(threshold), changed, max_temperature)

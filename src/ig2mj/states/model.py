@@ -1,0 +1,53 @@
+"""`StateModel`: everything about states that does not change during a run. Closed over by the jitted functions."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Int
+
+from ig2mj.scene.manifest import Manifest
+from ig2mj.scene.tables import SceneTables
+from ig2mj.states.options import StateOptions
+from ig2mj.states.parameters import Abilities, Part, StateParameters, make_parameters, parameters_of_manifest
+
+DEFAULTS = StateOptions()
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class StateModel:
+    """Constants of a scene's states: tables, parameters, options."""
+
+    tables: SceneTables
+    parameters: StateParameters
+    options: StateOptions = DEFAULTS
+
+    @classmethod
+    def of_manifest(cls, tables: SceneTables, manifest: Manifest, options: StateOptions = DEFAULTS) -> StateModel:
+        """The model of a loaded scene."""
+        return cls(tables, parameters_of_manifest(manifest, tables, options.compat), options)
+
+    @classmethod
+    def of_abilities(
+        cls,
+        tables: SceneTables,
+        abilities: Sequence[Abilities],
+        parts: Sequence[Part] = (),
+        options: StateOptions = DEFAULTS,
+    ) -> StateModel:
+        """The model of objects whose abilities are given, one mapping per object."""
+        return cls(tables, make_parameters(tables, abilities, parts, options.compat), options)
+
+    @property
+    def paper(self) -> bool:
+        """Whether the paper's rules are in force, rather than iGibson's code's (spec/states.md section 17)."""
+        return self.options.compat == "paper"
+
+    @functools.cached_property
+    def swap_objects(self) -> Int[np.ndarray, "M"]:
+        """Objects that slicing moves, wholes first: the M axis of `Swap`."""
+        wholes = np.unique(self.parameters.half_whole)
+        return np.concatenate([wholes, self.parameters.half_object]).astype(int)

@@ -1,0 +1,175 @@
+"""Relations between named pairs of objects, each computed once per step for everyone who asks.
+
+Heat sources ask what is inside them; predicates ask for inside, above and below, beside, distance. `RelationPlan`
+gathers the pairs before tracing; `Relations` holds the answers. Rays are the dearest part of a step, so a `Memo` can
+carry the last answers along: a pair is computed anew unless every number it depends on (the object's centre of mass,
+the pose of every body of the target) is bitwise the same. iGibson's own memo looks at two positions only, and goes
+stale when something turns, opens or closes (spec/states.md 19.1). The memo pays where worlds are few and mostly asleep;
+without one, everything is computed every time.
+
+Axes: W worlds, P pairs of a kind, K numbers that an answer depends on.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Iterable
+from typing import Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.states.adjacency import AdjacencyPairs
+from ig2mj.states.model import StateModel
+
+Kind = Literal["inside", "vertical", "horizontal"]
+Pair = tuple[int, int]
+Query = tuple[Kind, int, int]
+"""What is asked: kind, object, target. The answers are `Relations.inside`, `.above` with `.below`, `.beside`."""
+
+KINDS: tuple[Kind, ...] = ("inside", "vertical", "horizontal")
+
+
+@struct.dataclass
+class Memo:
+    """The last answers and what they were computed from, per kind.
+
+    Attributes:
+      inputs: NaN at first, which equals nothing. values: one or two booleans per pair.
+    """
+
+    inputs: dict[str, Float[Array, "W P K"]]
+    values: dict[str, Bool[Array, "W P V"]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Relations:
+    """Answers of one step; arrays over the pairs asked for, in their order."""
+
+    plan: RelationPlan
+    values: dict[str, Bool[Array, "W P V"]]
+
+    def inside(self, pairs: Iterable[Pair]) -> Bool[Array, "W P"]:
+        """Two orthogonal axes through the object meet the target on both sides."""
+        return self._of("inside", pairs)[..., 0]
+
+    def above(self, pairs: Iterable[Pair]) -> Bool[Array, "W P"]:
+        """The target is above the object (InSamePositiveVerticalAxisObjs of the object)."""
+        return self._of("vertical", pairs)[..., 0]
+
+    def below(self, pairs: Iterable[Pair]) -> Bool[Array, "W P"]:
+        """The target is below the object (InSameNegativeVerticalAxisObjs of the object)."""
+        return self._of("vertical", pairs)[..., 1]
+
+    def beside(self, pairs: Iterable[Pair]) -> Bool[Array, "W P"]:
+        """A horizontal ray of the object enters the target (InSameHorizontalPlaneObjs of the object)."""
+        return self._of("horizontal", pairs)[..., 0]
+
+    def _of(self, kind: Kind, pairs: Iterable[Pair]) -> Bool[Array, "W P V"]:
+        where = [self.plan.index[kind][(int(a), int(b))] for a, b in pairs]
+        return self.values[kind][:, np.array(where, int)]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RelationPlan:
+    """The pairs of each kind, without repetition."""
+
+    model: StateModel
+    pairs: dict[Kind, tuple[Pair, ...]]
+
+    @classmethod
+    def build(cls, model: StateModel, queries: Iterable[Query]) -> RelationPlan:
+        """Gathers what all askers need. A pair of an object with itself is left out: it never holds."""
+        asked: dict[Kind, dict[Pair, None]] = {kind: {} for kind in KINDS}
+        for kind, a, b in queries:
+            asked[kind][(int(a), int(b))] = None
+        return cls(model, {kind: tuple(pairs) for kind, pairs in asked.items()})
+
+    @functools.cached_property
+    def index(self) -> dict[Kind, dict[Pair, int]]:
+        """Position of each pair in its kind's axis."""
+        return {kind: {pair: i for i, pair in enumerate(pairs)} for kind, pairs in self.pairs.items()}
+
+    @functools.cached_property
+    def _adjacency(self) -> dict[Kind, AdjacencyPairs]:
+        return {k: AdjacencyPairs.build(self.model, np.array(p, int)) for k, p in self.pairs.items() if p}
+
+    def empty_memo(self, num_worlds: int) -> Memo:
+        """A memo that knows nothing yet."""
+        inputs, values = {}, {}
+        for kind, adjacency in self._adjacency.items():
+            shape = (num_worlds, len(adjacency.pairs))
+            inputs[kind] = jnp.full((*shape, 3 + 7 * self._target_bodies[kind].shape[1]), jnp.nan, jnp.float32)
+            values[kind] = jnp.zeros((*shape, 2 if kind == "vertical" else 1), bool)
+        return Memo(inputs, values)
+
+    def evaluate(self, view: PhysicsView) -> Relations:
+        """All answers, computed now."""
+        values = {kind: self._gate(kind, view)[..., None] & self._compute(kind, view) for kind in self._adjacency}
+        return Relations(self, self._padded(values, view))
+
+    def evaluate_changed(self, view: PhysicsView, memo: Memo) -> tuple[Relations, Memo]:
+        """All answers, those of pairs where nothing moved from the memo, and the memo for the next step."""
+        inputs, values = {}, {}
+        for kind in self._adjacency:
+            inputs[kind] = self._inputs(kind, view)
+            changed = jnp.any(inputs[kind] != memo.inputs[kind], axis=-1)
+            needed = changed & self._gate(kind, view)
+            computed = jax.lax.cond(
+                jnp.any(needed),
+                lambda kind=kind: self._compute(kind, view),
+                lambda kind=kind: jnp.zeros(memo.values[kind].shape, bool),
+            )
+            values[kind] = jnp.where(changed[..., None], needed[..., None] & computed, memo.values[kind])
+        return Relations(self, self._padded(values, view)), Memo(inputs, values)
+
+    def _compute(self, kind: Kind, view: PhysicsView) -> Bool[Array, "W P V"]:
+        adjacency = self._adjacency[kind]
+        if kind == "inside":
+            return adjacency.inside(view)[..., None]
+        if kind == "vertical":
+            return jnp.stack(adjacency.vertical(view), axis=-1)
+        positive, negative = adjacency.horizontal(view)
+        return jnp.any(positive | negative, axis=-1)[..., None]
+
+    def _gate(self, kind: Kind, view: PhysicsView) -> Bool[Array, "W P"]:
+        """Cheap necessary conditions from the target's world box: false means that no ray can answer yes."""
+        pairs = self._adjacency[kind].pairs
+        com = jnp.asarray(view.object_com)[:, pairs[:, 0]]
+        low = jnp.asarray(view.aabb_low)[:, pairs[:, 1]] - BOX_SLACK
+        high = jnp.asarray(view.aabb_high)[:, pairs[:, 1]] + BOX_SLACK
+        within = (low <= com) & (com <= high)
+        apart = pairs[:, 0] != pairs[:, 1]
+        axes = {"inside": [0, 1, 2], "vertical": [0, 1], "horizontal": [2]}[kind]
+        return jnp.all(within[..., np.array(axes)], axis=-1) & apart
+
+    def _inputs(self, kind: Kind, view: PhysicsView) -> Float[Array, "W P K"]:
+        pairs, bodies = self._adjacency[kind].pairs, self._target_bodies[kind]
+        com = jnp.asarray(view.object_com)[:, pairs[:, 0]]
+        poses = jnp.concatenate([jnp.asarray(view.body_pos), jnp.asarray(view.body_quat)], axis=-1)[:, bodies]
+        return jnp.concatenate([com, poses.reshape(*com.shape[:2], -1)], axis=-1)
+
+    @functools.cached_property
+    def _target_bodies(self) -> dict[Kind, Int[np.ndarray, "P B"]]:
+        """Bodies that carry pieces of each pair's target, padded by repetition."""
+        tables, found = self.model.tables, {}
+        for kind, adjacency in self._adjacency.items():
+            rows = [np.unique(tables.piece_body[tables.piece_object == b]) for b in adjacency.pairs[:, 1]]
+            width = max((len(r) for r in rows), default=0)
+            found[kind] = np.array([np.resize(r, width) if len(r) else np.zeros(width, int) for r in rows], int)
+        return found
+
+    def _padded(self, values: dict[Kind, Array], view: PhysicsView) -> dict[str, Array]:
+        """Adds kinds that nobody asked for, so that asking for no pairs gives empty arrays."""
+        worlds = view.object_com.shape[0]
+        none = {kind: jnp.zeros((worlds, 0, 2), bool) for kind in KINDS if kind not in values}
+        return {**none, **values}
+
+
+BOX_SLACK = 0.005
+"""Metres. Rounding of the world box, and the rays' own slack about hulls (`adjacency.INFLATE`)."""

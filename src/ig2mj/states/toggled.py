@@ -1,0 +1,50 @@
+"""ToggledState: a switch that an agent flips by holding a finger at its button (spec/states.md section 9).
+
+The paper asks for contact of the agent with the TogglingLink, which is virtual and collides with nothing. iGibson
+realises that as nearness, and so do both sets of rules here: some finger's frame strictly within 0.10 m of the link at
+five consecutive updates flips the switch; staying does not flip it again.
+
+Axes: W worlds, O objects, B buttons.
+"""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Int
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.scene.tables import LinkKind
+from ig2mj.states.model import StateModel
+
+REACH = 0.10
+"""Metres between a finger's frame and the button (iGibson's toggle.py)."""
+
+HOLD = 5
+"""Consecutive updates within reach after which the switch flips (iGibson's toggle.py)."""
+
+
+def update(
+    model: StateModel, toggled: Bool[Array, "W O"], press_count: Int[Array, "W O"], view: PhysicsView
+) -> tuple[Bool[Array, "W O"], Int[Array, "W O"]]:
+    """One step: the switches and the counts."""
+    tables = model.tables
+    buttons = np.flatnonzero(tables.link_kind == LinkKind.TOGGLE_BUTTON)
+    buttons = buttons[model.parameters.has("toggleable")[tables.link_object[buttons]]]
+    if len(buttons) == 0 or view.finger_pos.shape[1] == 0:
+        return toggled, press_count
+    offset = jnp.asarray(view.finger_pos)[:, None] - jnp.asarray(view.link_pos)[:, buttons, None]
+    near = jnp.any(jnp.sum(offset * offset, axis=-1) < REACH**2, axis=-1)  # [W, B]
+    of_object = np.full(tables.num_objects, len(buttons))
+    of_object[tables.link_object[buttons]] = np.arange(len(buttons))
+    pressed = jnp.concatenate([near, jnp.zeros((near.shape[0], 1), bool)], axis=-1)[:, of_object]
+    # Beyond HOLD the count stands, so that it can be held for ever.
+    count = jnp.where(pressed, jnp.minimum(press_count, HOLD) + 1, 0)
+    return toggled ^ (count == HOLD), count
+
+
+def set_toggled_on(
+    model: StateModel, toggled: Bool[Array, "W O"], objects: Bool[Array, "#W O"], value: bool
+) -> Bool[Array, "W O"]:
+    """Switches the masked objects on or off (paper table A.5)."""
+    return jnp.where(objects & model.parameters.has("toggleable"), value, toggled)

@@ -1,0 +1,131 @@
+"""The one order in which extended states are updated after physics (design: spec/states.md section 2).
+
+    view -> toggled -> sliced -> water -> wetness -> cleaning -> open -> heat sources -> temperature -> max temperature
+
+A state that depends on another sees this step's value of it, but for water: a tap that is switched on in this step lets
+the first drop go in the next, as in iGibson.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.states import (
+    cleaning,
+    heat_source,
+    max_temperature,
+    open,
+    particles,
+    sliced,
+    temperature,
+    toggled,
+    water,
+    wetness,
+)
+from ig2mj.states.model import StateModel
+from ig2mj.states.relations import Query, RelationPlan, Relations
+from ig2mj.states.world import ExtendedStates, Swap
+
+
+def initial_states(model: StateModel, num_worlds: int) -> ExtendedStates:
+    """Everything at room temperature, dry, clean, switched off, whole."""
+    shape = (num_worlds, model.tables.num_objects)
+    return ExtendedStates(
+        temperature=temperature.initial(*shape),
+        max_temperature=max_temperature.initial(*shape),
+        wetness=wetness.initial(*shape),
+        toggled=jnp.zeros(shape, bool),
+        press_count=jnp.zeros(shape, jnp.int32),
+        sliced=jnp.zeros(shape, bool),
+        water=water.no_drops(num_worlds, len(model.parameters.water_object)),
+        dust=particles.no_particles(num_worlds, len(model.parameters.dust_rows)),
+        stain=particles.no_particles(num_worlds, len(model.parameters.stain_rows)),
+    )
+
+
+def queries(model: StateModel) -> list[Query]:
+    """The relations between objects that an update needs."""
+    return heat_source.queries(model)
+
+
+def update(
+    model: StateModel, states: ExtendedStates, view: PhysicsView, relations: Relations | None = None
+) -> tuple[ExtendedStates, Swap]:
+    """One control step of all extended states of all worlds. Pure; to be jitted with `model` closed over.
+
+    Args:
+      model: constants.
+      states: before.
+      view: physics after this control step.
+      relations: answers for `view` to at least `queries(model)`; None: they are computed here.
+
+    Returns:
+      The states after the step, and the teleports that slicing asks of the engine.
+    """
+    if relations is None:
+        relations = RelationPlan.build(model, queries(model)).evaluate(view)
+    p = model.parameters
+
+    switch, press_count = toggled.update(model, states.toggled, states.press_count, view)
+    states = states.replace(toggled=switch, press_count=press_count)
+
+    cut_now = sliced.cut(model, states.sliced, view)
+    states, *swap = sliced.apply(model, states, cut_now, view)
+    in_use = sliced.in_use(model, states.sliced)
+
+    drops, contacts = water.update(model, states.water, view, states.toggled)
+    wet = wetness.update(model, states.wetness, contacts)
+    states = states.replace(water=drops, wetness=wet)
+
+    working = cleaning.working(model, states.toggled)
+    soaked = wetness.soaked(model, wet)[:, p.tool_object]
+    states = states.replace(
+        dust=cleaning.update(model, states.dust, p.dust_rows, working, view),
+        stain=cleaning.update(model, states.stain, p.stain_rows, working & soaked, view),
+    )
+
+    opened = open.is_open(model, view.joint_pos)
+    on = heat_source.switched_on(model, states.toggled, opened)
+    acts = _as_wholes(model, cut_now, heat_source.acts_on(model, on, view, relations))
+    warm = temperature.update(model, states.temperature, acts, in_use, view)
+    states = states.replace(
+        temperature=warm, max_temperature=max_temperature.update(model, states.max_temperature, warm)
+    )
+    return states, Swap(*swap)
+
+
+def _as_wholes(model: StateModel, cut_now: Bool[Array, "W O"], acts: Bool[Array, "W O S"]) -> Bool[Array, "W O S"]:
+    """On halves in the step of their birth act the sources that act on the whole: the view still has them parked."""
+    p = model.parameters
+    if len(p.half_object) == 0 or acts.shape[-1] == 0:
+        return acts
+    source = np.arange(model.tables.num_objects)
+    source[p.half_object] = p.half_whole
+    born = cut_now[:, source] & (source != np.arange(len(source)))
+    return jnp.where(born[..., None], acts[:, source], acts)
+
+
+def with_values(model: StateModel, states: ExtendedStates, values: Sequence[Mapping[str, Any]]) -> ExtendedStates:
+    """States in which every world has the initial values a manifest gives (`ObjectEntry.state`, one per object).
+
+    Keys: temperature, max_temperature, wetness, toggled, sliced. Unknown keys are left alone.
+    """
+    for name, dtype in (
+        ("temperature", np.float32),
+        ("max_temperature", np.float32),
+        ("wetness", np.float32),
+        ("toggled", bool),
+        ("sliced", bool),
+    ):
+        given = [(i, v[name]) for i, v in enumerate(values) if name in v]
+        if given:
+            objects, numbers = zip(*given, strict=True)
+            field = getattr(states, name)
+            states = states.replace(**{name: field.at[:, np.array(objects)].set(np.array(numbers, dtype))})
+    return states

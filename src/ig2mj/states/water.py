@@ -1,0 +1,181 @@
+"""Water: sources let drops fall, drops land, sinks and soakable objects take them (paper tables A.2 to A.4).
+
+A drop is a point that falls straight down with a radius, not a body: under gravity alone, held against the collision
+pieces of all objects on the way it falls during the step, so that none is skipped at speed. What it touches first
+decides: a soakable object absorbs it (wetness.py), a sink or the source's own object takes it back, on anything else
+it rests until that goes away. Drops that fall out of the house come back to the source.
+
+Rules in force (spec/states.md section 17, rows 2 and 3): the paper's droplets are absorbed, and sinks (`water_sink`
+links) take drops; in iGibson's code a soaked object leaves the drop where it is, and only the source's own object takes
+drops back, so that a tap over anything else runs dry after ten.
+
+Axes: W worlds, C sources, N = 10 drops of each, O objects.
+"""
+
+from __future__ import annotations
+
+import math
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.poses import quat_rotate_inverse
+from ig2mj.geometry.targets import RayTargets, fall_contact
+from ig2mj.scene.tables import LinkKind
+from ig2mj.states.model import StateModel
+
+NUM_DROPS = 10
+"""Drops of one source (iGibson's particles.py)."""
+
+DROP_RADIUS = 0.01
+"""Metres (spec/states.md section 0)."""
+
+DROP_PERIOD = 0.1
+"""Seconds that a source waits, at least, between two drops (spec/states.md 7.2)."""
+
+SPAWN_BELOW = 0.05
+"""Metres below the source's link at which a drop appears (spec/states.md 7.1)."""
+
+TOUCHING = 0.003
+"""Metres. A drop this near a surface touches it, as any two bodies (spec/states.md section 24)."""
+
+GRAVITY = 9.8
+"""m/s^2 (spec/states.md section 0)."""
+
+LOST_BELOW = 10.0
+"""Metres below its source at which a drop has left the house."""
+
+SINK_REACH = 0.1
+"""Metres around a sink link that is a point, not a box: drops this near are taken."""
+
+
+@struct.dataclass
+class WaterDrops:
+    """The drops of all sources.
+
+    Attributes:
+      active: on the way or at rest, not in the source. pos: centre, world frame. speed: downwards, m/s.
+      waited: updates since the last drop, counted up to the period. running: the source was on at the last update (the
+      next drop depends on it, one step late, as in iGibson).
+    """
+
+    active: Bool[Array, "W C N"]
+    pos: Float[Array, "W C N 3"]
+    speed: Float[Array, "W C N"]
+    waited: Int[Array, "W C"]
+    running: Bool[Array, "W C"]
+
+
+def no_drops(num_worlds: int, num_sources: int) -> WaterDrops:
+    """All taps off and full; the first drop comes as soon as one runs."""
+    shape = (num_worlds, num_sources, NUM_DROPS)
+    return WaterDrops(
+        active=jnp.zeros(shape, bool),
+        pos=jnp.zeros((*shape, 3), jnp.float32),
+        speed=jnp.zeros(shape, jnp.float32),
+        waited=jnp.full(shape[:2], np.iinfo(np.int16).max, jnp.int32),
+        running=jnp.zeros(shape[:2], bool),
+    )
+
+
+def update(
+    model: StateModel, water: WaterDrops, view: PhysicsView, toggled: Bool[Array, "W O"]
+) -> tuple[WaterDrops, Int[Array, "W O"]]:
+    """One control step of all drops.
+
+    Returns:
+      The drops, and how many touched each soakable object: those it absorbs (paper), or that lie on it (iGibson).
+    """
+    parameters = model.parameters
+    num_worlds = toggled.shape[0]
+    if len(parameters.water_object) == 0:
+        return water, jnp.zeros((num_worlds, model.tables.num_objects), jnp.int32)
+
+    emitting, waited = _emission(model, water)
+    moved, contacts = jax.lax.cond(
+        jnp.any(water.active),
+        lambda: _fall(model, water, view),
+        lambda: (water, jnp.zeros((num_worlds, model.tables.num_objects), jnp.int32)),
+    )
+    tap = jnp.asarray(view.link_pos)[:, parameters.water_link] - np.array([0.0, 0.0, SPAWN_BELOW], np.float32)
+    switched = model.parameters.has("toggleable")[parameters.water_object]
+    updated = WaterDrops(
+        active=moved.active | emitting,
+        pos=jnp.where(emitting[..., None], tap[:, :, None], moved.pos),
+        speed=jnp.where(emitting, 0.0, moved.speed),
+        waited=waited,
+        running=jnp.where(switched, toggled[:, parameters.water_object], True),
+    )
+    return updated, contacts
+
+
+def _emission(model: StateModel, water: WaterDrops) -> tuple[Bool[Array, "W C N"], Int[Array, "W C"]]:
+    """Which drop each source lets go now, and its count. The count stands still while it is off or empty."""
+    period = math.ceil(DROP_PERIOD / model.options.timestep - 1e-9)
+    able = water.running & ~jnp.all(water.active, axis=-1)
+    due = able & (water.waited >= period)
+    next_drop = jnp.argmin(water.active, axis=-1)  # the first that is in the source
+    emitting = due[..., None] & (np.arange(NUM_DROPS) == next_drop[..., None])
+    return emitting, jnp.where(due, 0, jnp.where(able, jnp.minimum(water.waited + 1, period), water.waited))
+
+
+def _fall(model: StateModel, water: WaterDrops, view: PhysicsView) -> tuple[WaterDrops, Int[Array, "W O"]]:
+    """Moves the drops that are out, lands them, gives them back."""
+    parameters, tables = model.parameters, model.tables
+    dt = model.options.timestep
+    num_worlds, objects = water.active.shape[0], np.arange(tables.num_objects)
+    speed = water.speed + GRAVITY * dt
+    fall = (water.speed + 0.5 * GRAVITY * dt) * dt
+
+    reach = fall_contact(
+        RayTargets.build(tables, objects),
+        view.body_pos,
+        view.body_quat,
+        water.pos.reshape(num_worlds, -1, 3),
+        fall.reshape(num_worlds, -1),
+        inflate=DROP_RADIUS + TOUCHING,
+    ).reshape(*water.active.shape, len(objects))
+    first = jnp.min(reach, axis=-1)
+    landed = water.active & jnp.isfinite(first)
+    on = (jnp.argmin(reach, axis=-1)[..., None] == objects) & landed[..., None]  # [W, C, N, O]
+
+    drop = jnp.where(landed, first, jnp.where(water.active, fall, 0.0))
+    pos = water.pos - drop[..., None] * np.array([0.0, 0.0, 1.0], np.float32)
+    soaking = on & np.isfinite(parameters.wetness_soaked)
+    gone = jnp.any(on & takes_back(model)[:, None, :], axis=-1)
+    if model.paper:
+        gone |= jnp.any(soaking, axis=-1) | _in_sink(model, pos, view)
+        tap = jnp.asarray(view.link_pos)[:, parameters.water_link, 2]
+        gone |= ~(pos[..., 2] >= tap[..., None] - LOST_BELOW)
+    moved = water.replace(
+        active=water.active & ~gone,
+        pos=pos,
+        speed=jnp.where(landed | ~water.active, 0.0, speed),
+    )
+    return moved, jnp.sum(soaking, axis=(1, 2), dtype=jnp.int32)
+
+
+def takes_back(model: StateModel) -> Bool[np.ndarray, "C O"]:
+    """Objects that take a source's drops on touch: itself; in the paper's rules every source and every sink."""
+    parameters, objects = model.parameters, np.arange(model.tables.num_objects)
+    own = parameters.water_object[:, None] == objects
+    if not model.paper:
+        return own
+    return own | parameters.has("waterSink") | parameters.has("waterSource")
+
+
+def _in_sink(model: StateModel, pos: Float[Array, "W C N 3"], view: PhysicsView) -> Bool[Array, "W C N"]:
+    """Whether drops are at an annotated sink link (paper table A.3, DropletSinkLink)."""
+    links = np.flatnonzero(model.tables.link_kind == LinkKind.WATER_SINK)
+    if len(links) == 0:
+        return jnp.zeros(pos.shape[:-1], bool)
+    offset = pos[..., None, :] - jnp.asarray(view.link_pos)[:, None, None, links]
+    half = model.tables.link_half[links]
+    local = quat_rotate_inverse(jnp.asarray(view.link_quat)[:, None, None, links], offset)
+    within_box = jnp.all(jnp.abs(local) <= half + DROP_RADIUS, axis=-1)
+    within_reach = jnp.sum(offset * offset, axis=-1) <= SINK_REACH**2
+    return jnp.any(jnp.where(np.any(half > 0, axis=-1), within_box, within_reach), axis=-1)

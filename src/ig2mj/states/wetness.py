@@ -1,0 +1,41 @@
+"""WetnessLevel: droplets that a soakable object has absorbed (paper table A.4); Soaked is read from it.
+
+The paper's level is a number that grows by one per droplet. iGibson's code keeps a latch only: here, with
+compat="igibson", one drop on the object makes the level the soaked threshold and no more (spec/states.md section 17,
+row 2). Drying is no part of either and off by default (`StateOptions.drying_rate`).
+"""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.view import Array
+from ig2mj.states.model import StateModel
+
+
+def initial(num_worlds: int, num_objects: int) -> Float[Array, "W O"]:
+    """Everything dry."""
+    return jnp.zeros((num_worlds, num_objects), jnp.float32)
+
+
+def update(model: StateModel, wetness: Float[Array, "W O"], drops: Int[Array, "W O"]) -> Float[Array, "W O"]:
+    """One step; `drops` touched each soakable object in it (water.py)."""
+    if model.options.drying_rate:
+        wetness = jnp.maximum(wetness - model.options.drying_rate * model.options.timestep, 0.0)
+    if model.paper:
+        return wetness + drops
+    return jnp.where(drops > 0, jnp.maximum(wetness, model.parameters.wetness_soaked), wetness)
+
+
+def soaked(model: StateModel, wetness: Float[Array, "W O"]) -> Bool[Array, "W O"]:
+    """Whether each object is at or over its threshold (table A.1); false without the ability."""
+    return wetness >= model.parameters.wetness_soaked
+
+
+def set_soaked(
+    model: StateModel, wetness: Float[Array, "W O"], objects: Bool[Array, "#W O"], value: bool
+) -> Float[Array, "W O"]:
+    """Makes the masked objects' wetness match the threshold, or 0 (paper table A.5)."""
+    level = model.parameters.wetness_soaked if value else 0.0
+    return jnp.where(objects & model.parameters.has("soakable"), level, wetness)
