@@ -1,1 +1,25 @@
 """ig2mj: iGibson 2.0 on MuJoCo and JAX."""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ig2mj.scene.scene import Scene, load_scene
+    from ig2mj.simulation import Simulation
+
+__all__ = ["Scene", "Simulation", "load_scene"]
+
+_HOME = {"Scene": "ig2mj.scene.scene", "load_scene": "ig2mj.scene.scene", "Simulation": "ig2mj.simulation"}
+
+
+def __getattr__(name: str) -> Any:
+    """Imports the public names when they are first used, so that `import ig2mj` loads neither MuJoCo nor JAX."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'ig2mj' has no attribute '{name}'")
+    return getattr(importlib.import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOME})

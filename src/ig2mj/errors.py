@@ -62,5 +62,9 @@ class EngineError(Ig2mjError):
     """An engine cannot run the scene, or a step of it went wrong."""
 
 
+class PoseError(Ig2mjError):
+    """A pose or joint position that cannot be set: not finite, no rotation, or of something that cannot move."""
+
+
 class MissingDependencyError(Ig2mjError):
     """An optional package or system library is absent; the message gives the command that installs it."""

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol, runtime_checkable
 
+import mujoco
 from flax import struct
 from jaxtyping import Bool, Float, Int
 
@@ -63,7 +64,7 @@ class Snapshot:
     ctrl: Float[Array, "*W nu"]
     qacc_warmstart: Float[Array, "*W nv"]
     eq_active: Bool[Array, "*W E"]
-    eq_data: Float[Array, "*W E 11"]
+    eq_data: Float[Array, "*W E 12"]
     mocap_pos: Float[Array, "*W M 3"]
     mocap_quat: Float[Array, "*W M 4"]
     time: Float[Array, "*W"]
@@ -76,7 +77,8 @@ class Write:
     """A change to physics that is no simulation: teleports, joint positions, grasps. Leave out (None) what stays.
 
     What is written moves at once, its velocity becomes zero, and it wakes together with the sleeping island it is part
-    of. A fixed object cannot be moved: its row of `object_mask` is ignored.
+    of. A fixed object cannot be moved: its row of `object_mask` is ignored. A write of nothing at all brings the view
+    up to date with what someone changed in MuJoCo's own structures (`Engine.to_mujoco`).
 
     Attributes:
       object_mask, object_pos, object_quat: teleports of objects: frame of the main body, world frame, w-x-y-z. Bodies
@@ -91,7 +93,7 @@ class Write:
     qpos_mask: Bool[Array, "W nq"] | None = None
     qpos: Float[Array, "W nq"] | None = None
     eq_active: Bool[Array, "W E"] | None = None
-    eq_data: Float[Array, "W E 11"] | None = None
+    eq_data: Float[Array, "W E 12"] | None = None
 
 
 @runtime_checkable
@@ -137,6 +139,10 @@ class Engine(Protocol):
         """The view of the present state. After `step` the same as it returned; after `write`, with no forces."""
         ...
 
+    def time(self, physics: Physics) -> Float[Array, "W"]:
+        """Simulated seconds since each world's reset."""
+        ...
+
     def write(self, physics: Physics, write: Write) -> Physics:
         """Applies a change and brings everything derived up to date; what it moves wakes."""
         ...
@@ -152,5 +158,12 @@ class Engine(Protocol):
           physics: as returned by the last call.
           snapshot: with the world axis: row w goes to world w. Without it: goes to every world.
           mask: the worlds to replace; None: all.
+        """
+        ...
+
+    def to_mujoco(self, physics: Physics, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """One world as MuJoCo's own structures, kinematics up to date, for viewers and renderers; never traced.
+
+        The native engine hands out its live ones: forces put on them act in the next step. Others hand out copies.
         """
         ...

@@ -128,7 +128,7 @@ def _grasps(model: mujoco.MjModel, tables: SceneTables) -> tuple[np.ndarray, np.
     }
     rows = []
     for e in range(model.neq):
-        if model.eq_type[e] not in (mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_CONNECT):
+        if mujoco.mjtEq(int(model.eq_type[e])) not in (mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_CONNECT):
             continue
         ids = (int(model.eq_obj1id[e]), int(model.eq_obj2id[e]))
         if model.eq_objtype[e] == mujoco.mjtObj.mjOBJ_SITE:

@@ -1,0 +1,29 @@
+"""Engines by name. An engine's module is imported when it is first asked for, so that the native one needs no MJX."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+from ig2mj.engine.base import Engine
+from ig2mj.errors import UnknownNameError
+from ig2mj.scene.scene import Scene
+
+ENGINES = {"native": "ig2mj.engine.native:NativeEngine"}
+"""Name: module and class."""
+
+
+def make_engine(name: str, scene: Scene, num_worlds: int = 1, **options: Any) -> Engine:
+    """Makes an engine for a scene.
+
+    Args:
+      name: a key of ENGINES.
+      options: keyword arguments of the engine's class, e.g. `boxes="igibson"`.
+
+    Raises:
+      UnknownNameError: no such engine. EngineError: the engine cannot run this scene.
+    """
+    if name not in ENGINES:
+        raise UnknownNameError("engine", name, ENGINES)
+    module, kind = ENGINES[name].split(":")
+    return getattr(importlib.import_module(module), kind)(scene, num_worlds, **options)

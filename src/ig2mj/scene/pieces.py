@@ -1,0 +1,115 @@
+"""Convex collision pieces of a compiled model: the half-spaces, corners and local boxes of `SceneTables.piece_*`.
+
+All in the geom's own frame as MuJoCo compiled it: the compiler moves a mesh to its centre of inertia and principal axes
+and moves the geom's pose the other way, so the compiled vertices and the compiled geom pose belong together.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import mujoco
+import numpy as np
+import scipy.spatial
+
+from ig2mj.scene.tables import PieceKind
+
+SAME_FACET = 1e-3
+"""Facets whose unit normals differ by less are one facet: triangles of one flat side, not a design choice."""
+
+SUPPORTED = {
+    mujoco.mjtGeom.mjGEOM_SPHERE: PieceKind.SPHERE,
+    mujoco.mjtGeom.mjGEOM_CAPSULE: PieceKind.CAPSULE,
+    mujoco.mjtGeom.mjGEOM_CYLINDER: PieceKind.CYLINDER,
+    mujoco.mjtGeom.mjGEOM_BOX: PieceKind.POLYHEDRON,
+    mujoco.mjtGeom.mjGEOM_MESH: PieceKind.POLYHEDRON,
+}
+
+
+@dataclasses.dataclass(frozen=True)
+class Piece:
+    """One convex piece in its own frame.
+
+    planes [n, 4]: half-spaces (nx, ny, nz, d) with n.x <= d, unit normals; empty for round primitives.
+    vertices [v, 3]: corners; of a round primitive the corners of its box.
+    center, half: [3] box in the piece's frame.
+    """
+
+    kind: PieceKind
+    planes: np.ndarray
+    vertices: np.ndarray
+    center: np.ndarray
+    half: np.ndarray
+
+
+def hull_planes(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Half-spaces and corners of the convex hull of points [n, 3]; triangles of one flat side give one half-space.
+
+    Every point lies inside every half-space: distances are those of the farthest point.
+
+    Returns:
+      planes [m, 4], corners [k, 3] in the order of `vertices`.
+    """
+    try:
+        hull = scipy.spatial.ConvexHull(vertices)
+    except scipy.spatial.QhullError:
+        hull = scipy.spatial.ConvexHull(vertices, qhull_options="QJ")  # nearly flat: joggle
+    corners = vertices[np.sort(hull.vertices)]
+    normals = hull.equations[:, :3]
+    # A union-find would chain gently curved sides into one facet; comparing with the group's first member does not.
+    kept: list[np.ndarray] = []
+    for normal in normals:
+        if not kept or np.min(np.max(np.abs(np.asarray(kept) - normal), axis=1)) > SAME_FACET:
+            kept.append(normal)
+    planes = np.array(kept)
+    return np.concatenate([planes, np.max(planes @ corners.T, axis=1, keepdims=True)], 1), corners
+
+
+def mesh_corners(model: mujoco.MjModel, mesh: int) -> np.ndarray:
+    """Vertices [v, 3] that MuJoCo collides with: those of its convex hull, where it has one, else all."""
+    start, count = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
+    vertices = np.asarray(model.mesh_vert[start : start + count], np.float64)
+    graph = model.mesh_graphadr[mesh]
+    if graph < 0:
+        return vertices
+    number = model.mesh_graph[graph]  # layout: numvert, numface, edge address per vertex, vertex ids, ...
+    return vertices[np.sort(model.mesh_graph[graph + 2 + number : graph + 2 + 2 * number])]
+
+
+def _box_piece(half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1], indexing="ij")).reshape(3, 8).T
+    planes = np.concatenate([np.concatenate([np.eye(3), -np.eye(3)]), np.tile(half, 2)[:, None]], 1)
+    return planes, signs * half
+
+
+def make_pieces(model: mujoco.MjModel, geoms: np.ndarray) -> list[Piece]:
+    """Pieces of the given geoms [K], in their order.
+
+    Raises:
+      ValueError: a geom is no convex solid (plane, height field, ellipsoid, SDF); the message is its name.
+    """
+    meshes: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+    pieces = []
+    for geom in geoms:
+        shape, size = mujoco.mjtGeom(int(model.geom_type[geom])), np.asarray(model.geom_size[geom])
+        kind = SUPPORTED.get(shape)
+        if kind is None:
+            raise ValueError(model.geom(geom).name)
+        if shape == mujoco.mjtGeom.mjGEOM_MESH:
+            mesh = int(model.geom_dataid[geom])
+            if mesh not in meshes:
+                meshes[mesh] = hull_planes(mesh_corners(model, mesh))
+            planes, vertices = meshes[mesh]
+        else:
+            radius = size[0]
+            half = {
+                mujoco.mjtGeom.mjGEOM_SPHERE: np.array([radius, radius, radius]),
+                mujoco.mjtGeom.mjGEOM_CAPSULE: np.array([radius, radius, radius + size[1]]),
+                mujoco.mjtGeom.mjGEOM_CYLINDER: np.array([radius, radius, size[1]]),
+            }.get(shape, size)
+            planes, vertices = _box_piece(half)
+            if kind != PieceKind.POLYHEDRON:
+                planes = np.zeros((0, 4))
+        low, high = vertices.min(0), vertices.max(0)
+        pieces.append(Piece(kind, planes, vertices, (low + high) / 2, (high - low) / 2))
+    return pieces

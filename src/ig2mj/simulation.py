@@ -1,0 +1,181 @@
+"""`Simulation`: one world, for people: step it, move things by name, look at it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ig2mj.engine.base import Engine, Write
+from ig2mj.engine.registry import make_engine
+from ig2mj.engine.view import PhysicsView
+from ig2mj.errors import EngineError, PoseError, UnknownNameError
+from ig2mj.scene.scene import Scene, load_scene
+
+Vector = Sequence[float] | np.ndarray
+
+
+class Simulation:
+    """One world of a scene on any engine.
+
+    Attributes:
+      scene: the household. engine: what steps it. physics: the engine's state; use what the methods give instead.
+    """
+
+    def __init__(self, scene: Scene | str | os.PathLike, engine: str | Engine = "native", **options: Any):
+        """Starts at the scene's initial state.
+
+        Args:
+          scene: a loaded scene, or what `load_scene` takes.
+          engine: an engine's name, or an engine made for this scene with one world.
+          options: go to the engine, where it is given by name, e.g. `boxes="igibson"`.
+        """
+        self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
+        self.engine: Engine = make_engine(engine, self.scene, 1, **options) if isinstance(engine, str) else engine
+        if self.engine.num_worlds != 1:
+            raise EngineError(f"a Simulation is one world, and the engine has {self.engine.num_worlds}")
+        self.physics = self.engine.reset()
+
+    @property
+    def time(self) -> float:
+        """Simulated seconds since the reset."""
+        return float(np.asarray(self.engine.time(self.physics))[0])
+
+    @property
+    def view(self) -> PhysicsView:
+        """Everything that states and predicates know of physics; world axis of length 1."""
+        return self.engine.view(self.physics)
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """MuJoCo's model of this world."""
+        return self.engine.to_mujoco(self.physics, 0)[0]
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's data of this world: live on the native engine (call `forward` after changing it), else a copy."""
+        return self.engine.to_mujoco(self.physics, 0)[1]
+
+    def reset(self) -> PhysicsView:
+        """Back to the scene's initial state."""
+        self.physics = self.engine.reset()
+        return self.view
+
+    def step(self, ctrl: Vector | None = None, count: int = 1) -> PhysicsView:
+        """Takes `count` control steps.
+
+        Args:
+          ctrl: [nu] controls of the agents' actuators; None keeps the last ones.
+
+        Raises:
+          EngineError: ctrl has another length than the model has actuators, or the physics went wrong.
+        """
+        row = None
+        if ctrl is not None:
+            row = np.asarray(ctrl, np.float64)
+            if row.shape != (self.scene.model.nu,):
+                raise EngineError(
+                    f"ctrl has shape {row.shape}; scene '{self.scene.name}' has {self.scene.model.nu} actuators"
+                )
+            row = row[None]
+        view = self.view
+        for _ in range(count):
+            self.physics, view = self.engine.step(self.physics, row)
+            row = None
+        return view
+
+    def forward(self) -> PhysicsView:
+        """Brings everything derived up to date without passing time."""
+        self.physics = self.engine.write(self.physics, Write())
+        return self.view
+
+    def object_pose(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Frame of an object's main body: position [3] (m) and quaternion [4] (w-x-y-z), world frame."""
+        index, view = self.scene.object_index(name), self.view
+        return np.array(view.object_pos[0, index], np.float64), np.array(view.object_quat[0, index], np.float64)
+
+    def set_object_pose(self, name: str, pos: Vector, quat_wxyz: Vector | None = None) -> PhysicsView:
+        """Puts an object somewhere, at rest and awake.
+
+        Args:
+          pos: [3] m, world frame, of the main body's frame.
+          quat_wxyz: [4], of any length but zero; None keeps the rotation.
+
+        Raises:
+          UnknownNameError: no such object. PoseError: it is fixed, or the pose is no pose.
+        """
+        index = self.scene.object_index(name)
+        if self.scene.tables.object_fixed[index]:
+            raise PoseError(f"object '{name}' is fixed to the house and cannot be moved (its joints can: set_joint)")
+        place = _finite(pos, 3, f"position of object '{name}'")
+        turn = self.object_pose(name)[1] if quat_wxyz is None else _finite(quat_wxyz, 4, f"rotation of object '{name}'")
+        length = float(np.linalg.norm(turn))
+        if length < 1e-6:
+            raise PoseError(f"the rotation of object '{name}' is the zero quaternion (w, x, y, z is wanted)")
+        number = len(self.scene.object_names)
+        mask, at, to = np.zeros((1, number), bool), np.zeros((1, number, 3)), np.zeros((1, number, 4))
+        mask[0, index], at[0, index], to[0, index] = True, place, turn / length
+        self.physics = self.engine.write(self.physics, Write(object_mask=mask, object_pos=at, object_quat=to))
+        return self.view
+
+    def joint(self, name: str) -> float:
+        """Position of a hinge (rad) or slide (m). Raises UnknownNameError; PoseError for a free joint."""
+        return float(self.data.qpos[self._joint_address(name)])
+
+    def set_joint(self, name: str, q: float) -> PhysicsView:
+        """Puts a hinge (rad) or slide (m) somewhere, at rest and awake; limits push back in the next step.
+
+        Raises:
+          UnknownNameError: no such joint. PoseError: it is a free joint, or q is not finite.
+        """
+        address = self._joint_address(name)
+        mask, values = np.zeros((1, self.scene.model.nq), bool), np.zeros((1, self.scene.model.nq))
+        mask[0, address], values[0, address] = True, _finite([q], 1, f"position of joint '{name}'")[0]
+        self.physics = self.engine.write(self.physics, Write(qpos_mask=mask, qpos=values))
+        return self.view
+
+    def render(self, camera: Any = None, *, width: int = 640, height: int = 480, **options: Any) -> np.ndarray:
+        """A picture, uint8 [height, width, 3].
+
+        Args:
+          camera: a camera's name or number, an `ig2mj.viewer.offscreen.FreeView`, or None for an overview.
+          options: see `ig2mj.viewer.offscreen.render`.
+        """
+        from ig2mj.viewer import offscreen
+
+        model, data = self.engine.to_mujoco(self.physics, 0)
+        return offscreen.render(model, data, camera, width=width, height=height, **options)
+
+    def launch_viewer(self, **options: Any) -> Any:
+        """Opens MuJoCo's viewer on this world; see `ig2mj.viewer.interactive`."""
+        from ig2mj.viewer import interactive
+
+        return interactive.launch(self, **options)
+
+    def _joint_address(self, name: str) -> int:
+        model = self.scene.model
+        number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
+        if number < 0:
+            raise UnknownNameError("joint", name, [model.joint(j).name for j in range(model.njnt)])
+        if mujoco.mjtJoint(int(model.jnt_type[number])) not in (
+            mujoco.mjtJoint.mjJNT_HINGE,
+            mujoco.mjtJoint.mjJNT_SLIDE,
+        ):
+            raise PoseError(f"joint '{name}' is no hinge and no slide (use set_object_pose)")
+        return int(model.jnt_qposadr[number])
+
+
+def _finite(values: Vector, length: int, what: str) -> np.ndarray:
+    """The values as float64 [length]. Raises PoseError."""
+    try:
+        array = np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        raise PoseError(f"the {what} is no list of numbers: {values!r}") from None
+    if array.shape != (length,):
+        raise PoseError(f"the {what} needs {length} numbers, not an array of shape {array.shape}")
+    if not np.isfinite(array).all():
+        raise PoseError(f"the {what} is not finite: {array.tolist()}")
+    return array
