@@ -1,0 +1,111 @@
+"""Contacts of an MJX step, reduced to what the view needs. Pure JAX, all worlds at once.
+
+MJX-Warp keeps one flat contact list for all worlds (design section 2, fact 10), MJX-JAX one list per world; both are
+brought to one form, and reduced with one scatter.
+
+Axes: C contacts, U units, W worlds, L links, O objects.
+"""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+from flax import struct
+from jaxtyping import Bool, Float, Int
+from mujoco import mjx
+
+from ig2mj.engine.layout import ModelLayout
+from ig2mj.engine.view import Array
+
+
+@struct.dataclass
+class Contacts:
+    """A flat contact list. `valid`: the row holds a contact. `geom`: the two geoms. `dist`: metres, negative inside.
+
+    `efc_address`: rows of the constraint list that carry the contact's force, -1 none; `edges`: how many of them add up
+    to the normal force (all edges of a pyramid, the first row of an elliptic cone).
+    """
+
+    valid: Bool[Array, "C"]
+    world: Int[Array, "C"]
+    geom: Int[Array, "C 2"]
+    dist: Float[Array, "C"]
+    efc_address: Int[Array, "C E"]
+
+
+def warp_contacts(data: mjx.Data) -> Contacts:
+    """Contacts of a batch of MJX-Warp data."""
+    impl = data._impl
+    count = impl.contact__dist.shape[0]
+    return Contacts(
+        valid=jnp.arange(count) < impl.nacon[0],
+        world=impl.contact__worldid,
+        geom=impl.contact__geom,
+        dist=impl.contact__dist,
+        efc_address=impl.contact__efc_address,
+    )
+
+
+def jax_contacts(data: mjx.Data) -> Contacts:
+    """Contacts of a batch of MJX-JAX data; geoms of padding rows are -1."""
+    contact = data._impl.contact
+    worlds, count = contact.dist.shape
+    dim = contact.dim[0] if contact.dim.ndim == 2 else contact.dim
+    edges = int(max((2 * (int(d) - 1) for d in dim), default=1)) if len(dim) else 1
+    address = contact.efc_address[..., None] + jnp.arange(edges)
+    return Contacts(
+        valid=(contact.geom[..., 0] >= 0).reshape(-1),
+        world=jnp.repeat(jnp.arange(worlds), count),
+        geom=contact.geom.reshape(-1, 2),
+        dist=contact.dist.reshape(-1),
+        efc_address=jnp.where(contact.efc_address[..., None] >= 0, address, -1).reshape(-1, edges),
+    )
+
+
+def touching_units(
+    contacts: Contacts,
+    layout: ModelLayout,
+    tolerance: float,
+    remembered: Bool[Array, "W U U"],
+    unit_fresh: Bool[Array, "W U"],
+) -> Bool[Array, "W U U"]:
+    """Touching of units after a step.
+
+    Args:
+      contacts: of the last physics step.
+      layout: which unit a geom belongs to.
+      tolerance: metres.
+      remembered: touching before the step.
+      unit_fresh: the unit is awake. Only pairs with an awake unit have contacts; all others keep their value.
+    """
+    geom_unit = jnp.asarray(layout.geom_unit)
+    unit = geom_unit[jnp.maximum(contacts.geom, 0)]
+    near = contacts.valid & (unit >= 0).all(-1) & (contacts.geom >= 0).all(-1) & (contacts.dist <= tolerance)
+    world = jnp.where(near, contacts.world, remembered.shape[0])  # out of range: dropped
+    now = jnp.zeros_like(remembered).at[world, unit[:, 0], unit[:, 1]].set(True, mode="drop")
+    fresh = unit_fresh[:, :, None] | unit_fresh[:, None, :]
+    return jnp.where(fresh, now | now.swapaxes(1, 2), remembered)
+
+
+def link_forces(
+    contacts: Contacts,
+    layout: ModelLayout,
+    geom_object: Int[Array, "G"],
+    efc_force: Float[Array, "W N"],
+    pyramidal: bool,
+    num_objects: int,
+    num_links: int,
+) -> Float[Array, "W L O"]:
+    """Largest normal force (N) of a single contact between each annotated link's geom and each object."""
+    geom = jnp.maximum(contacts.geom, 0)
+    address = contacts.efc_address
+    rows = efc_force[jnp.clip(contacts.world, 0, efc_force.shape[0] - 1)[:, None], jnp.maximum(address, 0)]
+    rows = jnp.where((address >= 0) & (address < efc_force.shape[1]), rows, 0.0)
+    normal = rows.sum(-1) if pyramidal else rows[:, 0]
+    link = jnp.asarray(layout.link_of_geom)[geom]
+    thing = jnp.asarray(geom_object)[geom]
+    force = jnp.zeros((efc_force.shape[0], num_links, num_objects), jnp.float32)
+    for side in (0, 1):
+        usable = contacts.valid & (link[:, side] >= 0) & (thing[:, 1 - side] >= 0)
+        world = jnp.where(usable, contacts.world, force.shape[0])
+        force = force.at[world, link[:, side], thing[:, 1 - side]].max(normal, mode="drop")
+    return force

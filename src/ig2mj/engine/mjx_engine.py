@@ -1,0 +1,303 @@
+"""What the two MJX engines share: physics as a pytree, control steps, writes, snapshots. Pure functions under JAX.
+
+A batch is MJX data whose arrays begin with the world axis. Kinematics are computed for every body in every step, so
+positions, sleep and a few more arrays are all of a world's state: replacing a world replaces just these.
+"""
+
+from __future__ import annotations
+
+import abc
+import copy
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from flax import struct
+from jaxtyping import Bool, Float, Int
+from mujoco import mjx
+
+from ig2mj.engine.base import BOX_RULES, PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snapshot, Write
+from ig2mj.engine.layout import ModelLayout, make_layout
+from ig2mj.engine.mjx_contacts import Contacts, link_forces, touching_units
+from ig2mj.engine.mjx_view import ViewPlan, make_view, plan_view
+from ig2mj.engine.mjx_write import apply_write
+from ig2mj.engine.sleep import FULLY_AWAKE
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.errors import EngineError
+from ig2mj.scene.scene import Scene
+
+STATE_FIELDS = ("qpos", "qvel", "act", "ctrl", "qacc_warmstart", "eq_active", "mocap_pos", "mocap_quat", "time")
+"""Fields of MJX data that are state, and that a `Snapshot` has by the same name."""
+
+
+@struct.dataclass
+class MjxPhysics:
+    """Physics of a batch.
+
+    Attributes:
+      data: MJX data; arrays begin with the world axis, but for Warp's contact list (design section 2, fact 10).
+      eq_data: parameters of the equality constraints of each world.
+      touching: of units, as of the last step. link_force: newtons, of the last control step.
+      overflow: or of MJX-Warp's overflow flags since the world was loaded (`ig2mj.engine.guards`).
+    """
+
+    data: Any
+    eq_data: Float[Array, "W E 12"]
+    touching: Bool[Array, "W U U"]
+    link_force: Float[Array, "W L O"]
+    overflow: Int[Array, "W"]
+
+
+class MjxEngine(abc.ABC):
+    """The `Engine` protocol on MJX; subclasses choose the implementation. See `ig2mj.engine.base`.
+
+    Contacts of the view are those of the last physics step, that is of positions 1/120 s before the poses, as in
+    Bullet and iGibson.
+    """
+
+    name: str
+    pure = True
+
+    def __init__(
+        self,
+        scene: Scene,
+        num_worlds: int = 1,
+        *,
+        substeps: int = SUBSTEPS,
+        timestep: float = PHYSICS_TIMESTEP,
+        touch_tolerance: float = TOUCH_TOLERANCE,
+        boxes: str = "tight",
+        initial: Snapshot | None = None,
+    ):
+        """Makes an engine.
+
+        Args:
+          scene: shared by all worlds.
+          num_worlds: W.
+          substeps, timestep: physics steps in a control step, and their length in seconds.
+          touch_tolerance: metres.
+          boxes: rule of the view's world boxes, "tight" or "igibson".
+          initial: where `reset` starts every world, without the world axis; None: the scene's initial state.
+
+        Raises:
+          EngineError: an argument is out of range, or MJX cannot run the scene.
+        """
+        if boxes not in BOX_RULES:
+            raise EngineError(f"there is no box rule '{boxes}' (rules: {', '.join(BOX_RULES)})")
+        if num_worlds < 1 or substeps < 1 or not timestep > 0:
+            raise EngineError(
+                f"num_worlds = {num_worlds}, substeps = {substeps}, timestep = {timestep}: all must be positive"
+            )
+        self.scene, self.tables, self.num_worlds = scene, scene.tables, num_worlds
+        self.substeps, self.timestep, self.boxes = substeps, timestep, boxes
+        self.touch_tolerance = touch_tolerance
+        self.host_model = self._host_model(scene.model)
+        self.layout: ModelLayout = make_layout(self.host_model, self.tables)
+        self.plan: ViewPlan = plan_view(self.host_model, self.tables, self.layout, boxes)
+        self._initial = initial
+        self._pyramidal = self.host_model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
+        self._has_blades = bool((self.tables.link_geom >= 0).any())
+        try:
+            self.model = self._put_model(self.host_model)
+            self._template = self._put_data(self.host_model, self._host_data())
+        except (NotImplementedError, ValueError) as e:
+            raise EngineError(f"MJX ({self.name}) cannot run scene '{scene.name}': {e}") from e
+
+    # What the implementations differ in.
+
+    @abc.abstractmethod
+    def _put_model(self, model: mujoco.MjModel) -> mjx.Model: ...
+
+    @abc.abstractmethod
+    def _put_data(self, model: mujoco.MjModel, data: mujoco.MjData) -> mjx.Data: ...
+
+    @abc.abstractmethod
+    def _contacts(self, data: mjx.Data) -> Contacts: ...
+
+    @abc.abstractmethod
+    def _efc_force(self, data: mjx.Data) -> Float[Array, "W N"]: ...
+
+    @abc.abstractmethod
+    def _tree_asleep(self, data: mjx.Data) -> Int[Array, "W T"]: ...
+
+    @abc.abstractmethod
+    def _with_sleep(self, data: mjx.Data, asleep: Int[Array, "W T"], awake: Bool[Array, "W T"]) -> mjx.Data: ...
+
+    @abc.abstractmethod
+    def _overflow(self, data: mjx.Data) -> Int[Array, "W"]: ...
+
+    # The protocol.
+
+    def reset(self) -> MjxPhysics:
+        """All worlds at the initial state."""
+        worlds, tables = self.num_worlds, self.tables
+        spread = jax.vmap(lambda ctrl: self._template.replace(ctrl=ctrl))
+        data = spread(jnp.tile(self._template.ctrl, (worlds, 1)))
+        units = self.layout.num_units
+        physics = MjxPhysics(
+            data=data,
+            eq_data=jnp.tile(jnp.asarray(self.host_model.eq_data, jnp.float32), (worlds, 1, 1)),
+            touching=jnp.zeros((worlds, units, units), bool),
+            link_force=jnp.zeros((worlds, len(tables.link_object), tables.num_objects), jnp.float32),
+            overflow=jnp.zeros(worlds, jnp.int32),
+        )
+        if self._initial is not None:
+            return jax.jit(self.load)(physics, self._initial)
+        return jax.jit(self._refresh)(physics)
+
+    def step(self, physics: MjxPhysics, ctrl: Float[Array, "W nu"] | None = None) -> tuple[MjxPhysics, PhysicsView]:
+        """One control step of every world; see `Engine.step`."""
+        data, force, overflow = physics.data, jnp.zeros_like(physics.link_force), physics.overflow
+        if ctrl is not None:
+            data = data.replace(ctrl=jnp.asarray(ctrl, jnp.float32))
+        awake = self._tree_asleep(data) < 0
+        for _ in range(self.substeps):
+            awake = self._tree_asleep(data) < 0
+            data = self._advance(data, physics.eq_data)
+            overflow |= self._overflow(data)
+            if self._has_blades:
+                force = jnp.maximum(force, self._link_forces(data))
+        touching = self._touching(data, physics.touching, awake)
+        data = self._kinematics(data)
+        physics = dataclasses.replace(physics, data=data, touching=touching, link_force=force, overflow=overflow)
+        return physics, self.view(physics)
+
+    def view(self, physics: MjxPhysics) -> PhysicsView:
+        """The view of the present state."""
+        data = physics.data
+        return make_view(
+            self.plan,
+            data.qpos,
+            data.xpos,
+            data.xquat,
+            self._tree_asleep(data) < 0,
+            physics.touching,
+            physics.link_force,
+            data.eq_active.astype(bool),
+        )
+
+    def time(self, physics: MjxPhysics) -> Float[Array, "W"]:
+        """Simulated seconds since each world's reset."""
+        return physics.data.time
+
+    def write(self, physics: MjxPhysics, write: Write) -> MjxPhysics:
+        """Applies a change; see `Engine.write`. Costs a forward pass of all worlds where any world is written to."""
+        data = physics.data
+        asleep = self._tree_asleep(data)
+        qpos, qvel, tree_moved = apply_write(self.layout, self.host_model, data.qpos, data.qvel, write)
+        eq_active = data.eq_active if write.eq_active is None else jnp.asarray(write.eq_active, data.eq_active.dtype)
+        eq_data = physics.eq_data if write.eq_data is None else jnp.asarray(write.eq_data, jnp.float32)
+        changed = tree_moved.any() | (eq_active != data.eq_active).any() | (eq_data != physics.eq_data).any()
+        data = data.replace(qpos=qpos, qvel=qvel, eq_active=eq_active)
+        data = self._with_sleep(
+            data, jnp.where(tree_moved & (asleep < 0), FULLY_AWAKE, asleep), (asleep < 0) | tree_moved
+        )
+        physics = dataclasses.replace(physics, data=data, eq_data=eq_data)
+        return jax.lax.cond(changed, self._refresh, lambda p: p, physics)
+
+    def export(self, physics: MjxPhysics, world: int) -> Snapshot:
+        """One world as a snapshot in numpy arrays of its own."""
+        if not 0 <= world < self.num_worlds:
+            raise EngineError(f"there is no world {world}: this engine has {self.num_worlds}")
+        data = physics.data
+        fields = {name: np.array(getattr(data, name)[world]) for name in STATE_FIELDS}
+        fields["eq_active"] = fields["eq_active"].astype(bool)
+        return Snapshot(
+            **fields,
+            eq_data=np.array(physics.eq_data[world]),
+            tree_asleep=np.array(self._tree_asleep(data)[world]),
+            touching=np.array(physics.touching[world]),
+        )
+
+    def load(self, physics: MjxPhysics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> MjxPhysics:
+        """Replaces worlds by snapshots; see `Engine.load`. Raises EngineError where it is of another scene."""
+        if snapshot.qpos.shape[-1] != self.host_model.nq:
+            raise EngineError(
+                f"a snapshot with {snapshot.qpos.shape[-1]} coordinates does not fit scene '{self.scene.name}', which "
+                f"has {self.host_model.nq} (load it into the scene, with the agents, that it was saved from)"
+            )
+        chosen = jnp.ones(self.num_worlds, bool) if mask is None else jnp.asarray(mask, bool)
+        batched = snapshot.qpos.ndim == 2
+
+        def put(new: Any, old: Array) -> Array:
+            new = jnp.asarray(new).astype(old.dtype)
+            shape = (-1,) + (1,) * (old.ndim - 1)
+            return jnp.where(chosen.reshape(shape), new if batched else new[None], old)
+
+        data = physics.data
+        data = data.replace(**{name: put(getattr(snapshot, name), getattr(data, name)) for name in STATE_FIELDS})
+        asleep = put(snapshot.tree_asleep, self._tree_asleep(data))
+        data = self._with_sleep(data, asleep, asleep < 0)
+        return dataclasses.replace(
+            physics,
+            data=self._kinematics(data),
+            eq_data=put(snapshot.eq_data, physics.eq_data),
+            touching=put(snapshot.touching, physics.touching),
+            link_force=jnp.where(chosen[:, None, None], 0.0, physics.link_force),
+            overflow=jnp.where(chosen, 0, physics.overflow),
+        )
+
+    # Stages.
+
+    def _advance(self, data: mjx.Data, eq_data: Float[Array, "W E 12"]) -> mjx.Data:
+        """One physics step of every world."""
+        return self._mapped(mjx.step, data, eq_data)
+
+    def _kinematics(self, data: mjx.Data) -> mjx.Data:
+        """Body poses of the present positions."""
+        return jax.vmap(lambda d: mjx.kinematics(self.model, d))(data)
+
+    def _refresh(self, physics: MjxPhysics) -> MjxPhysics:
+        """Everything derived, of the present positions; wakes what was marked. No forces are reported."""
+        data = self._mapped(mjx.forward, physics.data, physics.eq_data)
+        awake = self._tree_asleep(data) < 0
+        return dataclasses.replace(
+            physics,
+            data=data,
+            touching=self._touching(data, physics.touching, awake),
+            link_force=jnp.zeros_like(physics.link_force),
+        )
+
+    def _mapped(self, act: Any, data: mjx.Data, eq_data: Float[Array, "W E 12"]) -> mjx.Data:
+        if self.host_model.neq == 0:
+            return jax.vmap(lambda d: act(self.model, d))(data)
+        return jax.vmap(lambda e, d: act(self.model.replace(eq_data=e), d))(eq_data, data)
+
+    def _touching(
+        self, data: mjx.Data, remembered: Bool[Array, "W U U"], tree_awake: Bool[Array, "W T"]
+    ) -> Bool[Array, "W U U"]:
+        """`tree_awake`: as the step that made the contacts began; what woke in it is awake now."""
+        tree = self.layout.unit_tree
+        fresh_tree = tree_awake | (self._tree_asleep(data) < 0)
+        fresh = (
+            fresh_tree[:, np.maximum(tree, 0)] & (tree >= 0)
+            if self.host_model.ntree
+            else jnp.zeros((remembered.shape[0], len(tree)), bool)
+        )
+        return touching_units(self._contacts(data), self.layout, self.touch_tolerance, remembered, fresh)
+
+    def _link_forces(self, data: mjx.Data) -> Float[Array, "W L O"]:
+        return link_forces(
+            self._contacts(data),
+            self.layout,
+            jnp.asarray(self.tables.geom_object),
+            self._efc_force(data),
+            self._pyramidal,
+            self.tables.num_objects,
+            len(self.tables.link_object),
+        )
+
+    def _host_model(self, model: mujoco.MjModel) -> mujoco.MjModel:
+        own = copy.copy(model)
+        own.opt.timestep = self.timestep
+        return own
+
+    def _host_data(self) -> mujoco.MjData:
+        data = mujoco.MjData(self.host_model)
+        if self.host_model.nkey:
+            mujoco.mj_resetDataKeyframe(self.host_model, data, 0)
+        mujoco.mj_forward(self.host_model, data)
+        return data

@@ -1,0 +1,83 @@
+"""`EngineProfile`: how large the Warp engine's buffers are. Written by `ig2mj calibrate`, read by the engine.
+
+MJX-Warp allocates per world for the most degrees of freedom awake at once, the most constraint rows and the most
+contacts. What does not fit is lost, and the world is flagged (`ig2mj.engine.guards`). Tight buffers are what makes a
+batch fast (design section 2, fact 4), so they are measured per scene and kept beside its manifest.
+"""
+
+from __future__ import annotations
+
+import os
+import pathlib
+
+import msgspec
+import mujoco
+
+from ig2mj.errors import InputError
+
+PROFILE_FILE = "engine_profile.json"
+
+
+class EngineProfile(msgspec.Struct, omit_defaults=True):
+    """Sizes of the Warp engine's buffers, per world.
+
+    Attributes:
+      awake_dofs: degrees of freedom awake at once (`nvmax`).
+      constraints: constraint rows (`njmax`).
+      contacts: contacts, on average over the worlds of a batch: the list is shared by all (`naconmax` / W).
+      convex_contacts: contacts found by the general convex routine, likewise (`naccdmax` / W).
+      measured: what the sizes come from: peaks, safety factor, versions. For people; not read back.
+    """
+
+    awake_dofs: int
+    constraints: int
+    contacts: int
+    convex_contacts: int
+    measured: dict[str, float | int | str] = {}
+
+
+def default_profile(model: mujoco.MjModel) -> EngineProfile:
+    """Sizes that hold whatever a household scene does: everything awake, every geom in contact with several others."""
+    geoms = int(((model.geom_contype != 0) | (model.geom_conaffinity != 0)).sum())
+    moving = int((model.body_treeid[model.geom_bodyid] >= 0).sum())
+    contacts = max(64, 8 * min(moving, geoms))
+    limits = int(model.jnt_limited.sum())
+    friction = int((model.dof_frictionloss > 0).sum())
+    return EngineProfile(
+        awake_dofs=int(model.nv),
+        constraints=4 * contacts + limits + friction + 6 * int(model.neq),
+        contacts=contacts,
+        convex_contacts=contacts,
+    )
+
+
+def load_profile(folder: str | os.PathLike, model: mujoco.MjModel) -> EngineProfile:
+    """The profile beside a scene's manifest, or the safe default where there is none.
+
+    Raises:
+      InputError: the file is broken.
+    """
+    file = pathlib.Path(folder) / PROFILE_FILE
+    if not file.exists():
+        return default_profile(model)
+    mend = "run `ig2mj calibrate` again, or delete the file"
+    try:
+        profile = msgspec.json.decode(file.read_bytes(), type=EngineProfile)
+    except msgspec.MsgspecError as e:
+        raise InputError(file, f"is no engine profile: {e}", mend=mend) from e
+    for name in ("awake_dofs", "constraints", "contacts", "convex_contacts"):
+        if getattr(profile, name) < 1:
+            raise InputError(file, "must be at least 1", element=name, mend=mend)
+    return fit(profile, model)
+
+
+def fit(profile: EngineProfile, model: mujoco.MjModel) -> EngineProfile:
+    """The profile with no more awake degrees of freedom than the model has."""
+    return msgspec.structs.replace(profile, awake_dofs=min(profile.awake_dofs, int(model.nv)))
+
+
+def save_profile(profile: EngineProfile, folder: str | os.PathLike) -> pathlib.Path:
+    """Writes the profile beside the manifest and says where."""
+    file = pathlib.Path(folder) / PROFILE_FILE
+    file.write_bytes(msgspec.json.format(msgspec.json.encode(profile), indent=1) + b"\n")
+    return file
