@@ -1,4 +1,4 @@
-"""A scene as MJCF and manifest entries: every object at its place, the unused ones parked, the start state as keyframe."""
+"""A scene as MJCF and manifest entries: objects at their places, unused ones parked, the start state as keyframe."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .mjcf_object import ObjectElements, add_object, pos_quat
 from .model_builder import HIDDEN_GROUP, ModelBuilder
 from .parking import park
 from .placements import Placement
-from .poses import rotation_from_wxyz, wxyz
+from .poses import rotation_from_wxyz
 from .setting import add_setting
 
 #: The start state: joint positions as saved, or 0 brought inside the limits (dataset_format.md section 7).
@@ -118,7 +118,7 @@ def root_poses(placement: Placement, assembly: Assembly) -> list[np.ndarray]:
 
 
 def _saved_poses(placement: Placement, assembly: Assembly) -> list[np.ndarray]:
-    """Base-frame poses out of `base_poses` (centres of mass, x-y-z-w), one per root; [] where there are none."""
+    """Base-frame poses out of `base_poses` (centres of mass, w-x-y-z by now), one per root; [] where there are none."""
     saved = placement.instance.base_poses
     roots = assembly.roots
     if not saved or len(saved) != len(roots):
@@ -126,7 +126,7 @@ def _saved_poses(placement: Placement, assembly: Assembly) -> list[np.ndarray]:
     poses = []
     for index, (position, quat) in zip(roots, saved, strict=True):
         pose = np.eye(4)
-        pose[:3, :3] = rotation_from_wxyz(wxyz(np.asarray(quat, float)))
+        pose[:3, :3] = rotation_from_wxyz(np.asarray(quat, float))
         pose[:3, 3] = np.asarray(position, float) - pose[:3, :3] @ assembly.bodies[index].com
         poses.append(pose)
     return poses
