@@ -22,7 +22,9 @@ def make_table(title: str, columns: Sequence[str], rows: Iterable[Sequence[objec
     """A table of texts. A column whose name starts with '>' is right-aligned."""
     table = Table(title=escape(title), title_justify="left", title_style="bold", box=None, pad_edge=False)
     for column in columns:
-        table.add_column(column.lstrip(">"), justify="right" if column.startswith(">") else "left", overflow="fold")
+        table.add_column(
+            escape(column.lstrip(">")), justify="right" if column.startswith(">") else "left", overflow="fold"
+        )
     for row in rows:
         table.add_row(*[escape(str(cell)) for cell in row])
     return table

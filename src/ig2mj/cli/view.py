@@ -56,7 +56,7 @@ def run(
     for _ in range(round(seconds / timestep)):
         mujoco.mj_step(home.model, data)
     if picture is not None:
-        _write_picture(home, data, picture, _view(home.model, camera, eye, target), size, collision)
+        _write_picture(home, data, picture, _view(home, data, camera, eye, target), size, collision)
         return
     from ig2mj.viewer.interactive import open_viewer
 
@@ -98,16 +98,17 @@ def _check(picture, camera, eye, target, size, seconds) -> None:
             raise Ig2mjError(f"{picture}: the folder {picture.parent} does not exist")
 
 
-def _view(model, camera: str | None, eye: Vec3 | None, target: Vec3 | None):
+def _view(home, data, camera: str | None, eye: Vec3 | None, target: Vec3 | None):
     """A camera's name, or a free view: from a point, or of the whole scene."""
     import math
 
     from ig2mj.viewer.offscreen import FreeView
+    from ig2mj.viewer.overview import home_overview
 
     if camera is not None:
         return camera
     if eye is None or target is None:
-        return FreeView.around(model)
+        return home_overview(home, data)
     dx, dy, dz = (t - e for t, e in zip(target, eye, strict=True))
     flat = math.hypot(dx, dy)
     return FreeView(

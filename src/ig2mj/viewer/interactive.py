@@ -20,6 +20,7 @@ import numpy as np
 from ig2mj.errors import EngineError, MissingDependencyError
 from ig2mj.scene.scene import Scene
 from ig2mj.viewer.overlays import Overlay, default_overlays
+from ig2mj.viewer.overview import home_overview
 
 #: Keys that switch overlays on and off, in their order. MuJoCo's viewer uses 0 to 5 for groups of geoms, and nearly
 #: all letters.
@@ -133,8 +134,9 @@ def open_viewer(
     state = ViewerState(default_overlays(scene) if overlays is None else overlays, paused)
     keys: queue.SimpleQueue[int] = queue.SimpleQueue()
     with _launch(scene.model, data, keys.put) as handle:
-        handle.cam.lookat[:] = scene.model.stat.center
-        handle.cam.distance = 1.5 * scene.model.stat.extent
+        view = home_overview(scene, data)
+        handle.cam.lookat[:] = view.lookat
+        handle.cam.distance, handle.cam.azimuth, handle.cam.elevation = view.distance, view.azimuth, view.elevation
         due = time.monotonic()
         held = 0
         while handle.is_running():

@@ -1,0 +1,195 @@
+"""The command `ig2mj`: statuses, one-line errors, near names, and help that loads nothing heavy."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+import resource
+import subprocess
+import sys
+import types
+
+import pytest
+
+from ig2mj import cli
+from ig2mj.errors import Ig2mjError, InputError
+
+HEAVY = {"jax", "mujoco", "coacd", "trimesh", "warp", "scipy", "ig2mj_converters", "ig2mj_homes"}
+
+
+@pytest.fixture
+def command(monkeypatch):
+    """Registers a sub-command `probe` whose body is the given function."""
+
+    def register(function=None, **subcommands):
+        module = types.ModuleType("ig2mj.cli.probe")
+        if function is not None:
+            module.run = function
+        if subcommands:
+            module.SUBCOMMANDS = subcommands
+        monkeypatch.setitem(sys.modules, "ig2mj.cli.probe", module)
+        monkeypatch.setitem(cli.COMMANDS, "probe", "try something")
+
+    return register
+
+
+def test_a_user_error_is_one_line_on_stderr_and_status_2(command, capsys):
+    def run() -> None:
+        raise InputError("a.urdf", "has no\nlinks", element="robot", mend="add one")
+
+    command(run)
+    assert cli.call(["probe"]) == 2
+    out = capsys.readouterr()
+    assert out.err == "error: a.urdf: robot: has no links (add one)\n"
+    assert out.out == ""
+
+
+@pytest.mark.parametrize("argv", [["--debug", "probe"], ["probe", "--debug"]])
+def test_debug_lets_the_traceback_through(command, argv):
+    def run() -> None:
+        raise InputError("a.urdf", "is broken")
+
+    command(run)
+    with pytest.raises(Ig2mjError):
+        cli.call(argv)
+
+
+def test_an_interrupt_is_status_130(command, capsys):
+    def run() -> None:
+        raise KeyboardInterrupt
+
+    command(run)
+    assert cli.call(["probe"]) == 130
+    assert capsys.readouterr().err == "interrupted\n"
+
+
+def test_an_error_of_ig2mj_itself_is_status_1_and_no_traceback(command, capsys):
+    def run() -> None:
+        raise ZeroDivisionError("by zero")
+
+    command(run)
+    assert cli.call(["probe"]) == 1
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1
+    assert "ZeroDivisionError: by zero" in line
+    assert "--debug" in line
+
+
+def test_a_missing_package_names_the_command_that_installs_it(command, capsys):
+    def run() -> None:
+        raise ModuleNotFoundError("No module named 'coacd'", name="coacd")
+
+    command(run)
+    assert cli.call(["probe"]) == 2
+    assert 'install "ig2mj[convert]"' in capsys.readouterr().err
+
+
+def test_a_file_that_cannot_be_written_is_status_2_and_named(command, capsys):
+    def run() -> None:
+        raise PermissionError(13, "Permission denied", "/x/out.png")
+
+    command(run)
+    assert cli.call(["probe"]) == 2
+    assert capsys.readouterr().err == "error: /x/out.png: Permission denied\n"
+
+
+@pytest.mark.parametrize("status", [0, 1, 3])
+def test_what_a_command_returns_is_the_status(command, status):
+    def run() -> int:
+        return status
+
+    command(run)
+    assert cli.call(["probe"]) == status
+
+
+def test_a_command_that_returns_nothing_is_status_0(command):
+    def run() -> None:
+        pass
+
+    command(run)
+    assert cli.call(["probe"]) == 0
+
+
+def test_typed_parameters_are_the_command_line(command, capsys):
+    def run(number: int, fast: bool = False) -> None:
+        print(number + 1, fast)
+
+    command(run)
+    assert cli.call(["probe", "--number", "4", "--fast"]) == 0
+    assert capsys.readouterr().out == "5 True\n"
+    assert cli.call(["probe", "--number", "four"]) == 2
+    assert cli.call(["probe"]) == 2
+    assert cli.call(["probe", "--number", "4", "--slow"]) == 2
+
+
+def test_nested_commands_are_found_listed_and_corrected(command, capsys):
+    def scene(name: str = "a") -> None:
+        """Does a scene."""
+        print("scene", name)
+
+    command(scene=scene, thing=lambda: None)
+    assert cli.call(["probe", "scene", "--name", "b"]) == 0
+    assert capsys.readouterr().out == "scene b\n"
+    assert cli.call(["probe", "--help"]) == 0
+    assert "Does a scene." in capsys.readouterr().out
+    assert cli.call(["probe", "scen"]) == 2
+    assert "did you mean scene?" in capsys.readouterr().err
+    assert cli.call(["probe"]) == 2
+
+
+def test_an_unknown_command_suggests_near_ones(capsys):
+    assert cli.call(["doktor"]) == 2
+    assert capsys.readouterr().err == "error: 'doktor' is no command (did you mean doctor?)\n"
+    assert cli.call(["zzzz"]) == 2
+    assert "`ig2mj --help` lists them" in capsys.readouterr().err
+
+
+def test_version_is_that_of_the_package(capsys):
+    assert cli.call(["--version"]) == 0
+    assert capsys.readouterr().out.split() == ["ig2mj", importlib.metadata.version("ig2mj")]
+
+
+def test_help_lists_every_command(capsys):
+    assert cli.call(["--help"]) == 0
+    out = capsys.readouterr().out
+    assert all(f"  {name} " in out and text in out for name, text in cli.COMMANDS.items())
+
+
+def test_no_arguments_give_the_help_and_status_2(capsys):
+    assert cli.call([]) == 2
+    assert "commands:" in capsys.readouterr().out
+
+
+def run_help(*argv: str) -> tuple[set[str], float, subprocess.CompletedProcess]:
+    """Heavy modules that the command line loads, its processor seconds, and the finished process."""
+    code = (
+        "import json, sys; from ig2mj import cli; status = cli.call(sys.argv[1:]); "
+        "print(json.dumps(sorted({m.split(chr(46))[0] for m in sys.modules})), file=sys.stderr); sys.exit(status)"
+    )
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    done = subprocess.run([sys.executable, "-c", code, *argv], capture_output=True, text=True)
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    loaded = set(json.loads(done.stderr.splitlines()[-1]))
+    return loaded & HEAVY, (after.ru_utime + after.ru_stime) - (before.ru_utime + before.ru_stime), done
+
+
+def test_help_takes_less_than_a_second_and_loads_nothing_heavy():
+    heavy, seconds, done = run_help("--help")
+    assert done.returncode == 0
+    assert not heavy
+    assert seconds < 1.0
+
+
+@pytest.mark.parametrize("name", list(cli.COMMANDS))
+def test_every_command_exists_and_its_help_loads_no_engine(name):
+    heavy, _, done = run_help(name, "--help")
+    assert done.returncode == 0, done.stderr
+    assert "usage: ig2mj " + name in done.stdout
+    assert not heavy & {"jax", "mujoco", "coacd", "warp"}
+
+
+def test_output_cut_off_by_head_is_no_error(tmp_path):
+    code = "from ig2mj import cli; import sys; sys.exit(cli.call(['--help']))"
+    with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        assert b"Traceback" not in process.stderr.read()

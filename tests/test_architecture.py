@@ -1,0 +1,197 @@
+"""The house's rules: who may import whom, and what is packed (docs/architecture.md)."""
+
+from __future__ import annotations
+
+import ast
+import fnmatch
+import pathlib
+import tomllib
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+SRC = ROOT / "src" / "ig2mj"
+
+#: Rooms of the package, lowest first. One may import itself and what stands before it.
+LAYERS = [
+    "errors",
+    "install_hint",
+    "knowledge",
+    "scene",
+    "geometry",
+    "engine",
+    "states",
+    "predicates",
+    "sampling",
+    "agents",
+    "sensors",
+    "tasks",
+    "envs",
+    "viewer",
+    "simulation",
+    "planning",
+    "learn",
+    "calibration",
+    "diagnosis_probes",
+    "diagnosis",
+    "demos",
+    "cli",
+    "__main__",
+]
+#: Room -> packages that must not appear in it, not even inside a function.
+FORBIDDEN = {
+    "knowledge": {"jax", "flax", "mujoco", "warp", "numpy", "bddl"},
+    "geometry": {"mujoco", "warp"},
+    "states": {"mujoco", "warp"},
+    "predicates": {"mujoco", "warp"},
+}
+#: Packages beside `ig2mj` -> what they may import of it.
+GUESTS = {
+    "converters": ("ig2mj.knowledge", "ig2mj.scene.manifest", "ig2mj.errors", "ig2mj.install_hint"),
+    "homes": ("ig2mj.knowledge", "ig2mj.errors", "ig2mj.install_hint"),
+}
+GUEST_NAMES = {"ig2mj_converters", "ig2mj_homes"}
+
+
+def imports_of(file: pathlib.Path) -> list[tuple[int, str]]:
+    """(line, absolute module name) of every import that runs, also those inside functions.
+
+    What stands under `if TYPE_CHECKING` never runs and does not count. `from a import b` gives "a.b".
+    """
+    tree = ast.parse(file.read_text(encoding="utf-8"), str(file))
+    typing_only = {
+        id(inner)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
+        for statement in node.body
+        for inner in ast.walk(statement)
+    }
+    package = module_name(file).split(".") if file.name == "__init__.py" else module_name(file).split(".")[:-1]
+    found = []
+    for node in ast.walk(tree):
+        if id(node) in typing_only:
+            continue
+        if isinstance(node, ast.Import):
+            found += [(node.lineno, alias.name) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            module = ".".join([*base, *([node.module] if node.module else [])])
+            found += [(node.lineno, f"{module}.{alias.name}") for alias in node.names]
+    return found
+
+
+def module_name(file: pathlib.Path) -> str:
+    for folder, package in ((SRC, "ig2mj"), (ROOT / "converters", "ig2mj_converters"), (ROOT / "homes", "ig2mj_homes")):
+        if file.is_relative_to(folder):
+            parts = file.relative_to(folder).with_suffix("").parts
+            return ".".join([package, *(p for p in parts if p != "__init__")])
+    raise AssertionError(file)
+
+
+def room_of(file: pathlib.Path) -> str:
+    return file.relative_to(SRC).with_suffix("").parts[0]
+
+
+def sources(*folders: pathlib.Path) -> list[pathlib.Path]:
+    return sorted(f for folder in folders for f in folder.rglob("*.py") if "__pycache__" not in f.parts)
+
+
+def test_every_room_of_the_package_has_its_place_in_the_order():
+    rooms = {room_of(f) for f in sources(SRC)} - {"__init__"}
+    assert rooms <= set(LAYERS), f"give {sorted(rooms - set(LAYERS))} a place in LAYERS and in docs/architecture.md"
+
+
+def test_imports_run_downwards_only():
+    wrong = []
+    for file in sources(SRC):
+        room = room_of(file)
+        if room == "__init__":
+            continue
+        for line, name in imports_of(file):
+            parts = name.split(".")
+            if parts[0] == "ig2mj" and len(parts) > 1 and parts[1] in LAYERS:
+                if LAYERS.index(parts[1]) > LAYERS.index(room):
+                    wrong.append(f"{file.relative_to(ROOT)}:{line}: {room} imports {name}")
+            elif parts[0] == "ig2mj" and room not in ("cli", "demos", "__main__"):
+                wrong.append(f"{file.relative_to(ROOT)}:{line}: imports {name} from the public surface")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_only_the_command_line_imports_converters_and_homes():
+    wrong = [
+        f"{file.relative_to(ROOT)}:{line}: {name}"
+        for file in sources(SRC)
+        if room_of(file) != "cli"
+        for line, name in imports_of(file)
+        if name.split(".")[0] in GUEST_NAMES
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("room", FORBIDDEN)
+def test_a_room_does_without_the_engines_it_must_not_know(room):
+    wrong = [
+        f"{file.relative_to(ROOT)}:{line}: {name}"
+        for file in sources(SRC / room)
+        for line, name in imports_of(file)
+        if name.split(".")[0] in FORBIDDEN[room]
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("guest", GUESTS)
+def test_guest_packages_import_no_more_of_ig2mj_than_they_may(guest):
+    allowed = GUESTS[guest]
+    wrong = [
+        f"{file.relative_to(ROOT)}:{line}: {name}"
+        for file in sources(ROOT / guest)
+        for line, name in imports_of(file)
+        if name.split(".")[0] == "ig2mj" and not any(name == a or name.startswith(a + ".") for a in allowed)
+    ]
+    assert not wrong, "\n".join(wrong)
+
+
+def pyproject() -> dict:
+    return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+
+
+def packed_folders() -> dict[str, pathlib.Path]:
+    """Package name -> folder, for each folder with Python files under the roots that pyproject.toml maps."""
+    found = {}
+    for package, root in pyproject()["tool"]["setuptools"]["package-dir"].items():
+        for file in sources(ROOT / root):
+            parts = file.parent.relative_to(ROOT / root).parts
+            found[".".join([package, *parts])] = file.parent
+    return found
+
+
+def test_the_package_list_of_pyproject_is_complete():
+    assert sorted(pyproject()["tool"]["setuptools"]["packages"]) == sorted(packed_folders())
+
+
+def test_every_package_has_an_init_file():
+    assert [str(f) for f in packed_folders().values() if not (f / "__init__.py").is_file()] == []
+
+
+def test_every_data_file_is_packed():
+    patterns = pyproject()["tool"]["setuptools"]["package-data"]
+    left_out = []
+    for name, folder in packed_folders().items():
+        root = name.split(".")[0]
+        top = ROOT / pyproject()["tool"]["setuptools"]["package-dir"][root]
+        for file in folder.iterdir():
+            if file.is_file() and file.suffix not in (".py", ".pyc", ".pyi"):
+                relative = file.relative_to(top).as_posix()
+                wanted = [p for p in patterns.get(root, []) if fnmatch.fnmatch(relative, p.removeprefix("**/"))]
+                if not wanted:
+                    left_out.append(file.relative_to(ROOT).as_posix())
+    assert not left_out
+
+
+def test_no_module_grows_past_four_hundred_lines():
+    long = {
+        str(f.relative_to(ROOT)): n
+        for f in sources(SRC, ROOT / "converters", ROOT / "homes")
+        if (n := len(f.read_text(encoding="utf-8").splitlines())) > 400
+    }
+    assert not long, f"look for the second subject in {long}"
