@@ -194,14 +194,12 @@ def surface_distance(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def sample_surface(triangles: np.ndarray, count: int) -> np.ndarray:
-    """About `count` points [., 3] spread evenly over the triangles, and all their corners and centres. No chance in it."""
+    """About `count` points [., 3] spread evenly over the triangles, and all corners and centres. No chance in it."""
     return _sample_triangles(triangles, count)[0]
 
 
 def _sample_triangles(triangles: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    area = 0.5 * np.linalg.norm(
-        np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1
-    )
+    area = 0.5 * np.linalg.norm(np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]), axis=1)
     share = np.floor(area / max(float(area.sum()), 1e-300) * count).astype(int)
     owner = np.repeat(np.arange(len(triangles)), share)
     sequence = np.arange(len(owner), dtype=np.float64)

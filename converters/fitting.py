@@ -208,7 +208,8 @@ def primitive_hull(kind: str, size: tuple[float, ...], pose: np.ndarray) -> Hull
     elif kind == "cylinder":
         angle = np.linspace(0, 2 * np.pi, 32, endpoint=False)
         ring = np.column_stack([size[0] * np.cos(angle), size[0] * np.sin(angle), np.zeros(32)])
-        points = np.concatenate([ring - [0, 0, size[1] / 2], ring + [0, 0, size[1] / 2]])
+        up = np.array([0, 0, size[1] / 2])
+        points = np.concatenate([ring - up, ring + up])
     else:
         points = np.asarray(trimesh.creation.icosphere(subdivisions=2, radius=size[0]).vertices)
         if kind == "capsule":

@@ -101,7 +101,7 @@ def parts(vertices: np.ndarray, faces: np.ndarray) -> list[Part]:
             mesh.invert()
             volume = -volume
         outer.append([mesh, hull, closed, volume])
-    return [_part(*o) for o in outer]
+    return [_part(*o, others=[x[1] for x in outer if x is not o]) for o in outer]
 
 
 def signed_volume(triangles: np.ndarray) -> float:
@@ -121,10 +121,11 @@ def _labels(faces: np.ndarray) -> np.ndarray:
     return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
 
 
-def _part(mesh: trimesh.Trimesh, hull: Hull, closed: bool, volume: float) -> Part:
-    hollow = not closed and _opens_up(mesh, hull)
-    if not closed and not hollow:
-        capped = _capped(mesh)
+def _part(mesh: trimesh.Trimesh, hull: Hull, closed: bool, volume: float, others: list[Hull]) -> Part:
+    rings = [] if closed else _holes(mesh)
+    hollow = any(_opens_up(np.asarray(mesh.vertices)[ring], hull, others) for ring in rings)
+    if rings and not hollow:
+        capped = _capped(mesh, rings)
         if capped is not None:
             mesh, closed, volume = capped, True, abs(signed_volume(_triangles(capped)))
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
@@ -133,48 +134,58 @@ def _part(mesh: trimesh.Trimesh, hull: Hull, closed: bool, volume: float) -> Par
     return Part(vertices, faces, hull, volume, closed, hollow)
 
 
-def _capped(mesh: trimesh.Trimesh) -> trimesh.Trimesh | None:
-    """The mesh with its holes closed by fans about their middles, or None if that does not close it."""
-    open_edges = trimesh.grouping.group_rows(np.sort(mesh.edges, axis=1), require_count=1)
-    if not 0 < len(open_edges) <= 2000:
-        return None
-    vertices, faces = list(np.asarray(mesh.vertices)), list(np.asarray(mesh.faces))
+def _holes(mesh: trimesh.Trimesh) -> list[list[int]]:
+    """Closed rings of open edges, as vertex numbers, run against the mesh; [] where they do not close."""
+    single = trimesh.grouping.group_rows(np.sort(mesh.edges, axis=1), require_count=1)
     after: dict[int, list[int]] = {}
-    for a, b in np.asarray(mesh.edges)[open_edges].tolist():
-        after.setdefault(b, []).append(a)  # the cap runs against the mesh
+    for a, b in np.asarray(mesh.edges)[single].tolist():
+        after.setdefault(b, []).append(a)
+    rings = []
     while after:
-        start, ring = next(iter(after)), []
-        at = start
+        start = next(iter(after))
+        ring, at = [], start
         while True:
             ring.append(at)
-            if at not in after:
-                return None
-            at, rest = after[at][0], after[at][1:]
-            if rest:
-                after[ring[-1]] = rest
-            else:
-                del after[ring[-1]]
+            nexts = after.get(at)
+            if not nexts:
+                return []
+            following = nexts.pop()
+            if not nexts:
+                del after[at]
+            at = following
             if at == start:
                 break
-        if len(ring) < 3:
-            return None
+        if len(ring) >= 3:
+            rings.append(ring)
+    return rings
+
+
+def _capped(mesh: trimesh.Trimesh, rings: list[list[int]]) -> trimesh.Trimesh | None:
+    """The mesh with its holes closed by fans about their middles, or None if that does not close it."""
+    vertices, faces = list(np.asarray(mesh.vertices)), list(np.asarray(mesh.faces))
+    for ring in rings:
         vertices.append(np.mean([vertices[i] for i in ring], axis=0))
         faces += [[ring[i], ring[(i + 1) % len(ring)], len(vertices) - 1] for i in range(len(ring))]
     closed = trimesh.Trimesh(np.array(vertices), np.array(faces), process=False)
     return closed if closed.is_watertight and closed.is_winding_consistent else None
 
 
-def _opens_up(mesh: trimesh.Trimesh, hull: Hull) -> bool:
-    """Whether a hole of some size in the mesh faces up, as a bowl's or a box's does."""
+def _opens_up(ring: np.ndarray, hull: Hull, others: list[Hull]) -> bool:
+    """Whether a hole with this rim [k, 3] is of some size and faces up, as a bowl's or a box's does.
+
+    A hole that another part covers is only a face that nobody would have seen.
+    """
     corners = hull.vertices[hull.faces]
     total = float(np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum())
-    for ring in mesh.outline().discrete:
-        spokes = ring - ring.mean(axis=0)
-        around = np.cross(spokes, np.roll(spokes, -1, axis=0)).sum(axis=0)
-        area = float(np.linalg.norm(around))
-        if area > OPEN_SHARE * total and abs(around[2]) > OPEN_UP * area:
-            return float(ring[:, 2].mean()) > float(hull.vertices[:, 2].mean())
-    return False
+    spokes = ring - ring.mean(axis=0)
+    around = np.cross(spokes, np.roll(spokes, -1, axis=0)).sum(axis=0)
+    area = float(np.linalg.norm(around))
+    if area <= OPEN_SHARE * total or abs(around[2]) <= OPEN_UP * area:
+        return False
+    if float(ring[:, 2].mean()) <= float(hull.vertices[:, 2].mean()):
+        return False
+    middle = ring.mean(axis=0, keepdims=True)
+    return not any(other.contains(middle, 0.02 * hull.diagonal).any() for other in others)
 
 
 def points_in(hull: Hull, count: int = SAMPLES) -> np.ndarray:
