@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import functools
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -44,17 +45,21 @@ class NativePhysics:
         self.worlds, self.arrays = worlds, arrays
         self.view: PhysicsView | None = None
 
-    def update(self, changed: Changed) -> PhysicsView:
+    def update(self, changed: int) -> PhysicsView:
         """The view of the present state: copies of what changed, the old arrays for the rest."""
-        old = self.view
-        if old is None:
+        if self.view is None:
             self.view = PhysicsView(**{name: array.copy() for name, array in self.arrays.items()})
         elif changed:
-            self.view = PhysicsView(
-                **{n: self.arrays[n].copy() if group & changed else getattr(old, n) for n, group in FIELDS.items()}
-            )
-        assert self.view is not None
+            fields = {name: getattr(self.view, name) for name in FIELDS}
+            for name in _fields_of(changed):
+                fields[name] = self.arrays[name].copy()
+            self.view = PhysicsView(**fields)
         return self.view
+
+
+@functools.cache
+def _fields_of(changed: int) -> tuple[str, ...]:
+    return tuple(name for name, group in FIELDS.items() if group & changed)
 
 
 class NativeEngine:
@@ -161,7 +166,7 @@ class NativeEngine:
             if (value := getattr(write, name)) is not None
         }
 
-        def apply(world: World) -> Changed:
+        def apply(world: World) -> int:
             return apply_write(world, {name: value[world.number] for name, value in rows.items()})
 
         physics.update(self._run(physics, apply))
@@ -190,7 +195,7 @@ class NativeEngine:
             )
         chosen = np.ones(self.num_worlds, bool) if mask is None else np.asarray(mask, bool)
 
-        def replace(world: World) -> Changed:
+        def replace(world: World) -> int:
             if not chosen[world.number]:
                 return Changed.NOTHING
             return world.load({n: a[world.number] if batched else a for n, a in arrays.items()})
@@ -204,12 +209,12 @@ class NativeEngine:
         one.model.eq_data[:] = one.eq_data
         return one.model, one.data
 
-    def _run(self, physics: NativePhysics, act: Callable[[World], Changed]) -> Changed:
+    def _run(self, physics: NativePhysics, act: Callable[[World], int]) -> int:
         """Does something to every world, each share of the worlds on its own thread and with its own model."""
 
         failures: list[EngineError] = []
 
-        def run(share: np.ndarray) -> Changed:
+        def run(share: np.ndarray) -> int:
             changed = Changed.NOTHING
             for number in share:
                 world = physics.worlds[number]

@@ -9,7 +9,7 @@ from ig2mj.engine.native_world import Changed, World
 from ig2mj.engine.sleep import wake_trees
 
 
-def apply_write(world: World, rows: dict[str, np.ndarray]) -> Changed:
+def apply_write(world: World, rows: dict[str, np.ndarray]) -> int:
     """Applies one world's rows of a `Write` (its fields that are not None) and refreshes the world.
 
     Without any rows the world is refreshed from what stands in its MjData.

@@ -1,0 +1,179 @@
+"""A hand that floats: six joints move the palm, ten bend its fingers, all actuated. The simplest thing that acts.
+
+The palm's frame is that of BehaviorRobot's right hand (spec/robots_tasks_sensors.md section 1.3): fingers point along
+-z, the palm faces -y, the thumb is on the +x side. Three slides along the world's axes and three hinges (x, then y,
+then z) carry it. Position servos limited to the paper's 300 N drive them, each axis by itself, as in Bullet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from ig2mj.scene.manifest import AgentEntry
+
+HAND_FORCE = 300.0
+"""Newtons (newton metres for turning) of each axis (paper, appendix A.3; design section 5)."""
+
+FINGER_TORQUE = 3.0
+"""Newton metres of each finger joint (spec/robots_tasks_sensors.md section 1.3)."""
+
+FINGER_CLOSED, THUMB_CLOSED = 1.2, 0.6
+"""Radians at which fingers and thumb are closed; open is 0 (same section)."""
+
+FRICTION = 2.5
+"""Sliding friction of palm and fingers (same section)."""
+
+PALM_MASS, SEGMENT_MASS = 1.0, 0.1
+"""Kilograms (same section)."""
+
+CONTACT_GAP = 0.003
+"""Metres, as on every collision geom of a scene (design section 2, fact 15)."""
+
+PALM_HALF = (0.042, 0.012, 0.045)
+SEGMENTS = (0.042, 0.034)
+"""Metres: half size of the palm; lengths of a finger's two segments."""
+
+ARMATURE = 0.02
+"""kg m^2 added to the palm's turning joints, so that a servo of a light hand stays stable at 1/120 s."""
+
+STIFFNESS_RATE = 0.08 * 120**2
+"""1/s^2. A servo's stiffness is this times the inertia it moves: Bullet closes 0.08 of the error in a physics step."""
+
+_FINGERS = {"index": 0.03, "middle": 0.01, "ring": -0.01, "pinky": -0.03}  # place on the palm's edge, x in metres
+
+
+def add_floating_hand(
+    spec: mujoco.MjSpec,
+    name: str = "hand",
+    pos: Sequence[float] = (0.0, 0.0, 1.0),
+    quat: Sequence[float] = (1, 0, 0, 0),
+) -> AgentEntry:
+    """Adds a hand to a scene that is not compiled yet.
+
+    Actuators, in this order: `<name>_x`, `_y`, `_z` (m, from `pos`, world axes), `<name>_roll`, `_pitch`, `_yaw` (rad),
+    then proximal and distal joint of thumb, index, middle, ring, pinky (rad, 0 open). The hand stays where its controls
+    say, at zero controls at `pos`, `quat`; gravity is compensated.
+
+    Args:
+      spec: of the scene; changed in place.
+      name: of the agent and its palm's body; prefix of everything else.
+      pos, quat: world frame, m and w-x-y-z, of the palm at joint positions 0.
+
+    Returns:
+      The manifest's entry: base body, eye camera, finger bodies.
+    """
+    palm = spec.worldbody.add_body(name=name, pos=list(pos), quat=list(quat), gravcomp=1)
+    turn = np.zeros(9)
+    mujoco.mju_quat2Mat(turn, np.array(quat, np.float64) / np.linalg.norm(quat))
+    world_axes = turn.reshape(3, 3)  # rows: the world's axes in the palm's frame, where joint axes are given
+    servos: list[tuple[str, float, float]] = []
+    mass = PALM_MASS + 10 * SEGMENT_MASS
+    for axis, letter in zip(world_axes, "xyz", strict=True):
+        palm.add_joint(name=f"{name}_{letter}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=list(axis))
+        servos.append((f"{name}_{letter}", mass * STIFFNESS_RATE, HAND_FORCE))
+    for axis, word in zip(np.eye(3), ("roll", "pitch", "yaw"), strict=True):
+        palm.add_joint(name=f"{name}_{word}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=list(axis), armature=ARMATURE)
+        servos.append((f"{name}_{word}", ARMATURE * STIFFNESS_RATE, HAND_FORCE))
+    _solid(palm, mujoco.mjtGeom.mjGEOM_BOX, PALM_HALF, PALM_MASS)
+    palm.add_camera(name=f"{name}/eye", pos=[0.0, 0.08, 0.12], fovy=60.0)
+
+    fingers = []
+    down = np.array([0.0, 0.0, -1.0])
+    for finger in ("thumb", *_FINGERS):
+        if finger == "thumb":
+            root, along, axis = (
+                np.array([PALM_HALF[0], -0.015, 0.02]),
+                np.array([0.5, -0.6, -0.62]),
+                np.array([0, 0, -1.0]),
+            )
+        else:
+            root, along, axis = np.array([_FINGERS[finger], 0.0, -PALM_HALF[2]]), down, np.array([-1.0, 0, 0])
+        along = along / np.linalg.norm(along)
+        closed = THUMB_CLOSED if finger == "thumb" else FINGER_CLOSED
+        parent, place = palm, root
+        for segment, length in zip(("proximal", "distal"), SEGMENTS, strict=True):
+            body = parent.add_body(name=f"{name}_{finger}_{segment}", pos=list(place), gravcomp=1)
+            joint = f"{name}_{finger}_{segment}_joint"
+            body.add_joint(
+                name=joint,
+                type=mujoco.mjtJoint.mjJNT_HINGE,
+                axis=list(axis),
+                range=[-0.05, closed + 0.05],
+                limited=mujoco.mjtLimited.mjLIMITED_TRUE,
+                armature=0.002,
+            )
+            servos.append((joint, 0.002 * STIFFNESS_RATE, FINGER_TORQUE))
+            _solid(body, mujoco.mjtGeom.mjGEOM_CAPSULE, (0.009, 0, 0), SEGMENT_MASS, end=along * length)
+            fingers.append(body.name)
+            parent, place = body, along * length
+
+    for joint, stiffness, limit in servos:
+        servo = spec.add_actuator(
+            name=joint.removesuffix("_joint"),
+            target=joint,
+            trntype=mujoco.mjtTrn.mjTRN_JOINT,
+            forcelimited=mujoco.mjtLimited.mjLIMITED_TRUE,
+            forcerange=[-limit, limit],
+        )
+        servo.set_to_position(kp=stiffness, dampratio=1.0)
+    bodies = [name, *fingers]
+    for k, one in enumerate(bodies):
+        for other in bodies[k + 1 :]:
+            spec.add_exclude(bodyname1=one, bodyname2=other)
+    for key in spec.keys:  # the hand's joints come last, at zero
+        for field in ("qpos", "qvel", "ctrl"):
+            values = list(getattr(key, field))
+            if values:
+                setattr(key, field, [*values, *[0.0] * len(servos)])
+    return AgentEntry(name=name, body=name, camera=f"{name}/eye", fingers=fingers, hands=[name])
+
+
+def hand_ctrl(
+    offset: Sequence[float] = (0.0, 0.0, 0.0), turn: Sequence[float] = (0.0, 0.0, 0.0), closed: float = 0.0
+) -> np.ndarray:
+    """Controls [16] of one floating hand.
+
+    Args:
+      offset: m, world axes, from the hand's initial position.
+      turn: roll, pitch, yaw in radians.
+      closed: 0 open hand, 1 closed hand.
+    """
+    fingers = np.full(10, FINGER_CLOSED)
+    fingers[:2] = THUMB_CLOSED
+    return np.concatenate([np.asarray(offset, np.float64), np.asarray(turn, np.float64), fingers * closed])
+
+
+def _solid(
+    body: mujoco.MjsBody,
+    shape: mujoco.mjtGeom,
+    size: Sequence[float],
+    mass: float,
+    end: np.ndarray | None = None,
+) -> None:
+    """A collision geom, and the same geom to look at; from the body's origin to `end` where given."""
+    place = {} if end is None else {"fromto": [0.0, 0.0, 0.0, *end]}
+    body.add_geom(
+        name=f"{body.name}/collision_0",
+        type=shape,
+        size=list(size),
+        mass=mass,
+        friction=[FRICTION, 0.005, 0.0001],
+        gap=CONTACT_GAP,
+        margin=0.0,
+        group=3,
+        **place,
+    )
+    body.add_geom(
+        name=f"{body.name}/visual_0",
+        type=shape,
+        size=list(size),
+        mass=0.0,
+        contype=0,
+        conaffinity=0,
+        group=0,
+        rgba=[0.85, 0.65, 0.55, 1.0],
+        **place,
+    )
