@@ -31,35 +31,61 @@ def add_setting(spec: mujoco.MjSpec, low: np.ndarray, high: np.ndarray, rooms: R
     visual.global_.offwidth, visual.global_.offheight = 1920, 1080
     visual.global_.azimuth, visual.global_.elevation = 120, -50
     visual.quality.shadowsize = 4096
-    visual.map.znear, visual.map.zfar = 0.005, 40.0
+    visual.map.znear, visual.map.zfar, visual.map.shadowclip = 0.005, 8.0, 1.3  # wider ranges speckle the shadows
     visual.rgba.haze = (0.85, 0.90, 0.95, 1.0)
     sky = spec.add_texture(name="sky", type=mujoco.mjtTexture.mjTEXTURE_SKYBOX)
     sky.builtin = mujoco.mjtBuiltin.mjBUILTIN_GRADIENT
     sky.rgb1, sky.rgb2 = (0.72, 0.82, 0.93), (0.93, 0.95, 0.97)
     sky.width, sky.height = 256, 256
-    _add_sun(spec, centre, high)
+    _add_sun(spec, centre, extent)
     _add_camera(spec, TOP_CAMERA, _above(centre, size), np.array([1.0, 0.0, 0.0, 0.0]), _TOP_FOVY)
     if rooms is not None:
         _add_room_cameras(spec, rooms)
 
 
-def room_view(rooms: RoomMaps, index: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """Eye and target [3] for a look into a room from its farthest corner; None where the map has no pixel of it.
+def add_ground(spec: mujoco.MjSpec, like: mujoco.MjsDefault) -> None:
+    """A checkered ground plane at z = 0 for an object that is shown alone; contacts as class `like` has them."""
+    checker = spec.add_texture(name="ground", type=mujoco.mjtTexture.mjTEXTURE_2D, width=256, height=256)
+    checker.builtin = mujoco.mjtBuiltin.mjBUILTIN_CHECKER
+    checker.rgb1, checker.rgb2 = (0.80, 0.82, 0.84), (0.74, 0.76, 0.79)
+    material = spec.add_material(name="ground", texrepeat=(4.0, 4.0), texuniform=True)
+    material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = "ground"
+    plane = spec.worldbody.add_geom(like)
+    plane.name, plane.type, plane.material = "ground", mujoco.mjtGeom.mjGEOM_PLANE, "ground"
+    plane.size, plane.group = (0.0, 0.0, 0.05), 0
 
-    Row is y, column is x, the world's origin is the map's centre (dataset_format.md 2.5).
+
+def room_view(rooms: RoomMaps, index: int) -> tuple[np.ndarray, np.ndarray] | None:
+    """Eye and target [3] for a look into a room: from the free floor farthest from its middle, towards its middle.
+
+    None where the map has no pixel of the room. Row is y, column is x, the world's origin is the map's centre
+    (dataset_format.md 2.5).
     """
-    rows, columns = np.nonzero(rooms.room_map == index + 1)
-    if len(rows) == 0:
+    points = _pixel_centres(rooms.room_map == index + 1, rooms.resolution)
+    if len(points) == 0:
         return None
-    middle = np.array(rooms.room_map.shape[::-1]) / 2
-    points = (np.stack([columns, rows], axis=1) + 0.5 - middle) * rooms.resolution
     centroid = points.mean(axis=0)
-    corner = points[np.argmax(np.linalg.norm(points - centroid, axis=1))]
-    inward = centroid - corner
-    step = min(0.35, float(np.linalg.norm(inward)) / 2) / max(float(np.linalg.norm(inward)), 1e-9)
-    wanted = corner + step * inward
-    eye = points[np.argmin(np.linalg.norm(points - wanted, axis=1))]
+    free = points[_is_free(rooms, points)]
+    stands = free if len(free) else points
+    eye = stands[np.argmax(np.linalg.norm(stands - centroid, axis=1))]
+    if np.allclose(eye, centroid):
+        eye = centroid + 0.1
     return np.array([*eye, ROOM_CAMERA_HEIGHT]), np.array([*centroid, 0.7])
+
+
+def _pixel_centres(mask: np.ndarray, resolution: float) -> np.ndarray:
+    """World x, y of the true pixels of a square map, [n, 2], m."""
+    rows, columns = np.nonzero(mask)
+    return (np.stack([columns, rows], axis=1) + 0.5 - np.array(mask.shape[::-1]) / 2) * resolution
+
+
+def _is_free(rooms: RoomMaps, points: np.ndarray) -> np.ndarray:
+    """Which of the points [n, 2] lie on floor where nothing stands; all, where there is no such map."""
+    if rooms.traversable is None:
+        return np.ones(len(points), dtype=bool)
+    side = rooms.traversable.shape[0]
+    cells = np.clip((points / rooms.trav_resolution + side / 2).astype(int), 0, side - 1)
+    return rooms.traversable[cells[:, 1], cells[:, 0]]
 
 
 def _add_room_cameras(spec: mujoco.MjSpec, rooms: RoomMaps) -> None:
@@ -74,11 +100,11 @@ def _add_camera(spec: mujoco.MjSpec, name: str, pos: np.ndarray, quat: np.ndarra
     camera.pos, camera.quat, camera.fovy = pos, quat, fovy
 
 
-def _add_sun(spec: mujoco.MjSpec, centre: np.ndarray, high: np.ndarray) -> None:
+def _add_sun(spec: mujoco.MjSpec, centre: np.ndarray, extent: float) -> None:
+    direction = np.array([0.25, 0.35, -0.9])
     sun = spec.worldbody.add_light(name="sun")
     sun.type = mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
-    sun.pos = (centre[0], centre[1], high[2] + 5.0)
-    sun.dir = (0.25, 0.35, -0.9)
+    sun.pos, sun.dir = centre - 1.3 * extent * direction, direction
     sun.diffuse, sun.ambient, sun.specular = (0.55, 0.54, 0.50), (0.0, 0.0, 0.0), (0.1, 0.1, 0.1)
     sun.castshadow = True
 
