@@ -20,6 +20,8 @@ from .poses import apply
 #: A body without mass cannot move in MuJoCo: the least mass (kg) and the least radius of gyration (m) we give one.
 MIN_MASS = 1e-3
 MIN_GYRATION_RADIUS = 1e-3
+#: No body's largest moment of inertia exceeds the sum of the other two; MJCF's six digits must not round it there.
+LARGEST_MOMENT = 0.9995
 
 
 @dataclasses.dataclass
@@ -215,7 +217,7 @@ class _Planner:
         floor = inertial.mass * MIN_GYRATION_RADIUS**2
         values, axes = np.linalg.eigh((inertial.inertia + inertial.inertia.T) / 2)
         values = np.maximum(values, floor)
-        values[2] = min(values[2], values[0] + values[1])  # no rigid body has a larger one
+        values[2] = min(values[2], LARGEST_MOMENT * (values[0] + values[1]))
         inertial.inertia = axes @ np.diag(values) @ axes.T
 
 

@@ -26,7 +26,7 @@ from .model_task import BuiltModel, build_model
 from .options import ConvertOptions
 from .output import replaced_folder
 from .parking import resting_pose
-from .setting import add_setting
+from .setting import add_ground, add_setting
 from .urdf import read_urdf
 
 
@@ -41,8 +41,8 @@ def convert_object(
 ) -> Outcome:
     """Converts one object: `object.xml`, `manifest.json`, `meshes/`, and the report.
 
-    The object floats freely, its lowest point at z = 0. Masses are the URDF's own; missing ones come from the category's
-    density where the URDF lies in a dataset, else from a general one.
+    The object stands on a ground plane, free to move. Masses are the URDF's own; missing ones come from the
+    category's density where the URDF lies in a dataset, else from a general one.
 
     Args:
       category: what it is, in iGibson's names: decides its abilities. model: its name, default the URDF's.
@@ -129,7 +129,7 @@ def _build(
 def _write(
     source: ObjectModel, built: BuiltModel, folder: pathlib.Path, options: ConvertOptions
 ) -> tuple[ModelBuilder, Manifest]:
-    builder = ModelBuilder(source.model, folder)
+    builder = ModelBuilder(source.model, folder, category_colours=options.category_colours)
     assembly, name = built.assembly, source.model
     base = resting_pose(assembly)
     elements = add_object(
@@ -142,6 +142,7 @@ def _write(
     )
     low, high = extent(assembly, base)
     add_setting(builder.spec, low, high, None)
+    add_ground(builder.spec, builder.collision_class)
     add_start_key(builder.spec, {elements.joints[j.name]: clamp(j, 0.0) for j in assembly.joints()})
     manifest = Manifest(
         format_version=FORMAT_VERSION,

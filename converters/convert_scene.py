@@ -68,7 +68,7 @@ def convert_scene(
         start = time.perf_counter()
         options.progress("writing the scene", 0, 1)
         build = build_scene(
-            ModelBuilder(name, folder),
+            ModelBuilder(name, folder, category_colours=options.category_colours),
             placements,
             {object_name: model.assembly for object_name, model in built.items()},
             rooms=scene.rooms,

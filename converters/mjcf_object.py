@@ -173,7 +173,8 @@ class _ObjectWriter:
 
     def _add_visual(self, body: mujoco.MjsBody, part: VisualPart, link: str, name: str) -> None:
         geom = body.add_geom(self._builder.visual_class)
-        geom.name, geom.rgba = name, part.rgba or self._colour
+        own = None if self._builder.category_colours else part.rgba
+        geom.name, geom.rgba = name, own or self._colour
         if part.kind == "mesh":
             assert part.vertices is not None and part.faces is not None
             geom.type = mujoco.mjtGeom.mjGEOM_MESH

@@ -17,8 +17,8 @@ VISUAL_GROUP, COLLISION_GROUP, HIDDEN_GROUP = 0, 3, 4
 #: Sliding friction: Bullet multiplies 0.5 by 0.5, MuJoCo takes the larger (dataset_format.md section 7). The other two
 #: are MuJoCo's own defaults (m).
 FRICTION = (0.25, 0.005, 0.0001)
-#: Rolling friction (m) of recognised cylinders and spheres. Bullet has none, but puts whatever rolls slower than 0.8 m/s
-#: to sleep; without any, a can would roll on for ever here.
+#: Rolling friction (m) of recognised cylinders and spheres. Bullet has none, but puts to sleep whatever rolls slower
+#: than 0.8 m/s; without any, a can would roll on for ever here.
 ROLLING_FRICTION = 0.001
 #: Contacts are listed from this distance on, without force: how `touching` sees what Bullet's margins let it see (m).
 GAP = 0.003
@@ -31,11 +31,13 @@ class ModelBuilder:
 
     Attributes:
       spec: the model. folder: the output folder, which gets `meshes/` and `textures/`.
+      category_colours: untextured visuals get their category's colour instead of the source's.
       meshes, textures: stores of assets. body_names, joint_names: give each name once.
       warnings: object name -> lines, "" for the whole model.
     """
 
-    def __init__(self, name: str, folder: pathlib.Path):
+    def __init__(self, name: str, folder: pathlib.Path, *, category_colours: bool = False):
+        self.category_colours = category_colours
         self.spec, self.folder = mujoco.MjSpec(), folder
         self.spec.modelname = name
         self.spec.modelfiledir = str(folder)

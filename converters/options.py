@@ -30,6 +30,7 @@ class ConvertOptions:
       ceiling_collision: give ceilings collision geoms.
       max_hulls, max_hull_vertices: budgets per link and per hull.
       bullet_inertia: inertia of the bounding box, as Bullet computes it, instead of the hulls'.
+      category_colours: household colours by category for visuals without a texture, instead of the source's.
       jobs: processes. cache: use the cache of decompositions. report: write report.json and report.html.
       renderer, view: what draws the report's pictures (see `report.write_report`).
     """
@@ -43,6 +44,7 @@ class ConvertOptions:
     max_hulls: int = 16
     max_hull_vertices: int = 32
     bullet_inertia: bool = False
+    category_colours: bool = False
 
     jobs: int = 1
     cache: bool = True
@@ -72,6 +74,7 @@ class ConvertOptions:
     def record(self) -> dict[str, Any]:
         """What the manifest keeps of the options: those that decide what comes out."""
         kept = ("seed", "fixed_furniture", "ceiling_collision", "max_hulls", "max_hull_vertices", "bullet_inertia")
+        kept += ("category_colours",)
         record: dict[str, Any] = {name: getattr(self, name) for name in kept}
         for name in ("only_rooms", "only_categories"):
             value = getattr(self, name)

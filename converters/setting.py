@@ -6,6 +6,7 @@ import math
 
 import mujoco
 import numpy as np
+from scipy import ndimage
 
 from .description import RoomMaps
 from .poses import quat_from_rotation
@@ -14,6 +15,7 @@ TOP_CAMERA = "top"
 #: Eye height (m) and view angle (degrees) of the rooms' cameras: a look from a corner, over the furniture.
 ROOM_CAMERA_HEIGHT, ROOM_CAMERA_FOVY = 2.1, 80.0
 _TOP_FOVY = 45.0
+_CLEARANCE = 0.3  # m, of a room's camera from walls and furniture
 
 
 def add_setting(spec: mujoco.MjSpec, low: np.ndarray, high: np.ndarray, rooms: RoomMaps | None) -> None:
@@ -80,12 +82,13 @@ def _pixel_centres(mask: np.ndarray, resolution: float) -> np.ndarray:
 
 
 def _is_free(rooms: RoomMaps, points: np.ndarray) -> np.ndarray:
-    """Which of the points [n, 2] lie on floor where nothing stands; all, where there is no such map."""
+    """Which of the points [n, 2] lie on floor with nothing near; all, where there is no such map."""
     if rooms.traversable is None:
         return np.ones(len(points), dtype=bool)
-    side = rooms.traversable.shape[0]
+    clear = ndimage.binary_erosion(rooms.traversable, iterations=max(1, round(_CLEARANCE / rooms.trav_resolution)))
+    side = clear.shape[0]
     cells = np.clip((points / rooms.trav_resolution + side / 2).astype(int), 0, side - 1)
-    return rooms.traversable[cells[:, 1], cells[:, 0]]
+    return clear[cells[:, 1], cells[:, 0]]
 
 
 def _add_room_cameras(spec: mujoco.MjSpec, rooms: RoomMaps) -> None:

@@ -36,6 +36,7 @@ def convert_scene(
     max_hull_vertices: int = 32,
     bullet_inertia: Annotated[bool, Flag] = False,
     ceiling_collision: Annotated[bool, Flag] = False,
+    category_colours: Annotated[bool, Flag] = False,
     no_cache: Annotated[bool, Flag] = False,
     no_report: Annotated[bool, Flag] = False,
     json: Annotated[bool, Flag] = False,
@@ -59,6 +60,7 @@ def convert_scene(
       max_hull_vertices: most vertices per piece.
       bullet_inertia: inertia of each link's box, as Bullet computes it, instead of that of its hulls.
       ceiling_collision: let ceilings collide.
+      category_colours: household colours by category instead of the source's, where there is no texture.
       no_cache: do not use the cache of convex decompositions.
       no_report: no checks, no report.json and report.html.
       json: print what was done as JSON.
@@ -75,6 +77,7 @@ def convert_scene(
         max_hulls=max_hulls,
         max_hull_vertices=max_hull_vertices,
         bullet_inertia=bullet_inertia,
+        category_colours=category_colours,
         jobs=jobs,
         cache=not no_cache,
         report=not no_report,
@@ -94,6 +97,7 @@ def convert_object(
     max_hulls: int = 16,
     max_hull_vertices: int = 32,
     bullet_inertia: Annotated[bool, Flag] = False,
+    category_colours: Annotated[bool, Flag] = False,
     no_cache: Annotated[bool, Flag] = False,
     no_report: Annotated[bool, Flag] = False,
     json: Annotated[bool, Flag] = False,
@@ -112,6 +116,7 @@ def convert_object(
       max_hulls: most convex pieces per link; more are merged.
       max_hull_vertices: most vertices per piece.
       bullet_inertia: inertia of each link's box, as Bullet computes it, instead of that of its hulls.
+      category_colours: household colours by category instead of the source's, where there is no texture.
       no_cache: do not use the cache of convex decompositions.
       no_report: no checks, no report.json and report.html.
       json: print what was done as JSON.
@@ -123,6 +128,7 @@ def convert_object(
         max_hulls=max_hulls,
         max_hull_vertices=max_hull_vertices,
         bullet_inertia=bullet_inertia,
+        category_colours=category_colours,
         cache=not no_cache,
         report=not no_report,
     )
