@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 
 import mujoco
@@ -155,3 +156,83 @@ def test_the_overview_leaves_out_what_is_parked(tiny_home, data):
     assert view.distance < 3 * np.linalg.norm(floor)
     parked = [data.body(o.bodies[0]).xpos for o in tiny_home.manifest.objects if o.parked]
     assert all(np.linalg.norm(p - view.lookat) > view.distance for p in parked)
+
+
+class FakeHandle:
+    """Stands for MuJoCo's window: closes itself after some pictures, and notes what it was told."""
+
+    def __init__(self, model, pictures: int):
+        self.left, self.synced, self.texts = pictures, 0, []
+        self.cam, self.perturb = mujoco.MjvCamera(), mujoco.MjvPerturb()
+        self.user_scn = mujoco.MjvScene(model, maxgeom=100)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *error):
+        pass
+
+    def is_running(self) -> bool:
+        self.left -= 1
+        return self.left >= 0
+
+    def lock(self):
+        return contextlib.nullcontext()
+
+    def set_texts(self, texts) -> None:
+        self.texts.append(texts)
+
+    def sync(self) -> None:
+        self.synced += 1
+
+
+class CopyingWorld:
+    """A world whose data is a new copy after every step, as that of a batched engine is."""
+
+    def __init__(self, scene):
+        self.scene, self.data, self.steps = scene, mujoco.MjData(scene.model), 0
+
+    def step(self) -> None:
+        self.steps += 1
+        self.data = mujoco.MjData(self.scene.model)
+        self.data.time = self.steps / 30
+
+    def reset(self) -> None:
+        self.steps = 0
+        self.data = mujoco.MjData(self.scene.model)
+
+
+def test_the_window_shows_every_step_also_of_a_world_that_hands_out_copies(tiny_home, monkeypatch):
+    handle = FakeHandle(tiny_home.model, pictures=3)
+    shown, pressed = [], []
+
+    def launch_window(model, data, key_callback):
+        shown.append(data)
+        key_callback(ord("6"))
+        return handle
+
+    monkeypatch.setattr(interactive, "_launch", launch_window)
+    world = CopyingWorld(tiny_home)
+    interactive.launch(world, step_time=0.001, key_callback=pressed.append)
+    assert (world.steps, handle.synced) == (3, 3)
+    assert shown[0].time == pytest.approx(3 / 30)
+    assert pressed == [ord("6")]
+    names = {handle.user_scn.geoms[i].label for i in range(handle.user_scn.ngeom)}
+    assert "apple" not in names  # key 6 switched the names off
+    assert dict(zip(*(t.splitlines() for t in handle.texts[-1][0][2:]), strict=True))["time"] == "0.1 s"
+
+
+def test_the_mouse_pushes_the_held_body_and_lets_it_go(tiny_home, data):
+    perturb = mujoco.MjvPerturb()
+    body = tiny_home.model.body("apple").id
+    perturb.select, perturb.active = body, mujoco.mjtPertBit.mjPERT_TRANSLATE
+    option, camera = mujoco.MjvOption(), mujoco.MjvCamera()
+    scene = mujoco.MjvScene(tiny_home.model, maxgeom=500)
+    mujoco.mjv_updateScene(tiny_home.model, data, option, None, camera, mujoco.mjtCatBit.mjCAT_ALL.value, scene)
+    mujoco.mjv_initPerturb(tiny_home.model, data, scene, perturb)
+    perturb.refselpos[2] += 1.0
+    assert interactive._drag(tiny_home.model, data, perturb, 0) == body
+    assert data.xfrc_applied[body, 2] > 0
+    perturb.active = 0
+    assert interactive._drag(tiny_home.model, data, perturb, body) == 0
+    assert not data.xfrc_applied.any()

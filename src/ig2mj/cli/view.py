@@ -36,39 +36,16 @@ def run(
       collision: draw the collision geometry instead of the visual one (picture only; key 3 in the window).
       paused: open the window paused.
     """
-    import mujoco
-
-    from ig2mj.scene.scene import load_scene
-
     _check(picture, camera, eye, target, size, seconds)
-    home = load_scene(scene)
-    data = mujoco.MjData(home.model)
-
-    def reset() -> None:
-        if home.model.nkey:
-            mujoco.mj_resetDataKeyframe(home.model, data, 0)
-        else:
-            mujoco.mj_resetData(home.model, data)
-        mujoco.mj_forward(home.model, data)
-
-    reset()
-    timestep = home.model.opt.timestep
-    for _ in range(round(seconds / timestep)):
-        mujoco.mj_step(home.model, data)
     if picture is not None:
-        _write_picture(home, data, picture, _view(home, data, camera, eye, target), size, collision)
+        _write_picture(scene, picture, camera, eye, target, size, seconds, collision)
         return
-    from ig2mj.viewer.interactive import open_viewer
+    from ig2mj.simulation import Simulation
 
-    substeps = max(1, round(1 / 30 / timestep))
-    open_viewer(
-        home,
-        data,
-        lambda: mujoco.mj_step(home.model, data, nstep=substeps),
-        reset=reset,
-        step_time=substeps * timestep,
-        paused=paused,
-    )
+    world = Simulation(scene)
+    if seconds > 0:
+        world.step(count=round(seconds * 30))
+    world.launch_viewer(paused=paused)
 
 
 def _check(picture, camera, eye, target, size, seconds) -> None:
@@ -119,15 +96,26 @@ def _view(home, data, camera: str | None, eye: Vec3 | None, target: Vec3 | None)
     )
 
 
-def _write_picture(home, data, file: pathlib.Path, view, size: tuple[int, int], collision: bool) -> None:
+def _write_picture(scene, file, camera, eye, target, size, seconds, collision) -> None:
+    """MuJoCo alone is enough for a picture: the scene's start, `seconds` later."""
     import sys
 
+    import mujoco
     from PIL import Image
 
+    from ig2mj.scene.scene import load_scene
     from ig2mj.viewer.offscreen import VISIBLE_GROUPS, default_backend, render
 
-    groups = (3,) if collision else VISIBLE_GROUPS
+    home = load_scene(scene)
+    data = mujoco.MjData(home.model)
+    if home.model.nkey:
+        mujoco.mj_resetDataKeyframe(home.model, data, 0)
+    mujoco.mj_forward(home.model, data)
+    if seconds > 0:
+        mujoco.mj_step(home.model, data, nstep=max(1, round(seconds / home.model.opt.timestep)))
+    view = _view(home, data, camera, eye, target)
     backend = default_backend()
+    groups = (3,) if collision else VISIBLE_GROUPS
     image = render(home.model, data, view, width=size[0], height=size[1], groups=groups, backend=backend)
     Image.fromarray(image).save(file)
     print(f"wrote {file} ({size[0]} x {size[1]}, drawn with {backend})", file=sys.stderr)

@@ -12,7 +12,7 @@ import sys
 import time
 import warnings
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 import mujoco
 import numpy as np
@@ -104,6 +104,40 @@ class ViewerState:
                 )
                 geom.label = label.text[:99]  # mjvGeom holds 100 bytes
                 scene.ngeom += 1
+
+
+@runtime_checkable
+class World(Protocol):
+    """What `launch` asks of a world; `ig2mj.Simulation` is one. `data` may be another object after every step."""
+
+    @property
+    def scene(self) -> Scene: ...
+
+    @property
+    def data(self) -> mujoco.MjData: ...
+
+    def step(self) -> Any: ...
+
+    def reset(self) -> Any: ...
+
+
+def launch(world: World, **options: Any) -> None:
+    """Opens the window on a world and runs it until the window is closed; `options` as in `open_viewer`."""
+    shown = world.data
+
+    def show() -> None:
+        if world.data is not shown:  # an engine that hands out copies
+            mujoco.mj_copyData(shown, world.scene.model, world.data)
+
+    def step() -> None:
+        world.step()
+        show()
+
+    def reset() -> None:
+        world.reset()
+        show()
+
+    open_viewer(world.scene, shown, step, reset=reset, **options)
 
 
 def open_viewer(
