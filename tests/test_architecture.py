@@ -22,6 +22,7 @@ LAYERS = [
     "engine",
     "states",
     "predicates",
+    "worlds",
     "sampling",
     "agents",
     "sensors",

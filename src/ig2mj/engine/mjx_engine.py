@@ -20,6 +20,7 @@ from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 
 from ig2mj.engine.base import BOX_RULES, PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snapshot, Write
+from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.mjx_contacts import Contacts, link_forces, touching_units
 from ig2mj.engine.mjx_view import ViewPlan, make_view, plan_view
@@ -238,6 +239,17 @@ class MjxEngine(abc.ABC):
             touching=put(snapshot.touching, physics.touching),
             link_force=jnp.where(chosen[:, None, None], 0.0, physics.link_force),
             overflow=jnp.where(chosen, 0, physics.overflow),
+        )
+
+    def health(self, physics: MjxPhysics) -> Health:
+        """What went wrong in each world; see `ig2mj.engine.health`."""
+        data = physics.data
+        free = np.concatenate([self.layout.object_dofadr[self.layout.object_dofadr >= 0], self.layout.extra_dofadr])
+        velocity = data.qvel[:, free[:, None] + np.arange(3)]
+        return Health(
+            overflow=physics.overflow,
+            finite=jnp.isfinite(data.qpos).all(1) & jnp.isfinite(data.qvel).all(1),
+            top_speed=jnp.sqrt(jnp.square(velocity).sum(-1).max(1, initial=0.0)),
         )
 
     # Stages.

@@ -14,8 +14,9 @@ from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 
 from ig2mj.engine.base import Snapshot
+from ig2mj.engine.health import Usage
 from ig2mj.engine.mjx_contacts import Contacts, warp_contacts
-from ig2mj.engine.mjx_engine import MjxEngine
+from ig2mj.engine.mjx_engine import MjxEngine, MjxPhysics
 from ig2mj.engine.profile import EngineProfile, fit, load_profile
 from ig2mj.engine.settle import settle
 from ig2mj.engine.view import Array
@@ -51,6 +52,11 @@ class WarpEngine(MjxEngine):
         if initial is None and self.profile.awake_dofs < scene.model.nv:
             initial = settle(scene)
         super().__init__(scene, num_worlds, initial=initial, **options)
+
+    def usage(self, physics: MjxPhysics) -> Usage:
+        """How full the buffers were in the last physics step."""
+        impl = physics.data._impl
+        return Usage(impl.nv_awake, impl.nefc, impl.nacon[0], impl.ncollision[0])
 
     def _host_model(self, model: mujoco.MjModel) -> mujoco.MjModel:
         own = super()._host_model(model)

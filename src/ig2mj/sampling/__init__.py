@@ -1,0 +1,1 @@
+"""From truth to state: perturbed and settled initial states, pools of them."""

@@ -1,0 +1,97 @@
+"""Settled initial states in numbers: a scene is disturbed at random and stepped until it rests, many times over.
+
+Native engine only: it puts to sleep what rests, and what sleeps costs nothing in a batch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ig2mj.engine.base import Snapshot
+from ig2mj.engine.native import NativeEngine, NativePhysics
+from ig2mj.engine.view import PhysicsView
+from ig2mj.errors import EngineError
+from ig2mj.sampling.perturbation import loose_objects, perturb
+from ig2mj.scene.scene import Scene
+from ig2mj.states.model import StateModel
+from ig2mj.states.update import initial_states, with_values
+from ig2mj.worlds.guards import lowest_support
+from ig2mj.worlds.pool import Pool, stack
+from ig2mj.worlds.random_streams import episode_keys
+
+SECONDS = 6.0
+"""Simulated seconds within which a row must come to rest, or be thrown away."""
+
+TRIES = 4
+"""Times as many rows as asked for may be tried before giving up."""
+
+Progress = Callable[[int], None]
+
+
+def make_pool(
+    scene: Scene,
+    model: StateModel,
+    count: int,
+    *,
+    seed: int = 0,
+    share: float = 0.3,
+    threads: int | None = None,
+    progress: Progress = lambda done: None,
+) -> Pool:
+    """A pool of `count` rows.
+
+    Args:
+      scene, model: the household and its states' constants.
+      count: P.
+      seed: the same seed gives the same pool, whatever the number of threads.
+      share: probability that an object is disturbed, per object and row.
+      threads: of the native engine; None: one per processor.
+      progress: called with the number of rows done so far.
+
+    Raises:
+      EngineError: too few rows come to rest with everything still in the house.
+    """
+    width = min(count, 16)
+    engine = NativeEngine(scene, width, threads=threads)
+    physics = engine.reset()
+    physics, view = _rest(engine, physics)
+    start = engine.export(physics, 0)
+    floor = lowest_support(view, scene.tables.object_fixed)
+    loose = loose_objects(scene.tables, view)
+    states = with_values(model, initial_states(model, 1), [entry.state for entry in scene.manifest.objects])
+    rows: list[Snapshot] = []
+    tried = 0
+    while len(rows) < count:
+        if tried >= TRIES * count + width:
+            raise EngineError(
+                f"of {tried} disturbed states of '{scene.name}' only {len(rows)} came to rest with everything in the "
+                f"house (convert the scene with its checks and mend what does not settle)"
+            )
+        physics = engine.load(physics, start)
+        world = jnp.arange(tried, tried + width)
+        key = episode_keys(seed, world, jnp.zeros_like(world))
+        physics = engine.write(physics, jax.device_get(perturb(scene.tables, loose, engine.view(physics), key, share)))
+        physics, view = _rest(engine, physics)
+        asleep = ~np.asarray(view.awake).any(1)
+        inside = (np.asarray(view.object_com)[..., 2] >= floor).all(1)
+        for w in np.flatnonzero(asleep & inside):
+            if len(rows) < count:
+                rows.append(engine.export(physics, int(w)))
+        tried += width
+        progress(len(rows))
+    one = [Pool(physics=jax.tree.map(lambda a: np.asarray(a)[None], row), states=states) for row in rows]
+    return stack(one)
+
+
+def _rest(engine: NativeEngine, physics: NativePhysics) -> tuple[NativePhysics, PhysicsView]:
+    """Steps until every object of every world sleeps, or the time is over."""
+    view = engine.view(physics)
+    for _ in range(round(SECONDS / (engine.substeps * engine.timestep))):
+        physics, view = engine.step(physics)
+        if not np.asarray(view.awake).any():
+            break
+    return physics, view

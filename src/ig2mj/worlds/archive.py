@@ -1,0 +1,81 @@
+"""Pytrees of arrays in `.npz` files: one array per leaf under its path, a JSON header, no pickle."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+from typing import Any, TypeVar
+
+import jax
+import msgspec
+import numpy as np
+
+from ig2mj.errors import InputError
+
+HEADER = "header"
+
+Tree = TypeVar("Tree")
+
+
+def save_tree(file: str | os.PathLike, tree: Any, header: dict[str, Any]) -> None:
+    """Writes all leaves of a pytree and a header; the file appears only when it is complete."""
+    path = pathlib.Path(file)
+    arrays = {_name(keys): np.asarray(leaf) for keys, leaf in jax.tree_util.tree_flatten_with_path(tree)[0]}
+    arrays[HEADER] = np.frombuffer(msgspec.json.encode(header), np.uint8)
+    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
+    with unfinished.open("wb") as out:
+        np.savez_compressed(out, allow_pickle=False, **arrays)
+    unfinished.replace(path)
+
+
+def read_header(file: str | os.PathLike) -> dict[str, Any]:
+    """The header of a file that `save_tree` wrote. Raises InputError."""
+    with _open(file) as archive:
+        return _header(archive, file)
+
+
+def load_tree(file: str | os.PathLike, like: Tree) -> tuple[Tree, dict[str, Any]]:
+    """Reads a pytree of the structure, leaf ranks and dtypes of `like`, and the header.
+
+    The leading axis may differ from that of `like`.
+
+    Raises:
+      InputError: the file is missing, no such archive, or of another structure.
+    """
+    with _open(file) as archive:
+        header = _header(archive, file)
+
+        def leaf(keys: Any, wanted: Any) -> np.ndarray:
+            name = _name(keys)
+            if name not in archive.files:
+                raise InputError(file, "is missing", element=name, mend="make the file again with this version")
+            array = archive[name]
+            if array.ndim != wanted.ndim or array.shape[1:] != wanted.shape[1:]:
+                raise InputError(
+                    file,
+                    f"has shape {array.shape}, the scene needs (any, {', '.join(map(str, wanted.shape[1:]))})",
+                    element=name,
+                    mend="make the file again for this scene",
+                )
+            return array.astype(wanted.dtype)
+
+        return jax.tree_util.tree_map_with_path(leaf, like), header
+
+
+def _name(keys: Any) -> str:
+    return jax.tree_util.keystr(keys, simple=True, separator=".")
+
+
+def _open(file: str | os.PathLike) -> Any:
+    try:
+        return np.load(file, allow_pickle=False)
+    except OSError as e:
+        raise InputError(file, f"cannot be read: {e.strerror or e}") from e
+    except ValueError as e:
+        raise InputError(file, f"is no npz archive: {e}") from e
+
+
+def _header(archive: Any, file: str | os.PathLike) -> dict[str, Any]:
+    if not hasattr(archive, "files") or HEADER not in archive.files:
+        raise InputError(file, "is no archive of this project", element=HEADER)
+    return msgspec.json.decode(archive[HEADER].tobytes())

@@ -1,0 +1,86 @@
+"""Guards: worlds that went wrong are flagged, counted, and put right at the next reset.
+
+A flagged world goes on being stepped with the others; whatever it says is not to be believed, and `reset` replaces it.
+"""
+
+from __future__ import annotations
+
+import enum
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.health import CAPACITY, SETTING, Health, Overflow
+from ig2mj.engine.profile import PROFILE_FILE
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.errors import EngineError
+
+TOP_SPEED = 20.0
+"""m/s. Nothing in a household moves faster; what does was shot out of a penetration."""
+
+BELOW_FLOOR = 0.5
+"""Metres. An object whose centre of mass is this far below the lowest support has left the house."""
+
+
+class Flag(enum.IntFlag):
+    """What can be wrong with a world."""
+
+    OVERFLOW = 1
+    NOT_FINITE = 2
+    FELL = 4
+    TOO_FAST = 8
+
+
+def check(health: Health, view: PhysicsView, floor: Float[np.ndarray, "O"]) -> Int[Array, "W"]:
+    """Flags of every world now.
+
+    Args:
+      health: from the engine. view: of the same instant.
+      floor: metres; the height below which each object has left the house (`lowest_support`).
+    """
+    com = jnp.asarray(view.object_com)
+    finite = jnp.asarray(health.finite)
+    flags = jnp.where((jnp.asarray(health.overflow) & int(CAPACITY)) != 0, int(Flag.OVERFLOW), 0)
+    flags |= jnp.where(~finite, int(Flag.NOT_FINITE), 0)
+    flags |= jnp.where(finite & (com[..., 2] < floor).any(1), int(Flag.FELL), 0)
+    flags |= jnp.where(finite & (jnp.asarray(health.top_speed) > TOP_SPEED), int(Flag.TOO_FAST), 0)
+    return flags.astype(jnp.int32)
+
+
+def lowest_support(view: PhysicsView, fixed: Bool[np.ndarray, "O"]) -> Float[np.ndarray, "O"]:
+    """Height (m) below which an object has left the house: under everything that is fixed, and under its own start."""
+    low = np.asarray(view.aabb_low)[0, :, 2]
+    floor = low[fixed].min() if fixed.any() else 0.0
+    return np.minimum(floor, low) - BELOW_FLOOR
+
+
+def count(flags: Int[Array, "W"]) -> Int[Array, "W K"]:
+    """One column per `Flag`, in its order: 1 where the world carries it."""
+    return jnp.stack([(flags & int(flag)) != 0 for flag in Flag], axis=-1).astype(jnp.int32)
+
+
+def metrics(counts: Int[Array, "W K"]) -> dict[str, int]:
+    """Sums over worlds, by the flags' names in lower case."""
+    totals = np.asarray(counts).sum(0)
+    return {flag.name.lower(): int(n) for flag, n in zip(Flag, totals, strict=True) if flag.name}
+
+
+def explain(world: int, flags: int, overflow: int) -> str:
+    """One line: which world, which flags, and what to raise where a buffer was too small."""
+    names = ", ".join(flag.name.lower() for flag in Flag if flags & flag and flag.name)
+    text = f"world {world}: {names}"
+    lost = [bit for bit in Overflow if overflow & bit & CAPACITY]
+    if lost:
+        raise_these = sorted({SETTING[bit] for bit in lost if bit in SETTING})
+        text += f" ({', '.join(bit.name or '' for bit in lost)}"
+        text += f"; raise {', '.join(raise_these)} in {PROFILE_FILE}, or run `ig2mj calibrate`)" if raise_these else ")"
+    return text
+
+
+def raise_first(flags: Int[Array, "W"], overflow: Int[Array, "W"]) -> None:
+    """Raises EngineError for the first flagged world, if there is one. On the host: it waits for the device."""
+    flagged = np.flatnonzero(np.asarray(flags))
+    if len(flagged):
+        world = int(flagged[0])
+        raise EngineError(explain(world, int(np.asarray(flags)[world]), int(np.asarray(overflow)[world])))
