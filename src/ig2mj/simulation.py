@@ -38,6 +38,7 @@ class Simulation:
         if self.engine.num_worlds != 1:
             raise EngineError(f"a Simulation is one world, and the engine has {self.engine.num_worlds}")
         self.physics = self.engine.reset()
+        self._initial = self.engine.export(self.physics, 0)
 
     @property
     def time(self) -> float:
@@ -61,7 +62,7 @@ class Simulation:
 
     def reset(self) -> PhysicsView:
         """Back to the scene's initial state."""
-        self.physics = self.engine.reset()
+        self.physics = self.engine.load(self.physics, self._initial)
         return self.view
 
     def step(self, ctrl: Vector | None = None, count: int = 1) -> PhysicsView:
@@ -149,11 +150,19 @@ class Simulation:
         model, data = self.engine.to_mujoco(self.physics, 0)
         return offscreen.render(model, data, camera, width=width, height=height, **options)
 
-    def launch_viewer(self, **options: Any) -> Any:
-        """Opens MuJoCo's viewer on this world; see `ig2mj.viewer.interactive`."""
+    def launch_viewer(self, **options: Any) -> None:
+        """Opens MuJoCo's viewer on this world and steps it until the window is closed.
+
+        Args:
+          options: `overlays`, `paused`; see `ig2mj.viewer.interactive.open_viewer`.
+
+        Raises:
+          MissingDependencyError: there is no display.
+        """
         from ig2mj.viewer import interactive
 
-        return interactive.launch(self, **options)
+        options.setdefault("step_time", self.engine.substeps * self.engine.timestep)
+        interactive.launch(self, **options)
 
     def _joint_address(self, name: str) -> int:
         model = self.scene.model

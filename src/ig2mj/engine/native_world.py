@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 
 import mujoco
 import numpy as np
@@ -214,15 +213,15 @@ class World:
 
     def _check_finite(self) -> None:
         data = self.data
-        if math.isfinite(float(data.qpos.sum())) and math.isfinite(float(data.qvel.sum())):
-            return
-        dofs = np.flatnonzero(~np.isfinite(data.qvel))
+        if abs(float(data.qpos.sum())) < mujoco.mjMAXVAL and abs(float(data.qvel.sum())) < mujoco.mjMAXVAL:
+            return  # false for NaN, too
+        dofs = np.flatnonzero(~(np.abs(data.qvel) < mujoco.mjMAXVAL))
         if len(dofs):
             joint = int(self.model.dof_jntid[dofs[0]])
         else:
-            coordinates = np.flatnonzero(~np.isfinite(data.qpos))
+            coordinates = np.flatnonzero(~(np.abs(data.qpos) < mujoco.mjMAXVAL))
             if not len(coordinates):
-                return  # only the sum overflowed
+                return
             joint = int(np.searchsorted(self.model.jnt_qposadr, coordinates[0], side="right")) - 1
         body = f"body '{self.model.body(int(self.model.jnt_bodyid[joint])).name}'"
         raise EngineError(
