@@ -34,7 +34,7 @@ def piece_boxes(
     low, high = jnp.min(turned, axis=-2), jnp.max(turned, axis=-2)
     reach = _round_reach(kind, size, quat)
     hull = (kind == PieceKind.POLYHEDRON)[..., None]
-    return pos + jnp.where(hull, low, -reach), pos + jnp.where(hull, high, reach)
+    return jnp.add(pos, jnp.where(hull, low, -reach)), jnp.add(pos, jnp.where(hull, high, reach))
 
 
 def rotated_boxes(
@@ -45,7 +45,7 @@ def rotated_boxes(
     margin: Float[AnyArray, "*#b"] | float = 0.0,
 ) -> Boxes:
     """Boxes (low, high) around local boxes that are posed in the world; `margin` is added on every side."""
-    middle = pos + quat_rotate(quat, center)
+    middle = jnp.add(pos, quat_rotate(quat, center))
     reach = jnp.sum(jnp.abs(quat_to_matrix(quat)) * half[..., None, :], axis=-1) + jnp.asarray(margin)[..., None]
     return middle - reach, middle + reach
 
@@ -101,10 +101,9 @@ def box_gap(
 ) -> Float[Array, "*b"]:
     """Distance of two boxes: the length of the gaps along the axes, 0 where they overlap (spec/states.md 5.5)."""
     gap = jnp.maximum(low_a, low_b) - jnp.minimum(high_a, high_b)
-    finite = jnp.all(gap < jnp.inf, axis=-1)  # an empty box makes a gap inf; NaN stays NaN below
-    unbounded = jnp.any(gap == jnp.inf, axis=-1)
-    distance = length(jnp.maximum(jnp.where(finite[..., None] | jnp.isnan(gap), gap, 0.0), 0.0))
-    return jnp.where(unbounded, jnp.inf, distance)
+    endless = gap == jnp.inf  # of an empty box; kept out of the square root for its gradient
+    distance = length(jnp.maximum(jnp.where(endless, 0.0, gap), 0.0))
+    return jnp.where(jnp.any(endless, axis=-1), jnp.inf, distance)
 
 
 def point_box_distance(

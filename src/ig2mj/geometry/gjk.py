@@ -1,0 +1,224 @@
+"""Distance and nearest points of two convex pieces of any kind, and of a point and a piece.
+
+The method is GJK on the pieces' cores (a sphere's centre, a capsule's axis, the whole of cylinders and polyhedra); the
+cores' radii are taken off at the end. A loop runs until every pair has converged, at most `MAX_STEPS` times. The
+result carries gradients with respect to poses and sizes: at the optimum the nearest points may be held fixed in their
+pieces, so nothing is differentiated through the loop.
+
+Limits: pieces that overlap have distance 0, not a depth. In float32 the error is about 1e-5 m for pieces up to a
+few metres in size and distance (tests hold it below 1e-4 against MuJoCo); a gap below 1e-6 m between cores counts as
+overlap.
+"""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+from jaxtyping import Array, Bool, Float, Int
+
+from ig2mj.geometry.hulls import core_radius, core_support
+from ig2mj.geometry.poses import (
+    AnyArray,
+    compose,
+    length,
+    normalize,
+    quat_normalize,
+    quat_rotate,
+    quat_rotate_inverse,
+    relative_pose,
+)
+from ig2mj.scene.tables import PieceKind, SceneTables
+
+MAX_STEPS = 40
+"""Polyhedra need about ten steps, cylinders up to thirty."""
+
+CONVERGED = 5e-6
+"""Metres between the distance found and a proven lower bound of it."""
+
+OVERLAP = 1e-6
+"""Metres; cores nearer than this overlap."""
+
+FLAT = 1e-6
+"""Six times a tetrahedron's volume over its size cubed, and twice a triangle's area over its size squared, below which
+float32 cannot tell inside from outside."""
+
+EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
+FACES = np.array([(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)])
+
+
+@struct.dataclass
+class PosedPieces:
+    """Convex pieces with their world poses; leading axes broadcast. `vertices` count for polyhedra only."""
+
+    kind: Int[AnyArray, "*#b"]
+    size: Float[AnyArray, "*#b 3"]
+    vertices: Float[AnyArray, "*#b V 3"]
+    pos: Float[AnyArray, "*#b 3"]
+    quat: Float[AnyArray, "*#b 4"]
+
+
+@struct.dataclass
+class Nearest:
+    """The nearest points of two pieces.
+
+    Attributes:
+      distance: metres, 0 where they overlap.
+      point_a, point_b: on the surfaces, world frame; somewhere inside the overlap where they overlap.
+      overlap: the pieces have a point in common.
+    """
+
+    distance: Float[Array, "*b"]
+    point_a: Float[Array, "*b 3"]
+    point_b: Float[Array, "*b 3"]
+    overlap: Bool[Array, "*b"]
+
+
+def pose_pieces(
+    tables: SceneTables,
+    body_pos: Float[AnyArray, "W B 3"],
+    body_quat: Float[AnyArray, "W B 4"],
+    pieces: Int[np.ndarray, "M"],
+) -> PosedPieces:
+    """The scene's pieces with the given indices, posed in every world: [W, M]."""
+    body = tables.piece_body[pieces]
+    pos, quat = compose(
+        jnp.asarray(body_pos)[:, body],
+        jnp.asarray(body_quat)[:, body],
+        np.asarray(tables.piece_pos[pieces], np.float32),
+        np.asarray(tables.piece_quat[pieces], np.float32),
+    )
+    return PosedPieces(
+        kind=tables.piece_kind[pieces],
+        size=np.asarray(tables.piece_size[pieces], np.float32),
+        vertices=np.asarray(tables.piece_vertices[pieces], np.float32),
+        pos=pos,
+        quat=quat,
+    )
+
+
+def piece_distance(a: PosedPieces, b: PosedPieces) -> Nearest:
+    """Distance and nearest points of each pair of pieces (leading axes of `a` and `b` broadcast); NaN for NaN poses."""
+    core_a, core_b, apart = _core_witnesses(*jax.lax.stop_gradient((a, b)))
+    world_a = jnp.add(a.pos, quat_rotate(a.quat, core_a))
+    world_b = jnp.add(b.pos, quat_rotate(b.quat, core_b))
+    away = world_a - world_b
+    reach = length(away)
+    radius_a, radius_b = core_radius(a.kind, a.size), core_radius(b.kind, b.size)
+    distance = jnp.where(apart, reach - radius_a - radius_b, 0.0 * reach)
+    unit = normalize(away)
+    # Where the roundings overlap the surface points are pulled together to one point of the overlap.
+    excess = jnp.minimum(distance, 0.0)
+    share = radius_a / jnp.where(radius_a + radius_b > 0.0, radius_a + radius_b, 1.0)
+    return Nearest(
+        distance=jnp.maximum(distance, 0.0),
+        point_a=world_a - unit * (radius_a + excess * share)[..., None],
+        point_b=world_b + unit * (radius_b + excess * (1.0 - share))[..., None],
+        overlap=distance <= 0.0,
+    )
+
+
+def point_distance(point: Float[AnyArray, "*#b 3"], piece: PosedPieces) -> Nearest:
+    """Distance of points from pieces, 0 inside; `point_b` is the nearest point of the piece."""
+    shape = point.shape[:-1]
+    as_piece = PosedPieces(
+        kind=np.full(shape, PieceKind.SPHERE),
+        size=np.zeros((*shape, 3), np.float32),
+        vertices=np.zeros((*shape, 1, 3), np.float32),
+        pos=point,
+        quat=np.broadcast_to(np.array([1.0, 0.0, 0.0, 0.0], np.float32), (*shape, 4)),
+    )
+    return piece_distance(as_piece, piece)
+
+
+def _core_witnesses(
+    a: PosedPieces, b: PosedPieces
+) -> tuple[Float[Array, "*b 3"], Float[Array, "*b 3"], Bool[Array, "*b"]]:
+    """Nearest points of the cores, each in its own piece's frame, and whether the cores are apart."""
+    pos, quat = relative_pose(a.pos, a.quat, b.pos, b.quat)
+    quat = quat_normalize(quat)
+
+    def support(direction: Array) -> Array:
+        """Points of a and of b, in a's frame, that are farthest along and against `direction`: [..., 2, 3]."""
+        of_a = core_support(a.kind, a.size, a.vertices, direction)
+        of_b = core_support(b.kind, b.size, b.vertices, quat_rotate_inverse(quat, -direction))
+        return jnp.stack([of_a, pos + quat_rotate(quat, of_b)], axis=-2)
+
+    def step(state: tuple) -> tuple:
+        count, points, weights, done = state
+        nearest = _weighted(points, weights)
+        v = nearest[..., 0, :] - nearest[..., 1, :]
+        new = support(-v)
+        # v.w/|v| bounds the distance from below for the support point w.
+        bound = jnp.sum(v * (v - new[..., 0, :] + new[..., 1, :]), axis=-1) / jnp.maximum(length(v), OVERLAP)
+        done = done | ~(bound > CONVERGED)
+        slot = jax.nn.one_hot(jnp.argmin(weights, axis=-1), 4, dtype=bool)
+        # Points that carry no weight become copies of one that does: the simplex holds supporting points only.
+        kept = jnp.take_along_axis(points, jnp.argmax(weights, axis=-1)[..., None, None, None], axis=-3)
+        simplex = jnp.where((weights > 0.0)[..., None, None], points, kept)
+        simplex = jnp.where(slot[..., None, None], new[..., None, :, :], simplex)
+        candidate, enclosed = _nearest_weights(simplex[..., 0, :] - simplex[..., 1, :])
+        moved = _weighted(simplex, candidate)
+        shorter = length(moved[..., 0, :] - moved[..., 1, :]) < length(v)
+        take = ~done & (shorter | enclosed)
+        points = jnp.where(take[..., None, None, None], simplex, points)
+        weights = jnp.where(take[..., None], candidate, weights)
+        ended = done | ~take | enclosed
+        return count + 1, points, weights, ended
+
+    shape = jnp.broadcast_shapes(a.pos.shape[:-1], b.pos.shape[:-1], a.kind.shape, b.kind.shape)
+    first = jnp.broadcast_to(support(jnp.broadcast_to(pos, (*shape, 3)))[..., None, :, :], (*shape, 4, 2, 3))
+    weights = jnp.broadcast_to(jnp.array([1.0, 0.0, 0.0, 0.0]), (*shape, 4))
+    start = (0, first, weights, jnp.zeros(shape, bool))
+    _, points, weights, _ = jax.lax.while_loop(lambda s: (s[0] < MAX_STEPS) & ~jnp.all(s[3]), step, start)
+    core = _weighted(points, weights)
+    # `~(<=)` so that NaN counts as apart and shows in the distance.
+    apart = ~(length(core[..., 0, :] - core[..., 1, :]) <= OVERLAP)
+    return core[..., 0, :], quat_rotate_inverse(quat, core[..., 1, :] - pos), apart
+
+
+def _weighted(points: Float[Array, "*b 4 2 3"], weights: Float[Array, "*b 4"]) -> Float[Array, "*b 2 3"]:
+    return jnp.sum(points * weights[..., None, None], axis=-3)
+
+
+def _nearest_weights(y: Float[Array, "*b 4 3"]) -> tuple[Float[Array, "*b 4"], Bool[Array, "*b"]]:
+    """Weights of the point of a tetrahedron that is nearest to the origin, and whether the origin is inside.
+
+    The corners may coincide. All edges and faces are tried and the nearest valid point is taken: more work than
+    walking through Voronoi regions, but without branches and safe for slivers.
+    """
+    start, along = y[..., EDGES[:, 0], :], y[..., EDGES[:, 1], :] - y[..., EDGES[:, 0], :]
+    square = jnp.sum(along * along, axis=-1)
+    t = jnp.clip(-jnp.sum(start * along, axis=-1) / jnp.where(square > 0.0, square, 1.0), 0.0, 1.0)
+    on_edge = (1.0 - t)[..., None] * np.eye(4)[EDGES[:, 0]] + t[..., None] * np.eye(4)[EDGES[:, 1]]
+
+    a, b, c = (y[..., FACES[:, i], :] for i in range(3))
+    normal = jnp.cross(b - a, c - a)
+    area = jnp.sum(normal * normal, axis=-1)
+    parts = [jnp.sum(normal * jnp.cross(p, q), axis=-1) for p, q in ((b, c), (c, a), (a, b))]
+    share = jnp.stack(parts, axis=-1) / jnp.where(area > 0.0, area, 1.0)[..., None]
+    longest = jnp.max(square, axis=-1)
+    valid = jnp.all(share > 0.0, axis=-1) & (area > FLAT * FLAT * (longest * longest)[..., None])
+    share = share / jnp.where(valid, jnp.sum(share, axis=-1), 1.0)[..., None]
+    on_face = sum(share[..., i, None] * np.eye(4)[FACES[:, i]] for i in range(3))
+
+    weights = jnp.concatenate([on_edge, jnp.where(valid[..., None], on_face, 0.0)], axis=-2)
+    points = jnp.sum(weights[..., None] * y[..., None, :, :], axis=-2)
+    usable = jnp.concatenate([jnp.ones_like(t, bool), valid], axis=-1)
+    far = jnp.where(usable, jnp.sum(points * points, axis=-1), jnp.inf)
+    best = jnp.take_along_axis(weights, jnp.argmin(far, axis=-1)[..., None, None], axis=-2)[..., 0, :]
+
+    # Six times the signed volumes of the tetrahedra that the origin makes with each face.
+    p, q, r, s = (y[..., i, :] for i in range(4))
+
+    def triple(u: Array, v: Array, w: Array) -> Array:
+        return jnp.sum(u * jnp.cross(v, w), axis=-1)
+
+    volumes = jnp.stack([triple(q, s, r), triple(p, r, s), triple(p, s, q), triple(p, q, r)], axis=-1)
+    whole = jnp.sum(volumes, axis=-1)
+    enclosed = jnp.all(volumes * jnp.sign(whole)[..., None] >= 0.0, axis=-1)
+    # Rounding grows with the corners' distance from the origin; with that inside, no edge is shorter by much.
+    enclosed &= jnp.abs(whole) > FLAT * jnp.max(jnp.sum(y * y, axis=-1), axis=-1) ** 1.5
+    inside = volumes / jnp.where(enclosed, whole, 1.0)[..., None]
+    return jnp.where(enclosed[..., None], inside, best), enclosed

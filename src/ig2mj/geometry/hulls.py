@@ -1,0 +1,112 @@
+"""Points against convex pieces: containment, signed distance, support points. Metres.
+
+Pieces are described as in `SceneTables.piece_*`, in their own frames: capsules and cylinders along z, `size` is
+MuJoCo's geom_size, half-spaces (n, d) with n.x <= d. Distances between two pieces are in `ig2mj.geometry.gjk`.
+"""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Bool, Float, Int
+
+from ig2mj.geometry.poses import AnyArray, length, normalize
+from ig2mj.scene.tables import PieceKind
+
+
+def signed_depth(
+    kind: Int[AnyArray, "*#b"],
+    size: Float[AnyArray, "*#b 3"],
+    planes: Float[AnyArray, "*#b N 4"],
+    point: Float[AnyArray, "*#b 3"],
+) -> Float[Array, "*b"]:
+    """How deep a point lies in a piece, in the piece's frame: positive inside, negative outside.
+
+    Inside it is the distance to the surface. Outside it is exact (the negative distance) for round pieces; for
+    polyhedra it is the negative distance from the farthest violated face's plane, which is nearer than the surface
+    where an edge or a corner is nearest (`ig2mj.geometry.gjk.point_distance` is exact there).
+    """
+    radius, half = size[..., 0], size[..., 1]
+    height = jnp.abs(point[..., 2])
+    from_axis = length(point[..., :2])
+    from_end = jnp.stack([from_axis, jnp.maximum(height - half, 0.0)], axis=-1)
+    side, end = radius - from_axis, half - height
+    corner = length(jnp.stack([jnp.maximum(-side, 0.0), jnp.maximum(-end, 0.0)], axis=-1))
+    cylinder = jnp.where((side >= 0.0) & (end >= 0.0), jnp.minimum(side, end), -corner)
+    room = planes[..., 3] - jnp.sum(planes[..., :3] * point[..., None, :], axis=-1)
+    in_use = jnp.any(planes[..., :3] != 0.0, axis=-1)
+    polyhedron = jnp.min(jnp.where(in_use, room, jnp.inf), axis=-1, initial=jnp.inf)
+    return jnp.select(
+        [kind == k for k in (PieceKind.SPHERE, PieceKind.CAPSULE, PieceKind.CYLINDER)],
+        [radius - length(point), radius - length(from_end), cylinder],
+        polyhedron,
+    )
+
+
+def point_in_piece(
+    kind: Int[AnyArray, "*#b"],
+    size: Float[AnyArray, "*#b 3"],
+    planes: Float[AnyArray, "*#b N 4"],
+    point: Float[AnyArray, "*#b 3"],
+    tolerance: float = 0.0,
+) -> Bool[Array, "*b"]:
+    """Whether a point, in the piece's frame, lies in the piece or at most `tolerance` outside. False for NaN.
+
+    With a tolerance polyhedra grow by moving their faces outwards.
+    """
+    return signed_depth(kind, size, planes, point) >= -tolerance
+
+
+def support_point(
+    kind: Int[AnyArray, "*#b"],
+    size: Float[AnyArray, "*#b 3"],
+    vertices: Float[AnyArray, "*#b V 3"],
+    direction: Float[AnyArray, "*#b 3"],
+) -> Float[Array, "*b 3"]:
+    """A point of the piece that is farthest along `direction` (any length but zero), in the piece's frame."""
+    core = core_support(kind, size, vertices, direction)
+    rounding = core_radius(kind, size)[..., None]
+    return core + rounding * normalize(direction)
+
+
+def core_radius(kind: Int[AnyArray, "*#b"], size: Float[AnyArray, "*#b 3"]) -> Float[Array, "*b"]:
+    """Radius of the ball that, swept over the core, gives the piece: that of spheres and capsules, else 0."""
+    return jnp.where((kind == PieceKind.SPHERE) | (kind == PieceKind.CAPSULE), size[..., 0], 0.0)
+
+
+def bounding_radius(
+    kind: Int[AnyArray, "*#b"], size: Float[AnyArray, "*#b 3"], vertices: Float[AnyArray, "*#b V 3"]
+) -> Float[Array, "*b"]:
+    """Radius of a ball about the frame's origin that holds the piece."""
+    radius, half = size[..., 0], size[..., 1]
+    return jnp.select(
+        [kind == k for k in (PieceKind.SPHERE, PieceKind.CAPSULE, PieceKind.CYLINDER)],
+        [radius, radius + half, jnp.sqrt(radius * radius + half * half)],
+        jnp.max(jnp.sqrt(jnp.sum(jnp.square(vertices), axis=-1)), axis=-1),
+    )
+
+
+def core_support(
+    kind: Int[AnyArray, "*#b"],
+    size: Float[AnyArray, "*#b 3"],
+    vertices: Float[AnyArray, "*#b V 3"],
+    direction: Float[AnyArray, "*#b 3"],
+) -> Float[Array, "*b 3"]:
+    """Farthest point of the core: a sphere's centre, a capsule's axis, the whole of cylinders and polyhedra.
+
+    `kind` as a numpy array spares the kinds that do not occur.
+    """
+    present = set(PieceKind) if isinstance(kind, Array) else {PieceKind(k) for k in np.unique(kind)}
+    shape = jnp.broadcast_shapes(kind.shape, size.shape[:-1], vertices.shape[:-2], direction.shape[:-1])
+    point = jnp.zeros((*shape, 3))
+    if PieceKind.POLYHEDRON in present:
+        height = jnp.sum(vertices * direction[..., None, :], axis=-1)
+        best = jnp.argmax(height, axis=-1)[..., None, None]
+        corner = jnp.take_along_axis(jnp.broadcast_to(vertices, (*best.shape[:-2], *vertices.shape[-2:])), best, -2)
+        point = jnp.where((kind == PieceKind.POLYHEDRON)[..., None], corner[..., 0, :], point)
+    if present & {PieceKind.CAPSULE, PieceKind.CYLINDER}:
+        end = jnp.where(direction[..., 2] >= 0.0, size[..., 1], -size[..., 1])
+        rim = normalize(direction[..., :2]) * jnp.where(kind == PieceKind.CYLINDER, size[..., 0], 0.0)[..., None]
+        along = jnp.concatenate(jnp.broadcast_arrays(rim[..., :1], rim[..., 1:], end[..., None]), axis=-1)
+        point = jnp.where(((kind == PieceKind.CAPSULE) | (kind == PieceKind.CYLINDER))[..., None], along, point)
+    return point
