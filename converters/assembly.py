@@ -221,6 +221,12 @@ class _Planner:
         inertial.inertia = axes @ np.diag(values) @ axes.T
 
 
+def has_own_look(assembly: Assembly) -> bool:
+    """Whether the visuals say how the thing looks: a texture, or more than one colour."""
+    parts = [part for body in assembly.bodies for part in body.visuals]
+    return any(part.texture for part in parts) or len({part.rgba for part in parts if part.rgba is not None}) > 1
+
+
 def merge_inertials(parts: Sequence[tuple[Inertial, np.ndarray]]) -> Inertial:
     """One inertial out of several, each with the 4x4 pose of its link in the common frame; axes of the common frame.
 

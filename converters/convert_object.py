@@ -129,7 +129,7 @@ def _build(
 def _write(
     source: ObjectModel, built: BuiltModel, folder: pathlib.Path, options: ConvertOptions
 ) -> tuple[ModelBuilder, Manifest]:
-    builder = ModelBuilder(source.model, folder, category_colours=options.category_colours)
+    builder = ModelBuilder(source.model, folder, category_colours=options.colours == "category")
     assembly, name = built.assembly, source.model
     base = resting_pose(assembly)
     elements = add_object(

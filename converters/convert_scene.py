@@ -13,6 +13,7 @@ import numpy as np
 from ig2mj.errors import InputError
 from ig2mj.scene.manifest import FORMAT_VERSION, Manifest, RoomsEntry
 
+from .assembly import has_own_look
 from .dataset import Dataset
 from .description import Instance, SceneDescription
 from .finish import Outcome, finish, version_record
@@ -68,7 +69,7 @@ def convert_scene(
         start = time.perf_counter()
         options.progress("writing the scene", 0, 1)
         build = build_scene(
-            ModelBuilder(name, folder, category_colours=options.category_colours),
+            ModelBuilder(name, folder, category_colours=_use_category_colours(built, options)),
             placements,
             {object_name: model.assembly for object_name, model in built.items()},
             rooms=scene.rooms,
@@ -95,6 +96,13 @@ def convert_scene(
             skipped=skipped,
             rooms=scene.rooms,
         )
+
+
+def _use_category_colours(built: dict[str, BuiltModel], options: ConvertOptions) -> bool:
+    """Whether untextured visuals get their category's colour (see `ConvertOptions.colours`)."""
+    if options.colours != "auto":
+        return options.colours == "category"
+    return not any(has_own_look(model.assembly) for model in built.values())
 
 
 def _drop_missing(dataset: Dataset, scene: SceneDescription, options: ConvertOptions) -> list[str]:

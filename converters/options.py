@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Collection
-from typing import Any
+from typing import Any, Literal
 
 from .pieces import HullOptions
 from .report import Renderer
@@ -30,7 +30,8 @@ class ConvertOptions:
       ceiling_collision: give ceilings collision geoms.
       max_hulls, max_hull_vertices: budgets per link and per hull.
       bullet_inertia: inertia of the bounding box, as Bullet computes it, instead of the hulls'.
-      category_colours: household colours by category for visuals without a texture, instead of the source's.
+      colours: of visuals without a texture: the source's, or household ones by category. "auto": the source's, unless
+        every object of a scene is of one flat colour, which tells of the modelling program and not of the things.
       jobs: processes. cache: use the cache of decompositions. report: write report.json and report.html.
       renderer, view: what draws the report's pictures (see `report.write_report`).
     """
@@ -44,7 +45,7 @@ class ConvertOptions:
     max_hulls: int = 16
     max_hull_vertices: int = 32
     bullet_inertia: bool = False
-    category_colours: bool = False
+    colours: Literal["auto", "source", "category"] = "auto"
 
     jobs: int = 1
     cache: bool = True
@@ -74,7 +75,7 @@ class ConvertOptions:
     def record(self) -> dict[str, Any]:
         """What the manifest keeps of the options: those that decide what comes out."""
         kept = ("seed", "fixed_furniture", "ceiling_collision", "max_hulls", "max_hull_vertices", "bullet_inertia")
-        kept += ("category_colours",)
+        kept += ("colours",)
         record: dict[str, Any] = {name: getattr(self, name) for name in kept}
         for name in ("only_rooms", "only_categories"):
             value = getattr(self, name)

@@ -7,7 +7,7 @@ import json as json_module
 import pathlib
 import sys
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
 
@@ -36,7 +36,7 @@ def convert_scene(
     max_hull_vertices: int = 32,
     bullet_inertia: Annotated[bool, Flag] = False,
     ceiling_collision: Annotated[bool, Flag] = False,
-    category_colours: Annotated[bool, Flag] = False,
+    colours: Literal["auto", "source", "category"] = "auto",
     no_cache: Annotated[bool, Flag] = False,
     no_report: Annotated[bool, Flag] = False,
     json: Annotated[bool, Flag] = False,
@@ -60,7 +60,8 @@ def convert_scene(
       max_hull_vertices: most vertices per piece.
       bullet_inertia: inertia of each link's box, as Bullet computes it, instead of that of its hulls.
       ceiling_collision: let ceilings collide.
-      category_colours: household colours by category instead of the source's, where there is no texture.
+      colours: of visuals without a texture: the source's, or household ones by category; auto prefers the source's,
+        unless every object of a scene is of one flat colour.
       no_cache: do not use the cache of convex decompositions.
       no_report: no checks, no report.json and report.html.
       json: print what was done as JSON.
@@ -77,7 +78,7 @@ def convert_scene(
         max_hulls=max_hulls,
         max_hull_vertices=max_hull_vertices,
         bullet_inertia=bullet_inertia,
-        category_colours=category_colours,
+        colours=colours,
         jobs=jobs,
         cache=not no_cache,
         report=not no_report,
@@ -97,7 +98,7 @@ def convert_object(
     max_hulls: int = 16,
     max_hull_vertices: int = 32,
     bullet_inertia: Annotated[bool, Flag] = False,
-    category_colours: Annotated[bool, Flag] = False,
+    colours: Literal["auto", "source", "category"] = "auto",
     no_cache: Annotated[bool, Flag] = False,
     no_report: Annotated[bool, Flag] = False,
     json: Annotated[bool, Flag] = False,
@@ -116,7 +117,8 @@ def convert_object(
       max_hulls: most convex pieces per link; more are merged.
       max_hull_vertices: most vertices per piece.
       bullet_inertia: inertia of each link's box, as Bullet computes it, instead of that of its hulls.
-      category_colours: household colours by category instead of the source's, where there is no texture.
+      colours: of visuals without a texture: the source's, or household ones by category; auto prefers the source's,
+        unless every object of a scene is of one flat colour.
       no_cache: do not use the cache of convex decompositions.
       no_report: no checks, no report.json and report.html.
       json: print what was done as JSON.
@@ -128,7 +130,7 @@ def convert_object(
         max_hulls=max_hulls,
         max_hull_vertices=max_hull_vertices,
         bullet_inertia=bullet_inertia,
-        category_colours=category_colours,
+        colours=colours,
         cache=not no_cache,
         report=not no_report,
     )
