@@ -26,13 +26,14 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.states.adjacency import AdjacencyPairs
 from ig2mj.states.model import StateModel
+from ig2mj.states.nearness import NearPairs, boxes_near
 
-Kind = Literal["inside", "vertical", "horizontal"]
+Kind = Literal["inside", "vertical", "horizontal", "near"]
 Pair = tuple[int, int]
 Query = tuple[Kind, int, int]
-"""What is asked: kind, object, target. The answers are `Relations.inside`, `.above` with `.below`, `.beside`."""
+"""What is asked: kind, object, target. Answers: `Relations.inside`, `.above` with `.below`, `.beside`, `.near`."""
 
-KINDS: tuple[Kind, ...] = ("inside", "vertical", "horizontal")
+KINDS: tuple[Kind, ...] = ("inside", "vertical", "horizontal", "near")
 
 
 @struct.dataclass
@@ -70,6 +71,10 @@ class Relations:
         """A horizontal ray of the object enters the target (InSameHorizontalPlaneObjs of the object)."""
         return self._of("horizontal", pairs)[..., 0]
 
+    def near(self, pairs: Iterable[Pair]) -> Bool[Array, "W P"]:
+        """The object and the target are near each other (nearness.py)."""
+        return self._of("near", pairs)[..., 0]
+
     def _of(self, kind: Kind, pairs: Iterable[Pair]) -> Bool[Array, "W P V"]:
         where = [self.plan.index[kind][(int(a), int(b))] for a, b in pairs]
         return self.values[kind][:, np.array(where, int)]
@@ -96,27 +101,31 @@ class RelationPlan:
         return {kind: {pair: i for i, pair in enumerate(pairs)} for kind, pairs in self.pairs.items()}
 
     @functools.cached_property
-    def _adjacency(self) -> dict[Kind, AdjacencyPairs]:
-        return {k: AdjacencyPairs.build(self.model, np.array(p, int)) for k, p in self.pairs.items() if p}
+    def _work(self) -> dict[Kind, AdjacencyPairs | NearPairs]:
+        return {
+            kind: (NearPairs if kind == "near" else AdjacencyPairs).build(self.model, np.array(pairs, int))
+            for kind, pairs in self.pairs.items()
+            if pairs
+        }
 
     def empty_memo(self, num_worlds: int) -> Memo:
         """A memo that knows nothing yet."""
         inputs, values = {}, {}
-        for kind, adjacency in self._adjacency.items():
-            shape = (num_worlds, len(adjacency.pairs))
-            inputs[kind] = jnp.full((*shape, 3 + 7 * self._target_bodies[kind].shape[1]), jnp.nan, jnp.float32)
+        for kind, work in self._work.items():
+            shape = (num_worlds, len(work.pairs))
+            inputs[kind] = jnp.full((*shape, 3 + 7 * self._bodies[kind].shape[1]), jnp.nan, jnp.float32)
             values[kind] = jnp.zeros((*shape, 2 if kind == "vertical" else 1), bool)
         return Memo(inputs, values)
 
     def evaluate(self, view: PhysicsView) -> Relations:
         """All answers, computed now."""
-        values = {kind: self._gate(kind, view)[..., None] & self._compute(kind, view) for kind in self._adjacency}
+        values = {kind: self._gate(kind, view)[..., None] & self._compute(kind, view) for kind in self._work}
         return Relations(self, self._padded(values, view))
 
     def evaluate_changed(self, view: PhysicsView, memo: Memo) -> tuple[Relations, Memo]:
         """All answers, those of pairs where nothing moved from the memo, and the memo for the next step."""
         inputs, values = {}, {}
-        for kind in self._adjacency:
+        for kind in self._work:
             inputs[kind] = self._inputs(kind, view)
             changed = jnp.any(inputs[kind] != memo.inputs[kind], axis=-1)
             needed = changed & self._gate(kind, view)
@@ -129,38 +138,43 @@ class RelationPlan:
         return Relations(self, self._padded(values, view)), Memo(inputs, values)
 
     def _compute(self, kind: Kind, view: PhysicsView) -> Bool[Array, "W P V"]:
-        adjacency = self._adjacency[kind]
+        work = self._work[kind]
+        if isinstance(work, NearPairs):
+            return work.near(view)[..., None]
         if kind == "inside":
-            return adjacency.inside(view)[..., None]
+            return work.inside(view)[..., None]
         if kind == "vertical":
-            return jnp.stack(adjacency.vertical(view), axis=-1)
-        positive, negative = adjacency.horizontal(view)
+            return jnp.stack(work.vertical(view), axis=-1)
+        positive, negative = work.horizontal(view)
         return jnp.any(positive | negative, axis=-1)[..., None]
 
     def _gate(self, kind: Kind, view: PhysicsView) -> Bool[Array, "W P"]:
-        """Cheap necessary conditions from the target's world box: false means that no ray can answer yes."""
-        pairs = self._adjacency[kind].pairs
+        """Cheap necessary conditions from world boxes: false means that the answer is no."""
+        pairs = self._work[kind].pairs
+        apart = pairs[:, 0] != pairs[:, 1]
+        if kind == "near":
+            return boxes_near(view, pairs) & apart
         com = jnp.asarray(view.object_com)[:, pairs[:, 0]]
         low = jnp.asarray(view.aabb_low)[:, pairs[:, 1]] - BOX_SLACK
         high = jnp.asarray(view.aabb_high)[:, pairs[:, 1]] + BOX_SLACK
         within = (low <= com) & (com <= high)
-        apart = pairs[:, 0] != pairs[:, 1]
         axes = {"inside": [0, 1, 2], "vertical": [0, 1], "horizontal": [2]}[kind]
         return jnp.all(within[..., np.array(axes)], axis=-1) & apart
 
     def _inputs(self, kind: Kind, view: PhysicsView) -> Float[Array, "W P K"]:
-        pairs, bodies = self._adjacency[kind].pairs, self._target_bodies[kind]
+        pairs, bodies = self._work[kind].pairs, self._bodies[kind]
         com = jnp.asarray(view.object_com)[:, pairs[:, 0]]
         poses = jnp.concatenate([jnp.asarray(view.body_pos), jnp.asarray(view.body_quat)], axis=-1)[:, bodies]
         return jnp.concatenate([com, poses.reshape(*com.shape[:2], -1)], axis=-1)
 
     @functools.cached_property
-    def _target_bodies(self) -> dict[Kind, Int[np.ndarray, "P B"]]:
-        """Bodies that carry pieces of each pair's target, padded by repetition."""
+    def _bodies(self) -> dict[Kind, Int[np.ndarray, "P B"]]:
+        """Bodies whose poses each pair's answer depends on, padded by repetition."""
         tables, found = self.model.tables, {}
-        for kind, adjacency in self._adjacency.items():
-            rows = [np.unique(tables.piece_body[tables.piece_object == b]) for b in adjacency.pairs[:, 1]]
-            width = max((len(r) for r in rows), default=0)
+        for kind, work in self._work.items():
+            owners = [{a, b} if kind == "near" else {b} for a, b in work.pairs.tolist()]
+            rows = [np.unique(tables.piece_body[np.isin(tables.piece_object, list(o))]) for o in owners]
+            width = max(len(r) for r in rows)
             found[kind] = np.array([np.resize(r, width) if len(r) else np.zeros(width, int) for r in rows], int)
         return found
 

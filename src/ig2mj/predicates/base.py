@@ -1,0 +1,94 @@
+"""`Predicate`: one logical predicate, and `Context`: all that it may read.
+
+A predicate is evaluated for a list of argument tuples in all worlds at once. Arguments are indices: objects, or rooms
+where the predicate says so. It never asks for more pairs than it is given.
+
+Axes: W worlds, P argument tuples, K arguments of a predicate (1 or 2).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Literal
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Int
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.states.contacts import finite
+from ig2mj.states.model import StateModel
+from ig2mj.states.relations import Query, Relations
+from ig2mj.states.world import ExtendedStates
+
+Arguments = Int[np.ndarray, "P K"]
+ANY_ROOM = -1
+"""The room argument of `on_floor` where the floor itself is named, not a room."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Context:
+    """What predicates read: constants, extended states, physics, and the relations of this step."""
+
+    model: StateModel
+    states: ExtendedStates
+    view: PhysicsView
+    relations: Relations
+
+    @property
+    def num_worlds(self) -> int:
+        return self.view.object_com.shape[0]
+
+    def known(self, objects: Int[np.ndarray, "P"]) -> Bool[Array, "W P"]:
+        """Whether the places of objects are finite; a NaN pose never makes a predicate true."""
+        return finite(self.view)[:, objects]
+
+    def none(self, arguments: Arguments) -> Bool[Array, "W P"]:
+        """False everywhere."""
+        return jnp.zeros((self.num_worlds, len(arguments)), bool)
+
+
+Evaluate = Callable[[Context, Arguments], Bool[Array, "W P"]]
+Queries = Callable[[StateModel, Arguments], list[Query]]
+Why = Callable[[Context, tuple[int, ...], int], str]
+
+
+def no_queries(model: StateModel, arguments: Arguments) -> list[Query]:
+    """For predicates that need no relations."""
+    return []
+
+
+@dataclasses.dataclass(frozen=True)
+class Predicate:
+    """One logical predicate.
+
+    Attributes:
+      name: snake_case. arguments: what each argument is. reads: fields of the view, the states and the tables it
+        depends on. evaluate: truth for argument tuples. ability: without it the first argument's answer is False.
+        aliases: other names (iGibson's, BDDL's tokens, the paper's). queries: relations it needs. why: for people, the
+        numbers behind the answer in one world.
+    """
+
+    name: str
+    arguments: tuple[Literal["object", "room"], ...]
+    reads: tuple[str, ...]
+    evaluate: Evaluate
+    ability: str | None = None
+    aliases: tuple[str, ...] = ()
+    queries: Queries = no_queries
+    why: Why | None = None
+
+    @property
+    def arity(self) -> int:
+        return len(self.arguments)
+
+
+def of_objects(value: Bool[Array, "W O"], arguments: Arguments) -> Bool[Array, "W P"]:
+    """Gathers a per-object answer."""
+    return value[:, arguments[:, 0]]
+
+
+def yes(value: object) -> str:
+    """For `why` texts."""
+    return "yes" if bool(value) else "no"

@@ -1,0 +1,96 @@
+"""Why an expression does not hold, for people: the tree with what is missing, and the numbers behind it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import jax
+import numpy as np
+
+from ig2mj.engine.view import PhysicsView
+from ig2mj.predicates import logic
+from ig2mj.predicates.base import Context
+from ig2mj.predicates.logic import And, Atom, Exactly, Expression, Not, Or, Pairing
+from ig2mj.states.world import ExtendedStates
+
+if TYPE_CHECKING:
+    from ig2mj.predicates.compile import CompiledExpression
+
+
+def explain(compiled: CompiledExpression, states: ExtendedStates, view: PhysicsView, world: int = 0) -> str:
+    """Readable text about one world: one line when the expression holds, else what is missing."""
+    one = jax.tree.map(lambda leaf: np.asarray(leaf)[world : world + 1], (states, view))
+    states, view = one
+    relations = compiled.plan.evaluate(view)
+    context = Context(compiled.model, states, view, relations)
+    truth = np.asarray(compiled.literals.evaluate(context))[0]
+    table = dict(zip(compiled.atoms, truth.tolist(), strict=True))
+    if _value(compiled.ground, table):
+        return f"{logic.text(compiled.source)} holds."
+    lines = [f"{logic.text(compiled.source)} does not hold. Missing:"]
+    literals = {x.atom: x for x in compiled.literals.literals}
+
+    def reason(atom: Atom) -> str:
+        literal = literals[atom]
+        if not literal.able:
+            return f"'{atom.arguments[0]}' is not {literal.predicate.ability}"
+        if any(compiled.model.parameters.halves_of(o) and states.sliced[0, o] for o in literal.arguments):
+            return "judged by its halves"
+        return literal.predicate.why(context, literal.arguments, 0) if literal.predicate.why else ""
+
+    _missing(compiled.ground, table, True, reason, lines, "  ")
+    return "\n".join(lines)
+
+
+def _value(e: Expression, table: dict[Atom, bool]) -> bool:
+    match e:
+        case Atom():
+            return table[e]
+        case Not(part):
+            return not _value(part, table)
+        case And(parts):
+            return all(_value(p, table) for p in parts)
+        case Or(parts):
+            return any(_value(p, table) for p in parts)
+        case Exactly(count, parts):
+            return sum(_value(p, table) for p in parts) == count
+        case Pairing(count, rows):
+            rows_found, columns_found = _pairs(rows, table)
+            return min(rows_found, columns_found) >= count
+    raise TypeError(f"{e!r} is no ground expression")
+
+
+def _pairs(rows, table: dict[Atom, bool]) -> tuple[int, int]:
+    grid = [[p is not None and _value(p, table) for p in row] for row in rows]
+    return sum(any(row) for row in grid), sum(any(column) for column in zip(*grid, strict=True))
+
+
+def _missing(e: Expression, table: dict[Atom, bool], wanted: bool, reason, lines: list[str], indent: str) -> None:
+    """Adds lines about `e`, which is not as wanted."""
+    if _value(e, table) == wanted:
+        return
+    match e:
+        case Atom():
+            why = reason(e)
+            lines.append(f"{indent}{'' if wanted else 'not '}{logic.text(e)}" + (f": {why}" if why else ""))
+        case Not(part):
+            _missing(part, table, not wanted, reason, lines, indent)
+        case And(parts) | Or(parts):
+            every = isinstance(e, And) == wanted
+            if not every and len(parts) > 1:
+                lines.append(f"{indent}one of:")
+                indent += "  "
+            if not parts:
+                lines.append(f"{indent}nothing can make an empty alternative true")
+            for p in parts:
+                _missing(p, table, wanted, reason, lines, indent)
+        case Exactly(count, parts):
+            found = sum(_value(p, table) for p in parts)
+            lines.append(f"{indent}{'' if wanted else 'not '}exactly {count} of {len(parts)} (now {found}):")
+            for p in parts:
+                _missing(p, table, found < count, reason, lines, indent + "  ")
+        case Pairing(count, rows):
+            found = min(_pairs(rows, table))
+            lines.append(f"{indent}{'' if wanted else 'not '}{count} pairs (now {found}):")
+            for p in (p for row in rows for p in row if p is not None):
+                _missing(p, table, wanted, reason, lines, indent + "  ")

@@ -1,0 +1,173 @@
+"""Literals: predicates of named objects, resolved against a scene and evaluated together.
+
+Names become indices here, once, with typed errors. An object without the ability a predicate asks for answers False,
+with one warning, or is an error with `strict`. A whole that has been sliced is stood for by its halves: a predicate of
+it holds when it holds for all of them; with it as the second argument, when it holds for any (in iGibson that raises,
+spec/states.md 19.11).
+
+Axes: W worlds, L literals.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool
+
+from ig2mj.engine.view import Array
+from ig2mj.errors import AbilityError, Ig2mjError, UnknownNameError
+from ig2mj.predicates.base import ANY_ROOM, Context, Predicate
+from ig2mj.predicates.logic import Atom
+from ig2mj.predicates.registry import find
+from ig2mj.states.model import StateModel
+from ig2mj.states.relations import Query
+
+Instance = tuple[str, tuple[int, ...]]
+"""A predicate's name and the indices of its arguments."""
+
+
+class AbilityWarning(UserWarning):
+    """A predicate was asked of an object whose category lacks the ability; it is False."""
+
+
+class ArityError(Ig2mjError):
+    """A predicate was given the wrong number of arguments."""
+
+
+_WARNED: set[tuple[str, str]] = set()
+
+
+@dataclasses.dataclass(frozen=True)
+class Literal:
+    """A resolved atom: `able` is false where the ability is missing; then it is False everywhere."""
+
+    atom: Atom
+    predicate: Predicate
+    arguments: tuple[int, ...]
+    able: bool
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Literals:
+    """Literals of a scene, ready to be evaluated in one go."""
+
+    model: StateModel
+    literals: tuple[Literal, ...]
+    instances: dict[str, tuple[tuple[int, ...], ...]]
+
+    @classmethod
+    def build(cls, model: StateModel, atoms: Sequence[Atom], strict: bool = False) -> Literals:
+        """Resolves names.
+
+        Raises:
+          UnknownNameError: no such predicate, object or room. ArityError: too many or too few arguments.
+          AbilityError: with `strict`, an object lacks the ability.
+        """
+        literals = tuple(resolve(model, a, strict) for a in atoms)
+        instances: dict[str, dict[tuple[int, ...], None]] = {}
+        for literal in literals:
+            if literal.able:
+                for arguments in _variants(model, literal):
+                    instances.setdefault(literal.predicate.name, {})[arguments] = None
+        return cls(model, literals, {name: tuple(rows) for name, rows in instances.items()})
+
+    def queries(self) -> list[Query]:
+        """The relations that evaluating needs."""
+        return [q for name, rows in self.instances.items() for q in find(name).queries(self.model, np.array(rows, int))]
+
+    def evaluate(self, context: Context) -> Bool[Array, "W L"]:
+        """Truth of every literal in every world."""
+        place, columns = {}, []
+        for name, rows in self.instances.items():
+            place.update({(name, row): len(place) + i for i, row in enumerate(rows)})
+            columns.append(find(name).evaluate(context, np.array(rows, int)))
+        if not columns:
+            return jnp.zeros((context.num_worlds, len(self.literals)), bool)
+        truth = jnp.concatenate([*columns, jnp.zeros((context.num_worlds, 1), bool)], axis=-1)
+        last = truth.shape[-1] - 1
+        whole = np.array([place[(x.predicate.name, x.arguments)] if x.able else last for x in self.literals], int)
+        found = truth[:, whole]
+        split = [i for i, x in enumerate(self.literals) if x.able and len(_variants(self.model, x)) > 1]
+        for i in split:
+            found = found.at[:, i].set(self._of_halves(self.literals[i], truth, place, context))
+        return found
+
+    def _of_halves(
+        self, literal: Literal, truth: Bool[Array, "W I"], place: dict[Instance, int], context: Context
+    ) -> Bool[Array, "W"]:
+        sliced, parameters = context.states.sliced, self.model.parameters
+        roles = literal.predicate.arguments
+        first = literal.arguments[0]
+
+        def about(subject: int) -> Array:
+            """The literal with `subject` as first argument; its second argument may have halves."""
+            rest = literal.arguments[1:]
+            value = truth[:, place[(literal.predicate.name, (subject, *rest))]]
+            if rest and roles[1] == "object" and (halves := parameters.halves_of(rest[0])):
+                of_half = [truth[:, place[(literal.predicate.name, (subject, h))]] for h in halves]
+                value = jnp.where(sliced[:, rest[0]], jnp.any(jnp.stack(of_half), axis=0), value)
+            return value
+
+        halves = parameters.halves_of(first)
+        if not halves:
+            return about(first)
+        return jnp.where(sliced[:, first], jnp.all(jnp.stack([about(h) for h in halves]), axis=0), about(first))
+
+
+def resolve(model: StateModel, atom: Atom, strict: bool = False) -> Literal:
+    """Names to indices; see `Literals.build` for errors."""
+    predicate = find(atom.predicate)
+    if len(atom.arguments) != predicate.arity:
+        raise ArityError(
+            f"predicate '{predicate.name}' takes {predicate.arity} argument{'s' * (predicate.arity > 1)}, "
+            f"not {len(atom.arguments)}"
+        )
+    roles = zip(predicate.arguments, atom.arguments, strict=True)
+    arguments = tuple(
+        object_index(model, name) if role == "object" else room_index(model, name) for role, name in roles
+    )
+    able = predicate.ability is None or predicate.ability in model.parameters.abilities[arguments[0]]
+    if not able:
+        name = atom.arguments[0]
+        category = model.tables.object_categories[arguments[0]]
+        message = f"predicate '{predicate.name}' of '{name}': its category '{category}' is not {predicate.ability}"
+        if strict:
+            raise AbilityError(message)
+        if (predicate.name, name) not in _WARNED:
+            _WARNED.add((predicate.name, name))
+            warnings.warn(f"{message}; it is False", AbilityWarning, stacklevel=2)
+    return Literal(atom, predicate, arguments, able)
+
+
+def object_index(model: StateModel, name: str) -> int:
+    """Position of an object on the O axis. Raises UnknownNameError."""
+    names = model.tables.object_names
+    if name not in names:
+        raise UnknownNameError("object", name, names)
+    return names.index(name)
+
+
+def room_index(model: StateModel, name: str) -> int:
+    """Position of a room instance, or `ANY_ROOM` for the name of a floor object. Raises UnknownNameError."""
+    tables = model.tables
+    if name in tables.room_names:
+        return tables.room_names.index(name)
+    floors = [n for n, is_floor in zip(tables.object_names, tables.object_is_floor, strict=True) if is_floor]
+    if name in floors:
+        return ANY_ROOM
+    raise UnknownNameError("room", name, [*tables.room_names, *floors])
+
+
+def _variants(model: StateModel, literal: Literal) -> list[tuple[int, ...]]:
+    """The literal's arguments, then those with halves in the place of wholes."""
+    choices = []
+    for role, index in zip(literal.predicate.arguments, literal.arguments, strict=True):
+        halves = model.parameters.halves_of(index) if role == "object" else ()
+        choices.append((index, *halves))
+    if len(choices) == 1:
+        return [(a,) for a in choices[0]]
+    return [(a, b) for a in choices[0] for b in choices[1]]

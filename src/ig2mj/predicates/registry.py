@@ -1,0 +1,60 @@
+"""All predicates by name: one line each."""
+
+from __future__ import annotations
+
+from ig2mj.errors import UnknownNameError
+from ig2mj.predicates.base import Predicate
+from ig2mj.predicates.burnt import BURNT
+from ig2mj.predicates.cooked import COOKED
+from ig2mj.predicates.dusty import DUSTY
+from ig2mj.predicates.frozen import FROZEN
+from ig2mj.predicates.in_contact_with import IN_CONTACT_WITH
+from ig2mj.predicates.in_hand_of_agent import IN_HAND_OF_AGENT
+from ig2mj.predicates.in_reach_of_agent import IN_REACH_OF_AGENT
+from ig2mj.predicates.in_same_room_as_agent import IN_SAME_ROOM_AS_AGENT
+from ig2mj.predicates.inside import INSIDE
+from ig2mj.predicates.next_to import NEXT_TO
+from ig2mj.predicates.on_floor import ON_FLOOR
+from ig2mj.predicates.on_top import ON_TOP
+from ig2mj.predicates.open import OPEN
+from ig2mj.predicates.sliced import SLICED
+from ig2mj.predicates.soaked import SOAKED
+from ig2mj.predicates.stained import STAINED
+from ig2mj.predicates.toggled_on import TOGGLED_ON
+from ig2mj.predicates.under import UNDER
+
+PREDICATES: dict[str, Predicate] = {
+    p.name: p
+    for p in (
+        INSIDE,
+        ON_TOP,
+        NEXT_TO,
+        IN_CONTACT_WITH,
+        UNDER,
+        ON_FLOOR,
+        OPEN,
+        COOKED,
+        BURNT,
+        FROZEN,
+        SOAKED,
+        DUSTY,
+        STAINED,
+        TOGGLED_ON,
+        SLICED,
+        IN_HAND_OF_AGENT,
+        IN_REACH_OF_AGENT,
+        IN_SAME_ROOM_AS_AGENT,
+    )
+}
+"""The 19 predicates of the paper's table A.1, under their snake_case names."""
+
+_ALIASES = {alias: p for p in PREDICATES.values() for alias in p.aliases}
+
+
+def find(name: str) -> Predicate:
+    """The predicate of that name or alias, upper and lower case alike. Raises UnknownNameError."""
+    key = name.lower()
+    found = PREDICATES.get(key) or _ALIASES.get(key)
+    if found is None:
+        raise UnknownNameError("predicate", name, [*PREDICATES, *_ALIASES])
+    return found
