@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import trimesh
 
 from .description import Inertial, Link, ObjectModel
 from .kinematics import shape_bounds
-from .solids import Solid, combine, hull_volume, joined, shape_solids
+from .solids import Solid, combine, hull_volume, joined, shape_solids, signed_volume
 
 DEFAULT_DENSITY = 67.0
 """kg per m^3 of the bounding box, of a category without a spec (section 6)."""
@@ -57,8 +58,9 @@ def link_com(link: Link) -> np.ndarray | None:
             continue
         body = joined(shape.meshes)
         body.apply_transform(shape.pose @ np.diag([*shape.scale, 1.0]))
-        solid = body.is_watertight and abs(body.volume) > 0
-        parts.append((abs(body.volume) if solid else body.area, body.center_mass if solid else body.centroid))
+        volume = abs(signed_volume(body))
+        solid = body.is_watertight and volume > MIN_RADIUS**3 * 1e-6
+        parts.append((volume if solid else body.area, body.center_mass if solid else _surface_centre(body)))
     if len(parts) == 1:
         return np.array(parts[0][1])
     if parts:  # several meshes in one link: iGibson refuses them; here all count as one surface or one solid
@@ -68,12 +70,17 @@ def link_com(link: Link) -> np.ndarray | None:
     return None if whole is None else whole.centre
 
 
+def _surface_centre(body: trimesh.Trimesh) -> np.ndarray:
+    """The surface's centre; the vertices' mean where there is no surface."""
+    return np.asarray(body.centroid if body.area > 0 else body.vertices.mean(axis=0))
+
+
 def _split_mass(model: ObjectModel, total: float) -> dict[str, float]:
     """Mass per link, by the signed volume of its meshes, or by hulls where any of those is not positive."""
     signed, hulls = {}, {}
     for name, link in model.links.items():
         meshes = [m for shape in link.collisions for m in shape.meshes]
-        signed[name] = float(joined(meshes).volume) if meshes else 0.0
+        signed[name] = signed_volume(joined(meshes)) if meshes else 0.0
         hulls[name] = sum(hull_volume(m) for m in meshes)
     with_mesh = [name for name, link in model.links.items() if any(s.meshes for s in link.collisions)]
     volumes = signed

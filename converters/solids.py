@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import trimesh
-from scipy.spatial import QhullError
+from scipy.spatial import ConvexHull, QhullError
 
 from .description import Mesh, Shape
 from .poses import apply
@@ -49,10 +49,16 @@ def joined(meshes: Sequence[Mesh]) -> trimesh.Trimesh:
     )
 
 
+def signed_volume(body: trimesh.Trimesh) -> float:
+    """Volume by the divergence theorem, m^3 (trimesh's own divides by it to get at the centre, even where it is 0)."""
+    a, b, c = np.moveaxis(np.asarray(body.triangles, dtype=float), 1, 0)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+
+
 def hull_volume(mesh: Mesh) -> float:
     """Volume of the convex hull; 0 of a flat mesh."""
     hull = _hull(mesh.vertices)
-    return 0.0 if hull is None else float(hull.volume)
+    return 0.0 if hull is None else signed_volume(hull)
 
 
 def shape_solids(shape: Shape) -> list[Solid]:
@@ -102,9 +108,9 @@ def _primitive(shape: Shape) -> tuple[float, list[float]]:
 
 def _mesh_solid(mesh: Mesh, hull: bool) -> Solid:
     body = None if hull else joined([mesh])
-    if body is None or not body.is_watertight or body.volume <= 0:
+    if body is None or not body.is_watertight or signed_volume(body) <= 0:
         body = _hull(mesh.vertices)
-    if body is None or body.volume <= 0:
+    if body is None:
         return _plate(mesh)
     centre = np.asarray(body.center_mass)
     return Solid(float(body.volume), centre, covariance_of(np.asarray(body.moment_inertia)) / body.volume)
@@ -127,7 +133,13 @@ def _plate(mesh: Mesh) -> Solid:
 def _hull(points: np.ndarray) -> trimesh.Trimesh | None:
     """Convex hull, or None of flat points."""
     try:
-        hull = trimesh.convex.convex_hull(points)
+        hull = ConvexHull(points)
     except (QhullError, ValueError):
         return None
-    return hull if hull.volume > 0 else None
+    if hull.volume <= 1e-9 * float(np.linalg.norm(np.ptp(points, axis=0))) ** 3:
+        return None
+    corners = points[hull.simplices]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    inwards = np.einsum("ij,ij->i", normals, hull.equations[:, :3]) < 0
+    faces = np.where(inwards[:, None], hull.simplices[:, ::-1], hull.simplices)
+    return trimesh.Trimesh(points, faces, process=True)

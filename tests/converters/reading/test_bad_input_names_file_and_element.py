@@ -7,9 +7,10 @@ import json
 import struct
 
 import pytest
-from ig2mj.errors import Ig2mjError, InputError
 from ig2mj_converters.dataset import Dataset
 from ig2mj_converters.urdf import read_urdf
+
+from ig2mj.errors import Ig2mjError, InputError
 
 MESH = "shape/c.obj"
 
