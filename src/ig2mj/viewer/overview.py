@@ -9,8 +9,8 @@ from ig2mj.scene.scene import Scene
 from ig2mj.viewer.offscreen import FreeView
 
 #: Distance of the camera in radii of the home: what just fills a picture with MuJoCo's vertical field of view of 45
-#: degrees is 2.6; a home is flat, and seen from above fills it from nearer.
-DISTANCE_IN_RADII = 2.2
+#: degrees is 2.6; a home is flat and wider than high, and fills a picture that is so too from nearer.
+DISTANCE_IN_RADII = 1.8
 
 
 def home_overview(scene: Scene, data: mujoco.MjData, azimuth: float = 90.0, elevation: float = -50.0) -> FreeView:
