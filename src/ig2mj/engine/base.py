@@ -21,6 +21,7 @@ import mujoco
 from flax import struct
 from jaxtyping import Bool, Float, Int
 
+from ig2mj.engine.health import Health
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.scene.tables import SceneTables
 
@@ -145,6 +146,10 @@ class Engine(Protocol):
 
     def write(self, physics: Physics, write: Write) -> Physics:
         """Applies a change and brings everything derived up to date; what it moves wakes."""
+        ...
+
+    def health(self, physics: Physics) -> Health:
+        """What went wrong in each world since it was loaded; see `ig2mj.engine.health`."""
         ...
 
     def export(self, physics: Physics, world: int) -> Snapshot:

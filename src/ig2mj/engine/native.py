@@ -24,6 +24,7 @@ from jaxtyping import Bool, Float
 
 from ig2mj.engine.base import BOX_RULES, PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snapshot, Write
 from ig2mj.engine.boxes import make_box_table
+from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.native_world import FIELDS, Changed, Statics, World
 from ig2mj.engine.native_write import apply_write
@@ -171,6 +172,18 @@ class NativeEngine:
 
         physics.update(self._run(physics, apply))
         return physics
+
+    def health(self, physics: NativePhysics) -> Health:
+        """What went wrong in each world; see `ig2mj.engine.health`. C MuJoCo's buffers grow: nothing overflows."""
+        layout = self.layout
+        free = np.concatenate([layout.object_dofadr[layout.object_dofadr >= 0], layout.extra_dofadr])
+        velocity = np.array([world.data.qvel[free[:, None] + np.arange(3)] for world in physics.worlds], np.float32)
+        positions = np.array([world.data.qpos for world in physics.worlds])
+        return Health(
+            overflow=np.zeros(self.num_worlds, np.int32),
+            finite=np.isfinite(positions).all(1) & np.isfinite(velocity).all((1, 2)),
+            top_speed=np.sqrt(np.square(velocity).sum(-1).max(1, initial=0.0)),
+        )
 
     def export(self, physics: NativePhysics, world: int) -> Snapshot:
         """One world as a snapshot in float64 numpy arrays of its own."""

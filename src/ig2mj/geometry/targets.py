@@ -268,4 +268,5 @@ def _slots(pair: Int[np.ndarray, "E"], num_pairs: int) -> Int[np.ndarray, "P S"]
 
 
 def _matrices(quat: Float[np.ndarray, "K 4"]) -> Float[np.ndarray, "K 3 3"]:
-    return np.asarray(quat_to_matrix(np.asarray(quat, np.float32)), np.float64)
+    with jax.ensure_compile_time_eval():  # plans may be built while something is traced
+        return np.asarray(quat_to_matrix(np.asarray(quat, np.float32)), np.float64)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Int, UInt
+from jaxtyping import Int, UInt
+
+from ig2mj.engine.view import Array
 
 
 def episode_keys(seed: Int[Array, ""] | int, world: Int[Array, "W"], episode: Int[Array, "W"]) -> UInt[Array, "W 2"]:
