@@ -32,10 +32,10 @@ _BY_WORD: tuple[tuple[tuple[str, ...], Rgba], ...] = (
 
 def category_colour(category: str) -> Rgba:
     """A category's colour: a household one where the name tells, else a muted hue that depends on the name only."""
-    words = category.lower()
+    words = category.lower().removeprefix("half_")
     for names, colour in _BY_WORD:
         if any(name in words for name in names):
             return colour
-    digest = hashlib.sha256(category.encode()).digest()
+    digest = hashlib.sha256(words.encode()).digest()
     r, g, b = colorsys.hls_to_rgb(digest[0] / 255, 0.45 + digest[1] / 1275, 0.35 + digest[2] / 850)
     return (round(r, 3), round(g, 3), round(b, 3), 1.0)

@@ -140,7 +140,7 @@ class _ObjectWriter:
         if limits is not None:
             joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_TRUE, limits
         joint.frictionloss = friction(source, self._category, reach(self._assembly, index), self._igibson_joints)
-        joint.damping = max(source.damping, DAMPING[kind])
+        joint.damping = (max(source.damping, DAMPING[kind]), 0.0, 0.0)  # linear in velocity
         joint.armature = ARMATURE[kind]
         return name
 
