@@ -85,8 +85,6 @@ def _decompose(shapes: Sequence[Shape], options: HullOptions) -> LinkHulls:
     out.pieces = pieces
     out.volume = _union_of(pieces)
     out.method = "+".join(sorted({p.source for p in pieces}))
-    if not pieces:
-        out.warnings.append("no usable collision geometry")
     out.seconds = time.monotonic() - started
     return out
 
