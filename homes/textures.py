@@ -44,9 +44,9 @@ def wood(rgb: RGB, rng: random.Random) -> Image.Image:
     fibre = _smooth(g.standard_normal((SIZE, SIZE)), 14, 1)
     rows = np.arange(SIZE)[:, None] / SIZE
     waves = np.sin(
-        2 * np.pi * (rows * g.integers(3, 6) + 0.25 * np.sin(2 * np.pi * np.arange(SIZE)[None] / SIZE + 6 * rows))
+        2 * np.pi * (rows * g.integers(3, 6) + 0.08 * np.sin(2 * np.pi * np.arange(SIZE)[None] / SIZE + 6 * rows))
     )
-    return _image(fibre / np.abs(fibre).max() + 0.8 * waves, rgb, 0.22)
+    return _image(fibre / np.abs(fibre).max() + 0.45 * waves, rgb, 0.2)
 
 
 def brushed(rgb: RGB, rng: random.Random) -> Image.Image:

@@ -1,5 +1,43 @@
 """All families; the catalogue is made of their CATEGORIES."""
 
-from . import cabinets, chairs, cookware, fridges, fruit, books, packages, sinks, stoves, tables, tableware
+from . import (
+    books,
+    bottles,
+    cabinets,
+    chairs,
+    cleaning_tools,
+    clothes,
+    cloths,
+    containers,
+    cookware,
+    food,
+    fridges,
+    fruit,
+    packages,
+    sinks,
+    stoves,
+    tables,
+    tableware,
+    vegetables,
+)
 
-FAMILIES = (cabinets, chairs, cookware, fridges, fruit, books, packages, sinks, stoves, tables, tableware)
+FAMILIES = (
+    books,
+    bottles,
+    cabinets,
+    chairs,
+    cleaning_tools,
+    clothes,
+    cloths,
+    containers,
+    cookware,
+    food,
+    fridges,
+    fruit,
+    packages,
+    sinks,
+    stoves,
+    tables,
+    tableware,
+    vegetables,
+)

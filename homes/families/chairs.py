@@ -7,12 +7,8 @@ import math
 from .. import materials
 from ..catalogue import Entry
 from ..model import ObjectBuilder
-from ..solids import Solid, bar, block, box, cylinder, hull, rod, soft_box, tube
+from ..solids import bar, block, box, cylinder, hull, rod, soft_box, tube
 from .parts import legs
-
-
-def _cushion(size: tuple[float, float, float]) -> Solid:
-    return soft_box(*size)
 
 
 def straight_chair(b: ObjectBuilder) -> None:
@@ -30,7 +26,7 @@ def straight_chair(b: ObjectBuilder) -> None:
     if seat is wood:
         b.add(block((x - 0.03, y, 0.025), (0.015, 0, height)), wood)
     else:
-        b.add(_cushion((x - 0.04, y - 0.01, 0.05)).at(0.02, 0, height - 0.025), seat)
+        b.add(soft_box(x - 0.04, y - 0.01, 0.05).at(0.02, 0, height - 0.025), seat)
     back = b.pick(("slats", "board", "bars"))
     x_back = -x / 2 + 0.035
     if back == "board":
@@ -129,9 +125,7 @@ def rocking_chair(b: ObjectBuilder) -> None:
         b.add(bar((-0.25, yy, seat + 0.2), (0.24, yy, seat + 0.2), 0.045, 0.02), wood)
         b.add(bar((-0.24, yy, seat), (-x / 2 + 0.06, yy, z), 0.03, 0.03), wood)
     b.add(block((0.48, y - 0.06, 0.03), (-0.01, 0, seat)), wood)
-    centre = ((-0.24 - x / 2 + 0.06) / 2, 0, (seat + z) / 2 + 0.05)
     b.add(bar((-0.245, 0, seat + 0.1), (-x / 2 + 0.065, 0, z), y - 0.1, 0.018), wood)
-    del centre
 
 
 def folding_chair(b: ObjectBuilder) -> None:

@@ -45,7 +45,7 @@ def pear(b: ObjectBuilder) -> None:
 
 
 def lemon(b: ObjectBuilder, *, skins: tuple = ("yellow",)) -> None:
-    """A lemon lies along x? No: it lies along y, so that the cut at x = 0 shows its length."""
+    """A lemon lying along y, so that the cut at x = 0 shows its length."""
     x, y, z = b.size
     r, h = z / 2, y
     profile = [(0.12 * r, 0), (0.22 * r, 0.07 * h), (0.75 * r, 0.2 * h), (r, 0.45 * h), (0.95 * r, 0.6 * h),
@@ -120,7 +120,7 @@ _SLICEABLE: list[Line] = [
     ("chestnut", round_fruit, (0.032, 0.032, 0.026), 0.014, (0.93, 0.86, 0.66), {"skins": ((0.36, 0.18, 0.10),), "stem": None}),
     ("coconut", round_fruit, (0.115, 0.115, 0.12), 0.68, (0.97, 0.96, 0.93), {"skins": ((0.36, 0.25, 0.16),), "stem": None,
                                                                             "depth": 0.35}),
-    ("kiwi", lemon, (0.048, 0.064, 0.046), 0.075, (0.55, 0.72, 0.24), {"skins": ((0.45, 0.36, 0.22),)}),
+    ("kiwi", round_fruit, (0.048, 0.064, 0.046), 0.075, (0.55, 0.72, 0.24), {"skins": ((0.45, 0.36, 0.22),), "stem": None}),
     ("lemon", lemon, (0.058, 0.085, 0.056), 0.11, (0.97, 0.91, 0.55), {"skins": ("yellow",)}),
     ("mushroom", mushroom, (0.050, 0.050, 0.045), 0.018, (0.95, 0.92, 0.86), {}),
     ("orange", round_fruit, (0.076, 0.076, 0.075), 0.18, (0.97, 0.68, 0.28), {"skins": ("orange",), "stem": None}),

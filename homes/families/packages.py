@@ -75,6 +75,8 @@ CATEGORIES = [
           options={"looks": (("red", "yellow"), ("navy", "orange"), ("orange", "brown"))}),
     Entry("canned_food", tin, (0.075, 0.075, 0.110), 0.42, 4,
           options={"looks": (("red", "cream"), ("green", "yellow"), ("blue", "white"), ("orange", "red"))}),
+    Entry("oatmeal", carton_box, (0.085, 0.140, 0.240), 0.55, 3, options={"looks": (("tan", "red"), ("blue", "cream"))}),
+    Entry("pasta", carton_box, (0.050, 0.110, 0.200), 0.50, 3, options={"looks": (("blue", "yellow"), ("green", "cream"), ("red", "cream"))}),
     Entry("butter", stick, (0.065, 0.100, 0.038), 0.25, 3,
           options={"looks": (("yellow", "blue"), ("silver", "green"), ("cream", "red"))}),
 ]  # fmt: skip

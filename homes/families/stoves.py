@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import math
-
 from .. import materials, textures
 from ..catalogue import Entry
 from ..materials import Material
 from ..model import ObjectBuilder
-from ..solids import Solid, block, box, cylinder, decal, join, lathe, rod, soft_box, tube
+from ..solids import block, cylinder, decal, join, lathe, rod, soft_box
 from .parts import bow_handle, button, carcass, door, flap, knob, lid
 
 
@@ -138,23 +136,23 @@ def microwave(b: ObjectBuilder) -> None:
     base = 0.01
     room = y - panel
     height = z - base
-    middle = panel / 2
+    middle = -panel / 2
     b.add(carcass(depth, room, height, wall, back=wall).at(shift, middle, base), body)
-    b.add(block((depth, panel, height), (shift, -(y - panel) / 2, base + height / 2)), body)
+    b.add(block((depth, panel, height), (shift, (y - panel) / 2, base + height / 2)), body)
     b.add(block((0.002, room - 2 * wall, height - 2 * wall), (shift - depth / 2 + wall + 0.001, middle, base + height / 2)).seen(),
           materials.plain("cream"))  # fmt: skip
     plate = min(depth, room) * 0.42
     b.add(lathe([(plate, 0), (plate, 0.006)]).at(shift, middle, base + wall), materials.glass("glass", 0.6))
     plane = shift + depth / 2
-    link = door(b, "door", plane, (panel - y / 2 + 0.002, y / 2), (base, z), body, bow_handle(0.6 * z, 0.02, upright=True),
+    link = door(b, "door", plane, (-y / 2, y / 2 - panel - 0.002), (base, z), body, bow_handle(0.6 * z, 0.02, upright=True),
                 materials.metal("chrome"), depth=leaf - 0.026 + 0.004, angle=1.9)  # fmt: skip
     window = block((0.002, 0.7 * room, 0.6 * height), (plane + leaf - 0.021, middle, base + height / 2)).seen()
     link.add(window, materials.plain("black", shine=0.8))
     pad = materials.picture("keypad", textures.keys((0.1, 0.1, 0.11), (0.75, 0.76, 0.78), 3, 5), kind="plastic")
-    b.add(decal(0.75 * panel, 0.5 * height).at(plane + 0.001, -(y - panel) / 2, base + 0.42 * height), pad)
+    b.add(decal(0.75 * panel, 0.5 * height).at(plane + 0.001, (y - panel) / 2, base + 0.42 * height), pad)
     shown = materials.picture("display", textures.screen(b.rng, (0.02, 0.2, 0.12)), kind="screen")
-    b.add(decal(0.75 * panel, 0.12 * height).at(plane + 0.001, -(y - panel) / 2, base + 0.82 * height), shown)
-    b.point("toggle_button", (plane + 0.005, -(y - panel) / 2, base + 0.15 * height))
+    b.add(decal(0.75 * panel, 0.12 * height).at(plane + 0.001, (y - panel) / 2, base + 0.82 * height), shown)
+    b.point("toggle_button", (plane + 0.005, (y - panel) / 2, base + 0.15 * height))
     b.point("heat_source", (shift, middle, base + height / 2))
 
 

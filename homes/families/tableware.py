@@ -6,7 +6,7 @@ from .. import materials
 from ..catalogue import Entry
 from ..materials import Material
 from ..model import ObjectBuilder
-from ..solids import Solid, ball, block, hull, lathe, prism, rod, soft_box, tube
+from ..solids import Solid, ball, hull, lathe, prism, rod, soft_box, tube
 from ..vessels import turned_vessel
 from .parts import ear
 
