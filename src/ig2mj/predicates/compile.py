@@ -18,7 +18,6 @@ import functools
 from collections.abc import Mapping, Sequence
 
 import jax
-import jax.numpy as jnp
 from flax import struct
 from jaxtyping import Bool, Float
 
@@ -27,8 +26,9 @@ from ig2mj.errors import UnknownNameError
 from ig2mj.knowledge import categories_of
 from ig2mj.predicates import logic
 from ig2mj.predicates.base import Context
+from ig2mj.predicates.evaluate import fraction, holds
 from ig2mj.predicates.literals import Literals
-from ig2mj.predicates.logic import And, Atom, Exactly, Expression, Not, Or, Pairing
+from ig2mj.predicates.logic import Atom, Expression
 from ig2mj.predicates.parse import parse
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations import Query, RelationPlan, Relations
@@ -42,7 +42,7 @@ class Verdict:
     """What an expression says of every world.
 
     Attributes:
-      holds: it is true. fraction: of its literals that are as they should be (see `CompiledExpression.fraction`).
+      holds: it is true. fraction: of its literals that are as they should be (`evaluate.fraction`).
       literals: truth of every literal, in the order of `CompiledExpression.atoms`.
     """
 
@@ -86,19 +86,16 @@ class CompiledExpression:
         truth = self.literals.evaluate(Context(self.model, states, view, relations))
         column = {a: truth[:, i] for i, a in enumerate(self.atoms)}
         worlds = truth.shape[0]
-        score, _ = _score(self.ground, column, True, worlds)
-        return Verdict(holds=_holds(self.ground, column, worlds), fraction=score, literals=truth)
+        return Verdict(
+            holds=holds(self.ground, column, worlds), fraction=fraction(self.ground, column, worlds), literals=truth
+        )
 
     def __call__(self, world: WorldState) -> Bool[Array, "W"]:
         """Whether the expression holds, in every world."""
         return self._jitted(world.states, world.view).holds
 
     def fraction(self, world: WorldState) -> Float[Array, "W"]:
-        """Share of literals that are as the expression wants them: 1 exactly where it holds.
-
-        A conjunction counts the literals of its parts. Of a disjunction, and of what exists, the part that is nearest
-        to holding counts; exactly n and pairs count the n nearest, less what is too much.
-        """
+        """Share of literals that are as the expression wants them: 1 exactly where it holds (`evaluate.fraction`)."""
         return self._jitted(world.states, world.view).fraction
 
     def explain(self, world: WorldState, index: int = 0) -> str:
@@ -150,92 +147,3 @@ def _categories(synset: str) -> set[str]:
         return set(categories_of(synset))
     except UnknownNameError:
         return set()
-
-
-def _holds(e: Expression, column: Mapping[Atom, Bool[Array, "W"]], worlds: int) -> Bool[Array, "W"]:
-    def stacked(parts: Sequence[Expression]) -> Bool[Array, "N W"]:
-        none = jnp.zeros((0, worlds), bool)
-        return jnp.stack([_holds(p, column, worlds) for p in parts]) if parts else none
-
-    match e:
-        case Atom():
-            return column[e]
-        case Not(part):
-            return ~_holds(part, column, worlds)
-        case And(parts):
-            return jnp.all(stacked(parts), axis=0)
-        case Or(parts):
-            return jnp.any(stacked(parts), axis=0)
-        case Exactly(count, parts):
-            return jnp.sum(stacked(parts), axis=0) == count
-        case Pairing(count, rows):
-            return _pairs_found(_grid(rows, lambda p: _holds(p, column, worlds), worlds), count)
-    raise TypeError(f"{e!r} is no ground expression")
-
-
-def _grid(rows, value, worlds: int) -> Bool[Array, "M N W"]:
-    """Values of the parts of a `Pairing`; an object paired with itself has 0."""
-    cells = [[jnp.zeros(worlds) if p is None else jnp.asarray(value(p)) for p in row] for row in rows]
-    if not cells or not cells[0]:
-        return jnp.zeros((len(cells), 0, worlds))
-    return jnp.stack([jnp.stack(row) for row in cells])
-
-
-def _pairs_found(grid: Array, count: int) -> Bool[Array, "W"]:
-    """BDDL's test: at least `count` rows and `count` columns have a true cell."""
-    true = grid > 0.5
-    return (jnp.sum(jnp.any(true, axis=1), axis=0) >= count) & (jnp.sum(jnp.any(true, axis=0), axis=0) >= count)
-
-
-def _score(
-    e: Expression, column: Mapping[Atom, Bool[Array, "W"]], wanted: bool, worlds: int
-) -> tuple[Float[Array, "W"], float]:
-    """How far an expression is from being `wanted`, 0 to 1, and how many literals that counts for."""
-    ones = jnp.ones(worlds)
-
-    def scores(parts: Sequence[Expression], value: bool) -> list[tuple[Float[Array, "W"], float]]:
-        return [_score(p, column, value, worlds) for p in parts]
-
-    match e:
-        case Atom():
-            return (column[e] == wanted).astype(jnp.float32), 1.0
-        case Not(part):
-            return _score(part, column, not wanted, worlds)
-        case And(parts) | Or(parts):
-            found = scores(parts, wanted)
-            if isinstance(e, And) == wanted:
-                total = sum(n for _, n in found)
-                return (sum(n * s for s, n in found) / total, total) if found else (ones, 0.0)
-            return (
-                (jnp.max(jnp.stack([s for s, _ in found]), axis=0), max(n for _, n in found))
-                if found
-                else (
-                    0 * ones,
-                    1.0,
-                )
-            )
-        case Exactly(count, parts):
-            holds = _holds(e, column, worlds) == wanted
-            near = jnp.stack([s for s, _ in scores(parts, True)]) if parts else jnp.zeros((0, worlds))
-            best = jnp.sum(jnp.sort(near, axis=0)[::-1][:count], axis=0)
-            extra = jnp.maximum(jnp.sum(near >= 1.0, axis=0) - count, 0)
-            share = (best - extra) / max(count, len(parts), 1)
-            return _whole_or_less(holds, share if wanted else 0 * ones), float(max(count, 1))
-        case Pairing(count, rows):
-            holds = _holds(e, column, worlds) == wanted
-            grid = _grid(rows, lambda p: _score(p, column, True, worlds)[0], worlds)
-            sides = [
-                jnp.sum(jnp.sort(jnp.max(grid, axis=a, initial=0.0), axis=0)[::-1][:count], axis=0) for a in (0, 1)
-            ]
-            share = jnp.minimum(*sides) / max(count, 1)
-            return _whole_or_less(holds, share if wanted else 0 * ones), float(max(count, 1))
-    raise TypeError(f"{e!r} is no ground expression")
-
-
-def _whole_or_less(holds: Bool[Array, "W"], share: Float[Array, "W"]) -> Float[Array, "W"]:
-    """1 exactly where it holds."""
-    return jnp.where(holds, 1.0, jnp.clip(share, 0.0, LESS_THAN_ONE))
-
-
-LESS_THAN_ONE = 0.99
-"""The most that a quantifier that does not hold scores."""

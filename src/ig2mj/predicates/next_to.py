@@ -18,7 +18,8 @@ from ig2mj.states.relations import Query
 def _queries(model: StateModel, arguments: Arguments) -> list[Query]:
     asked: list[Query] = []
     for a, b in arguments.tolist():
-        asked += [("near", a, b), ("horizontal", a, b)]
+        asked.append(("near", a, b))
+        asked.append(("horizontal", a, b))
         if not model.paper:
             asked.append(("horizontal", b, a))
     return asked

@@ -13,6 +13,7 @@ comment.
 from __future__ import annotations
 
 import re
+from typing import TypeAlias
 
 from ig2mj.errors import InputError
 from ig2mj.predicates import logic
@@ -23,7 +24,7 @@ _TOKEN = re.compile(r'\s*(?:;[^\n]*\n?\s*)*([()]|"(?:\\.|[^"\\])*"|[^\s()";]+)')
 MAX_DEPTH = 100
 """Nesting that no sensible goal reaches; deeper text is refused instead of overflowing the stack."""
 
-Tree = "str | list[Tree]"
+Tree: TypeAlias = "str | list[Tree]"
 
 
 class ExpressionError(InputError):
@@ -118,16 +119,17 @@ def _expression(tree: Tree, name: str) -> Expression:
             wants(4, "(fornpairs N (?x - GROUP) (?y - GROUP) X)")
             count, first, second = _count(parts[0], name), _binding(parts[1], name), _binding(parts[2], name)
             return logic.ForNPairs(count, first, second, _expression(parts[3], name))
-    if not all(isinstance(p, str) for p in parts):
+    names = [p for p in parts if isinstance(p, str)]
+    if len(names) < len(parts):
         raise ExpressionError(name, f"'{word}' is no word of the language, so its parts are names", element=_show(tree))
-    return logic.Atom(tree[0], tuple(_unquoted(p) for p in parts))
+    return logic.Atom(tree[0], tuple(_unquoted(p) for p in names))
 
 
 def _binding(tree: Tree, name: str) -> tuple[str, str]:
-    fits = isinstance(tree, list) and len(tree) == 3 and all(isinstance(p, str) for p in tree) and tree[1] == "-"
-    if not fits or not tree[0].startswith("?"):
-        raise ExpressionError(name, "expected (?x - GROUP)", element=_show(tree))
-    return tree[0], _unquoted(tree[2])
+    match tree:
+        case [str(variable), "-", str(group)] if variable.startswith("?"):
+            return variable, _unquoted(group)
+    raise ExpressionError(name, "expected (?x - GROUP)", element=_show(tree))
 
 
 def _count(tree: Tree, name: str) -> int:

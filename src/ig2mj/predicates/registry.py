@@ -9,6 +9,7 @@ from ig2mj.predicates.cooked import COOKED
 from ig2mj.predicates.dusty import DUSTY
 from ig2mj.predicates.frozen import FROZEN
 from ig2mj.predicates.in_contact_with import IN_CONTACT_WITH
+from ig2mj.predicates.in_fov_of_agent import IN_FOV_OF_AGENT
 from ig2mj.predicates.in_hand_of_agent import IN_HAND_OF_AGENT
 from ig2mj.predicates.in_reach_of_agent import IN_REACH_OF_AGENT
 from ig2mj.predicates.in_same_room_as_agent import IN_SAME_ROOM_AS_AGENT
@@ -41,6 +42,7 @@ PREDICATES: dict[str, Predicate] = {
         STAINED,
         TOGGLED_ON,
         SLICED,
+        IN_FOV_OF_AGENT,
         IN_HAND_OF_AGENT,
         IN_REACH_OF_AGENT,
         IN_SAME_ROOM_AS_AGENT,

@@ -17,8 +17,8 @@ from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import EngineError
 from ig2mj.sampling.perturbation import loose_objects, perturb
 from ig2mj.scene.scene import Scene
+from ig2mj.states.initial import states_of_manifest
 from ig2mj.states.model import StateModel
-from ig2mj.states.update import initial_states, with_values
 from ig2mj.worlds.guards import lowest_support
 from ig2mj.worlds.pool import Pool, stack
 from ig2mj.worlds.random_streams import episode_keys
@@ -62,7 +62,8 @@ def make_pool(
     start = engine.export(physics, 0)
     floor = lowest_support(view, scene.tables.object_fixed)
     loose = loose_objects(scene.tables, view)
-    states = with_values(model, initial_states(model, 1), [entry.state for entry in scene.manifest.objects])
+    bodies = {scene.model.body(b).name: b for b in range(scene.model.nbody)}
+    states = states_of_manifest(model, scene.manifest, bodies)
     rows: list[Snapshot] = []
     tried = 0
     while len(rows) < count:

@@ -3,10 +3,11 @@
 A state is one file; `update.update` calls them in their one order; `world.ExtendedStates` holds what they keep.
 """
 
+from ig2mj.states.initial import initial_states, states_of_manifest
 from ig2mj.states.model import StateModel
 from ig2mj.states.options import StateOptions
 from ig2mj.states.relations import Memo, RelationPlan, Relations
-from ig2mj.states.update import initial_states, update
+from ig2mj.states.update import queries, update
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
 
 __all__ = [
@@ -19,5 +20,7 @@ __all__ = [
     "Swap",
     "WorldState",
     "initial_states",
+    "queries",
+    "states_of_manifest",
     "update",
 ]

@@ -10,6 +10,8 @@ Axes: W worlds, T tools, R rows of particles, N particles.
 
 from __future__ import annotations
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -56,7 +58,7 @@ def update(
         lambda: particles.alive & ~_wiped(model, particles, touching, view),
         lambda: particles.alive,
     )
-    return particles.replace(alive=alive)
+    return dataclasses.replace(particles, alive=alive)
 
 
 def _wiped(

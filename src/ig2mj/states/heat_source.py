@@ -47,7 +47,7 @@ def acts_on(model: StateModel, on: Bool[Array, "W S"], view: PhysicsView, relati
         for column in np.flatnonzero(p.heat_requires_inside):
             mine = np.flatnonzero(pairs[:, 1] == p.heat_object[column])
             place[pairs[mine, 0], column] = mine
-        inside = relations.inside(map(tuple, pairs))
+        inside = relations.inside(pairs)
         inside = jnp.concatenate([inside, jnp.zeros((worlds, 1), bool)], axis=-1)[:, place]
     else:
         inside = jnp.zeros(reached.shape, bool)

@@ -84,7 +84,7 @@ def sample_open(
     mine = objects[:, tables.openable_object] & model.parameters.has("openable")[tables.openable_object]
     moves = jnp.broadcast_to(mine, joint_pos.shape)
     if value and not fully:
-        moves = moves & _random_subset(model, moves.shape, pick)
+        moves = moves & _random_subset(model, moves.shape[0], pick)
     end = tables.openable_open if value else tables.openable_closed
     if value and not model.paper:
         both_sides = tables.object_both_sides[tables.openable_object]
@@ -94,15 +94,15 @@ def sample_open(
     return jnp.where(moves, target, joint_pos).astype(jnp.float32), moves
 
 
-def _random_subset(model: StateModel, shape: tuple[int, int], key: jax.Array) -> Bool[Array, "W J"]:
+def _random_subset(model: StateModel, worlds: int, key: jax.Array) -> Bool[Array, "W J"]:
     """Of each object's joints a subset whose size is uniform from 1 to all of them (spec/states.md section 11)."""
     tables = model.tables
     order, size = jax.random.split(key)
-    rank_of = jax.random.uniform(order, shape)
+    rank_of = jax.random.uniform(order, (worlds, len(tables.openable_object)))
     same = tables.openable_object[:, None] == tables.openable_object
     rank = jnp.sum(same & (rank_of[:, None, :] < rank_of[:, :, None]), axis=-1)
     count = same.sum(axis=-1)
-    wanted = jax.random.uniform(size, (shape[0], tables.num_objects))[:, tables.openable_object]
+    wanted = jax.random.uniform(size, (worlds, tables.num_objects))[:, tables.openable_object]
     return rank < 1 + jnp.floor(wanted * count)
 
 

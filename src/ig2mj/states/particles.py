@@ -11,6 +11,8 @@ particles.
 
 from __future__ import annotations
 
+import dataclasses
+
 import jax.numpy as jnp
 import numpy as np
 from flax import struct
@@ -114,7 +116,7 @@ def place(
 
     def put(field: Array, value: Array) -> Array:
         mask = chosen.reshape(-1, *[1] * (field.ndim - 2))
-        return field.at[:, row].set(jnp.where(mask, value, field[:, row]))
+        return jnp.asarray(field).at[:, row].set(jnp.where(mask, value, field[:, row]))
 
     placed = Particles(
         alive=put(particles.alive, valid),
@@ -129,9 +131,10 @@ def place(
 def remove(particles: Particles, row: int, worlds: Bool[Array, "W"] | None = None) -> Particles:
     """Cleans the object of a row (paper table A.5, Dusty(o)=False)."""
     keep = jnp.zeros((particles.alive.shape[0], 1), bool) if worlds is None else ~jnp.asarray(worlds)[:, None]
-    return particles.replace(
-        alive=particles.alive.at[:, row].set(particles.alive[:, row] & keep),
-        placed=particles.placed.at[:, row].set(particles.placed[:, row] & keep),
+    return dataclasses.replace(
+        particles,
+        alive=jnp.asarray(particles.alive).at[:, row].set(particles.alive[:, row] & keep),
+        placed=jnp.asarray(particles.placed).at[:, row].set(particles.placed[:, row] & keep),
     )
 
 

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal
 
 import jax
@@ -30,6 +30,7 @@ from ig2mj.states.nearness import NearPairs, boxes_near
 
 Kind = Literal["inside", "vertical", "horizontal", "near"]
 Pair = tuple[int, int]
+Pairs = Iterable[Sequence[int]] | np.ndarray
 Query = tuple[Kind, int, int]
 """What is asked: kind, object, target. Answers: `Relations.inside`, `.above` with `.below`, `.beside`, `.near`."""
 
@@ -55,27 +56,27 @@ class Relations:
     plan: RelationPlan
     values: dict[str, Bool[Array, "W P V"]]
 
-    def inside(self, pairs: Iterable[Pair]) -> Bool[Array, "W P"]:
+    def inside(self, pairs: Pairs) -> Bool[Array, "W P"]:
         """Two orthogonal axes through the object meet the target on both sides."""
         return self._of("inside", pairs)[..., 0]
 
-    def above(self, pairs: Iterable[Pair]) -> Bool[Array, "W P"]:
+    def above(self, pairs: Pairs) -> Bool[Array, "W P"]:
         """The target is above the object (InSamePositiveVerticalAxisObjs of the object)."""
         return self._of("vertical", pairs)[..., 0]
 
-    def below(self, pairs: Iterable[Pair]) -> Bool[Array, "W P"]:
+    def below(self, pairs: Pairs) -> Bool[Array, "W P"]:
         """The target is below the object (InSameNegativeVerticalAxisObjs of the object)."""
         return self._of("vertical", pairs)[..., 1]
 
-    def beside(self, pairs: Iterable[Pair]) -> Bool[Array, "W P"]:
+    def beside(self, pairs: Pairs) -> Bool[Array, "W P"]:
         """A horizontal ray of the object enters the target (InSameHorizontalPlaneObjs of the object)."""
         return self._of("horizontal", pairs)[..., 0]
 
-    def near(self, pairs: Iterable[Pair]) -> Bool[Array, "W P"]:
+    def near(self, pairs: Pairs) -> Bool[Array, "W P"]:
         """The object and the target are near each other (nearness.py)."""
         return self._of("near", pairs)[..., 0]
 
-    def _of(self, kind: Kind, pairs: Iterable[Pair]) -> Bool[Array, "W P V"]:
+    def _of(self, kind: Kind, pairs: Pairs) -> Bool[Array, "W P V"]:
         where = [self.plan.index[kind][(int(a), int(b))] for a, b in pairs]
         return self.values[kind][:, np.array(where, int)]
 
@@ -124,7 +125,8 @@ class RelationPlan:
 
     def evaluate_changed(self, view: PhysicsView, memo: Memo) -> tuple[Relations, Memo]:
         """All answers, those of pairs where nothing moved from the memo, and the memo for the next step."""
-        inputs, values = {}, {}
+        inputs: dict[str, Array] = {}
+        values: dict[str, Array] = {}
         for kind in self._work:
             inputs[kind] = self._inputs(kind, view)
             changed = jnp.any(inputs[kind] != memo.inputs[kind], axis=-1)
@@ -178,10 +180,10 @@ class RelationPlan:
             found[kind] = np.array([np.resize(r, width) if len(r) else np.zeros(width, int) for r in rows], int)
         return found
 
-    def _padded(self, values: dict[Kind, Array], view: PhysicsView) -> dict[str, Array]:
+    def _padded(self, values: Mapping[str, Array], view: PhysicsView) -> dict[str, Array]:
         """Adds kinds that nobody asked for, so that asking for no pairs gives empty arrays."""
         worlds = view.object_com.shape[0]
-        none = {kind: jnp.zeros((worlds, 0, 2), bool) for kind in KINDS if kind not in values}
+        none: dict[str, Array] = {kind: jnp.zeros((worlds, 0, 2), bool) for kind in KINDS if kind not in values}
         return {**none, **values}
 
 

@@ -10,6 +10,7 @@ Axes: W worlds, O objects, M swapped objects (wholes, then halves), K blades.
 
 from __future__ import annotations
 
+import dataclasses
 from typing import TYPE_CHECKING
 
 import jax
@@ -57,7 +58,7 @@ def apply(
     model: StateModel, states: ExtendedStates, cut_now: Bool[Array, "W O"], view: PhysicsView
 ) -> tuple[ExtendedStates, Bool[Array, "W M"], Float[Array, "W M 3"], Float[Array, "W M 4"]]:
     """Marks what is cut, lets halves inherit, and says what is to be moved where (the fields of a `Swap`)."""
-    states = states.replace(sliced=states.sliced | cut_now)
+    states = dataclasses.replace(states, sliced=states.sliced | cut_now)
     if len(model.parameters.half_object) == 0:
         empty = jnp.zeros((cut_now.shape[0], 0))
         return states, empty.astype(bool), jnp.zeros((*empty.shape, 3)), jnp.zeros((*empty.shape, 4))
@@ -79,7 +80,8 @@ def inherit(model: StateModel, states: ExtendedStates, cut_now: Bool[Array, "W O
     def of_whole(field: Array) -> Array:
         return jnp.where(takes, field[:, source], field)
 
-    return states.replace(
+    return dataclasses.replace(
+        states,
         temperature=of_whole(states.temperature),
         max_temperature=of_whole(states.max_temperature),
         wetness=of_whole(states.wetness),
@@ -116,7 +118,7 @@ def _inherit_particles(
 
     def put(field: Array, value: Array) -> Array:
         chosen = mask.reshape(*mask.shape, *[1] * (field.ndim - 2))
-        return field.at[:, to].set(jnp.where(chosen, value, field[:, to]).astype(field.dtype))
+        return jnp.asarray(field).at[:, to].set(jnp.where(chosen, value, field[:, to]).astype(field.dtype))
 
     return Particles(
         alive=put(particles.alive, particles.alive[:, start]),

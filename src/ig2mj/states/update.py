@@ -8,8 +8,7 @@ the first drop go in the next, as in iGibson.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+import dataclasses
 
 import jax.numpy as jnp
 import numpy as np
@@ -21,7 +20,6 @@ from ig2mj.states import (
     heat_source,
     max_temperature,
     open,
-    particles,
     sliced,
     temperature,
     toggled,
@@ -31,22 +29,6 @@ from ig2mj.states import (
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations import Query, RelationPlan, Relations
 from ig2mj.states.world import ExtendedStates, Swap
-
-
-def initial_states(model: StateModel, num_worlds: int) -> ExtendedStates:
-    """Everything at room temperature, dry, clean, switched off, whole."""
-    shape = (num_worlds, model.tables.num_objects)
-    return ExtendedStates(
-        temperature=temperature.initial(*shape),
-        max_temperature=max_temperature.initial(*shape),
-        wetness=wetness.initial(*shape),
-        toggled=jnp.zeros(shape, bool),
-        press_count=jnp.zeros(shape, jnp.int32),
-        sliced=jnp.zeros(shape, bool),
-        water=water.no_drops(num_worlds, len(model.parameters.water_object)),
-        dust=particles.no_particles(num_worlds, len(model.parameters.dust_rows)),
-        stain=particles.no_particles(num_worlds, len(model.parameters.stain_rows)),
-    )
 
 
 def queries(model: StateModel) -> list[Query]:
@@ -73,7 +55,7 @@ def update(
     p = model.parameters
 
     switch, press_count = toggled.update(model, states.toggled, states.press_count, view)
-    states = states.replace(toggled=switch, press_count=press_count)
+    states = dataclasses.replace(states, toggled=switch, press_count=press_count)
 
     cut_now = sliced.cut(model, states.sliced, view)
     states, *swap = sliced.apply(model, states, cut_now, view)
@@ -81,11 +63,12 @@ def update(
 
     drops, contacts = water.update(model, states.water, view, states.toggled)
     wet = wetness.update(model, states.wetness, contacts)
-    states = states.replace(water=drops, wetness=wet)
+    states = dataclasses.replace(states, water=drops, wetness=wet)
 
     working = cleaning.working(model, states.toggled)
     soaked = wetness.soaked(model, wet)[:, p.tool_object]
-    states = states.replace(
+    states = dataclasses.replace(
+        states,
         dust=cleaning.update(model, states.dust, p.dust_rows, working, view),
         stain=cleaning.update(model, states.stain, p.stain_rows, working & soaked, view),
     )
@@ -94,8 +77,8 @@ def update(
     on = heat_source.switched_on(model, states.toggled, opened)
     acts = _as_wholes(model, cut_now, heat_source.acts_on(model, on, view, relations))
     warm = temperature.update(model, states.temperature, acts, in_use, view)
-    states = states.replace(
-        temperature=warm, max_temperature=max_temperature.update(model, states.max_temperature, warm)
+    states = dataclasses.replace(
+        states, temperature=warm, max_temperature=max_temperature.update(model, states.max_temperature, warm)
     )
     return states, Swap(*swap)
 
@@ -109,23 +92,3 @@ def _as_wholes(model: StateModel, cut_now: Bool[Array, "W O"], acts: Bool[Array,
     source[p.half_object] = p.half_whole
     born = cut_now[:, source] & (source != np.arange(len(source)))
     return jnp.where(born[..., None], acts[:, source], acts)
-
-
-def with_values(model: StateModel, states: ExtendedStates, values: Sequence[Mapping[str, Any]]) -> ExtendedStates:
-    """States in which every world has the initial values a manifest gives (`ObjectEntry.state`, one per object).
-
-    Keys: temperature, max_temperature, wetness, toggled, sliced. Unknown keys are left alone.
-    """
-    for name, dtype in (
-        ("temperature", np.float32),
-        ("max_temperature", np.float32),
-        ("wetness", np.float32),
-        ("toggled", bool),
-        ("sliced", bool),
-    ):
-        given = [(i, v[name]) for i, v in enumerate(values) if name in v]
-        if given:
-            objects, numbers = zip(*given, strict=True)
-            field = getattr(states, name)
-            states = states.replace(**{name: field.at[:, np.array(objects)].set(np.array(numbers, dtype))})
-    return states

@@ -14,6 +14,7 @@ Axes: W worlds, C sources, N = 10 drops of each, O objects.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 
 import jax
@@ -151,7 +152,8 @@ def _fall(model: StateModel, water: WaterDrops, view: PhysicsView) -> tuple[Wate
         gone |= jnp.any(soaking, axis=-1) | _in_sink(model, pos, view)
         tap = jnp.asarray(view.link_pos)[:, parameters.water_link, 2]
         gone |= ~(pos[..., 2] >= tap[..., None] - LOST_BELOW)
-    moved = water.replace(
+    moved = dataclasses.replace(
+        water,
         active=water.active & ~gone,
         pos=pos,
         speed=jnp.where(landed | ~water.active, 0.0, speed),

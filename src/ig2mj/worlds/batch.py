@@ -27,9 +27,10 @@ from ig2mj.engine.base import Engine, Write
 from ig2mj.engine.health import Health
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.predicates.compile import CompiledExpression, Verdict
+from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations import RelationPlan
-from ig2mj.states.update import initial_states, queries, update
+from ig2mj.states.update import queries, update
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
 from ig2mj.worlds import guards
 from ig2mj.worlds.pool import Pool

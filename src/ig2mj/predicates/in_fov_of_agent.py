@@ -1,0 +1,146 @@
+"""InFoVOfAgent(o): at least one pixel of the agent's camera image shows o (table A.1).
+
+Found without rendering: of points spread evenly over o's collision surface, one is in the view frustum, and the line of
+sight to it enters no other object before (unless `StateOptions.occlusion` is off). An object of which less shows than
+lies between sample points may be missed. Objects are opaque, also where their visual mesh is glass; the agent's own
+body hides nothing.
+
+Axes: W worlds, P objects, A agents, N sample points of an object, E pieces that may stand in the way.
+"""
+
+from __future__ import annotations
+
+import functools
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.frustum import BLOCKING, Camera, points_in_frustum
+from ig2mj.geometry.poses import quat_rotate
+from ig2mj.geometry.surface import sample_surface, surface_table
+from ig2mj.geometry.targets import RayTargets, rays_enter_targets
+from ig2mj.predicates.base import Arguments, Context, Predicate
+from ig2mj.scene.tables import SceneTables
+
+NUM_POINTS = 48
+"""Sample points of an object."""
+
+NEAR, FAR = 0.1, 100.0
+"""Metres; iGibson's camera (spec/robots_tasks_sensors.md 3.1)."""
+
+SIGHT_BUDGET = 2**24
+"""Numbers that the lines of sight may fill at a time; more worlds are taken in turns."""
+
+
+def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
+    tables, objects = context.model.tables, arguments[:, 0]
+    found = context.none(arguments)
+    with_surface = np.isin(objects, tables.piece_object)
+    agents = np.flatnonzero(tables.agent_camera >= 0)
+    if not with_surface.any() or len(agents) == 0:
+        return found
+    sight = functools.partial(_seen, context, objects[with_surface])
+    seen = functools.reduce(jnp.logical_or, [sight(int(agent)) for agent in agents])
+    return jnp.asarray(found).at[:, np.flatnonzero(with_surface)].set(seen)
+
+
+def _seen(context: Context, objects: np.ndarray, agent: int) -> Bool[Array, "W P"]:
+    """Whether one agent sees each object."""
+    tables, view = context.model.tables, context.view
+    points = _points(tables, view, objects)  # [W, P, N, 3]
+    camera = Camera(
+        pos=view.eye_pos[:, agent],
+        quat=view.eye_quat[:, agent],
+        fovy=float(tables.agent_fovy[agent]),
+        aspect=context.model.options.image_aspect,
+        near=NEAR,
+        far=FAR,
+    )
+    flat = points.reshape(points.shape[0], -1, 3)
+    in_view = points_in_frustum(camera, flat).reshape(points.shape[:-1])
+    if not context.model.options.occlusion:
+        return jnp.any(in_view, axis=-1)
+    free = jax.lax.cond(
+        jnp.any(in_view),
+        lambda: ~_hidden(tables, view, objects, points, jnp.asarray(camera.pos)),
+        lambda: jnp.zeros(in_view.shape, bool),
+    )
+    return jnp.any(in_view & free, axis=-1)
+
+
+def _hidden(
+    tables: SceneTables,
+    view: PhysicsView,
+    objects: np.ndarray,
+    points: Float[Array, "W P N 3"],
+    eye: Float[Array, "W 3"],
+) -> Bool[Array, "W P N"]:
+    """Whether another object stands in the way to each point."""
+    others = np.unique(tables.piece_object[tables.piece_object >= 0])
+    targets = RayTargets.build(tables, others)
+    lines = points.shape[1] * points.shape[2]
+    lengths = np.full(lines, BLOCKING, np.float32)
+
+    def of_world(world: tuple[Array, Array, Array, Array]) -> Bool[Array, "P N O"]:
+        body_pos, body_quat, at, start = world
+        hit = rays_enter_targets(
+            targets,
+            body_pos[None],
+            body_quat[None],
+            jnp.broadcast_to(start, (1, len(others), 3)),
+            at.reshape(-1, 3) - start,
+            lengths,
+        )
+        return jnp.swapaxes(hit[0], 0, 1).reshape(*at.shape[:2], len(others))
+
+    worlds = (jnp.asarray(view.body_pos), jnp.asarray(view.body_quat), points, eye)
+    at_once = max(1, SIGHT_BUDGET // (lines * max(len(tables.piece_object), 1)))
+    blocked = jax.lax.map(of_world, worlds, batch_size=min(at_once, points.shape[0]))
+    another = others != objects[:, None]
+    return jnp.any(blocked & another[:, None], axis=-1)
+
+
+def _points(tables: SceneTables, view: PhysicsView, objects: np.ndarray) -> Float[Array, "W P N 3"]:
+    """The objects' sample points, world frame."""
+    samples = [surface_points(tables, int(o)) for o in objects]
+    body, local = (np.stack(column) for column in zip(*samples, strict=True))
+    pos, quat = jnp.asarray(view.body_pos)[:, body], jnp.asarray(view.body_quat)[:, body]
+    return pos + quat_rotate(quat, local)
+
+
+@functools.lru_cache(maxsize=4096)
+def surface_points(tables: SceneTables, obj: int) -> tuple[np.ndarray, np.ndarray]:
+    """Bodies [N] and places [N, 3] in them of an object's sample points; the same for every call."""
+    pieces = np.flatnonzero(tables.piece_object == obj)
+    bodies = tables.piece_body[pieces]
+    surfaces = [(body, surface_table(*_columns(tables, pieces[bodies == body]))) for body in np.unique(bodies)]
+    areas = [surface.area for _, surface in surfaces]
+    found_body, found_pos = [], []
+    share = np.diff(np.round(NUM_POINTS * np.cumsum([0.0, *areas]) / sum(areas)).astype(int))
+    rng = np.random.default_rng(obj)
+    for (body, surface), count in zip(surfaces, share, strict=True):
+        found_pos.append(sample_surface(surface, int(count), rng).points)
+        found_body.append(np.full(count, body))
+    return np.concatenate(found_body), np.concatenate(found_pos).astype(np.float32)
+
+
+def _columns(tables: SceneTables, k: np.ndarray) -> tuple[np.ndarray, ...]:
+    return (
+        tables.piece_kind[k],
+        tables.piece_size[k],
+        tables.piece_vertices[k],
+        tables.piece_pos[k],
+        tables.piece_quat[k],
+    )
+
+
+IN_FOV_OF_AGENT = Predicate(
+    name="in_fov_of_agent",
+    arguments=("object",),
+    reads=("view.eye_pos", "view.eye_quat", "view.body_pos", "view.body_quat"),
+    evaluate=_evaluate,
+    aliases=("in_fov_of_robot", "infovofagent", "infovofrobot"),
+)
