@@ -69,3 +69,11 @@ def test_unknown_names_suggest_near_ones(tiny_home_folder, capsys, option, value
 def test_a_folder_without_a_manifest_is_status_2(tmp_path, capsys):
     assert cli.call(["inspect", str(tmp_path)]) == 2
     assert "manifest.json" in capsys.readouterr().err
+
+
+def test_a_home_that_comes_with_ig2mj_goes_by_its_bare_name(tiny_home_folder, capsys, monkeypatch, tmp_path):
+    import ig2mj.scene.scene
+
+    monkeypatch.setattr(ig2mj.scene.scene, "SHIPPED_HOMES", tiny_home_folder.parent)
+    monkeypatch.chdir(tmp_path)
+    assert inspect_json(capsys, tiny_home_folder.name)["name"] == load_manifest(tiny_home_folder).name

@@ -15,16 +15,16 @@ Kind = Literal["objects", "joints", "abilities", "rooms"]
 
 
 def run(
-    scene: Annotated[pathlib.Path, tyro.conf.Positional],
+    scene: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="SCENE")],
     show: tuple[Kind, ...] = ("rooms", "objects", "joints", "abilities"),
-    room: str | None = None,
-    category: str | None = None,
+    room: Annotated[str | None, tyro.conf.arg(metavar="ROOM")] = None,
+    category: Annotated[str | None, tyro.conf.arg(metavar="CATEGORY")] = None,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> None:
     """List a scene's objects, joints, abilities and rooms.
 
     Args:
-      scene: folder of a converted scene, or its scene.xml or manifest.json.
+      scene: folder of a converted scene, its scene.xml or manifest.json, or the name of a home that comes with ig2mj.
       show: which tables.
       room: only objects of this room instance, e.g. kitchen_0.
       category: only objects of this category, e.g. fridge.
@@ -32,7 +32,12 @@ def run(
     """
     from ig2mj.scene.manifest import load_manifest
 
-    manifest = load_manifest(scene.parent if scene.name.endswith(".xml") else scene)
+    if not scene.exists() and len(scene.parts) == 1:
+        from ig2mj.scene.scene import SHIPPED_HOMES
+
+        if (SHIPPED_HOMES / scene).is_dir():
+            scene = SHIPPED_HOMES / scene
+    manifest = load_manifest(scene.parent if scene.suffix == ".xml" else scene)
     objects = _select(manifest, room, category)
     if json:
         _print_json(manifest, objects, show)

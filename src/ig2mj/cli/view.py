@@ -11,13 +11,13 @@ Vec3 = tuple[float, float, float]
 
 
 def run(
-    scene: Annotated[pathlib.Path, tyro.conf.Positional],
-    picture: pathlib.Path | None = None,
-    camera: str | None = None,
+    scene: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="SCENE")],
+    picture: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    camera: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None,
     eye: Annotated[Vec3 | None, tyro.conf.arg(name="from", metavar="X Y Z")] = None,
     target: Annotated[Vec3 | None, tyro.conf.arg(name="at", metavar="X Y Z")] = None,
     size: Annotated[tuple[int, int], tyro.conf.arg(metavar="W H")] = (1280, 960),
-    seconds: float = 0.0,
+    seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0,
     collision: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     paused: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> None:
