@@ -22,17 +22,15 @@ from ig2mj.errors import InputError
 MAX_XML_BYTES = 128 * 2**20  # the largest cached BEHAVIOR scenes are a few MiB
 Element = Any  # lxml.etree._Element, for which there are no type stubs
 
+# libxml2 goes quiet after its first syntax error, so only errors that leave it talking may be let pass.
 _HARMLESS = {
     "NS_ERR_UNDEFINED_NAMESPACE",
     "NS_ERR_ATTRIBUTE_REDEFINED",
     "ERR_DOCUMENT_END",
-    "ERR_UNKNOWN_VERSION",
-    "ERR_HYPHEN_IN_COMMENT",
-    "WAR_UNKNOWN_VERSION",
     "WAR_NS_URI",
     "WAR_NS_URI_RELATIVE",
 }
-_DECLARATION = re.compile(r"<\?xml\b[^>]*\?>")
+_DECLARATION = re.compile(r"\A\s*<\?xml\b[^>]*\?>")
 _ENCODING = re.compile(rb"<\?xml[^>]*\bencoding\s*=\s*[\"']([A-Za-z0-9._-]+)[\"']")
 _COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
 _BARE_AMPERSAND = re.compile(r"&(?!#\d+;|#x[0-9A-Fa-f]+;|(?:amp|lt|gt|quot|apos);)")
@@ -55,7 +53,7 @@ def read_bytes(file: str | os.PathLike, limit: int) -> bytes:
 
 
 def decode_xml(raw: bytes, file: object) -> str:
-    """Bytes -> text without byte-order mark and declaration (line numbers are kept). Raises InputError."""
+    """Bytes -> text without byte-order mark, declaration and comments (line numbers are kept). Raises InputError."""
     if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
         encoding = "utf-16"
     elif match := _ENCODING.search(raw[:400]):
@@ -73,13 +71,15 @@ def decode_xml(raw: bytes, file: object) -> str:
     if start < 0:
         raise InputError(file, "is no XML: it holds no '<'" if text.strip("\0 \r\n\t") else "is empty")
     text = "\n" * text.count("\n", 0, start) + text[start:]
-    match = _DECLARATION.match(text.lstrip("\n"))
-    if match:
-        text = text.replace(match[0], "\n" * match[0].count("\n"), 1)
-    bare = _COMMENT.sub("", text)
-    if "<!ENTITY" in bare:
+    text = _DECLARATION.sub(_only_newlines, text, count=1)
+    text = _COMMENT.sub(_only_newlines, text)
+    if "<!ENTITY" in text:
         raise InputError(file, "declares XML entities, which are refused", mend="replace the entities by their text")
     return text
+
+
+def _only_newlines(match: re.Match[str]) -> str:
+    return "\n" * match[0].count("\n")
 
 
 def read_xml(

@@ -67,7 +67,7 @@ def load_rooms(path: str | os.PathLike) -> Rooms:
         file = file / "rooms.npz"
     mend = "convert the scene again"
     try:
-        with np.load(file, allow_pickle=False) as data:
+        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
             version = int(data["format_version"])
             if version != FORMAT_VERSION:
                 raise InputError(file, f"has format version {version}, this ig2mj reads {FORMAT_VERSION}", mend=mend)
@@ -84,7 +84,7 @@ def load_rooms(path: str | os.PathLike) -> Rooms:
         raise InputError(file, f"lacks an array: {e.args[0]}", mend=mend) from e
     except FileNotFoundError as e:
         raise InputError(file, "does not exist", mend=mend) from e
-    except (OSError, ValueError, TypeError, EOFError, zipfile.BadZipFile) as e:
+    except (OSError, ValueError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as e:
         raise InputError(file, f"cannot be read: {e}", mend=mend) from e
     shape = rooms.room_map.shape
     if len(shape) != 2 or shape[0] != shape[1] or len(rooms.names) != len(rooms.types):

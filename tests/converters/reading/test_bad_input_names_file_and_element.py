@@ -156,6 +156,8 @@ XML = {
     "HTML": (b"<html><body>404</body></html>", "root element is <html>"),
     "truncated": (b"<robot><link name='a'><visual>", "line 1.*truncated"),
     "truncated in a tag": (b"<robot>\n<link name='a", "truncated"),
+    "truncated after oddities": (b"<robot a:b='1'><!-- a -- b --><x:y/>&<link name='a'>", "truncated"),
+    "comment without end": (b"<robot><!-- <link name='a'/></robot>", "line 1"),
     "ill nested": (b"<robot><link name='a'></robot></link>", "line 1"),
     "attribute twice": (b"<robot><link name='a' name='b'/></robot>", "line 1.*redefined"),
     "attribute without quotes": (b"<robot><link name=a/></robot>", "line 1"),
