@@ -152,6 +152,10 @@ class Engine(Protocol):
         """What went wrong in each world since it was loaded; see `ig2mj.engine.health`."""
         ...
 
+    def snapshot(self, physics: Physics) -> Snapshot:
+        """All worlds as a snapshot with the world axis."""
+        ...
+
     def export(self, physics: Physics, world: int) -> Snapshot:
         """One world as a snapshot without the world axis, in numpy arrays that share no memory with the engine."""
         ...

@@ -199,19 +199,20 @@ class MjxEngine(abc.ABC):
         physics = dataclasses.replace(physics, data=data, eq_data=eq_data)
         return jax.lax.cond(changed, self._refresh, lambda p: p, physics)
 
+    def snapshot(self, physics: MjxPhysics) -> Snapshot:
+        """All worlds as a snapshot with the world axis."""
+        data = physics.data
+        fields = {name: getattr(data, name) for name in STATE_FIELDS}
+        fields["eq_active"] = fields["eq_active"].astype(bool)
+        return Snapshot(
+            **fields, eq_data=physics.eq_data, tree_asleep=self._tree_asleep(data), touching=physics.touching
+        )
+
     def export(self, physics: MjxPhysics, world: int) -> Snapshot:
         """One world as a snapshot in numpy arrays of its own."""
         if not 0 <= world < self.num_worlds:
             raise EngineError(f"there is no world {world}: this engine has {self.num_worlds}")
-        data = physics.data
-        fields = {name: np.array(getattr(data, name)[world]) for name in STATE_FIELDS}
-        fields["eq_active"] = fields["eq_active"].astype(bool)
-        return Snapshot(
-            **fields,
-            eq_data=np.array(physics.eq_data[world]),
-            tree_asleep=np.array(self._tree_asleep(data)[world]),
-            touching=np.array(physics.touching[world]),
-        )
+        return jax.tree.map(lambda a: np.array(a[world]), self.snapshot(physics))
 
     def load(self, physics: MjxPhysics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> MjxPhysics:
         """Replaces worlds by snapshots; see `Engine.load`. Raises EngineError where it is of another scene."""

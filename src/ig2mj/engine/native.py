@@ -1,4 +1,4 @@
-"""The native engine: C MuJoCo with sleeping, one world or many on a thread pool. No JAX in it.
+"""The native engine: C MuJoCo with sleeping, one world or many on a thread pool. No physics of JAX in it.
 
 Each world has its own MjData and is stepped by one thread from start to end, so that results are the same, bit for
 bit, for any number of threads and of worlds. (`mujoco.batch.Batch` steps as fast, but gives neither contacts nor a way
@@ -18,6 +18,7 @@ import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
+import jax
 import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
@@ -181,9 +182,13 @@ class NativeEngine:
         positions = np.array([world.data.qpos for world in physics.worlds])
         return Health(
             overflow=np.zeros(self.num_worlds, np.int32),
-            finite=np.isfinite(positions).all(1) & np.isfinite(velocity).all((1, 2)),
+            finite=np.asarray(np.isfinite(positions).all(1) & np.isfinite(velocity).all((1, 2))),
             top_speed=np.sqrt(np.square(velocity).sum(-1).max(1, initial=0.0)),
         )
+
+    def snapshot(self, physics: NativePhysics) -> Snapshot:
+        """All worlds as a snapshot with the world axis."""
+        return jax.tree.map(lambda *rows: np.stack(rows), *(self.export(physics, w) for w in range(self.num_worlds)))
 
     def export(self, physics: NativePhysics, world: int) -> Snapshot:
         """One world as a snapshot in float64 numpy arrays of its own."""

@@ -9,10 +9,10 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int, UInt
+from jaxtyping import Bool, Float, Int, UInt
 
 from ig2mj.engine.base import Write
-from ig2mj.engine.view import PhysicsView
+from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import axis_angle_to_quat, quat_multiply
 from ig2mj.scene.tables import SceneTables
 

@@ -136,7 +136,7 @@ class Worlds:
         world = batch.world
         episode = jnp.where(mask, batch.episode + 1, batch.episode)
         key = episode_keys(batch.seed, batch.number, episode)
-        rows = self.pool.rows(pick_rows(key, self.pool.size))
+        rows = self.pool.rows(jnp.asarray(pick_rows(key, self.pool.size)))
         physics = self.engine.load(world.physics, rows.physics, mask)
         view = self.engine.view(physics)
 

@@ -1,0 +1,92 @@
+"""Recording the last control steps of every world, and dumping one world's for replay.
+
+For debugging: it costs memory for every step kept. `ig2mj view SCENE --dump FILE` plays a dump.
+
+Axes: S steps kept, W worlds, T steps of a dump.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+from jaxtyping import Int
+
+from ig2mj.engine.base import Engine, Snapshot
+from ig2mj.engine.view import Array
+from ig2mj.errors import InputError
+from ig2mj.states.world import ExtendedStates
+from ig2mj.worlds.archive import load_tree, save_tree
+from ig2mj.worlds.batch import Batch
+
+LENGTH = 50
+"""Control steps kept by default."""
+
+
+@struct.dataclass
+class Frames:
+    """Physics and extended states of consecutive control steps; arrays begin with the step axis."""
+
+    physics: Snapshot
+    states: ExtendedStates
+
+
+@struct.dataclass
+class Recording:
+    """A ring of the last S control steps of all worlds. `written`: steps recorded so far."""
+
+    frames: Frames
+    written: Int[Array, ""]
+
+    @property
+    def length(self) -> int:
+        return self.frames.physics.qpos.shape[0]
+
+
+def start_recording(engine: Engine, batch: Batch, length: int = LENGTH) -> Recording:
+    """A recording whose first step is the present state."""
+    now = _now(engine, batch)
+    empty = jax.tree.map(lambda a: jnp.zeros((length, *a.shape), a.dtype), now)
+    return record(engine, Recording(empty, jnp.zeros((), jnp.int32)), batch)
+
+
+def record(engine: Engine, recording: Recording, batch: Batch) -> Recording:
+    """Adds the present state, over the oldest one when full. Pure."""
+    place = recording.written % recording.length
+    now = _now(engine, batch)
+    frames = jax.tree.map(lambda ring, a: ring.at[place].set(a), recording.frames, now)
+    return Recording(frames, recording.written + 1)
+
+
+def frames_of(recording: Recording, world: int) -> Frames:
+    """The recorded steps of one world, oldest first: [T, ...]. On the host."""
+    written, length = int(recording.written), recording.length
+    order = np.arange(max(0, written - length), written) % length
+    return jax.tree.map(lambda a: np.asarray(a[:, world])[order], recording.frames)
+
+
+def save_dump(frames: Frames, file: str | os.PathLike, scene: str, note: dict[str, Any]) -> None:
+    """Writes a dump. `note`: world, flags, and whatever helps to understand it."""
+    save_tree(file, frames, {"kind": "dump", "scene": scene, **note})
+
+
+def load_dump(file: str | os.PathLike, like: Frames, scene: str) -> tuple[Frames, dict[str, Any]]:
+    """Reads a dump of the scene. Raises InputError."""
+    frames, header = load_tree(file, like)
+    if header.get("kind") != "dump" or header.get("scene") != scene:
+        raise InputError(
+            file,
+            f"is a {header.get('kind')} of scene '{header.get('scene')}', not a dump of '{scene}'",
+            mend="give the scene it was dumped from",
+        )
+    return frames, header
+
+
+def _now(engine: Engine, batch: Batch) -> Frames:
+    physics = jax.tree.map(jnp.asarray, engine.snapshot(batch.world.physics))
+    return Frames(dataclasses.replace(physics), batch.world.states)
