@@ -19,7 +19,7 @@ from .description import Instance, SceneDescription
 from .finish import Outcome, finish, version_record
 from .manifest_entries import room_entries, task_entry, vec3
 from .mjcf_file import write_model
-from .mjcf_scene import SceneBuild, build_scene, fill_states
+from .mjcf_scene import SceneBuild, build_scene, fill_states, rest_start
 from .model_builder import ModelBuilder
 from .model_task import BuiltModel, ModelTask, model_task, run_task
 from .options import ConvertOptions
@@ -78,6 +78,8 @@ def convert_scene(
         )
         model = write_model(build.builder.spec, folder / "scene.xml")
         fill_states(build, model, placements)
+        if not options.keep_hovering and rest_start(build, model):
+            model = write_model(build.builder.spec, folder / "scene.xml")
         if scene.rooms is not None:
             write_rooms(scene.rooms, folder / ROOMS_FILE)
         timings["writing"] = time.perf_counter() - start

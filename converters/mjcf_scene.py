@@ -16,12 +16,13 @@ from .cached_states import convert_states
 from .description import RoomMaps
 from .joint_limits import clamp
 from .manifest_entries import object_entry
-from .mjcf_object import ObjectElements, add_object, pos_quat
+from .mjcf_object import ObjectElements, add_object
 from .model_builder import HIDDEN_GROUP, ModelBuilder
 from .parking import park
 from .placements import Placement
 from .poses import rotation_from_wxyz
 from .setting import add_setting
+from .start_state import let_down
 
 #: The start state: joint positions as saved, or 0 brought inside the limits (dataset_format.md section 7).
 START_KEY = "initial"
@@ -159,8 +160,18 @@ def _scene_box(
     return np.min([low for low, _ in boxes], axis=0), np.max([high for _, high in boxes], axis=0)
 
 
-def add_start_key(spec: mujoco.MjSpec, joints: Mapping[str, float]) -> None:
-    """Adds the keyframe "initial": free bodies where the model has them, the other joints as given (else 0)."""
+def add_start_key(
+    spec: mujoco.MjSpec,
+    joints: Mapping[str, float],
+    moved: Mapping[str, tuple[np.ndarray, np.ndarray]] | None = None,
+) -> None:
+    """Sets the keyframe "initial": free bodies where the model has them, the other joints as given (else 0).
+
+    Args:
+      joints: joint -> position. moved: free bodies that start elsewhere -> position, quaternion.
+    """
+    for key in spec.keys:
+        spec.delete(key)
     qpos: list[float] = []
     bodies = list(reversed(spec.worldbody.bodies))
     while bodies:
@@ -168,7 +179,8 @@ def add_start_key(spec: mujoco.MjSpec, joints: Mapping[str, float]) -> None:
         bodies.extend(reversed(body.bodies))
         for joint in body.joints:
             if joint.type == mujoco.mjtJoint.mjJNT_FREE:
-                qpos += [*body.pos, *body.quat]
+                pos, quat = (moved or {}).get(body.name, (body.pos, body.quat))
+                qpos += [*pos, *quat]
             else:
                 qpos.append(joints.get(joint.name, 0.0))
     spec.add_key(name=START_KEY, qpos=qpos)
@@ -197,4 +209,27 @@ def fill_states(build: SceneBuild, model: mujoco.MjModel, placements: Sequence[P
             build.builder.warn(entry.name, line)
 
 
-__all__ = ["START_KEY", "SceneBuild", "add_start_key", "build_scene", "fill_states", "pos_quat", "root_poses"]
+def rest_start(build: SceneBuild, model: mujoco.MjModel) -> bool:
+    """Lets hovering objects down in the keyframe "initial"; the bodies keep the source's poses (`start_state`).
+
+    Returns:
+      whether anything changed; the model must then be written again.
+    """
+    owners = {body: name for name, elements in build.elements.items() for body in elements.bodies}
+    drops = let_down(model, START_KEY)
+    for drop in drops:
+        text = f"hovers {100 * drop.distance:.1f} cm above its support in the source: starts lower by that much"
+        build.builder.warn(owners[drop.body], text)
+    if drops:
+        add_start_key(build.builder.spec, build.start_joints, {d.body: (d.pos, d.quat) for d in drops})
+    return bool(drops)
+
+    "START_KEY",
+    "SceneBuild",
+    "add_start_key",
+    "build_scene",
+    "fill_states",
+    "pos_quat",
+    "rest_start",
+    "root_poses",
+]

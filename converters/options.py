@@ -32,6 +32,7 @@ class ConvertOptions:
       bullet_inertia: inertia of the bounding box, as Bullet computes it, instead of the hulls'.
       colours: of visuals without a texture: the source's, or household ones by category. "auto": the source's, unless
         every object of a scene is of one flat colour, which tells of the modelling program and not of the things.
+      keep_hovering: start loose objects exactly where the source has them, even in mid-air.
       jobs: processes. cache: use the cache of decompositions. report: write report.json and report.html.
       renderer, view: what draws the report's pictures (see `report.write_report`).
     """
@@ -46,6 +47,8 @@ class ConvertOptions:
     max_hull_vertices: int = 32
     bullet_inertia: bool = False
     colours: Literal["auto", "source", "category"] = "auto"
+
+    keep_hovering: bool = False
 
     jobs: int = 1
     cache: bool = True
@@ -75,7 +78,7 @@ class ConvertOptions:
     def record(self) -> dict[str, Any]:
         """What the manifest keeps of the options: those that decide what comes out."""
         kept = ("seed", "fixed_furniture", "ceiling_collision", "max_hulls", "max_hull_vertices", "bullet_inertia")
-        kept += ("colours",)
+        kept += ("colours", "keep_hovering")
         record: dict[str, Any] = {name: getattr(self, name) for name in kept}
         for name in ("only_rooms", "only_categories"):
             value = getattr(self, name)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 import pathlib
+from collections.abc import Sequence
 
 import numpy as np
 import trimesh
@@ -74,7 +75,7 @@ def write_model(
     category: str,
     model: str,
     links: dict[str, list[Piece]],
-    joints: list[str] = (),
+    joints: Sequence[str] = (),
     *,
     low,
     high,
@@ -349,7 +350,7 @@ def _write_scene(folder: pathlib.Path) -> None:
 
 def cached_instances() -> list[str]:
     """A sliced apple with states, dust and stains, a knife, an agent: what a cached BEHAVIOR scene adds."""
-    dust = [None] * 20
+    dust: list = [None] * 20
     dust[3] = ["base_link", [-0.9, 0.1, 0.702], [0, 0, 0, 1]]
     stain = {"dirt_dump": [None] * 20, "random_bbox_dims": [[0.01, 0.02, 0.004]] * 20}
     whole_states = {

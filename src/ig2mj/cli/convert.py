@@ -36,6 +36,7 @@ def convert_scene(
     max_hull_vertices: int = 32,
     bullet_inertia: Annotated[bool, Flag] = False,
     ceiling_collision: Annotated[bool, Flag] = False,
+    keep_hovering: Annotated[bool, Flag] = False,
     colours: Literal["auto", "source", "category"] = "auto",
     no_cache: Annotated[bool, Flag] = False,
     no_report: Annotated[bool, Flag] = False,
@@ -60,6 +61,7 @@ def convert_scene(
       max_hull_vertices: most vertices per piece.
       bullet_inertia: inertia of each link's box, as Bullet computes it, instead of that of its hulls.
       ceiling_collision: let ceilings collide.
+      keep_hovering: start loose objects exactly where the source has them; by default those in mid-air are let down.
       colours: of visuals without a texture: the source's, or household ones by category; auto prefers the source's,
         unless every object of a scene is of one flat colour.
       no_cache: do not use the cache of convex decompositions.
@@ -79,6 +81,7 @@ def convert_scene(
         max_hull_vertices=max_hull_vertices,
         bullet_inertia=bullet_inertia,
         colours=colours,
+        keep_hovering=keep_hovering,
         jobs=jobs,
         cache=not no_cache,
         report=not no_report,
