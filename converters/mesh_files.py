@@ -242,8 +242,10 @@ def _look(geometry: trimesh.Trimesh) -> tuple[tuple[float, float, float, float] 
     if visual.kind == "texture":
         material = visual.material
         image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
-        factor = getattr(material, "baseColorFactor", None)
-        colour = factor if factor is not None else material.main_color
+        simple = isinstance(material, trimesh.visual.material.SimpleMaterial)
+        colour = material.diffuse if simple else material.baseColorFactor
+        if colour is None or (simple and image is not None):
+            return None, image  # nothing said: the texture alone, or the URDF's colour
     elif visual.kind in ("vertex", "face"):
         image, colour = None, np.mean(visual.vertex_colors, axis=0)
     else:
