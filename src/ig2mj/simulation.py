@@ -15,7 +15,7 @@ from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import EngineError, PoseError, UnknownNameError
 from ig2mj.scene.scene import Scene, load_scene
 
-Vector = Sequence[float] | np.ndarray
+Vector = Sequence[float | int] | np.ndarray
 
 
 class Simulation:
@@ -126,7 +126,7 @@ class Simulation:
         """Position of a hinge (rad) or slide (m). Raises UnknownNameError; PoseError for a free joint."""
         return float(self.data.qpos[self._joint_address(name)])
 
-    def set_joint(self, name: str, q: float) -> PhysicsView:
+    def set_joint(self, name: str, q: float | int) -> PhysicsView:
         """Puts a hinge (rad) or slide (m) somewhere, at rest and awake; limits push back in the next step.
 
         Raises:

@@ -14,6 +14,8 @@ import numpy as np
 
 from ig2mj.scene.manifest import AgentEntry
 
+Vector = Sequence[float | int] | np.ndarray
+
 HAND_FORCE = 300.0
 """Newtons (newton metres for turning) of each axis (paper, appendix A.3; design section 5)."""
 
@@ -48,8 +50,8 @@ _FINGERS = {"index": 0.03, "middle": 0.01, "ring": -0.01, "pinky": -0.03}  # pla
 def add_floating_hand(
     spec: mujoco.MjSpec,
     name: str = "hand",
-    pos: Sequence[float] = (0.0, 0.0, 1.0),
-    quat: Sequence[float] = (1, 0, 0, 0),
+    pos: Vector = (0, 0, 1),
+    quat: Vector = (1, 0, 0, 0),
 ) -> AgentEntry:
     """Adds a hand to a scene that is not compiled yet.
 
@@ -80,6 +82,7 @@ def add_floating_hand(
     _solid(palm, mujoco.mjtGeom.mjGEOM_BOX, PALM_HALF, PALM_MASS)
     palm.add_camera(name=f"{name}/eye", pos=[0.0, 0.08, 0.12], fovy=60.0)
 
+    unit = np.rad2deg(1.0) if spec.compiler.degree else 1.0  # MjSpec takes ranges in the compiler's unit
     fingers = []
     down = np.array([0.0, 0.0, -1.0])
     for finger in ("thumb", *_FINGERS):
@@ -101,7 +104,7 @@ def add_floating_hand(
                 name=joint,
                 type=mujoco.mjtJoint.mjJNT_HINGE,
                 axis=list(axis),
-                range=[-0.05, closed + 0.05],
+                range=[-0.05 * unit, (closed + 0.05) * unit],
                 limited=mujoco.mjtLimited.mjLIMITED_TRUE,
                 armature=0.002,
             )
@@ -131,9 +134,7 @@ def add_floating_hand(
     return AgentEntry(name=name, body=name, camera=f"{name}/eye", fingers=fingers, hands=[name])
 
 
-def hand_ctrl(
-    offset: Sequence[float] = (0.0, 0.0, 0.0), turn: Sequence[float] = (0.0, 0.0, 0.0), closed: float = 0.0
-) -> np.ndarray:
+def hand_ctrl(offset: Vector = (0, 0, 0), turn: Vector = (0, 0, 0), closed: float | int = 0) -> np.ndarray:
     """Controls [16] of one floating hand.
 
     Args:
@@ -149,7 +150,7 @@ def hand_ctrl(
 def _solid(
     body: mujoco.MjsBody,
     shape: mujoco.mjtGeom,
-    size: Sequence[float],
+    size: Sequence[float | int],
     mass: float,
     end: np.ndarray | None = None,
 ) -> None:

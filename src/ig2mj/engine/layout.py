@@ -33,6 +33,7 @@ class ModelLayout:
       link_tree: [L] tree of the link's body, -1: static.
       qpos_tree, qpos_dof: [nq] tree and first degree of freedom of the joint that owns the coordinate.
       qpos_ndof: [nq] number of degrees of freedom of that joint.
+      equality_tree: [E, 2] trees that an equality constraint joins, -1: the world or nothing.
       grasp_equality, grasp_agent, grasp_object: equality constraints between an agent's body and an object's.
     """
 
@@ -52,6 +53,7 @@ class ModelLayout:
     qpos_tree: Int[np.ndarray, "nq"]
     qpos_dof: Int[np.ndarray, "nq"]
     qpos_ndof: Int[np.ndarray, "nq"]
+    equality_tree: Int[np.ndarray, "E 2"]
     grasp_equality: Int[np.ndarray, "Y"]
     grasp_agent: Int[np.ndarray, "Y"]
     grasp_object: Int[np.ndarray, "Y"]
@@ -96,7 +98,8 @@ def make_layout(model: mujoco.MjModel, tables: SceneTables) -> ModelLayout:
     joint_ndof = np.select([width == 7, width == 4], [6, 3], 1)
     owner = np.repeat(np.arange(model.njnt), width)
 
-    equality, agent, grasped = _grasps(model, tables)
+    equality_body = _equality_bodies(model)
+    equality, agent, grasped = _grasps(model, tables, equality_body)
     return ModelLayout(
         object_qposadr=object_qposadr,
         object_dofadr=object_dofadr,
@@ -114,26 +117,39 @@ def make_layout(model: mujoco.MjModel, tables: SceneTables) -> ModelLayout:
         qpos_tree=body_tree[model.jnt_bodyid[owner]],
         qpos_dof=np.asarray(model.jnt_dofadr)[owner],
         qpos_ndof=joint_ndof[owner],
+        equality_tree=np.where(equality_body >= 0, body_tree[equality_body], -1),
         grasp_equality=equality,
         grasp_agent=agent,
         grasp_object=grasped,
     )
 
 
-def _grasps(model: mujoco.MjModel, tables: SceneTables) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _equality_bodies(model: mujoco.MjModel) -> np.ndarray:
+    """Bodies [E, 2] that each equality constraint joins; -1: none (a joint held at a value)."""
+    out = np.full((model.neq, 2), -1)
+    for e in range(model.neq):
+        ids = np.array([model.eq_obj1id[e], model.eq_obj2id[e]])
+        kind = mujoco.mjtEq(int(model.eq_type[e]))
+        if kind in (mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_CONNECT):
+            of_site = model.eq_objtype[e] == mujoco.mjtObj.mjOBJ_SITE
+            out[e] = model.site_bodyid[ids] if of_site else ids
+        elif kind == mujoco.mjtEq.mjEQ_JOINT:
+            out[e] = np.where(ids >= 0, model.jnt_bodyid[ids], -1)
+    return out
+
+
+def _grasps(
+    model: mujoco.MjModel, tables: SceneTables, equality_body: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Welds and connects that join an agent to an object: equality ids, agents, objects."""
     agent_of_root = {int(model.body_rootid[b]): a for a, b in enumerate(tables.agent_body)}
-    agent_of_root |= {
-        int(model.body_rootid[b]): int(a) for b, a in zip(tables.finger_body, tables.finger_agent, strict=True)
-    }
+    for body, agent in zip(tables.finger_body, tables.finger_agent, strict=True):
+        agent_of_root[int(model.body_rootid[body])] = int(agent)
     rows = []
-    for e in range(model.neq):
-        if mujoco.mjtEq(int(model.eq_type[e])) not in (mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_CONNECT):
-            continue
-        ids = (int(model.eq_obj1id[e]), int(model.eq_obj2id[e]))
-        if model.eq_objtype[e] == mujoco.mjtObj.mjOBJ_SITE:
-            ids = (int(model.site_bodyid[ids[0]]), int(model.site_bodyid[ids[1]]))
-        for one, other in (ids, ids[::-1]):
+    for e, bodies in enumerate(equality_body):
+        for one, other in (bodies, bodies[::-1]):
+            if one < 0 or other < 0:
+                continue
             agent, held = agent_of_root.get(int(model.body_rootid[one])), int(tables.body_object[other])
             if agent is not None and held >= 0:
                 rows.append((e, agent, held))

@@ -195,6 +195,7 @@ class World:
     def _set_state(self, fields: dict[str, np.ndarray]) -> None:
         for name in _STATE:
             getattr(self.data, name)[:] = fields[name]
+        self.data.qacc[:] = fields["qacc_warmstart"]
         self.data.time = float(fields["time"])
 
     def clear_force(self) -> int:
@@ -215,17 +216,17 @@ class World:
         data = self.data
         if abs(float(data.qpos.sum())) < mujoco.mjMAXVAL and abs(float(data.qvel.sum())) < mujoco.mjMAXVAL:
             return  # false for NaN, too
-        dofs = np.flatnonzero(~(np.abs(data.qvel) < mujoco.mjMAXVAL))
-        if len(dofs):
-            joint = int(self.model.dof_jntid[dofs[0]])
-        else:
-            coordinates = np.flatnonzero(~(np.abs(data.qpos) < mujoco.mjMAXVAL))
-            if not len(coordinates):
-                return
-            joint = int(np.searchsorted(self.model.jnt_qposadr, coordinates[0], side="right")) - 1
-        body = f"body '{self.model.body(int(self.model.jnt_bodyid[joint])).name}'"
+        model = self.model
+        wrong = ~(np.abs(data.qvel) < mujoco.mjMAXVAL)
+        bodies = set(model.dof_bodyid[wrong])
+        coordinates = np.flatnonzero(~(np.abs(data.qpos) < mujoco.mjMAXVAL))
+        bodies |= set(model.jnt_bodyid[np.searchsorted(model.jnt_qposadr, coordinates, side="right") - 1])
+        if not bodies:
+            return
+        names = [f"'{model.body(int(b)).name}'" for b in sorted(bodies)]
+        listed = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
         raise EngineError(
-            f"world {self.number}: the position or velocity of {body} is not finite at t = {data.time:.3f} s "
+            f"world {self.number}: position or velocity is not finite at t = {data.time:.3f} s of {listed} "
             "(reset the world; a smaller timestep or weaker controls may mend it)"
         )
 
@@ -305,6 +306,9 @@ class World:
         if key == self._awake_key:
             return Changed.NOTHING
         self._awake_key = key
+        asleep = ~awake[self.model.dof_treeid]
+        for array in (self.data.qacc, self.data.qacc_smooth, self.data.qacc_warmstart):
+            array[asleep] = 0.0  # MuJoCo leaves old values there; a loaded world must start a wake from the same ones
         self.rows["awake"][:] = (self.statics.layout.object_trees & awake).any(1)
         return Changed.AWAKE
 

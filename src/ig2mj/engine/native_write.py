@@ -32,15 +32,18 @@ def apply_write(world: World, rows: dict[str, np.ndarray]) -> int:
             for k in range(int(count.max())):
                 data.qvel[(first + k)[count > k]] = 0.0
             trees[layout.qpos_tree[address]] = True
-    equality = False
+    joined = np.zeros(model.neq, bool)
     if "eq_active" in rows:
-        equality |= not np.array_equal(data.eq_active, rows["eq_active"])
+        joined |= data.eq_active.astype(bool) != rows["eq_active"]
         data.eq_active[:] = rows["eq_active"]
     if "eq_data" in rows:
-        equality |= not np.array_equal(world.eq_data, rows["eq_data"])
+        joined |= (world.eq_data != rows["eq_data"]).any(1) & data.eq_active.astype(bool)
         world.eq_data = rows["eq_data"].astype(np.float64)
         model.eq_data[:] = world.eq_data
-    if rows and not equality and not trees.any():
+    if joined.any():  # what a hand lets go may be ready to sleep: it would hang in the air
+        free = layout.equality_tree[joined].ravel()
+        trees[free[free >= 0]] = True
+    if rows and not trees.any():
         return Changed.NOTHING
     wake_trees(model, data, np.flatnonzero(trees))
     mujoco.mj_step1(model, data)
