@@ -48,6 +48,8 @@ COMMANDS: dict[str, str] = {
     "convert": "turn an iGibson scene or a URDF object into MJCF",
     "view": "open a scene in MuJoCo's viewer, or write a picture of it",
     "inspect": "list a scene's objects, joints, abilities and rooms",
+    "calibrate": "measure the batched engine's buffers for a scene",
+    "pool": "make a pool of settled initial states for batched resets",
     "homes": "build our own dataset of household objects and homes",
     "doctor": "tell what this machine can run, and how to mend what it cannot",
 }

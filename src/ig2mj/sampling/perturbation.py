@@ -23,8 +23,8 @@ LIFT = (0.02, 0.10)
 """Metres: objects are let go from between these heights over where they lay."""
 
 
-def loose_objects(tables: SceneTables, view: PhysicsView) -> Int[np.ndarray, "M"]:
-    """Objects that can be moved: free, in use, and standing clear of the parking slab."""
+def loose_objects(tables: SceneTables) -> Int[np.ndarray, "M"]:
+    """Objects that can be moved: free, in use at the start, and no half of another object."""
     return np.flatnonzero(~tables.object_fixed & ~tables.object_parked & (tables.object_part_of < 0))
 
 

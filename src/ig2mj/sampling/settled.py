@@ -61,7 +61,7 @@ def make_pool(
     physics, view = _rest(engine, physics)
     start = engine.export(physics, 0)
     floor = lowest_support(view, scene.tables.object_fixed)
-    loose = loose_objects(scene.tables, view)
+    loose = loose_objects(scene.tables)
     bodies = {scene.model.body(b).name: b for b in range(scene.model.nbody)}
     states = states_of_manifest(model, scene.manifest, bodies)
     rows: list[Snapshot] = []

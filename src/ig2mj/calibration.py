@@ -1,0 +1,174 @@
+"""Measuring how large the Warp engine's buffers must be for a scene: it is disturbed, and the peaks are kept.
+
+Where there is a GPU, the Warp engine itself is measured, in many worlds. Else C MuJoCo is: it lists about as many
+contacts and constraint rows (four contacts per face against face, where Warp keeps up to as many), so the safety factor
+is larger.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+
+from ig2mj.agents.pushing import push_controls
+from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.profile import EngineProfile, default_profile
+from ig2mj.engine.settle import settle
+from ig2mj.engine.warp import WarpEngine
+from ig2mj.errors import EngineError
+from ig2mj.sampling.perturbation import loose_objects, perturb
+from ig2mj.scene.scene import Scene
+from ig2mj.worlds.random_streams import episode_keys
+
+SAFETY = {"warp": 1.3, "native": 2.0}
+"""Factor on the measured peaks."""
+
+SHARE = 0.08
+"""Share of the loose objects that are dropped at the start of a round, on average: a few at once."""
+
+ROUND = 60
+"""Control steps of a round; then every world starts afresh."""
+
+ALIGN = 4
+"""Sizes are rounded up to a multiple of this."""
+
+Progress = Callable[[int, int], None]
+
+
+def calibrate(
+    scene: Scene,
+    *,
+    engine: str = "",
+    num_worlds: int = 0,
+    rounds: int = 6,
+    seed: int = 0,
+    safety: float = 0.0,
+    progress: Progress = lambda done, total: None,
+) -> EngineProfile:
+    """Measures a scene.
+
+    Args:
+      scene: with or without an agent; a floating hand that is its only agent pushes objects about.
+      engine: "warp" or "native"; "": warp where JAX has a GPU.
+      num_worlds: measured side by side; 0: 1,024 on warp, 8 on native.
+      rounds: of two simulated seconds each.
+      seed: of the disturbance.
+      safety: factor on the peaks; 0: `SAFETY`.
+      progress: called with rounds done and in all.
+
+    Raises:
+      EngineError: no such engine, or the measurement itself overflowed.
+    """
+    engine = engine or ("warp" if jax.default_backend() == "gpu" else "native")
+    if engine not in SAFETY:
+        raise EngineError(f"there is no engine '{engine}' to calibrate with (engines: {', '.join(SAFETY)})")
+    worlds = num_worlds or {"warp": 1024, "native": 8}[engine]
+    measure = _measure_warp if engine == "warp" else _measure_native
+    peaks = measure(scene, worlds, rounds, seed, progress)
+    factor = safety or SAFETY[engine]
+    widest = default_profile(scene.model)
+    names = ("awake_dofs", "constraints", "contacts", "convex_contacts")
+    sizes = {n: ALIGN * math.ceil(max(1.0, factor * peaks[n]) / ALIGN) for n in names}
+    sizes["awake_dofs"] = min(sizes["awake_dofs"], widest.awake_dofs)
+    # Contacts come as one list for all worlds: its average is what counts, with room for a batch that is all disturbed.
+    return EngineProfile(
+        **sizes,
+        measured={
+            **{f"peak_{n}": round(float(peaks[n]), 2) for n in names},
+            "engine": engine,
+            "worlds": worlds,
+            "rounds": rounds,
+            "seed": seed,
+            "safety": factor,
+            "mujoco": mujoco.__version__,
+        },
+    )
+
+
+class _Disturbance:
+    """What happens to the worlds of a measurement: drops at the start of each round, a hand that pushes, if any."""
+
+    def __init__(self, scene: Scene, engine: NativeEngine | WarpEngine, seed: int):
+        self.scene, self.engine, self.seed = scene, engine, seed
+        self.loose = loose_objects(scene.tables)
+        model = scene.model
+        self.pushes = len(scene.tables.agent_body) == 1 and model.nu >= 3 and len(self.loose) > 0
+        self.home = np.array(model.body_pos[scene.tables.agent_body[0]]) if self.pushes else np.zeros(3)
+        self.seconds = engine.substeps * engine.timestep
+
+    def key(self, round_number: int) -> jax.Array:
+        worlds = jnp.arange(self.engine.num_worlds)
+        return jnp.asarray(episode_keys(self.seed, worlds, jnp.full_like(worlds, round_number)))
+
+    def drop(self, view, key: jax.Array):  # a Write
+        return perturb(self.scene.tables, self.loose, view, key, SHARE)
+
+    def controls(self, view, ctrl: jax.Array, key: jax.Array, step: jax.Array) -> jax.Array:
+        if not self.pushes:
+            return ctrl
+        return jnp.asarray(push_controls(view, ctrl, self.home, self.loose, key, step, self.seconds))
+
+
+def _measure_native(scene: Scene, worlds: int, rounds: int, seed: int, progress: Progress) -> dict[str, float]:
+    engine = NativeEngine(scene, worlds)
+    start = settle(scene)
+    physics = engine.load(engine.reset(), start)
+    act = _Disturbance(scene, engine, seed)
+    drop, controls = jax.jit(act.drop), jax.jit(act.controls)
+    peaks: dict[str, float] = dict.fromkeys(("awake_dofs", "constraints", "contacts", "convex_contacts"), 0.0)
+    for number in range(rounds):
+        physics = engine.load(physics, start)
+        key = act.key(number)
+        view = engine.view(physics)
+        physics = engine.write(physics, jax.device_get(drop(view, key)))
+        ctrl = jnp.zeros((worlds, scene.model.nu), jnp.float32)
+        for step in range(ROUND):
+            physics, view = engine.step(physics, np.asarray(ctrl))
+            ctrl = controls(view, ctrl, key, jnp.full(worlds, step))
+            total = 0
+            for w in range(worlds):
+                data = engine.to_mujoco(physics, w)[1]
+                peaks["awake_dofs"] = max(peaks["awake_dofs"], data.nv_awake)
+                peaks["constraints"] = max(peaks["constraints"], data.nefc)
+                total = max(total, data.ncon)
+            peaks["contacts"] = peaks["convex_contacts"] = max(peaks["contacts"], total)
+        progress(number + 1, rounds)
+    return peaks
+
+
+def _measure_warp(scene: Scene, worlds: int, rounds: int, seed: int, progress: Progress) -> dict[str, float]:
+    engine = WarpEngine(scene, worlds, profile=default_profile(scene.model), initial=settle(scene))
+    act = _Disturbance(scene, engine, seed)
+    first = engine.reset()
+
+    def one_round(physics, number):
+        key = act.key(number)
+        view = engine.view(physics)
+        physics = engine.write(physics, act.drop(view, key))
+
+        def body(carry, step):
+            physics, view, ctrl = carry
+            ctrl = act.controls(view, ctrl, key, jnp.full(worlds, step))
+            physics, view = engine.step(physics, ctrl)
+            use = engine.usage(physics)
+            use = jnp.array(
+                [use.awake_dofs.max(), use.constraints.max(), use.contacts / worlds, use.convex_contacts / worlds]
+            )
+            return (physics, view, ctrl), use
+
+        ctrl = jnp.zeros((worlds, scene.model.nu), jnp.float32)
+        (physics, _, _), use = jax.lax.scan(body, (physics, view, ctrl), jnp.arange(ROUND))
+        return use.max(0), engine.health(physics)
+
+    run = jax.jit(one_round)
+    peaks = np.zeros(4)
+    for number in range(rounds):
+        use, _ = run(first, number)
+        peaks = np.maximum(peaks, np.asarray(use))
+        progress(number + 1, rounds)
+    return dict(zip(("awake_dofs", "constraints", "contacts", "convex_contacts"), map(float, peaks), strict=True))

@@ -1,0 +1,59 @@
+"""`ig2mj pool SCENE`: makes a pool of settled initial states for batched resets."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import Annotated
+
+import tyro
+
+
+def run(
+    scene: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="SCENE")],
+    count: int = 64,
+    out: pathlib.Path | None = None,
+    seed: int = 0,
+    share: float = 0.3,
+    threads: int = 0,
+    hand: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+) -> None:
+    """Make a pool of settled initial states by disturbing a scene at random.
+
+    Args:
+      scene: folder of a converted scene, or the name of a home that comes with ig2mj.
+      count: rows.
+      out: the file; default: pool.npz in the scene's folder.
+      seed: the same seed gives the same pool.
+      share: probability that a loose object is moved, per row.
+      threads: 0: one per processor.
+      hand: make it for the scene with a floating hand.
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from ig2mj.agents.floating_hand import add_floating_hand
+    from ig2mj.errors import EngineError
+    from ig2mj.sampling.settled import make_pool
+    from ig2mj.scene.scene import load_scene
+    from ig2mj.states.model import StateModel
+    from ig2mj.worlds.pool import save_pool
+
+    if count < 1:
+        raise EngineError(f"--count {count}: a pool needs at least one row")
+    if not 0 <= share <= 1:
+        raise EngineError(f"--share {share}: a probability is between 0 and 1")
+    loaded = load_scene(scene, [add_floating_hand] if hand else [])
+    file = out or loaded.folder / "pool.npz"
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(f"settling {loaded.name}", total=count)
+        pool = make_pool(
+            loaded,
+            StateModel.of_manifest(loaded.tables, loaded.manifest),
+            count,
+            seed=seed,
+            share=share,
+            threads=threads or None,
+            progress=lambda done: bar.update(task, completed=done),
+        )
+    save_pool(pool, file, loaded.name, {"seed": seed, "share": share, "hand": hand})
+    print(f"{file}: {pool.size} settled states of {loaded.name}")
