@@ -98,7 +98,8 @@ class FileGuard:
                 element=element,
                 mend=f"put the URDF into the package's folder, named '{package}' or with a package.xml",
             )
-        if self.roots is not None and root not in self.roots:
+        beside = self.file.parent.resolve() / package
+        if self.roots is not None and root not in self.roots and not (beside.is_symlink() or beside == root):
             self.roots.append(root)
         return root / inside
 
@@ -118,9 +119,11 @@ def package_root(folder: pathlib.Path) -> pathlib.Path | None:
 def find_package(folder: pathlib.Path, package: str) -> pathlib.Path | None:
     """The folder that `package://<package>/` means, seen from a folder inside it or beside it.
 
-    Walking up: a folder with a package.xml of that name, a folder of that name, or a neighbour of that name
-    with a package.xml.
+    First a folder of that name beside the URDF, as Bullet has it. Then walking up: a folder with a package.xml of that
+    name, a folder of that name, or a neighbour of that name with a package.xml.
     """
+    if (folder / package).is_dir():
+        return (folder / package).resolve()
     for candidate in _upwards(folder.resolve()):
         manifest = candidate / "package.xml"
         if manifest.is_file() and _package_name(manifest) == package:

@@ -9,7 +9,7 @@ MAX_MESH_BYTES = 512 * 2**20
 
 
 class MeshError(InputError):
-    """A mesh file's content cannot be used."""
+    """A geometry, or a mesh file's content, cannot be used: fatal for a collision, a warning for a visual."""
 
 
 def too_many_faces(file: object, count: int) -> MeshError:

@@ -55,13 +55,17 @@ class GeometryReader:
         return dataclasses.replace(shape, meshes=list(meshes), grouped=grouped, scale=self._scale(mesh), file=path)
 
     def visual(self, element: Element) -> list[Shape]:
-        """One shape per material. A mesh that cannot be used is a warning and no shape.
+        """One shape per material. A geometry that cannot be used is a warning and no shape.
 
         Raises:
           InputError: numbers or file names that no URDF may have.
         """
         rgba = self._colour(element)
-        shape, mesh = self._primitive(element)
+        try:
+            shape, mesh = self._primitive(element)
+        except MeshError as e:
+            self.warnings.append(f"a visual is left out: {e}")
+            return []
         shape.rgba = rgba
         if mesh is None:
             return [shape]
@@ -96,7 +100,7 @@ class GeometryReader:
         geometry = element.find("geometry")
         kinds = [] if geometry is None else [c for c in geometry if isinstance(c.tag, str)]
         if len(kinds) != 1:
-            raise InputError(file, f"has {len(kinds)} geometries instead of one", element=where(element))
+            raise MeshError(file, f"has {len(kinds)} geometries instead of one", element=where(element))
         kind = kinds[0]
         shape = Shape(local_name(kind), read_origin(element, file), name=element.get("name") or "")
         if shape.kind == "mesh":
@@ -108,14 +112,14 @@ class GeometryReader:
         elif shape.kind == "sphere":
             size = np.array([number(kind, "radius", file)])
         else:
-            raise InputError(
+            raise MeshError(
                 file,
                 f"geometry <{shape.kind}> is not supported",
                 element=where(element),
                 mend="use mesh, box, cylinder, sphere or capsule",
             )
         if np.any(size <= 0):
-            raise InputError(file, f"a size of the {shape.kind} is not positive", element=where(kind))
+            raise MeshError(file, f"a size of the {shape.kind} is not positive", element=where(kind))
         shape.size = tuple(float(v) for v in size)
         return shape, None
 

@@ -183,6 +183,16 @@ def test_a_visual_that_cannot_be_read_is_a_warning(root, make):
     assert ["gone.obj" in model.warnings[0], "empty.obj" in model.warnings[1]] == [True, True]
 
 
+@pytest.mark.parametrize(
+    "geometry", ["<sphere radius='0'/>", "<plane/>", "", "<sphere radius='1'/><sphere radius='1'/>"]
+)
+def test_a_visual_primitive_that_makes_no_sense_is_a_warning(root, make, geometry):
+    """Real robot files have spheres of radius 0 and visuals with two geometries."""
+    model = read(root, make.link("a", f"<visual><geometry>{geometry}</geometry></visual>"), make=make)
+    assert not model.links["a"].visuals
+    assert "a visual is left out" in model.warnings[0]
+
+
 def test_a_visual_outside_the_root_is_an_error_all_the_same(root, make):
     root.object(make.robot(make.link("a", make.shape("visual", "../../../../x.obj"))))
     with pytest.raises(InputError, match=r"m.urdf.*link 'a'.*outside the dataset root"):
@@ -246,6 +256,8 @@ def test_without_metadata_bbox_json_then_nothing(root):
         ("ws/bot_description/urdf/x.urdf", "../meshes/a.obj", None),
         ("ws/bot_description/a/b/x.urdf", "../../meshes/a.obj", "ws/bot_description/package.xml"),
         ("ws/bot_description/x.urdf", "meshes\\a.obj", None),
+        ("ws/bot_description/x.urdf", "package://meshes/a.obj", None),
+        ("ws/x.urdf", "package://bot_description/meshes/a.obj", None),
     ],
 )
 def test_ros_packages_are_found_by_walking_up(root, make, urdf, name, manifest):
