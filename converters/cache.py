@@ -78,7 +78,8 @@ def store(key: str, facts: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) 
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as file:
             temporary = file.name
-            np.savez_compressed(file, facts=text, **arrays)
+            everything: dict[str, Any] = {"facts": text, **arrays}
+            np.savez_compressed(file, **everything)
         pathlib.Path(temporary).replace(path)
     except OSError:
         if temporary is not None:

@@ -186,7 +186,7 @@ def surface_distance(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
         return best
     marks, owner = _sample_triangles(triangles, 20_000)
     k = 12
-    _, nearest = scipy.spatial.cKDTree(marks).query(points, k=k)
+    _, nearest = scipy.spatial.KDTree(marks).query(points, k=k)
     candidates = owner[nearest]
     flat = np.repeat(points, k, axis=0)
     near = closest_point(triangles[candidates.ravel()], flat)

@@ -229,7 +229,7 @@ def _used(mesh: Mesh) -> np.ndarray:
 
 
 def _joined(meshes: list[Mesh]) -> tuple[np.ndarray, np.ndarray]:
-    offsets = np.cumsum([0] + [len(m.vertices) for m in meshes])
+    offsets = np.cumsum([0, *(len(m.vertices) for m in meshes)])
     vertices = [m.vertices for m in meshes] or [np.zeros((0, 3))]
     faces = [m.faces + o for m, o in zip(meshes, offsets, strict=False)] or [np.zeros((0, 3), np.int64)]
     return np.concatenate(vertices), np.concatenate(faces)
@@ -247,7 +247,7 @@ def _budget(found: list[_Found], taken: int, options: HullOptions, out: LinkHull
     if len(found) <= limit:
         return found
     merged = merge_to_budget([f.hull for f in found], limit)
-    return [_Found(m.hull, "merged" if len(m.members) > 1 else found[m.members[0]].source) for m in merged]
+    return [_Found(m.hull, "merged" if len(m.members) > 1 else found[min(m.members)].source) for m in merged]
 
 
 def _finish(found: _Found, options: HullOptions) -> Piece:

@@ -50,7 +50,8 @@ def clean(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarr
     vertices = np.asarray(vertices, np.float64).reshape(-1, 3)
     faces = np.asarray(faces, np.int64).reshape(-1, 3)
     faces = faces[np.all((faces >= 0) & (faces < len(vertices)), axis=1)]
-    faces = faces[np.isfinite(vertices).all(axis=1)[faces].all(axis=1)]
+    finite = np.asarray(np.isfinite(vertices).all(axis=1))
+    faces = faces[finite[faces].all(axis=1)]
     if not len(faces):
         return np.zeros((0, 3)), np.zeros((0, 3), np.int64)
     used, faces = np.unique(faces, return_inverse=True)
@@ -106,7 +107,8 @@ def parts(vertices: np.ndarray, faces: np.ndarray) -> list[Part]:
 
 def signed_volume(triangles: np.ndarray) -> float:
     """m3 enclosed by [m, 3, 3]; negative if wound inward; means little for an open mesh."""
-    a, b, c = (triangles[:, i] - triangles[0, 0] for i in range(3))
+    moved = triangles - triangles[0, 0]
+    a, b, c = (moved[:, i] for i in range(3))
     return float(np.einsum("mi,mi->", a, np.cross(b, c)) / 6)
 
 
@@ -116,7 +118,7 @@ def _triangles(mesh: trimesh.Trimesh) -> np.ndarray:
 
 def _labels(faces: np.ndarray) -> np.ndarray:
     """Part number per face: joined over edges of exactly two faces."""
-    pairs = trimesh.graph.face_adjacency(faces)
+    pairs = np.asarray(trimesh.graph.face_adjacency(faces)).reshape(-1, 2)
     graph = scipy.sparse.coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(faces), len(faces)))
     return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
 
@@ -227,10 +229,8 @@ def decimate(vertices: np.ndarray, faces: np.ndarray, most: int) -> tuple[np.nda
         return vertices, faces
     vertices, faces = clean(vertices, faces)
     if len(faces) > most:
-        v, f = fast_simplification.simplify(
-            vertices.astype(np.float32), faces.astype(np.int32), target_reduction=1 - most / len(faces)
-        )
-        vertices, faces = clean(v, f)
+        found = fast_simplification.simplify(vertices, faces.astype(np.int32), target_reduction=1 - most / len(faces))
+        vertices, faces = clean(found[0], found[1])
     return vertices, faces
 
 

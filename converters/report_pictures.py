@@ -45,7 +45,7 @@ class Pictures:
     def __init__(self, model: mujoco.MjModel, manifest: Manifest, index: ModelIndex, renderer: Any, view: Any):
         self.original, self.manifest, self.index = model, manifest, index
         self.renderer = renderer if view is not None else None
-        self.view = view
+        self.view: Any = view
         self.note = "" if self.renderer else "nothing here renders: pictures are drawings"
         self.model = copy.copy(model)
         self.data = start_data(self.model)
@@ -111,7 +111,8 @@ class Pictures:
         return data_uri(image)
 
     def _render(self, geoms: np.ndarray, size: tuple[int, int], azimuth: float, elevation: float, flat: bool):
-        if self.renderer is None:
+        renderer = self.renderer
+        if renderer is None:
             return None
         m, (width, height) = self.model, size
         m.geom_group[:] = HIDDEN
@@ -124,13 +125,13 @@ class Pictures:
         m.vis.headlight.active = 1
         m.vis.headlight.ambient[:], m.vis.headlight.diffuse[:], m.vis.headlight.specular[:] = 0.45, 0.5, 0.05
         span = max(float(high[1] - low[1]), float(high[0] - low[0]) * height / width) * 1.04
-        view = self.view(
-            tuple(float(x) for x in middle), 2.0 * extent if flat else 1.25 * extent, azimuth, elevation,
+        view: Any = self.view(
+            tuple(float(x) for x in middle), 2.0 * extent if flat else 1.4 * extent, azimuth, elevation,
             height=span if flat else None,
         )  # fmt: skip
         started = time.perf_counter()
         try:
-            image = self.renderer(m, self.data, view, width=width, height=height, groups=(SEEN,))
+            image = renderer(m, self.data, view, width=width, height=height, groups=(SEEN,))
         except Exception as e:  # whatever a driver may raise: the report must not fail for a picture
             self.renderer = None
             self.note = f"rendering failed ({' '.join(str(e).split())[:200]}): pictures are drawings"

@@ -13,6 +13,8 @@ from .model_index import ModelIndex, geom_box
 
 COLOURS = ("#cfe3f7", "#fde2c4", "#d5efd2", "#f7d3d8", "#e4d8f3", "#fbf3bf", "#cdeeea", "#e8e1d6", "#dfe6b8", "#f3d9ea")
 FIXED, LOOSE, WALL = "#8a94a0", "#2f6db5", "#4a5058"
+LINTEL = 1.2
+"""Walls that begin higher than this, metres, are above doors and windows and not in the plan."""
 INK = "#20262d"
 BUILDING = ("walls", "floors", "ceilings")
 
@@ -23,7 +25,9 @@ def footprints(model: mujoco.MjModel, data: mujoco.MjData, manifest: Manifest, i
     for number, entry in enumerate(manifest.objects):
         if not entry.parked:
             geoms = np.flatnonzero((index.geom_object == number) & index.solid)
-            found[entry.name] = [geom_box(model, g, data.geom_xmat[g].reshape(3, 3), data.geom_xpos[g]) for g in geoms]
+            found[entry.name] = [
+                geom_box(model, int(g), data.geom_xmat[g].reshape(3, 3), data.geom_xpos[g]) for g in geoms
+            ]
     return found
 
 
@@ -63,6 +67,8 @@ def draw_plan(
             continue
         colour = WALL if entry.category == "walls" else FIXED if entry.fixed else LOOSE
         for box in boxes.get(entry.name, []):
+            if entry.category == "walls" and box[0, 2] > LINTEL:
+                continue
             (x0, y0), (x1, y1) = at(box[0, 0], box[1, 1]), at(box[1, 0], box[0, 1])
             filled = colour if entry.category == "walls" else None
             pen.rectangle((x0, y0, max(x1, x0 + 1), max(y1, y0 + 1)), outline=colour, fill=filled)

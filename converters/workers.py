@@ -12,6 +12,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -90,7 +91,8 @@ def main(given: str, found: str) -> None:
         mesh = coacd.Mesh(file["vertices"], file["faces"])
         parameters = {str(n): ast.literal_eval(str(v)) for n, v in zip(file["names"], file["values"], strict=True)}
     pieces = [np.asarray(p[0], np.float64) for p in coacd.run_coacd(mesh, **parameters)]
-    np.savez(found, count=len(pieces), **{f"piece_{i}": p for i, p in enumerate(pieces)})
+    everything: dict[str, Any] = {"count": len(pieces)} | {f"piece_{i}": p for i, p in enumerate(pieces)}
+    np.savez(found, **everything)
 
 
 def _limit_cpu(seconds: int) -> None:
