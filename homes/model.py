@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import dataclasses
 import random
+import zlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -120,8 +121,8 @@ class ObjectBuilder:
         self.base.add(solid, material, collide)
 
     def pick(self, choices: Sequence):
-        """Cycles through choices by the model's index, so that the models of a category differ."""
-        return choices[self.index % len(choices)]
+        """Cycles through choices by the model's index, so that a category's models differ; each category begins elsewhere."""
+        return choices[(self.index + zlib.crc32(self.category.encode())) % len(choices)]
 
     # --- joints -------------------------------------------------------------------------------------------------
 

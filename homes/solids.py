@@ -121,7 +121,6 @@ def soft_box(x: float, y: float, z: float, radius: float | None = None, steps: i
     """A box with rounded edges (cushions, bread, soap) standing on the origin; the hull is the plain box."""
     size = np.array([x, y, z])
     r = min(radius if radius is not None else 0.25 * size.min(), 0.499 * size.min())
-    n = 2 * steps + 2
     inner = size / 2 - r
     # A cube's surface grid, whose outermost cells become the rounded edges.
     angles = np.tan(np.linspace(0, math.pi / 4, steps + 1))
@@ -150,7 +149,6 @@ def soft_box(x: float, y: float, z: float, radius: float | None = None, steps: i
                         quad.append(vertex(tuple(key)))  # type: ignore[arg-type]
                     quad = quad if side == last else quad[::-1]
                     faces += [[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]]
-    del n
     mesh = Mesh(np.array(vertices) + [0, 0, z / 2], np.array(faces))
     return Solid((mesh,), (_corners(size) + [0, 0, z / 2],))
 
@@ -166,6 +164,11 @@ def lathe(profile: Sequence[tuple[float, float]], sides: int = ROUND_SIDES, spli
     for low, high in zip(cuts[:-1], cuts[1:], strict=True):
         hulls.append(_turned_hull(_band(list(profile), low, high)))
     return Solid((visual,), tuple(hulls))
+
+
+def sleeve(profile: Sequence[tuple[float, float]], sides: int = ROUND_SIDES) -> Solid:
+    """A turned skin without end caps, only seen: a label around a bottle, a stripe. profile: (radius, z), upwards."""
+    return Solid((_turn([(float(r), float(z)) for r, z in profile], sides),))
 
 
 def _close(profile: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:

@@ -1,6 +1,8 @@
 """All families; the catalogue is made of their CATEGORIES."""
 
 from . import (
+    appliances,
+    bathroom,
     books,
     bottles,
     cabinets,
@@ -10,11 +12,16 @@ from . import (
     cloths,
     containers,
     cookware,
+    decorations,
+    doors_windows,
+    electronics,
     food,
     fridges,
     fruit,
     packages,
+    shelves,
     sinks,
+    sofas_beds,
     stoves,
     tables,
     tableware,
@@ -22,6 +29,8 @@ from . import (
 )
 
 FAMILIES = (
+    appliances,
+    bathroom,
     books,
     bottles,
     cabinets,
@@ -31,11 +40,16 @@ FAMILIES = (
     cloths,
     containers,
     cookware,
+    decorations,
+    doors_windows,
+    electronics,
     food,
     fridges,
     fruit,
     packages,
+    shelves,
     sinks,
+    sofas_beds,
     stoves,
     tables,
     tableware,

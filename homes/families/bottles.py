@@ -8,7 +8,7 @@ from .. import materials, textures
 from ..catalogue import Entry
 from ..materials import Material
 from ..model import ObjectBuilder
-from ..solids import Solid, ball, block, box, cylinder, decal, hull, lathe, rod, soft_box, tube
+from ..solids import Solid, ball, block, box, cylinder, decal, hull, lathe, rod, sleeve, soft_box, tube
 from ..vessels import disc, ring, turned_vessel
 from .packages import printed
 from .parts import ear
@@ -20,7 +20,7 @@ def body_material(look: str | tuple, clear: bool) -> Material:
 
 def band(r: float, low: float, high: float, material: Material) -> tuple[Solid, Material]:
     """A label around a round bottle."""
-    return lathe([(r * 1.01, low), (r * 1.01, high)]).seen(), material
+    return sleeve([(r * 1.01, low), (r * 1.01, high)]), material
 
 
 def bottle(b: ObjectBuilder, *, looks: tuple = (("green", "cream"),), neck: float = 0.28, shoulder: float = 0.62,
@@ -279,7 +279,7 @@ def paper_cup(b: ObjectBuilder) -> None:
     r = x / 2
     b.add(lathe([(0.68 * r, 0), (0.95 * r, 0.92 * z)]), materials.plain("white", "paper"))
     b.add(
-        lathe([(0.78 * r, 0.25 * z), (0.9 * r, 0.65 * z)]).seen().scaled(1.02, 1.02),
+        sleeve([(0.78 * r, 0.25 * z), (0.9 * r, 0.65 * z)]).scaled(1.02, 1.02),
         materials.plain(b.pick(("cardboard", "dark_green", "red")), "paper"),
     )
     b.add(lathe([(r, 0.92 * z), (r, 0.95 * z), (0.85 * r, z)]), materials.plain("white"))
@@ -305,9 +305,7 @@ def cup_tub(b: ObjectBuilder, *, looks: tuple = (("white", "pink"), ("white", "b
     look, accent = b.pick(looks)
     b.add(lathe([(0.78 * r, 0), (0.95 * r, 0.92 * z), (r, 0.93 * z), (r, z)]), materials.plain(look))
     b.add(cylinder(r * 0.99, 0.001).seen().at(z=z), materials.metal("silver"))
-    b.add(
-        lathe([(0.82 * r, 0.2 * z), (0.92 * r, 0.72 * z)]).seen().scaled(1.02, 1.02), materials.plain(accent, "paper")
-    )
+    b.add(sleeve([(0.82 * r, 0.2 * z), (0.92 * r, 0.72 * z)]).scaled(1.02, 1.02), materials.plain(accent, "paper"))
 
 
 def paint_tin(b: ObjectBuilder) -> None:
