@@ -38,9 +38,12 @@ def acts_on(model: StateModel, on: Bool[Array, "W S"], view: PhysicsView, relati
     worlds = on.shape[0]
     if len(p.heat_object) == 0:
         return jnp.zeros((worlds, num_objects, 0), bool)
-    link = jnp.asarray(view.link_pos)[:, np.maximum(p.heat_link, 0)]
-    offset = jnp.asarray(view.object_com)[:, :, None] - link[:, None]
-    reached = jnp.sum(offset * offset, axis=-1) <= p.heat_distance**2
+    if np.any(p.heat_link >= 0):
+        link = jnp.asarray(view.link_pos)[:, np.maximum(p.heat_link, 0)]
+        offset = jnp.asarray(view.object_com)[:, :, None] - link[:, None]
+        reached = jnp.sum(offset * offset, axis=-1) <= p.heat_distance**2
+    else:
+        reached = jnp.zeros((worlds, num_objects, len(p.heat_object)), bool)
     pairs = _inside_pairs(model)
     if len(pairs):
         place = np.full((num_objects, len(p.heat_object)), len(pairs))
