@@ -156,8 +156,8 @@ class Pictures:
         bare = [n for n in shown if not np.any((self.index.geom_object == n) & ~self.index.solid)]
         looks = np.concatenate([looks, np.flatnonzero(np.isin(self.index.geom_object, bare))])
         pictures = [
-            ("From above", self._picture(looks, SCENE_SIZE, azimuth=90, elevation=-90, flat=True)),
-            ("From a corner", self._picture(looks, SCENE_SIZE, azimuth=120, elevation=-50)),
+            ("From above", self._picture(looks, SCENE_SIZE, azimuth=90.0, elevation=-90.0, flat=True)),
+            ("From a corner", self._picture(looks, SCENE_SIZE, azimuth=120.0, elevation=-50.0)),
         ]
         plan = draw_plan(self.model, self.data, self.manifest, self.index, rooms)
         if plan is not None:
