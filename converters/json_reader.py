@@ -11,7 +11,7 @@ import numpy as np
 
 from ig2mj.errors import InputError
 
-from .xml_reader import read_bytes
+from .xml_reader import MAX_NUMBER, read_bytes
 
 MAX_JSON_BYTES = 64 * 2**20
 
@@ -46,7 +46,7 @@ def vector(value: Any, count: int, file: object, element: str) -> np.ndarray:
         array = np.array(value, dtype=float)
     except OverflowError:
         array = np.array([np.inf])
-    if not np.all(np.isfinite(array)):
+    if not np.all(np.abs(array) <= MAX_NUMBER):
         raise InputError(file, "has a number that is not finite", element=element)
     return array
 

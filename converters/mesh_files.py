@@ -24,12 +24,13 @@ import numpy as np
 import trimesh
 from PIL import Image
 from trimesh.resolvers import Resolver
+from trimesh.visual.material import SimpleMaterial
 
 from ig2mj.errors import InputError
 
 from .description import Mesh
 from .file_access import FileGuard
-from .mesh_limits import MAX_FACES, MAX_MESH_BYTES, MeshError, too_many_faces
+from .mesh_limits import MAX_FACES, MAX_MESH_BYTES, MeshError, check_vertices, too_many_faces
 from .obj_files import Material, ObjFile, group_meshes, material_meshes, read_mtl, read_obj
 from .xml_reader import decode_xml, parse_number, parse_strictly, read_bytes
 
@@ -212,8 +213,8 @@ def _read_with_trimesh(file: pathlib.Path, guard: FileGuard) -> list[MeshPart]:
 def _trimesh_part(geometry: Any, matrix: np.ndarray, files: _GuardedFiles, file: pathlib.Path) -> MeshPart | None:
     if not isinstance(geometry, trimesh.Trimesh) or not len(geometry.faces):
         return None  # points and lines
-    if not np.all(np.isfinite(geometry.vertices)) or not np.all(np.isfinite(matrix)):
-        raise MeshError(file, "has a vertex that is not finite")
+    check_vertices(np.asarray(geometry.vertices), file)
+    check_vertices(matrix, file)
     if geometry.faces.min() < 0 or geometry.faces.max() >= len(geometry.vertices):
         raise MeshError(file, "a face names a vertex that does not exist")
     with np.errstate(all="ignore"):
@@ -242,7 +243,7 @@ def _look(geometry: trimesh.Trimesh) -> tuple[tuple[float, float, float, float] 
     if visual.kind == "texture":
         material = visual.material
         image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
-        simple = isinstance(material, trimesh.visual.material.SimpleMaterial)
+        simple = isinstance(material, SimpleMaterial)
         colour = material.diffuse if simple else material.baseColorFactor
         if colour is None or (simple and image is not None):
             return None, image  # nothing said: the texture alone, or the URDF's colour

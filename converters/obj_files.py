@@ -12,7 +12,7 @@ import pathlib
 import numpy as np
 
 from .description import Mesh
-from .mesh_limits import MAX_FACES, MAX_MESH_BYTES, MeshError, too_many_faces
+from .mesh_limits import MAX_FACES, MAX_MESH_BYTES, MeshError, check_vertices, too_many_faces
 from .xml_reader import parse_number, read_bytes
 
 
@@ -95,8 +95,10 @@ def read_obj(file: pathlib.Path) -> ObjFile:
             libraries.append(line.split(None, 1)[1].strip() if len(words) > 1 else "")
     if not group:
         raise MeshError(file, "is empty: it has no faces")
+    points = _floats(vertices, 3, file, vertex_lines)
+    check_vertices(points, file)
     return ObjFile(
-        vertices=_floats(vertices, 3, file, vertex_lines),
+        vertices=points,
         uv=_floats(uv, 2, file, None),
         corners=np.array(corners, dtype=np.int64).reshape(-1, 3, 2),
         group=np.array(group),

@@ -8,7 +8,6 @@ truncated or ill-nested files, files that are no XML, and files over the size li
 
 from __future__ import annotations
 
-import math
 import os
 import pathlib
 import re
@@ -20,6 +19,7 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  it has no
 from ig2mj.errors import InputError
 
 MAX_XML_BYTES = 128 * 2**20  # the largest cached BEHAVIOR scenes are a few MiB
+MAX_NUMBER = 1e15  # beyond, products of a few numbers are no numbers any more
 Element = Any  # lxml.etree._Element, for which there are no type stubs
 
 # libxml2 goes quiet after its first syntax error, so only errors that leave it talking may be let pass.
@@ -153,11 +153,11 @@ def where(element: Element) -> str:
 
 
 def parse_number(word: str) -> float | None:
-    """A finite decimal number, or None (float() would take "nan", "1_000" and digits of other scripts)."""
+    """A decimal number below `MAX_NUMBER`, or None (float() would take "nan", "1_000" and digits of other scripts)."""
     if not _NUMBER.match(word):
         return None
     value = float(word)
-    return value if math.isfinite(value) else None
+    return value if abs(value) <= MAX_NUMBER else None
 
 
 def numbers(

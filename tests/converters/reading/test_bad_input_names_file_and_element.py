@@ -61,6 +61,7 @@ URDFS = {
         "joint 'j' origin.*0,5",
     ),
     "underscore in a number": ("{link a <inertial><mass value='1_0'/></inertial>}", "link 'a'.*mass.*1_0"),
+    "a mass no float can hold twice": ("{link a <inertial><mass value='1e200'/></inertial>}", "link 'a'.*mass.*1e200"),
     "negative mass": ("{link a <inertial><mass value='-1'/></inertial>}", "link 'a' inertial mass.*negative"),
     "mass is no number": ("{link a <inertial><mass value='heavy'/></inertial>}", "link 'a' inertial mass.*heavy"),
     "inertia not finite": (
@@ -202,6 +203,7 @@ OBJS = {
     "vertex not a number": ("v 0 0 x\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "line 1.*0 0 x"),
     "vertex NaN": ("v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n", "line 2.*nan"),
     "vertex infinite": ("v 0 0 0\nv 1 0 0\nv 0 1e999 0\nf 1 2 3\n", "line 3.*1e999"),
+    "vertex light years away": ("v 0 0 0\nv 1 0 0\nv 0 1e50 0\nf 1 2 3\n", "1e.50 units away"),
     "vertex with two numbers": ("v 0 0 0\nv 1 0\nv 0 1 0\nf 1 2 3\n", "line 2.*1 0"),
     "Git LFS pointer": ("version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "git lfs pull"),
     "a million faces": (ball_of_faces(1_000_001), "faces, the limit is 1000000"),

@@ -54,7 +54,6 @@ def test_a_chain_of_thousands_of_links_is_read_in_linear_time(root, make):
 
 def test_joints(root, make):
     """Numeric noise, -0.0, a closed pose that is not 0; axes are normalised; effort and velocity may be missing."""
-    mimic = '<mimic joint="r" multiplier="2"/>'
     model = read(
         root,
         *(make.link(n) for n in "abcde"),
