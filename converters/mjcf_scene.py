@@ -224,12 +224,3 @@ def rest_start(build: SceneBuild, model: mujoco.MjModel) -> bool:
         add_start_key(build.builder.spec, build.start_joints, {d.body: (d.pos, d.quat) for d in drops})
     return bool(drops)
 
-    "START_KEY",
-    "SceneBuild",
-    "add_start_key",
-    "build_scene",
-    "fill_states",
-    "pos_quat",
-    "rest_start",
-    "root_poses",
-]

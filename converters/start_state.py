@@ -31,7 +31,7 @@ class Drop:
 
 
 def let_down(model: mujoco.MjModel, key: str) -> list[Drop]:
-    """Free bodies that fall straight down from their pose in keyframe `key`, and the poses in which they come to rest."""
+    """Free bodies that fall straight down from their pose in keyframe `key`, and the poses where they come to rest."""
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key(key).id)
     start = data.qpos.copy()
