@@ -26,7 +26,7 @@ class BoxTable:
       points: [K, 3, V] corners in the body's frame; ends of the core of round primitives.
       radius: [K, 1]; axis: [K, 3] in the body's frame, the flat direction of a cylinder, zero for all others. A thing
         reaches `radius * sqrt(1 - axis_i^2)` beyond its points along world axis i.
-      center, half: [K, 3] box in the body's frame; margin: [K, 1] m.
+      center, half: [K, 3] box in the body's frame; margin: [K, 1] m. any_round: some radius is not zero.
     """
 
     rule: str
@@ -43,11 +43,21 @@ class BoxTable:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BoxPlan:
-    """The rows of a `BoxTable` for some objects: objects [n], rows [k], first row of each object [n]."""
+    """The rows of a `BoxTable` for some objects, gathered once.
 
-    objects: np.ndarray
-    rows: np.ndarray
+    Attributes:
+      starts: [n] first row of each of the n objects. round: some row has a radius. The others: as in the table.
+    """
+
     starts: np.ndarray
+    body: np.ndarray
+    points: np.ndarray
+    radius: np.ndarray
+    axis: np.ndarray
+    center: np.ndarray
+    half: np.ndarray
+    margin: np.ndarray
+    round: bool
 
 
 def make_box_table(rule: str, model: mujoco.MjModel, tables: SceneTables, layout: ModelLayout) -> BoxTable:
@@ -93,39 +103,51 @@ def make_box_table(rule: str, model: mujoco.MjModel, tables: SceneTables, layout
     )
 
 
-def plan_boxes(table: BoxTable, objects: np.ndarray) -> BoxPlan:
-    """Prepares boxes of the given objects [n] (ascending)."""
-    rows = np.flatnonzero(np.isin(table.owner, objects))
-    _, starts = np.unique(table.owner[rows], return_index=True)
-    return BoxPlan(objects, rows, starts)
+def plan_boxes(table: BoxTable, chosen: np.ndarray) -> BoxPlan:
+    """Prepares boxes of the chosen objects, mask [O]; they come in the objects' order."""
+    rows = np.flatnonzero(chosen[table.owner])
+    owner = table.owner[rows]
+    radius = table.radius[rows]
+    return BoxPlan(
+        starts=np.flatnonzero(np.diff(owner, prepend=-1)),
+        body=table.body[rows],
+        points=table.points[rows],
+        radius=radius,
+        axis=table.axis[rows],
+        center=table.center[rows],
+        half=table.half[rows],
+        margin=table.margin[rows],
+        round=bool(radius.any()),
+    )
 
 
-def world_boxes(table: BoxTable, plan: BoxPlan, xpos: np.ndarray, xmat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def world_boxes(rule: str, plan: BoxPlan, xpos: np.ndarray, xmat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Boxes of the plan's objects.
 
     Args:
-      table, plan: see there.
+      rule: of the table that the plan was made from.
       xpos, xmat: [B, 3] and [B, 9] poses of all bodies, as in MjData.
 
     Returns:
       low, high: [n, 3] float64, world frame.
     """
-    rows = plan.rows
-    body = table.body[rows]
-    rotation = xmat[body].reshape(-1, 3, 3)
-    if table.rule == "tight":
-        turned = rotation @ table.points[rows]
+    rotation = xmat[plan.body].reshape(-1, 3, 3)
+    if rule == "tight":
+        turned = rotation @ plan.points
         low, high = turned.min(-1), turned.max(-1)
-        if table.any_round:
-            along = (rotation @ table.axis[rows][..., None])[..., 0]
-            reach = table.radius[rows] * np.sqrt(np.maximum(0.0, 1.0 - along * along))
+        if plan.round:
+            along = (rotation @ plan.axis[..., None])[..., 0]
+            reach = plan.radius * np.sqrt(np.maximum(0.0, 1.0 - along * along))
             low, high = low - reach, high + reach
     else:
-        center = (rotation @ table.center[rows][..., None])[..., 0]
-        half = (np.abs(rotation) @ table.half[rows][..., None])[..., 0] + table.margin[rows]
+        center = (rotation @ plan.center[..., None])[..., 0]
+        half = (np.abs(rotation) @ plan.half[..., None])[..., 0] + plan.margin
         low, high = center - half, center + half
-    position = xpos[body]
-    return np.minimum.reduceat(low + position, plan.starts), np.maximum.reduceat(high + position, plan.starts)
+    position = xpos[plan.body]
+    low, high = low + position, high + position
+    if len(plan.starts) == len(plan.body):
+        return low, high
+    return np.minimum.reduceat(low, plan.starts), np.maximum.reduceat(high, plan.starts)
 
 
 def _cores(tables: SceneTables, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -106,10 +106,12 @@ class World:
         self.units = np.zeros((statics.layout.num_units, statics.layout.num_units), bool)
         self.eq_data = np.array(model.eq_data)
         self._plans: dict[bytes, _Plan] = {}
-        self._fresh_key, self._fresh = b"", self.units
-        self._awake_key = b""
-        self._eq_key = b""
-        self._moving = np.ones(model.ntree, bool)
+        self._fresh = np.zeros_like(self.units)  # [U, U] pairs with an awake unit
+        self._any_fresh = False
+        self._awake_key = self._eq_key = b""
+        self._awake = self._awake_before = np.zeros(model.ntree, bool)
+        self._none_awake = False
+        self._steady_plan = self._plan(self._awake)
         self._has_force = False
 
     def step(self, ctrl: np.ndarray | None) -> int:
@@ -138,19 +140,18 @@ class World:
         Args:
           everything: also what sleeps, and touching from this instant's contacts alone.
         """
-        data = self.data
+        if self._none_awake and not self.data.ntree_awake and not everything:
+            return self._refresh_grasped()
+        changed = self._note_awake()
         if everything:
             plan = self._plan(None)
-            self._moving[:] = True
-        elif not data.ntree_awake and not self._moving.any():
-            return self._refresh_grasped()
         else:
-            awake = data.tree_awake != 0
-            plan = self._plan(awake | self._moving)  # what just fell asleep moved during the step, too
-            self._moving = awake
+            plan = self._plan(self._awake | self._awake_before) if changed else self._steady_plan
             self._check_finite()
-        changed = self._refresh_poses(plan) | self._refresh_awake() | self._refresh_grasped()
-        return changed | self._refresh_touching(everything)
+        changed |= self._refresh_poses(plan) | self._refresh_grasped()
+        if self._any_fresh or changed & Changed.AWAKE or everything:
+            changed |= self._refresh_touching(everything)
+        return changed
 
     def start(self) -> int:
         """The scene's initial state: its first keyframe, else the zero pose."""
@@ -188,9 +189,7 @@ class World:
         restore_sleep(model, data, fields["tree_asleep"])
         mujoco.mj_step1(model, data)
         self.units = np.array(fields["touching"], bool)
-        changed = self.clear_force() | self.refresh(everything=True)
-        self._moving = data.tree_awake != 0
-        return changed
+        return self.clear_force() | self.refresh(everything=True)
 
     def _set_state(self, fields: dict[str, np.ndarray]) -> None:
         for name in _STATE:
@@ -241,23 +240,22 @@ class World:
         return plan
 
     def _make_plan(self, trees: np.ndarray | None) -> _Plan:
-        statics, tables = self.statics, self.statics.tables
-        tree = statics.body_tree
-        moves = np.ones(len(tree), bool) if trees is None else (tree >= 0) & trees[tree]
-        bodies = np.flatnonzero(moves)
-        objects = np.unique(tables.body_object[bodies])
-        objects = objects[objects >= 0]
+        statics, tables, layout = self.statics, self.statics.tables, self.statics.layout
+        if trees is None:
+            moves, chosen = np.ones(len(statics.body_tree), bool), np.ones(tables.num_objects, bool)
+        else:
+            moves = np.concatenate([trees, [False]])[statics.body_tree]
+            chosen = (layout.object_trees & trees).any(1)
         links = np.flatnonzero(moves[tables.link_body])
-        agent_bodies = np.concatenate([tables.agent_body, tables.finger_body])
         return _Plan(
-            bodies=bodies,
-            objects=objects,
-            roots=tables.object_root[objects],
+            bodies=np.flatnonzero(moves),
+            objects=np.flatnonzero(chosen),
+            roots=tables.object_root[chosen],
             links=links,
             link_bodies=tables.link_body[links],
-            boxes=plan_boxes(statics.boxes, objects),
-            agents=bool(len(agent_bodies)) and bool(trees is None or moves[agent_bodies].any()),
-            joints=bool(len(tables.openable_object)) and bool(np.isin(tables.openable_object, objects).any()),
+            boxes=plan_boxes(statics.boxes, chosen),
+            agents=bool(moves[tables.agent_body].any() or moves[tables.finger_body].any()),
+            joints=bool(chosen[tables.openable_object].any()),
         )
 
     def _refresh_poses(self, plan: _Plan) -> int:
@@ -273,7 +271,7 @@ class World:
             rows["object_quat"][plan.objects] = xquat[plan.roots]
             rows["object_com"][plan.objects] = data.xipos[plan.roots]
             rows["aabb_low"][plan.objects], rows["aabb_high"][plan.objects] = world_boxes(
-                self.statics.boxes, plan.boxes, xpos, xmat
+                self.statics.boxes.rule, plan.boxes, xpos, xmat
             )
             changed |= Changed.OBJECTS
         if plan.joints:
@@ -300,16 +298,24 @@ class World:
             changed |= Changed.AGENT
         return changed
 
-    def _refresh_awake(self) -> int:
-        awake = self.data.tree_awake != 0
-        key = awake.tobytes()
+    def _note_awake(self) -> int:
+        """Takes over which trees are awake, and everything that hangs on it alone."""
+        data, layout = self.data, self.statics.layout
+        key = data.tree_awake.tobytes()
         if key == self._awake_key:
             return Changed.NOTHING
         self._awake_key = key
-        asleep = ~awake[self.model.dof_treeid]
-        for array in (self.data.qacc, self.data.qacc_smooth, self.data.qacc_warmstart):
+        # What just fell asleep still moved during the control step that is over.
+        self._awake_before, self._awake = self._awake, data.tree_awake != 0
+        self._none_awake = not self._awake.any()
+        self._steady_plan = self._plan(self._awake)
+        unit_awake = np.concatenate([self._awake, [False]])[layout.unit_tree]
+        self._fresh = unit_awake[:, None] | unit_awake
+        self._any_fresh = bool(unit_awake.any())
+        asleep = ~self._awake[self.model.dof_treeid]
+        for array in (data.qacc, data.qacc_smooth, data.qacc_warmstart):
             array[asleep] = 0.0  # MuJoCo leaves old values there; a loaded world must start a wake from the same ones
-        self.rows["awake"][:] = (self.statics.layout.object_trees & awake).any(1)
+        self.rows["awake"][:] = (layout.object_trees & self._awake).any(1)
         return Changed.AWAKE
 
     def _refresh_grasped(self) -> int:
@@ -328,11 +334,6 @@ class World:
 
     def _refresh_touching(self, everything: bool) -> int:
         statics, data = self.statics, self.data
-        awake = data.tree_awake != 0
-        key = awake.tobytes()
-        if key != self._fresh_key:
-            unit_awake = np.concatenate([awake, [False]])[statics.layout.unit_tree]
-            self._fresh_key, self._fresh = key, unit_awake[:, None] | unit_awake
         units = touching_units(data, statics.contact_unit, statics.tolerance, self.units, self._fresh)
         if units is self.units and not everything:
             return Changed.NOTHING
