@@ -86,7 +86,7 @@ def _draw(spec: mujoco.MjSpec, body, link, scale: float, felt: bool) -> None:
         look = spec.add_material(name=name, rgba=[*material.rgb, material.alpha], specular=material.shine * 0.5)
         uv = None
         if material.texture is not None:
-            picture = np.asarray(material.texture.convert("RGB"))[::-1]
+            picture = np.asarray(material.texture.convert("RGB"))
             texture = spec.add_texture(name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, nchannel=3,
                                        width=picture.shape[1], height=picture.shape[0])  # fmt: skip
             texture.data = np.ascontiguousarray(picture).tobytes()

@@ -22,9 +22,13 @@ from . import (
     shelves,
     sinks,
     sofas_beds,
+    stationery,
     stoves,
     tables,
     tableware,
+    tools,
+    toys,
+    utensils,
     vegetables,
 )
 
@@ -50,8 +54,12 @@ FAMILIES = (
     shelves,
     sinks,
     sofas_beds,
+    stationery,
     stoves,
     tables,
     tableware,
+    tools,
+    toys,
+    utensils,
     vegetables,
 )

@@ -8,9 +8,9 @@ from .. import materials, textures
 from ..catalogue import Entry
 from ..materials import Material
 from ..model import ObjectBuilder
-from ..solids import ball, block, box, cylinder, decal, hull, lathe, rod, soft_box, tube
-from ..vessels import turned_vessel
-from .parts import bow_handle, button, carcass, drawer, flap, knob
+from ..solids import ball, block, box, cylinder, decal, hull, join, lathe, rod, soft_box, tube
+from ..vessels import tray, turned_vessel
+from .parts import bow_handle, button, carcass, flap, knob
 
 
 def _casing(b: ObjectBuilder) -> Material:
@@ -35,30 +35,7 @@ def dishwasher(b: ObjectBuilder) -> None:
         low = foot + 0.035 + k * room_z
         size = (depth - 0.06, y - 0.07, room_z - 0.02)
         centre = (plane - 0.006 - size[0] / 2, 0, low + size[2] / 2)
-        rack = drawer(
-            b,
-            f"rack_{k}",
-            centre,
-            size,
-            (size[1] - 0.01, 0.06),
-            wire,
-            wire,
-            None,
-            chrome,
-            openable=False,
-            face_depth=0.004,
-        )
-        for j in range(8):
-            yy = (j - 3.5) * size[1] / 8.5
-            rack.add(
-                rod(
-                    (centre[0] - 0.4 * size[0], yy, low + 0.01),
-                    (centre[0] - 0.4 * size[0], yy, low + 0.6 * size[2]),
-                    0.003,
-                    5,
-                ).seen(),
-                chrome,
-            )
+        _rack(b, f"rack_{k}", centre, size, wire)
     link = flap(
         b,
         "door",
@@ -76,6 +53,27 @@ def dishwasher(b: ObjectBuilder) -> None:
     button(b, (plane, 0.35 * y, z), materials.plain("red"), 0.01, "z")
 
 
+def _rack(
+    b: ObjectBuilder, name: str, centre: tuple[float, float, float], size: tuple[float, float, float], wire: Material
+) -> None:
+    """A wire basket that slides towards +x: five felt plates, drawn as rods."""
+    sx, sy, sz = size
+    tall = 0.5 * sz
+    link = b.slide(name, centre, (1, 0, 0), 0.85 * sx, openable=False)
+    at = (centre[0], centre[1], centre[2] - sz / 2)
+    link.add(tray(sx, sy, tall, 0.006).felt().at(*at), wire)
+    rods = []
+    for h in (0.004, tall / 2, tall):
+        rods += [rod((-sx / 2, s * sy / 2, h), (sx / 2, s * sy / 2, h), 0.003, 5) for s in (-1, 1)]
+        rods += [rod((s * sx / 2, -sy / 2, h), (s * sx / 2, sy / 2, h), 0.003, 5) for s in (-1, 1)]
+    for j in range(9):
+        yy = (j / 8 - 0.5) * sy
+        path = [(-sx / 2, yy, tall), (-sx / 2, yy, 0.004), (-0.1 * sx, yy, 0.004), (-0.1 * sx, yy, 0.9 * tall)]
+        path += [(0, yy, 0.004), (sx / 2, yy, 0.004), (sx / 2, yy, tall)]
+        rods.append(tube(path, 0.0025, 4, hulls=0))
+    link.add(join(rods).seen().at(*at), wire)
+
+
 def drum(b: ObjectBuilder, *, washing: bool = True) -> None:
     """A washing machine or dryer: a hollow case, a porthole with a door, a panel with a knob and a button."""
     x, y, z = b.size
@@ -85,7 +83,7 @@ def drum(b: ObjectBuilder, *, washing: bool = True) -> None:
     shift = -(x - depth) / 2
     plane = shift + depth / 2
     panel = 0.14
-    hole = 0.36 * min(y, z)
+    hole = 0.5 * min(y, z)
     middle = (z - panel) * 0.52
     b.add(carcass(depth - 0.03, y, z, 0.02, back=0.02).at(shift - 0.015), body)
     front = plane - 0.015
@@ -219,12 +217,12 @@ def heater(b: ObjectBuilder) -> None:
     count = max(5, round(y / 0.075))
     for k in range(count):
         yy = (k + 0.5) / count * y - y / 2
-        b.add(soft_box(x, 0.6 * y / count, 0.86 * z, 0.02).seen().at(0, yy, 0.1 * z), look)
-    b.add(box(x, y, 0.86 * z).felt().at(z=0.1 * z), look)
+        b.add(soft_box(0.7 * x, 0.6 * y / count, 0.86 * z, 0.02).seen().at(0, yy, 0.1 * z), look)
+    b.add(box(0.7 * x, y, 0.86 * z).felt().at(z=0.1 * z), look)
     b.add(block((0.3 * x, y * 0.98, 0.03), (0, 0, 0.9 * z)).seen(), look)
     for s in (-1, 1):
-        b.add(box(1.4 * x, 0.05, 0.1 * z).at(0, s * 0.36 * y), materials.plain("black"))
-    b.add(soft_box(0.9 * x, 0.04, 0.3 * z).at(0, -y / 2 + 0.01, 0.5 * z), materials.plain("black"))
+        b.add(box(x, 0.05, 0.1 * z).at(0, s * 0.36 * y), materials.plain("black"))
+    b.add(soft_box(0.66 * x, 0.04, 0.3 * z).at(0, -y / 2 + 0.01, 0.5 * z), materials.plain("black"))
     b.point("heat_source", (0.0, 0, 0.55 * z))
     b.add(knob(0.02, 0.015).seen().at(0.4 * x, -y / 2, 0.7 * z), materials.plain("silver"))
     b.point("toggle_button", (0.45 * x, -y / 2, 0.7 * z))

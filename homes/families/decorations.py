@@ -61,7 +61,10 @@ def floor_lamp(b: ObjectBuilder) -> None:
         path = [(0.0, 0, 0.8 * z), (0.05, 0, 0.9 * z), (0.4 * r, 0, 0.97 * z), (0.8 * r, 0, 0.93 * z)]
         b.add(tube(path, 0.011, 8, hulls=2), look)
         b.add(
-            lathe([(0.5 * r, 0), (0.4 * r, 0.05), (0.08 * r, 0.11)], 20).turned("y", 15).at(0.72 * r, 0, 0.8 * z), look
+            lathe([(0.5 * r, 0), (0.4 * r, 0.05), (0.08 * r, 0.11)], 20)
+            .turned("y", -12)
+            .at(0.82 * r, 0, 0.93 * z - 0.12),
+            look,
         )
     button(b, (0.012, 0, 0.7 * z), materials.plain("black"), 0.008)
 
@@ -290,7 +293,7 @@ def tinsel(b: ObjectBuilder) -> None:
     look = materials.plain(b.pick(("gold", "silver", "red")), "metal", 0.9)
     path = [(t * (x - z), 0.5 * (y - z) * math.sin(9 * t), z / 2) for t in [k / 16 - 0.5 for k in range(17)]]
     b.add(tube(path, 0.3 * z, 6, hulls=5), look)
-    for k in range(0, 17):
+    for k in range(17):
         px, py, pz = path[k]
         for a in (0.4, 2.5, 4.6):
             b.add(

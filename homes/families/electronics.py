@@ -176,7 +176,11 @@ def alarm(b: ObjectBuilder) -> None:
     for s in (-1, 1):
         b.add(rod((0, s * 0.55 * r, 0.3 * middle), (0, s * 0.85 * r, 0), 0.06 * r + 0.001, 6), metal)
         b.add(ball(0.6 * r, 0.6 * r, 0.4 * r, 10).turned("x", -s * 35).at(0, s * 0.55 * r, middle + 0.75 * r), metal)
-    b.add(block((0.02, 0.5 * r, 0.006), (0, 0, z - 0.004)), metal)
+    arch = [
+        (0, 0.62 * r * math.cos(a), middle + r + (z - middle - r - 0.003) * math.sin(a))
+        for a in (k * math.pi / 6 for k in range(7))
+    ]
+    b.add(tube(arch, 0.003, 5, hulls=0) + block((0.02, 0.7 * r, 0.006), (0, 0, z - 0.004)).felt(), metal)
     b.point("toggle_button", (0, 0, z))
 
 
