@@ -88,7 +88,7 @@ class HandWorld:
 
     def _make_model(self, options: Mapping) -> StateModel:
         parts = [
-            Part(self.index[t.name], self.index[half], tuple(offset), IDENTITY)
+            Part(self.index[t.name], self.index[half], tuple(map(float, offset)), IDENTITY)
             for t in self.things
             for half, offset in t.parts.items()
         ]

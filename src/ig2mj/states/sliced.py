@@ -16,13 +16,14 @@ from typing import TYPE_CHECKING
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import quat_multiply, quat_rotate, quat_rotate_inverse
 from ig2mj.scene.tables import LinkKind
 from ig2mj.states.model import StateModel
 from ig2mj.states.particles import Particles
+from ig2mj.states.swap import Swap
 
 if TYPE_CHECKING:
     from ig2mj.states.world import ExtendedStates
@@ -56,14 +57,15 @@ def in_use(model: StateModel, sliced: Bool[Array, "W O"]) -> Bool[Array, "W O"]:
 
 def apply(
     model: StateModel, states: ExtendedStates, cut_now: Bool[Array, "W O"], view: PhysicsView
-) -> tuple[ExtendedStates, Bool[Array, "W M"], Float[Array, "W M 3"], Float[Array, "W M 4"]]:
-    """Marks what is cut, lets halves inherit, and says what is to be moved where (the fields of a `Swap`)."""
+) -> tuple[ExtendedStates, Swap]:
+    """Marks what is cut, lets halves inherit, and says what is to be moved where."""
     states = dataclasses.replace(states, sliced=states.sliced | cut_now)
     if len(model.parameters.half_object) == 0:
-        empty = jnp.zeros((cut_now.shape[0], 0))
-        return states, empty.astype(bool), jnp.zeros((*empty.shape, 3)), jnp.zeros((*empty.shape, 4))
+        worlds = cut_now.shape[0]
+        nothing = Swap(jnp.zeros((worlds, 0), bool), jnp.zeros((worlds, 0, 3)), jnp.zeros((worlds, 0, 4)))
+        return states, nothing
     states = jax.lax.cond(jnp.any(cut_now), lambda s: inherit(model, s, cut_now), lambda s: s, states)
-    return states, *_swap(model, cut_now, view)
+    return states, _swap(model, cut_now, view)
 
 
 def inherit(model: StateModel, states: ExtendedStates, cut_now: Bool[Array, "W O"]) -> ExtendedStates:
@@ -129,9 +131,7 @@ def _inherit_particles(
     )
 
 
-def _swap(
-    model: StateModel, cut_now: Bool[Array, "W O"], view: PhysicsView
-) -> tuple[Bool[Array, "W M"], Float[Array, "W M 3"], Float[Array, "W M 4"]]:
+def _swap(model: StateModel, cut_now: Bool[Array, "W O"], view: PhysicsView) -> Swap:
     p = model.parameters
     wholes = np.unique(p.half_whole)
     first_half = np.array([p.half_object[p.half_whole == w][0] for w in wholes])
@@ -139,8 +139,16 @@ def _swap(
     half_pos = pos[:, p.half_whole] + quat_rotate(quat[:, p.half_whole], p.half_pos)
     half_quat = quat_multiply(quat[:, p.half_whole], p.half_quat)
     mask = jnp.concatenate([cut_now[:, wholes], cut_now[:, p.half_whole]], axis=1)
-    return (
-        mask,
-        jnp.concatenate([pos[:, first_half], half_pos], axis=1),
-        jnp.concatenate([quat[:, first_half], half_quat], axis=1),
+    return Swap(
+        mask=mask,
+        pos=jnp.concatenate([pos[:, first_half], half_pos], axis=1),
+        quat=jnp.concatenate([quat[:, first_half], half_quat], axis=1),
     )
+
+
+def set_sliced(
+    model: StateModel, states: ExtendedStates, objects: Bool[Array, "#W O"], view: PhysicsView
+) -> tuple[ExtendedStates, Swap]:
+    """Slices the masked objects that are in one piece and in use (paper table A.5). There is no way back."""
+    asked = objects & model.parameters.has("sliceable") & ~states.sliced & in_use(model, states.sliced)
+    return apply(model, states, asked, view)

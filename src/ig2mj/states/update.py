@@ -58,7 +58,7 @@ def update(
     states = dataclasses.replace(states, toggled=switch, press_count=press_count)
 
     cut_now = sliced.cut(model, states.sliced, view)
-    states, *swap = sliced.apply(model, states, cut_now, view)
+    states, swap = sliced.apply(model, states, cut_now, view)
     in_use = sliced.in_use(model, states.sliced)
 
     drops, contacts = water.update(model, states.water, view, states.toggled)
@@ -80,7 +80,7 @@ def update(
     states = dataclasses.replace(
         states, temperature=warm, max_temperature=max_temperature.update(model, states.max_temperature, warm)
     )
-    return states, Swap(*swap)
+    return states, swap
 
 
 def _as_wholes(model: StateModel, cut_now: Bool[Array, "W O"], acts: Bool[Array, "W O S"]) -> Bool[Array, "W O S"]:

@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int, UInt
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.states.particles import Particles
+from ig2mj.states.swap import Swap
 from ig2mj.states.water import WaterDrops
 
 
@@ -41,22 +42,6 @@ class ExtendedStates:
 
 
 @struct.dataclass
-class Swap:
-    """Teleports that slicing asks of the engine: halves to where the whole was, the whole to where a half was parked.
-
-    The moved objects come to rest (zero velocity) and wake. Axis M: `StateModel.swap_objects`, object indices.
-
-    Attributes:
-      mask: the object is to be moved now. pos, quat: its main body's frame, world axes, w-x-y-z; where not masked, any
-        finite numbers.
-    """
-
-    mask: Bool[Array, "W M"]
-    pos: Float[Array, "W M 3"]
-    quat: Float[Array, "W M 4"]
-
-
-@struct.dataclass
 class WorldState:
     """All worlds of a batch at the end of a control step.
 
@@ -71,3 +56,6 @@ class WorldState:
     key: UInt[Array, "W 2"]
     step: Int[Array, "W"]
     time: Float[Array, "W"]
+
+
+__all__ = ["ExtendedStates", "Swap", "WorldState"]

@@ -1,0 +1,202 @@
+"""Dust, stains and cleaning: spec/states.md section 8, the dirt vectors of section 22, paper tables A.1 to A.5."""
+
+from __future__ import annotations
+
+import functools
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hand_world import HandWorld, Thing, step
+
+from ig2mj.states import dust, initial_states, particles, stain
+from ig2mj.states.particles import NUM_PARTICLES
+
+DIRT = {"dustyable": {}, "stainable": {}}
+TABLE = Thing("table", (((0, 0, 0), (1, 0.5, 0.01)),), DIRT)
+BROOM = Thing(
+    "broom",
+    (((0, 0, 0.5), (0.02, 0.02, 0.5)),),
+    {"cleaningTool": {}},
+    links={"cleaning_tool_area": ((0, 0, 0.0), (0.2, 0.1, 0.02))},
+    pos=(0, 0, 9),
+)
+RAG = Thing("rag", (((0, 0, 0), (0.1, 0.1, 0.01)),), {"cleaningTool": {}, "soakable": {}}, pos=(0, 0, 8))
+VACUUM = Thing("vacuum", (((0, 0, 0), (0.1, 0.1, 0.1)),), {"cleaningTool": {}, "toggleable": {}}, pos=(0, 0, 7))
+ROOM = HandWorld(TABLE, BROOM, RAG, VACUUM)
+
+# Twenty points along the table's length, 10 cm apart, on its upper face.
+PLACES = np.stack([np.linspace(-0.95, 0.95, NUM_PARTICLES), np.zeros(NUM_PARTICLES), np.full(NUM_PARTICLES, 0.01)], -1)
+UP = np.tile([0.0, 0.0, 1.0], (NUM_PARTICLES, 1))
+
+
+def _points(valid: int = NUM_PARTICLES):
+    """Arguments of set_dusty and set_stained: body, pos, normal, valid."""
+    return (
+        jnp.ones((1, NUM_PARTICLES), jnp.int32),
+        jnp.asarray(PLACES, jnp.float32)[None],
+        jnp.asarray(UP, jnp.float32)[None],
+        jnp.asarray(np.arange(NUM_PARTICLES) < valid)[None],
+    )
+
+
+@functools.cache
+def _dirty():
+    """A dusty and stained table in a clean room."""
+    model = ROOM.model()
+    states = initial_states(model, 1)
+    dusty, done = dust.set_dusty(model, states.dust, 0, *_points())
+    stained, _ = stain.set_stained(model, states.stain, 0, *_points())
+    assert bool(done.all())
+    return states.replace(dust=dusty, stain=stained)
+
+
+def _counts(states) -> tuple[int, int]:
+    return int(states.dust.alive.sum()), int(states.stain.alive.sum())
+
+
+@pytest.mark.parametrize(("alive", "dirty"), [(11, True), (10, False)])
+def test_section_22_twenty_placed_are_dirty_at_eleven_and_clean_at_ten(alive, dirty):
+    model = ROOM.model()
+    rows = _dirty().dust
+    rows = rows.replace(alive=rows.alive & (np.arange(NUM_PARTICLES) < alive))
+    assert bool(dust.dusty(model, rows)[0, 0]) == dirty
+    assert bool(stain.stained(model, rows)[0, 0]) == dirty
+
+
+@pytest.mark.parametrize(("alive", "dirty"), [(16, True), (15, False)])
+def test_section_22_floors_are_dirty_at_sixteen_and_clean_at_fifteen_in_igibsons_code(alive, dirty):
+    home = HandWorld(Thing("floor", abilities=DIRT, category="floors", floor=True))
+    model = home.model(compat="igibson")
+    rows, _ = dust.set_dusty(model, initial_states(model, 1).dust, 0, *_points())
+    rows = rows.replace(alive=rows.alive & (np.arange(NUM_PARTICLES) < alive))
+    assert bool(dust.dusty(model, rows)[0, 0]) == dirty
+    assert bool(dust.dusty(home.model(), rows)[0, 0])  # the paper's threshold is one half for all
+
+
+def test_table_a1_the_threshold_is_configurable_per_model():
+    home = HandWorld(Thing("shelf", abilities={"dustyable": {"dusty_threshold": 0.1}}))
+    model = home.model()
+    rows, _ = dust.set_dusty(model, initial_states(model, 1).dust, 0, *_points())
+    rows = rows.replace(alive=rows.alive & (np.arange(NUM_PARTICLES) < 3))
+    assert bool(dust.dusty(model, rows)[0, 0])
+
+
+def test_table_a4_levels_are_fractions_of_the_placed_particles():
+    rows = _dirty().dust
+    assert particles.level(rows)[0].tolist() == [1.0]
+    rows = rows.replace(alive=rows.alive & (np.arange(NUM_PARTICLES) < 5))
+    assert particles.level(rows)[0, 0] == 0.25
+    assert particles.level(particles.no_particles(1, 1))[0, 0] == 0.0
+
+
+def test_table_a4_any_cleaning_tool_takes_dust_in_its_region():
+    # The broom's head covers x in [0.3, 0.7]: the points at 0.35, 0.45, 0.55, 0.65.
+    states = step(ROOM.model(), _dirty(), ROOM.view({"broom": (0.5, 0, 0.0)}, touching=[("broom", "table")]))
+    assert _counts(states) == (16, 20)
+    gone = np.flatnonzero(~np.asarray(states.dust.alive[0, 0]))
+    assert np.allclose(PLACES[gone, 0], [0.35, 0.45, 0.55, 0.65])
+
+
+def test_section_8_3_without_an_annotated_area_the_whole_tool_cleans():
+    states = step(ROOM.model(), _dirty(), ROOM.view({"rag": (0.0, 0, 0.02)}, touching=[("rag", "table")]))
+    assert _counts(states) == (18, 20)
+
+
+def test_section_8_3_the_tool_must_touch_what_it_cleans():
+    states = step(ROOM.model(), _dirty(), ROOM.view({"rag": (0.0, 0, 0.02)}))
+    assert _counts(states) == (20, 20)
+
+
+def test_table_a4_stains_go_only_with_a_soaked_tool():
+    view = ROOM.view({"rag": (0.0, 0, 0.02)}, touching=[("rag", "table")])
+    wet = _dirty()
+    wet = wet.replace(wetness=wet.wetness.at[0, 2].set(1.0))
+    assert _counts(step(ROOM.model(), wet, view)) == (18, 18)
+    broom = ROOM.view({"broom": (0.5, 0, 0.0)}, touching=[("broom", "table")])
+    assert _counts(step(ROOM.model(), wet, broom))[1] == 20  # a broom cannot be soaked
+
+
+def test_section_19_17_a_vacuum_cleaner_cleans_only_while_it_is_on():
+    view = ROOM.view({"vacuum": (0.0, 0, 0.1)}, touching=[("vacuum", "table")])
+    off = _dirty()
+    on = off.replace(toggled=off.toggled.at[0, 3].set(True))
+    assert _counts(step(ROOM.model(), off, view))[0] == 20
+    assert _counts(step(ROOM.model(), on, view))[0] == 18
+
+
+def test_particles_move_with_the_body_they_stick_to():
+    turned = (np.sqrt(0.5), 0, 0, np.sqrt(0.5))  # a quarter about z
+    view = ROOM.view({"table": (1, 2, 3)}, quat={"table": turned})
+    where = np.asarray(particles.world_positions(_dirty().dust, view))[0, 0]
+    assert np.allclose(where, np.stack([1 + 0 * PLACES[:, 0], 2 + PLACES[:, 0], 3 + PLACES[:, 2]], -1), atol=1e-5)
+    assert np.allclose(particles.world_normals(_dirty().dust, view)[0, 0], UP, atol=1e-6)
+
+
+def test_a_tool_cleans_where_the_moved_table_is():
+    view = ROOM.view({"table": (5, 0, 0), "rag": (5, 0, 0.02)}, touching=[("rag", "table")])
+    assert _counts(step(ROOM.model(), _dirty(), view))[0] == 18
+    view = ROOM.view({"table": (5, 0, 0), "rag": (0, 0, 0.02)}, touching=[("rag", "table")])
+    assert _counts(step(ROOM.model(), _dirty(), view))[0] == 20
+
+
+def test_section_19_8_dirtying_what_is_dirty_replaces_the_particles():
+    model = ROOM.model()
+    half = _dirty().dust
+    half = half.replace(alive=half.alive & (np.arange(NUM_PARTICLES) < 5))
+    again, done = dust.set_dusty(model, half, 0, *_points())
+    assert bool(done[0]) and int(again.alive.sum()) == 20
+
+
+def test_table_a5_dusty_false_removes_all_particles():
+    clean = dust.set_not_dusty(_dirty().dust, 0)
+    assert not clean.alive.any()
+    assert not bool(dust.dusty(ROOM.model(), clean)[0, 0])
+    assert not bool(stain.stained(ROOM.model(), stain.set_not_stained(_dirty().stain, 0))[0, 0])
+
+
+@pytest.mark.parametrize(
+    ("compat", "valid", "works"),
+    [("paper", 20, True), ("paper", 19, False), ("igibson", 5, True), ("igibson", 4, False)],
+)
+def test_section_17_row_19_how_many_particles_must_find_a_place(compat, valid, works):
+    model = ROOM.model(compat=compat)
+    rows, done = dust.set_dusty(model, initial_states(model, 1).dust, 0, *_points(valid))
+    assert bool(done[0]) == works
+    assert int(rows.alive.sum()) == (valid if works else 0)
+    assert bool(dust.dusty(model, rows)[0, 0]) == works
+
+
+def test_section_19_8_the_number_placed_is_part_of_the_state():
+    # Eight of twenty left is clean; iGibson reloads it as eight of eight, dirty.
+    rows = _dirty().dust
+    rows = rows.replace(alive=rows.alive & (np.arange(NUM_PARTICLES) < 8))
+    assert int(rows.placed.sum()) == 20
+    assert not bool(dust.dusty(ROOM.model(), rows)[0, 0])
+
+
+def test_setting_dirt_in_some_worlds_leaves_the_others():
+    model = ROOM.model()
+    rows, _ = stain.set_stained(
+        model, initial_states(model, 3).stain, 0, *_points(), worlds=jnp.array([True, False, True])
+    )
+    assert rows.alive.sum(axis=(1, 2)).tolist() == [20, 0, 20]
+
+
+def test_section_8_2_stain_sizes_follow_the_median_edge():
+    sizes = particles.stain_sizes(np.array([[0.1, 0.5, 3.0], [0.01, 0.01, 0.01], [5.0, 5.0, 5.0]]))
+    assert sizes[0, 0] == pytest.approx(0.02) and sizes[0, -1] == pytest.approx(0.05)
+    assert sizes[1, 0] == pytest.approx(0.01) and sizes[1, -1] == pytest.approx(0.02)
+    assert sizes[2, -1] == pytest.approx(0.1)
+    assert np.all(np.diff(sizes[0]) > 0)
+
+
+def test_a_nan_table_is_not_cleaned():
+    view = ROOM.view({"table": (np.nan, 0, 0), "rag": (0.0, 0, 0.02)}, touching=[("rag", "table")])
+    assert _counts(step(ROOM.model(), _dirty(), view))[0] == 20
+
+
+def test_objects_without_the_ability_have_no_rows():
+    model = ROOM.model()
+    assert dust.row_of(model, ROOM.index["table"]) == 0
+    assert dust.row_of(model, ROOM.index["rag"]) is None

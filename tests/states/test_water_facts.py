@@ -1,0 +1,189 @@
+"""Water and wetness: spec/states.md section 7, the tap vector of section 22, paper tables A.1 to A.5."""
+
+from __future__ import annotations
+
+import itertools
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from hand_world import HandWorld, Thing, step
+
+from ig2mj.states import StateModel, initial_states
+from ig2mj.states.water import DROP_RADIUS, NUM_DROPS
+from ig2mj.states.wetness import set_soaked, soaked
+
+PLATE = (((0, 0, 0), (0.2, 0.2, 0.01)),)
+SINK = Thing(
+    "sink",
+    (((0, 0, 0.0), (0.3, 0.3, 0.05)),),
+    {"waterSource": {}, "toggleable": {}, "waterSink": {}},
+    links={"water_source": (0, 0, 0.5)},
+    fixed=True,
+)
+RAG = Thing("rag", PLATE, {"soakable": {"wetness_soaked": 1.0}}, pos=(5, 0, 0))
+TRAY = Thing("tray", PLATE, pos=(6, 0, 0))
+KITCHEN = HandWorld(SINK, RAG, TRAY)
+
+
+def _run(home: HandWorld, views: list, on_from: int = 1, **options) -> tuple[StateModel, list]:
+    """States after each update; the tap is switched on just before update `on_from` (from 1)."""
+    model = home.model(**options)
+    states, history = initial_states(model, 1), []
+    for k, view in enumerate(views, start=1):
+        if k == on_from:
+            states = states.replace(toggled=states.toggled.at[0, 0].set(True))
+        states = step(model, states, view)
+        history.append(states)
+    return model, history
+
+
+def _emissions(history: list) -> list[int]:
+    """Updates (from 1) at which a drop appeared at the tap."""
+    found = []
+    for k, states in enumerate(history, start=1):
+        at_tap = np.asarray(states.water.active[0, 0] & (states.water.speed[0, 0] == 0))
+        height = np.asarray(states.water.pos[0, 0, :, 2])
+        if (at_tap & np.isclose(height, 0.45)).any():
+            found.append(k)
+    return found
+
+
+def test_section_22_a_tap_on_from_update_k_drops_at_k_plus_1_and_then_every_four():
+    # Far from everything, no drop comes back: the tenth is the last.
+    air = Thing("air_tap", (((0, 0, 100), (0.1, 0.1, 0.1)),), {"waterSource": {}, "toggleable": {}},
+                links={"water_source": (0, 0, 0.5)})  # fmt: skip
+    home = HandWorld(air, RAG)
+    k = 3
+    _, history = _run(home, [home.view()] * 30, on_from=k)
+    assert _emissions(history)[:7] == [k + 1 + 4 * n for n in range(7)]
+
+
+def test_section_22_the_tenth_drop_comes_at_k_plus_37_and_then_the_tap_is_dry():
+    bench = Thing("bench", PLATE, pos=(0, 0, 0.3))
+    home = HandWorld(SINK, bench)
+    _, history = _run(home, [home.view()] * 50, compat="igibson")
+    assert _emissions(history)[-1] == 38
+    assert len(_emissions(history)) == NUM_DROPS
+    assert history[-1].water.active.all()
+
+
+def test_section_7_2_the_count_stands_still_while_the_tap_is_off():
+    model = KITCHEN.model()
+    states = initial_states(model, 1)
+    marks = []
+    for k in range(1, 14):
+        on = not 3 <= k <= 6  # the first drop comes at update 2
+        states = states.replace(toggled=states.toggled.at[0, 0].set(on))
+        before = states.water.active.sum()
+        states = step(model, states, KITCHEN.view())
+        marks.append(int(states.water.active.sum() - before))
+    assert [k for k, m in enumerate(marks, start=1) if m > 0][:2] == [2, 10]  # three waiting updates: 3, 8, 9
+
+
+def test_a_tap_that_is_off_gives_no_water_and_one_without_a_switch_always_runs():
+    _, history = _run(KITCHEN, [KITCHEN.view()] * 6, on_from=99)
+    assert not history[-1].water.active.any()
+    home = HandWorld(Thing("spring", abilities={"waterSource": {}}, links={"water_source": (0, 0, 2)}))
+    _, history = _run(home, [home.view()] * 3, on_from=99)
+    assert history[-1].water.active.any()
+
+
+def test_table_a4_wetness_counts_the_droplets_absorbed():
+    view = KITCHEN.view({"rag": (0, 0, 0.3)})
+    model, history = _run(KITCHEN, [view] * 40)
+    wet = [float(s.wetness[0, 1]) for s in history]
+    assert wet[-1] == 9.0  # drops of updates 2, 6, ..., 34 have fallen 15 cm by update 40
+    assert all(b - a in (0.0, 1.0) for a, b in itertools.pairwise(wet))
+    assert bool(soaked(model, history[-1].wetness)[0, 1])
+
+
+def test_section_17_row_2_igibsons_code_keeps_a_latch_and_does_not_take_the_drop():
+    view = KITCHEN.view({"rag": (0, 0, 0.3)})
+    _, history = _run(KITCHEN, [view] * 40, compat="igibson")
+    assert float(history[-1].wetness[0, 1]) == 1.0
+    assert history[-1].water.active.sum() >= 9
+
+
+def test_section_17_row_3_sinks_take_drops_in_the_paper_and_not_in_the_code():
+    drain = Thing("drain", PLATE, {"waterSink": {}}, links={"water_sink": (0, 0, 0)}, pos=(0, 0, 0.3))
+    home = HandWorld(SINK, drain)
+    _, paper = _run(home, [home.view()] * 60)
+    _, code = _run(home, [home.view()] * 60, compat="igibson")
+    assert not paper[-1].water.active.all()
+    assert code[-1].water.active.all()
+
+
+def test_table_a3_a_droplet_sink_link_takes_drops_without_any_surface():
+    box = Thing("hole", (((3, 0, 0), (0.1, 0.1, 0.1)),), {}, links={"water_sink": ((0, 0, 0.2), (0.1, 0.1, 0.1))})
+    tap = Thing("tap", (((0, 0, 5), (0.1, 0.1, 0.1)),), {"waterSource": {}}, links={"water_source": (0, 0, 0.5)})
+    home = HandWorld(tap, box)
+    _, history = _run(home, [home.view()] * 20)
+    assert all(float(s.water.pos[0, 0, :, 2][s.water.active[0, 0]].min(initial=1.0)) > 0.05 for s in history)
+    assert history[-1].water.active.sum() < 4
+
+
+def test_a_drop_that_touches_the_source_itself_goes_back():
+    for compat in ("paper", "igibson"):
+        _, history = _run(KITCHEN, [KITCHEN.view()] * 60, compat=compat)
+        assert history[-1].water.active.sum() <= 4  # 40 cm take 0.29 s, nine updates
+
+
+def test_a_drop_rests_on_a_tray_and_falls_on_when_the_tray_goes():
+    under, away = KITCHEN.view({"tray": (0, 0, 0.3)}), KITCHEN.view()
+    _, history = _run(KITCHEN, [under] * 20)
+    at_rest = history[-1].water
+    first = np.asarray(at_rest.pos[0, 0, 0])
+    assert first[2] == pytest.approx(0.31 + DROP_RADIUS + 0.003, abs=1e-4)
+    assert float(at_rest.speed[0, 0, 0]) == 0.0
+    states = history[-1].replace(toggled=history[-1].toggled & False)
+    for _ in range(12):
+        states = step(KITCHEN.model(), states, away)
+    assert not states.water.active.any()  # they fell into the sink
+
+
+def test_no_drop_is_missed_at_speed():
+    # A thin rag 8 m below: 12.5 m/s, 42 cm in one update.
+    thin = Thing("rag", (((0, 0, 0), (0.1, 0.1, 0.001)),), {"soakable": {}}, pos=(0, 0, -8))
+    tap = Thing("tap", (((0, 0, 5), (0.1, 0.1, 0.1)),), {"waterSource": {}}, links={"water_source": (0, 0, 0.5)})
+    home = HandWorld(tap, thin)
+    _, history = _run(home, [home.view()] * 45)
+    assert float(history[-1].wetness[0, 1]) >= 1.0
+
+
+def test_a_drop_that_leaves_the_house_comes_back():
+    tap = Thing("tap", (((0, 0, 5), (0.1, 0.1, 0.1)),), {"waterSource": {}}, links={"water_source": (0, 0, 0.5)})
+    home = HandWorld(tap)
+    _, history = _run(home, [home.view()] * 120)
+    assert sum(int(s.water.active[0].all()) for s in history[80:]) < 40
+
+
+def test_section_19_6_a_source_without_its_link_crashes_nothing():
+    home = HandWorld(Thing("sink", abilities={"waterSource": {}, "toggleable": {}}), RAG)
+    _, history = _run(home, [home.view()] * 2)
+    assert history[-1].water.active.shape == (1, 0, NUM_DROPS)
+    assert float(history[-1].wetness.sum()) == 0.0
+
+
+def test_section_19_18_drying_is_off_and_can_be_switched_on():
+    wet = initial_states(KITCHEN.model(), 1)
+    wet = wet.replace(wetness=wet.wetness.at[0, 1].set(2.0))
+    assert float(step(KITCHEN.model(), wet, KITCHEN.view()).wetness[0, 1]) == 2.0
+    drying = KITCHEN.model(drying_rate=3.0)
+    assert float(step(drying, wet, KITCHEN.view()).wetness[0, 1]) == pytest.approx(1.9)
+    dry = wet.replace(wetness=wet.wetness * 0)
+    assert float(step(drying, dry, KITCHEN.view()).wetness[0, 1]) == 0.0
+
+
+def test_table_a5_soaked_sets_the_level_to_the_threshold_or_zero():
+    home = HandWorld(Thing("rag", abilities={"soakable": {"wetness_soaked": 3.0}}), Thing("rock"))
+    model = home.model()
+    wetness = initial_states(model, 1).wetness
+    wet = set_soaked(model, wetness, jnp.ones((1, 2), bool), True)
+    assert wet[0].tolist() == [3.0, 0.0]
+    assert set_soaked(model, wet, jnp.ones((1, 2), bool), False)[0].tolist() == [0.0, 0.0]
+
+
+def test_a_nan_pose_catches_no_drop():
+    _, history = _run(KITCHEN, [KITCHEN.view({"rag": (0, np.nan, 0.3)})] * 20)
+    assert float(history[-1].wetness[0, 1]) == 0.0
