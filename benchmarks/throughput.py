@@ -1,0 +1,176 @@
+"""Control steps per second of the batched engine: worlds x scenes, idle and disturbed, with states and a goal.
+
+    python benchmarks/throughput.py HOME [HOME ...] --worlds 1024 4096 16384 [--idle] [--no-states] [--out DIR]
+
+A control step is four physics steps of 1/120 s, the view, all extended states, guards and a goal of up to ten literals,
+in one jitted function under `lax.scan`; a floating hand pushes objects about unless `--idle`. Every run reports the
+overflow and non-finite counts next to its speed: a run with any is no result.
+"""
+
+from __future__ import annotations
+
+import argparse
+import functools
+import json
+import pathlib
+import time
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+import ig2mj
+from ig2mj.agents.floating_hand import add_floating_hand
+from ig2mj.agents.pushing import push_controls
+from ig2mj.calibration import calibrate
+from ig2mj.engine.health import CAPACITY, Overflow
+from ig2mj.engine.profile import EngineProfile
+from ig2mj.engine.warp import WarpEngine
+from ig2mj.predicates.compile import compile_expression
+from ig2mj.sampling.perturbation import loose_objects
+from ig2mj.sampling.settled import make_pool
+from ig2mj.states.model import StateModel
+from ig2mj.worlds.batch import Worlds
+from ig2mj.worlds.pool import Pool
+
+STEPS = 30
+"""Control steps of one timed call."""
+
+HAND_START = (0.0, 0.0, 1.2)
+
+
+def ten_literals(model: StateModel) -> str:
+    """A goal of ten literals over the first loose objects: where they are, and what they have become."""
+    tables = model.tables
+    loose = [tables.object_names[i] for i in loose_objects(tables)]
+    fixed = [
+        n
+        for n, f, c in zip(tables.object_names, tables.object_fixed, tables.object_categories, strict=True)
+        if f and c not in ("walls", "floors", "ceilings")
+    ]
+    pairs = [(loose[i % len(loose)], fixed[(3 * i) % len(fixed)]) for i in range(7)]
+    words = ["on_top", "inside", "next_to", "under", "on_top", "inside", "touching"]
+    atoms = [f"({w} {a} {b})" for w, (a, b) in zip(words, pairs, strict=True)]
+    atoms += [f"(in_contact_with {loose[0]} {loose[-1]})", f"(not (frozen {loose[0]}))", f"(not (burnt {loose[-1]}))"]
+    return "(and " + " ".join(atoms) + ")"
+
+
+class Case:
+    """One scene, made ready: profile, pool, goal."""
+
+    def __init__(self, home: str, hand: bool, pool_rows: int, profile: EngineProfile | None):
+        agents = [functools.partial(add_floating_hand, pos=HAND_START)] if hand else []
+        self.scene = ig2mj.load_scene(home, agents)
+        self.model = StateModel.of_manifest(self.scene.tables, self.scene.manifest)
+        self.loose = loose_objects(self.scene.tables)
+        start = time.time()
+        self.pool: Pool = make_pool(self.scene, self.model, pool_rows, share=0.2)
+        self.pool_seconds = time.time() - start
+        start = time.time()
+        self.profile = profile or calibrate(self.scene, rounds=4)
+        self.calibration_seconds = time.time() - start
+        self.goal = compile_expression(self.model, ten_literals(self.model))
+
+
+def run(case: Case, num_worlds: int, disturbed: bool, states: bool, calls: int = 4) -> dict:
+    """Times one batch. The first call compiles and is not counted."""
+    scene, model = case.scene, case.model
+    engine = WarpEngine(
+        scene, num_worlds, profile=case.profile, initial=jax.tree.map(lambda a: a[0], case.pool.physics)
+    )
+    worlds = Worlds(engine, model, case.pool, case.goal)
+    seconds = engine.substeps * engine.timestep
+
+    def control(batch, ctrl):
+        if not disturbed:
+            return ctrl
+        world = batch.world
+        return push_controls(world.view, ctrl, np.array(HAND_START), case.loose, world.key, world.step, seconds)
+
+    def with_states(carry, _):
+        batch, ctrl = carry
+        ctrl = control(batch, ctrl)
+        batch, verdict = worlds.step(batch, ctrl)
+        return (batch, ctrl), verdict.fraction.mean()
+
+    def physics_only(carry, _):
+        batch, ctrl = carry
+        ctrl = control(batch, ctrl)
+        physics, view = engine.step(batch.world.physics, ctrl)
+        world = batch.world.replace(physics=physics, view=view, step=batch.world.step + 1)
+        return (batch.replace(world=world), ctrl), view.object_com[:, 0, 2].mean()
+
+    body = with_states if states else physics_only
+    call = jax.jit(lambda b, c: jax.lax.scan(body, (b, c), None, STEPS), donate_argnums=(0, 1))
+    start = time.time()
+    batch = jax.block_until_ready(jax.jit(worlds.start)(0))
+    ctrl = jnp.zeros((num_worlds, scene.model.nu), jnp.float32)
+    (batch, ctrl), _ = jax.block_until_ready(call(batch, ctrl))
+    compile_seconds = time.time() - start
+    times, awake = [], []
+    for _ in range(calls):
+        start = time.time()
+        (batch, ctrl), _ = jax.block_until_ready(call(batch, ctrl))
+        times.append(time.time() - start)
+        awake.append(int(engine.usage(batch.world.physics).awake_dofs.max()))
+    overflow = np.asarray(batch.world.physics.overflow)
+    memory = (jax.devices()[0].memory_stats() or {}).get("peak_bytes_in_use", 0)
+    row = {
+        "scene": scene.name,
+        "objects": scene.tables.num_objects,
+        "worlds": num_worlds,
+        "disturbed": disturbed,
+        "states": states,
+        "control_steps_per_s": round(num_worlds * STEPS / float(np.median(times))),
+        "ms_per_control_step": round(1e3 * float(np.median(times)) / STEPS, 3),
+        "compile_s": round(compile_seconds, 1),
+        "awake_dofs_peak": max(awake),
+        "capacity_overflows": int(((overflow & int(CAPACITY)) != 0).sum()),
+        "iteration_limits": int(((overflow & int(Overflow.ITERATIONS | Overflow.LS_ITERATIONS)) != 0).sum()),
+        "non_finite": int((~np.asarray(engine.health(batch.world.physics).finite)).sum()),
+        "peak_device_MB_per_world": round(memory / num_worlds / 1e6, 3),
+        "troubles": worlds.metrics(batch) if states else {},
+    }
+    print(json.dumps(row), flush=True)
+    return row
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("homes", nargs="+")
+    parser.add_argument("--worlds", type=int, nargs="+", default=[4096])
+    parser.add_argument("--idle", action="store_true", help="no hand, nothing moves")
+    parser.add_argument("--no-states", action="store_true", help="physics and view only, for comparison")
+    parser.add_argument("--pool", type=int, default=16)
+    parser.add_argument("--out", type=pathlib.Path)
+    args = parser.parse_args()
+    device = jax.devices()[0]
+    rows = []
+    for home in args.homes:
+        case = Case(home, not args.idle, args.pool, None)
+        model = case.scene.model
+        print(
+            json.dumps(
+                {
+                    "scene": case.scene.name,
+                    "objects": case.scene.tables.num_objects,
+                    "nv": int(model.nv),
+                    "ngeom": int(model.ngeom),
+                    "nbody": int(model.nbody),
+                    "profile": str(case.profile),
+                    "pool_s": round(case.pool_seconds, 1),
+                    "calibration_s": round(case.calibration_seconds, 1),
+                }
+            ),
+            flush=True,
+        )
+        for worlds in args.worlds:
+            rows.append(run(case, worlds, not args.idle, not args.no_states))
+    if args.out:
+        args.out.mkdir(parents=True, exist_ok=True)
+        report = {"device": str(device.device_kind), "jax": jax.__version__, "rows": rows}
+        (args.out / "throughput.json").write_text(json.dumps(report, indent=1))
+
+
+if __name__ == "__main__":
+    main()
