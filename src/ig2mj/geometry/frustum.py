@@ -40,8 +40,8 @@ class Camera:
     quat: Float[AnyArray, "*b 4"]
     fovy: Float[AnyArray, "*#b"] | float
     aspect: Float[AnyArray, "*#b"] | float = 1.0
-    near: float = 0.01
-    far: float = 100.0
+    near: Float[AnyArray, ""] | float = 0.01
+    far: Float[AnyArray, ""] | float = 100.0
 
     @property
     def slopes(self) -> Float[Array, "*#b 2"]:

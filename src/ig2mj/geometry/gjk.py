@@ -146,7 +146,7 @@ def _core_witnesses(
         return jnp.stack([of_a, pos + quat_rotate(quat, of_b)], axis=-2)
 
     def step(state: tuple) -> tuple:
-        count, points, weights, done = state
+        count, points, weights, done, overlap = state
         nearest = _weighted(points, weights)
         v = nearest[..., 0, :] - nearest[..., 1, :]
         new = support(-v)
@@ -165,16 +165,16 @@ def _core_witnesses(
         points = jnp.where(take[..., None, None, None], simplex, points)
         weights = jnp.where(take[..., None], candidate, weights)
         ended = done | ~take | enclosed
-        return count + 1, points, weights, ended
+        return count + 1, points, weights, ended, overlap | (take & enclosed)
 
     shape = jnp.broadcast_shapes(a.pos.shape[:-1], b.pos.shape[:-1], a.kind.shape, b.kind.shape)
     first = jnp.broadcast_to(support(jnp.broadcast_to(pos, (*shape, 3)))[..., None, :, :], (*shape, 4, 2, 3))
     weights = jnp.broadcast_to(jnp.array([1.0, 0.0, 0.0, 0.0]), (*shape, 4))
-    start = (0, first, weights, jnp.zeros(shape, bool))
-    _, points, weights, _ = jax.lax.while_loop(lambda s: (s[0] < MAX_STEPS) & ~jnp.all(s[3]), step, start)
+    start = (0, first, weights, jnp.zeros(shape, bool), jnp.zeros(shape, bool))
+    _, points, weights, _, overlap = jax.lax.while_loop(lambda s: (s[0] < MAX_STEPS) & ~jnp.all(s[3]), step, start)
     core = _weighted(points, weights)
     # `~(<=)` so that NaN counts as apart and shows in the distance.
-    apart = ~(length(core[..., 0, :] - core[..., 1, :]) <= OVERLAP)
+    apart = ~(overlap | (length(core[..., 0, :] - core[..., 1, :]) <= OVERLAP))
     return core[..., 0, :], quat_rotate_inverse(quat, core[..., 1, :] - pos), apart
 
 

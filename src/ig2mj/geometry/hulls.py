@@ -29,9 +29,9 @@ def signed_depth(
     radius, half = size[..., 0], size[..., 1]
     height = jnp.abs(point[..., 2])
     from_axis = length(point[..., :2])
-    from_end = jnp.stack([from_axis, jnp.maximum(height - half, 0.0)], axis=-1)
+    from_end = jnp.stack(jnp.broadcast_arrays(from_axis, jnp.maximum(height - half, 0.0)), axis=-1)
     side, end = radius - from_axis, half - height
-    corner = length(jnp.stack([jnp.maximum(-side, 0.0), jnp.maximum(-end, 0.0)], axis=-1))
+    corner = length(jnp.stack(jnp.broadcast_arrays(jnp.maximum(-side, 0.0), jnp.maximum(-end, 0.0)), axis=-1))
     cylinder = jnp.where((side >= 0.0) & (end >= 0.0), jnp.minimum(side, end), -corner)
     room = planes[..., 3] - jnp.sum(planes[..., :3] * point[..., None, :], axis=-1)
     in_use = jnp.any(planes[..., :3] != 0.0, axis=-1)

@@ -121,6 +121,7 @@ def cylinder_interval(
     half: Float[AnyArray, "*#b"] | float,
 ) -> Interval:
     """Interval of a line inside a cylinder along z."""
+    origin, direction = jnp.asarray(origin), jnp.asarray(direction)
     o, d = origin[..., :2], direction[..., :2]
     side = _quadratic_interval(jnp.sum(d * d, axis=-1), jnp.sum(o * d, axis=-1), jnp.sum(o * o, axis=-1), radius)
     top = _half_space_interval(direction[..., 2], half - origin[..., 2])
