@@ -245,7 +245,7 @@ class World:
             moves, chosen = np.ones(len(statics.body_tree), bool), np.ones(tables.num_objects, bool)
         else:
             moves = np.concatenate([trees, [False]])[statics.body_tree]
-            chosen = (layout.object_trees & trees).any(1)
+            chosen = np.any(layout.object_trees & trees, axis=1)
         links = np.flatnonzero(moves[tables.link_body])
         return _Plan(
             bodies=np.flatnonzero(moves),
