@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import io
 import json
 import os
 import pathlib
@@ -61,12 +62,18 @@ def _feed(digest: Any, part: Any) -> None:
 def load(key: str) -> tuple[dict[str, Any], dict[str, np.ndarray]] | None:
     """The entry's facts and arrays, or None if there is none that reads."""
     try:
-        with np.load(_path(key), allow_pickle=False) as file:
+        content = io.BytesIO(_path(key).read_bytes())
+        with np.load(content, allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}
         facts = json.loads(arrays.pop("facts").tobytes().decode())
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
         return None
     return (facts, arrays) if isinstance(facts, dict) and facts.get("key") == key else None
+
+
+def holds(key: str) -> bool:
+    """Whether there is an entry, which may still turn out to be broken when it is loaded."""
+    return _path(key).is_file()
 
 
 def store(key: str, facts: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> None:

@@ -71,7 +71,8 @@ def _qhull(points: np.ndarray) -> Hull | None:
 
 def principal_axes(points: np.ndarray) -> np.ndarray:
     """Rows: unit axes of the point set, from the longest to the shortest spread. [3, 3]."""
-    return np.linalg.svd(points - points.mean(axis=0), full_matrices=True)[2]
+    off = points - points.mean(axis=0)
+    return np.linalg.eigh(off.T @ off)[1].T[::-1]
 
 
 def thickness(points: np.ndarray) -> float:
@@ -112,6 +113,19 @@ def union_volume(hulls: Sequence[Hull]) -> float:
     volume = float(union.volume())
     low, high = max(h.volume for h in hulls), sum(h.volume for h in hulls)
     return min(max(volume, low), high)
+
+
+def mesh_union_volume(meshes: Sequence[tuple[np.ndarray, np.ndarray]]) -> float | None:
+    """m3 of the union of closed meshes (vertices, faces), or None where one of them is no proper solid."""
+    import manifold3d
+
+    solids = []
+    for vertices, faces in meshes:
+        mesh = manifold3d.Mesh64(vertices.astype(np.float64), faces.astype(np.uint64))
+        solids.append(manifold3d.Manifold(mesh))
+        if solids[-1].status() != manifold3d.Error.NoError:
+            return None
+    return float(manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add).volume())
 
 
 def reduce_vertices(hull: Hull, limit: int) -> Hull:

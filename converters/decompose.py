@@ -5,6 +5,9 @@ from __future__ import annotations
 import dataclasses
 import time
 
+import numpy as np
+import trimesh
+
 from . import cache, workers
 from .convex import Hull, hull_of, solid_hull
 from .mesh_parts import Part, decimate
@@ -13,6 +16,9 @@ from .rectilinear import boxes_of
 
 MOST_FACES = 20_000
 """Meshes with more are made coarser before CoACD sees them."""
+
+MOST_SHEET_FACES = 400
+"""The same for a sheet, whose faces become pieces."""
 
 LADDER = (
     {"threshold": 1.0, "mcts_iterations": 150, "preprocess_resolution": 50},
@@ -37,11 +43,36 @@ def cut_part(part: Part, options: HullOptions, deadline: float) -> Cut:
     Args:
       deadline: `time.monotonic()` after which no more is tried.
     """
+    if part.hollow:
+        return Cut(sheet_hulls(part, options.min_thickness), "sheet", [])
     if part.closed:
         boxes = boxes_of(part.vertices, part.faces, part.volume)
         if boxes:
             return Cut(boxes, "boxes", [])
     return _coacd(part, options, deadline)
+
+
+def sheet_hulls(part: Part, thickness: float) -> list[Hull]:
+    """The sides of a surface without thickness, each made so thick to its inner side: hollow containers stay hollow.
+
+    Flat sides are one hull where they are convex; other faces are one each.
+    """
+    vertices, faces = decimate(part.vertices, part.faces, MOST_SHEET_FACES)
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    whole = [list(side) for side in mesh.facets]
+    sides: list[list[int]] = []
+    for side in whole:
+        hull, _ = solid_hull(vertices[np.unique(faces[side])], 1.0)  # 1 m thick: its volume is its area
+        convex = hull is not None and hull.volume <= 1.02 * float(mesh.area_faces[side].sum())
+        sides += [side] if convex else [[face] for face in side]
+    taken = {face for side in whole for face in side}
+    sides += [[face] for face in range(len(faces)) if face not in taken]
+    found = []
+    for side in sides:
+        points = vertices[np.unique(faces[side])]
+        inward = -mesh.face_normals[side].mean(axis=0)
+        found.append(hull_of(np.concatenate([points, points + thickness * inward])))
+    return [h for h in found if h is not None]
 
 
 def _coacd(part: Part, options: HullOptions, deadline: float) -> Cut:
@@ -54,12 +85,13 @@ def _coacd(part: Part, options: HullOptions, deadline: float) -> Cut:
             return Cut([h for h in hulls if h is not None], "coacd", list(facts["warnings"]))
     vertices, faces = decimate(part.vertices, part.faces, MOST_FACES)
     warnings: list[str] = []
-    for step, settings in enumerate(LADDER):
+    ladder = LADDER if part.closed else LADDER[1:]  # CoACD rebuilds an open mesh as voxels: slow when fine
+    for step, settings in enumerate(ladder):
         left = deadline - time.monotonic()
         if left <= 0:
             warnings.append("convex decomposition ran out of time")
             break
-        limit = left if step == len(LADDER) - 1 else left / 2
+        limit = left if step == len(ladder) - 1 else left / 2
         threshold = min(max(settings["threshold"] * options.coacd_threshold, 0.01), 1.0)
         parameters = {**settings, "threshold": threshold, "seed": options.seed}
         try:

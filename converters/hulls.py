@@ -22,10 +22,10 @@ from .convex import Hull, distance_outside, reduce_vertices, solid_hull, union_v
 from .decompose import cut_part
 from .description import Mesh, Shape
 from .fitting import fit_primitive, primitive_hull, primitive_volume
-from .mesh_parts import clean, decimate, hull_stands_for, parts, points_in, winding
+from .mesh_parts import clean, decimate, enclosed_volume, hull_stands_for, parts
 from .pieces import HullOptions, LinkHulls, Piece, PieceSource
 
-__all__ = ["HullOptions", "LinkHulls", "Piece", "decompose_link"]
+__all__ = ["HullOptions", "LinkHulls", "Piece", "decompose_link", "is_cached"]
 
 GROUP_RATIO = 1.3
 """A group whose hull has more than this many times its mesh's volume is no convex piece, whatever the file says
@@ -61,6 +61,11 @@ def decompose_link(shapes: Sequence[Shape], options: HullOptions | None = None) 
     if options.cache:
         cache.store(key, *_pack(result))
     return result
+
+
+def is_cached(shapes: Sequence[Shape], options: HullOptions) -> bool:
+    """Whether `decompose_link` would find its result in the cache, and so take no time worth a process of its own."""
+    return options.cache and cache.holds(_key(shapes, options))
 
 
 def _decompose(shapes: Sequence[Shape], options: HullOptions) -> LinkHulls:
@@ -123,7 +128,7 @@ def _from_mesh(shape: Shape, label: str, options: HullOptions, deadline: float, 
     found: list[_Found] = []
     for number, mesh in enumerate(meshes):
         name = f"{label} group '{mesh.name or number}'"
-        hull, note = solid_hull(mesh.vertices[_used(mesh)], options.min_thickness)
+        hull, note = solid_hull(mesh.vertices[np.unique(mesh.faces)], options.min_thickness)
         if hull is None:
             if len(mesh.vertices):
                 out.warnings.append(f"{name} {note}, left out")
@@ -171,10 +176,7 @@ def _from_soup(
     if not solid:
         out.warnings.append(f"{label} consists of flat sheets: its hull stands for it")
         return [_Found(whole, "hull")]
-    volume = solid[0].volume
-    if len(solid) > 1:
-        volume = whole.volume * float(np.mean(winding(points_in(whole), vertices[faces]) > 0.5))
-        volume = min(max(volume, max(p.volume for p in solid)), sum(p.volume for p in solid))
+    volume = enclosed_volume(solid, whole)
     out.source_volume = (out.source_volume or 0.0) + volume
     ratio, depth = options.hull_ratio, options.hull_depth
     hollow = any(p.hollow for p in solid)
@@ -216,16 +218,15 @@ def _fewer(solid: list) -> list:
 
 
 def _placed(mesh: Mesh, shape: Shape) -> Mesh:
-    """The mesh in the link frame; a mirroring scale turns the faces round."""
+    """The mesh in the link frame without unusable faces; a mirroring scale turns the faces round."""
     vertices = np.asarray(mesh.vertices, np.float64).reshape(-1, 3) * np.array(shape.scale, float)
     vertices = vertices @ shape.pose[:3, :3].T + shape.pose[:3, 3]
     faces = np.asarray(mesh.faces, np.int64).reshape(-1, 3)
+    faces = faces[np.all((faces >= 0) & (faces < len(vertices)), axis=1)]
+    usable = np.asarray(np.isfinite(vertices).all(axis=1))
+    faces = faces[usable[faces].all(axis=1)]
     mirrored = np.prod(shape.scale) * np.linalg.det(shape.pose[:3, :3]) < 0
     return Mesh(vertices, faces[:, ::-1] if mirrored else faces, mesh.name)
-
-
-def _used(mesh: Mesh) -> np.ndarray:
-    return np.unique(mesh.faces) if len(mesh.faces) else np.arange(len(mesh.vertices))
 
 
 def _joined(meshes: list[Mesh]) -> tuple[np.ndarray, np.ndarray]:

@@ -13,10 +13,12 @@ import scipy.sparse
 import scipy.stats.qmc
 import trimesh
 
-from .convex import Hull, hull_of, sample_surface, surface_distance
+from .convex import Hull, hull_of, mesh_union_volume, sample_surface, surface_distance
 
 SAMPLES = 2048
 """Points that decide how much of a hull is filled: standard error about 1 % at worst."""
+MARKS = 2000
+"""Most points of a hull whose distance from the mesh is measured."""
 WORK = 10_000_000
 """Most (point, triangle) pairs of one winding-number sum."""
 OPEN_UP = 0.7
@@ -190,6 +192,19 @@ def _opens_up(ring: np.ndarray, hull: Hull, others: list[Hull]) -> bool:
     return not any(other.contains(middle, 0.02 * hull.diagonal).any() for other in others)
 
 
+def enclosed_volume(solid: list[Part], whole: Hull) -> float:
+    """m3 of the union of the parts, whose common hull is `whole`: exact where they are closed, else by sampling."""
+    if len(solid) == 1:
+        return solid[0].volume
+    volume = None
+    if all(p.closed for p in solid):
+        volume = mesh_union_volume([(p.vertices, p.faces) for p in solid])
+    if volume is None:
+        triangles = np.concatenate([p.triangles for p in solid])
+        volume = whole.volume * float(np.mean(winding(points_in(whole), triangles) > 0.5))
+    return min(max(volume, max(p.volume for p in solid)), sum(p.volume for p in solid))
+
+
 def points_in(hull: Hull, count: int = SAMPLES) -> np.ndarray:
     """About `count` points [., 3] spread evenly inside the hull, always the same ones."""
     low, high = hull.vertices.min(axis=0), hull.vertices.max(axis=0)
@@ -244,4 +259,5 @@ def hull_stands_for(hull: Hull, triangles: np.ndarray, volume: float, ratio: flo
     if volume <= 0 or hull.volume > ratio * volume:
         return False
     marks = sample_surface(hull.vertices[hull.faces], 600)
+    marks = marks[:: -(-len(marks) // MARKS)]
     return float(surface_distance(marks, triangles).max()) <= max(min(depth, 0.05 * hull.diagonal), 1e-6)

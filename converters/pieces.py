@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 PieceKind = Literal["box", "cylinder", "sphere", "capsule", "hull"]
-PieceSource = Literal["primitive", "group", "hull", "component", "boxes", "coacd", "fallback", "merged"]
+PieceSource = Literal["primitive", "group", "hull", "component", "boxes", "sheet", "coacd", "fallback", "merged"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -63,8 +63,9 @@ class Piece:
         link frame. Of a hull these are the geom itself; of a recognised primitive they are the hull it replaced; of a
         primitive that was one in the source, a fine enough polyhedron.
       source: where it came from. "primitive": the source said so; "group": one `o`/`g` group; "hull": the whole
-        mesh's hull; "component": a connected part's hull; "boxes": an exact cut into boxes; "coacd"; "fallback": one
-        hull because decomposition failed; "merged": by the budget.
+        mesh's hull; "component": a connected part's hull; "boxes": an exact cut into boxes; "sheet": a side of a
+        container without thickness; "coacd"; "fallback": one hull because decomposition failed; "merged": by the
+        budget.
       volume: of the geom that is emitted, m3.
       fit_error: greatest distance between the surface of the geom and the hull it stands for before any reduction,
         metres.
