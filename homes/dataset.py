@@ -59,10 +59,8 @@ def build_dataset(
         shutil.rmtree(objects / entry.category, ignore_errors=True)
     sizes: dict[str, list[list[float]]] = {entry.category: [] for entry in entries}
     chunks = [(str(objects), seed, tasks[k : k + CHUNK]) for k in range(0, len(tasks), CHUNK)]
-    done = 0
-    for category, size in _run(chunks, jobs):
+    for done, (category, size) in enumerate(_run(chunks, jobs), start=1):
         sizes[category].append(size)
-        done += 1
         if progress:
             progress(done, len(tasks))
     write_metadata(out, entries, sizes)

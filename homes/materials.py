@@ -15,14 +15,16 @@ COLOURS: dict[str, RGB] = {
     "birch": (0.88, 0.79, 0.64), "ash": (0.70, 0.64, 0.55), "ebony": (0.20, 0.16, 0.14), "teak": (0.60, 0.42, 0.24),
     "white": (0.95, 0.95, 0.94), "cream": (0.94, 0.90, 0.80), "beige": (0.82, 0.74, 0.62), "grey": (0.55, 0.56, 0.58),
     "light_grey": (0.76, 0.77, 0.78), "dark_grey": (0.25, 0.26, 0.28), "black": (0.09, 0.09, 0.10),
-    "red": (0.75, 0.13, 0.12), "dark_red": (0.50, 0.09, 0.10), "orange": (0.92, 0.50, 0.12), "yellow": (0.95, 0.80, 0.20),
-    "green": (0.25, 0.55, 0.25), "dark_green": (0.13, 0.33, 0.18), "lime": (0.60, 0.75, 0.25), "mint": (0.65, 0.85, 0.75),
-    "blue": (0.16, 0.36, 0.68), "navy": (0.11, 0.16, 0.34), "sky": (0.55, 0.75, 0.90), "teal": (0.12, 0.48, 0.50),
-    "purple": (0.42, 0.22, 0.52), "pink": (0.92, 0.60, 0.68), "rose": (0.80, 0.36, 0.45), "brown": (0.42, 0.27, 0.16),
-    "tan": (0.76, 0.60, 0.42), "gold": (0.83, 0.66, 0.26), "silver": (0.78, 0.79, 0.81), "steel": (0.66, 0.68, 0.70),
-    "copper": (0.72, 0.44, 0.28), "iron": (0.22, 0.22, 0.23), "brass": (0.72, 0.58, 0.28), "terracotta": (0.72, 0.40, 0.27),
-    "cardboard": (0.70, 0.54, 0.36), "paper": (0.96, 0.95, 0.91), "leaf": (0.22, 0.48, 0.16), "soil": (0.23, 0.16, 0.10),
-    "glass": (0.80, 0.90, 0.92), "porcelain": (0.97, 0.97, 0.96), "rubber": (0.13, 0.13, 0.13), "chrome": (0.82, 0.83, 0.85),
+    "red": (0.75, 0.13, 0.12), "dark_red": (0.50, 0.09, 0.10), "orange": (0.92, 0.50, 0.12),
+    "yellow": (0.95, 0.80, 0.20), "green": (0.25, 0.55, 0.25), "dark_green": (0.13, 0.33, 0.18),
+    "lime": (0.60, 0.75, 0.25), "mint": (0.65, 0.85, 0.75), "blue": (0.16, 0.36, 0.68), "navy": (0.11, 0.16, 0.34),
+    "sky": (0.55, 0.75, 0.90), "teal": (0.12, 0.48, 0.50), "purple": (0.42, 0.22, 0.52), "pink": (0.92, 0.60, 0.68),
+    "rose": (0.80, 0.36, 0.45), "brown": (0.42, 0.27, 0.16), "tan": (0.76, 0.60, 0.42), "gold": (0.83, 0.66, 0.26),
+    "silver": (0.78, 0.79, 0.81), "steel": (0.66, 0.68, 0.70), "copper": (0.72, 0.44, 0.28),
+    "iron": (0.22, 0.22, 0.23), "brass": (0.72, 0.58, 0.28), "terracotta": (0.72, 0.40, 0.27),
+    "cardboard": (0.70, 0.54, 0.36), "paper": (0.96, 0.95, 0.91), "leaf": (0.22, 0.48, 0.16),
+    "soil": (0.23, 0.16, 0.10), "glass": (0.80, 0.90, 0.92), "porcelain": (0.97, 0.97, 0.96),
+    "rubber": (0.13, 0.13, 0.13), "chrome": (0.82, 0.83, 0.85),
 }  # fmt: skip
 
 WOODS = ("oak", "pine", "walnut", "cherry", "birch", "ash", "teak")
@@ -33,7 +35,7 @@ BRIGHT = ("red", "blue", "yellow", "green", "orange", "purple", "pink", "teal", 
 
 @dataclasses.dataclass(frozen=True)
 class Material:
-    """name: unique inside a model. tile: metres that one repeat of the texture covers (box mapping). kind: iGibson's class."""
+    """name: unique inside a model. tile: metres that a texture's repeat covers (box mapping). kind: iGibson's class."""
 
     name: str
     rgb: RGB

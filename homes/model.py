@@ -32,7 +32,7 @@ class Area:
 
 @dataclasses.dataclass
 class Joint:
-    """kind: revolute, prismatic, continuous or fixed; limits in radians or metres. openable: direction, 0 if not openable."""
+    """kind: revolute, prismatic, continuous, fixed; limits: radians or metres. openable: direction, 0 if not openable."""
 
     name: str
     kind: str
@@ -121,7 +121,7 @@ class ObjectBuilder:
         self.base.add(solid, material, collide)
 
     def pick(self, choices: Sequence):
-        """Cycles through choices by the model's index, so that a category's models differ; each category begins elsewhere."""
+        """Cycles through choices by the model's index; each category begins elsewhere."""
         return choices[(self.index + zlib.crc32(self.category.encode())) % len(choices)]
 
     # --- joints -------------------------------------------------------------------------------------------------

@@ -7,89 +7,21 @@ Every brick stands on the origin (its lowest point is z = 0, centred in x and y)
 
 from __future__ import annotations
 
-import dataclasses
+import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
+import shapely
 import trimesh
 
-Vec = Sequence[float]
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+from .shape import AXES, Mesh, Solid, Vec, join
+from .turned import ball, cylinder, lathe, sleeve
 
-ROUND_SIDES = 20  # facets of a round visual
-HULL_SIDES = 10  # facets of a round collision hull: 3 levels of it stay under 32 vertices
-
-
-@dataclasses.dataclass
-class Mesh:
-    """Triangles that are seen. vertices [n, 3], faces [m, 3]; uv [m, 3, 2] per face corner, or None: box mapping."""
-
-    vertices: np.ndarray
-    faces: np.ndarray
-    uv: np.ndarray | None = None
-
-    def moved(self, matrix: np.ndarray) -> Mesh:
-        vertices = self.vertices @ matrix[:3, :3].T + matrix[:3, 3]
-        flip = np.linalg.det(matrix[:3, :3]) < 0
-        faces = self.faces[:, ::-1] if flip else self.faces
-        uv = self.uv[:, ::-1] if flip and self.uv is not None else self.uv
-        return Mesh(vertices, faces, uv)
-
-
-@dataclasses.dataclass(frozen=True)
-class Solid:
-    """A shape: `visuals` are drawn, `hulls` are point sets [n, 3] whose convex hulls collide."""
-
-    visuals: tuple[Mesh, ...] = ()
-    hulls: tuple[np.ndarray, ...] = ()
-
-    def __add__(self, other: Solid) -> Solid:
-        return Solid(self.visuals + other.visuals, self.hulls + other.hulls)
-
-    def moved(self, matrix: np.ndarray) -> Solid:
-        """Transformed by a 4x4 matrix."""
-        hulls = tuple(points @ matrix[:3, :3].T + matrix[:3, 3] for points in self.hulls)
-        return Solid(tuple(mesh.moved(matrix) for mesh in self.visuals), hulls)
-
-    def at(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Solid:
-        matrix = np.eye(4)
-        matrix[:3, 3] = (x, y, z)
-        return self.moved(matrix)
-
-    def turned(self, axis: str, degrees: float) -> Solid:
-        """Rotated about a coordinate axis through the origin."""
-        return self.moved(trimesh.transformations.rotation_matrix(math.radians(degrees), AXES[axis]))
-
-    def scaled(self, x: float = 1.0, y: float = 1.0, z: float = 1.0) -> Solid:
-        return self.moved(np.diag([x, y, z, 1.0]))
-
-    def mirrored(self, axis: str) -> Solid:
-        return self.scaled(**{axis: -1.0})
-
-    def seen(self) -> Solid:
-        """Only the visuals: a detail that nothing touches."""
-        return Solid(self.visuals, ())
-
-    def felt(self) -> Solid:
-        """Only the collision hulls."""
-        return Solid((), self.hulls)
-
-    def points(self) -> np.ndarray:
-        """All points [n, 3] of hulls and visuals."""
-        return np.concatenate([*self.hulls, *(mesh.vertices for mesh in self.visuals)])
-
-
-def join(solids: Iterable[Solid]) -> Solid:
-    total = Solid()
-    for solid in solids:
-        total += solid
-    return total
-
-
-def one_hull(solid: Solid) -> Solid:
-    """The same picture with a single hull around all hulls; give it few points."""
-    return Solid(solid.visuals, (np.concatenate(solid.hulls),))
+__all__ = [
+    "Mesh", "Solid", "Vec", "arc", "ball", "bar", "block", "box", "cylinder", "decal", "extrusion", "frustum", "hull",
+    "join", "lathe", "prism", "rod", "sheet", "sleeve", "soft_box", "tube",
+]  # fmt: skip
 
 
 def _corners(size: Vec) -> np.ndarray:
@@ -149,95 +81,8 @@ def soft_box(x: float, y: float, z: float, radius: float | None = None, steps: i
                         quad.append(vertex(tuple(key)))  # type: ignore[arg-type]
                     quad = quad if side == last else quad[::-1]
                     faces += [[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]]
-    mesh = Mesh(np.array(vertices) + [0, 0, z / 2], np.array(faces))
-    return Solid((mesh,), (_corners(size) + [0, 0, z / 2],))
-
-
-def lathe(profile: Sequence[tuple[float, float]], sides: int = ROUND_SIDES, split: Sequence[float] = ()) -> Solid:
-    """A turned shape. profile: (radius, z) from the bottom up; it is closed to the axis at both ends.
-
-    split: heights at which the collision is cut into separate hulls (a bottle: at the shoulder).
-    """
-    visual = _turn(_close(profile), sides)
-    cuts = [-math.inf, *split, math.inf]
-    hulls = []
-    for low, high in zip(cuts[:-1], cuts[1:], strict=True):
-        hulls.append(_turned_hull(_band(list(profile), low, high)))
-    return Solid((visual,), tuple(hulls))
-
-
-def sleeve(profile: Sequence[tuple[float, float]], sides: int = ROUND_SIDES) -> Solid:
-    """A turned skin without end caps, only seen: a label around a bottle, a stripe. profile: (radius, z), upwards."""
-    return Solid((_turn([(float(r), float(z)) for r, z in profile], sides),))
-
-
-def _close(profile: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    points = [(float(r), float(z)) for r, z in profile]
-    if points[0][0] > 0:
-        points.insert(0, (0.0, points[0][1]))
-    if points[-1][0] > 0:
-        points.append((0.0, points[-1][1]))
-    return points
-
-
-def _turn(points: list[tuple[float, float]], sides: int) -> Mesh:
-    """Revolves a polyline about z; points on the axis become one vertex."""
-    angles = np.arange(sides) * 2 * math.pi / sides
-    vertices: list[Sequence[float]] = []
-    rings = []
-    for r, z in points:
-        start = len(vertices)
-        if r <= 1e-9:
-            vertices.append((0.0, 0.0, z))
-            rings.append([start] * sides)
-        else:
-            vertices += [(r * math.cos(a), r * math.sin(a), z) for a in angles]
-            rings.append(list(range(start, start + sides)))
-    faces = []
-    for low, high in zip(rings[:-1], rings[1:], strict=True):
-        for k in range(sides):
-            n = (k + 1) % sides
-            if low[k] != low[n]:
-                faces.append((low[k], low[n], high[n]))
-            if high[k] != high[n]:
-                faces.append((low[k], high[n], high[k]))
-    return Mesh(np.array(vertices), np.array(faces))
-
-
-def _band(profile: list[tuple[float, float]], low: float, high: float) -> list[tuple[float, float]]:
-    """The part of a profile between two heights, with the cut points put in."""
-    points = []
-    for (r0, z0), (r1, z1) in zip(profile[:-1], profile[1:], strict=True):
-        a, b = min(z0, z1), max(z0, z1)
-        if low <= z0 <= high:
-            points.append((r0, z0))
-        points += [(r0 + (r1 - r0) * (cut - z0) / (z1 - z0), cut) for cut in (low, high) if a < cut < b]
-    if low <= profile[-1][1] <= high:
-        points.append(profile[-1])
-    return points
-
-
-def _turned_hull(profile: list[tuple[float, float]]) -> np.ndarray:
-    """Points of a round hull: the lowest, the widest and the highest level of a profile (at most 3 x HULL_SIDES + 2)."""
-    levels = {min(profile, key=lambda p: (p[1], -p[0])), max(profile, key=lambda p: (p[1], p[0])), max(profile)}
-    widest = max(levels)[0]
-    lowest_wide = min((p for p in profile if p[0] >= 0.97 * widest), key=lambda p: p[1])
-    highest_wide = max((p for p in profile if p[0] >= 0.97 * widest), key=lambda p: p[1])
-    levels |= {lowest_wide, highest_wide}
-    sides = HULL_SIDES if sum(r > 1e-6 for r, _ in levels) <= 3 else 8
-    angles = np.arange(sides) * 2 * math.pi / sides
-    points = []
-    for r, z in sorted(levels, key=lambda p: p[1]):
-        if r <= 1e-6:
-            points.append((0.0, 0.0, z))
-        else:
-            points += [(r * math.cos(a), r * math.sin(a), z) for a in angles]
-    return np.array(points)
-
-
-def cylinder(radius: float, height: float, sides: int = ROUND_SIDES) -> Solid:
-    """A cylinder along z standing on the origin."""
-    return lathe([(radius, 0), (radius, height)], sides)
+    mesh = Mesh(np.array(vertices) + np.array([0, 0, z / 2]), np.array(faces))
+    return Solid((mesh,), (_corners(size) + np.array([0, 0, z / 2]),))
 
 
 def rod(start: Vec, end: Vec, radius: float, sides: int = 8) -> Solid:
@@ -263,21 +108,6 @@ def bar(start: Vec, end: Vec, width: float, depth: float) -> Solid:
     matrix[:3, 0], matrix[:3, 1], matrix[:3, 2] = along, side, np.cross(along, side)
     matrix[:3, 3] = (a + b) / 2
     return block((float(np.linalg.norm(b - a)), width, depth)).moved(matrix)
-
-
-def ball(x: float, y: float, z: float, sides: int = 16) -> Solid:
-    """An ellipsoid with full axes x, y, z standing on the origin."""
-    levels = 9
-    angles = np.linspace(-math.pi / 2, math.pi / 2, levels)
-    points = [(max(0.0, 0.5 * math.cos(a)), 0.5 + 0.5 * math.sin(a)) for a in angles]
-    visual = _turn([(r if 0 < k < levels - 1 else 0.0, h) for k, (r, h) in enumerate(points)], sides)
-    ring = np.arange(8) * math.pi / 4
-    hull = [(0, 0, 0.0), (0, 0, 1.0)]
-    for a in (-math.pi / 4, 0.0, math.pi / 4):
-        hull += [
-            (0.5 * math.cos(a) * math.cos(t), 0.5 * math.cos(a) * math.sin(t), 0.5 + 0.5 * math.sin(a)) for t in ring
-        ]
-    return Solid((visual,), (np.array(hull),)).scaled(x, y, z)
 
 
 def tube(path: Sequence[Vec], radius: float, sides: int = 8, hulls: int | None = 1, closed: bool = False) -> Solid:
@@ -314,7 +144,7 @@ def tube(path: Sequence[Vec], radius: float, sides: int = 8, hulls: int | None =
     edges = np.linspace(0, len(stations) - 1, runs + 1).round().astype(int)
     step = 2 if sides >= 8 else 1
     pieces = []
-    for a, b in zip(edges[:-1], edges[1:], strict=True):
+    for a, b in itertools.pairwise(edges):
         picked = stations[a : b + 1]
         if len(picked) > 5:
             picked = [picked[i] for i in np.linspace(0, len(picked) - 1, 5).round().astype(int)]
@@ -340,7 +170,7 @@ def extrusion(
     """A simple (also concave) outline (x, y), counter-clockwise, extruded along z; `pieces`: outlines of its hulls."""
     flat = np.asarray(outline, float)
     count = len(flat)
-    caps = np.array(trimesh.creation.triangulate_polygon(_polygon(flat), engine="earcut")[1])
+    caps = np.array(trimesh.creation.triangulate_polygon(shapely.Polygon(flat), engine="earcut")[1])
     area = np.cross(flat[caps[:, 1]] - flat[caps[:, 0]], flat[caps[:, 2]] - flat[caps[:, 0]])
     caps = np.where(area[:, None] < 0, caps[:, ::-1], caps)
     vertices = np.concatenate([np.c_[flat, np.zeros(count)], np.c_[flat, np.full(count, height)]])
@@ -353,12 +183,6 @@ def extrusion(
         p = np.asarray(piece, float)
         hulls.append(np.concatenate([np.c_[p, np.zeros(len(p))], np.c_[p, np.full(len(p), height)]]))
     return Solid((Mesh(vertices, faces),), tuple(hulls))
-
-
-def _polygon(flat: np.ndarray):
-    import shapely
-
-    return shapely.Polygon(flat)
 
 
 def hull(points: Sequence[Vec]) -> Solid:
@@ -408,5 +232,5 @@ def sheet(x: float, y: float, waves: float, thickness: float, count: int = 10, p
     total = count * count
     side = np.concatenate([np.c_[rim + total, nxt + total, nxt], np.c_[rim + total, nxt, rim]])
     faces = np.concatenate([upper, upper[:, ::-1] + total, side])
-    felt = _corners((x, y, thickness + waves)) + [0, 0, (thickness + waves) / 2]
+    felt = _corners((x, y, thickness + waves)) + np.array([0, 0, (thickness + waves) / 2])
     return Solid((Mesh(np.concatenate([top, bottom]), faces),), (felt,))

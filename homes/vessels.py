@@ -7,7 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .solids import ROUND_SIDES, Mesh, Solid, _turn, block, join
+from .solids import Mesh, Solid, block, join
+from .turned import ROUND_SIDES, turn
 
 RING_GROWTH = 0.5  # a ring's corners lie this far between the circle and the polygon around it
 
@@ -41,7 +42,7 @@ def turned_vessel(
     floor = wall if floor is None else floor
     outer = [(float(r), float(z)) for r, z in profile]
     inner = [(max(r - wall, 1e-4), max(z, outer[0][1] + floor)) for r, z in reversed(outer)]
-    visual = _turn([(0.0, outer[0][1]), *outer, *inner, (0.0, outer[0][1] + floor)], sides)
+    visual = turn([(0.0, outer[0][1]), *outer, *inner, (0.0, outer[0][1] + floor)], sides)
     (r0, z0), (r1, z1) = outer[0], outer[-1]
     return Solid((visual,)) + disc(r0, z0, floor) + ring(r0, r1, z0, z1, wall, pieces)
 

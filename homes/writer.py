@@ -152,7 +152,7 @@ def visual_obj(meshes: Iterable[Mesh], material: Material, name: str) -> str:
 
 
 def box_mapping(mesh: Mesh, tile: float) -> np.ndarray:
-    """[m, 3, 2] texture coordinates: each face is projected along the axis it faces most; u follows the longest edge."""
+    """[m, 3, 2] texture coordinates: each face is seen along the axis it faces most; u follows the longest edge."""
     order = np.argsort(-np.ptp(mesh.vertices, axis=0).round(6), kind="stable")
     corners = mesh.vertices[mesh.faces]
     normals = np.abs(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))

@@ -18,6 +18,10 @@ from . import (
     food,
     fridges,
     fruit,
+    jars_cups,
+    lamps,
+    machines,
+    meat_fish,
     packages,
     shelves,
     sinks,
@@ -30,6 +34,7 @@ from . import (
     toys,
     utensils,
     vegetables,
+    wrappings,
 )
 
 FAMILIES = (
@@ -50,6 +55,10 @@ FAMILIES = (
     food,
     fridges,
     fruit,
+    jars_cups,
+    lamps,
+    machines,
+    meat_fish,
     packages,
     shelves,
     sinks,
@@ -62,4 +71,5 @@ FAMILIES = (
     toys,
     utensils,
     vegetables,
+    wrappings,
 )

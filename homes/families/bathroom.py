@@ -36,6 +36,7 @@ def bathtub(b: ObjectBuilder) -> None:
     chrome = materials.metal("chrome")
     b.add(tap(0.12, 0.16).at(-x / 2 + 0.035, 0, top), chrome)
     b.add(cylinder(0.02, 0.04, 10).seen().at(-x / 2 + 0.035, 0.1, top), chrome)
+    b.point("water_sink", (-0.3 * x, 0, 0.09))
     b.add(cylinder(0.03, 0.003, 12).seen().at(-0.3 * x, 0, 0.09), materials.metal("iron"))
 
 
@@ -109,6 +110,7 @@ def shower(b: ObjectBuilder) -> None:
     )
     b.add(lathe([(0.09, 0), (0.08, 0.012), (0.02, 0.03)], 16).at(wall_x + 0.24, 0.1, z - 0.1), chrome)
     b.add(soft_box(0.05, 0.2, 0.05, 0.015).at(wall_x, 0.1, 1.05), chrome)
+    b.point("water_sink", (0, 0, 0.05))
     b.add(cylinder(0.04, 0.003, 12).seen().at(0, 0, 0.05), materials.metal("iron"))
 
 

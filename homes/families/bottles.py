@@ -8,7 +8,7 @@ from .. import materials, textures
 from ..catalogue import Entry
 from ..materials import Material
 from ..model import ObjectBuilder
-from ..solids import Solid, ball, block, box, cylinder, decal, hull, lathe, rod, sleeve, soft_box, tube
+from ..solids import Solid, ball, block, cylinder, decal, hull, lathe, rod, sleeve, soft_box, tube
 from ..vessels import disc, ring, turned_vessel
 from .packages import printed
 from .parts import ear
@@ -23,17 +23,30 @@ def band(r: float, low: float, high: float, material: Material) -> tuple[Solid, 
     return sleeve([(r * 1.01, low), (r * 1.01, high)]), material
 
 
-def bottle(b: ObjectBuilder, *, looks: tuple = (("green", "cream"),), neck: float = 0.28, shoulder: float = 0.62,
-           clear: bool = False, cap: str | None = None) -> None:  # fmt: skip
-    """A round bottle. looks: (body, label) colours; neck: its radius relative to the body; shoulder: where it begins."""
+def bottle(
+    b: ObjectBuilder,
+    *,
+    looks: tuple = (("green", "cream"),),
+    neck: float = 0.28,
+    shoulder: float = 0.62,
+    clear: bool = False,
+    cap: str | None = None,
+) -> None:
+    """A round bottle. looks: (body, label) colours; neck: radius relative to the body; shoulder: where it begins."""
     x, _, z = b.size
     r = x / 2
     look, label = b.pick(looks)
     body = body_material(look, clear)
     n = neck * r
     high = (shoulder + 0.5 * (1 - shoulder)) * z
-    profile = [(0.92 * r, 0), (r, 0.03 * z), (r, shoulder * z), (0.8 * r, shoulder * z + 0.35 * (high - shoulder * z)),
-               (n * 1.1, high), (n, z)]  # fmt: skip
+    profile = [
+        (0.92 * r, 0),
+        (r, 0.03 * z),
+        (r, shoulder * z),
+        (0.8 * r, shoulder * z + 0.35 * (high - shoulder * z)),
+        (n * 1.1, high),
+        (n, z),
+    ]
     b.add(lathe(profile, split=[high]), body)
     b.add(*band(r, 0.18 * z, (shoulder - 0.08) * z, materials.plain(label, "paper")))
     b.add(*band(r * 1.002, 0.3 * z, 0.36 * z, materials.plain(look, "paper")))
@@ -65,8 +78,13 @@ def jug_bottle(b: ObjectBuilder, *, looks: tuple = (("orange", "blue"),)) -> Non
     plastic = materials.plain(look, "plastic", 0.5)
     body = 0.7 * z
     b.add(soft_box(x, y, body, 0.16 * x), plastic)
-    b.add(hull([(sx * 0.45 * x, sy * 0.46 * y, body * 0.96) for sx in (-1, 1) for sy in (-1, 1)]
-               + [(sx * 0.22 * x, 0.1 * y + sy * 0.18 * y, 0.86 * z) for sx in (-1, 1) for sy in (-1, 1)]), plastic)  # fmt: skip
+    b.add(
+        hull(
+            [(sx * 0.45 * x, sy * 0.46 * y, body * 0.96) for sx in (-1, 1) for sy in (-1, 1)]
+            + [(sx * 0.22 * x, 0.1 * y + sy * 0.18 * y, 0.86 * z) for sx in (-1, 1) for sy in (-1, 1)]
+        ),
+        plastic,
+    )
     b.add(
         tube(
             [(0, -0.4 * y, 0.66 * z), (0, -0.42 * y, 0.8 * z), (0, -0.2 * y, 0.86 * z), (0, 0.02 * y, 0.84 * z)],
@@ -80,83 +98,6 @@ def jug_bottle(b: ObjectBuilder, *, looks: tuple = (("orange", "blue"),)) -> Non
     b.add(decal(0.8 * y, 0.7 * body).at(x / 2 + 0.0005, 0, 0.45 * body), printed(b, label, look))
 
 
-def can(
-    b: ObjectBuilder, *, looks: tuple = (("red", "white"), ("blue", "silver"), ("green", "lime"), ("orange", "cream"))
-) -> None:
-    """A drink can."""
-    x, _, z = b.size
-    r = x / 2
-    look, accent = b.pick(looks)
-    silver = materials.metal("silver")
-    profile = [(0.78 * r, 0), (r, 0.08 * z), (r, 0.88 * z), (0.8 * r, 0.97 * z), (0.82 * r, z)]
-    b.add(lathe(profile), materials.plain(look, "metal", 0.7))
-    b.add(*band(r * 0.996, 0.35 * z, 0.62 * z, materials.plain(accent, "metal", 0.7)))
-    b.add(cylinder(0.8 * r, 0.001).seen().at(z=z), silver)
-    b.add(soft_box(0.5 * r, 0.3 * r, 0.002).seen().at(0.15 * r, 0, z + 0.001), silver)
-
-
-def jar(b: ObjectBuilder, *, fills: tuple = ("red", "tan", "orange", "lime"), hinged: bool = True) -> None:
-    """A hollow glass jar: 6 walls, a floor, and a lid hinged at its rear rim."""
-    x, _, z = b.size
-    r = x / 2
-    glass = materials.glass("glass", 0.35)
-    top = 0.86 * z
-    b.add(turned_vessel([(0.95 * r, 0), (r, 0.06 * z), (r, 0.9 * top), (0.92 * r, top)], 0.004, 6, floor=0.006), glass)
-    lid = b.hinge("lid", (-r, 0, top), (0, -1, 0), 2.0, hinged)
-    look = b.pick(
-        (
-            materials.metal("gold"),
-            materials.plain("red", "metal"),
-            materials.wood("pine", b.rng),
-            materials.metal("silver"),
-        )
-    )
-    lid.add(cylinder(0.97 * r, z - top - 0.004).at(z=top + 0.002), look)
-
-
-def filled_jar(
-    b: ObjectBuilder, *, fills: tuple = ("red",), lids: tuple = ("gold", "red", "white"), label: bool = True
-) -> None:
-    """A full, closed jar (jam, sauce, sugar): solid."""
-    x, _, z = b.size
-    r = x / 2
-    fill = b.pick(fills)
-    top = 0.84 * z
-    b.add(
-        lathe([(0.92 * r, 0), (r, 0.05 * z), (r, 0.88 * top), (0.84 * r, top)]),
-        materials.plain(materials.tint(fill, b.rng), "glass", 0.8),
-    )
-    b.add(lathe([(0.92 * r, top), (0.92 * r, z)]), materials.plain(b.pick(lids), "metal", 0.6))
-    if label:
-        b.add(*band(r, 0.25 * z, 0.6 * z, materials.plain("cream", "paper")))
-        b.add(*band(r * 1.003, 0.38 * z, 0.46 * z, materials.plain(b.pick(lids), "paper")))
-
-
-def shaker(b: ObjectBuilder, *, looks: tuple = (("white", "silver"),)) -> None:
-    """A salt shaker or spice pot: body and domed cap with holes to be seen."""
-    x, _, z = b.size
-    r = x / 2
-    look, top = b.pick(looks)
-    b.add(lathe([(0.95 * r, 0), (r, 0.1 * z), (0.75 * r, 0.7 * z)], 14), materials.plain(look, "ceramic", 0.6))
-    b.add(lathe([(0.78 * r, 0.7 * z), (0.74 * r, 0.88 * z), (0.3 * r, z)], 14), materials.metal(top))
-    for k in range(5):
-        a = 2 * math.pi * k / 5
-        b.add(
-            cylinder(0.05 * r, 0.02 * z, 6).seen().at(0.25 * r * math.cos(a), 0.25 * r * math.sin(a), 0.985 * z),
-            materials.plain("black"),
-        )
-
-
-def mill(b: ObjectBuilder) -> None:
-    """A turned pepper mill."""
-    x, _, z = b.size
-    r = x / 2
-    wood = materials.wood(b.pick(("walnut", "cherry", "oak")), b.rng)
-    b.add(lathe([(r, 0), (r, 0.12 * z), (0.6 * r, 0.3 * z), (0.75 * r, 0.6 * z), (0.9 * r, 0.7 * z)], 16), wood)
-    b.add(lathe([(0.9 * r, 0.71 * z), (0.95 * r, 0.82 * z), (0.5 * r, 0.93 * z)], 16), wood)
-    b.add(ball(0.5 * r, 0.5 * r, 0.07 * z, 10).seen().at(z=0.93 * z), materials.metal("gold"))
-
-
 def tube_bottle(b: ObjectBuilder, *, looks: tuple = (("white", "blue"), ("red", "white"), ("mint", "green"))) -> None:
     """A squeeze tube lying on its back: flat end, round shoulder, cap."""
     x, y, z = b.size
@@ -168,8 +109,17 @@ def tube_bottle(b: ObjectBuilder, *, looks: tuple = (("white", "blue"), ("red", 
     round_ = [(x / 2 - cap, r * 1.3 * math.cos(a), r + r * math.sin(a)) for a in (k * math.pi / 4 for k in range(8))]
     b.add(hull(flat + round_), skin)
     b.add(cylinder(0.7 * r, cap, 12).turned("y", 90).at(x / 2 - cap, 0, r), materials.plain(accent))
-    b.add(hull([(-0.3 * x + 0.05 * x * k, s * y * 0.46, 0.5 * z + h * (0.10 + 0.14 * k) * z * 0.85) for k in range(4) for s in (-0.6, 0.6)
-                for h in (0, 1.12)]).seen(), materials.plain(accent))  # fmt: skip
+    b.add(
+        hull(
+            [
+                (-0.3 * x + 0.05 * x * k, s * y * 0.46, 0.5 * z + h * (0.10 + 0.14 * k) * z * 0.85)
+                for k in range(4)
+                for s in (-0.6, 0.6)
+                for h in (0, 1.12)
+            ]
+        ).seen(),
+        materials.plain(accent),
+    )
 
 
 def perfume(b: ObjectBuilder) -> None:
@@ -206,6 +156,7 @@ def atomizer(b: ObjectBuilder) -> None:
     )
     b.add(block((0.2 * x, 0.14 * y, 0.05 * z), (0.4 * x, 0, 0.95 * z)), head)
     b.add(rod((0.1 * x, 0, 0.86 * z), (0.22 * x, 0, 0.66 * z), 0.06 * y, 6).seen(), head)
+    b.point("toggle_button", (0.16 * x, 0, 0.76 * z))
 
 
 def carafe(b: ObjectBuilder) -> None:
@@ -253,73 +204,6 @@ def pitcher(b: ObjectBuilder) -> None:
     b.add(hull(lip).seen(), look)
 
 
-def drink(b: ObjectBuilder) -> None:
-    """A martini glass, filled."""
-    x, _, z = b.size
-    r = x / 2
-    glass = materials.glass("glass", 0.4)
-    b.add(
-        lathe(
-            [(0.62 * r, 0), (0.6 * r, 0.004), (0.07 * r, 0.03 * z), (0.06 * r, 0.55 * z), (0.1 * r, 0.57 * z)],
-            split=[0.03 * z],
-        ),
-        glass,
-    )
-    b.add(lathe([(0.05 * r, 0.56 * z), (r, z)], split=[]), glass)
-    b.add(
-        lathe([(0.05 * r, 0.575 * z), (0.86 * r, 0.94 * z)]).seen(),
-        materials.glass(b.pick(("lime", "pink", "gold")), 0.7),
-    )
-    b.add(ball(0.2 * r, 0.2 * r, 0.2 * r, 8).seen().at(0.3 * r, 0, 0.9 * z), materials.plain("leaf", "organic"))
-
-
-def paper_cup(b: ObjectBuilder) -> None:
-    """A take-away coffee cup with lid and sleeve."""
-    x, _, z = b.size
-    r = x / 2
-    b.add(lathe([(0.68 * r, 0), (0.95 * r, 0.92 * z)]), materials.plain("white", "paper"))
-    b.add(
-        sleeve([(0.78 * r, 0.25 * z), (0.9 * r, 0.65 * z)]).scaled(1.02, 1.02),
-        materials.plain(b.pick(("cardboard", "dark_green", "red")), "paper"),
-    )
-    b.add(lathe([(r, 0.92 * z), (r, 0.95 * z), (0.85 * r, z)]), materials.plain("white"))
-
-
-def pouch(b: ObjectBuilder, *, looks: tuple = (("brown", "gold"), ("dark_green", "cream"), ("black", "red"))) -> None:
-    """A standing bag with a folded top (coffee, flour)."""
-    x, y, z = b.size
-    look, accent = b.pick(looks)
-    points = [(sx * x / 2, sy * y / 2, h) for sx in (-1, 1) for sy in (-1, 1) for h in (0, 0.62 * z)]
-    points += [(sx * 0.08 * x, sy * y / 2, 0.88 * z) for sx in (-1, 1) for sy in (-1, 1)]
-    foil = materials.plain(look, "paper", 0.3)
-    b.add(hull(points), foil)
-    b.add(soft_box(0.2 * x, y, 0.12 * z).at(z=0.88 * z), foil)
-    for side, s in (("x", 1), ("-x", -1)):
-        b.add(decal(0.8 * y, 0.52 * z, side).at(s * (x / 2 + 0.0005), 0, 0.32 * z), printed(b, accent, look))
-
-
-def cup_tub(b: ObjectBuilder, *, looks: tuple = (("white", "pink"), ("white", "blue"), ("cream", "orange"))) -> None:
-    """A plastic pot with a foil lid (yogurt, cream)."""
-    x, _, z = b.size
-    r = x / 2
-    look, accent = b.pick(looks)
-    b.add(lathe([(0.78 * r, 0), (0.95 * r, 0.92 * z), (r, 0.93 * z), (r, z)]), materials.plain(look))
-    b.add(cylinder(r * 0.99, 0.001).seen().at(z=z), materials.metal("silver"))
-    b.add(sleeve([(0.82 * r, 0.2 * z), (0.92 * r, 0.72 * z)]).scaled(1.02, 1.02), materials.plain(accent, "paper"))
-
-
-def paint_tin(b: ObjectBuilder) -> None:
-    x, _, z = b.size
-    r = x / 2
-    b.add(lathe([(r, 0), (r, 0.94 * z), (0.96 * r, z)]), materials.metal("silver", b.rng))
-    b.add(*band(r, 0.15 * z, 0.8 * z, materials.plain(b.pick(("blue", "yellow", "green", "white")), "paper")))
-    arch = [
-        (1.015 * r * math.sin(a), r * math.cos(a), 0.78 * z - 0.32 * z * math.sin(a))
-        for a in (k * math.pi / 8 for k in range(9))
-    ]
-    b.add(tube(arch, 0.0025, 5, hulls=0), materials.metal("steel"))
-
-
 def bar_soap(b: ObjectBuilder) -> None:
     x, y, z = b.size
     b.add(soft_box(x, y, z, 0.42 * z, 3), materials.plain(b.pick(("cream", "mint", "pink", "sky")), "organic", 0.5))
@@ -327,20 +211,6 @@ def bar_soap(b: ObjectBuilder) -> None:
         decal(0.5 * y, 0.4 * x, "z").at(z=z + 0.0003),
         materials.picture("stamp", textures.stripes((0.9, 0.9, 0.85), (0.8, 0.8, 0.75), 3)),
     )
-
-
-def case_of_cans(b: ObjectBuilder) -> None:
-    """A cardboard tray with a block of cans under film."""
-    x, y, z = b.size
-    b.add(box(x, y, 0.35 * z), materials.plain("cardboard", "cardboard"))
-    red = materials.plain(b.pick(("red", "blue", "green")), "metal", 0.6)
-    for i in range(3):
-        for j in range(4):
-            px, py = (i - 1) * x / 3, (j - 1.5) * y / 4
-            r = min(x / 6.3, y / 8.4)
-            b.add(lathe([(r, 0.3 * z), (r, 0.94 * z), (0.8 * r, z)], 12).seen().at(px, py), red)
-            b.add(cylinder(0.78 * r, 0.001, 12).seen().at(px, py, z), materials.metal("silver"))
-    b.add(box(0.96 * x, 0.96 * y, 0.65 * z).felt().at(z=0.35 * z), red)
 
 
 def lipstick(b: ObjectBuilder) -> None:
@@ -354,42 +224,33 @@ def lipstick(b: ObjectBuilder) -> None:
     )
 
 
-def pills(b: ObjectBuilder) -> None:
-    x, _, z = b.size
-    r = x / 2
-    b.add(lathe([(0.9 * r, 0), (0.9 * r, 0.76 * z)]), materials.glass(b.pick(("orange", "white", "sky")), 0.85))
-    b.add(lathe([(r, 0.76 * z), (r, z)]), materials.plain("white"))
-    b.add(*band(0.9 * r, 0.12 * z, 0.62 * z, materials.plain("paper", "paper")))
-
-
 CATEGORIES = [
     Entry("wine_bottle", bottle, (0.076, 0.076, 0.300), 1.25, 4,
           options={"looks": (("dark_green", "cream"), ("black", "white"), ("green", "gold"))}),
-    Entry("beer", bottle, (0.062, 0.062, 0.230), 0.55, 4, options={"looks": (("brown", "gold"), ("dark_green", "white")), "neck": 0.4,
+    Entry("beer", bottle, (0.062, 0.062, 0.230), 0.55, 4,
+          options={"looks": (("brown", "gold"), ("dark_green", "white")), "neck": 0.4,
                                                                   "cap": "silver"}),
-    Entry("water", bottle, (0.066, 0.066, 0.220), 0.53, 3, options={"looks": (("sky", "blue"), ("glass", "white")), "neck": 0.42,
+    Entry("water", bottle, (0.066, 0.066, 0.220), 0.53, 3,
+          options={"looks": (("sky", "blue"), ("glass", "white")), "neck": 0.42,
                                                                   "shoulder": 0.75, "clear": True, "cap": "blue"}),
-    Entry("olive_oil", bottle, (0.072, 0.072, 0.280), 0.95, 3, options={"looks": (((0.55, 0.56, 0.16), "gold"), ("dark_green", "cream")),
+    Entry("olive_oil", bottle, (0.072, 0.072, 0.280), 0.95, 3,
+          options={"looks": (((0.55, 0.56, 0.16), "gold"), ("dark_green", "cream")),
                                                                       "cap": "dark_green"}),
-    Entry("vinegar", bottle, (0.066, 0.066, 0.260), 0.75, 3, options={"looks": (("dark_red", "cream"), ("gold", "white")), "clear": True}),
+    Entry("vinegar", bottle, (0.066, 0.066, 0.260), 0.75, 3,
+          options={"looks": (("dark_red", "cream"), ("gold", "white")), "clear": True}),
     Entry("catsup", squeeze, (0.055, 0.085, 0.200), 0.55, 3, options={"looks": (("red", "white"), ("red", "green"))}),
-    Entry("mayonnaise", squeeze, (0.060, 0.085, 0.190), 0.45, 3, options={"looks": (("cream", "blue"), ("white", "yellow"))}),
-    Entry("shampoo", squeeze, (0.050, 0.080, 0.210), 0.42, 4, options={"looks": (("sky", "white"), ("green", "cream"), ("purple", "pink"))}),
-    Entry("conditioner", squeeze, (0.050, 0.080, 0.200), 0.42, 2, options={"looks": (("cream", "gold"), ("pink", "white"))}),
-    Entry("lotion", squeeze, (0.055, 0.075, 0.190), 0.36, 3, options={"looks": (("white", "blue"), ("pink", "white")), "pump": True}),
-    Entry("sunscreen", squeeze, (0.042, 0.065, 0.165), 0.24, 2, options={"looks": (("orange", "white"), ("yellow", "blue"))}),
+    Entry("mayonnaise", squeeze, (0.060, 0.085, 0.190), 0.45, 3,
+          options={"looks": (("cream", "blue"), ("white", "yellow"))}),
+    Entry("shampoo", squeeze, (0.050, 0.080, 0.210), 0.42, 4,
+          options={"looks": (("sky", "white"), ("green", "cream"), ("purple", "pink"))}),
+    Entry("conditioner", squeeze, (0.050, 0.080, 0.200), 0.42, 2,
+          options={"looks": (("cream", "gold"), ("pink", "white"))}),
+    Entry("lotion", squeeze, (0.055, 0.075, 0.190), 0.36, 3,
+          options={"looks": (("white", "blue"), ("pink", "white")), "pump": True}),
+    Entry("sunscreen", squeeze, (0.042, 0.065, 0.165), 0.24, 2,
+          options={"looks": (("orange", "white"), ("yellow", "blue"))}),
     Entry("detergent", jug_bottle, (0.100, 0.170, 0.270), 1.9, 4,
           options={"looks": (("orange", "blue"), ("blue", "white"), ("green", "white"), ("white", "red"))}),
-    Entry("pop", can, (0.066, 0.066, 0.122), 0.37, 4),
-    Entry("pop_case", case_of_cans, (0.200, 0.268, 0.125), 4.5, 3, vary=0.03),
-    Entry("jar", jar, (0.095, 0.095, 0.150), 0.42, 6, rest="upright"),
-    Entry("jam", filled_jar, (0.072, 0.072, 0.092), 0.45, 3, options={"fills": ("dark_red", "orange", "purple")}),
-    Entry("spaghetti_sauce", filled_jar, (0.088, 0.088, 0.165), 0.90, 3, options={"fills": ((0.68, 0.16, 0.08), (0.75, 0.30, 0.16))}),
-    Entry("sugar_jar", filled_jar, (0.100, 0.100, 0.130), 0.85, 3, options={"fills": ("white",), "lids": ("silver", "pine", "sky")}),
-    Entry("powder_bottle", filled_jar, (0.060, 0.060, 0.150), 0.25, 2, options={"fills": ("white",), "lids": ("sky", "pink")}),
-    Entry("protein_powder", filled_jar, (0.150, 0.150, 0.210), 1.20, 2, options={"fills": ("black", "navy"), "lids": ("red", "black")}),
-    Entry("salt", shaker, (0.045, 0.045, 0.090), 0.15, 3, options={"looks": (("white", "silver"), ("sky", "silver"), ("glass", "chrome"))}),
-    Entry("pepper_grinder", mill, (0.055, 0.055, 0.190), 0.25, 3),
     Entry("toothpaste", tube_bottle, (0.175, 0.055, 0.036), 0.13, 3),
     Entry("perfume", perfume, (0.034, 0.056, 0.100), 0.20, 3),
     Entry("cologne", perfume, (0.036, 0.060, 0.110), 0.22, 3),
@@ -397,14 +258,6 @@ CATEGORIES = [
     Entry("carafe", carafe, (0.110, 0.110, 0.240), 0.60, 3, rest="upright", uniform=True),
     Entry("cruet", cruet, (0.085, 0.065, 0.150), 0.30, 3),
     Entry("cream_pitcher", pitcher, (0.110, 0.075, 0.085), 0.22, 3, rest="upright", uniform=True),
-    Entry("martini", drink, (0.105, 0.105, 0.160), 0.30, 2, rest="upright", uniform=True),
-    Entry("coffee_cup", paper_cup, (0.088, 0.088, 0.115), 0.30, 3, uniform=True),
-    Entry("coffee_pouch", pouch, (0.065, 0.095, 0.190), 0.27, 3),
-    Entry("flour", pouch, (0.075, 0.115, 0.180), 1.00, 3, options={"looks": (("paper", "blue"), ("paper", "red"))}),
-    Entry("yogurt", cup_tub, (0.072, 0.072, 0.082), 0.17, 4, uniform=True),
-    Entry("cream", cup_tub, (0.078, 0.078, 0.100), 0.26, 3, uniform=True, options={"looks": (("white", "sky"), ("cream", "red"))}),
-    Entry("paint", paint_tin, (0.165, 0.165, 0.190), 4.0, 3, uniform=True),
     Entry("soap", bar_soap, (0.090, 0.058, 0.028), 0.10, 4),
     Entry("lipstick", lipstick, (0.020, 0.020, 0.080), 0.020, 3, uniform=True),
-    Entry("medicine", pills, (0.042, 0.042, 0.085), 0.06, 3, uniform=True),
 ]  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from .. import materials
 from ..catalogue import Entry
 from ..materials import Material
@@ -94,9 +96,9 @@ def _drawers(b, plane, depth, y, span, rows, front, body, metal) -> None:
 def _recentre(link, was: float, now: float) -> None:
     """Moves a drawer's front board (its last hull and mesh) from height `was` to `now`."""
     shift = now - was
-    link.hulls[-1] = link.hulls[-1] + [0, 0, shift]
+    link.hulls[-1] = link.hulls[-1] + np.array([0, 0, shift])
     material, mesh = link.seen[-1]
-    link.seen[-1] = (material, type(mesh)(mesh.vertices + [0, 0, shift], mesh.faces, mesh.uv))
+    link.seen[-1] = (material, type(mesh)(mesh.vertices + np.array([0, 0, shift]), mesh.faces, mesh.uv))
 
 
 def _doors(b, plane, y, span, front, metal, *, glazed: bool = False, handle_low: bool = False) -> None:

@@ -144,7 +144,7 @@ def folding_chair(b: ObjectBuilder) -> None:
 
 def swivel_chair(b: ObjectBuilder) -> None:
     """An office chair: star foot with castors, a column, and a seat with back and arms that turns on it."""
-    x, y, z = b.size
+    z = b.size[2]
     black = materials.plain("black")
     cloth = materials.fabric(b.pick(("dark_grey", "navy", "grey", "red")), b.rng)
     metal = materials.metal(b.pick(("chrome", "iron")))
@@ -153,8 +153,18 @@ def swivel_chair(b: ObjectBuilder) -> None:
     for k in range(5):
         a = 2 * math.pi * k / 5
         c, s = reach * math.cos(a), reach * math.sin(a)
-        b.add(hull([(c * t + dx, s * t + dy, h) for t, w, h0, h1 in ((0.1, 0.03, 0.07, 0.12), (1, 0.02, 0.05, 0.07))
-                    for dx in (-w, w) for dy in (-w, w) for h in (h0, h1)]), metal)  # fmt: skip
+        b.add(
+            hull(
+                [
+                    (c * t + dx, s * t + dy, h)
+                    for t, w, h0, h1 in ((0.1, 0.03, 0.07, 0.12), (1, 0.02, 0.05, 0.07))
+                    for dx in (-w, w)
+                    for dy in (-w, w)
+                    for h in (h0, h1)
+                ]
+            ),
+            metal,
+        )
         b.add(soft_box(0.05, 0.05, 0.055, 0.02).at(c, s), black)
     b.add(cylinder(0.03, seat - 0.1, 12).at(z=0.08), metal)
     top = b.spin("seat", (0, 0, seat - 0.03), (0, 0, 1))

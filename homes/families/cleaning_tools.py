@@ -18,10 +18,20 @@ def broom(b: ObjectBuilder) -> None:
     bristle = materials.skin(b.pick(((0.80, 0.66, 0.36), "green", "dark_grey")), b.rng, 0.4, 0.05)
     brush = 0.16 * x
     b.add(rod((-x / 2, 0, z / 2), (x / 2 - brush, 0, z / 2), 0.012), wood)
-    b.add(hull([(x / 2 - brush - 0.04, s * 0.1 * y, z / 2 + h * 0.2 * z) for s in (-1, 1) for h in (-1, 1)]
-               + [(x / 2 - brush, s * 0.42 * y, z / 2 + h * z / 2) for s in (-1, 1) for h in (-1, 1)]), wood)  # fmt: skip
-    b.add(hull([(x / 2 - brush, s * 0.4 * y, z / 2 + h * 0.45 * z) for s in (-1, 1) for h in (-1, 1)]
-               + [(x / 2 - 0.02, s * y / 2, z / 2 + h * z / 2) for s in (-1, 1) for h in (-1, 1)]), bristle)  # fmt: skip
+    b.add(
+        hull(
+            [(x / 2 - brush - 0.04, s * 0.1 * y, z / 2 + h * 0.2 * z) for s in (-1, 1) for h in (-1, 1)]
+            + [(x / 2 - brush, s * 0.42 * y, z / 2 + h * z / 2) for s in (-1, 1) for h in (-1, 1)]
+        ),
+        wood,
+    )
+    b.add(
+        hull(
+            [(x / 2 - brush, s * 0.4 * y, z / 2 + h * 0.45 * z) for s in (-1, 1) for h in (-1, 1)]
+            + [(x / 2 - 0.02, s * y / 2, z / 2 + h * z / 2) for s in (-1, 1) for h in (-1, 1)]
+        ),
+        bristle,
+    )
     b.area("cleaning_tool_area", (0.05, y, z), (x / 2 - 0.025, 0, z / 2))
 
 
@@ -51,11 +61,21 @@ def hand_brush(
 def paintbrush(b: ObjectBuilder) -> None:
     """A flat paintbrush lying along x."""
     x, y, z = b.size
-    b.add(hull([(-x / 2, s * 0.16 * y, z / 2 + h * 0.3 * z) for s in (-1, 1) for h in (-1, 1)]
-               + [(0.1 * x, s * 0.4 * y, z / 2 + h * 0.45 * z) for s in (-1, 1) for h in (-1, 1)]), materials.wood(b.pick(("pine", "red", "navy")), b.rng))  # fmt: skip
+    b.add(
+        hull(
+            [(-x / 2, s * 0.16 * y, z / 2 + h * 0.3 * z) for s in (-1, 1) for h in (-1, 1)]
+            + [(0.1 * x, s * 0.4 * y, z / 2 + h * 0.45 * z) for s in (-1, 1) for h in (-1, 1)]
+        ),
+        materials.wood(b.pick(("pine", "red", "navy")), b.rng),
+    )
     b.add(block((0.12 * x, y, z), (0.15 * x, 0, z / 2)), materials.metal("silver"))
-    b.add(hull([(0.2 * x, s * 0.48 * y, z / 2 + h * 0.45 * z) for s in (-1, 1) for h in (-1, 1)]
-               + [(x / 2, s * 0.42 * y, z / 2 + h * 0.1 * z) for s in (-1, 1) for h in (-1, 1)]), materials.skin("tan", b.rng, 0.4, 0.01))  # fmt: skip
+    b.add(
+        hull(
+            [(0.2 * x, s * 0.48 * y, z / 2 + h * 0.45 * z) for s in (-1, 1) for h in (-1, 1)]
+            + [(x / 2, s * 0.42 * y, z / 2 + h * 0.1 * z) for s in (-1, 1) for h in (-1, 1)]
+        ),
+        materials.skin("tan", b.rng, 0.4, 0.01),
+    )
 
 
 def vacuum(b: ObjectBuilder) -> None:
@@ -109,8 +129,13 @@ def scraper(b: ObjectBuilder) -> None:
     """A putty knife: a wide thin blade and a handle; the blade's edge cleans."""
     x, y, z = b.size
     blade = 0.5 * x
-    b.add(hull([(x / 2 - 0.02, s * y / 2, 0.45 * z + h) for s in (-1, 1) for h in (0, 0.0015)]
-               + [(x / 2 - blade, s * 0.18 * y, 0.45 * z + h) for s in (-1, 1) for h in (0, 0.004)]), materials.metal("steel"))  # fmt: skip
+    b.add(
+        hull(
+            [(x / 2 - 0.02, s * y / 2, 0.45 * z + h) for s in (-1, 1) for h in (0, 0.0015)]
+            + [(x / 2 - blade, s * 0.18 * y, 0.45 * z + h) for s in (-1, 1) for h in (0, 0.004)]
+        ),
+        materials.metal("steel"),
+    )
     b.add(
         soft_box(x - blade + 0.01, 0.3 * y, z, 0.35 * z).at(-blade / 2 - 0.005),
         b.pick((materials.wood("cherry", b.rng), materials.plain("red"), materials.plain("black"))),
@@ -187,6 +212,7 @@ def mousetrap(b: ObjectBuilder) -> None:
     b.add(tube(path, 0.0018, 5, hulls=0), steel)
     b.add(cylinder(0.3 * z, 0.8 * y, 8).at(z=-0.4 * y).turned("x", 90).at(0, 0, 0.7 * z), steel)
     b.add(box(0.2 * x, 0.3 * y, 0.15 * z).seen().at(-0.25 * x, 0, 0.45 * z), materials.plain("yellow", "metal"))
+    b.point("toggle_button", (-0.25 * x, 0, 0.6 * z))
 
 
 def comb(b: ObjectBuilder) -> None:
@@ -202,8 +228,13 @@ def comb(b: ObjectBuilder) -> None:
 def razor(b: ObjectBuilder) -> None:
     x, y, z = b.size
     look = materials.plain(b.pick(("blue", "pink", "black")))
-    b.add(hull([(-x / 2, s * 0.11 * y, 0.35 * z + h * 0.25 * z) for s in (-1, 1) for h in (-1, 1)]
-               + [(0.42 * x, s * 0.13 * y, 0.6 * z + h * 0.2 * z) for s in (-1, 1) for h in (-1, 1)]), look)  # fmt: skip
+    b.add(
+        hull(
+            [(-x / 2, s * 0.11 * y, 0.35 * z + h * 0.25 * z) for s in (-1, 1) for h in (-1, 1)]
+            + [(0.42 * x, s * 0.13 * y, 0.6 * z + h * 0.2 * z) for s in (-1, 1) for h in (-1, 1)]
+        ),
+        look,
+    )
     b.add(box(0.14 * x, y, 0.5 * z).at(x / 2 - 0.07 * x, 0, 0.4 * z), materials.metal("silver"))
 
 
@@ -219,8 +250,13 @@ def toothbrush(b: ObjectBuilder) -> None:
         ),
         look,
     )
-    b.add(hull([(0.2 * x, s * 0.2 * y, h) for s in (-1, 1) for h in (0, low)]
-               + [(px, s * y / 2, h) for px in (0.36 * x, x / 2) for s in (-1, 1) for h in (0, low)]), look)  # fmt: skip
+    b.add(
+        hull(
+            [(0.2 * x, s * 0.2 * y, h) for s in (-1, 1) for h in (0, low)]
+            + [(px, s * y / 2, h) for px in (0.36 * x, x / 2) for s in (-1, 1) for h in (0, low)]
+        ),
+        look,
+    )
     b.add(box(0.15 * x, 0.85 * y, z - low).seen().at(0.415 * x, 0, low), materials.plain("white"))
     b.area("cleaning_tool_area", (0.15 * x, 0.85 * y, z - low), (0.415 * x, 0, (z + low) / 2))
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from .. import materials, textures
 from ..catalogue import Entry
 from ..model import ObjectBuilder
@@ -11,10 +13,38 @@ from ..solids import arc, ball, block, box, cylinder, decal, extrusion, hull, la
 from ..vessels import ring
 from .cloths import cloth
 
-SHIRT = [(0.5, -0.26), (0.5, -0.12), (0.44, 0.0), (0.5, 0.12), (0.5, 0.26), (0.3, 0.5), (0.14, 0.42), (0.22, 0.27), (-0.5, 0.27),
-         (-0.5, -0.27), (0.22, -0.27), (0.14, -0.42), (0.3, -0.5)]  # fmt: skip
-LONG = [(0.5, -0.2), (0.5, -0.1), (0.46, 0.0), (0.5, 0.1), (0.5, 0.2), (0.36, 0.32), (-0.12, 0.5), (-0.16, 0.38), (0.18, 0.26), (-0.5, 0.27),
-        (-0.5, -0.27), (0.18, -0.26), (-0.16, -0.38), (-0.12, -0.5), (0.36, -0.32)]  # fmt: skip
+SHIRT = [
+    (0.5, -0.26),
+    (0.5, -0.12),
+    (0.44, 0.0),
+    (0.5, 0.12),
+    (0.5, 0.26),
+    (0.3, 0.5),
+    (0.14, 0.42),
+    (0.22, 0.27),
+    (-0.5, 0.27),
+    (-0.5, -0.27),
+    (0.22, -0.27),
+    (0.14, -0.42),
+    (0.3, -0.5),
+]
+LONG = [
+    (0.5, -0.2),
+    (0.5, -0.1),
+    (0.46, 0.0),
+    (0.5, 0.1),
+    (0.5, 0.2),
+    (0.36, 0.32),
+    (-0.12, 0.5),
+    (-0.16, 0.38),
+    (0.18, 0.26),
+    (-0.5, 0.27),
+    (-0.5, -0.27),
+    (0.18, -0.26),
+    (-0.16, -0.38),
+    (-0.12, -0.5),
+    (0.36, -0.32),
+]
 TROUSERS = [(0.5, -0.34), (0.5, 0.34), (-0.5, 0.5), (-0.5, 0.1), (0.2, 0.0), (-0.5, -0.1), (-0.5, -0.5)]
 DRESS = [
     (0.5, -0.2),
@@ -235,6 +265,7 @@ def watch(b: ObjectBuilder) -> None:
     b.add(cylinder(z / 2, 0.12 * x, 16).turned("y", 90).at(x / 2 - 0.16 * x, 0, z / 2), materials.metal("silver"))
     b.add(decal(0.62 * z, 0.62 * z).at(x / 2 - 0.04 * x + 0.0005, 0, z / 2), materials.picture("dial", textures.dial()))
     del y
+    b.point("toggle_button", (x / 2 - 0.1 * x, z / 2, z / 2))
 
 
 def umbrella(b: ObjectBuilder) -> None:
@@ -270,7 +301,7 @@ def hanger(b: ObjectBuilder) -> None:
     for start, end in ((left, top), (top, right), (left, right)):
         b.add(rod(start, end, z / 2, 8), wood)
     hook = [top, (top[0] + 0.1 * x, 0, z / 2)] + [
-        p + (x / 2 - 0.17 * x, 0, z / 2) for p in arc(0.15 * x, -160, 60, 8, "xy")
+        p + np.array([x / 2 - 0.17 * x, 0, z / 2]) for p in arc(0.15 * x, -160, 60, 8, "xy")
     ]
     b.add(tube(hook, 0.25 * z, 6, hulls=2), materials.metal("steel"))
 

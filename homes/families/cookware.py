@@ -13,8 +13,14 @@ from ..vessels import turned_vessel
 
 
 def _metal(b: ObjectBuilder) -> Material:
-    return b.pick((materials.metal("steel", b.rng), materials.metal("iron"), materials.metal("copper", b.rng),
-                   materials.plain("dark_red", "metal", 0.6)))  # fmt: skip
+    return b.pick(
+        (
+            materials.metal("steel", b.rng),
+            materials.metal("iron"),
+            materials.metal("copper", b.rng),
+            materials.plain("dark_red", "metal", 0.6),
+        )
+    )
 
 
 def _grip(length: float, width: float, thick: float, rise: float) -> Solid:

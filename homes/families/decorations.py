@@ -6,87 +6,10 @@ import math
 
 from .. import materials, textures
 from ..catalogue import Entry
-from ..materials import Material
 from ..model import ObjectBuilder
 from ..solids import Solid, ball, block, box, cylinder, decal, extrusion, hull, lathe, rod, sleeve, soft_box, tube
 from ..vessels import ring
-from .containers import loops
-from .parts import button
-
-
-def _foot(b: ObjectBuilder) -> Material:
-    return b.pick((materials.metal("brass"), materials.metal("iron"), materials.wood("walnut", b.rng), materials.metal("chrome"),
-                   materials.plain("porcelain", "ceramic", 0.8), materials.plain("teal", "ceramic", 0.8)))  # fmt: skip
-
-
-def _shade(b: ObjectBuilder, bottom: float, top: float, low: float, high: float) -> None:
-    look = materials.glow(b.pick(("cream", "white", "tan", "rose")))
-    skin = sleeve([(bottom, low), (top, high)], 24) + sleeve([(top * 0.99, high), (bottom * 0.99, low)], 24)
-    b.add(skin, look)
-    b.add(lathe([(bottom, low), (top, high)], 10).felt(), look)
-    b.add(ball(0.06, 0.06, 0.09, 10).seen().at(0, 0, (low + high) / 2 - 0.045), materials.glow("yellow"))
-
-
-def table_lamp(b: ObjectBuilder) -> None:
-    x, _, z = b.size
-    r = x / 2
-    look = _foot(b)
-    low = 0.55 * z
-    if b.pick((True, False)):
-        b.add(
-            lathe([(0.5 * r, 0), (0.5 * r, 0.03 * z), (0.1 * r, 0.06 * z), (0.09 * r, 0.6 * z)], split=[0.05 * z]), look
-        )
-    else:
-        b.add(
-            lathe(
-                [(0.35 * r, 0), (0.55 * r, 0.15 * z), (0.5 * r, 0.3 * z), (0.12 * r, 0.5 * z), (0.1 * r, 0.6 * z)],
-                split=[0.4 * z],
-            ),
-            look,
-        )
-    _shade(b, r, 0.65 * r, low, z)
-    button(b, (0.2 * r, 0, 0.5 * z), materials.plain("black"), 0.008)
-
-
-def floor_lamp(b: ObjectBuilder) -> None:
-    """A standing lamp with a shade, or a bent reading lamp."""
-    x, _, z = b.size
-    r = x / 2
-    look = _foot(b)
-    b.add(lathe([(0.75 * r, 0), (0.72 * r, 0.025), (0.06, 0.04)], 24), look)
-    b.add(cylinder(0.012, 0.8 * z - 0.03, 10).at(z=0.03), look)
-    if b.pick((True, False)):
-        _shade(b, r, 0.7 * r, 0.78 * z, z)
-    else:
-        path = [(0.0, 0, 0.8 * z), (0.05, 0, 0.9 * z), (0.4 * r, 0, 0.97 * z), (0.8 * r, 0, 0.93 * z)]
-        b.add(tube(path, 0.011, 8, hulls=2), look)
-        b.add(
-            lathe([(0.5 * r, 0), (0.4 * r, 0.05), (0.08 * r, 0.11)], 20)
-            .turned("y", -12)
-            .at(0.82 * r, 0, 0.93 * z - 0.12),
-            look,
-        )
-    button(b, (0.012, 0, 0.7 * z), materials.plain("black"), 0.008)
-
-
-def candle(b: ObjectBuilder) -> None:
-    """A pillar candle on a dish, or a taper in a holder."""
-    x, _, z = b.size
-    r = x / 2
-    wax = materials.plain(materials.tint(b.pick(("cream", "red", "white", "sky")), b.rng), "organic", 0.4)
-    top = 0.9 * z
-    if b.pick((True, False)):
-        b.add(lathe([(r, 0), (r, 0.03 * z)]), materials.metal("brass"))
-        b.add(lathe([(0.8 * r, 0.03 * z), (0.8 * r, top)]), wax)
-    else:
-        b.add(
-            lathe([(r, 0), (0.95 * r, 0.04 * z), (0.25 * r, 0.1 * z), (0.4 * r, 0.25 * z)], split=[0.06 * z]),
-            materials.metal("silver"),
-        )
-        b.add(lathe([(0.32 * r, 0.2 * z), (0.28 * r, top)], 12), wax)
-    b.add(rod((0, 0, top), (0, 0, z), 0.0015, 5).seen(), materials.plain("black", "fabric"))
-    b.point("heat_source", (0, 0, z))
-    b.point("toggle_button", (0, 0, z))
+from .wrappings import loops
 
 
 def framed(b: ObjectBuilder) -> None:
@@ -115,6 +38,7 @@ def board(b: ObjectBuilder, *, kind: str) -> None:
     x, y, z = b.size
     b.add(box(x, y, z), materials.metal("silver") if kind == "white" else materials.wood("oak", b.rng))
     if kind == "white":
+        b.point("toggle_button", (x / 2, 0.45 * y, 0.05 * z))
         b.add(block((0.001, 0.96 * y, 0.94 * z), (x / 2, 0, z / 2)).seen(), materials.plain("white", shine=0.8))
         b.add(box(0.05, 0.4 * y, 0.012).seen().at(x / 2 + 0.02, 0, 0.0), materials.metal("silver"))
     else:
@@ -142,6 +66,7 @@ def wall_clock(b: ObjectBuilder) -> None:
     )
     b.add(decal(1.4 * r, 1.4 * r).at(x / 2 + 0.001, 0, r), materials.picture("dial", textures.dial()))
     b.add(sleeve([(r, 0), (0.93 * r, 0.006)], 24).turned("y", 90).at(x / 2, 0, r), materials.metal("silver"))
+    b.point("toggle_button", (x / 2, 0, 0.05 * z))
 
 
 def grandfather_clock(b: ObjectBuilder) -> None:
@@ -172,8 +97,14 @@ def pot_plant(b: ObjectBuilder) -> None:
     x, _, z = b.size
     plan = b.pick(("leaves", "bush", "palm", "cactus"))
     r = 0.42 * x
-    pot = b.pick((materials.plain("terracotta", "ceramic"), materials.plain("white", "ceramic", 0.6), materials.plain("dark_grey", "ceramic"),
-                  materials.plain("teal", "ceramic", 0.6)))  # fmt: skip
+    pot = b.pick(
+        (
+            materials.plain("terracotta", "ceramic"),
+            materials.plain("white", "ceramic", 0.6),
+            materials.plain("dark_grey", "ceramic"),
+            materials.plain("teal", "ceramic", 0.6),
+        )
+    )
     high = 0.34 * z
     b.add(lathe([(0.68 * r, 0), (0.95 * r, 0.85 * high), (r, 0.86 * high), (r, high)], 20), pot)
     b.add(cylinder(0.92 * r, 0.002, 16).seen().at(z=high), materials.plain("soil", "organic"))
@@ -321,6 +252,7 @@ def wall_socket(b: ObjectBuilder) -> None:
         b.add(
             cylinder(0.04 * y, 0.002, 8).seen().turned("y", 90).at(x / 2, s * 0.13 * y, z / 2), materials.plain("black")
         )
+    b.point("toggle_button", (x / 2, 0.35 * y, 0.85 * z))
 
 
 def hook(b: ObjectBuilder) -> None:
@@ -354,18 +286,17 @@ def slab(b: ObjectBuilder, *, kind: str) -> None:
 
 
 CATEGORIES = [
-    Entry("table_lamp", table_lamp, (0.300, 0.300, 0.480), 1.8, 6, rest="upright", uniform=True),
-    Entry("floor_lamp", floor_lamp, (0.420, 0.420, 1.600), 6.0, 6, rest="upright", uniform=True),
-    Entry("candle", candle, (0.085, 0.085, 0.160), 0.30, 5, rest="upright"),
     Entry("painting", framed, (0.030, 0.800, 0.600), 2.2, 6, rest="upright", fixed=True, vary=0.15),
     Entry("picture", framed, (0.022, 0.420, 0.320), 0.8, 6, rest="upright", fixed=True, vary=0.15),
     Entry("whiteboard", board, (0.022, 1.200, 0.900), 8.0, 2, rest="upright", fixed=True, options={"kind": "white"}),
     Entry("bulletin_board", board, (0.020, 0.900, 0.600), 2.5, 3, rest="upright", fixed=True, options={"kind": "cork"}),
     Entry("wall_clock", wall_clock, (0.045, 0.300, 0.300), 0.9, 3, rest="upright", fixed=True, uniform=True),
-    Entry("grandfather_clock", grandfather_clock, (0.280, 0.480, 2.000), 45.0, 3, rest="upright", fixed=True, vary=0.05),
+    Entry("grandfather_clock", grandfather_clock, (0.280, 0.480, 2.000), 45.0, 3, rest="upright", fixed=True,
+                  vary=0.05),
     Entry("pot_plant", pot_plant, (0.320, 0.320, 0.520), 3.0, 8, rest="upright", uniform=True, vary=0.2),
     Entry("christmas_tree", christmas_tree, (0.950, 0.950, 1.700), 9.0, 3, rest="upright", fixed=True, uniform=True),
-    Entry("christmas_tree_decorated", christmas_tree, (0.950, 0.950, 1.700), 11.0, 3, rest="upright", fixed=True, uniform=True,
+    Entry("christmas_tree_decorated", christmas_tree, (0.950, 0.950, 1.700), 11.0, 3, rest="upright", fixed=True,
+                  uniform=True,
           options={"decorated": True}),
     Entry("wreath", wreath, (0.420, 0.420, 0.070), 0.6, 3, uniform=True),
     Entry("tinsel", tinsel, (0.500, 0.160, 0.040), 0.08, 2),

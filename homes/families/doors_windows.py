@@ -38,8 +38,15 @@ def door(b: ObjectBuilder) -> None:
     """A room door: frame without threshold and one leaf, plain, panelled or glazed; opens by 90 degrees."""
     x, y, z = b.size
     plan = b.pick(("plain", "panels", "glazed", "planks"))
-    wood = b.pick((materials.plain("white", "wood"), materials.wood("oak", b.rng), materials.wood("walnut", b.rng),
-                   materials.plain("light_grey", "wood"), materials.plain("dark_green", "wood")))  # fmt: skip
+    wood = b.pick(
+        (
+            materials.plain("white", "wood"),
+            materials.wood("oak", b.rng),
+            materials.wood("walnut", b.rng),
+            materials.plain("light_grey", "wood"),
+            materials.plain("dark_green", "wood"),
+        )
+    )
     depth = x - KNOB
     b.add(frame(depth, y, z, sill=False).at(-KNOB / 2), wood)
     left = b.pick((True, False, False))

@@ -90,6 +90,7 @@ def mouse(b: ObjectBuilder) -> None:
         cylinder(0.06 * x, 0.006, 10).seen().at(z=-0.003).turned("x", 90).at(0.25 * x, 0, 0.87 * z),
         materials.plain("grey"),
     )
+    b.point("toggle_button", (0.3 * x, 0.15 * y, 0.85 * z))
 
 
 def box_device(b: ObjectBuilder, *, lamps: bool = True, vents: bool = True, on: bool = True) -> None:
@@ -132,6 +133,7 @@ def tower(b: ObjectBuilder) -> None:
     for px, py in ((-0.3, -0.2), (-0.3, 0.1), (-0.3, 0.3), (0.3, 0.32), (0.35, -0.3)):
         b.add(box(0.16 * x, 0.1 * y, 0.3 * z).at(px * x, py * y, 0.2 * z).seen(), materials.plain("black"))
     b.add(box(0.06 * x, 0.8 * y, 0.8 * z).at(-0.46 * x, 0, 0.2 * z), materials.plain("dark_grey"))
+    b.point("toggle_button", (0.1 * x, 0, 0.7 * z))
 
 
 def printer(b: ObjectBuilder, *, phone: bool = False) -> None:
@@ -262,6 +264,7 @@ def scale(b: ObjectBuilder, *, analog: bool = False) -> None:
     x, y, z = b.size
     look = b.pick((materials.plain("white"), materials.plain("red"), materials.metal("steel", b.rng)))
     if analog:
+        b.point("toggle_button", (0.4 * x, 0.3 * y, 0.35 * z))
         b.add(
             hull(
                 [
@@ -307,6 +310,7 @@ def game(b: ObjectBuilder) -> None:
         decal(0.94 * y, 0.94 * x, "z").at(z=z + 0.0003),
         materials.picture("cover", textures.label(materials.colour("black"), materials.colour(ground), b.rng)),
     )
+    b.point("toggle_button", (0.3 * x, 0.3 * y, z))
 
 
 def cord(b: ObjectBuilder) -> None:
@@ -328,7 +332,8 @@ def cord(b: ObjectBuilder) -> None:
 CATEGORIES = [
     Entry("monitor", screen_on_foot, (0.200, 0.550, 0.430), 4.5, 5, rest="upright"),
     Entry("standing_tv", screen_on_foot, (0.260, 1.150, 0.740), 14.0, 5, rest="upright", fixed=True, vary=0.12),
-    Entry("wall_mounted_tv", screen_on_foot, (0.060, 1.200, 0.690), 13.0, 5, rest="upright", fixed=True, vary=0.12, options={"foot": False}),
+    Entry("wall_mounted_tv", screen_on_foot, (0.060, 1.200, 0.690), 13.0, 5, rest="upright", fixed=True, vary=0.12,
+          options={"foot": False}),
     Entry("laptop", laptop, (0.230, 0.330, 0.020), 1.6, 5, rest="upright"),
     Entry("keyboard", keyboard, (0.150, 0.440, 0.028), 0.65, 4, rest="upright"),
     Entry("mouse", mouse, (0.108, 0.062, 0.036), 0.09, 4, rest="upright"),
@@ -346,7 +351,8 @@ CATEGORIES = [
     Entry("speaker_system", loudspeaker, (0.200, 0.900, 0.300), 9.0, 3, rest="upright", options={"pair": True}),
     Entry("light_bulb", bulb, (0.062, 0.062, 0.110), 0.06, 3, uniform=True),
     Entry("digital_scale", scale, (0.220, 0.180, 0.026), 0.6, 3, rest="upright"),
-    Entry("kitchen_analog_scale", scale, (0.200, 0.200, 0.230), 1.3, 3, rest="upright", uniform=True, options={"analog": True}),
+    Entry("kitchen_analog_scale", scale, (0.200, 0.200, 0.230), 1.3, 3, rest="upright", uniform=True,
+          options={"analog": True}),
     Entry("ink_cartridge", cartridge, (0.070, 0.020, 0.042), 0.04, 2),
     Entry("video_game", game, (0.190, 0.135, 0.015), 0.12, 3),
     Entry("cord", cord, (0.190, 0.160, 0.016), 0.25, 3),

@@ -14,8 +14,15 @@ WALL = 0.045  # m, insulated
 def fridge(b: ObjectBuilder) -> None:
     """plan by model: one door; freezer above; freezer drawer below; French doors over a drawer."""
     x, y, z = b.size
-    body = b.pick((materials.metal("steel", b.rng), materials.plain("white"), materials.metal("dark_grey", b.rng),
-                   materials.plain("cream"), materials.plain("mint")))  # fmt: skip
+    body = b.pick(
+        (
+            materials.metal("steel", b.rng),
+            materials.plain("white"),
+            materials.metal("dark_grey", b.rng),
+            materials.plain("cream"),
+            materials.plain("mint"),
+        )
+    )
     inner = materials.plain("white")
     metal = materials.metal("chrome")
     plan = b.pick(("single", "freezer_top", "drawer", "french"))

@@ -51,8 +51,10 @@ def tin(b: ObjectBuilder, *, looks: tuple = (("red", "cream"),)) -> None:
     x, _, z = b.size
     r = x / 2
     ground, accent = b.pick(looks)
-    b.add(lathe([(r, 0), (r, 0.02 * z), (0.965 * r, 0.03 * z), (0.965 * r, 0.97 * z), (r, 0.98 * z), (r, z)]),
-          materials.metal("silver"))  # fmt: skip
+    b.add(
+        lathe([(r, 0), (r, 0.02 * z), (0.965 * r, 0.03 * z), (0.965 * r, 0.97 * z), (r, 0.98 * z), (r, z)]),
+        materials.metal("silver"),
+    )
     b.add(cylinder(0.985 * r, 0.88 * z).seen().at(z=0.06 * z), materials.plain(ground, "paper"))
     b.add(cylinder(0.99 * r, 0.3 * z).seen().at(z=0.35 * z), materials.plain(accent, "paper"))
 
@@ -75,8 +77,10 @@ CATEGORIES = [
           options={"looks": (("red", "yellow"), ("navy", "orange"), ("orange", "brown"))}),
     Entry("canned_food", tin, (0.075, 0.075, 0.110), 0.42, 4,
           options={"looks": (("red", "cream"), ("green", "yellow"), ("blue", "white"), ("orange", "red"))}),
-    Entry("oatmeal", carton_box, (0.085, 0.140, 0.240), 0.55, 3, options={"looks": (("tan", "red"), ("blue", "cream"))}),
-    Entry("pasta", carton_box, (0.050, 0.110, 0.200), 0.50, 3, options={"looks": (("blue", "yellow"), ("green", "cream"), ("red", "cream"))}),
+    Entry("oatmeal", carton_box, (0.085, 0.140, 0.240), 0.55, 3,
+          options={"looks": (("tan", "red"), ("blue", "cream"))}),
+    Entry("pasta", carton_box, (0.050, 0.110, 0.200), 0.50, 3,
+          options={"looks": (("blue", "yellow"), ("green", "cream"), ("red", "cream"))}),
     Entry("butter", stick, (0.065, 0.100, 0.038), 0.25, 3,
           options={"looks": (("yellow", "blue"), ("silver", "green"), ("cream", "red"))}),
 ]  # fmt: skip

@@ -152,8 +152,18 @@ def lid(
     return link
 
 
-def legs(b: ObjectBuilder, x: float, y: float, height: float, width: float, material: Material, *, splay: float = 0.0,
-         round_: bool = False, inset: float = 0.0) -> None:  # fmt: skip
+def legs(
+    b: ObjectBuilder,
+    x: float,
+    y: float,
+    height: float,
+    width: float,
+    material: Material,
+    *,
+    splay: float = 0.0,
+    round_: bool = False,
+    inset: float = 0.0,
+) -> None:
     """Four legs under a plate x by y whose underside is at `height`; splay: how far the feet stand outwards, metres."""
     for sx in (-1, 1):
         for sy in (-1, 1):
@@ -169,8 +179,10 @@ def legs(b: ObjectBuilder, x: float, y: float, height: float, width: float, mate
 
 def _slanted(foot: tuple[float, float], top: tuple[float, float], height: float, width: float) -> Solid:
     corners = [(dx * width / 2, dy * width / 2) for dx in (-1, 1) for dy in (-1, 1)]
-    return hull([(foot[0] + dx * 0.7, foot[1] + dy * 0.7, 0) for dx, dy in corners]
-                + [(top[0] + dx, top[1] + dy, height) for dx, dy in corners])  # fmt: skip
+    return hull(
+        [(foot[0] + dx * 0.7, foot[1] + dy * 0.7, 0) for dx, dy in corners]
+        + [(top[0] + dx, top[1] + dy, height) for dx, dy in corners]
+    )
 
 
 def ear(radius: float, thickness: float, upright: bool = True) -> Solid:
@@ -179,8 +191,9 @@ def ear(radius: float, thickness: float, upright: bool = True) -> Solid:
     return tube(path, thickness, 6, hulls=1)
 
 
-def button(b: ObjectBuilder, xyz: tuple[float, float, float], material: Material, radius: float = 0.012,
-           facing: str = "x") -> None:  # fmt: skip
+def button(
+    b: ObjectBuilder, xyz: tuple[float, float, float], material: Material, radius: float = 0.012, facing: str = "x"
+) -> None:
     """A push button: a small disc that is only seen, and the toggle_button point in its middle."""
     disc = cylinder(radius, 0.004, 12).seen()
     disc = disc.turned("y", 90) if facing == "x" else disc

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from .. import materials
 from ..catalogue import Entry
 from ..model import ObjectBuilder
@@ -16,7 +18,7 @@ def tap(height: float, reach: float) -> Solid:
     r = reach / 2
     neck = (
         [(0, 0, 0), (0, 0, height - r)]
-        + [p + (r, 0, height - r) for p in arc(r, 150, 0, 6)]
+        + [p + np.array([r, 0, height - r]) for p in arc(r, 150, 0, 6)]
         + [(reach, 0, height - r - 0.02)]
     )
     return cylinder(0.024, 0.02, 12).seen() + tube(neck, 0.012, 8, hulls=2)
@@ -27,17 +29,19 @@ def basin(x: float, y: float, depth: float, z: float) -> Solid:
     w = 0.015
     inner_x, inner_y = x - 2 * RIM - 0.06, y - 2 * RIM
     cx = 0.03
-    return join([
-        block((RIM, y, 0.02), ((x - RIM) / 2, 0, z - 0.01)),
-        block((RIM + 0.06, y, 0.02), (-(x - RIM - 0.06) / 2, 0, z - 0.01)),
-        block((inner_x, RIM, 0.02), (cx, (y - RIM) / 2, z - 0.01)),
-        block((inner_x, RIM, 0.02), (cx, -(y - RIM) / 2, z - 0.01)),
-        block((inner_x + 2 * w, inner_y + 2 * w, w), (cx, 0, z - depth - w / 2)),
-        block((w, inner_y + 2 * w, depth - 0.02), (cx + (inner_x + w) / 2, 0, z - 0.02 - (depth - 0.02) / 2)),
-        block((w, inner_y + 2 * w, depth - 0.02), (cx - (inner_x + w) / 2, 0, z - 0.02 - (depth - 0.02) / 2)),
-        block((inner_x, w, depth - 0.02), (cx, (inner_y + w) / 2, z - 0.02 - (depth - 0.02) / 2)),
-        block((inner_x, w, depth - 0.02), (cx, -(inner_y + w) / 2, z - 0.02 - (depth - 0.02) / 2)),
-    ])  # fmt: skip
+    return join(
+        [
+            block((RIM, y, 0.02), ((x - RIM) / 2, 0, z - 0.01)),
+            block((RIM + 0.06, y, 0.02), (-(x - RIM - 0.06) / 2, 0, z - 0.01)),
+            block((inner_x, RIM, 0.02), (cx, (y - RIM) / 2, z - 0.01)),
+            block((inner_x, RIM, 0.02), (cx, -(y - RIM) / 2, z - 0.01)),
+            block((inner_x + 2 * w, inner_y + 2 * w, w), (cx, 0, z - depth - w / 2)),
+            block((w, inner_y + 2 * w, depth - 0.02), (cx + (inner_x + w) / 2, 0, z - 0.02 - (depth - 0.02) / 2)),
+            block((w, inner_y + 2 * w, depth - 0.02), (cx - (inner_x + w) / 2, 0, z - 0.02 - (depth - 0.02) / 2)),
+            block((inner_x, w, depth - 0.02), (cx, (inner_y + w) / 2, z - 0.02 - (depth - 0.02) / 2)),
+            block((inner_x, w, depth - 0.02), (cx, -(inner_y + w) / 2, z - 0.02 - (depth - 0.02) / 2)),
+        ]
+    )
 
 
 def fittings(b: ObjectBuilder, x: float, z: float, depth: float, height: float = 0.26) -> None:
@@ -81,8 +85,18 @@ def sink(b: ObjectBuilder) -> None:
         b.add(carcass(body_x, y - 0.02, rim - 0.02, top=False).at(-0.01), body)
         plane = -0.01 + body_x / 2
         for k, (span, left) in enumerate((((0.002, y / 2 - 0.013), True), ((0.013 - y / 2, -0.002), False))):
-            door(b, f"door_{k}", plane, span, (0.03, rim - 0.03), body, bow_handle(0.12, upright=True),
-                 materials.metal("steel"), left=left, handle_z=rim - 0.16)  # fmt: skip
+            door(
+                b,
+                f"door_{k}",
+                plane,
+                span,
+                (0.03, rim - 0.03),
+                body,
+                bow_handle(0.12, upright=True),
+                materials.metal("steel"),
+                left=left,
+                handle_z=rim - 0.16,
+            )
     fittings(b, x, rim, depth)
 
 

@@ -139,13 +139,27 @@ def microwave(b: ObjectBuilder) -> None:
     middle = -panel / 2
     b.add(carcass(depth, room, height, wall, back=wall).at(shift, middle, base), body)
     b.add(block((depth, panel, height), (shift, (y - panel) / 2, base + height / 2)), body)
-    b.add(block((0.002, room - 2 * wall, height - 2 * wall), (shift - depth / 2 + wall + 0.001, middle, base + height / 2)).seen(),
-          materials.plain("cream"))  # fmt: skip
+    b.add(
+        block(
+            (0.002, room - 2 * wall, height - 2 * wall), (shift - depth / 2 + wall + 0.001, middle, base + height / 2)
+        ).seen(),
+        materials.plain("cream"),
+    )
     plate = min(depth, room) * 0.42
     b.add(lathe([(plate, 0), (plate, 0.006)]).at(shift, middle, base + wall), materials.glass("glass", 0.6))
     plane = shift + depth / 2
-    link = door(b, "door", plane, (-y / 2, y / 2 - panel - 0.002), (base, z), body, bow_handle(0.6 * z, 0.02, upright=True),
-                materials.metal("chrome"), depth=leaf - 0.026 + 0.004, angle=1.9)  # fmt: skip
+    link = door(
+        b,
+        "door",
+        plane,
+        (-y / 2, y / 2 - panel - 0.002),
+        (base, z),
+        body,
+        bow_handle(0.6 * z, 0.02, upright=True),
+        materials.metal("chrome"),
+        depth=leaf - 0.026 + 0.004,
+        angle=1.9,
+    )
     window = block((0.002, 0.7 * room, 0.6 * height), (plane + leaf - 0.021, middle, base + height / 2)).seen()
     link.add(window, materials.plain("black", shine=0.8))
     pad = materials.picture("keypad", textures.keys((0.1, 0.1, 0.11), (0.75, 0.76, 0.78), 3, 5), kind="plastic")
@@ -168,11 +182,15 @@ def grill(b: ObjectBuilder) -> None:
             b.add(
                 rod((sx * 0.42 * x, sy * 0.3 * y, 0), (sx * 0.36 * x, sy * 0.27 * y, rack - tub + 0.02), 0.014), steel
             )
-    walls = join([block((x, 0.6 * y, 0.012), (0, 0, rack - tub)),
-                  block((0.012, 0.6 * y, tub), (x / 2 - 0.006, 0, rack - tub / 2)),
-                  block((0.012, 0.6 * y, tub), (-x / 2 + 0.006, 0, rack - tub / 2)),
-                  block((x, 0.012, tub), (0, 0.3 * y, rack - tub / 2)),
-                  block((x, 0.012, tub), (0, -0.3 * y, rack - tub / 2))])  # fmt: skip
+    walls = join(
+        [
+            block((x, 0.6 * y, 0.012), (0, 0, rack - tub)),
+            block((0.012, 0.6 * y, tub), (x / 2 - 0.006, 0, rack - tub / 2)),
+            block((0.012, 0.6 * y, tub), (-x / 2 + 0.006, 0, rack - tub / 2)),
+            block((x, 0.012, tub), (0, 0.3 * y, rack - tub / 2)),
+            block((x, 0.012, tub), (0, -0.3 * y, rack - tub / 2)),
+        ]
+    )
     b.add(walls, iron)
     b.add(block((x - 0.03, 0.6 * y - 0.03, 0.008), (0, 0, rack - 0.035)).felt(), steel)
     for k in range(9):
@@ -183,10 +201,15 @@ def grill(b: ObjectBuilder) -> None:
     b.add(block((0.01, 0.14, 0.05), (x / 2 + 0.003, 0, rack - 0.12)).seen(), steel)
     button(b, (x / 2 + 0.01, 0.0, rack - 0.12), materials.plain("red"))
     b.point("heat_source", (0, 0, rack - 0.02))
-    dome = join([block((x, 0.6 * y, 0.012), (0, 0, rack + 0.2)),
-                 block((0.012, 0.6 * y, 0.2), (-x / 2 + 0.006, 0, rack + 0.104)),
-                 block((0.012, 0.6 * y, 0.2), (x / 2 - 0.006, 0, rack + 0.104)),
-                 block((x, 0.012, 0.2), (0, 0.3 * y, rack + 0.104)), block((x, 0.012, 0.2), (0, -0.3 * y, rack + 0.104))])  # fmt: skip
+    dome = join(
+        [
+            block((x, 0.6 * y, 0.012), (0, 0, rack + 0.2)),
+            block((0.012, 0.6 * y, 0.2), (-x / 2 + 0.006, 0, rack + 0.104)),
+            block((0.012, 0.6 * y, 0.2), (x / 2 - 0.006, 0, rack + 0.104)),
+            block((x, 0.012, 0.2), (0, 0.3 * y, rack + 0.104)),
+            block((x, 0.012, 0.2), (0, -0.3 * y, rack + 0.104)),
+        ]
+    )
     link = lid(b, "lid", dome, iron, -x / 2, rack + 0.004, angle=1.5, openable=False)
     link.add(bow_handle(0.3 * y).at(x / 2, 0, rack + 0.06), steel)
 

@@ -87,8 +87,17 @@ def desk(b: ObjectBuilder) -> None:
     for k in range(rows):
         middle = low + (k + 0.5) * pitch
         room = (depth - 0.04, width - 2 * BOARD, pitch - 0.006)
-        drawer(b, f"drawer_{k}", (plane - room[0] / 2, centre, middle), room, (width, pitch - 0.004), front, wood,
-               grip(b, width), metal)  # fmt: skip
+        drawer(
+            b,
+            f"drawer_{k}",
+            (plane - room[0] / 2, centre, middle),
+            room,
+            (width, pitch - 0.004),
+            front,
+            wood,
+            grip(b, width),
+            metal,
+        )
 
 
 def pool_table(b: ObjectBuilder) -> None:

@@ -66,9 +66,11 @@ def glass(b: ObjectBuilder) -> None:
 
 def _handle(length: float, width: float, thick: float) -> Solid:
     """A flat handle from the origin to -x."""
-    return hull([(-length, s * 0.6 * width, h) for s in (-1, 1) for h in (0, thick)]
-                + [(-0.7 * length, s * width / 2, h) for s in (-1, 1) for h in (0, thick)]
-                + [(0, s * 0.28 * width, h) for s in (-1, 1) for h in (0, thick)])  # fmt: skip
+    return hull(
+        [(-length, s * 0.6 * width, h) for s in (-1, 1) for h in (0, thick)]
+        + [(-0.7 * length, s * width / 2, h) for s in (-1, 1) for h in (0, thick)]
+        + [(0, s * 0.28 * width, h) for s in (-1, 1) for h in (0, thick)]
+    )
 
 
 def spoon(b: ObjectBuilder) -> None:
@@ -84,12 +86,23 @@ def fork(b: ObjectBuilder) -> None:
     steel = materials.metal("silver")
     head = 0.35 * x
     b.add(_handle(x - head, 0.6 * y, 0.0025).at(x / 2 - head, 0, 0.3 * z), steel)
-    b.add(hull([(x / 2 - head - 0.005, s * 0.15 * y, 0.3 * z + h) for s in (-1, 1) for h in (0, 0.0025)]
-               + [(x / 2 - 0.55 * head, s * y / 2, h) for s in (-1, 1) for h in (0, 0.003)]), steel)  # fmt: skip
+    b.add(
+        hull(
+            [(x / 2 - head - 0.005, s * 0.15 * y, 0.3 * z + h) for s in (-1, 1) for h in (0, 0.0025)]
+            + [(x / 2 - 0.55 * head, s * y / 2, h) for s in (-1, 1) for h in (0, 0.003)]
+        ),
+        steel,
+    )
     for k in range(4):
         yy = (k - 1.5) * y / 3.9
-        tine = [(x / 2 - 0.55 * head, yy - 0.0014, 0), (x / 2 - 0.55 * head, yy + 0.0014, 0), (x / 2 - 0.55 * head, yy, 0.003),
-                (x / 2, yy - 0.0007, 0.5 * z), (x / 2, yy + 0.0007, 0.5 * z), (x / 2, yy, z)]  # fmt: skip
+        tine = [
+            (x / 2 - 0.55 * head, yy - 0.0014, 0),
+            (x / 2 - 0.55 * head, yy + 0.0014, 0),
+            (x / 2 - 0.55 * head, yy, 0.003),
+            (x / 2, yy - 0.0007, 0.5 * z),
+            (x / 2, yy + 0.0007, 0.5 * z),
+            (x / 2, yy, z),
+        ]
         b.add(hull(tine), steel)
 
 
@@ -111,8 +124,13 @@ def knife(b: ObjectBuilder, *, blade: float = 0.55, tall: float = 0.8, grip: str
         (start, spine),
     ]
     b.add(prism(outline, thick).seen().at(z=low), steel)
-    felt = [(start, edge + rim), (tip - 0.1 * blade * x, edge + rim), (tip, spine - 0.35 * (spine - edge)), (tip - 0.02, spine),
-            (start, spine)]  # fmt: skip
+    felt = [
+        (start, edge + rim),
+        (tip - 0.1 * blade * x, edge + rim),
+        (tip, spine - 0.35 * (spine - edge)),
+        (tip - 0.02, spine),
+        (start, spine),
+    ]
     b.add(prism(felt, thick).felt().at(z=low), steel)
     b.area("slicer", (0.75 * blade * x, rim, thick), (start + 0.375 * blade * x, edge + rim / 2, z / 2))
     b.add(soft_box(x - blade * x, 0.55 * y, z, 0.3 * z).at(-x / 2 + (x - blade * x) / 2, y / 2 - 0.36 * y, 0), handle)
@@ -153,8 +171,12 @@ def tray(b: ObjectBuilder) -> None:
     b.add(open_box(x, y, 0.55 * z, 0.008, 0.006, spread=0.008), look)
     for s in (-1, 1):
         h = 0.18 * x
-        path = [(-h, s * (y / 2 - 0.006), 0.5 * z), (-h, s * (y / 2 - 0.006), z - 0.005), (h, s * (y / 2 - 0.006), z - 0.005),
-                (h, s * (y / 2 - 0.006), 0.5 * z)]  # fmt: skip
+        path = [
+            (-h, s * (y / 2 - 0.006), 0.5 * z),
+            (-h, s * (y / 2 - 0.006), z - 0.005),
+            (h, s * (y / 2 - 0.006), z - 0.005),
+            (h, s * (y / 2 - 0.006), 0.5 * z),
+        ]
         b.add(tube(path, 0.005, 6, hulls=1), look)
 
 

@@ -47,8 +47,13 @@ def hammer(b: ObjectBuilder) -> None:
     b.add(cylinder(z / 2, 0.3 * y, 12).turned("x", 90).at(x / 2 - 0.05 * x, -0.2 * y, z / 2), steel)
     b.add(block((0.09 * x, 0.45 * y, 0.8 * z), (0.45 * x, 0.0, z / 2)), steel)
     for s in (-1, 1):
-        claw = [(0.42 * x, 0.2 * y, z / 2 + s * 0.1 * z), (0.49 * x, 0.2 * y, z / 2 + s * 0.4 * z), (0.43 * x, 0.2 * y, z / 2 + s * 0.4 * z),
-                (0.36 * x, y / 2, z / 2 + s * 0.15 * z), (0.38 * x, y / 2, z / 2 + s * 0.38 * z)]  # fmt: skip
+        claw = [
+            (0.42 * x, 0.2 * y, z / 2 + s * 0.1 * z),
+            (0.49 * x, 0.2 * y, z / 2 + s * 0.4 * z),
+            (0.43 * x, 0.2 * y, z / 2 + s * 0.4 * z),
+            (0.36 * x, y / 2, z / 2 + s * 0.15 * z),
+            (0.38 * x, y / 2, z / 2 + s * 0.38 * z),
+        ]
         b.add(hull(claw), steel)
 
 
@@ -218,8 +223,19 @@ def thumbtack(b: ObjectBuilder) -> None:
 def paper_clip(b: ObjectBuilder) -> None:
     x, y, z = b.size
     r = z / 2
-    path = [(-0.3 * x, -0.25 * y, r), (0.3 * x, -0.25 * y, r), (0.42 * x, 0, r), (0.3 * x, 0.25 * y, r), (-0.4 * x, 0.25 * y, r), (-0.5 * x + r, 0.0, r),
-            (-0.4 * x, -0.45 * y, r), (0.4 * x, -0.45 * y, r), (0.5 * x - r, 0.0, r), (0.4 * x, 0.45 * y, r), (-0.2 * x, 0.45 * y, r)]  # fmt: skip
+    path = [
+        (-0.3 * x, -0.25 * y, r),
+        (0.3 * x, -0.25 * y, r),
+        (0.42 * x, 0, r),
+        (0.3 * x, 0.25 * y, r),
+        (-0.4 * x, 0.25 * y, r),
+        (-0.5 * x + r, 0.0, r),
+        (-0.4 * x, -0.45 * y, r),
+        (0.4 * x, -0.45 * y, r),
+        (0.5 * x - r, 0.0, r),
+        (0.4 * x, 0.45 * y, r),
+        (-0.2 * x, 0.45 * y, r),
+    ]
     b.add(
         tube(path, r, 5, hulls=0) + box(x, y, z).felt(),
         b.pick((materials.metal("silver"), materials.plain("red"), materials.plain("blue"))),

@@ -75,8 +75,23 @@ def board_game(b: ObjectBuilder) -> None:
 
 def dart(b: ObjectBuilder) -> None:
     x, _, z = b.size
-    b.add(lathe([(0.0, 0), (0.12 * z, 0.25 * x), (0.22 * z, 0.3 * x), (0.22 * z, 0.6 * x), (0.1 * z, 0.65 * x), (0.1 * z, 0.8 * x)], 8, split=[0.25 * x])
-          .turned("y", -90).at(x / 2, 0, z / 2), materials.metal("brass"))  # fmt: skip
+    b.add(
+        lathe(
+            [
+                (0.0, 0),
+                (0.12 * z, 0.25 * x),
+                (0.22 * z, 0.3 * x),
+                (0.22 * z, 0.6 * x),
+                (0.1 * z, 0.65 * x),
+                (0.1 * z, 0.8 * x),
+            ],
+            8,
+            split=[0.25 * x],
+        )
+        .turned("y", -90)
+        .at(x / 2, 0, z / 2),
+        materials.metal("brass"),
+    )
     for a in (45, 135):
         b.add(
             block((0.28 * x, 0.001, z)).turned("x", a).at(-0.36 * x, 0, z / 2),
@@ -146,6 +161,7 @@ def bell(b: ObjectBuilder) -> None:
         lathe([(0.16 * r, 0.5 * z), (0.26 * r, 0.7 * z), (0.2 * r, 0.9 * z), (0.28 * r, z)], 12),
         materials.wood("walnut", b.rng),
     )
+    b.point("toggle_button", (0, 0, z))
 
 
 def trinket(b: ObjectBuilder) -> None:

@@ -168,6 +168,7 @@ def griddle(b: ObjectBuilder) -> None:
         b.add(block((0.4 * x, 0.07 * y, 0.4 * z), (0, s * 0.465 * y, 0.7 * z)), iron)
     for k in range(8):
         b.add(box(0.92 * x, 0.012, 0.003).seen().at(0, (k - 3.5) * 0.09 * y, 0.5 * z), materials.metal("dark_grey"))
+    b.point("toggle_button", (x / 2, 0.3 * y, 0.5 * z))
 
 
 def lid(b: ObjectBuilder) -> None:

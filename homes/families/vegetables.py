@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import random
 
@@ -23,8 +24,14 @@ def long_root(
     tuft = 0.12 * x if leaves else 0.0
     h = x - tuft
     r = z / 2
-    profile = [(taper * 0.5 * r, 0), (max(taper, 0.15) * r, 0.06 * h), (r * (0.5 + 0.5 * taper), 0.4 * h), (r, 0.8 * h),
-               (0.95 * r, 0.93 * h), (ends * r * 0.8, h)]  # fmt: skip
+    profile = [
+        (taper * 0.5 * r, 0),
+        (max(taper, 0.15) * r, 0.06 * h),
+        (r * (0.5 + 0.5 * taper), 0.4 * h),
+        (r, 0.8 * h),
+        (0.95 * r, 0.93 * h),
+        (ends * r * 0.8, h),
+    ]
     b.add(lathe(profile, 14, split=[0.4 * h]).at(z=-x / 2).turned("y", 90).scaled(y=y / z).at(z=r), skin)
     if leaves:
         green = materials.plain(leaves, "organic")
@@ -48,8 +55,12 @@ def bent(
     skin = materials.skin(b.pick(skins), b.rng, 0.08)
     b.add(swept(middle, [r * taper, *[r * t for t in (0.8, 0.95, 1, 1, 1, 1, 0.95, 0.75)], r * taper * 0.8]), skin)
     if tip:
-        b.add(ball(r * taper * 1.9, r * taper * 1.9, r * taper * 1.9, 8).seen().at(*middle[-1][:2], r * (1 - taper * 0.95)),
-              materials.plain(tip, "organic"))  # fmt: skip
+        b.add(
+            ball(r * taper * 1.9, r * taper * 1.9, r * taper * 1.9, 8)
+            .seen()
+            .at(*middle[-1][:2], r * (1 - taper * 0.95)),
+            materials.plain(tip, "organic"),
+        )
 
 
 def swept(path: list, radii: list[float], sides: int = 10, hulls: int = 3) -> Solid:
@@ -62,7 +73,7 @@ def swept(path: list, radii: list[float], sides: int = 10, hulls: int = 3) -> So
     mesh.vertices = scaled.reshape(-1, 3)
     edges = np.linspace(0, len(path) - 1, hulls + 1).round().astype(int)
     pieces = []
-    for a, c in zip(edges[:-1], edges[1:], strict=True):
+    for a, c in itertools.pairwise(edges):
         pieces.append(scaled[a : c + 1][:, ::2].reshape(-1, 3))
     return Solid((mesh,), tuple(pieces))
 
@@ -104,8 +115,15 @@ def broccoli(b: ObjectBuilder) -> None:
     b.add(lathe([(0.4 * x, 0.45 * z), (0.5 * x, 0.65 * z), (0.3 * x, z)], 10).felt(), green)
 
 
-def bunch(b: ObjectBuilder, *, stem: str | tuple = "lime", leaf: str | tuple = "leaf", leafy: float = 0.5, count: int = 9,
-          bulb: bool = False) -> None:  # fmt: skip
+def bunch(
+    b: ObjectBuilder,
+    *,
+    stem: str | tuple = "lime",
+    leaf: str | tuple = "leaf",
+    leafy: float = 0.5,
+    count: int = 9,
+    bulb: bool = False,
+) -> None:
     """Herbs, celery or spring onions lying along x: stalks with a leafy end towards +x; one or two hulls."""
     x, y, z = b.size
     split = x / 2 - leafy * x
@@ -121,12 +139,21 @@ def bunch(b: ObjectBuilder, *, stem: str | tuple = "lime", leaf: str | tuple = "
         if leafy > 0:
             spread = b.rng.uniform(0.25, 0.45) * y * (1 if k % 2 else -1)
             start, w = split + b.rng.uniform(0, 0.3) * leafy * x, 0.12 * y
-            points = [(start, yy, zz - 0.05 * z), (start + 0.3 * leafy * x, yy + w, zz), (start + 0.3 * leafy * x, yy - w, zz + 0.04 * z),
-                      (start + b.rng.uniform(0.5, 0.7) * leafy * x, yy + 0.5 * spread, zz + 0.2 * z * b.rng.uniform(-1, 1))]  # fmt: skip
+            points = [
+                (start, yy, zz - 0.05 * z),
+                (start + 0.3 * leafy * x, yy + w, zz),
+                (start + 0.3 * leafy * x, yy - w, zz + 0.04 * z),
+                (start + b.rng.uniform(0.5, 0.7) * leafy * x, yy + 0.5 * spread, zz + 0.2 * z * b.rng.uniform(-1, 1)),
+            ]
             b.add(hull(points).seen(), green)
-    b.add(hull([(-x / 2, s * 0.25 * y, h * z) for s in (-1, 1) for h in (0.2, 0.8)]
-               + [(split, s * 0.5 * y, h * z) for s in (-1, 1) for h in (0, 1)]
-               + [(x / 2, s * 0.4 * y, h * z) for s in (-1, 1) for h in (0.1, 0.9)]).felt(), green)  # fmt: skip
+    b.add(
+        hull(
+            [(-x / 2, s * 0.25 * y, h * z) for s in (-1, 1) for h in (0.2, 0.8)]
+            + [(split, s * 0.5 * y, h * z) for s in (-1, 1) for h in (0, 1)]
+            + [(x / 2, s * 0.4 * y, h * z) for s in (-1, 1) for h in (0.1, 0.9)]
+        ).felt(),
+        green,
+    )
 
 
 def heap(b: ObjectBuilder, *, colours: tuple, grain: float = 0.35, count: int = 12) -> None:
@@ -209,8 +236,13 @@ def garlic_clove(b: ObjectBuilder) -> None:
     x, _, z = b.size
     r = z / 2
     brown = materials.plain((0.30, 0.16, 0.09), "organic")
-    b.add(lathe([(0.35 * r, 0), (0.45 * r, 0.7 * x), (0.9 * r, 0.78 * x), (r, 0.9 * x), (0.5 * r, x)], 8).at(z=-x / 2)
-          .turned("y", 90).at(z=r), brown)  # fmt: skip
+    b.add(
+        lathe([(0.35 * r, 0), (0.45 * r, 0.7 * x), (0.9 * r, 0.78 * x), (r, 0.9 * x), (0.5 * r, x)], 8)
+        .at(z=-x / 2)
+        .turned("y", 90)
+        .at(z=r),
+        brown,
+    )
 
 
 def grape(b: ObjectBuilder) -> None:
@@ -226,11 +258,18 @@ def grape(b: ObjectBuilder) -> None:
         a = 2.4 * k
         place = ((u - 0.5) * (0.8 * x - size), wide * math.cos(a), (z - size) / 2 * (1 + math.sin(a) * 0.9))
         b.add(ball(size, size, size, 8).seen().at(*place), skin)
-    b.add(tube([(0.38 * x, 0, z / 2), (0.45 * x, 0, 0.55 * z), (x / 2, 0.05 * y, 0.65 * z)], 0.04 * y, 5, hulls=0),
-          materials.plain("brown", "organic"))  # fmt: skip
-    b.add(hull([(-0.4 * x, s * 0.2 * y, h * z) for s in (-1, 1) for h in (0.2, 0.8)]
-               + [(dx * x, s * 0.5 * y, h * z) for dx in (-0.1, 0.2) for s in (-1, 1) for h in (0.1, 0.9)]
-               + [(0.4 * x, s * 0.2 * y, h * z) for s in (-1, 1) for h in (0, 1)]).felt(), skin)  # fmt: skip
+    b.add(
+        tube([(0.38 * x, 0, z / 2), (0.45 * x, 0, 0.55 * z), (x / 2, 0.05 * y, 0.65 * z)], 0.04 * y, 5, hulls=0),
+        materials.plain("brown", "organic"),
+    )
+    b.add(
+        hull(
+            [(-0.4 * x, s * 0.2 * y, h * z) for s in (-1, 1) for h in (0.2, 0.8)]
+            + [(dx * x, s * 0.5 * y, h * z) for dx in (-0.1, 0.2) for s in (-1, 1) for h in (0.1, 0.9)]
+            + [(0.4 * x, s * 0.2 * y, h * z) for s in (-1, 1) for h in (0, 1)]
+        ).felt(),
+        skin,
+    )
 
 
 def crumb(b: ObjectBuilder) -> None:
@@ -249,16 +288,24 @@ def rosehip(b: ObjectBuilder) -> None:
 
 GREEN = (0.30, 0.52, 0.22)
 CATEGORIES = [
-    Entry("banana", bent, (0.185, 0.070, 0.038), 0.12, 4, options={"skins": ("yellow", (0.85, 0.78, 0.30)), "curve": 50.0}),
-    Entry("chili", bent, (0.110, 0.030, 0.018), 0.015, 3, options={"skins": ("red", "green"), "curve": 25.0, "taper": 0.3}),
+    Entry("banana", bent, (0.185, 0.070, 0.038), 0.12, 4,
+          options={"skins": ("yellow", (0.85, 0.78, 0.30)), "curve": 50.0}),
+    Entry("chili", bent, (0.110, 0.030, 0.018), 0.015, 3,
+          options={"skins": ("red", "green"), "curve": 25.0, "taper": 0.3}),
     Entry("bean", bent, (0.120, 0.022, 0.010), 0.006, 3, options={"skins": (GREEN, "lime"), "curve": 20.0}),
-    Entry("pea", bent, (0.085, 0.022, 0.013), 0.006, 3, options={"skins": ("lime", GREEN), "curve": 15.0, "taper": 0.3}),
+    Entry("pea", bent, (0.085, 0.022, 0.013), 0.006, 3,
+          options={"skins": ("lime", GREEN), "curve": 15.0, "taper": 0.3}),
     Entry("carrot", long_root, (0.200, 0.030, 0.030), 0.075, 4, options={"skins": ("orange",), "leaves": "leaf"}),
-    Entry("radish", long_root, (0.075, 0.030, 0.030), 0.020, 3, options={"skins": ("rose", "red"), "taper": 0.08, "leaves": "leaf"}),
-    Entry("cucumber", long_root, (0.240, 0.046, 0.046), 0.30, 3, options={"skins": ((0.16, 0.36, 0.14),), "taper": 0.75, "ends": 0.9}),
-    Entry("zucchini", long_root, (0.200, 0.048, 0.048), 0.25, 3, options={"skins": ((0.22, 0.42, 0.18),), "taper": 0.85, "ends": 0.6}),
-    Entry("eggplant", long_root, (0.210, 0.085, 0.085), 0.40, 3, options={"skins": ((0.22, 0.10, 0.26),), "taper": 0.5, "leaves": "leaf"}),
-    Entry("turnip", onion, (0.085, 0.085, 0.085), 0.18, 3, uniform=True, options={"skins": ((0.86, 0.66, 0.72), (0.9, 0.88, 0.84))}),
+    Entry("radish", long_root, (0.075, 0.030, 0.030), 0.020, 3,
+          options={"skins": ("rose", "red"), "taper": 0.08, "leaves": "leaf"}),
+    Entry("cucumber", long_root, (0.240, 0.046, 0.046), 0.30, 3,
+          options={"skins": ((0.16, 0.36, 0.14),), "taper": 0.75, "ends": 0.9}),
+    Entry("zucchini", long_root, (0.200, 0.048, 0.048), 0.25, 3,
+          options={"skins": ((0.22, 0.42, 0.18),), "taper": 0.85, "ends": 0.6}),
+    Entry("eggplant", long_root, (0.210, 0.085, 0.085), 0.40, 3,
+          options={"skins": ((0.22, 0.10, 0.26),), "taper": 0.5, "leaves": "leaf"}),
+    Entry("turnip", onion, (0.085, 0.085, 0.085), 0.18, 3, uniform=True,
+          options={"skins": ((0.86, 0.66, 0.72), (0.9, 0.88, 0.84))}),
     Entry("beet", onion, (0.075, 0.075, 0.085), 0.15, 3, uniform=True, options={"skins": ((0.42, 0.08, 0.18),)}),
     Entry("potato", nut, (0.100, 0.066, 0.056), 0.19, 4, options={"colour": (0.78, 0.64, 0.42)}),
     Entry("lime", round_fruit, (0.050, 0.058, 0.050), 0.07, 3, options={"skins": ((0.42, 0.65, 0.20),), "stem": None}),
@@ -266,23 +313,32 @@ CATEGORIES = [
           options={"skins": ((0.78, 0.70, 0.48),), "stem": None, "depth": 0.4}),
     Entry("watermelon", round_fruit, (0.260, 0.340, 0.250), 7.0, 3, uniform=True,
           options={"skins": ((0.18, 0.40, 0.18), (0.30, 0.50, 0.24)), "stem": None, "depth": 0.5}),
-    Entry("pumpkin", ribbed, (0.260, 0.260, 0.220), 4.0, 4, uniform=True, options={"skins": ("orange", (0.85, 0.42, 0.12))}),
+    Entry("pumpkin", ribbed, (0.260, 0.260, 0.220), 4.0, 4, uniform=True,
+          options={"skins": ("orange", (0.85, 0.42, 0.12))}),
     Entry("bell_pepper", ribbed, (0.080, 0.080, 0.100), 0.16, 4, uniform=True,
           options={"skins": ("red", "yellow", "green", "orange"), "ribs": 4, "stem": "leaf"}),
-    Entry("head_cabbage", head, (0.175, 0.175, 0.160), 1.0, 3, uniform=True, options={"colour": (0.66, 0.78, 0.50), "loose": 0.02}),
+    Entry("head_cabbage", head, (0.175, 0.175, 0.160), 1.0, 3, uniform=True,
+          options={"colour": (0.66, 0.78, 0.50), "loose": 0.02}),
     Entry("lettuce", head, (0.160, 0.160, 0.140), 0.42, 3, uniform=True, options={"colour": (0.48, 0.70, 0.28)}),
-    Entry("artichoke", head, (0.095, 0.095, 0.100), 0.25, 3, uniform=True, options={"colour": (0.40, 0.52, 0.28), "loose": 0.05}),
+    Entry("artichoke", head, (0.095, 0.095, 0.100), 0.25, 3, uniform=True,
+          options={"colour": (0.40, 0.52, 0.28), "loose": 0.05}),
     Entry("broccoli", broccoli, (0.130, 0.130, 0.140), 0.32, 4, uniform=True),
-    Entry("celery", bunch, (0.330, 0.080, 0.060), 0.45, 3, options={"leafy": 0.25, "stem": (0.66, 0.80, 0.46), "count": 8}),
+    Entry("celery", bunch, (0.330, 0.080, 0.060), 0.45, 3,
+          options={"leafy": 0.25, "stem": (0.66, 0.80, 0.46), "count": 8}),
     Entry("green_onion", bunch, (0.300, 0.045, 0.022), 0.08, 3, options={"leafy": 0.5, "stem": "white", "bulb": True}),
     Entry("parsley", bunch, (0.200, 0.110, 0.035), 0.04, 3, options={"leafy": 0.55, "count": 14}),
-    Entry("basil", bunch, (0.160, 0.100, 0.040), 0.03, 3, options={"leafy": 0.6, "count": 12, "leaf": (0.24, 0.54, 0.20)}),
+    Entry("basil", bunch, (0.160, 0.100, 0.040), 0.03, 3,
+          options={"leafy": 0.6, "count": 12, "leaf": (0.24, 0.54, 0.20)}),
     Entry("chives", bunch, (0.220, 0.030, 0.015), 0.02, 2, options={"leafy": 0.0, "count": 14, "stem": "leaf"}),
-    Entry("spinach", bunch, (0.190, 0.130, 0.045), 0.10, 3, options={"leafy": 0.65, "count": 16, "leaf": (0.14, 0.38, 0.14)}),
-    Entry("green_onion_chopped", heap, (0.080, 0.080, 0.020), 0.02, 2, options={"colours": ("lime", "leaf", "white"), "grain": 0.24, "count": 34}),
-    Entry("raspberry", heap, (0.022, 0.022, 0.024), 0.005, 3, options={"colours": ((0.78, 0.15, 0.25),), "grain": 0.36, "count": 16}),
+    Entry("spinach", bunch, (0.190, 0.130, 0.045), 0.10, 3,
+          options={"leafy": 0.65, "count": 16, "leaf": (0.14, 0.38, 0.14)}),
+    Entry("green_onion_chopped", heap, (0.080, 0.080, 0.020), 0.02, 2,
+          options={"colours": ("lime", "leaf", "white"), "grain": 0.24, "count": 34}),
+    Entry("raspberry", heap, (0.022, 0.022, 0.024), 0.005, 3,
+          options={"colours": ((0.78, 0.15, 0.25),), "grain": 0.36, "count": 16}),
     Entry("gooseberry", round_fruit, (0.018, 0.018, 0.018), 0.004, 2, options={"skins": ((0.62, 0.72, 0.36),)}),
-    Entry("olive", round_fruit, (0.018, 0.024, 0.018), 0.005, 3, options={"skins": ((0.42, 0.46, 0.18), "black"), "stem": None}),
+    Entry("olive", round_fruit, (0.018, 0.024, 0.018), 0.005, 3,
+          options={"skins": ((0.42, 0.46, 0.18), "black"), "stem": None}),
     Entry("cherry", cherry, (0.055, 0.050, 0.030), 0.016, 3),
     Entry("grape", grape, (0.170, 0.100, 0.070), 0.35, 4),
     Entry("almond", nut, (0.024, 0.013, 0.008), 0.0012, 2, options={"colour": (0.66, 0.44, 0.26)}),
