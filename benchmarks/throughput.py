@@ -51,7 +51,10 @@ def ten_literals(model: StateModel) -> str:
     pairs = [(loose[i % len(loose)], fixed[(3 * i) % len(fixed)]) for i in range(7)]
     words = ["on_top", "inside", "next_to", "under", "on_top", "inside", "touching"]
     atoms = [f"({w} {a} {b})" for w, (a, b) in zip(words, pairs, strict=True)]
-    atoms += [f"(in_contact_with {loose[0]} {loose[-1]})", f"(not (frozen {loose[0]}))", f"(not (burnt {loose[-1]}))"]
+    atoms.append(f"(in_contact_with {loose[0]} {loose[-1]})")
+    able = model.parameters
+    for word, has in (("frozen", np.isfinite(able.freeze_temperature)), ("burnt", np.isfinite(able.burn_temperature))):
+        atoms += [f"(not ({word} {tables.object_names[int(i)]}))" for i in np.flatnonzero(has)[:1]]
     return "(and " + " ".join(atoms) + ")"
 
 
