@@ -21,7 +21,7 @@ from .manifest_entries import room_entries, task_entry, vec3
 from .mjcf_file import write_model
 from .mjcf_scene import SceneBuild, build_scene, fill_states, rest_start
 from .model_builder import ModelBuilder
-from .model_task import BuiltModel, ModelTask, model_task, run_task
+from .model_task import BuiltModel, ModelTask, is_quick, model_task, run_task
 from .options import ConvertOptions
 from .output import replaced_folder
 from .placements import Placement, complete_parts, make_halves, place_instances
@@ -164,9 +164,9 @@ def _run_tasks(
         task = model_task(dataset, scene, instance, hulls, options.bullet_inertia)
         tasks.setdefault(task.key, task)
         keys[instance.name] = task.key
-    results = map_tasks(
-        run_task, list(tasks.values()), [t.label for t in tasks.values()], options.jobs, options.progress
-    )
+    work = list(tasks.values())
+    labels = [task.label for task in work]
+    results = map_tasks(run_task, work, labels, options.jobs, options.progress, is_quick)
     by_key = dict(zip(tasks, results, strict=True))
     return {name: by_key[key] for name, key in keys.items()}
 

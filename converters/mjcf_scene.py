@@ -223,4 +223,3 @@ def rest_start(build: SceneBuild, model: mujoco.MjModel) -> bool:
     if drops:
         add_start_key(build.builder.spec, build.start_joints, {d.body: (d.pos, d.quat) for d in drops})
     return bool(drops)
-

@@ -10,10 +10,12 @@ import time
 
 import numpy as np
 
+from ig2mj.errors import Ig2mjError
+
 from .assembly import Assembly, assemble
 from .dataset import Dataset
 from .description import Instance, ObjectModel, SceneDescription
-from .hulls import decompose_link
+from .hulls import decompose_link, is_cached
 from .inertia import link_inertials
 from .pieces import HullOptions, LinkHulls
 from .scaling import instance_scale, scale_model
@@ -76,6 +78,16 @@ def run_task(task: ModelTask) -> BuiltModel:
     weighed = instance.kind != "building" and model.metadata.bbox_size is not None
     density = dataset.density(instance.category) if weighed else None
     return build_model(model, scale, density, task.hulls, task.bullet_inertia, igibson_visuals=True)
+
+
+def is_quick(task: ModelTask) -> bool:
+    """Whether all the geometry of a task is in the cache; a task that will fail is left to `run_task`, so not quick."""
+    try:
+        model = _dataset(task.root).instance_model(task.scene, task.instance)
+        scaled = scale_model(model, instance_scale(task.instance, model))
+    except Ig2mjError:
+        return False
+    return all(is_cached(link.collisions, task.hulls) for link in scaled.links.values() if link.collisions)
 
 
 def build_model(

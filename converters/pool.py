@@ -20,10 +20,12 @@ def map_tasks(
     labels: Sequence[str],
     jobs: int,
     progress: Progress,
+    is_quick: Callable[[Task], bool] | None = None,
 ) -> list[Result]:
-    """`[function(task) for task in tasks]`, in `jobs` processes where there is more than one task.
+    """`[function(task) for task in tasks]`, in `jobs` processes where that is worth it.
 
-    The first error is raised as it came; what has not begun then is dropped. On an interrupt the processes are ended.
+    Tasks that are quick are done here, while the processes work on the others. The first error is raised as it came;
+    what has not begun then is dropped. On an interrupt the processes are ended.
     """
     if jobs <= 1 or len(tasks) <= 1:
         results = []
@@ -31,32 +33,47 @@ def map_tasks(
             progress(label, done, len(tasks))
             results.append(function(task))
         return results
-    return _in_processes(function, tasks, labels, jobs, progress)
+    with _Pool(jobs) as pool:
+        found: dict[int, Result] = {}
+        sent: dict[concurrent.futures.Future, int] = {}
+        for index, task in enumerate(tasks):
+            progress(labels[index], len(found), len(tasks))
+            if is_quick is not None and is_quick(task):
+                found[index] = function(task)
+            else:
+                sent[pool.submit(function, task)] = index
+        waiting = {index: labels[index] for index in sent.values()}
+        for future in concurrent.futures.as_completed(sent):
+            progress(next(iter(waiting.values())), len(found), len(tasks))
+            found[sent[future]] = future.result()
+            waiting.pop(sent[future])
+    return [found[index] for index in range(len(tasks))]
 
 
-def _in_processes(
-    function: Callable[[Task], Result], tasks: Sequence[Task], labels: Sequence[str], jobs: int, progress: Progress
-) -> list[Result]:
-    before = set(multiprocessing.active_children())
-    context = multiprocessing.get_context("spawn")  # forking a process that has threads can hang
-    executor = concurrent.futures.ProcessPoolExecutor(min(jobs, len(tasks)), context, initializer=_ignore_interrupts)
-    try:
-        futures = {executor.submit(function, task): index for index, task in enumerate(tasks)}
-        waiting = dict(enumerate(labels))
-        progress(labels[0], 0, len(tasks))
-        results: dict[int, Result] = {}
-        for future in concurrent.futures.as_completed(futures):
-            index = futures[future]
-            results[index] = future.result()
-            waiting.pop(index)
-            progress(next(iter(waiting.values()), ""), len(results), len(tasks))
-        executor.shutdown()
-        return [results[index] for index in range(len(tasks))]
-    except BaseException:
-        executor.shutdown(wait=False, cancel_futures=True)
-        for process in set(multiprocessing.active_children()) - before:
-            process.terminate()
-        raise
+class _Pool:
+    """A process pool that starts with its first task, and whose processes are ended when the block is left early."""
+
+    def __init__(self, jobs: int):
+        self._jobs = jobs
+        self._executor: concurrent.futures.ProcessPoolExecutor | None = None
+        self._others = set(multiprocessing.active_children())
+
+    def __enter__(self) -> _Pool:
+        return self
+
+    def submit(self, function: Callable[[Task], Result], task: Task) -> concurrent.futures.Future:
+        if self._executor is None:
+            context = multiprocessing.get_context("spawn")  # forking a process that has threads can hang
+            self._executor = concurrent.futures.ProcessPoolExecutor(self._jobs, context, initializer=_ignore_interrupts)
+        return self._executor.submit(function, task)
+
+    def __exit__(self, error: type[BaseException] | None, *_: object) -> None:
+        if self._executor is None:
+            return
+        self._executor.shutdown(wait=error is None, cancel_futures=error is not None)
+        if error is not None:
+            for process in set(multiprocessing.active_children()) - self._others:
+                process.terminate()
 
 
 def _ignore_interrupts() -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pathlib
+
 import mujoco
 import numpy as np
 import pytest
@@ -31,7 +33,9 @@ def joint(name, kind, parent, child, xyz=(0, 0, 0), axis=(0, 0, 1), lower=0.0, u
 
 
 def thing(links, joints, inertials=None, pieces=None, base="base_link"):
-    model = ObjectModel("box", "m", None, {n: Link(n) for n in links}, {j.name: j for j in joints}, base)
+    model = ObjectModel(
+        "box", "m", pathlib.Path("m.urdf"), {n: Link(n) for n in links}, {j.name: j for j in joints}, base
+    )
     model.metadata = Metadata()
     given = {n: Inertial(1.0, np.eye(3) * 1e-3) for n in links} | (inertials or {})
     return assemble(model, np.ones(3), pieces or {n: [hull()] for n in links}, given)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pathlib
 
 import mujoco
 import numpy as np
@@ -21,7 +22,7 @@ def test_the_joint_origin_is_the_pose_of_the_bounding_box_centre_section_2_2(hou
 
 
 def test_the_offset_is_turned_with_the_object_section_2_2():
-    model = ObjectModel("c", "m", None, {}, {}, "base_link")
+    model = ObjectModel("c", "m", pathlib.Path("m.urdf"), {}, {}, "base_link")
     model.metadata = Metadata(bbox_size=np.ones(3), base_link_offset=np.array([0.3, 0.0, 0.1]))
     body = BodyPlan("base_link", None, np.eye(4), None, ["base_link"], [], [], Inertial(1.0, np.eye(3)), np.zeros(3))
     plan = Assembly(model, np.ones(3), [body], {}, [])
@@ -34,7 +35,7 @@ def test_the_offset_is_turned_with_the_object_section_2_2():
 
 def two_bodied(box: bool) -> Assembly:
     """A base whose centre of mass is at (0.1, 0, 0), and a body split off at (0, 0, 1)."""
-    model = ObjectModel("c", "m", None, {}, {}, "base_link")
+    model = ObjectModel("c", "m", pathlib.Path("m.urdf"), {}, {}, "base_link")
     if box:
         model.metadata = Metadata(bbox_size=np.ones(3), base_link_offset=np.zeros(3))
     above = np.eye(4)
