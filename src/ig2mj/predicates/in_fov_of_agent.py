@@ -105,7 +105,8 @@ def _hidden(
 
 def _points(tables: SceneTables, view: PhysicsView, objects: np.ndarray) -> Float[Array, "W P N 3"]:
     """The objects' sample points, world frame."""
-    samples = [surface_points(tables, int(o)) for o in objects]
+    with jax.ensure_compile_time_eval():  # constants: on the host, also while tracing
+        samples = [surface_points(tables, int(o)) for o in objects]
     body, local = (np.stack(column) for column in zip(*samples, strict=True))
     pos, quat = jnp.asarray(view.body_pos)[:, body], jnp.asarray(view.body_quat)[:, body]
     return pos + quat_rotate(quat, local)
