@@ -50,11 +50,11 @@ class FreeView:
       height: None for a perspective picture; metres of world from the lower to the upper edge for an orthographic one.
     """
 
-    lookat: tuple[float, float, float]
-    distance: float
-    azimuth: float = 90.0
-    elevation: float = -45.0
-    height: float | None = None
+    lookat: Sequence[float | int]
+    distance: float | int
+    azimuth: float | int = 90.0
+    elevation: float | int = -45.0
+    height: float | int | None = None
 
     @classmethod
     def around(cls, model: mujoco.MjModel, azimuth: float = 90.0, elevation: float = -45.0) -> FreeView:
