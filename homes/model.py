@@ -32,7 +32,7 @@ class Area:
 
 @dataclasses.dataclass
 class Joint:
-    """kind: revolute, prismatic, continuous, fixed; limits: radians or metres. openable: direction, 0 if not openable."""
+    """kind: revolute, prismatic, continuous, fixed; limits: radians or metres; openable: its direction, or 0."""
 
     name: str
     kind: str
@@ -155,8 +155,8 @@ class ObjectBuilder:
         assert name not in {other.name for other in self.links}, f"{self.category}: two links named {name}"
         self.links.append(link)
         offset = link.origin - parent.origin
-        axis = tuple(float(v) for v in axis)
-        self.joints.append(Joint(f"{name}_joint", kind, parent.name, name, offset, axis, limits, int(openable)))
+        ax, ay, az = (float(v) for v in axis)
+        self.joints.append(Joint(f"{name}_joint", kind, parent.name, name, offset, (ax, ay, az), limits, int(openable)))
         return link
 
     # --- annotated links ----------------------------------------------------------------------------------------

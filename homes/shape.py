@@ -9,7 +9,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import trimesh
 
-Vec = Sequence[float]
+Vec = Sequence[float] | np.ndarray  # three numbers
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 

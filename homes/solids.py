@@ -49,7 +49,7 @@ def box(x: float, y: float, z: float) -> Solid:
     return block((x, y, z), (0, 0, z / 2))
 
 
-def soft_box(x: float, y: float, z: float, radius: float | None = None, steps: int = 2) -> Solid:
+def soft_box(x: float, y: float, z: float, radius: float | None = None, steps: int = 1) -> Solid:
     """A box with rounded edges (cushions, bread, soap) standing on the origin; the hull is the plain box."""
     size = np.array([x, y, z])
     r = min(radius if radius is not None else 0.25 * size.min(), 0.499 * size.min())

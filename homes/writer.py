@@ -1,6 +1,6 @@
 """Writes one model folder of the iGibson dataset (dataset_format.md section 4): URDF, meshes, textures, metadata.
 
-Numbers are rounded (collision 1 micrometre, visual 10 micrometres) so that the same model gives the same bytes.
+Numbers are rounded (collision 1 micrometre, visual 10 micrometres, or 100 in a mesh wider than 0.3 m) so that the same model gives the same bytes.
 """
 
 from __future__ import annotations
@@ -128,12 +128,15 @@ def collision_obj(link: LinkBuilder) -> str:
 
 def visual_obj(meshes: Iterable[Mesh], material: Material, name: str) -> str:
     """One OBJ of one material, with texture coordinates where the material has a texture."""
+    meshes = list(meshes)
+    reach = max(float(np.ptp(mesh.vertices, axis=0).max()) for mesh in meshes)
+    digits = 4 if reach > 0.3 else 5
     lines = ["mtllib default.mtl", f"usemtl {name}"]
     faces: list[str] = []
     places: dict[str, int] = {}
     corners: dict[str, int] = {}
     for mesh in meshes:
-        spots = [places.setdefault(numbers(v, 5), len(places) + 1) for v in mesh.vertices]
+        spots = [places.setdefault(numbers(v, digits), len(places) + 1) for v in mesh.vertices]
         uv = None
         if material.texture is not None:
             uv = mesh.uv if mesh.uv is not None else box_mapping(mesh, material.tile)

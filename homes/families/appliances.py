@@ -102,7 +102,7 @@ def drum(b: ObjectBuilder, *, washing: bool = True) -> None:
     b.add(cylinder(0.52 * hole + 0.03, 0.006, 16).turned("y", 90).at(plane - 0.04 - reach, 0, middle), inside)
     left = b.pick((True, False))
     s = 1 if left else -1
-    link = b.hinge("door", (plane, s * (0.56 * hole + 0.02), middle), (0, 0, s), 2.0)
+    link = b.hinge("door", (plane + leaf, s * (0.56 * hole + 0.02), middle), (0, 0, s), 2.0)
     r = 0.56 * hole + 0.02
     link.add(cylinder(r, leaf, 20).turned("y", 90).at(plane, 0, middle), body)
     link.add(

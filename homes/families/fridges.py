@@ -37,20 +37,17 @@ def fridge(b: ObjectBuilder) -> None:
         inner,
     )
     plane = shift + depth / 2
-    split = {
-        "single": None,
-        "freezer_top": foot + 0.68 * (z - foot),
-        "drawer": foot + 0.3 * z,
-        "french": foot + 0.33 * z,
-    }[plan]
+    # Height of the board between the two compartments; 0: there is only one.
+    heights = {"freezer_top": foot + 0.68 * (z - foot), "drawer": foot + 0.3 * z, "french": foot + 0.33 * z}
+    split = heights.get(plan, 0.0)
     room_x = depth - WALL - 0.02
     middle_x = plane - 0.01 - room_x / 2
-    if split is not None:
+    if split:
         b.add(block((room_x, y - 2 * WALL, 0.04), (middle_x, 0, split)), body)
     cold_low, cold_high = foot + WALL, z - WALL
     if plan == "freezer_top":
         cold_high = split - 0.02
-    elif split is not None:
+    elif split:
         cold_low = split + 0.02
     shelf = materials.glass("sky", 0.45)
     count = max(2, round((cold_high - cold_low) / 0.34))

@@ -64,19 +64,14 @@ def piano(b: ObjectBuilder) -> None:
     b.add(block((x - depth + 0.02, y, 0.13), (x / 2 - (x - depth) / 2 - 0.01, 0, 0.65)), wood)
     for s in (-1, 1):
         b.add(box(0.06, 0.06, 0.6).at(x / 2 - 0.04, s * (y / 2 - 0.05)), wood)
-    keys = textures.custom(
-        lambda d: (
-            [d.rectangle([k * 8, 0, k * 8, 32], fill=(120, 120, 120)) for k in range(32)]
-            + [
-                d.rectangle([k * 8 - 2, 0, k * 8 + 2, 19], fill=(10, 10, 10))
-                for k in range(32)
-                if k % 7 in (1, 2, 4, 5, 6)
-            ]
-        ),
-        (256, 32),
-        (0.97, 0.97, 0.95),
-        4,
-    )
+
+    def draw_keys(draw) -> None:
+        for k in range(32):
+            draw.rectangle([k * 8, 0, k * 8, 32], fill=(120, 120, 120))
+            if k % 7 in (1, 2, 4, 5, 6):
+                draw.rectangle([k * 8 - 2, 0, k * 8 + 2, 19], fill=(10, 10, 10))
+
+    keys = textures.custom(draw_keys, (256, 32), (0.97, 0.97, 0.95), 4)
     b.add(
         decal(0.94 * y, 0.8 * (x - depth), "z").at(x / 2 - 0.5 * (x - depth), 0, 0.716), materials.picture("keys", keys)
     )

@@ -101,7 +101,8 @@ def door(
     """
     y0, y1 = min(y), max(y)
     middle, height, width = (z[0] + z[1]) / 2, z[1] - z[0], y1 - y0
-    origin = (plane, y1 if left else y0, middle)
+    # The axis runs along the outer front edge, so that the leaf never swings beyond its own width.
+    origin = (plane + depth, y1 if left else y0, middle)
     link = b.hinge(name, origin, (0, 0, 1 if left else -1), angle, openable)
     board = leaf if leaf is not None else block((depth, width, height), (depth / 2, 0, 0))
     link.add(board.at(plane, (y0 + y1) / 2, middle), face)
@@ -128,7 +129,8 @@ def flap(
 ) -> LinkBuilder:
     """An oven's or dishwasher's door: hinged along its lower edge, closing the plane x = `plane`."""
     middle, height = (z[0] + z[1]) / 2, z[1] - z[0]
-    link = b.hinge(name, (plane, y, z[0]), (0, 1, 0), angle, openable)
+    # The axis runs along the outer lower edge, so that the open flap does not reach below its closed place.
+    link = b.hinge(name, (plane + depth, y, z[0]), (0, 1, 0), angle, openable)
     link.add(block((depth, width, height), (plane + depth / 2, y, middle)), face)
     if handle is not None:
         link.add(handle.at(plane + depth, y, z[1] - 0.08 * height - 0.01), metal)

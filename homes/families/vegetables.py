@@ -18,7 +18,7 @@ from .fruit import onion, round_fruit
 def long_root(
     b: ObjectBuilder, *, skins: tuple, taper: float = 0.25, leaves: str | None = None, ends: float = 0.7
 ) -> None:
-    """A carrot, cucumber or courgette lying along x. taper: tip's radius; ends: blunt end's, relative to the thickest."""
+    """A carrot or cucumber lying along x. taper: the tip's radius, ends: the blunt end's, relative to the thickest."""
     x, y, z = b.size
     skin = materials.skin(b.pick(skins), b.rng, 0.12)
     tuft = 0.12 * x if leaves else 0.0
