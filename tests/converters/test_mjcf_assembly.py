@@ -15,6 +15,7 @@ from ig2mj_converters.mjcf_object import add_object
 from ig2mj_converters.model_builder import ModelBuilder
 from ig2mj_converters.naming import NamePool, file_slug
 from ig2mj_converters.pieces import Piece
+from scipy.spatial.transform import Rotation
 
 
 def at(x, y, z) -> np.ndarray:
@@ -143,9 +144,16 @@ def test_a_free_base_without_mass_is_flagged_section_6():
     assert "static" in plan.warnings[0]
 
 
-def test_an_impossible_inertia_is_made_one_that_mujoco_takes(tmp_path):
-    plan = thing(["base_link"], [], {"base_link": Inertial(1.0, np.diag([1e-9, 1e-9, 5.0]))})
-    compiled(plan, tmp_path, fixed=False)
+@pytest.mark.parametrize(
+    "moments",
+    [(1e-9, 1e-9, 5.0), (4.2e-7, 0.075, 0.07496), (1.0, 1.0, 2.0), (0.3333333, 0.1234567, 0.45679), (0, 0, 0)],
+)
+def test_flat_slender_and_impossible_inertias_survive_mjcfs_six_digits(moments, tmp_path):
+    turn = Rotation.from_euler("xyz", (0.3, 1.1, -0.7)).as_matrix()
+    for axes in (np.eye(3), turn):
+        plan = thing(["base_link"], [], {"base_link": Inertial(1.0, axes @ np.diag(moments) @ axes.T)})
+        _, _, builder = compiled(plan, tmp_path, fixed=False)
+        mujoco.MjModel.from_xml_string(builder.spec.to_xml())
 
 
 def test_clashing_names_get_a_suffix(tmp_path):
