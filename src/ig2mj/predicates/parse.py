@@ -19,12 +19,12 @@ from ig2mj.errors import InputError
 from ig2mj.predicates import logic
 from ig2mj.predicates.logic import Expression
 
-_TOKEN = re.compile(r'\s*(?:;[^\n]*\n?\s*)*([()]|"(?:\\.|[^"\\])*"|[^\s()";]+)')
+_TOKEN = re.compile(r'\s+|;[^\n]*|(?P<token>[()]|"(?:\\.|[^"\\])*"|[^\s()";]+)')
 
 MAX_DEPTH = 100
 """Nesting that no sensible goal reaches; deeper text is refused instead of overflowing the stack."""
 
-Tree: TypeAlias = "str | list[Tree]"
+Tree: TypeAlias = str | list
 
 
 class ExpressionError(InputError):
@@ -54,15 +54,13 @@ def parse(source: str, name: str = "expression") -> Expression:
 
 def _tokens(source: str, name: str) -> list[str]:
     found, at = [], 0
-    source = source.rstrip()
     while at < len(source):
-        token = _TOKEN.match(source, at)
-        if token is None:
-            if re.fullmatch(r"\s*(;[^\n]*\s*)*", source[at:]):
-                break
+        match = _TOKEN.match(source, at)
+        if match is None:
             raise ExpressionError(name, "has a quote that does not end", element=source[at : at + 20])
-        found.append(token.group(1))
-        at = token.end()
+        if match["token"]:
+            found.append(match["token"])
+        at = match.end()
     return found
 
 
