@@ -20,8 +20,8 @@ from .poses import apply
 #: A body without mass cannot move in MuJoCo: the least mass (kg) and the least radius of gyration (m) we give one.
 MIN_MASS = 1e-3
 MIN_GYRATION_RADIUS = 1e-3
-#: No body's largest moment of inertia exceeds the sum of the other two. Flat and slender bodies lie near that bound, and
-#: MJCF's six digits must not round them across it: the distance kept, relative to the largest.
+#: No body's largest moment of inertia exceeds the sum of the other two. Flat and slender bodies lie near that bound,
+#: and MJCF's six digits must not round them across it: the distance kept, relative to the largest.
 MOMENT_MARGIN = 1e-5
 
 
@@ -218,6 +218,7 @@ class _Planner:
         floor = inertial.mass * MIN_GYRATION_RADIUS**2
         values, axes = np.linalg.eigh((inertial.inertia + inertial.inertia.T) / 2)
         values = np.maximum(values, floor)
+        values[2] = min(values[2], values[0] + values[1])
         margin = MOMENT_MARGIN * values[2]
         values[0] = max(values[0], 3 * margin)
         values[2] = min(values[2], values[0] + values[1] - margin)
