@@ -29,6 +29,7 @@ FRACTIONS = (0.0, 0.33, 0.66, 1.0)
 """Where in its range a joint is looked at for clearance."""
 CLEARANCE = 5e-3
 """Metres of new overlap with another object that count as blocked."""
+NO_JOINTS = "there are no joints"
 
 
 def check_settle(model: mujoco.MjModel, manifest: Manifest, index: ModelIndex) -> CheckResult:
@@ -60,6 +61,8 @@ def check_settle(model: mujoco.MjModel, manifest: Manifest, index: ModelIndex) -
                 )
     failures.sort(key=lambda f: -f.get("drift", np.inf))
     calm = loose - sum("drift" in f for f in failures)
+    if not loose and not failures:
+        return CheckResult("settle", True, "nothing is loose")
     text = f"{calm} of {loose} loose objects move less than {DRIFT_TOLERANCE * 100:g} cm in {SETTLE_TIME:g} s"
     return CheckResult("settle", not failures, text, failures, measured)
 
@@ -215,7 +218,7 @@ def _sweep_result(model: mujoco.MjModel, index: ModelIndex, reached: dict[int, f
             owner = index.name(int(index.body_object[model.jnt_bodyid[joint]]))
             problem = f"{name} jams after {share:.0%} of its range"
             failures.append({"object": owner, "joint": name, "reached": share, "problem": problem})
-    text = f"{len(reached) - len(failures)} of {len(reached)} joints go through their range"
+    text = f"{len(reached) - len(failures)} of {len(reached)} joints go through their range" if reached else NO_JOINTS
     return CheckResult("joint_sweep", not failures, text, failures, measured)
 
 
@@ -266,4 +269,5 @@ def check_clearance(model: mujoco.MjModel, manifest: Manifest, index: ModelIndex
                     )
                     break
     text = f"{count - len(failures)} of {count} joints have room for their whole range where they stand"
+    text = text if count else NO_JOINTS
     return CheckResult("joint_clearance", not failures, text, failures, advisory=True)

@@ -183,7 +183,7 @@ def check_penetration(model: mujoco.MjModel, index: ModelIndex, allowed: Collect
             continue
         first, *rest = sorted(pair)
         other = rest[0] if rest else first
-        problem = f"{depth * 1000:.1f} mm inside {other if rest else 'its own other part'}"
+        problem = f"overlaps {other if rest else 'another part of itself'} by {depth * 1000:.1f} mm"
         failures.append({"object": first, "other": other, "depth": depth, "problem": problem})
     excused = len(deepest) - len(failures)
     text = f"{len(failures)} pair{'' if len(failures) == 1 else 's'} of objects overlap at the start"

@@ -101,7 +101,10 @@ def collect(model: mujoco.MjModel, manifest: Manifest, index: ModelIndex, given:
     for check in given.checks:
         for failure in check.failures:
             for name in {failure.get("object"), failure.get("other")} - {None}:
-                line = {"check": check.name, "problem": failure["problem"], "advisory": check.advisory}
+                problem = failure["problem"]
+                if name == failure.get("other") and name != failure.get("object"):
+                    problem = f"{failure['object']} {problem}"
+                line = {"check": check.name, "problem": problem, "advisory": check.advisory}
                 complaints.setdefault(str(name), []).append(line)
     measured = {check.name: check.measured for check in given.checks}
     objects = [

@@ -82,7 +82,7 @@ class Pictures:
         self.model.geom_matid[solid] = -1
         try:
             by_renderer = not self._too_slow()
-            return tuple(self._picture(g, SIZE, by_renderer=by_renderer) for g in (seen, solid))  # type: ignore[return-value]
+            return tuple(self._picture(g, SIZE, flat=True, by_renderer=by_renderer) for g in (seen, solid))  # type: ignore[return-value]
         finally:
             self.model.geom_rgba[solid] = self.original.geom_rgba[solid]
             self.model.geom_matid[solid] = keep
@@ -124,10 +124,9 @@ class Pictures:
         m.light_active[:] = 0
         m.vis.headlight.active = 1
         m.vis.headlight.ambient[:], m.vis.headlight.diffuse[:], m.vis.headlight.specular[:] = 0.45, 0.5, 0.05
-        span = max(float(high[1] - low[1]), float(high[0] - low[0]) * height / width) * 1.04
         view: Any = self.view(
-            tuple(float(x) for x in middle), 2.0 * extent if flat else 1.4 * extent, azimuth, elevation,
-            height=span if flat else None,
+            tuple(float(x) for x in middle), 2.0 * extent if flat else 1.2 * extent, azimuth, elevation,
+            height=self._span(geoms, azimuth, elevation, width / height) if flat else None,
         )  # fmt: skip
         started = time.perf_counter()
         try:
@@ -141,6 +140,15 @@ class Pictures:
         self._seconds += time.perf_counter() - started
         self._count += 1
         return _on_light_ground(image)
+
+    def _span(self, geoms: np.ndarray, azimuth: float, elevation: float, aspect: float) -> float:
+        """Metres from the lower to the upper edge of a picture without perspective that just holds the geoms."""
+        a, e = np.radians([azimuth, elevation])
+        right = np.array([np.sin(a), -np.cos(a), 0.0])
+        up = np.cross(right, [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
+        low, high = self.boxes[geoms, 0].min(axis=0), self.boxes[geoms, 1].max(axis=0)
+        across, along = (float(np.abs(axis) @ (high - low)) for axis in (right, up))
+        return 1.06 * max(along, across / aspect, 1e-3)
 
     def scene(self, rooms: RoomMaps | None) -> list[tuple[str, str]]:
         """(caption, data URI): from above, from a corner, and the plan; ceilings and parked objects are left out."""

@@ -48,7 +48,7 @@ def draw_plan(
         corners.append(_room_extent(rooms))
     if not corners:
         return None
-    low = np.min([c[0] for c in corners], axis=0) - 0.3
+    low = np.min([c[0] for c in corners], axis=0) - 0.5
     high = np.max([c[1] for c in corners], axis=0) + 0.3
     scale = width / float(high[0] - low[0])
     height = int(np.clip((high[1] - low[1]) * scale, 80, 2 * width))
@@ -76,7 +76,7 @@ def draw_plan(
         _name_rooms(pen, rooms, at)
     x, y = 12, height - 14
     pen.line((x, y, x + scale, y), fill=INK, width=3)
-    pen.text((x + scale + 6, y - 8), "1 m", fill=INK, font=_font(14))
+    pen.text((x + scale + 8, y - 14), "1 m", fill=INK, font=_font(22))
     return np.asarray(image)
 
 
@@ -109,7 +109,7 @@ def _name_rooms(pen: ImageDraw.ImageDraw, rooms: RoomMaps, at) -> None:
         if not len(rows):
             continue
         x, y = ((float(np.median(c)) + 0.5 - n / 2) * rooms.resolution for c in (columns, rows))
-        pen.text(at(x, y), name, fill=INK, font=_font(15), anchor="mm", stroke_width=2, stroke_fill="white")
+        pen.text(at(x, y), name, fill=INK, font=_font(24), anchor="mm", stroke_width=2, stroke_fill="white")
 
 
 def _font(size: int):

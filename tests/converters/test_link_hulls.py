@@ -142,6 +142,15 @@ def test_a_box_without_its_lid_is_hollow():
     assert not filled(result, [0, 0, 0.2]).any()
 
 
+def test_a_bowl_of_a_single_sheet_stays_open_within_the_budget(no_coacd):
+    bowl = trimesh.creation.icosphere(3, 0.2)
+    bowl.update_faces(bowl.triangles_center[:, 2] < 0)
+    result = decompose_link([shape(bowl)], NO_CACHE)
+    assert result.after == 16 and result.before > 100
+    assert not filled(result, [[0, 0, -0.02], [0, 0, -0.1], [0.1, 0, -0.05]]).any()
+    np.testing.assert_allclose(outline(result), [0.4, 0.4, 0.2], rtol=0.015)
+
+
 def test_doubled_faces_do_not_spoil_the_volume(no_coacd):
     """PartNet-Mobility's double-sided meshes enclose a signed volume of about 0 (dataset_format.md section 13)."""
     mesh = table()
@@ -231,6 +240,12 @@ def test_hulls_have_at_most_the_asked_vertices_and_say_what_that_cost():
         )
         > 32
     )
+
+
+@pytest.mark.parametrize("wrong", [{"max_hulls": 0}, {"max_hull_vertices": 4}])
+def test_a_budget_that_cannot_be_met_is_refused(wrong):
+    with pytest.raises(ValueError, match=next(iter(wrong))):
+        HullOptions(**wrong)
 
 
 def test_input_and_result_travel_to_worker_processes():
