@@ -11,7 +11,7 @@ import numpy as np
 from .shape import Mesh, Solid
 
 ROUND_SIDES = 20  # facets of a round visual
-HULL_SIDES = 10  # facets of a round collision hull: 3 levels of it stay under 32 vertices
+HULL_SIDES = 12  # facets of a round collision hull of two levels; a multiple of 4, so that its box is that of the circle
 
 
 def lathe(profile: Sequence[tuple[float, float]], sides: int = ROUND_SIDES, split: Sequence[float] = ()) -> Solid:
@@ -79,13 +79,13 @@ def _band(profile: list[tuple[float, float]], low: float, high: float) -> list[t
 
 
 def _turned_hull(profile: list[tuple[float, float]]) -> np.ndarray:
-    """Points of a round hull: the lowest, the widest and the highest level of a profile (3 x HULL_SIDES + 2)."""
+    """Points of a round hull: the lowest, the widest and the highest level of a profile, 32 vertices at most."""
     levels = {min(profile, key=lambda p: (p[1], -p[0])), max(profile, key=lambda p: (p[1], p[0])), max(profile)}
     widest = max(levels)[0]
     lowest_wide = min((p for p in profile if p[0] >= 0.97 * widest), key=lambda p: p[1])
     highest_wide = max((p for p in profile if p[0] >= 0.97 * widest), key=lambda p: p[1])
     levels |= {lowest_wide, highest_wide}
-    sides = HULL_SIDES if sum(r > 1e-6 for r, _ in levels) <= 3 else 8
+    sides = HULL_SIDES if sum(r > 1e-6 for r, _ in levels) <= 2 else 8
     angles = np.arange(sides) * 2 * math.pi / sides
     points = []
     for r, z in sorted(levels, key=lambda p: p[1]):

@@ -120,6 +120,8 @@ def rocking_chair(b: ObjectBuilder) -> None:
         angles = [-half + k * half / 3 for k in range(7)]
         path = [(radius * math.sin(a), yy, 0.02 + radius * (1 - math.cos(a))) for a in angles]
         b.add(tube(path, 0.02, 8, hulls=3), wood)
+        # A flat spot in the middle of the runner, on which the chair comes to rest.
+        b.add(block((0.44, 0.036, 0.02), (-0.03, yy, 0.01)).felt(), wood)
         b.add(rod((0.2, yy, 0.04), (0.2, yy, seat + 0.2), 0.018), wood)
         b.add(rod((-0.2, yy, 0.04), (-0.25, yy, seat), 0.018), wood)
         b.add(bar((-0.25, yy, seat + 0.2), (0.24, yy, seat + 0.2), 0.045, 0.02), wood)

@@ -175,6 +175,8 @@ def alarm(b: ObjectBuilder) -> None:
     middle = r + 0.09 * z
     b.add(cylinder(r, x, 20).turned("y", 90).at(-x / 2, 0, middle), look)
     b.add(decal(1.3 * r, 1.3 * r).at(x / 2 + 0.0005, 0, middle), materials.picture("dial", textures.dial()))
+    # Felt as a foot as deep as the drum, so that the clock does not roll over its two thin legs.
+    b.add(box(0.9 * x, 1.3 * r, 0.3 * middle).felt(), metal)
     for s in (-1, 1):
         b.add(rod((0, s * 0.55 * r, 0.3 * middle), (0, s * 0.85 * r, 0), 0.06 * r + 0.001, 6), metal)
         b.add(ball(0.6 * r, 0.6 * r, 0.4 * r, 10).turned("x", -s * 35).at(0, s * 0.55 * r, middle + 0.75 * r), metal)
