@@ -32,7 +32,7 @@ class Entry:
       mass: kilograms of a model of that size, contents included.
       count: how many models.
       fixed: furniture that is screwed or too heavy to be free in a scene.
-      rest: "any" (put down on any stable side) or "upright" (only as built).
+      rest: "any" (put down on any stable side), "standing" (mostly as built) or "upright" (only as built).
       vary: each edge is multiplied by a random factor of 1 +- vary; uniform: all three by the same.
       flesh: material of the cut faces; given for sliceable categories, whose models then come with halves.
       options: further keyword arguments of `build`.

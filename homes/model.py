@@ -72,7 +72,7 @@ class Part:
 class HouseholdObject:
     """A finished model, ready to be written. Shapes are in link frames; joint origins are relative to the parent link.
 
-    rest: which orientations it can be put down in: "upright" (as built) or "any" (stable poses of its hull).
+    rest: which orientations it can be put down in: "upright", "standing" or "any" (see poses.stable_orientations).
     """
 
     category: str

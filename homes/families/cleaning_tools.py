@@ -299,7 +299,7 @@ CATEGORIES = [
     Entry("broom", broom, (1.350, 0.300, 0.050), 0.80, 4, rest="any"),
     Entry("scrub_brush", hand_brush, (0.170, 0.065, 0.060), 0.16, 4, rest="upright"),
     Entry("toothbrush", toothbrush, (0.185, 0.014, 0.017), 0.018, 4),
-    Entry("hairbrush", hairbrush, (0.230, 0.070, 0.040), 0.12, 3, rest="upright"),
+    Entry("hairbrush", hairbrush, (0.230, 0.070, 0.040), 0.12, 3),
     Entry("paintbrush", paintbrush, (0.230, 0.060, 0.020), 0.08, 3),
     Entry("vacuum", vacuum, (0.320, 0.300, 1.100), 6.0, 4, rest="upright", vary=0.05),
     Entry("carpet_sweeper", sweeper, (0.600, 0.300, 1.050), 2.0, 3, rest="upright", vary=0.05),

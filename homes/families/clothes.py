@@ -322,7 +322,7 @@ CATEGORIES = [
     Entry("walker", shoe, (0.300, 0.110, 0.130), 0.50, 3, rest="upright"),
     Entry("sandal", shoe, (0.270, 0.100, 0.080), 0.25, 4, rest="upright", options={"style": "sandal"}),
     Entry("hat", hat, (0.330, 0.330, 0.120), 0.12, 4, rest="upright", uniform=True),
-    Entry("sunglass", glasses, (0.150, 0.145, 0.045), 0.030, 3, rest="upright"),
+    Entry("sunglass", glasses, (0.150, 0.145, 0.045), 0.030, 3),
     Entry("ring", jewel_ring, (0.024, 0.024, 0.008), 0.006, 2, uniform=True),
     Entry("bracelet", jewel_ring, (0.070, 0.070, 0.012), 0.025, 3, uniform=True, options={"gem": False}),
     Entry("necklace", necklace, (0.180, 0.140, 0.009), 0.030, 3),

@@ -178,7 +178,7 @@ def alarm(b: ObjectBuilder) -> None:
     # Felt as a foot as deep as the drum, so that the clock does not roll over its two thin legs.
     b.add(box(0.9 * x, 1.3 * r, 0.3 * middle).felt(), metal)
     for s in (-1, 1):
-        b.add(rod((0, s * 0.55 * r, 0.3 * middle), (0, s * 0.85 * r, 0), 0.06 * r + 0.001, 6), metal)
+        b.add(rod((0, s * 0.55 * r, 0.3 * middle), (0, s * 0.85 * r, 0), 0.06 * r + 0.001, 6).seen(), metal)
         b.add(ball(0.6 * r, 0.6 * r, 0.4 * r, 10).turned("x", -s * 35).at(0, s * 0.55 * r, middle + 0.75 * r), metal)
     arch = [
         (0, 0.62 * r * math.cos(a), middle + r + (z - middle - r - 0.003) * math.sin(a))

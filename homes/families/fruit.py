@@ -168,7 +168,7 @@ _SLICEABLE: list[Line] = [
 ]  # fmt: skip
 
 CATEGORIES = [
-    Entry(name, build, size, mass, 4, uniform=True, flesh=flesh(rgb), options=options)
+    Entry(name, build, size, mass, 4, rest="standing", uniform=True, flesh=flesh(rgb), options=options)
     for name, build, size, mass, rgb, options in _SLICEABLE
 ] + [
     Entry(f"half_{name}", half_of, (size[0] / 2, size[1], size[2]), mass / 2, 2, uniform=True,

@@ -68,19 +68,21 @@ def stick(b: ObjectBuilder, *, looks: tuple = (("yellow", "white"),)) -> None:
 
 
 CATEGORIES = [
-    Entry("milk", gable_carton, (0.072, 0.072, 0.240), 1.05, 4),
+    Entry("milk", gable_carton, (0.072, 0.072, 0.240), 1.05, 4, rest="standing"),
     Entry("juice", gable_carton, (0.072, 0.072, 0.230), 1.06, 4,
-          options={"looks": (("orange", "yellow"), ("red", "green"), ("lime", "yellow"))}),
+          rest="standing", options={"looks": (("orange", "yellow"), ("red", "green"), ("lime", "yellow"))}),
     Entry("cereal", carton_box, (0.065, 0.190, 0.290), 0.42, 4,
+          rest="standing",
           options={"looks": (("yellow", "red"), ("blue", "orange"), ("red", "yellow"), ("green", "cream"))}),
     Entry("cracker_box", carton_box, (0.062, 0.160, 0.210), 0.40, 3,
-          options={"looks": (("red", "yellow"), ("navy", "orange"), ("orange", "brown"))}),
+          rest="standing", options={"looks": (("red", "yellow"), ("navy", "orange"), ("orange", "brown"))}),
     Entry("canned_food", tin, (0.075, 0.075, 0.110), 0.42, 4,
+          rest="standing",
           options={"looks": (("red", "cream"), ("green", "yellow"), ("blue", "white"), ("orange", "red"))}),
     Entry("oatmeal", carton_box, (0.085, 0.140, 0.240), 0.55, 3,
-          options={"looks": (("tan", "red"), ("blue", "cream"))}),
+          rest="standing", options={"looks": (("tan", "red"), ("blue", "cream"))}),
     Entry("pasta", carton_box, (0.050, 0.110, 0.200), 0.50, 3,
-          options={"looks": (("blue", "yellow"), ("green", "cream"), ("red", "cream"))}),
+          rest="standing", options={"looks": (("blue", "yellow"), ("green", "cream"), ("red", "cream"))}),
     Entry("butter", stick, (0.065, 0.100, 0.038), 0.25, 3,
           options={"looks": (("yellow", "blue"), ("silver", "green"), ("cream", "red"))}),
 ]  # fmt: skip

@@ -304,7 +304,7 @@ CATEGORIES = [
     Entry("saw", saw, (0.560, 0.150, 0.026), 0.45, 3),
     Entry("screwdriver", screwdriver, (0.230, 0.032, 0.032), 0.11, 4),
     Entry("drill", drill, (0.240, 0.080, 0.220), 1.5, 4, rest="upright"),
-    Entry("trowel", trowel, (0.300, 0.080, 0.045), 0.25, 3, rest="upright"),
+    Entry("trowel", trowel, (0.300, 0.080, 0.045), 0.25, 3),
     Entry("caliper", caliper, (0.230, 0.075, 0.014), 0.16, 2),
     Entry("scissors", scissors, (0.210, 0.085, 0.012), 0.09, 3),
     Entry("clout_nail", nail, (0.050, 0.009, 0.009), 0.004, 2),

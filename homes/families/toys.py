@@ -193,7 +193,7 @@ CATEGORIES = [
     Entry("dart", dart, (0.150, 0.040, 0.040), 0.022, 2),
     Entry("dartboard", dartboard, (0.040, 0.450, 0.450), 4.5, 2, rest="upright", fixed=True, uniform=True),
     Entry("guitar", guitar, (1.000, 0.380, 0.105), 2.0, 3),
-    Entry("bell", bell, (0.075, 0.075, 0.140), 0.25, 3, uniform=True),
-    Entry("folderal", trinket, (0.070, 0.070, 0.130), 0.18, 3, uniform=True),
+    Entry("bell", bell, (0.075, 0.075, 0.140), 0.25, 3, rest="standing", uniform=True),
+    Entry("folderal", trinket, (0.070, 0.070, 0.130), 0.18, 3, rest="standing", uniform=True),
     Entry("ice_cube", ice_cube, (0.030, 0.030, 0.028), 0.022, 3, uniform=True),
 ]

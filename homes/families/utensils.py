@@ -227,7 +227,7 @@ def pocketknife(b: ObjectBuilder) -> None:
 
 
 CATEGORIES = [
-    Entry("spatula", spatula, (0.340, 0.085, 0.055), 0.12, 4, rest="upright"),
+    Entry("spatula", spatula, (0.340, 0.085, 0.055), 0.12, 4),
     Entry("soup_ladle", ladle, (0.240, 0.095, 0.200), 0.17, 4, uniform=True),
     Entry("dipper", ladle, (0.210, 0.110, 0.200), 0.20, 3, uniform=True, options={"flat": True}),
     Entry("tongs", tongs, (0.280, 0.070, 0.026), 0.13, 3),
