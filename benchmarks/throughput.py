@@ -1,6 +1,6 @@
 """Control steps per second of the batched engine: worlds x scenes, idle and disturbed, with states and a goal.
 
-    python benchmarks/throughput.py HOME [HOME ...] --worlds 1024 4096 16384 [--idle] [--no-states] [--out DIR]
+    python benchmarks/throughput.py HOME [HOME ...] --worlds 1024 4096 16384 [--idle] [--what full] [--out DIR]
 
 A control step is four physics steps of 1/120 s, the view, all extended states, guards and a goal of up to ten literals,
 in one jitted function under `lax.scan`; a floating hand pushes objects about unless `--idle`. Every run reports the
@@ -75,47 +75,51 @@ class Case:
         self.goal = compile_expression(self.model, ten_literals(self.model))
 
 
-def run(case: Case, num_worlds: int, disturbed: bool, states: bool, calls: int = 4) -> dict:
+def run(case: Case, num_worlds: int, disturbed: bool, what: str, calls: int = 4, **solver: int) -> dict:
     """Times one batch. The first call compiles and is not counted."""
     scene, model = case.scene, case.model
     engine = WarpEngine(
-        scene, num_worlds, profile=case.profile, initial=jax.tree.map(lambda a: a[0], case.pool.physics)
+        scene, num_worlds, profile=case.profile, initial=jax.tree.map(lambda a: a[0], case.pool.physics), **solver
     )
     worlds = Worlds(engine, model, case.pool, case.goal)
     seconds = engine.substeps * engine.timestep
 
-    def control(batch, ctrl):
+    def control(batch, ctrl, com):
         if not disturbed:
             return ctrl
         world = batch.world
-        return push_controls(world.view, ctrl, np.array(HAND_START), case.loose, world.key, world.step, seconds)
+        return push_controls(com, ctrl, np.array(HAND_START), case.loose, world.key, world.step, seconds)
 
-    def with_states(carry, _):
-        batch, ctrl = carry
-        ctrl = control(batch, ctrl)
+    def full(carry, _):
+        batch, ctrl, com = carry
+        ctrl = control(batch, ctrl, com)
         batch, verdict = worlds.step(batch, ctrl)
-        return (batch, ctrl), verdict.fraction.mean()
+        return (batch, ctrl, batch.world.view.object_com), verdict.fraction.mean()
 
-    def physics_only(carry, _):
-        batch, ctrl = carry
-        ctrl = control(batch, ctrl)
-        physics, view = engine.step(batch.world.physics, ctrl)
-        world = batch.world.replace(physics=physics, view=view, step=batch.world.step + 1)
-        return (batch.replace(world=world), ctrl), view.object_com[:, 0, 2].mean()
+    def physics(carry, _):
+        """Of the view only what the hand needs, unless the whole of it is asked for."""
+        batch, ctrl, com = carry
+        ctrl = control(batch, ctrl, com)
+        state, view = engine.step(batch.world.physics, ctrl)
+        world = batch.world.replace(physics=state, step=batch.world.step + 1)
+        if what == "view":
+            world = world.replace(view=view)
+        return (batch.replace(world=world), ctrl, view.object_com), view.object_com[:, 0, 2].mean()
 
-    body = with_states if states else physics_only
-    call = jax.jit(lambda b, c: jax.lax.scan(body, (b, c), None, STEPS), donate_argnums=(0, 1))
+    body = full if what == "full" else physics
+    call = jax.jit(lambda carry: jax.lax.scan(body, carry, None, STEPS)[0], donate_argnums=0)
     start = time.time()
     batch = jax.block_until_ready(jax.jit(worlds.start)(0))
     ctrl = jnp.zeros((num_worlds, scene.model.nu), jnp.float32)
-    (batch, ctrl), _ = jax.block_until_ready(call(batch, ctrl))
+    carry = jax.block_until_ready(call((batch, ctrl, batch.world.view.object_com + 0.0)))
     compile_seconds = time.time() - start
     times, awake = [], []
     for _ in range(calls):
         start = time.time()
-        (batch, ctrl), _ = jax.block_until_ready(call(batch, ctrl))
+        carry = jax.block_until_ready(call(carry))
         times.append(time.time() - start)
-        awake.append(int(engine.usage(batch.world.physics).awake_dofs.max()))
+        awake.append(int(engine.usage(carry[0].world.physics).awake_dofs.max()))
+    batch = carry[0]
     overflow = np.asarray(batch.world.physics.overflow)
     memory = (jax.devices()[0].memory_stats() or {}).get("peak_bytes_in_use", 0)
     row = {
@@ -123,7 +127,8 @@ def run(case: Case, num_worlds: int, disturbed: bool, states: bool, calls: int =
         "objects": scene.tables.num_objects,
         "worlds": num_worlds,
         "disturbed": disturbed,
-        "states": states,
+        "what": what,
+        **solver,
         "control_steps_per_s": round(num_worlds * STEPS / float(np.median(times))),
         "ms_per_control_step": round(1e3 * float(np.median(times)) / STEPS, 3),
         "compile_s": round(compile_seconds, 1),
@@ -132,7 +137,7 @@ def run(case: Case, num_worlds: int, disturbed: bool, states: bool, calls: int =
         "iteration_limits": int(((overflow & int(Overflow.ITERATIONS | Overflow.LS_ITERATIONS)) != 0).sum()),
         "non_finite": int((~np.asarray(engine.health(batch.world.physics).finite)).sum()),
         "peak_device_MB_per_world": round(memory / num_worlds / 1e6, 3),
-        "troubles": worlds.metrics(batch) if states else {},
+        "troubles": worlds.metrics(batch) if what == "full" else {},
     }
     print(json.dumps(row), flush=True)
     return row
@@ -143,7 +148,14 @@ def main() -> None:
     parser.add_argument("homes", nargs="+")
     parser.add_argument("--worlds", type=int, nargs="+", default=[4096])
     parser.add_argument("--idle", action="store_true", help="no hand, nothing moves")
-    parser.add_argument("--no-states", action="store_true", help="physics and view only, for comparison")
+    parser.add_argument(
+        "--what",
+        nargs="+",
+        default=["full"],
+        choices=["physics", "view", "full"],
+        help="full: with states, guards and goal; the others for comparison",
+    )
+    parser.add_argument("--iterations", type=int, nargs="+", default=[0], help="solver limits to try; 0: the engine's")
     parser.add_argument("--pool", type=int, default=16)
     parser.add_argument("--out", type=pathlib.Path)
     args = parser.parse_args()
@@ -168,7 +180,10 @@ def main() -> None:
             flush=True,
         )
         for worlds in args.worlds:
-            rows.append(run(case, worlds, not args.idle, not args.no_states))
+            for what in args.what:
+                for limit in args.iterations:
+                    solver = {"iterations": limit, "ls_iterations": limit} if limit else {}
+                    rows.append(run(case, worlds, not args.idle, what, **solver))
     if args.out:
         args.out.mkdir(parents=True, exist_ok=True)
         report = {"device": str(device.device_kind), "jax": jax.__version__, "rows": rows}

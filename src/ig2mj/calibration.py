@@ -111,7 +111,7 @@ class _Disturbance:
     def controls(self, view, ctrl: jax.Array, key: jax.Array, step: jax.Array) -> jax.Array:
         if not self.pushes:
             return ctrl
-        return jnp.asarray(push_controls(view, ctrl, self.home, self.loose, key, step, self.seconds))
+        return jnp.asarray(push_controls(view.object_com, ctrl, self.home, self.loose, key, step, self.seconds))
 
 
 def _measure_native(scene: Scene, worlds: int, rounds: int, seed: int, progress: Progress) -> dict[str, float]:

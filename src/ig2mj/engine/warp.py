@@ -22,6 +22,10 @@ from ig2mj.engine.settle import settle
 from ig2mj.engine.view import Array
 from ig2mj.scene.scene import Scene
 
+SOLVER_ITERATIONS, LINE_SEARCH_ITERATIONS = 20, 20
+"""All worlds of a batch iterate until the last one has converged, so the slowest world sets the price of a step.
+Newton's method needs 2 iterations on average here and rarely more than 10."""
+
 
 class WarpEngine(MjxEngine):
     """MJX-Warp behind the `Engine` protocol."""
@@ -35,6 +39,8 @@ class WarpEngine(MjxEngine):
         *,
         profile: EngineProfile | None = None,
         initial: Snapshot | None = None,
+        iterations: int | None = None,
+        ls_iterations: int | None = None,
         print_overflow: bool = False,
         **options: Any,
     ):
@@ -44,10 +50,14 @@ class WarpEngine(MjxEngine):
           scene, num_worlds, initial, options: see `MjxEngine`. Where `initial` is None and the profile does not hold
             everything awake, the scene is settled first with the native engine.
           profile: buffer sizes; None: the file beside the manifest, else safe sizes.
+          iterations, ls_iterations: limits of the solver and of its line search; None: `SOLVER_ITERATIONS`,
+            `LINE_SEARCH_ITERATIONS`, or the scene's where these are lower.
           print_overflow: let Warp print a line per overflowing world and step. The flags are kept in any case.
         """
         self.profile = fit(profile, scene.model) if profile else load_profile(scene.folder, scene.model)
         self._print_overflow = print_overflow
+        self._iterations = iterations or min(SOLVER_ITERATIONS, scene.model.opt.iterations)
+        self._ls_iterations = ls_iterations or min(LINE_SEARCH_ITERATIONS, scene.model.opt.ls_iterations)
         self._worlds_of_buffers = num_worlds
         if initial is None and self.profile.awake_dofs < scene.model.nv:
             initial = settle(scene)
@@ -61,6 +71,7 @@ class WarpEngine(MjxEngine):
     def _host_model(self, model: mujoco.MjModel) -> mujoco.MjModel:
         own = super()._host_model(model)
         own.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
+        own.opt.iterations, own.opt.ls_iterations = self._iterations, self._ls_iterations
         return own
 
     def _put_model(self, model: mujoco.MjModel) -> mjx.Model:
