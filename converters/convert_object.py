@@ -141,7 +141,7 @@ def _write(
         igibson_joints=False,
     )
     low, high = extent(assembly, base)
-    add_setting(builder.spec, low, high, None)
+    add_setting(builder.spec, low, high, None, distance=2.0)
     add_ground(builder.spec, builder.collision_class)
     add_start_key(builder.spec, {elements.joints[j.name]: clamp(j, 0.0) for j in assembly.joints()})
     manifest = Manifest(

@@ -18,15 +18,18 @@ _TOP_FOVY = 45.0
 _CLEARANCE = 0.3  # m, of a room's camera from walls and furniture
 
 
-def add_setting(spec: mujoco.MjSpec, low: np.ndarray, high: np.ndarray, rooms: RoomMaps | None) -> None:
+def add_setting(
+    spec: mujoco.MjSpec, low: np.ndarray, high: np.ndarray, rooms: RoomMaps | None, *, distance: float = 1.3
+) -> None:
     """Sky, lights, a camera from above, one per room, and the statistics that place the viewer's free camera.
 
     Args:
       low, high: [3] corners of what is to be seen.
+      distance: how far off the free camera starts; 1.3 cuts a house's corners, 2 shows an object with air around it.
     """
     centre, size = (low + high) / 2, np.maximum(high - low, 1e-3)
-    extent = float(np.linalg.norm(size[:2])) / 2
-    spec.stat.center, spec.stat.extent = centre, max(extent, 0.05)
+    extent = max(float(np.linalg.norm(size)) / 2, 0.03)
+    spec.stat.center, spec.stat.extent = centre, distance * extent
     visual = spec.visual
     visual.headlight.ambient, visual.headlight.diffuse = (0.32, 0.32, 0.32), (0.35, 0.35, 0.35)
     visual.headlight.specular = (0.05, 0.05, 0.05)
