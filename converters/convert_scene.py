@@ -69,7 +69,7 @@ def convert_scene(
         start = time.perf_counter()
         options.progress("writing the scene", 0, 1)
         build = build_scene(
-            ModelBuilder(name, folder, category_colours=_use_category_colours(built, options)),
+            ModelBuilder(name, folder, category_colours=_use_category_colours(built, options), assets=options.assets),
             placements,
             {object_name: model.assembly for object_name, model in built.items()},
             rooms=scene.rooms,

@@ -31,20 +31,22 @@ class ModelBuilder:
 
     Attributes:
       spec: the model. folder: the output folder, which gets `meshes/` and `textures/`.
+      assets: folder, relative to `folder`, that gets them instead.
       category_colours: untextured visuals get their category's colour instead of the source's.
       meshes, textures: stores of assets. body_names, joint_names: give each name once.
       warnings: object name -> lines, "" for the whole model.
     """
 
-    def __init__(self, name: str, folder: pathlib.Path, *, category_colours: bool = False):
+    def __init__(self, name: str, folder: pathlib.Path, *, category_colours: bool = False, assets: str = "."):
         self.category_colours = category_colours
         self.spec, self.folder = mujoco.MjSpec(), folder
         self.spec.modelname = name
         self.spec.modelfiledir = str(folder)
-        self.spec.meshdir, self.spec.texturedir = MESH_FOLDER, TEXTURE_FOLDER
+        meshes, textures = (pathlib.PurePosixPath(assets, part) for part in (MESH_FOLDER, TEXTURE_FOLDER))
+        self.spec.meshdir, self.spec.texturedir = str(meshes), str(textures)
         self.spec.compiler.degree = False
-        self.meshes = MeshStore(self.spec, folder / MESH_FOLDER)
-        self.textures = TextureStore(self.spec, folder / TEXTURE_FOLDER)
+        self.meshes = MeshStore(self.spec, folder / meshes)
+        self.textures = TextureStore(self.spec, folder / textures)
         self.body_names, self.joint_names = NamePool(), NamePool()
         self.body_names.take("world")
         self.warnings: dict[str, list[str]] = {}

@@ -32,6 +32,7 @@ class ConvertOptions:
       bullet_inertia: inertia of the bounding box, as Bullet computes it, instead of the hulls'.
       colours: of visuals without a texture: the source's, or household ones by category. "auto": the source's, unless
         every object of a scene is of one flat colour, which tells of the modelling program and not of the things.
+      assets: folder that gets `meshes/` and `textures/`, relative to the output's, so that many scenes can share them.
       keep_hovering: start loose objects exactly where the source has them, even in mid-air.
       jobs: processes. cache: use the cache of decompositions. report: write report.json and report.html.
       renderer, view: what draws the report's pictures (see `report.write_report`).
@@ -49,6 +50,7 @@ class ConvertOptions:
     colours: Literal["auto", "source", "category"] = "auto"
 
     keep_hovering: bool = False
+    assets: str = "."
 
     jobs: int = 1
     cache: bool = True

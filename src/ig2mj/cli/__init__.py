@@ -45,6 +45,7 @@ from ig2mj.install_hint import pip_install_module
 
 #: Sub-command -> what it does, in the order of `ig2mj --help`. The module is `ig2mj.cli.<sub-command>`.
 COMMANDS: dict[str, str] = {
+    "demo": "convert the small home, run it, tell what stands where",
     "convert": "turn an iGibson scene or a URDF object into MJCF",
     "view": "open a scene in MuJoCo's viewer, or write a picture of it",
     "inspect": "list a scene's objects, joints, abilities and rooms",

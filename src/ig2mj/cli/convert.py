@@ -37,6 +37,7 @@ def convert_scene(
     bullet_inertia: Annotated[bool, Flag] = False,
     ceiling_collision: Annotated[bool, Flag] = False,
     keep_hovering: Annotated[bool, Flag] = False,
+    assets: Annotated[str, tyro.conf.arg(metavar="DIR")] = ".",
     colours: Literal["auto", "source", "category"] = "auto",
     no_cache: Annotated[bool, Flag] = False,
     no_report: Annotated[bool, Flag] = False,
@@ -62,6 +63,7 @@ def convert_scene(
       bullet_inertia: inertia of each link's box, as Bullet computes it, instead of that of its hulls.
       ceiling_collision: let ceilings collide.
       keep_hovering: start loose objects exactly where the source has them; by default those in mid-air are let down.
+      assets: folder for meshes/ and textures/, relative to OUT, that several scenes may share (e.g. "..").
       colours: of visuals without a texture: the source's, or household ones by category; auto prefers the source's,
         unless every object of a scene is of one flat colour.
       no_cache: do not use the cache of convex decompositions.
@@ -82,6 +84,7 @@ def convert_scene(
         bullet_inertia=bullet_inertia,
         colours=colours,
         keep_hovering=keep_hovering,
+        assets=assets,
         jobs=jobs,
         cache=not no_cache,
         report=not no_report,

@@ -1,0 +1,1 @@
+"""Floor plans: `plan` (rooms, walls, openings), `openings` (where doors and windows go), `shipped` (the homes)."""

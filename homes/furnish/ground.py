@@ -1,0 +1,86 @@
+"""Can a robot still get everywhere? A coarse map of the floor that furniture is only put on where the answer is yes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..floor_plans.plan import Plan, Rect
+from ..layout_maps import FLAT, HIGH, LOW, reachable
+from ..things import Thing
+
+CELL = 0.05  # m
+RADIUS = 0.34
+"""m: the robot's 0.3 m and what a 5 cm map may be wrong by."""
+LEAST_SHARE = 0.12
+"""Of a room's floor that the robot's middle must be able to stand on, or LEAST_AREA (m2) in a tiny room."""
+LEAST_AREA = 0.04
+
+
+class Ground:
+    """Free floor of a plan at `CELL`; row is y, column is x, the world's origin in the middle."""
+
+    def __init__(self, plan: Plan):
+        x0, y0, x1, y1 = plan.extent()
+        self._half = int(np.ceil((max(-x0, -y0, x1, y1) + 0.5) / CELL))
+        self.free = np.zeros((2 * self._half, 2 * self._half), bool)
+        self._rooms: dict[str, tuple[slice, slice]] = {}
+        self._gates: list[tuple[int, int]] = []
+        self._area: dict[str, float] = {}
+        for room in plan.rooms:
+            cells = self._inner_cells(plan.inside(room))
+            self.free[cells] = True
+            self._rooms[room.name] = cells
+            self._area[room.name] = self.free[cells].size * CELL**2
+        for opening in plan.openings:
+            if not opening.walkable or opening.edge.outer:
+                continue
+            post = 0.04 if opening.kind == "door" else 0.0
+            half = opening.edge.thickness / 2 + CELL
+            p = opening.edge.point(opening.low + post, -half)
+            q = opening.edge.point(opening.high - post, half)
+            self.free[self._inner_cells((p[0], p[1], q[0], q[1]))] = True
+            x, y = opening.edge.point(opening.centre)
+            self._gates.append((self._cell(y), self._cell(x)))
+
+    def allows(self, thing: Thing) -> bool:
+        """Whether every room and doorway can still be reached with this thing in its place."""
+        after = self._without(thing)
+        return after is None or self._sound(after)
+
+    def occupy(self, thing: Thing) -> None:
+        """Takes a thing's floor away."""
+        after = self._without(thing)
+        if after is not None:
+            self.free = after
+
+    def _without(self, thing: Thing) -> np.ndarray | None:
+        if thing.category in (*FLAT, "door", "window"):
+            return None
+        after = self.free.copy()
+        for low, high in thing.boxes():
+            if low[2] < HIGH and high[2] > LOW:
+                after[self._outer_cells((low[0], low[1], high[0], high[1]))] = False
+        return None if np.array_equal(after, self.free) else after
+
+    def _sound(self, free: np.ndarray) -> bool:
+        reach = reachable(free, RADIUS, CELL)
+        if not all(reach[gate] for gate in self._gates):
+            return False
+        for name, cells in self._rooms.items():
+            need = max(LEAST_AREA, min(LEAST_SHARE * self._area[name], 1.2))
+            if reach[cells].sum() * CELL**2 < need:
+                return False
+        return True
+
+    def _cell(self, v: float) -> int:
+        return int(np.floor(v / CELL)) + self._half
+
+    def _inner_cells(self, rect: Rect) -> tuple[slice, slice]:
+        x0, y0, x1, y1 = rect
+        low, high = (lambda v: int(np.ceil(v / CELL - 1e-6)) + self._half), (lambda v: int(np.floor(v / CELL + 1e-6)))
+        return slice(low(y0), high(y1) + self._half), slice(low(x0), high(x1) + self._half)
+
+    def _outer_cells(self, rect: Rect) -> tuple[slice, slice]:
+        x0, y0, x1, y1 = rect
+        low, high = (lambda v: max(0, self._cell(v + 1e-6))), (lambda v: max(0, self._cell(v - 1e-6) + 1))
+        return slice(low(y0), high(y1)), slice(low(x0), high(x1))
