@@ -21,10 +21,11 @@ class JaxEngine(MjxEngine):
     """MJX-JAX behind the `Engine` protocol. Sleep states of snapshots are ignored: everything is awake."""
 
     name = "jax"
+    unrolled = False  # a step's program is large: compile it once
 
     def _host_model(self, model: mujoco.MjModel) -> mujoco.MjModel:
         own = super()._host_model(model)
-        own.opt.enableflags &= ~mujoco.mjtEnableBit.mjENBL_SLEEP
+        own.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
         return own
 
     def _put_model(self, model: mujoco.MjModel) -> mjx.Model:

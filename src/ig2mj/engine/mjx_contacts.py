@@ -9,6 +9,7 @@ Axes: C contacts, U units, W worlds, L links, O objects.
 from __future__ import annotations
 
 import jax.numpy as jnp
+import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float, Int
 from mujoco import mjx
@@ -46,18 +47,22 @@ def warp_contacts(data: mjx.Data) -> Contacts:
 
 
 def jax_contacts(data: mjx.Data) -> Contacts:
-    """Contacts of a batch of MJX-JAX data; geoms of padding rows are -1."""
+    """Contacts of a batch of MJX-JAX data: one slot for every contact that any pair of geoms could have.
+
+    Slots without a contact are far apart. Dimensions and addresses are the same in all worlds, and known at trace time.
+    """
     contact = data._impl.contact
     worlds, count = contact.dist.shape
-    dim = contact.dim[0] if contact.dim.ndim == 2 else contact.dim
-    edges = int(max((2 * (int(d) - 1) for d in dim), default=1)) if len(dim) else 1
-    address = contact.efc_address[..., None] + jnp.arange(edges)
+    rows = np.maximum(1, 2 * (np.asarray(contact.dim) - 1))  # edges of the pyramid, or the one row of dimension 1
+    edge = np.arange(rows.max(initial=1))
+    first = np.asarray(contact.efc_address)[:, None]
+    address = np.where((first >= 0) & (edge < rows[:, None]), first + edge, -1)
     return Contacts(
         valid=(contact.geom[..., 0] >= 0).reshape(-1),
         world=jnp.repeat(jnp.arange(worlds), count),
         geom=contact.geom.reshape(-1, 2),
         dist=contact.dist.reshape(-1),
-        efc_address=jnp.where(contact.efc_address[..., None] >= 0, address, -1).reshape(-1, edges),
+        efc_address=jnp.asarray(np.tile(address, (worlds, 1)), jnp.int32),
     )
 
 

@@ -24,8 +24,9 @@ from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.mjx_contacts import Contacts, link_forces, touching_units
 from ig2mj.engine.mjx_view import ViewPlan, make_view, plan_view
-from ig2mj.engine.mjx_write import apply_write
-from ig2mj.engine.sleep import FULLY_AWAKE
+from ig2mj.engine.mjx_write import apply_write, reaches
+from ig2mj.engine.sleep import FULLY_AWAKE, restore_sleep
+from ig2mj.engine.snapshot_check import check_snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
 from ig2mj.scene.scene import Scene
@@ -61,6 +62,8 @@ class MjxEngine(abc.ABC):
 
     name: str
     pure = True
+    unrolled = True
+    """Substeps are written out one after the other: no copies at a loop's border, but as often compiled."""
 
     def __init__(
         self,
@@ -151,16 +154,25 @@ class MjxEngine(abc.ABC):
 
     def step(self, physics: MjxPhysics, ctrl: Float[Array, "W nu"] | None = None) -> tuple[MjxPhysics, PhysicsView]:
         """One control step of every world; see `Engine.step`."""
-        data, force, overflow = physics.data, jnp.zeros_like(physics.link_force), physics.overflow
+        data = physics.data
         if ctrl is not None:
             data = data.replace(ctrl=jnp.asarray(ctrl, jnp.float32))
-        awake = self._tree_asleep(data) < 0
-        for _ in range(self.substeps):
+
+        def substep(carry: Any, _: Any) -> tuple[Any, None]:
+            data, force, overflow, _ = carry
             awake = self._tree_asleep(data) < 0
             data = self._advance(data, physics.eq_data)
-            overflow |= self._overflow(data)
             if self._has_blades:
                 force = jnp.maximum(force, self._link_forces(data))
+            return (data, force, overflow | self._overflow(data), awake), None
+
+        carry = (data, jnp.zeros_like(physics.link_force), physics.overflow, self._tree_asleep(data) < 0)
+        if self.unrolled:
+            for _ in range(self.substeps):
+                carry, _ = substep(carry, None)
+        else:
+            carry, _ = jax.lax.scan(substep, carry, length=self.substeps)
+        data, force, overflow, awake = carry
         touching = self._touching(data, physics.touching, awake)
         data = self._kinematics(data)
         physics = dataclasses.replace(physics, data=data, touching=touching, link_force=force, overflow=overflow)
@@ -191,6 +203,7 @@ class MjxEngine(abc.ABC):
         qpos, qvel, tree_moved = apply_write(self.layout, self.host_model, data.qpos, data.qvel, write)
         eq_active = data.eq_active if write.eq_active is None else jnp.asarray(write.eq_active, data.eq_active.dtype)
         eq_data = physics.eq_data if write.eq_data is None else jnp.asarray(write.eq_data, jnp.float32)
+        tree_moved |= self._trees_joined(physics, eq_active, eq_data)
         changed = tree_moved.any() | (eq_active != data.eq_active).any() | (eq_data != physics.eq_data).any()
         data = data.replace(qpos=qpos, qvel=qvel, eq_active=eq_active)
         data = self._with_sleep(
@@ -216,11 +229,7 @@ class MjxEngine(abc.ABC):
 
     def load(self, physics: MjxPhysics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> MjxPhysics:
         """Replaces worlds by snapshots; see `Engine.load`. Raises EngineError where it is of another scene."""
-        if snapshot.qpos.shape[-1] != self.host_model.nq:
-            raise EngineError(
-                f"a snapshot with {snapshot.qpos.shape[-1]} coordinates does not fit scene '{self.scene.name}', which "
-                f"has {self.host_model.nq} (load it into the scene, with the agents, that it was saved from)"
-            )
+        check_snapshot(snapshot, self.host_model, self.layout.num_units, self.num_worlds, self.scene.name)
         chosen = jnp.ones(self.num_worlds, bool) if mask is None else jnp.asarray(mask, bool)
         batched = snapshot.qpos.ndim == 2
 
@@ -253,7 +262,33 @@ class MjxEngine(abc.ABC):
             top_speed=jnp.sqrt(jnp.square(velocity).sum(-1).max(1, initial=0.0)),
         )
 
+    def to_mujoco(self, physics: MjxPhysics, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """A copy of a world in MuJoCo's own structures; contacts and forces in it are of its present positions."""
+        row = self.export(physics, world)
+        model = copy.copy(self.host_model)
+        model.eq_data[:] = row.eq_data
+        data = mujoco.MjData(model)
+        for name in STATE_FIELDS:
+            if name == "time":
+                data.time = float(row.time)
+            else:
+                getattr(data, name)[:] = getattr(row, name)
+        mujoco.mj_forward(model, data)  # of all bodies: nothing sleeps in new data
+        restore_sleep(model, data, np.asarray(row.tree_asleep))
+        return model, data
+
     # Stages.
+
+    def _trees_joined(
+        self, physics: MjxPhysics, eq_active: Bool[Array, "W E"], eq_data: Float[Array, "W E 12"]
+    ) -> Bool[Array, "W T"]:
+        """Trees at either end of an equality constraint that is being changed: what a hand lets go would hang in the
+        air if it fell asleep."""
+        model = self.host_model
+        changed = eq_active != physics.data.eq_active
+        changed |= (eq_data != physics.eq_data).any(-1) & eq_active.astype(bool)
+        of_tree = (self.layout.equality_tree[..., None] == np.arange(model.ntree)).any(1)
+        return reaches(changed, of_tree)
 
     def _advance(self, data: mjx.Data, eq_data: Float[Array, "W E 12"]) -> mjx.Data:
         """One physics step of every world."""

@@ -66,9 +66,9 @@ def apply_write(
         still = np.zeros((model.nq, model.nv), bool)
         for q, (first, count) in enumerate(zip(layout.qpos_dof, layout.qpos_ndof, strict=True)):
             still[q, first : first + count] = True
-        qvel = jnp.where(_reaches(mask, still), 0.0, qvel)
+        qvel = jnp.where(reaches(mask, still), 0.0, qvel)
         of_tree = layout.qpos_tree[:, None] == np.arange(model.ntree)
-        moved_tree |= _reaches(mask, of_tree)
+        moved_tree |= reaches(mask, of_tree)
     return qpos, qvel, moved_tree
 
 
@@ -97,6 +97,6 @@ def _put(
     return qpos, qvel, moved_tree.at[:, tree].max(mask)
 
 
-def _reaches(mask: Bool[Array, "W n"], table: np.ndarray) -> Bool[Array, "W m"]:
+def reaches(mask: Bool[Array, "W n"], table: np.ndarray) -> Bool[Array, "W m"]:
     """Whether any masked entry is marked in the column of a table [n, m]."""
     return (mask.astype(jnp.float32) @ jnp.asarray(table, jnp.float32)) > 0

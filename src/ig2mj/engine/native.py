@@ -29,6 +29,7 @@ from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.native_world import FIELDS, Changed, Statics, World
 from ig2mj.engine.native_write import apply_write
+from ig2mj.engine.snapshot_check import check_snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
 from ig2mj.scene.scene import Scene
@@ -198,19 +199,8 @@ class NativeEngine:
         """Replaces worlds in place; see `Engine.load`. Raises EngineError where the snapshot is of another scene."""
         model = self._models[0]
         arrays = {field.name: np.asarray(getattr(snapshot, field.name)) for field in dataclasses.fields(Snapshot)}
-        units = self.layout.num_units
-        lengths = {"qpos": model.nq, "ctrl": model.nu, "tree_asleep": model.ntree, "touching": units}
-        for name, length in lengths.items():
-            if arrays[name].shape[-1:] != (length,):
-                raise EngineError(
-                    f"the snapshot does not fit scene '{self.scene.name}': {name} has length {arrays[name].shape[-1]}, "
-                    f"the scene's {length} (load it into the scene, with the agents, that it was saved from)"
-                )
+        check_snapshot(snapshot, model, self.layout.num_units, self.num_worlds, self.scene.name)
         batched = arrays["time"].ndim == 1
-        if batched and len(arrays["time"]) != self.num_worlds:
-            raise EngineError(
-                f"{len(arrays['time'])} snapshots do not fit {self.num_worlds} worlds (give one for each)"
-            )
         chosen = np.ones(self.num_worlds, bool) if mask is None else np.asarray(mask, bool)
 
         def replace(world: World) -> int:

@@ -9,7 +9,11 @@ from ig2mj.engine.base import Engine
 from ig2mj.errors import UnknownNameError
 from ig2mj.scene.scene import Scene
 
-ENGINES = {"native": "ig2mj.engine.native:NativeEngine"}
+ENGINES = {
+    "native": "ig2mj.engine.native:NativeEngine",
+    "warp": "ig2mj.engine.warp:WarpEngine",
+    "jax": "ig2mj.engine.jax:JaxEngine",
+}
 """Name: module and class."""
 
 
