@@ -25,7 +25,7 @@ from ig2mj.predicates import (
     logic,
     parse,
 )
-from ig2mj.predicates.evaluate import fraction, holds
+from ig2mj.predicates.evaluate import Truth, fraction, holds
 from ig2mj.states import WorldState, initial_states
 
 SWITCH = {"toggleable": {}}
@@ -116,8 +116,9 @@ def _bddl_pairs(grid: np.ndarray, count: int) -> bool:
 @given(st.lists(st.lists(st.booleans(), min_size=3, max_size=3), min_size=2, max_size=2), st.integers(0, 3))
 def test_pairing_is_bddls_rule(grid, count):
     cells = [[Atom("p", (f"{i}{j}",)) for j in range(3)] for i in range(2)]
-    truth = {cells[i][j]: jnp.array([grid[i][j]]) for i in range(2) for j in range(3)}
-    value = holds(logic.Pairing(count, tuple(map(tuple, cells))), truth, 1)
+    index = {cells[i][j]: 3 * i + j for i in range(2) for j in range(3)}
+    truth = Truth(jnp.array([np.ravel(grid)]), index)
+    value = holds(logic.Pairing(count, tuple(map(tuple, cells))), truth)
     assert bool(value[0]) == _bddl_pairs(np.array(grid), count)
 
 
@@ -152,9 +153,9 @@ def _expression(tree) -> logic.Expression:
 def test_the_fraction_is_one_exactly_where_the_expression_holds(tree):
     expression = _expression(tree)
     worlds = np.array(list(itertools.product([False, True], repeat=4)))
-    truth = {a: jnp.asarray(worlds[:, i]) for i, a in enumerate(ATOMS)}
-    share = np.asarray(fraction(expression, truth, len(worlds)))
-    true = np.asarray(holds(expression, truth, len(worlds)))
+    truth = Truth(jnp.asarray(worlds), {a: i for i, a in enumerate(ATOMS)})
+    share = np.asarray(fraction(expression, truth))
+    true = np.asarray(holds(expression, truth))
     assert ((share == 1.0) == true).all()
     assert ((share >= 0.0) & (share <= 1.0)).all()
 

@@ -33,7 +33,7 @@ def _history(kind: str, parameters: dict, steps: int) -> np.ndarray:
     states = initial_states(model, 1)
 
     def step(value: jax.Array, _: None) -> tuple[jax.Array, jax.Array]:
-        new = temperature.update(model, value, jnp.asarray(acts), jnp.ones((1, 2), bool), view)
+        new = temperature.update(model, value, jnp.asarray(acts), jnp.ones((1, 2), bool), view.touching)
         return new, new[0, 1]
 
     _, history = jax.lax.scan(step, states.temperature, None, length=steps)

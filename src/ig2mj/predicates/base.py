@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import Literal
+from typing import Any, Literal
 
 import jax.numpy as jnp
 import numpy as np
@@ -50,6 +50,7 @@ class Context:
 
 
 Evaluate = Callable[[Context, Arguments], Bool[Array, "W P"]]
+OfStates = Callable[[StateModel, ExtendedStates], Bool[Array, "W O"]]
 Queries = Callable[[StateModel, Arguments], list[Query]]
 Why = Callable[[Context, tuple[int, ...], int], str]
 
@@ -67,7 +68,7 @@ class Predicate:
       name: snake_case. arguments: what each argument is. reads: fields of the view, the states and the tables it
         depends on. evaluate: truth for argument tuples. ability: without it the first argument's answer is False.
         aliases: other names (iGibson's, BDDL's tokens, the paper's). queries: relations it needs. why: for people, the
-        numbers behind the answer in one world.
+        numbers behind the answer in one world. per_object: see `of_states`.
     """
 
     name: str
@@ -78,15 +79,20 @@ class Predicate:
     aliases: tuple[str, ...] = ()
     queries: Queries = no_queries
     why: Why | None = None
+    per_object: OfStates | None = None
+
+    @classmethod
+    def of_states(cls, of_states: OfStates, **fields: Any) -> Predicate:
+        """A predicate of one object that reads extended states only; `of_states` answers for all objects."""
+
+        def evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
+            return of_states(context.model, context.states)[:, arguments[:, 0]]
+
+        return cls(arguments=("object",), evaluate=evaluate, per_object=of_states, **fields)
 
     @property
     def arity(self) -> int:
         return len(self.arguments)
-
-
-def of_objects(value: Bool[Array, "W O"], arguments: Arguments) -> Bool[Array, "W P"]:
-    """Gathers a per-object answer."""
-    return value[:, arguments[:, 0]]
 
 
 def yes(value: object) -> str:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from jaxtyping import Bool
 
 from ig2mj.engine.view import Array
-from ig2mj.predicates.base import Arguments, Context, Predicate, of_objects
+from ig2mj.predicates.base import Context, Predicate
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import ExtendedStates
 
 
-def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
-    value = context.states.max_temperature >= context.model.parameters.burn_temperature
-    return of_objects(value, arguments)
+def _burnt(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O"]:
+    return states.max_temperature >= model.parameters.burn_temperature
 
 
 def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
@@ -19,11 +20,10 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
     return f"highest temperature {reached:.1f} C, burns at {limit:.1f} C"
 
 
-BURNT = Predicate(
+BURNT = Predicate.of_states(
+    _burnt,
     name="burnt",
-    arguments=("object",),
     reads=("states.max_temperature",),
-    evaluate=_evaluate,
     ability="burnable",
     why=_why,
 )

@@ -26,7 +26,7 @@ from ig2mj.errors import UnknownNameError
 from ig2mj.knowledge import categories_of
 from ig2mj.predicates import logic
 from ig2mj.predicates.base import Context
-from ig2mj.predicates.evaluate import fraction, holds
+from ig2mj.predicates.evaluate import Truth, fraction, holds
 from ig2mj.predicates.literals import Literals
 from ig2mj.predicates.logic import Atom, Expression
 from ig2mj.predicates.parse import parse
@@ -81,14 +81,17 @@ class CompiledExpression:
 
     def verdict(self, states: ExtendedStates, view: PhysicsView, relations: Relations | None = None) -> Verdict:
         """Truth, fraction and literals in all worlds. Pure."""
-        if relations is None:
-            relations = self.plan.evaluate(view)
-        truth = self.literals.evaluate(Context(self.model, states, view, relations))
-        column = {a: truth[:, i] for i, a in enumerate(self.atoms)}
-        worlds = truth.shape[0]
-        return Verdict(
-            holds=holds(self.ground, column, worlds), fraction=fraction(self.ground, column, worlds), literals=truth
-        )
+        return self.verdict_of(self.literals.facts(self.context(states, view, relations)), states)
+
+    def context(self, states: ExtendedStates, view: PhysicsView, relations: Relations | None = None) -> Context:
+        """What the literals read; relations are computed where they are not given."""
+        return Context(self.model, states, view, self.plan.evaluate(view) if relations is None else relations)
+
+    def verdict_of(self, facts: Bool[Array, "W I"], states: ExtendedStates) -> Verdict:
+        """The verdict that follows from `Literals.facts`."""
+        values = self.literals.combine(facts, states.sliced)
+        truth = Truth(values, {a: i for i, a in enumerate(self.atoms)})
+        return Verdict(holds=holds(self.ground, truth), fraction=fraction(self.ground, truth), literals=values)
 
     def __call__(self, world: WorldState) -> Bool[Array, "W"]:
         """Whether the expression holds, in every world."""

@@ -5,15 +5,15 @@ from __future__ import annotations
 from jaxtyping import Bool
 
 from ig2mj.engine.view import Array
-from ig2mj.predicates.base import Arguments, Context, Predicate, of_objects
+from ig2mj.predicates.base import Context, Predicate
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import ExtendedStates
 
 
-def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
-    p, reached = context.model.parameters, context.states.max_temperature
+def _cooked(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O"]:
+    p, reached = model.parameters, states.max_temperature
     value = reached >= p.cook_temperature
-    if context.model.paper:
-        value &= reached < p.burn_temperature
-    return of_objects(value, arguments)
+    return value & (reached < p.burn_temperature) if model.paper else value
 
 
 def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
@@ -23,11 +23,10 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
     return text + (f", burns at {p.burn_temperature[o]:.1f} C" if context.model.paper else "")
 
 
-COOKED = Predicate(
+COOKED = Predicate.of_states(
+    _cooked,
     name="cooked",
-    arguments=("object",),
     reads=("states.max_temperature",),
-    evaluate=_evaluate,
     ability="cookable",
     why=_why,
 )

@@ -1,26 +1,41 @@
 """Truth of a ground expression from the truth of its atoms, and how much of it is fulfilled.
 
-Both are unrolled while tracing; every value is an array over worlds.
+Both are unrolled while tracing; every value is an array over worlds. Plain literals (atoms, and atoms with a `not`) of
+one connective are taken together as one array, so that a goal of many literals stays a few operations.
 
-Axes: W worlds, N parts, M rows of a pairing.
+Axes: W worlds, L atoms, N parts, M rows of a pairing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import dataclasses
+import functools
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array
 from ig2mj.predicates.logic import And, Atom, Exactly, Expression, Not, Or, Pairing
 
-Truth = Mapping[Atom, Bool[Array, "W"]]
 Rows = Sequence[Sequence[Expression | None]]
 
 LESS_THAN_ONE = 0.99
 """The most that a quantifier that does not hold scores."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Truth:
+    """Truth of atoms in all worlds, and where each atom stands on the L axis."""
+
+    values: Bool[Array, "W L"]
+    index: dict[Atom, int]
+
+    @property
+    def worlds(self) -> int:
+        return self.values.shape[0]
 
 
 class Score(NamedTuple):
@@ -30,67 +45,77 @@ class Score(NamedTuple):
     weight: float
 
 
-def holds(e: Expression, truth: Truth, worlds: int) -> Bool[Array, "W"]:
+def holds(e: Expression, truth: Truth) -> Bool[Array, "W"]:
     """Whether the expression is true."""
     match e:
         case Atom():
-            return truth[e]
+            return truth.values[:, truth.index[e]]
         case Not(part):
-            return ~holds(part, truth, worlds)
+            return ~holds(part, truth)
         case And(parts):
-            return jnp.all(_stacked(parts, truth, worlds), axis=0)
+            return jnp.all(_each(parts, truth), axis=-1)
         case Or(parts):
-            return jnp.any(_stacked(parts, truth, worlds), axis=0)
+            return jnp.any(_each(parts, truth), axis=-1)
         case Exactly(count, parts):
-            return jnp.sum(_stacked(parts, truth, worlds), axis=0) == count
+            return jnp.sum(_each(parts, truth), axis=-1) == count
         case Pairing(count, rows):
-            grid = _grid(rows, lambda p: holds(p, truth, worlds), worlds)
+            grid = _grid(rows, lambda p: holds(p, truth), truth)
             return jnp.minimum(_with_true(grid, 0), _with_true(grid, 1)) >= count
     raise TypeError(f"{e!r} is no ground expression")
 
 
-def fraction(e: Expression, truth: Truth, worlds: int) -> Float[Array, "W"]:
+def fraction(e: Expression, truth: Truth) -> Float[Array, "W"]:
     """Share of literals that are as the expression wants them; 1 exactly where it holds.
 
     A conjunction counts the literals of its parts. Of a disjunction, and of what exists, the part that is nearest to
     holding counts; exactly n, and pairs, count the n nearest, less what is too much. A plain conjunction of literals
     thus has iGibson's share of satisfied conditions.
     """
-    return _score(e, truth, True, worlds).value
+    return _score(e, truth, True).value
 
 
-def _score(e: Expression, truth: Truth, wanted: bool, worlds: int) -> Score:
+def _score(e: Expression, truth: Truth, wanted: bool) -> Score:
     match e:
         case Atom():
-            return Score((truth[e] == wanted).astype(jnp.float32), 1.0)
+            return Score((holds(e, truth) == wanted).astype(jnp.float32), 1.0)
         case Not(part):
-            return _score(part, truth, not wanted, worlds)
+            return _score(part, truth, not wanted)
         case And(parts) | Or(parts):
-            found = [_score(p, truth, wanted, worlds) for p in parts]
-            return _mean(found, worlds) if isinstance(e, And) == wanted else _best(found, worlds)
+            return (_mean if isinstance(e, And) == wanted else _best)(parts, truth, wanted)
         case Exactly(count, parts):
-            near = jnp.stack([_score(p, truth, True, worlds).value for p in parts] or [jnp.zeros(worlds)])
+            near = jnp.stack([_score(p, truth, True).value for p in parts] or [jnp.zeros(truth.worlds)])
             extra = jnp.maximum(jnp.sum(near >= 1.0, axis=0) - count, 0)
             share = (_sum_of_best(near, count) - extra) / max(count, len(parts), 1)
-            return _quantified(holds(e, truth, worlds), share, count, wanted)
+            return _quantified(holds(e, truth), share, count, wanted)
         case Pairing(count, rows):
-            grid = _grid(rows, lambda p: _score(p, truth, True, worlds).value, worlds)
+            grid = _grid(rows, lambda p: _score(p, truth, True).value, truth)
             sides = [_sum_of_best(jnp.max(grid, axis=axis, initial=0.0), count) for axis in (0, 1)]
-            return _quantified(holds(e, truth, worlds), jnp.minimum(*sides) / max(count, 1), count, wanted)
+            return _quantified(holds(e, truth), jnp.minimum(*sides) / max(count, 1), count, wanted)
     raise TypeError(f"{e!r} is no ground expression")
 
 
-def _mean(found: Sequence[Score], worlds: int) -> Score:
-    total = sum(s.weight for s in found)
+def _mean(parts: Sequence[Expression], truth: Truth, wanted: bool) -> Score:
+    plain, rest = _literals(parts)
+    others = [_score(p, truth, wanted) for p in rest]
+    total = float(len(plain) + sum(s.weight for s in others))
     if not total:
-        return Score(jnp.ones(worlds), 0.0)
-    return Score(jnp.sum(jnp.stack([s.weight * s.value for s in found]), axis=0) / total, total)
+        return Score(jnp.ones(truth.worlds), 0.0)
+    values = [s.weight * s.value for s in others]
+    if plain:
+        values.append(jnp.sum(_literal_values(plain, truth) == wanted, axis=-1).astype(jnp.float32))
+    value = functools.reduce(jnp.add, values)
+    return Score(value / total, total)
 
 
-def _best(found: Sequence[Score], worlds: int) -> Score:
-    if not found:
-        return Score(jnp.zeros(worlds), 1.0)
-    return Score(jnp.max(jnp.stack([s.value for s in found]), axis=0), max(1.0, *(s.weight for s in found)))
+def _best(parts: Sequence[Expression], truth: Truth, wanted: bool) -> Score:
+    plain, rest = _literals(parts)
+    others = [_score(p, truth, wanted) for p in rest]
+    values = [s.value for s in others]
+    if plain:
+        values.append(jnp.any(_literal_values(plain, truth) == wanted, axis=-1).astype(jnp.float32))
+    if not values:
+        return Score(jnp.zeros(truth.worlds), 1.0)
+    return Score(jnp.max(jnp.stack(values), axis=0), max([1.0, *(s.weight for s in others)]))
 
 
 def _sum_of_best(values: Float[Array, "N W"], count: int) -> Float[Array, "W"]:
@@ -102,15 +127,38 @@ def _quantified(true: Bool[Array, "W"], share: Float[Array, "W"], count: int, wa
     return Score(jnp.where(true == wanted, 1.0, share), float(max(count, 1)))
 
 
-def _stacked(parts: Sequence[Expression], truth: Truth, worlds: int) -> Bool[Array, "N W"]:
-    return jnp.stack([holds(p, truth, worlds) for p in parts]) if parts else jnp.zeros((0, worlds), bool)
+def _each(parts: Sequence[Expression], truth: Truth) -> Bool[Array, "W N"]:
+    """Truth of the parts, plain literals first."""
+    plain, rest = _literals(parts)
+    found = [_literal_values(plain, truth)] if plain else []
+    found += [holds(p, truth)[:, None] for p in rest]
+    if not found:
+        return jnp.zeros((truth.worlds, 0), bool)
+    return jnp.concatenate(found, axis=-1) if len(found) > 1 else found[0]
 
 
-def _grid(rows: Rows, value, worlds: int) -> Float[Array, "M N W"]:
+def _literals(parts: Sequence[Expression]) -> tuple[list[Expression], list[Expression]]:
+    """Plain literals among the parts, and the rest."""
+    plain: list[Expression] = [
+        p for p in parts if isinstance(p, Atom) or (isinstance(p, Not) and isinstance(p.part, Atom))
+    ]
+    return plain, [p for p in parts if p not in plain]
+
+
+def _literal_values(plain: Sequence[Expression], truth: Truth) -> Bool[Array, "W N"]:
+    atoms = [p.part if isinstance(p, Not) else p for p in plain]
+    place = np.array([truth.index[a] for a in atoms if isinstance(a, Atom)], int)
+    negated = np.array([isinstance(p, Not) for p in plain])
+    straight = len(place) == truth.values.shape[1] and (place == np.arange(len(place))).all()
+    return (truth.values if straight else truth.values[:, place]) ^ negated
+
+
+def _grid(rows: Rows, value: Callable[[Expression], Array], truth: Truth) -> Float[Array, "M N W"]:
     """Values of the parts; 0 where an object would be paired with itself."""
     width = len(rows[0]) if rows else 0
-    cells = [jnp.zeros(worlds) if p is None else value(p).astype(jnp.float32) for row in rows for p in row]
-    return jnp.stack(cells).reshape(len(rows), width, worlds) if cells else jnp.zeros((len(rows), width, worlds))
+    none = jnp.zeros(truth.worlds)
+    cells = [none if p is None else jnp.asarray(value(p), jnp.float32) for row in rows for p in row]
+    return jnp.stack(cells).reshape(len(rows), width, -1) if cells else jnp.zeros((len(rows), width, truth.worlds))
 
 
 def _with_true(grid: Float[Array, "M N W"], axis: int) -> Array:

@@ -5,12 +5,13 @@ from __future__ import annotations
 from jaxtyping import Bool
 
 from ig2mj.engine.view import Array
-from ig2mj.predicates.base import Arguments, Context, Predicate, of_objects
+from ig2mj.predicates.base import Context, Predicate
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import ExtendedStates
 
 
-def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
-    value = context.states.temperature <= context.model.parameters.freeze_temperature
-    return of_objects(value, arguments)
+def _frozen(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O"]:
+    return states.temperature <= model.parameters.freeze_temperature
 
 
 def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
@@ -18,11 +19,10 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
     return f"temperature {float(context.states.temperature[world, arguments[0]]):.1f} C, freezes at {limit:.1f} C"
 
 
-FROZEN = Predicate(
+FROZEN = Predicate.of_states(
+    _frozen,
     name="frozen",
-    arguments=("object",),
     reads=("states.temperature",),
-    evaluate=_evaluate,
     ability="freezable",
     why=_why,
 )

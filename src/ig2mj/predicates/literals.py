@@ -11,6 +11,7 @@ Axes: W worlds, L literals.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import warnings
 from collections.abc import Sequence
 
@@ -25,6 +26,7 @@ from ig2mj.predicates.logic import Atom
 from ig2mj.predicates.registry import find
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations import Query
+from ig2mj.states.world import ExtendedStates
 
 Instance = tuple[str, tuple[int, ...]]
 """A predicate's name and the indices of its arguments."""
@@ -37,6 +39,9 @@ class AbilityWarning(UserWarning):
 class ArityError(Ig2mjError):
     """A predicate was given the wrong number of arguments."""
 
+
+HEAT = {"states.temperature", "states.max_temperature"}
+"""What changes in every step while a thing is warm, though nothing moves."""
 
 _WARNED: set[tuple[str, str]] = set()
 
@@ -53,7 +58,16 @@ class Literal:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Literals:
-    """Literals of a scene, ready to be evaluated in one go."""
+    """Literals of a scene, ready to be evaluated in one go.
+
+    Evaluating has two parts: `facts`, the truth of every instance (a predicate of object indices, each once), and
+    `combine`, which makes literals of them. `update_heat` brings the facts that rest on temperature alone up to date
+    after a step in which nothing else changed.
+
+    Attributes:
+      model: constants. literals: the L axis. instances: rows of argument indices per predicate; the I axis is these one
+      after the other, and one more that is false.
+    """
 
     model: StateModel
     literals: tuple[Literal, ...]
@@ -75,40 +89,64 @@ class Literals:
                     instances.setdefault(literal.predicate.name, {})[arguments] = None
         return cls(model, literals, {name: tuple(rows) for name, rows in instances.items()})
 
+    @functools.cached_property
+    def place(self) -> dict[Instance, int]:
+        """Position of every instance on the I axis."""
+        every = [(name, row) for name, rows in self.instances.items() for row in rows]
+        return {instance: i for i, instance in enumerate(every)}
+
     def queries(self) -> list[Query]:
         """The relations that evaluating needs."""
         return [q for name, rows in self.instances.items() for q in find(name).queries(self.model, np.array(rows, int))]
 
     def evaluate(self, context: Context) -> Bool[Array, "W L"]:
         """Truth of every literal in every world."""
-        place, columns = {}, []
+        return self.combine(self.facts(context), context.states.sliced)
+
+    def facts(self, context: Context) -> Bool[Array, "W I"]:
+        """Truth of every instance."""
+        facts = jnp.zeros((context.num_worlds, len(self.place) + 1), bool)
         for name, rows in self.instances.items():
-            place.update({(name, row): len(place) + i for i, row in enumerate(rows)})
-            columns.append(find(name).evaluate(context, np.array(rows, int)))
-        if not columns:
-            return jnp.zeros((context.num_worlds, len(self.literals)), bool)
-        truth = jnp.concatenate([*columns, jnp.zeros((context.num_worlds, 1), bool)], axis=-1)
-        last = truth.shape[-1] - 1
-        whole = np.array([place[(x.predicate.name, x.arguments)] if x.able else last for x in self.literals], int)
-        found = truth[:, whole]
-        split = [i for i, x in enumerate(self.literals) if x.able and len(_variants(self.model, x)) > 1]
-        for i in split:
-            found = found.at[:, i].set(self._of_halves(self.literals[i], truth, place, context))
+            facts = self._laid(facts, name, find(name).evaluate(context, np.array(rows, int)))
+        return facts
+
+    def update_heat(self, facts: Bool[Array, "W I"], states: ExtendedStates) -> Bool[Array, "W I"]:
+        """The facts with those replaced that read temperatures and nothing else."""
+        for name, rows in self.instances.items():
+            predicate = find(name)
+            if predicate.per_object is not None and set(predicate.reads) <= HEAT:
+                value = predicate.per_object(self.model, states)
+                facts = self._laid(facts, name, value[:, np.array(rows)[:, 0]])
+        return facts
+
+    def _laid(self, facts: Bool[Array, "W I"], name: str, answer: Bool[Array, "W P"]) -> Bool[Array, "W I"]:
+        """Puts a predicate's answers in their places by selection: XLA fuses that, but not a concatenation."""
+        axis, count = np.arange(len(self.place) + 1), answer.shape[1]
+        start = self.place[(name, self.instances[name][0])]
+        mine = (axis >= start) & (axis < start + count)
+        return jnp.where(mine, answer[:, np.clip(axis - start, 0, count - 1)], facts)
+
+    def combine(self, facts: Bool[Array, "W I"], sliced: Bool[Array, "W O"]) -> Bool[Array, "W L"]:
+        """Literals from facts: halves stand for sliced wholes."""
+        last = len(self.place)
+        whole = np.array([self.place[(x.predicate.name, x.arguments)] if x.able else last for x in self.literals], int)
+        found = facts[:, whole]
+        for i, literal in enumerate(self.literals):
+            if literal.able and len(_variants(self.model, literal)) > 1:
+                found = jnp.asarray(found).at[:, i].set(self._of_halves(literal, facts, sliced))
         return found
 
-    def _of_halves(
-        self, literal: Literal, truth: Bool[Array, "W I"], place: dict[Instance, int], context: Context
-    ) -> Bool[Array, "W"]:
-        sliced, parameters = context.states.sliced, self.model.parameters
+    def _of_halves(self, literal: Literal, facts: Bool[Array, "W I"], sliced: Bool[Array, "W O"]) -> Bool[Array, "W"]:
+        parameters = self.model.parameters
         roles = literal.predicate.arguments
         first = literal.arguments[0]
 
         def about(subject: int) -> Array:
             """The literal with `subject` as first argument; its second argument may have halves."""
             rest = literal.arguments[1:]
-            value = truth[:, place[(literal.predicate.name, (subject, *rest))]]
+            value = facts[:, self.place[(literal.predicate.name, (subject, *rest))]]
             if rest and roles[1] == "object" and (halves := parameters.halves_of(rest[0])):
-                of_half = [truth[:, place[(literal.predicate.name, (subject, h))]] for h in halves]
+                of_half = [facts[:, self.place[(literal.predicate.name, (subject, h))]] for h in halves]
                 value = jnp.where(sliced[:, rest[0]], jnp.any(jnp.stack(of_half), axis=0), value)
             return value
 

@@ -6,12 +6,12 @@ import numpy as np
 from jaxtyping import Bool
 
 from ig2mj.engine.view import Array
-from ig2mj.predicates.base import Arguments, Context, Predicate, of_objects
+from ig2mj.predicates.base import Arguments, Context, Predicate
 from ig2mj.states.open import is_open, thresholds
 
 
 def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
-    return of_objects(is_open(context.model, context.view.joint_pos), arguments)
+    return is_open(context.model, context.view.joint_pos)[:, arguments[:, 0]]
 
 
 def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:

@@ -5,17 +5,18 @@ from __future__ import annotations
 from jaxtyping import Bool
 
 from ig2mj.engine.view import Array
-from ig2mj.predicates.base import Arguments, Context, Predicate, of_objects
+from ig2mj.predicates.base import Predicate
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import ExtendedStates
 
 
-def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
-    return of_objects(context.states.sliced, arguments)
+def _sliced(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O"]:
+    return states.sliced
 
 
-SLICED = Predicate(
+SLICED = Predicate.of_states(
+    _sliced,
     name="sliced",
-    arguments=("object",),
     reads=("states.sliced",),
-    evaluate=_evaluate,
     ability="sliceable",
 )

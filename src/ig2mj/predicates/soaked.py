@@ -5,12 +5,14 @@ from __future__ import annotations
 from jaxtyping import Bool
 
 from ig2mj.engine.view import Array
-from ig2mj.predicates.base import Arguments, Context, Predicate, of_objects
+from ig2mj.predicates.base import Context, Predicate
 from ig2mj.states import wetness
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import ExtendedStates
 
 
-def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
-    return of_objects(wetness.soaked(context.model, context.states.wetness), arguments)
+def _soaked(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O"]:
+    return wetness.soaked(model, states.wetness)
 
 
 def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
@@ -18,11 +20,10 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
     return f"wetness {level:g} droplets, soaked at {context.model.parameters.wetness_soaked[arguments[0]]:g}"
 
 
-SOAKED = Predicate(
+SOAKED = Predicate.of_states(
+    _soaked,
     name="soaked",
-    arguments=("object",),
     reads=("states.wetness",),
-    evaluate=_evaluate,
     ability="soakable",
     why=_why,
 )

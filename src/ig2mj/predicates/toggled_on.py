@@ -5,18 +5,19 @@ from __future__ import annotations
 from jaxtyping import Bool
 
 from ig2mj.engine.view import Array
-from ig2mj.predicates.base import Arguments, Context, Predicate, of_objects
+from ig2mj.predicates.base import Predicate
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import ExtendedStates
 
 
-def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
-    return of_objects(context.states.toggled, arguments)
+def _toggled_on(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O"]:
+    return states.toggled
 
 
-TOGGLED_ON = Predicate(
+TOGGLED_ON = Predicate.of_states(
+    _toggled_on,
     name="toggled_on",
-    arguments=("object",),
     reads=("states.toggled",),
-    evaluate=_evaluate,
     ability="toggleable",
     aliases=("toggledon",),
 )

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.engine.view import Array
 from ig2mj.states.model import StateModel
 
 AMBIENT_TEMPERATURE = 23.0
@@ -39,7 +39,7 @@ def update(
     temperature: Float[Array, "W O"],
     acts: Bool[Array, "W O S"],
     in_use: Bool[Array, "W O"],
-    view: PhysicsView,
+    touching: Bool[Array, "W O O"],
 ) -> Float[Array, "W O"]:
     """One step.
 
@@ -48,14 +48,14 @@ def update(
       temperature: before.
       acts: source j acts on object i (heat_source.py).
       in_use: false for parked objects, which keep their temperature.
-      view: read only where heat passes by contact (`StateOptions.contact_heat_rate`).
+      touching: read only where heat passes by contact (`StateOptions.contact_heat_rate`).
     """
     parameters = model.parameters
     rate = acts * parameters.heat_rate
     change = jnp.sum(rate * (parameters.heat_temperature - temperature[..., None]), axis=-1)
     change = jnp.where(jnp.any(acts, axis=-1), change, AMBIENT_RATE * (AMBIENT_TEMPERATURE - temperature))
     if model.options.contact_heat_rate:
-        touching = view.touching & np.outer(parameters.thermal, parameters.thermal)
+        touching = touching & np.outer(parameters.thermal, parameters.thermal)
         difference = temperature[:, None, :] - temperature[:, :, None]
         change += model.options.contact_heat_rate * jnp.sum(touching * difference, axis=-1)
     return jnp.where(in_use & parameters.thermal, temperature + model.options.timestep * change, temperature)

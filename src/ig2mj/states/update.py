@@ -52,6 +52,17 @@ def update(
     """
     if relations is None:
         relations = RelationPlan.build(model, queries(model)).evaluate(view)
+    states, swap, acts = events(model, states, view, relations)
+    return heat(model, states, acts, view.touching), swap
+
+
+def events(
+    model: StateModel, states: ExtendedStates, view: PhysicsView, relations: Relations
+) -> tuple[ExtendedStates, Swap, Bool[Array, "W O S"]]:
+    """The first part of a step: everything but temperatures, and which source acts on what.
+
+    It reads no temperature (but slicing copies them); with the same view and the same other states it does the same.
+    """
     p = model.parameters
 
     switch, press_count = toggled.update(model, states.toggled, states.press_count, view)
@@ -59,7 +70,6 @@ def update(
 
     cut_now = sliced.cut(model, states.sliced, view)
     states, swap = sliced.apply(model, states, cut_now, view)
-    in_use = sliced.in_use(model, states.sliced)
 
     drops, contacts = water.update(model, states.water, view, states.toggled)
     wet = wetness.update(model, states.wetness, contacts)
@@ -75,12 +85,22 @@ def update(
 
     opened = open.is_open(model, view.joint_pos)
     on = heat_source.switched_on(model, states.toggled, opened)
-    acts = _as_wholes(model, cut_now, heat_source.acts_on(model, on, view, relations))
-    warm = temperature.update(model, states.temperature, acts, in_use, view)
-    states = dataclasses.replace(
+    acts = heat_source.acts_on(model, on, view, relations)
+    return states, swap, _as_wholes(model, cut_now, acts)
+
+
+def heat(
+    model: StateModel, states: ExtendedStates, acts: Bool[Array, "W O S"], touching: Bool[Array, "W O O"]
+) -> ExtendedStates:
+    """The second part of a step: temperature and its maximum.
+
+    Args:
+      acts: from `events`. touching: read only where heat passes by contact.
+    """
+    warm = temperature.update(model, states.temperature, acts, sliced.in_use(model, states.sliced), touching)
+    return dataclasses.replace(
         states, temperature=warm, max_temperature=max_temperature.update(model, states.max_temperature, warm)
     )
-    return states, swap
 
 
 def _as_wholes(model: StateModel, cut_now: Bool[Array, "W O"], acts: Bool[Array, "W O S"]) -> Bool[Array, "W O S"]:

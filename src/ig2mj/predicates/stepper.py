@@ -1,0 +1,132 @@
+"""`StateStepper`: states and a goal stepped from the host, doing no more than the change of the world asks for.
+
+`ig2mj.states.update` computes everything for all worlds in every step, which is right where thousands of worlds run on
+a device. One world beside the native engine mostly lies still, and there even an operation on nothing costs
+microseconds. So the work is cut in two, with the same functions and bitwise the same results:
+
+- the whole step, where the view or the states are others than those of the last step, or the last step changed more
+  than temperatures. Relations come from a memo (`ig2mj.states.relations`).
+- temperatures and what follows from them, where the view and the states are the very objects of the last step, and
+  that step changed nothing else: then neither would this one.
+
+Arrays that a step hands through are not given to XLA as results at all, which would copy them.
+
+Axes: W worlds, O objects, S heat sources, I facts.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from flax import struct
+from jaxtyping import Bool, Float
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.predicates.compile import CompiledExpression, Verdict
+from ig2mj.states.initial import initial_states
+from ig2mj.states.model import StateModel
+from ig2mj.states.relations import Memo, RelationPlan
+from ig2mj.states.update import events, heat, queries
+from ig2mj.states.world import ExtendedStates, Swap
+
+
+class Step(NamedTuple):
+    """What a step gives: states, the teleports that slicing asks for (None: none), and the goal's verdict."""
+
+    states: ExtendedStates
+    swap: Swap | None
+    verdict: Verdict | None
+
+
+@struct.dataclass
+class _Kept:
+    """What the next step may go on with.
+
+    Attributes:
+      acts: source on object. facts: of the goal. flags: whether the step changed nothing but temperatures, and whether
+      it asks for teleports. memo: of relations.
+    """
+
+    acts: Bool[Array, "W O S"]
+    facts: Bool[Array, "W I"]
+    flags: Bool[Array, "2"]
+    memo: Memo
+
+
+class StateStepper:
+    """Steps states beside an engine that hands out the same view while nothing moves (the native one)."""
+
+    def __init__(self, model: StateModel, goal: CompiledExpression | None = None, num_worlds: int = 1):
+        """Compiles nothing yet: that happens at the first step.
+
+        Args:
+          goal: evaluated at the end of every step.
+        """
+        self.model, self.goal = model, goal
+        self.plan = RelationPlan.build(model, [*queries(model), *(goal.queries if goal else [])])
+        self._memo = self.plan.empty_memo(num_worlds)
+        self._template = initial_states(model, num_worlds)
+        self._whole = jax.jit(self._whole_step)
+        self._heat = jax.jit(self._heat_step)
+        self._changed: list[int] = []  # leaves of the states that a whole step gives; known once it was traced
+        self._view: PhysicsView | None = None
+        self._states: ExtendedStates | None = None
+        self._kept: _Kept | None = None
+
+    def step(self, states: ExtendedStates, view: PhysicsView) -> Step:
+        """One control step: `view` is physics after it."""
+        if view is self._view and states is self._states and self._kept is not None:
+            warm, hottest, verdict = self._heat(
+                states.temperature, states.max_temperature, states.sliced, self._kept.acts, self._kept.facts
+            )
+            self._states = dataclasses.replace(states, temperature=warm, max_temperature=hottest)
+            return Step(self._states, None, verdict)
+        found, swap, verdict, kept = self._whole(states, view, self._memo)
+        leaves, structure = jax.tree.flatten(states)
+        for place, leaf in zip(self._changed, found, strict=True):
+            leaves[place] = leaf
+        new = jax.tree.unflatten(structure, leaves)
+        quiet, swapped = jax.device_get(kept.flags)
+        self._memo, self._view, self._states = kept.memo, view, new
+        self._kept = kept if quiet and not self.model.options.contact_heat_rate else None
+        return Step(new, swap if swapped else None, verdict)
+
+    def _whole_step(
+        self, states: ExtendedStates, view: PhysicsView, memo: Memo
+    ) -> tuple[list[Array], Swap | None, Verdict | None, _Kept]:
+        relations, memo = self.plan.evaluate_changed(view, memo)
+        after, swap, acts = events(self.model, states, view, relations)
+        before = jax.tree.leaves(states)
+        same = [jnp.all(a == b) for a, b in zip(before, jax.tree.leaves(after), strict=True) if a is not b]
+        new = heat(self.model, after, acts, view.touching)
+        facts = jnp.zeros((view.object_com.shape[0], 0), bool)
+        if self.goal is not None:
+            facts = self.goal.literals.facts(self.goal.context(new, view, relations))
+        cuts = swap.mask.shape[1] > 0
+        flags = jnp.stack([jnp.all(jnp.array(same)), jnp.any(swap.mask)])
+        verdict = self.goal.verdict_of(facts, new) if self.goal else None
+        leaves = jax.tree.leaves(new)
+        self._changed = [i for i, (a, b) in enumerate(zip(before, leaves, strict=True)) if a is not b]
+        found = [leaves[i] for i in self._changed]
+        return found, swap if cuts else None, verdict, _Kept(acts=acts, facts=facts, flags=flags, memo=memo)
+
+    def _heat_step(
+        self,
+        temperature: Float[Array, "W O"],
+        max_temperature: Float[Array, "W O"],
+        sliced: Bool[Array, "W O"],
+        acts: Bool[Array, "W O S"],
+        facts: Bool[Array, "W I"],
+    ) -> tuple[Float[Array, "W O"], Float[Array, "W O"], Verdict | None]:
+        states = dataclasses.replace(
+            self._template, temperature=temperature, max_temperature=max_temperature, sliced=sliced
+        )
+        nothing = jnp.zeros((sliced.shape[0], sliced.shape[1], sliced.shape[1]), bool)
+        new = heat(self.model, states, acts, nothing)
+        verdict = None
+        if self.goal is not None:
+            verdict = self.goal.verdict_of(self.goal.literals.update_heat(facts, new), new)
+        return new.temperature, new.max_temperature, verdict
