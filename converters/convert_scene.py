@@ -78,7 +78,7 @@ def convert_scene(
         )
         model = write_model(build.builder.spec, folder / "scene.xml")
         fill_states(build, model, placements)
-        if not options.keep_hovering and rest_start(build, model):
+        if rest_start(build, model, keep_hovering=options.keep_hovering):
             model = write_model(build.builder.spec, folder / "scene.xml")
         if scene.rooms is not None:
             write_rooms(scene.rooms, folder / ROOMS_FILE)

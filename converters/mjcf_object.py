@@ -57,7 +57,6 @@ def add_object(
     igibson_joints: bool = True,
     collide: bool = True,
     visual_group: int | None = None,
-    asleep: bool = False,
 ) -> ObjectElements:
     """Adds an object to the model.
 
@@ -68,11 +67,8 @@ def add_object(
       igibson_joints: joint friction as iGibson's motors; False prefers the URDF's own.
       collide: False leaves the collision geoms out.
       visual_group: geom group of the visuals, default 0.
-      asleep: starts asleep (a parked object).
     """
-    return _ObjectWriter(builder, assembly, name, igibson_joints, collide, visual_group).write(
-        root_poses, fixed, asleep
-    )
+    return _ObjectWriter(builder, assembly, name, igibson_joints, collide, visual_group).write(root_poses, fixed)
 
 
 class _ObjectWriter:
@@ -91,7 +87,7 @@ class _ObjectWriter:
         self._label = f"{self._category}-{assembly.model.model}"
         self._colour = category_colour(self._category)
 
-    def write(self, root_poses: list[np.ndarray], fixed: bool, asleep: bool) -> ObjectElements:
+    def write(self, root_poses: list[np.ndarray], fixed: bool) -> ObjectElements:
         builder, bodies = self._builder, self._assembly.bodies
         poses = dict(zip(self._assembly.roots, root_poses, strict=True))
         elements = ObjectElements([], {}, {}, {})
@@ -107,8 +103,6 @@ class _ObjectWriter:
             elif index > 0 or not fixed:
                 elements.free_joints[name] = builder.joint_names.take(f"{name}/free")
                 body.add_freejoint(name=elements.free_joints[name])
-                if asleep:
-                    body.sleep = mujoco.mjtSleepPolicy.mjSLEEP_INIT
             self._add_geoms(body, plan, name)
             added.append(body)
             elements.bodies.append(name)

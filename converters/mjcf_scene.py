@@ -75,7 +75,6 @@ def build_scene(
             fixed=placement.instance.fixed and not placement.parked,
             collide=ceiling_collision or not ceiling,
             visual_group=HIDDEN_GROUP if ceiling else None,
-            asleep=placement.parked,
         )
         build.elements[placement.name] = elements
         build.start_joints |= _start_joints(placement, assembly, elements)
@@ -209,17 +208,19 @@ def fill_states(build: SceneBuild, model: mujoco.MjModel, placements: Sequence[P
             build.builder.warn(entry.name, line)
 
 
-def rest_start(build: SceneBuild, model: mujoco.MjModel) -> bool:
-    """Lets hovering objects down in the keyframe "initial"; the bodies keep the source's poses (`start_state`).
+def rest_start(build: SceneBuild, model: mujoco.MjModel, *, keep_hovering: bool = False) -> bool:
+    """Brings the keyframe "initial" to rest (`start_state`); the bodies themselves keep the source's poses.
 
     Returns:
       whether anything changed; the model must then be written again.
     """
     owners = {body: name for name, elements in build.elements.items() for body in elements.bodies}
-    drops = let_down(model, START_KEY)
+    parked = {body for entry in build.entries if entry.parked for body in entry.bodies}
+    drops = let_down(model, START_KEY, parked, hovering=not keep_hovering)
     for drop in drops:
-        text = f"hovers {100 * drop.distance:.1f} cm above its support in the source: starts lower by that much"
-        build.builder.warn(owners[drop.body], text)
+        if drop.body not in parked:
+            text = f"hovers {100 * drop.distance:.1f} cm above its support in the source: starts lower by that much"
+            build.builder.warn(owners[drop.body], text)
     if drops:
         add_start_key(build.builder.spec, build.start_joints, {d.body: (d.pos, d.quat) for d in drops})
     return bool(drops)

@@ -1,4 +1,7 @@
-"""The parking slab: where halves (and cut wholes) wait until they are needed, asleep, far outside the house."""
+"""The parking slab: where halves (and cut wholes) wait until they are needed, far outside the house.
+
+They rest there, so that they are asleep after the first moments; MJX-Warp does not take MuJoCo's `sleep="init"`.
+"""
 
 from __future__ import annotations
 

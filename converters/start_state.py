@@ -1,4 +1,4 @@
-"""Loose objects that hover in the source are let down onto what is below them, so that the scene starts at rest.
+"""The start state at rest: hovering objects are let down onto what is below them, parked ones have settled.
 
 Real scene files leave millimetres to centimetres of air under loose objects, which iGibson lets fall when it loads the
 scene (dataset_format.md 2.1). Here the fall is done once, at conversion, and only where it is nothing but a fall:
@@ -8,6 +8,7 @@ an object that slides, tips or rolls keeps the source's pose, and the checks lis
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Collection
 
 import mujoco
 import numpy as np
@@ -30,8 +31,13 @@ class Drop:
     quat: np.ndarray
 
 
-def let_down(model: mujoco.MjModel, key: str) -> list[Drop]:
-    """Free bodies that fall straight down from their pose in keyframe `key`, and the poses where they come to rest."""
+def let_down(model: mujoco.MjModel, key: str, parked: Collection[str], *, hovering: bool = True) -> list[Drop]:
+    """Free bodies that do not rest in keyframe `key`, and the poses where they come to rest.
+
+    Args:
+      parked: bodies on the parking slab, which may settle however they like.
+      hovering: also those that fall straight down elsewhere; False lets them hover.
+    """
     data = mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, data, model.key(key).id)
     start = data.qpos.copy()
@@ -40,11 +46,17 @@ def let_down(model: mujoco.MjModel, key: str) -> list[Drop]:
     if not np.all(np.isfinite(data.qpos)):
         return []
     free = [j for j in range(model.njnt) if model.jnt_type[j] == mujoco.mjtJoint.mjJNT_FREE]
-    drops = (_drop(model, data, joint, start) for joint in free)
+    drops = []
+    for joint in free:
+        body = model.body(model.jnt_bodyid[joint]).name
+        if body in parked or hovering:
+            drops.append(_drop(model, data, joint, start, body, anyhow=body in parked))
     return [drop for drop in drops if drop is not None]
 
 
-def _drop(model: mujoco.MjModel, data: mujoco.MjData, joint: int, start: np.ndarray) -> Drop | None:
+def _drop(
+    model: mujoco.MjModel, data: mujoco.MjData, joint: int, start: np.ndarray, body: str, *, anyhow: bool
+) -> Drop | None:
     at, speed = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
     before, after = start[at : at + 7], data.qpos[at : at + 7]
     moved = after[:3] - before[:3]
@@ -52,7 +64,7 @@ def _drop(model: mujoco.MjModel, data: mujoco.MjData, joint: int, start: np.ndar
     falls = LEAST_DROP < -moved[2] < GREATEST_DROP
     straight = np.hypot(moved[0], moved[1]) < GREATEST_SHIFT and turn < GREATEST_TURN
     rests = np.abs(data.qvel[speed : speed + 6]).max() < 0.01
-    if not (falls and straight and rests):
+    settles = anyhow and moved[2] > -GREATEST_DROP
+    if not (rests and (settles or (falls and straight))):
         return None
-    name = model.body(model.jnt_bodyid[joint]).name
-    return Drop(name, float(-moved[2]), after[:3].copy(), after[3:].copy())
+    return Drop(body, float(-moved[2]), after[:3].copy(), after[3:].copy())
