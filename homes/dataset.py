@@ -1,4 +1,4 @@
-"""Writes a dataset root in iGibson's layout (dataset_format.md section 1): VERSION, metadata/*, objects/*.
+"""Writes a dataset root in iGibson's layout (dataset_format.md section 1): VERSION, metadata, materials, objects.
 
 The same seed gives the same bytes. Models are built in a process pool; nothing outside the pool's results is random.
 """
@@ -15,6 +15,7 @@ from ig2mj.errors import UnknownNameError
 from ig2mj.knowledge import synset
 
 from .catalogue import Entry, build_model, catalogue
+from .material_library import write_material_library
 from .specs import category_spec
 from .writer import write_model
 
@@ -64,6 +65,7 @@ def build_dataset(
         if progress:
             progress(done, len(tasks))
     write_metadata(out, entries, sizes)
+    write_material_library(out, seed)
     return {category: len(found) for category, found in sizes.items()}
 
 

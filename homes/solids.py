@@ -171,7 +171,8 @@ def extrusion(
     flat = np.asarray(outline, float)
     count = len(flat)
     caps = np.array(trimesh.creation.triangulate_polygon(shapely.Polygon(flat), engine="earcut")[1])
-    area = np.cross(flat[caps[:, 1]] - flat[caps[:, 0]], flat[caps[:, 2]] - flat[caps[:, 0]])
+    (ax, ay), (bx, by) = (flat[caps[:, 1]] - flat[caps[:, 0]]).T, (flat[caps[:, 2]] - flat[caps[:, 0]]).T
+    area = ax * by - ay * bx
     caps = np.where(area[:, None] < 0, caps[:, ::-1], caps)
     vertices = np.concatenate([np.c_[flat, np.zeros(count)], np.c_[flat, np.full(count, height)]])
     k = np.arange(count)

@@ -1,6 +1,7 @@
 """Writes one model folder of the iGibson dataset (dataset_format.md section 4): URDF, meshes, textures, metadata.
 
-Numbers are rounded (collision 1 micrometre, visual 10 micrometres, or 100 in a mesh wider than 0.3 m) so that the same model gives the same bytes.
+Numbers are rounded (collision 1 micrometre, visual 10 micrometres, or 100 in a mesh wider than 0.3 m), so that the same
+model gives the same bytes.
 """
 
 from __future__ import annotations
@@ -61,6 +62,8 @@ def urdf(model: HouseholdObject, visuals: dict[str, list[str]]) -> str:
         if joint.kind in ("revolute", "prismatic"):
             low, high = joint.limits
             lines.append(f'    <limit lower="{number(low)}" upper="{number(high)}"/>')
+        if joint.kind != "fixed":
+            lines.append(f'    <dynamics damping="0" friction="{number(joint.friction, 3)}"/>')
         lines.append("  </joint>")
     return "\n".join([*lines, "</robot>", ""])
 

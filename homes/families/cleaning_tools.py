@@ -146,13 +146,13 @@ def scraper(b: ObjectBuilder) -> None:
 def eraser(b: ObjectBuilder) -> None:
     """A rubber in a sleeve; its bare end cleans."""
     x, y, z = b.size
-    b.add(box(0.75 * x, y, z).at(-x / 8), materials.plain("white", "rubber"))
+    b.add(box(0.82 * x, y, z).at(-0.09 * x), materials.plain("white", "rubber"))
     b.add(
         box(0.55 * x, y * 1.01, z * 1.01).seen().at(-0.2 * x, 0, -0.005 * z),
         materials.plain(b.pick(("blue", "red", "green")), "paper"),
     )
-    b.add(box(0.25 * x, y, z).at(3 * x / 8).seen(), materials.plain("white", "rubber"))
-    b.area("cleaning_tool_area", (0.25 * x, y, z), (3 * x / 8, 0, z / 2))
+    b.add(box(0.18 * x, y, z).at(0.41 * x).seen(), materials.plain("white", "rubber"))
+    b.area("cleaning_tool_area", (0.18 * x, y, z), (0.41 * x, 0, z / 2))
 
 
 def roller(b: ObjectBuilder) -> None:

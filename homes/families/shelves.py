@@ -17,7 +17,7 @@ def shelf(b: ObjectBuilder) -> None:
     plan = b.pick(("bookcase", "metal", "cubes", "low"))
     wood = materials.wood(b.pick(materials.WOODS), b.rng) if b.rng.random() < 0.7 else materials.plain("white", "wood")
     if plan == "low":
-        z *= 0.55
+        z *= 0.8
     if plan == "metal":
         iron = materials.metal(b.pick(("iron", "white", "steel")))
         for sx in (-1, 1):

@@ -6,7 +6,7 @@ from .. import materials, textures
 from ..catalogue import Entry
 from ..materials import Material
 from ..model import ObjectBuilder
-from ..solids import block, cylinder, decal, join, lathe, rod, soft_box
+from ..solids import block, box, cylinder, decal, join, lathe, rod, soft_box
 from .parts import bow_handle, button, carcass, door, flap, knob, lid
 
 
@@ -134,6 +134,7 @@ def microwave(b: ObjectBuilder) -> None:
     for dx, dy in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
         b.add(cylinder(0.015, 0.01, 8).seen().at(dx * 0.4 * x, dy * 0.42 * y, 0), materials.plain("black"))
     base = 0.01
+    b.add(box(0.84 * x, 0.88 * y, base).felt(), materials.plain("black"))
     room = y - panel
     height = z - base
     middle = -panel / 2
@@ -153,7 +154,7 @@ def microwave(b: ObjectBuilder) -> None:
         "door",
         plane,
         (-y / 2, y / 2 - panel - 0.002),
-        (base, z),
+        (base + 0.004, z),
         body,
         bow_handle(0.6 * z, 0.02, upright=True),
         materials.metal("chrome"),
