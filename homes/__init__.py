@@ -3,8 +3,8 @@
 Nothing here belongs to the run-time: this package writes files that `ig2mj_converters` reads, just as it reads the
 iGibson dataset. It imports `ig2mj.knowledge` and `ig2mj.errors` only.
 
-    solids.py, vessels.py   bricks: what is seen (meshes) together with what is felt (convex hulls)
-    materials.py, textures.py   colours, wood grain, cloth, labels, screens
+    shape.py, solids.py, turned.py, vessels.py   bricks: what is seen (meshes) with what is felt (convex hulls)
+    materials.py, textures.py, material_library.py   colours, wood grain, cloth, labels, screens
     model.py                ObjectBuilder: links, joints, annotated links
     families/*.py           one file per family of objects; each ends with CATEGORIES, its lines of the catalogue
     catalogue.py            Entry (size, mass, count, ...) and build_model()
