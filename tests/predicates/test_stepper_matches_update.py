@@ -11,7 +11,7 @@ import pytest
 from hand_world import HandWorld, Thing, shell
 
 from ig2mj.predicates import compile_expression
-from ig2mj.predicates.stepper import StateStepper
+from ig2mj.predicates.stepper import StateProgram, StateStepper
 from ig2mj.states import dust, initial_states, update
 
 FOOD = {"cookable": {}, "burnable": {}, "freezable": {}, "sliceable": {}, "stainable": {}}
@@ -54,7 +54,7 @@ def _start(model):
 def test_every_step_is_bitwise_the_same(options):
     model = HOME.model(**options)
     goal = compile_expression(model, GOAL)
-    stepper = StateStepper(model, goal)
+    stepper = StateStepper(StateProgram(model, goal))
 
     @jax.jit
     def reference(states, view):
@@ -86,7 +86,7 @@ def test_every_step_is_bitwise_the_same(options):
 def test_states_changed_from_outside_are_seen():
     model = HOME.model()
     goal = compile_expression(model, "(toggled_on oven)")
-    stepper = StateStepper(model, goal)
+    stepper = StateStepper(StateProgram(model, goal))
     states = _start(model)
     for _ in range(3):
         states, _, verdict = stepper.step(states, VIEWS[0])
@@ -98,7 +98,7 @@ def test_states_changed_from_outside_are_seen():
 
 def test_a_stepper_needs_no_goal():
     model = HOME.model()
-    stepper = StateStepper(model)
+    stepper = StateStepper(StateProgram(model))
     states = _start(model)
     for _ in range(3):
         states, swap, verdict = stepper.step(states, VIEWS[1])

@@ -56,8 +56,8 @@ class _Kept:
     memo: Memo
 
 
-class StateStepper:
-    """Steps states beside an engine that hands out the same view while nothing moves (the native one)."""
+class StateProgram:
+    """The two jitted functions of a scene; may serve any number of `StateStepper`s."""
 
     def __init__(self, model: StateModel, goal: CompiledExpression | None = None, num_worlds: int = 1):
         """Compiles nothing yet: that happens at the first step.
@@ -65,34 +65,12 @@ class StateStepper:
         Args:
           goal: evaluated at the end of every step.
         """
-        self.model, self.goal = model, goal
+        self.model, self.goal, self.num_worlds = model, goal, num_worlds
         self.plan = RelationPlan.build(model, [*queries(model), *(goal.queries if goal else [])])
-        self._memo = self.plan.empty_memo(num_worlds)
         self._template = initial_states(model, num_worlds)
-        self._whole = jax.jit(self._whole_step)
-        self._heat = jax.jit(self._heat_step)
-        self._changed: list[int] = []  # leaves of the states that a whole step gives; known once it was traced
-        self._view: PhysicsView | None = None
-        self._states: ExtendedStates | None = None
-        self._kept: _Kept | None = None
-
-    def step(self, states: ExtendedStates, view: PhysicsView) -> Step:
-        """One control step: `view` is physics after it."""
-        if view is self._view and states is self._states and self._kept is not None:
-            warm, hottest, verdict = self._heat(
-                states.temperature, states.max_temperature, states.sliced, self._kept.acts, self._kept.facts
-            )
-            self._states = dataclasses.replace(states, temperature=warm, max_temperature=hottest)
-            return Step(self._states, None, verdict)
-        found, swap, verdict, kept = self._whole(states, view, self._memo)
-        leaves, structure = jax.tree.flatten(states)
-        for place, leaf in zip(self._changed, found, strict=True):
-            leaves[place] = leaf
-        new = jax.tree.unflatten(structure, leaves)
-        quiet, swapped = jax.device_get(kept.flags)
-        self._memo, self._view, self._states = kept.memo, view, new
-        self._kept = kept if quiet and not self.model.options.contact_heat_rate else None
-        return Step(new, swap if swapped else None, verdict)
+        self.whole = jax.jit(self._whole_step)
+        self.heat = jax.jit(self._heat_step)
+        self.changed: list[int] = []  # leaves of the states that a whole step gives; known once it was traced
 
     def _whole_step(
         self, states: ExtendedStates, view: PhysicsView, memo: Memo
@@ -109,8 +87,8 @@ class StateStepper:
         flags = jnp.stack([jnp.all(jnp.array(same)), jnp.any(swap.mask)])
         verdict = self.goal.verdict_of(facts, new) if self.goal else None
         leaves = jax.tree.leaves(new)
-        self._changed = [i for i, (a, b) in enumerate(zip(before, leaves, strict=True)) if a is not b]
-        found = [leaves[i] for i in self._changed]
+        self.changed = [i for i, (a, b) in enumerate(zip(before, leaves, strict=True)) if a is not b]
+        found = [leaves[i] for i in self.changed]
         return found, swap if cuts else None, verdict, _Kept(acts=acts, facts=facts, flags=flags, memo=memo)
 
     def _heat_step(
@@ -130,3 +108,33 @@ class StateStepper:
         if self.goal is not None:
             verdict = self.goal.verdict_of(self.goal.literals.update_heat(facts, new), new)
         return new.temperature, new.max_temperature, verdict
+
+
+class StateStepper:
+    """Steps states beside an engine that hands out the same view while nothing moves (the native one)."""
+
+    def __init__(self, program: StateProgram):
+        """Begins with an empty memo."""
+        self.program = program
+        self._memo = program.plan.empty_memo(program.num_worlds)
+        self._view: PhysicsView | None = None
+        self._states: ExtendedStates | None = None
+        self._kept: _Kept | None = None
+
+    def step(self, states: ExtendedStates, view: PhysicsView) -> Step:
+        """One control step: `view` is physics after it."""
+        if view is self._view and states is self._states and self._kept is not None:
+            warm, hottest, verdict = self.program.heat(
+                states.temperature, states.max_temperature, states.sliced, self._kept.acts, self._kept.facts
+            )
+            self._states = dataclasses.replace(states, temperature=warm, max_temperature=hottest)
+            return Step(self._states, None, verdict)
+        found, swap, verdict, kept = self.program.whole(states, view, self._memo)
+        leaves, structure = jax.tree.flatten(states)
+        for place, leaf in zip(self.program.changed, found, strict=True):
+            leaves[place] = leaf
+        new = jax.tree.unflatten(structure, leaves)
+        quiet, swapped = jax.device_get(kept.flags)
+        self._memo, self._view, self._states = kept.memo, view, new
+        self._kept = kept if quiet and not self.program.model.options.contact_heat_rate else None
+        return Step(new, swap if swapped else None, verdict)
