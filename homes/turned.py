@@ -103,7 +103,7 @@ def cylinder(radius: float, height: float, sides: int = ROUND_SIDES) -> Solid:
 
 def ball(x: float, y: float, z: float, sides: int = 16) -> Solid:
     """An ellipsoid with full axes x, y, z standing on the origin."""
-    levels = 9
+    levels = 9 if sides > 8 else 6
     angles = np.linspace(-math.pi / 2, math.pi / 2, levels)
     points = [(max(0.0, 0.5 * math.cos(a)), 0.5 + 0.5 * math.sin(a)) for a in angles]
     visual = turn([(r if 0 < k < levels - 1 else 0.0, h) for k, (r, h) in enumerate(points)], sides)
