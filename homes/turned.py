@@ -11,7 +11,7 @@ import numpy as np
 from .shape import Mesh, Solid
 
 ROUND_SIDES = 20  # facets of a round visual
-HULL_SIDES = 12  # facets of a round collision hull of two levels; a multiple of 4, so that its box is that of the circle
+HULL_SIDES = 12  # facets of a round hull of two levels; a multiple of 4: its box is then that of the circle
 
 
 def lathe(profile: Sequence[tuple[float, float]], sides: int = ROUND_SIDES, split: Sequence[float] = ()) -> Solid:
