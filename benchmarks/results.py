@@ -1,0 +1,115 @@
+"""What a benchmark leaves behind: `result.json`, `table.md` and plots in `benchmarks/results/<name>/`."""
+
+from __future__ import annotations
+
+import datetime
+import importlib.metadata
+import os
+import pathlib
+import platform
+import shlex
+import subprocess
+import sys
+from collections.abc import Sequence
+from typing import Any
+
+import msgspec
+from rich.console import Console
+from rich.table import Table
+
+RESULTS = pathlib.Path(__file__).resolve().parent / "results"
+PACKAGES = ("mujoco", "jax", "jaxlib", "numpy", "pybullet")
+
+
+def machine(core: int) -> dict[str, Any]:
+    """The processor, how busy it was, and versions of what ran."""
+    versions = {"python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            versions[name] = importlib.metadata.version(name)
+        except importlib.metadata.PackageNotFoundError:
+            versions[name] = "absent"
+    return {
+        "processor": _processor(),
+        "cores": os.cpu_count(),
+        "cores_used": 1 if core >= 0 else os.cpu_count(),
+        "load_average": [round(v, 2) for v in os.getloadavg()] if hasattr(os, "getloadavg") else None,
+        "system": f"{platform.system()} {platform.machine()}",
+        "versions": versions,
+        "ig2mj_commit": _commit(),
+    }
+
+
+def save(
+    name: str,
+    core: int,
+    settings: dict[str, Any],
+    rows: list[dict[str, Any]],
+    tables: Sequence[Table],
+    out: pathlib.Path,
+) -> pathlib.Path:
+    """Writes JSON and tables below `out`, prints the tables, and returns the benchmark's folder."""
+    folder = out / name
+    folder.mkdir(parents=True, exist_ok=True)
+    result = {
+        "benchmark": name,
+        "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
+        "command": command(),
+        "machine": machine(core),
+        "settings": settings,
+        "rows": rows,
+    }
+    (folder / "result.json").write_bytes(msgspec.json.format(msgspec.json.encode(result), indent=1) + b"\n")
+    console = Console(width=140)
+    text = []
+    for table in tables:
+        console.print(table)
+        text += [f"### {table.title}", "", *_markdown(table), ""]
+    who = result["machine"]
+    text.append(f"{who['processor']}, {who['cores_used']} core used; `{result['command']}`; {result['date'][:10]}")
+    (folder / "table.md").write_text("\n".join(text) + "\n")
+    return folder
+
+
+def command() -> str:
+    """The command line, with folders reduced to their names: others have them elsewhere."""
+    words = [pathlib.PurePath(word).name if "/" in word else word for word in sys.argv[1:]]
+    return shlex.join(["python", f"benchmarks/{pathlib.PurePath(sys.argv[0]).name}", *words])
+
+
+def table(title: str, columns: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
+    """A table whose first column is text and whose others are numbers."""
+    result = Table(title=title)
+    for k, column in enumerate(columns):
+        result.add_column(column, justify="left" if k == 0 else "right", no_wrap=k == 0)
+    for row in rows:
+        result.add_row(*row)
+    return result
+
+
+def _markdown(table: Table) -> list[str]:
+    columns = [list(column.cells) for column in table.columns]
+    lines = ["| " + " | ".join(str(c.header) for c in table.columns) + " |"]
+    lines.append("|" + "|".join(":--" if k == 0 else "--:" for k in range(len(columns))) + "|")
+    lines += ["| " + " | ".join(str(cell) for cell in row) + " |" for row in zip(*columns, strict=True)]
+    return lines
+
+
+def _processor() -> str:
+    cpuinfo = pathlib.Path("/proc/cpuinfo")
+    if cpuinfo.is_file():
+        for line in cpuinfo.read_text().splitlines():
+            if line.startswith("model name"):
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()
+
+
+def _commit() -> str:
+    folder = pathlib.Path(__file__).resolve().parent
+    try:
+        done = subprocess.run(
+            ["git", "rev-parse", "--short", "HEAD"], cwd=folder, capture_output=True, text=True, check=True
+        )
+    except (OSError, subprocess.CalledProcessError):
+        return "unknown"
+    return done.stdout.strip()
