@@ -35,6 +35,7 @@ class Scene:
       model: the compiled model. Engines that must change a model change a copy.
       tables: its constants as arrays.
       rooms: room maps, or None.
+      agents: what was added when it was loaded.
     """
 
     folder: pathlib.Path
@@ -42,6 +43,7 @@ class Scene:
     model: mujoco.MjModel
     tables: SceneTables
     rooms: Rooms | None = None
+    agents: tuple[AddAgent, ...] = ()
 
     @property
     def name(self) -> str:
@@ -61,6 +63,13 @@ class Scene:
     def object(self, name: str) -> ObjectEntry:
         """The manifest's entry of an object. Raises UnknownNameError."""
         return self.manifest.objects[self.object_index(name)]
+
+    def spec(self) -> mujoco.MjSpec:
+        """The scene with its agents, read again, to be changed and compiled; ids are those of `model`."""
+        spec = read_spec(_model_file(self.folder))
+        for add in self.agents:
+            add(spec)
+        return spec
 
     def __repr__(self) -> str:
         return f"Scene('{self.name}', {len(self.object_names)} objects, {self.folder})"
@@ -89,7 +98,7 @@ def load_scene(path: str | os.PathLike, agents: Sequence[AddAgent] = ()) -> Scen
         model = _compile(None, file)
     rooms = load_rooms(folder / manifest.rooms.file) if manifest.rooms.file else None
     tables = build_tables(model, manifest, rooms, folder / MANIFEST_FILE)
-    return Scene(folder, manifest, model, tables, rooms)
+    return Scene(folder, manifest, model, tables, rooms, tuple(agents))
 
 
 def read_spec(file: pathlib.Path) -> mujoco.MjSpec:
