@@ -25,7 +25,7 @@ from ig2mj.sampling.perturbation import loose_objects, perturb
 from ig2mj.scene.scene import Scene
 from ig2mj.worlds.random_streams import episode_keys
 
-SAFETY = {"warp": 1.3, "native": 2.0}
+SAFETY = {"warp": 1.5, "native": 2.0}
 """Factor on the measured peaks."""
 
 SHARE = 0.08

@@ -26,7 +26,7 @@ def run(
       worlds: measured side by side; 0: 1,024 on warp, 8 on native.
       rounds: of two simulated seconds each.
       seed: of the disturbance.
-      safety: factor on the peaks; 0: 1.3 for warp, 2 for native.
+      safety: factor on the peaks; 0: 1.5 for warp, 2 for native.
       hand: let a floating hand push objects about.
       json: print the profile as JSON.
     """
