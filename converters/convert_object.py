@@ -138,7 +138,6 @@ def _write(
         name,
         [base @ assembly.bodies[index].pose for index in assembly.roots],
         fixed=False,
-        igibson_joints=False,
     )
     low, high = extent(assembly, base)
     add_setting(builder.spec, low, high, None, distance=2.0)

@@ -22,15 +22,16 @@ DAMPING = {"hinge": 0.05, "slide": 0.5}  # N m s / rad, N s / m
 ARMATURE = {"hinge": 1e-3, "slide": 1e-2}  # kg m^2, kg
 
 
-def friction(joint: Joint, category: str, reach: float, igibson: bool) -> float:
-    """Coulomb friction of a joint, N or N m.
+def friction(joint: Joint, category: str, reach: float) -> float:
+    """Coulomb friction of a joint, N or N m: the URDF's own `<dynamics friction>` where it gives one, else iGibson's motor.
+
+    Objects of iGibson's dataset never give one (dataset_format.md section 4).
 
     Args:
       category: of the object; ovens, dishwashers and toilets have values of their own.
       reach: largest distance of the moving part from the joint's axis, m.
-      igibson: iGibson's motor. False: the URDF's own `<dynamics friction>`, for a plain URDF that gives one.
     """
-    if not igibson and joint.friction > 0:
+    if joint.friction > 0:
         return float(joint.friction)
     value = FRICTION_BY_CATEGORY.get(category, FRICTION)
     return value if mujoco_type(joint) == "slide" else min(value, FRICTION_LIMIT_AT_RIM * reach)

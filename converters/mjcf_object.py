@@ -54,7 +54,6 @@ def add_object(
     root_poses: list[np.ndarray],
     *,
     fixed: bool,
-    igibson_joints: bool = True,
     collide: bool = True,
     visual_group: int | None = None,
 ) -> ObjectElements:
@@ -64,11 +63,10 @@ def add_object(
       name: of the object; also of its base body. Other bodies and joints are `<name>_<original name>` (section 7).
       root_poses: world pose, 4x4, of each root body of the assembly, the base first.
       fixed: the base gets no joint. Bodies behind floating joints are free whatever the base is (section 0, fact 8).
-      igibson_joints: joint friction as iGibson's motors; False prefers the URDF's own.
       collide: False leaves the collision geoms out.
       visual_group: geom group of the visuals, default 0.
     """
-    return _ObjectWriter(builder, assembly, name, igibson_joints, collide, visual_group).write(root_poses, fixed)
+    return _ObjectWriter(builder, assembly, name, collide, visual_group).write(root_poses, fixed)
 
 
 class _ObjectWriter:
@@ -77,12 +75,11 @@ class _ObjectWriter:
         builder: ModelBuilder,
         assembly: Assembly,
         name: str,
-        igibson_joints: bool,
         collide: bool,
         visual_group: int | None,
     ):
         self._builder, self._assembly, self._name = builder, assembly, name
-        self._igibson_joints, self._collide, self._visual_group = igibson_joints, collide, visual_group
+        self._collide, self._visual_group = collide, visual_group
         self._category = assembly.model.category
         self._label = f"{self._category}-{assembly.model.model}"
         self._colour = category_colour(self._category)
@@ -133,7 +130,7 @@ class _ObjectWriter:
         limits = joint_range(source)
         if limits is not None:
             joint.limited, joint.range = mujoco.mjtLimited.mjLIMITED_TRUE, limits
-        joint.frictionloss = friction(source, self._category, reach(self._assembly, index), self._igibson_joints)
+        joint.frictionloss = friction(source, self._category, reach(self._assembly, index))
         joint.damping = (max(source.damping, DAMPING[kind]), 0.0, 0.0)  # linear in velocity
         joint.armature = ARMATURE[kind]
         return name

@@ -74,8 +74,8 @@ def test_friction_of_ovens_dishwashers_and_toilets_section_0_fact_10(category, f
 
     slide = Joint("j", "prismatic", "a", "b", np.eye(4), np.array([1.0, 0, 0]), 0.0, 0.3)
     hinge = Joint("j", "revolute", "a", "b", np.eye(4), np.array([1.0, 0, 0]), 0.0, 1.0)
-    assert friction(slide, category, 0.0, True) == force
-    assert friction(hinge, category, 0.5, True) == force
+    assert friction(slide, category, 0.0) == force
+    assert friction(hinge, category, 0.5) == force
 
 
 def test_a_knob_is_not_held_by_a_furniture_hinges_torque():
@@ -83,7 +83,7 @@ def test_a_knob_is_not_held_by_a_furniture_hinges_torque():
     from ig2mj_converters.joint_rules import friction
 
     hinge = Joint("j", "revolute", "a", "b", np.eye(4), np.array([1.0, 0, 0]), 0.0, 1.0)
-    assert friction(hinge, "stove", 0.02, True) == pytest.approx(2.0)
+    assert friction(hinge, "stove", 0.02) == pytest.approx(2.0)
 
 
 def test_contacts_are_as_section_7_and_the_gap_lists_three_millimetres(house):
