@@ -23,9 +23,10 @@ ARMATURE = {"hinge": 1e-3, "slide": 1e-2}  # kg m^2, kg
 
 
 def friction(joint: Joint, category: str, reach: float) -> float:
-    """Coulomb friction of a joint, N or N m: the URDF's own `<dynamics friction>` where it gives one, else iGibson's motor.
+    """Coulomb friction of a joint, N or N m.
 
-    Objects of iGibson's dataset never give one (dataset_format.md section 4).
+    The URDF's own `<dynamics friction>` where it gives one, else iGibson's motor: objects of iGibson's dataset never
+    give one (dataset_format.md section 4).
 
     Args:
       category: of the object; ovens, dishwashers and toilets have values of their own.
