@@ -29,6 +29,7 @@ LAYERS = [
     "tasks",
     "envs",
     "viewer",
+    "simulation_states",
     "simulation",
     "planning",
     "learn",

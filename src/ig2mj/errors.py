@@ -66,5 +66,9 @@ class PoseError(Ig2mjError):
     """A pose or joint position that cannot be set: not finite, no rotation, or of something that cannot move."""
 
 
+class StateError(Ig2mjError):
+    """A state or predicate that cannot be set, or not to this value."""
+
+
 class MissingDependencyError(Ig2mjError):
     """An optional package or system library is absent; the message gives the command that installs it."""

@@ -1,4 +1,4 @@
-"""`Simulation`: one world, for people: step it, move things by name, look at it."""
+"""`Simulation`: one world, for people: step it, move things by name, ask what is true of it, look at it."""
 
 from __future__ import annotations
 
@@ -14,23 +14,36 @@ from ig2mj.engine.registry import make_engine
 from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import EngineError, PoseError, UnknownNameError
 from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.simulation_states import SimulationStates
+from ig2mj.states.model import DEFAULTS
+from ig2mj.states.options import StateOptions
 
 Vector = Sequence[float | int] | np.ndarray
 
 
-class Simulation:
+class Simulation(SimulationStates):
     """One world of a scene on any engine.
 
     Attributes:
       scene: the household. engine: what steps it. physics: the engine's state; use what the methods give instead.
     """
 
-    def __init__(self, scene: Scene | str | os.PathLike, engine: str | Engine = "native", **options: Any):
+    def __init__(
+        self,
+        scene: Scene | str | os.PathLike,
+        engine: str | Engine = "native",
+        *,
+        states: StateOptions | None = DEFAULTS,
+        seed: int = 0,
+        **options: Any,
+    ):
         """Starts at the scene's initial state.
 
         Args:
           scene: a loaded scene, or what `load_scene` takes.
           engine: an engine's name, or an engine made for this scene with one world.
+          states: how extended states behave; None: physics only.
+          seed: of what `set_state` draws at random.
           options: go to the engine, where it is given by name, e.g. `boxes="igibson"`.
         """
         self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
@@ -39,6 +52,7 @@ class Simulation:
             raise EngineError(f"a Simulation is one world, and the engine has {self.engine.num_worlds}")
         self.physics = self.engine.reset()
         self._initial = self.engine.export(self.physics, 0)
+        self._start_states(states, seed)
 
     @property
     def time(self) -> float:
@@ -63,6 +77,7 @@ class Simulation:
     def reset(self) -> PhysicsView:
         """Back to the scene's initial state."""
         self.physics = self.engine.load(self.physics, self._initial)
+        self._reset_states()
         return self.view
 
     def step(self, ctrl: Vector | None = None, count: int = 1) -> PhysicsView:
@@ -85,6 +100,7 @@ class Simulation:
         view = self.view
         for _ in range(count):
             self.physics, view = self.engine.step(self.physics, row)
+            view = self._step_states(view)
             row = None
         return view
 
