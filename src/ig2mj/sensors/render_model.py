@@ -1,0 +1,67 @@
+"""The scene as cameras see it: a model of its own that nothing moves in, so that pictures cost physics nothing.
+
+It has the scene's bodies, geoms, cameras, lights and materials with the scene's ids, no joints, and behind the last
+geom a number of free *slots*: small ellipsoids that become particles.
+"""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.errors import EngineError
+from ig2mj.scene.scene import Scene
+
+NOWHERE = (0.0, 0.0, -50.0)
+"""Metres, world frame: where slots are that show nothing."""
+
+
+def make_render_model(scene: Scene, slots: int) -> mujoco.MjModel:
+    """Compiles the render model; geom ids from `scene.model.ngeom` on are the slots.
+
+    Raises:
+      EngineError: the scene on disk is no longer the one that was loaded.
+    """
+    spec = scene.spec()
+    for elements in (spec.keys, spec.equalities, spec.actuators, spec.sensors, spec.tendons, spec.excludes, spec.pairs):
+        for element in list(elements):
+            spec.delete(element)
+    for joint in list(spec.joints):
+        spec.delete(joint)
+    body = spec.worldbody.add_body(name="ig2mj/particles")
+    for k in range(slots):
+        body.add_geom(
+            name=f"ig2mj/particle_{k}",
+            type=mujoco.mjtGeom.mjGEOM_ELLIPSOID,
+            size=[0.01, 0.01, 0.01],
+            pos=list(NOWHERE),
+            contype=0,
+            conaffinity=0,
+            group=0,
+        )
+    model = spec.compile()
+    known = scene.model
+    if model.ngeom != known.ngeom + slots or (model.geom_bodyid[: known.ngeom] != known.geom_bodyid).any():
+        raise EngineError(f"scene '{scene.name}' in {scene.folder} changed since it was loaded (load it again)")
+    return model
+
+
+def mean_colours(model: mujoco.MjModel) -> Float[np.ndarray, "G 4"]:
+    """rgba (0..1) of every geom: its own, or its material's times the mean of the material's texture."""
+    return np.stack([mean_colour(model, g) for g in range(model.ngeom)]).astype(np.float32).reshape(-1, 4)
+
+
+def mean_colour(model: mujoco.MjModel, geom: int) -> Float[np.ndarray, "4"]:
+    """rgba (0..1) of one geom, see `mean_colours`."""
+    material = int(model.geom_matid[geom])
+    if material < 0:
+        return np.array(model.geom_rgba[geom], np.float32)
+    colour = np.array(model.mat_rgba[material], np.float32)
+    texture = int(model.mat_texid[material, int(mujoco.mjtTextureRole.mjTEXROLE_RGB)])
+    if texture >= 0 and model.tex_nchannel[texture] >= 3 and model.tex_adr[texture] >= 0:
+        channels = int(model.tex_nchannel[texture])
+        size = int(model.tex_height[texture] * model.tex_width[texture]) * channels
+        start = int(model.tex_adr[texture])
+        colour[:3] *= model.tex_data[start : start + size].reshape(-1, channels)[:, :3].mean(axis=0) / 255
+    return colour
