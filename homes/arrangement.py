@@ -68,7 +68,7 @@ class Arrangement:
                 return False
         if ways and any(owner not in ignored and _overlaps(mine.boxes, zone).any() for owner, zone in self._ways):
             return False
-        if not thing.fixed or not thing.shape.swept:
+        if not thing.shape.swept:
             return True
         moving = _Group(thing, thing.swept())
         return not any(moving.meets(o) for o in self._solid if o.thing is None or o.thing.fixed)

@@ -16,6 +16,9 @@ from .solids import block, join
 from .writer import numbers, visual_obj
 
 FLOOR_DEPTH, CEILING_DEPTH = 0.2, 0.1  # m
+PARAPET = 1.05  # m, height of a balcony's outer walls
+STEPS, TREAD, STAIR_WIDTH = 12, 0.25, 0.95
+"""Of stairs: number, depth and width (m); they rise to the ceiling."""
 
 WALL_COLOURS = (
     (0.93, 0.91, 0.86), (0.89, 0.91, 0.93), (0.94, 0.93, 0.90),
@@ -32,8 +35,12 @@ FLOORING = {
 def wall_boxes(plan: Plan) -> np.ndarray:
     """[n, 2, 3] blocks of all walls, with holes at the openings: full height, under sills and over lintels."""
     boxes = []
+    outside = {room.name for room in plan.rooms if room.kind == "balcony"}
     for edge in plan.edges:
         if plan.fully_open(edge):
+            continue
+        if edge.outer and edge.rooms[0] in outside:
+            boxes.append(edge.box(_end(plan, edge, edge.low, -1), _end(plan, edge, edge.high, 1), 0, PARAPET))
             continue
         at, end = _end(plan, edge, edge.low, -1), _end(plan, edge, edge.high, 1)
         for opening in plan.openings_of(edge):
@@ -46,6 +53,23 @@ def wall_boxes(plan: Plan) -> np.ndarray:
         boxes.append(edge.box(at, end, 0, HEIGHT))
     found = np.array(boxes)
     return found[np.all(found[:, 1] - found[:, 0] > 1e-4, axis=1)]
+
+
+def stair_boxes(plan: Plan) -> np.ndarray:
+    """[n, 2, 3] the steps in every staircase, along the wall opposite its door (or the northern one)."""
+    boxes = []
+    for room in plan.rooms:
+        if room.kind != "staircase":
+            continue
+        x0, y0, x1, y1 = plan.inside(room)
+        doors = [o for o in plan.openings if o.walkable and room.name in o.edge.rooms and o.edge.axis == "x"]
+        south = any(o.edge.at > room.centre[1] for o in doors)
+        low = y0 if south else y1 - STAIR_WIDTH
+        for k in range(STEPS):
+            at = x0 + k * TREAD
+            if at + TREAD <= x1 + 1e-6:
+                boxes.append([[at, low, 0.0], [at + TREAD, low + STAIR_WIDTH, (k + 1) * HEIGHT / STEPS]])
+    return np.array(boxes).reshape(-1, 2, 3)
 
 
 def _end(plan: Plan, edge: Edge, end: float, way: int) -> float:
@@ -100,7 +124,9 @@ def write_building(plan: Plan, scene: pathlib.Path, rng: random.Random) -> None:
     for part in ("shape/visual", "shape/collision", "urdf", "material"):
         (scene / part).mkdir(parents=True, exist_ok=True)
     paint = materials.plain(rng.choice(WALL_COLOURS), "wall", 0.1)
-    walls = [(paint, wall_boxes(plan))]
+    stairs = stair_boxes(plan)
+    wood = materials.wood("oak", rng)
+    walls = [(paint, wall_boxes(plan)), *([(wood, stairs)] if len(stairs) else [])]
     look = {kind: flooring(kind, rng) for kind in dict.fromkeys(room.kind for room in plan.rooms)}
     floors = [(look[room.kind], box[None]) for room, box in zip(plan.rooms, floor_boxes(plan), strict=True)]
     ceilings = [(materials.plain("white", "wall", 0.1), ceiling_boxes(plan))]

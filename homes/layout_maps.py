@@ -13,6 +13,7 @@ from PIL import Image
 from scipy import ndimage
 
 from .arrangement import Arrangement
+from .building import stair_boxes
 from .dataset import ROOM_TYPES
 from .floor_plans.plan import Plan, Rect
 
@@ -45,6 +46,8 @@ class Maps:
         for opening in plan.openings:
             if opening.walkable and not opening.edge.outer:
                 self._doorway(plan, opening, floor)
+        for low, high in stair_boxes(plan):
+            floor[self._cells((low[0], low[1], high[0], high[1]))] = 0
         self.trav_no_obj = floor
         self.trav = floor.copy()
         for thing in home.things.values():

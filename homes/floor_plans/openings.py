@@ -35,13 +35,14 @@ def make_plan(
     passages: Collection[tuple[str, str]] = (),
     front: str | None = None,
     models: int = 3,
+    seed: int = 0,
 ) -> Plan:
     """A plan with openings.
 
     Args:
       open_plan: pairs of rooms with no wall between them. passages: pairs with a wide opening without a door.
       front: the room with the front door; None: the best hub at an outer wall.
-      models: at most so many models of doors and windows are used.
+      models: at most so many models of doors and windows are used. seed: of the models.
     """
     plan = Plan(name, rooms, make_edges(rooms))
     kinds = {room.name: room.kind for room in rooms}
@@ -56,33 +57,33 @@ def make_plan(
             _join(joined, a, b)
     style = rng.randrange(min(find("door").count, models))
     candidates = [e for e in plan.edges if not e.outer and e.length >= 0.95 + 2 * CORNER]
-    candidates.sort(key=lambda e: (_cost(kinds[e.before or ""], kinds[e.after or ""]), -e.length, e.at, e.low))
+    candidates.sort(key=lambda e: (_cost(e.before or "", e.after or "", kinds), -e.length, e.at, e.low))
     for edge in candidates:
         a, b = edge.rooms
         if _root(joined, a) != _root(joined, b):
-            openings.append(_door(edge, style, _into(plan, edge), rng))
+            openings.append(_door(edge, style, _into(plan, edge), rng, seed))
             _join(joined, a, b)
     roots = {_root(joined, room.name) for room in rooms}
     assert len(roots) == 1, f"{name}: rooms without a way in: {sorted(roots)}"
-    outer = [e for e in plan.edges if e.outer and e.length >= 0.95 + 2 * CORNER]
+    outer = [e for e in plan.edges if e.outer and e.length >= 0.95 + 2 * CORNER and kinds[e.rooms[0]] != "balcony"]
     entrances = [e for e in outer if e.rooms[0] == front] if front else sorted(
         outer, key=lambda e: (("lobby", "corridor", "living_room", "kitchen").index(kinds[e.rooms[0]])
                               if kinds[e.rooms[0]] in ("lobby", "corridor", "living_room", "kitchen") else 9,
                               e.length))  # fmt: skip
     entrance = entrances[0]
-    openings.append(_door(entrance, (style + 1) % models, entrance.rooms[0], rng))
+    openings.append(_door(entrance, (style + 1) % models, entrance.rooms[0], rng, seed))
     pane = rng.randrange(min(find("window").count, models))
     for room in rooms:
-        openings += _windows(room, [e for e in outer if e.rooms[0] == room.name], pane, openings)
+        openings += _windows(room, [e for e in outer if e.rooms[0] == room.name], pane, openings, seed)
     return dataclasses.replace(plan, openings=tuple(openings))
 
 
-def opening_things(plan: Plan) -> Iterator[tuple[Opening, Thing]]:
+def opening_things(plan: Plan, seed: int = 0) -> Iterator[tuple[Opening, Thing]]:
     """The doors and windows that stand in the openings; both rooms in `rooms`."""
     for opening in plan.openings:
         if opening.kind == "passage":
             continue
-        edge, form = opening.edge, shape(opening.kind, opening.index)
+        edge, form = opening.edge, shape(opening.kind, opening.index, seed)
         inward = 1 if opening.into == edge.after else -1
         if edge.axis == "x":
             turn = yaw(90 if inward > 0 else 270)
@@ -91,17 +92,20 @@ def opening_things(plan: Plan) -> Iterator[tuple[Opening, Thing]]:
         shift = KNOB / 2 if opening.kind == "door" else 0.0
         x, y = edge.point(opening.centre)
         position = turn @ [shift, -(form.low[1] + form.high[1]) / 2, 0.0] + [x, y, opening.bottom + AIR / 2]
-        yield opening, Thing(opening.kind, opening.kind, opening.index, position, turn, True, edge.rooms)
+        yield opening, Thing(opening.kind, opening.kind, opening.index, position, turn, True, edge.rooms, seed=seed)
 
 
-def _cost(a: str, b: str) -> int:
-    """How little one would like a door between two kinds of rooms."""
+def _cost(first: str, second: str, kinds: dict[str, str]) -> int:
+    """How little one would like a door between two rooms."""
+    a, b = kinds[first], kinds[second]
     hubs = (a in HUBS) + (b in HUBS)
     private = (a in PRIVATE) + (b in PRIVATE)
-    if {a, b} == {"bathroom", "bedroom"} or {a, b} == {"closet", "bedroom"} or {a, b} == {"pantry_room", "kitchen"}:
-        return 2
+    if {a, b} == {"bathroom", "bedroom"}:  # the first bathroom is everybody's
+        return 9 if "bathroom_0" in (first, second) else 0
+    if {a, b} == {"closet", "bedroom"} or {a, b} == {"pantry_room", "kitchen"}:
+        return 0
     if {a, b} == {"balcony", "living_room"} or {a, b} == {"balcony", "bedroom"}:
-        return 2
+        return 0
     if "corridor" in (a, b) or "lobby" in (a, b):
         return 1 if private < 2 else 3
     return 6 - 2 * hubs + 3 * private
@@ -118,19 +122,19 @@ def _into(plan: Plan, edge: Edge) -> str:
     return min(a, b, key=rank).name
 
 
-def _door(edge: Edge, index: int, into: str, rng: random.Random) -> Opening:
-    _, width, height = shape("door", index).size
+def _door(edge: Edge, index: int, into: str, rng: random.Random, seed: int) -> Opening:
+    _, width, height = shape("door", index, seed).size
     width = float(width) + AIR
     low, high = edge.low + CORNER + width / 2, edge.high - CORNER - width / 2
     centre = rng.choice((low, high)) if high > low else (low + high) / 2
     return Opening("door", edge, centre, width, 0.0, float(height) + AIR, index, into)
 
 
-def _windows(room: Room, edges: list[Edge], index: int, taken: list[Opening]) -> list[Opening]:
+def _windows(room: Room, edges: list[Edge], index: int, taken: list[Opening], seed: int) -> list[Opening]:
     """A room's windows: in its longest outer wall, and in the next one where the room is large."""
     if room.kind in DARK or room.kind == "balcony":
         return []
-    _, width, height = shape("window", index).size
+    _, width, height = shape("window", index, seed).size
     width, height = float(width) + AIR, float(height) + AIR
     found = []
     walls = 2 if room.area > LARGE and room.kind != "kitchen" else 1

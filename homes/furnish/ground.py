@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..building import stair_boxes
 from ..floor_plans.plan import Plan, Rect
 from ..layout_maps import FLAT, HIGH, LOW, reachable
 from ..things import Thing
@@ -31,6 +32,8 @@ class Ground:
             self.free[cells] = True
             self._rooms[room.name] = cells
             self._area[room.name] = self.free[cells].size * CELL**2
+        for low, high in stair_boxes(plan):
+            self.free[self._outer_cells((low[0], low[1], high[0], high[1]))] = False
         for opening in plan.openings:
             if not opening.walkable or opening.edge.outer:
                 continue

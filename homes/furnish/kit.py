@@ -16,12 +16,13 @@ from ..arrangement import AIR, Arrangement
 from ..catalogue import find
 from ..floor_plans.plan import Plan, Rect, Room
 from ..surfaces import Surface, insides, tops
-from ..things import Thing, lying, shape, yaw
+from ..things import Shape, Thing, lying, shape, yaw
 from .ground import Ground
 
 WALL_GAP = 0.006  # m, between a wall and what stands at it
 NEIGHBOUR_GAP = 0.012  # m, between pieces of furniture side by side
 STEP = 0.05  # m, between places that are tried along a wall
+MOST_POSES = 8  # stable orientations of a model at most (poses.MOST)
 FLAT_ON_WALL = 0.004  # m, air behind a picture
 SIDES = {"south": (0, 1), "east": (-1, 0), "north": (0, -1), "west": (1, 0)}
 """Side of a room -> the direction into the room."""
@@ -31,14 +32,21 @@ DEGREES = {"south": 90, "east": 180, "north": 270, "west": 0}
 
 @dataclasses.dataclass
 class HomeInProgress:
-    """What all rooms of a home share. models: at most so many models of a category are used (small shared meshes)."""
+    """What all rooms of a home share.
+
+    Attributes:
+      models, small_models: at most so many models of a category are used, of fixed and of loose things.
+      limit: no more things than that. seed: of the models.
+    """
 
     plan: Plan
     things: Arrangement
     ground: Ground
     rng: random.Random
     models: int = 3
+    small_models: int = 2
     limit: int | None = None
+    seed: int = 0
 
     @property
     def full(self) -> bool:
@@ -47,7 +55,8 @@ class HomeInProgress:
 
     def index(self, category: str) -> int:
         """A model number."""
-        return self.rng.randrange(min(find(category).count, self.models))
+        entry = find(category)
+        return self.rng.randrange(min(entry.count, self.models if entry.fixed else self.small_models))
 
 
 class RoomKit:
@@ -71,8 +80,10 @@ class RoomKit:
         height: float = 0.0,
         room_before: float = 0.0,
         gap: float = NEIGHBOUR_GAP,
+        wall_gap: float = WALL_GAP,
         fixed: bool | None = None,
         under_window: bool = True,
+        most: int | None = None,
     ) -> Thing | None:
         """Stands (or hangs) something with its back to a wall.
 
@@ -80,15 +91,17 @@ class RoomKit:
           side: "south", "east", ... or several to be tried in that order; None: all, in random order.
           near: x, y that it shall be close to; otherwise place: "corner", "middle" or "any".
           height: of its lower edge above the floor. room_before: metres of floor kept free before it.
+          gap, wall_gap: metres of air to other furniture, and behind it.
           under_window: False for what may not stand before a window even where it is lower.
+          most: places that are tried; None: all.
         """
         index = self.home.index(category) if index is None else index
         sides = [side] if isinstance(side, str) else list(side or self._shuffled(list(SIDES)))
-        form = shape(category, index)
+        form = self._shape(category, index)
         for name in sides:
-            for at in self._along(name, form.size[1], place, near):
+            for at in self._along(name, form.size[1], place, near)[:most]:
                 turn = yaw(DEGREES[name])
-                back = WALL_GAP if height == 0 else FLAT_ON_WALL
+                back = wall_gap if height == 0 else FLAT_ON_WALL
                 position = self._against(name, at, -form.low[0] + back, -(form.low[1] + form.high[1]) / 2, turn)
                 position[2] = height + (0 if (height or find(category).fixed) else AIR)
                 thing = self._thing(category, index, position, turn, fixed)
@@ -113,7 +126,7 @@ class RoomKit:
     ) -> Thing | None:
         """Stands something with the middle of its box at a place, its front towards `degrees` about z."""
         index = self.home.index(category) if index is None else index
-        form, turn = shape(category, index), yaw(degrees)
+        form, turn = self._shape(category, index), yaw(degrees)
         middle = turn @ ((form.low + form.high) / 2)
         lift = height + (0 if find(category).fixed else AIR)
         position = np.array([xy[0] - middle[0], xy[1] - middle[1], lift])
@@ -124,7 +137,7 @@ class RoomKit:
                height: float = 0.0, room_before: float = 0.0) -> Thing | None:  # fmt: skip
         """Stands something at the left (+1) or right (-1) of another, backs in one line, fronts the same way."""
         index = self.home.index(category) if index is None else index
-        form = shape(category, index)
+        form = self._shape(category, index)
         away = which * (anchor.size[1] / 2 + form.size[1] / 2 + gap)
         back = -anchor.size[0] / 2 + form.size[0] / 2
         spot = anchor.centre[:2] + anchor.rotation[:2, :2] @ np.array([back, away])
@@ -132,19 +145,32 @@ class RoomKit:
                        height=height, room_before=room_before)  # fmt: skip
 
     def before(self, anchor: Thing, category: str, distance: float, *, index: int | None = None, along: float = 0.0,
-               turn: float = 180.0, gap: float = 0.005, ways: bool = False) -> Thing | None:  # fmt: skip
+               side: float = 0.0, turn: float = 180.0, gap: float = 0.005,
+               ways: bool = False) -> Thing | None:  # fmt: skip
         """Stands something in front of another, `distance` metres between their boxes, looking back at it.
 
-        along: shifts it towards the anchor's left. turn: its yaw relative to the anchor.
+        Args:
+          along: shifts it towards the anchor's left. side: degrees; 90 is at the anchor's left instead of its front.
+          turn: its yaw relative to that side's outward direction.
         """
         index = self.home.index(category) if index is None else index
-        size = shape(category, index).size
+        size = self._shape(category, index).size
         depth = size[0] if turn % 180 == 0 else size[1]
-        spot = anchor.centre[:2] + anchor.rotation[:2, :2] @ np.array(
-            [anchor.size[0] / 2 + distance + depth / 2, along]
-        )
-        return self.at(category, (float(spot[0]), float(spot[1])), _degrees(anchor) + turn, index=index, gap=gap,
-                       ways=ways)  # fmt: skip
+        reach = anchor.size[0 if side % 180 == 0 else 1] / 2 + distance + depth / 2
+        spot = anchor.centre[:2] + (anchor.rotation @ yaw(side))[:2, :2] @ np.array([reach, along])
+        place = (float(spot[0]), float(spot[1]))
+        return self.at(category, place, _degrees(anchor) + side + turn, index=index, gap=gap, ways=ways)
+
+    def above(self, anchor: Thing, category: str, height: float, *, index: int | None = None) -> Thing | None:
+        """Hangs something on the wall behind another thing, its lower edge at `height`."""
+        index = self.home.index(category) if index is None else index
+        side = next(name for name, way in SIDES.items() if np.allclose(way, anchor.front, atol=0.1))
+        near = (float(anchor.centre[0]), float(anchor.centre[1]))
+        size = self._shape(category, index).size
+        for at in self._along(side, size[1], "any", near)[:3]:
+            if abs(at - (near[0] if side in ("south", "north") else near[1])) < 0.1:
+                return self.at_wall(category, side=side, near=near, index=index, height=height, gap=0.0, most=3)
+        return None
 
     # --- small things ----------------------------------------------------------------------------------------------
 
@@ -177,13 +203,14 @@ class RoomKit:
         for surface in found:
             for _ in range(1 if at is not None and degrees is not None else tries):
                 angle = self.rng.uniform(-180, 180) if degrees is None else degrees
-                turn = host.rotation @ yaw(angle) @ resting(category, index, stand)
+                turn = host.rotation @ yaw(angle) @ resting(category, index, stand, self.home.seed)
                 x0, y0, x1, y1 = (v * host.scale for v in surface.rect)
                 if isinstance(at, str):
                     x, y = (x0 + x1) / 2, (y0 + y1) / 2
                 else:
                     x, y = at if at is not None else (self.rng.uniform(x0, x1), self.rng.uniform(y0, y1))
-                thing = Thing(category, category, index, np.zeros(3), turn, False, (self.room.name,), scale, host.name)
+                thing = self._thing(category, index, np.zeros(3), turn, None)
+                thing.scale, thing.host = scale, host.name
                 local = thing.box()
                 spot = host.world(np.array([x, y, surface.z * host.scale]) / host.scale)
                 middle = local.mean(0)
@@ -201,7 +228,11 @@ class RoomKit:
 
     def _thing(self, category, index, position, turn, fixed) -> Thing:
         fixed = find(category).fixed if fixed is None else fixed
-        return Thing(category, category, index, np.asarray(position, float), turn, fixed, (self.room.name,))
+        rooms, seed = (self.room.name,), self.home.seed
+        return Thing(category, category, index, np.asarray(position, float), turn, fixed, rooms, seed=seed)
+
+    def _shape(self, category: str, index: int) -> Shape:
+        return shape(category, index, self.home.seed)
 
     def _stand(self, thing: Thing, gap: float, room_before: float, ways: bool = True) -> bool:
         """Puts furniture where it is if all is well; then its name is set."""
@@ -244,7 +275,7 @@ class RoomKit:
 
     def _along(self, side: str, width: float, place: str, near) -> list[float]:
         """Places along a wall (world coordinate) to try for something so wide."""
-        spans = self._wall_spans(side)
+        spans = self.wall_spans(side)
         spots: list[float] = []
         for low, high in spans:
             a, b = low + width / 2 + 0.002, high - width / 2 - 0.002
@@ -262,7 +293,7 @@ class RoomKit:
             return sorted(spots, key=lambda v: abs(v - sum(map(sum, spans)) / 2 / len(spans)))
         return self._shuffled(spots)
 
-    def _wall_spans(self, side: str) -> list[tuple[float, float]]:
+    def wall_spans(self, side: str) -> list[tuple[float, float]]:
         """Stretches of a side with a wall behind them."""
         x0, y0, x1, y1 = self.room.rect
         axis, at = ("x", y0 if side == "south" else y1) if side in ("south", "north") else (
@@ -307,17 +338,17 @@ class RoomKit:
         return values
 
 
-def resting(category: str, index: int, stand: int | None = None) -> np.ndarray:
+def resting(category: str, index: int, stand: int | None = None, seed: int = 0) -> np.ndarray:
     """Rotation [3, 3] in which a model is put down: as built where that is one of its stable orientations."""
     if stand is not None:
-        return lying(category, index, stand)
+        return lying(category, index, stand, seed)
     if find(category).rest == "upright":
         return np.eye(3)
-    for number in range(3):
-        turn = lying(category, index, number)
+    for number in range(MOST_POSES):
+        turn = lying(category, index, number, seed)
         if np.allclose(turn, np.eye(3), atol=0.02):
             return turn
-    return lying(category, index, 0)
+    return lying(category, index, 0, seed)
 
 
 def _degrees(thing: Thing) -> float:

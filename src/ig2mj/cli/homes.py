@@ -17,21 +17,26 @@ def build(
     seed: int = 0,
     only: tuple[str, ...] = (),
     jobs: int | None = None,
+    home: tuple[str, ...] = (),
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> None:
-    """Write a dataset root in iGibson's layout: VERSION, metadata and objects.
+    """Write a dataset root in iGibson's layout: VERSION, metadata, objects and scenes.
 
     Args:
-      out: dataset root; categories already there are replaced.
+      out: dataset root; categories and scenes already there are replaced.
       seed: of all variation; the same seed gives the same bytes.
-      only: build just these categories.
+      only: build just these categories, and no homes unless --home names some.
+      home: build just these homes, and of the objects just the categories they need.
       jobs: processes; default one per core.
       json: print what was built as JSON.
     """
     from ig2mj_homes.dataset import build_dataset
+    from ig2mj_homes.shipped_homes import build_homes, categories_of, furnished
     from rich.console import Console
     from rich.progress import Progress
 
+    if home and not only:
+        only = tuple(sorted({c for name in home for c in categories_of(furnished(name, seed))}))
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("building household objects", total=None)
         built = build_dataset(
@@ -41,10 +46,18 @@ def build(
             jobs=jobs,
             progress=lambda done, total: bar.update(task, completed=done, total=total),
         )
+        homes: dict[str, int] = {}
+        if home or not only:
+            task = bar.add_task("furnishing homes", total=None)
+            homes = build_homes(
+                out, home or None, seed, lambda name, done, total: bar.update(task, completed=done, total=total)
+            )
     if json:
-        _print_json({"dataset": str(out), "seed": seed, "categories": built})
-    else:
-        print(f"{out}: {sum(built.values())} models of {len(built)} categories")
+        _print_json({"dataset": str(out), "seed": seed, "categories": built, "homes": homes})
+        return
+    print(f"{out}: {sum(built.values())} models of {len(built)} categories, {len(homes)} homes")
+    if homes:
+        print(f"convert one: ig2mj convert scene --dataset {out} --scene {next(iter(homes))} --out OUT")
 
 
 def list_(

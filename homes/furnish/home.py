@@ -1,0 +1,78 @@
+"""A whole home: the rooms furnished turn by turn, then filled with small things up to the wanted number."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Iterator
+
+from ..floor_plans.plan import Plan
+from ..things import Thing
+from . import kitchen, living, sleeping, working
+from .clutter import fill
+from .kit import HomeInProgress, RoomKit
+from .start import start_home
+
+Rule = Callable[[RoomKit], Iterator[Thing | None]]
+
+RULES: dict[str, Rule] = {
+    "balcony": living.balcony,
+    "bathroom": sleeping.bathroom,
+    "bedroom": sleeping.bedroom,
+    "childs_room": sleeping.childs_room,
+    "closet": sleeping.closet,
+    "corridor": living.corridor,
+    "dining_room": kitchen.dining_room,
+    "exercise_room": working.exercise_room,
+    "garage": working.garage,
+    "home_office": working.home_office,
+    "kitchen": kitchen.kitchen,
+    "library": living.library,
+    "living_room": living.living_room,
+    "lobby": living.lobby,
+    "pantry_room": kitchen.pantry_room,
+    "playroom": sleeping.playroom,
+    "staircase": living.staircase,
+    "storage_room": working.storage_room,
+    "television_room": living.television_room,
+    "utility_room": kitchen.utility_room,
+}
+"""Room kind -> a generator that gives after each thing it put (or None where there was no room for one)."""
+
+FURNITURE_SHARE = 0.66
+"""Of the things that are neither doors nor windows: furniture comes first, small things take what is left."""
+
+
+def furnish_home(plan: Plan, objects: int, seed: int = 0) -> HomeInProgress:
+    """Furnishes a plan. objects: how many things in all, doors and windows included; fewer where nothing more fits."""
+    home = start_home(plan, random.Random(f"{seed}/{plan.name}/things"), seed=seed, limit=objects)
+    openings = len(home.things.things)
+    limit = openings + round(FURNITURE_SHARE * (objects - openings))
+    rooms = sorted(plan.rooms, key=lambda room: ORDER.get(room.kind, 2))
+    running = [(room.kind, RULES[room.kind](RoomKit(home, room))) for room in rooms]
+    steps = STEPS if objects >= LARGE else {}
+    turn = 0
+    while running and len(home.things.things) < limit:
+        for kind, rule in list(running):
+            if len(home.things.things) >= limit:
+                break
+            if turn >= START.get(kind, 0) and not any([_advance(rule) for _ in range(steps.get(kind, 1))]):
+                running.remove((kind, rule))
+        turn += 1
+    small = fill(home)
+    while not home.full and next(small, None) is not None:
+        pass
+    return home
+
+
+ORDER = {"kitchen": 0, "living_room": 1, "bathroom": 1, "bedroom": 1, "corridor": 4}
+"""Rooms of these kinds get their pieces first in a turn."""
+START = {"corridor": 4, "lobby": 1, "balcony": 3, "staircase": 3}
+"""Turn in which a room of this kind gets its first piece; others: 0."""
+STEPS = {"kitchen": 2}
+"""Pieces per turn in homes of at least LARGE things; others: 1."""
+LARGE = 40
+
+
+def _advance(rule: Iterator[Thing | None]) -> bool:
+    """Lets a rule go on until it has put one thing; False when it is through."""
+    return any(thing is not None for thing in rule)
