@@ -7,7 +7,11 @@ from typing import Annotated
 
 import tyro
 
+from ig2mj.errors import Ig2mjError
+
 Vec3 = tuple[float, float, float]
+
+VIDEOS = (".mp4", ".gif")
 
 
 def run(
@@ -20,6 +24,8 @@ def run(
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0,
     collision: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     paused: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    dump: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    video: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
 ) -> None:
     """Open a scene in MuJoCo's viewer, or write a picture of it.
 
@@ -35,8 +41,16 @@ def run(
       seconds: let this much time pass before the picture or the window.
       collision: draw the collision geometry instead of the visual one (picture only; key 3 in the window).
       paused: open the window paused.
+      dump: replay the last steps of a world that went wrong, from the file that debug mode wrote; with --picture, the
+        last of them whose numbers are finite.
+      video: write the dump as a video (.mp4 or .gif) instead of opening a window.
     """
-    _check(picture, camera, eye, target, size, seconds)
+    _check(picture or video, camera, eye, target, size, seconds)
+    if dump is not None:
+        _replay(scene, dump, picture, video, camera, eye, target, size, seconds, collision, paused)
+        return
+    if video is not None:
+        raise Ig2mjError("--video belongs to --dump")
     if picture is not None:
         _write_picture(scene, picture, camera, eye, target, size, seconds, collision)
         return
@@ -50,8 +64,6 @@ def run(
 
 def _check(picture, camera, eye, target, size, seconds) -> None:
     import math
-
-    from ig2mj.errors import Ig2mjError
 
     numbers = [*(eye or ()), *(target or ()), seconds]
     if camera is not None and (eye or target):
@@ -69,7 +81,7 @@ def _check(picture, camera, eye, target, size, seconds) -> None:
     if picture is not None:
         from PIL import Image
 
-        if picture.suffix.lower() not in Image.registered_extensions():
+        if picture.suffix.lower() not in {*Image.registered_extensions(), *VIDEOS}:
             raise Ig2mjError(f"{picture}: is no kind of picture that can be written (use .png or .jpg)")
         if not picture.parent.is_dir():
             raise Ig2mjError(f"{picture}: the folder {picture.parent} does not exist")
@@ -94,6 +106,36 @@ def _view(home, data, camera: str | None, eye: Vec3 | None, target: Vec3 | None)
         azimuth=math.degrees(math.atan2(dy, dx)) if flat > 0 else 90.0,
         elevation=math.degrees(math.atan2(dz, flat)),
     )
+
+
+def _replay(scene, dump, picture, video, camera, eye, target, size, seconds, collision, paused) -> None:
+    import sys
+
+    from PIL import Image
+
+    from ig2mj.scene.scene import load_scene
+    from ig2mj.viewer.offscreen import VISIBLE_GROUPS, render
+    from ig2mj.viewer.replay import Replay
+
+    if (picture is not None and video is not None) or seconds > 0:
+        raise Ig2mjError("--dump goes with one of --picture and --video, and without --seconds")
+    if video is not None and video.suffix.lower() not in VIDEOS:
+        raise Ig2mjError(f"{video}: is no kind of video that can be written (use {' or '.join(VIDEOS)})")
+    replay = Replay(load_scene(scene), dump)
+    print(f"{dump}: {len(replay)} steps; {replay.note.get('text', '')}", file=sys.stderr)
+    if picture is None and video is None:
+        replay.launch(paused=paused)
+        return
+    step = replay.show_last()
+    view = _view(replay.scene, replay.data, camera, eye, target)
+    if video is not None:
+        count = replay.video(video, view, width=size[0], height=size[1])
+        print(f"wrote {video} ({count} steps)", file=sys.stderr)
+        return
+    groups = (3,) if collision else VISIBLE_GROUPS
+    image = render(replay.scene.model, replay.data, view, width=size[0], height=size[1], groups=groups)
+    Image.fromarray(image).save(picture)
+    print(f"wrote {picture} (step {step + 1} of {len(replay)})", file=sys.stderr)
 
 
 def _write_picture(scene, file, camera, eye, target, size, seconds, collision) -> None:

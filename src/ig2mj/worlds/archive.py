@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import pathlib
+import zipfile
+import zlib
 from typing import Any, TypeVar
 
 import jax
@@ -49,7 +51,10 @@ def load_tree(file: str | os.PathLike, like: Tree) -> tuple[Tree, dict[str, Any]
             name = _name(keys)
             if name not in archive.files:
                 raise InputError(file, "is missing", element=name, mend="make the file again with this version")
-            array = archive[name]
+            try:
+                array = archive[name]
+            except (ValueError, OSError, zipfile.BadZipFile, zlib.error) as e:
+                raise InputError(file, f"is damaged: {e}", element=name) from e
             if array.ndim != wanted.ndim or array.shape[1:] != wanted.shape[1:]:
                 raise InputError(
                     file,
@@ -62,20 +67,37 @@ def load_tree(file: str | os.PathLike, like: Tree) -> tuple[Tree, dict[str, Any]
         return jax.tree_util.tree_map_with_path(leaf, like), header
 
 
+def read_arrays(file: str | os.PathLike, prefix: str) -> dict[str, np.ndarray]:
+    """The arrays of a file that `save_tree` wrote whose paths begin with `prefix`, which is taken off. Raises
+    InputError."""
+    with _open(file) as archive:
+        _header(archive, file)
+        try:
+            return {n.removeprefix(prefix): archive[n] for n in archive.files if n.startswith(prefix)}
+        except (ValueError, OSError, zipfile.BadZipFile, zlib.error) as e:
+            raise InputError(file, f"is damaged: {e}") from e
+
+
 def _name(keys: Any) -> str:
     return jax.tree_util.keystr(keys, simple=True, separator=".")
 
 
 def _open(file: str | os.PathLike) -> Any:
     try:
-        return np.load(file, allow_pickle=False)
+        archive = np.load(file, allow_pickle=False)
     except OSError as e:
         raise InputError(file, f"cannot be read: {e.strerror or e}") from e
-    except ValueError as e:
+    except (ValueError, EOFError, zipfile.BadZipFile) as e:
         raise InputError(file, f"is no npz archive: {e}") from e
+    if not hasattr(archive, "files"):  # a single array
+        raise InputError(file, "is no npz archive")
+    return archive
 
 
 def _header(archive: Any, file: str | os.PathLike) -> dict[str, Any]:
-    if not hasattr(archive, "files") or HEADER not in archive.files:
+    if HEADER not in archive.files:
         raise InputError(file, "is no archive of this project", element=HEADER)
-    return msgspec.json.decode(archive[HEADER].tobytes())
+    try:
+        return msgspec.json.decode(archive[HEADER].tobytes(), type=dict)
+    except (msgspec.DecodeError, ValueError, OSError, zipfile.BadZipFile, zlib.error) as e:
+        raise InputError(file, f"is damaged: {e}", element=HEADER) from e

@@ -12,6 +12,7 @@ from jaxtyping import Float
 from ig2mj.engine.view import Array
 from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import Verdict
+from ig2mj.scene.scene import Scene
 from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Batch, Worlds
 from ig2mj.worlds.recorder import LENGTH, Recording, frames_of, record, save_dump, start_recording
@@ -20,8 +21,8 @@ from ig2mj.worlds.recorder import LENGTH, Recording, frames_of, record, save_dum
 class DebugWorlds:
     """`Worlds` stepped under watch. Slower: it waits for the device in every step, and copies every world's state."""
 
-    def __init__(self, worlds: Worlds, scene: str, folder: str | os.PathLike = "dumps", length: int = LENGTH):
-        """Binds worlds to a folder for dumps; `scene`: the scene's name; `length`: control steps kept."""
+    def __init__(self, worlds: Worlds, scene: Scene, folder: str | os.PathLike = "dumps", length: int = LENGTH):
+        """Binds worlds of a scene to a folder for dumps; `length`: control steps kept."""
         self.worlds, self.scene, self.folder, self.length = worlds, scene, pathlib.Path(folder), length
         pure = worlds.engine.pure
         self._step = jax.jit(worlds.step) if pure else worlds.step
@@ -55,6 +56,7 @@ class DebugWorlds:
 
     def _report(self, batch: Batch, world: int) -> str:
         assert self._recording is not None
+        scene = self.scene
         health = self.worlds.engine.health(batch.world.physics)
         flags, overflow = int(np.asarray(batch.flags)[world]), int(np.asarray(health.overflow)[world])
         step = int(np.asarray(batch.world.step)[world])
@@ -63,5 +65,5 @@ class DebugWorlds:
         file = self.folder / f"world{world}_step{step}.npz"
         text = guards.explain(world, flags, overflow) + f"; step {step}, top speed {speed:.3g} m/s"
         note = {"world": world, "step": step, "flags": flags, "overflow": overflow, "text": text}
-        save_dump(frames_of(self._recording, world), file, self.scene, note)
-        return f"{text}; the last {self.length} steps: ig2mj view SCENE --dump {file}"
+        save_dump(frames_of(self._recording, world), file, scene.name, note, scene.model)
+        return f"{text}; the last {self.length} steps: ig2mj view {scene.folder} --dump {file}"

@@ -14,12 +14,13 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import struct
-from jaxtyping import Array, Int
+from jaxtyping import Int
 
 from ig2mj.engine.base import Snapshot
+from ig2mj.engine.view import Array
 from ig2mj.errors import InputError
 from ig2mj.states.world import ExtendedStates
-from ig2mj.worlds.archive import load_tree, save_tree
+from ig2mj.worlds.archive import load_tree, read_header, save_tree
 
 FORMAT_VERSION = 1
 
@@ -56,10 +57,13 @@ def load_pool(file: str | os.PathLike, like: Pool, scene: str) -> Pool:
     Raises:
       InputError: the file is missing, broken, of another scene, or of another version.
     """
-    pool, header = load_tree(file, like)
+    header = read_header(file)
     mend = "make a pool of this scene with `ig2mj pool`"
     if header.get("kind") != "pool" or header.get("format_version") != FORMAT_VERSION:
         raise InputError(file, "is no pool of this version", mend=mend)
     if header.get("scene") != scene:
         raise InputError(file, f"is a pool of scene '{header.get('scene')}', not of '{scene}'", mend=mend)
+    pool, _ = load_tree(file, like)
+    if not pool.size:
+        raise InputError(file, "has no rows", mend=mend)
     return pool

@@ -13,6 +13,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 from flax import struct
 from jaxtyping import Int
@@ -21,11 +22,14 @@ from ig2mj.engine.base import Engine, Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.errors import InputError
 from ig2mj.states.world import ExtendedStates
-from ig2mj.worlds.archive import load_tree, save_tree
+from ig2mj.worlds.archive import load_tree, read_arrays, read_header, save_tree
 from ig2mj.worlds.batch import Batch
 
 LENGTH = 50
 """Control steps kept by default."""
+
+MODEL = "model"
+"""In a dump: MuJoCo's binary form of the model."""
 
 
 @struct.dataclass
@@ -70,21 +74,59 @@ def frames_of(recording: Recording, world: int) -> Frames:
     return jax.tree.map(lambda a: np.asarray(a[:, world])[order], recording.frames)
 
 
-def save_dump(frames: Frames, file: str | os.PathLike, scene: str, note: dict[str, Any]) -> None:
-    """Writes a dump. `note`: world, flags, and whatever helps to understand it."""
-    save_tree(file, frames, {"kind": "dump", "scene": scene, **note})
+def save_dump(
+    frames: Frames,
+    file: str | os.PathLike,
+    scene: str,
+    note: dict[str, Any],
+    model: mujoco.MjModel | None = None,
+) -> None:
+    """Writes a dump.
+
+    Args:
+      note: world, flags, and whatever helps to understand it.
+      model: of the scene with its agents; None: the dump can be loaded, but not replayed.
+    """
+    binary = np.zeros(0 if model is None else mujoco.mj_sizeModel(model), np.uint8)
+    if model is not None:
+        mujoco.mj_saveModel(model, None, binary)
+    save_tree(file, {"frames": frames, MODEL: binary}, {"kind": "dump", "scene": scene, **note})
 
 
 def load_dump(file: str | os.PathLike, like: Frames, scene: str) -> tuple[Frames, dict[str, Any]]:
-    """Reads a dump of the scene. Raises InputError."""
-    frames, header = load_tree(file, like)
+    """Reads a dump of the scene, of the shapes of `like`, to go on from it. Raises InputError."""
+    check_dump(file, scene)
+    tree, header = load_tree(file, {"frames": like, MODEL: np.zeros(0, np.uint8)})
+    return tree["frames"], header
+
+
+def read_dump(file: str | os.PathLike, scene: str) -> tuple[Snapshot, mujoco.MjModel, dict[str, Any]]:
+    """Physics of a dump [T], the model it was recorded with, and the header, to look at. Raises InputError."""
+    header = check_dump(file, scene)
+    arrays = read_arrays(file, "frames.physics.")
+    binary = read_arrays(file, MODEL).get("", np.zeros(0, np.uint8))
+    absent = [f.name for f in dataclasses.fields(Snapshot) if f.name not in arrays]
+    if absent or not len(binary):
+        raise InputError(file, "is missing", element=", ".join(absent) or MODEL, mend="record it again")
+    try:
+        model = mujoco.MjModel.from_binary_path("dump.mjb", assets={"dump.mjb": binary.tobytes()})
+    except ValueError as e:
+        raise InputError(file, f"MuJoCo cannot read it: {e}", element=MODEL, mend="use the MuJoCo of the run") from e
+    if arrays["qpos"].shape[1:] != (model.nq,) or not len(arrays["qpos"]):
+        raise InputError(file, f"has shape {arrays['qpos'].shape}", element="frames.physics.qpos")
+    return Snapshot(**arrays), model, header
+
+
+def check_dump(file: str | os.PathLike, scene: str) -> dict[str, Any]:
+    """The header of a dump of the scene. Raises InputError."""
+    header = read_header(file)
     if header.get("kind") != "dump" or header.get("scene") != scene:
         raise InputError(
             file,
             f"is a {header.get('kind')} of scene '{header.get('scene')}', not a dump of '{scene}'",
             mend="give the scene it was dumped from",
         )
-    return frames, header
+    return header
 
 
 def _now(engine: Engine, batch: Batch) -> Frames:

@@ -1,0 +1,137 @@
+"""Pools: made by settling disturbed homes, saved, loaded, refused where they do not belong (issue, item 4)."""
+
+from __future__ import annotations
+
+import jax
+import numpy as np
+import pytest
+
+from ig2mj import cli
+from ig2mj.errors import EngineError, InputError
+from ig2mj.sampling import settled
+from ig2mj.sampling.settled import make_pool
+from ig2mj.worlds.archive import read_header, save_tree
+from ig2mj.worlds.pool import Pool, load_pool, save_pool, stack
+
+
+@pytest.fixture(scope="module")
+def pool(tiny_home, home_model) -> Pool:
+    return make_pool(tiny_home, home_model, 3, seed=5, share=0.4, threads=1)
+
+
+def same(one: Pool, other: Pool) -> bool:
+    return all(
+        (np.asarray(a) == np.asarray(b)).all()
+        for a, b in zip(jax.tree.leaves(one), jax.tree.leaves(other), strict=True)
+    )
+
+
+def test_rows_are_asleep_and_differ(pool):
+    assert pool.size == 3
+    assert (np.asarray(pool.physics.tree_asleep) >= 0).all()
+    assert np.abs(np.asarray(pool.physics.qpos)[0] - np.asarray(pool.physics.qpos)[1]).max() > 0.01
+    assert (np.asarray(pool.physics.qvel) == 0).all()
+
+
+def test_the_same_seed_gives_the_same_pool(pool, tiny_home, home_model):
+    again = make_pool(tiny_home, home_model, 3, seed=5, share=0.4, threads=2)
+    assert same(pool, again), "whatever the number of threads"
+    other = make_pool(tiny_home, home_model, 3, seed=6, share=0.4, threads=1)
+    assert not same(pool, other)
+
+
+def test_halves_stay_parked(pool, tiny_home):
+    address = tiny_home.model.joint("apple_half_0/free").qposadr[0]
+    assert np.asarray(pool.physics.qpos)[:, address] == pytest.approx(30.0, abs=0.05)
+
+
+def test_progress_counts_the_rows(tiny_home, home_model):
+    seen: list[int] = []
+    make_pool(tiny_home, home_model, 2, threads=1, progress=seen.append)
+    assert seen == sorted(seen) and seen[-1] == 2
+
+
+def test_a_home_that_never_rests_is_an_error(tiny_home, home_model, monkeypatch):
+    monkeypatch.setattr(settled, "SECONDS", 0.05)
+    with pytest.raises(EngineError, match="only 0 came to rest"):
+        make_pool(tiny_home, home_model, 1, share=1.0, threads=1)
+
+
+def test_a_pool_survives_its_file(pool, tmp_path):
+    file = tmp_path / "pool.npz"
+    save_pool(pool, file, "tiny_home", {"seed": 5})
+    assert same(load_pool(file, stack([pool, pool]), "tiny_home"), pool), "the number of rows is the file's"
+    header = read_header(file)
+    assert header["seed"] == 5 and header["scene"] == "tiny_home"
+    assert [f.name for f in tmp_path.iterdir()] == ["pool.npz"], "no leftovers"
+
+
+def test_rows_are_picked_in_order(pool):
+    rows = pool.rows(np.array([2, 0]))
+    np.testing.assert_array_equal(rows.physics.qpos, np.asarray(pool.physics.qpos, np.float32)[[2, 0]])
+
+
+def broken(pool: Pool, file, kind: str) -> str:
+    """Makes a broken file; returns what the error says of it."""
+    save_pool(pool, file, "tiny_home")
+    data = file.read_bytes()
+    if kind == "absent":
+        file.unlink()
+        return "cannot be read"
+    if kind == "text":
+        file.write_text("pool")
+        return "is no npz archive"
+    if kind == "cut":
+        file.write_bytes(data[: len(data) // 2])
+        return "is no npz archive"
+    if kind == "damaged":
+        file.write_bytes(bytes(b ^ 0x55 if 400 < k < 900 else b for k, b in enumerate(data)))
+        return "damaged"
+    if kind == "array":
+        with file.open("wb") as out:
+            np.save(out, np.zeros(3))
+        return "is no npz archive"
+    if kind == "foreign":
+        np.savez(file, a=np.zeros(3))
+        return "is no archive of this project"
+    if kind == "version":
+        save_tree(file, pool, {"kind": "pool", "format_version": 99, "scene": "tiny_home"})
+        return "is no pool of this version"
+    if kind == "dump":
+        save_tree(file, pool, {"kind": "dump", "format_version": 1, "scene": "tiny_home"})
+        return "is no pool of this version"
+    if kind == "scene":
+        save_pool(pool, file, "palace")
+        return "is a pool of scene 'palace', not of 'tiny_home'"
+    if kind == "shape":
+        physics = pool.physics.replace(qpos=np.asarray(pool.physics.qpos)[:, :-1])
+        save_pool(pool.replace(physics=physics), file, "tiny_home")
+        return "physics.qpos: has shape"
+    assert kind == "empty"
+    save_pool(jax.tree.map(lambda a: np.asarray(a)[:0], pool), file, "tiny_home")
+    return "has no rows"
+
+
+@pytest.mark.parametrize(
+    "kind",
+    ["absent", "text", "cut", "damaged", "array", "foreign", "version", "dump", "scene", "shape", "empty"],
+)
+def test_a_file_that_is_no_pool_of_the_scene_is_named(pool, tmp_path, kind):
+    file = tmp_path / "pool.npz"
+    says = broken(pool, file, kind)
+    with pytest.raises(InputError) as caught:
+        load_pool(file, pool, "tiny_home")
+    assert says in str(caught.value) and str(file) in str(caught.value) and "\n" not in str(caught.value)
+
+
+def test_the_command_makes_a_pool(tiny_home_folder, tiny_home, pool, tmp_path, capsys):
+    file = tmp_path / "some.npz"
+    assert cli.call(["pool", str(tiny_home_folder), "--count", "2", "--out", str(file), "--seed", "3"]) == 0
+    assert "2 settled states of tiny_home" in capsys.readouterr().out
+    assert load_pool(file, pool, "tiny_home").size == 2
+
+
+@pytest.mark.parametrize(("options", "says"), [(["--count", "0"], "at least one row"), (["--share", "1.5"], "between")])
+def test_the_command_refuses_senseless_numbers(tiny_home_folder, capsys, options, says):
+    assert cli.call(["pool", str(tiny_home_folder), *options]) == 2
+    assert says in capsys.readouterr().err
