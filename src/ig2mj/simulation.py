@@ -155,16 +155,22 @@ class Simulation(SimulationStates):
         return self.view
 
     def render(self, camera: Any = None, *, width: int = 640, height: int = 480, **options: Any) -> np.ndarray:
-        """A picture, uint8 [height, width, 3].
+        """A picture, uint8 [height, width, 3]; objects are tinted by state, dust, stains and water are drawn.
 
         Args:
           camera: a camera's name or number, an `ig2mj.viewer.offscreen.FreeView`, or None for an overview.
           options: see `ig2mj.viewer.offscreen.render`.
         """
-        from ig2mj.viewer import offscreen
+        from ig2mj.viewer import offscreen, state_marks
 
         model, data = self.engine.to_mujoco(self.physics, 0)
-        return offscreen.render(model, data, camera, width=width, height=height, **options)
+        if self.state_options is None or options.get("segmentation"):
+            return offscreen.render(model, data, camera, width=width, height=height, **options)
+        found = state_marks.marks(self.state_model, self.states, self.view)
+        options.setdefault("decorate", lambda scene: state_marks.draw_marks(scene, found))
+        tint = state_marks.tint_of_objects(self.state_model, self.states)
+        with state_marks.Tinter(model, self.scene.tables).shown(tint):
+            return offscreen.render(model, data, camera, width=width, height=height, **options)
 
     def launch_viewer(self, **options: Any) -> None:
         """Opens MuJoCo's viewer on this world and steps it until the window is closed.
@@ -175,8 +181,11 @@ class Simulation(SimulationStates):
         Raises:
           MissingDependencyError: there is no display.
         """
-        from ig2mj.viewer import interactive
+        from ig2mj.viewer import interactive, overlays, states_overlay
 
+        if self.state_options is not None:
+            shown = [*overlays.default_overlays(self.scene), states_overlay.StatesOverlay(self, self.model)]
+            options.setdefault("overlays", shown)
         options.setdefault("step_time", self.engine.substeps * self.engine.timestep)
         interactive.launch(self, **options)
 

@@ -118,6 +118,11 @@ class SimulationStates:
         return self._view
 
     @property
+    def state_model(self) -> StateModel:
+        """Constants of the states."""
+        return self._rules.model
+
+    @property
     def states(self) -> ExtendedStates:
         """Extended states; world axis of length 1."""
         _ = self._rules
@@ -195,6 +200,10 @@ class SimulationStates:
         """Whether an expression holds now; text as `ig2mj.predicates.parse` reads it. Raises ExpressionError, and as
         `predicate`."""
         return bool(self._rules.compiled(expression, strict)(self.world)[0])
+
+    def compiled(self, expression: Expression | str, strict: bool = False) -> CompiledExpression:
+        """An expression compiled for this scene, to be asked again and again: `compiled(goal)(simulation.world)`."""
+        return self._rules.compiled(expression, strict)
 
     def explain(self, expression: Expression | str) -> str:
         """Whether an expression holds now, and what is missing where it does not."""

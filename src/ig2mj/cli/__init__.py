@@ -45,10 +45,12 @@ from ig2mj.install_hint import pip_install_module
 
 #: Sub-command -> what it does, in the order of `ig2mj --help`. The module is `ig2mj.cli.<sub-command>`.
 COMMANDS: dict[str, str] = {
-    "demo": "convert the small home, run it, tell what stands where",
+    "demo": "convert the small home, run it, tell what stands where, cook a fish in it",
     "convert": "turn an iGibson scene or a URDF object into MJCF",
     "view": "open a scene in MuJoCo's viewer, or write a picture of it",
     "inspect": "list a scene's objects, joints, abilities and rooms",
+    "states": "list the extended states of a scene's objects",
+    "predicates": "tell what holds in a scene, or what an expression still lacks",
     "calibrate": "measure the batched engine's buffers for a scene",
     "pool": "make a pool of settled initial states for batched resets",
     "homes": "build our own dataset of household objects and homes",

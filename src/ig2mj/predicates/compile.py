@@ -101,6 +101,10 @@ class CompiledExpression:
         """Share of literals that are as the expression wants them: 1 exactly where it holds (`evaluate.fraction`)."""
         return self._jitted(world.states, world.view).fraction
 
+    def literals_of(self, world: WorldState) -> Bool[Array, "W L"]:
+        """Truth of every literal (`atoms`), in every world."""
+        return self._jitted(world.states, world.view).literals
+
     def explain(self, world: WorldState, index: int = 0) -> str:
         """What is still missing in one world, as text to read."""
         from ig2mj.predicates.explain import explain

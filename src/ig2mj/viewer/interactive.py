@@ -19,8 +19,9 @@ import numpy as np
 
 from ig2mj.errors import EngineError, MissingDependencyError
 from ig2mj.scene.scene import Scene
-from ig2mj.viewer.overlays import Overlay, default_overlays
+from ig2mj.viewer.overlays import Drawing, Overlay, default_overlays
 from ig2mj.viewer.overview import home_overview
+from ig2mj.viewer.state_marks import draw_marks
 
 #: Keys that switch overlays on and off, in their order. MuJoCo's viewer uses 0 to 5 for groups of geoms, and nearly
 #: all letters.
@@ -90,6 +91,8 @@ class ViewerState:
         """Replaces the user geoms of `scene` by the labels of the overlays that are on."""
         scene.ngeom = 0
         for overlay, on in zip(self.overlays, self.shown, strict=True):
+            if isinstance(overlay, Drawing):
+                draw_marks(scene, overlay.marks(data)) if on else overlay.hide()
             for label in overlay.labels(data) if on else ():
                 if scene.ngeom >= scene.maxgeom:
                     return

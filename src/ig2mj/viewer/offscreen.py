@@ -18,7 +18,7 @@ import importlib
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
@@ -73,6 +73,7 @@ def render(
     groups: Sequence[int] = VISIBLE_GROUPS,
     segmentation: bool = False,
     backend: str | None = None,
+    decorate: Callable[[mujoco.MjvScene], None] | None = None,
 ) -> np.ndarray:
     """Draws one picture of the state in `data` (positions must be up to date: mj_forward or mj_kinematics was called).
 
@@ -82,6 +83,7 @@ def render(
       groups: geom groups that are drawn. Sites follow group 0.
       segmentation: return which geom is seen at each pixel, not its colour.
       backend: one of BACKENDS; None takes the first of `available_backends()`.
+      decorate: adds geoms to the scene before it is drawn; Warp's ray caster leaves them out.
 
     Returns:
       uint8 [height, width, 3], row 0 on top; with `segmentation` int32 [height, width] of geom ids, -1 for none.
@@ -97,7 +99,7 @@ def render(
         return warp_snapshot.render(
             model, data, view, width=width, height=height, groups=groups, segmentation=segmentation
         )
-    return _render_gl(model, data, view, width, height, groups, segmentation, name)
+    return _render_gl(model, data, view, width, height, groups, segmentation, name, decorate)
 
 
 def default_backend() -> str:
@@ -199,7 +201,7 @@ def _use_gl(backend: str) -> None:
     _loaded_gl = backend
 
 
-def _render_gl(model, data, view, width, height, groups, segmentation, backend) -> np.ndarray:
+def _render_gl(model, data, view, width, height, groups, segmentation, backend, decorate) -> np.ndarray:
     _use_gl(backend)
     renderer = _renderer_for(model, width, height)
     option = mujoco.MjvOption()
@@ -221,6 +223,8 @@ def _render_gl(model, data, view, width, height, groups, segmentation, backend) 
         if segmentation:
             renderer.enable_segmentation_rendering()
         renderer.update_scene(data, camera, option)
+        if decorate is not None:
+            decorate(renderer.scene)
         image = renderer.render()
     finally:
         model.vis.global_.fovy, model.vis.global_.orthographic = keep

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 import mujoco
 import numpy as np
@@ -18,6 +18,15 @@ from ig2mj.scene.scene import Scene
 
 #: Categories of building parts: large, many and obvious, so that their names only hide the rest.
 UNNAMED_CATEGORIES = frozenset({"walls", "floors", "ceilings"})
+
+
+@runtime_checkable
+class Drawing(Protocol):
+    """An overlay that also draws shapes (`ig2mj.viewer.state_marks.Mark`), or changes how objects look."""
+
+    def marks(self, data: mujoco.MjData) -> Sequence[Any]: ...
+
+    def hide(self) -> None: ...
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,0 +1,125 @@
+"""`ig2mj predicates SCENE [EXPRESSION]`: what holds in a scene, or whether an expression does and what is missing."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import tyro
+
+if TYPE_CHECKING:
+    from ig2mj.predicates.logic import Atom
+    from ig2mj.simulation import Simulation
+
+#: Everything is inside the walls; it need not be said.
+BUILDING = ("walls", "floors", "ceilings")
+
+
+def run(
+    scene: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="SCENE")],
+    expression: Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="EXPRESSION")] = None,
+    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="STATE=OBJECT[=VALUE] ...")] = (),
+    seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0,
+    compat: Literal["paper", "igibson"] = "paper",
+    strict: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+) -> int:
+    """Tell what holds in a scene, or whether an expression holds and what is missing.
+
+    Without EXPRESSION: every predicate of one object, and of touching or nested pairs on_top, inside and on_floor. With
+    one, the exit status is 0 where it holds and 1 where it does not. Example:
+    '(and (cooked fish_0) (forall (?p - plate) (on_top ?p table_0)))'.
+
+    Args:
+      scene: folder of a converted scene, its scene.xml, or the name of a home that comes with ig2mj.
+      expression: predicates joined by and, or, not, imply, forall, exists, forn, forpairs, fornpairs.
+      set: set states first, e.g. toggled_on=stove or temperature=fish=80.
+      seconds: let this much time pass first.
+      compat: rules of the paper, or of iGibson's code where it differs.
+      strict: a predicate of an object that lacks the ability is an error instead of false.
+      json: print JSON instead of text.
+    """
+    from ig2mj.cli.worlds import started
+    from ig2mj.predicates import parse
+
+    parsed = None if expression is None else parse(expression, "EXPRESSION")
+    world = started(scene, compat, seconds, set)
+    if parsed is None:
+        _print_holding(world, json)
+        return 0
+    goal = world.compiled(parsed, strict)
+    now = world.world
+    true, share = bool(goal(now)[0]), float(goal.fraction(now)[0])
+    if json:
+        _print_json(world, {"holds": true, "fraction": share, "explanation": goal.explain(now)})
+    else:
+        print(goal.explain(now))
+        if not true:
+            print(f"Fulfilled: {share:.0%}")
+    return 0 if true else 1
+
+
+def _print_holding(world: Simulation, json: bool) -> None:
+    holding = _holding(world)
+    if json:
+        _print_json(world, {"holding": [[a.predicate, *a.arguments] for a in holding]})
+        return
+    from ig2mj.cli.tables import make_table, stdout_console
+    from ig2mj.predicates import PREDICATES
+
+    console = stdout_console()
+    found: dict[str, list[str]] = {}
+    for a in holding:
+        found.setdefault(a.predicate, []).append(", ".join(a.arguments))
+    rows = [[name, "; ".join(texts)] for name, texts in found.items()]
+    console.print(make_table(f"{world.scene.name}, {world.time:.2f} s: what holds", ["predicate", "of"], rows))
+    known = [
+        [p.name, ", ".join(p.arguments), p.ability or "any object", ", ".join(p.reads)] for p in PREDICATES.values()
+    ]
+    console.print(make_table("all predicates", ["name", "arguments", "for", "reads"], known))
+
+
+def _print_json(world: Simulation, found: dict) -> None:
+    import msgspec
+
+    out = {"name": world.scene.name, "time": round(world.time, 6), **found}
+    print(msgspec.json.format(msgspec.json.encode(out), indent=1).decode())
+
+
+def _holding(world: Simulation) -> list[Atom]:
+    """Atoms that hold, among those worth asking."""
+    import numpy as np
+
+    from ig2mj.predicates import And, atom
+
+    asked = _candidates(world)
+    if not asked:
+        return []
+    values = world.compiled(And(tuple(asked)), False).literals_of(world.world)
+    return [atom(a.predicate, *a.arguments) for a, true in zip(asked, np.asarray(values)[0], strict=True) if true]
+
+
+def _candidates(world: Simulation) -> list[Atom]:
+    """Predicates of one object that has the ability; of two that touch, or one of which is in the other's box."""
+    import numpy as np
+
+    from ig2mj.predicates import PREDICATES, atom
+
+    tables, view, names = world.scene.tables, world.view, world.scene.object_names
+    asked = []
+    for p in PREDICATES.values():
+        if p.arity == 1 and (p.ability or len(tables.agent_names)):
+            having = world.state_model.parameters.has(p.ability) if p.ability else ~tables.object_parked
+            asked += [atom(p.name, names[o]) for o in np.flatnonzero(having & (tables.object_part_of < 0))]
+    touching = np.asarray(view.touching)[0]
+    asked += [atom("on_top", names[a], names[b]) for a, b in np.argwhere(touching) if not tables.object_fixed[a]]
+    com = np.asarray(view.object_com)[0][:, None]
+    within = np.all((np.asarray(view.aabb_low)[0] <= com) & (com <= np.asarray(view.aabb_high)[0]), axis=-1)
+    pairs = np.argwhere(within & ~np.eye(len(names), dtype=bool))
+    building = np.isin(tables.object_categories, BUILDING)
+    loose = ~tables.object_fixed
+    asked += [atom("inside", names[a], names[b]) for a, b in pairs if loose[a] and not building[b]]
+    on_floor = np.flatnonzero(np.any(touching[:, tables.object_is_floor], axis=1) & ~tables.object_is_floor)
+    if tables.room_map.size:
+        asked += [atom("on_floor", names[o], room) for o in on_floor for room in tables.room_names]
+    return asked

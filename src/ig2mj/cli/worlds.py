@@ -1,0 +1,45 @@
+"""One world for the commands that look at states: loaded, set up, run for a while."""
+
+from __future__ import annotations
+
+import math
+import pathlib
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Literal
+
+from ig2mj.errors import Ig2mjError
+
+if TYPE_CHECKING:
+    from ig2mj.simulation import Simulation
+
+
+def started(
+    scene: pathlib.Path, compat: Literal["paper", "igibson"], seconds: float, settings: Sequence[str]
+) -> Simulation:
+    """The scene's world after `settings` ("STATE=OBJECT" or "STATE=OBJECT=VALUE") and `seconds`."""
+    if not math.isfinite(seconds) or seconds < 0:
+        raise Ig2mjError("--seconds must be finite and not negative")
+    from ig2mj.simulation import Simulation
+    from ig2mj.states.options import StateOptions
+
+    world = Simulation(scene, states=StateOptions(compat=compat))
+    for setting in settings:
+        name, name_of_object, value = _parsed(setting)
+        world.set_state(name, name_of_object, value)
+    world.step(count=round(seconds / (world.engine.substeps * world.engine.timestep)))
+    return world
+
+
+def _parsed(setting: str) -> tuple[str, str, bool | float]:
+    parts = setting.split("=")
+    if len(parts) not in (2, 3) or not all(parts):
+        raise Ig2mjError(f"--set {setting}: write STATE=OBJECT or STATE=OBJECT=VALUE, e.g. temperature=fish=80")
+    if len(parts) == 2:
+        return parts[0], parts[1], True
+    word = parts[2].lower()
+    if word in ("true", "yes", "on", "false", "no", "off"):
+        return parts[0], parts[1], word in ("true", "yes", "on")
+    try:
+        return parts[0], parts[1], float(word)
+    except ValueError:
+        raise Ig2mjError(f"--set {setting}: '{parts[2]}' is neither a number nor true or false") from None

@@ -1,0 +1,71 @@
+"""`ig2mj states` and `ig2mj predicates`."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from ig2mj import cli
+
+
+def _json(capsys, *argv: str, status: int = 0) -> dict:
+    assert cli.call([*argv, "--json"]) == status
+    return json.loads(capsys.readouterr().out)
+
+
+def test_states_of_all_objects_are_listed(tiny_home_folder, capsys):
+    out = _json(capsys, "states", str(tiny_home_folder))
+    assert out["time"] == 0.0
+    assert out["objects"]["apple"] == {"temperature": 23.0, "max_temperature": None, "sliced": False}
+    assert out["objects"]["stove"] == {"toggled": False, "heat_source": False}
+    assert "box" not in out["objects"]
+
+
+def test_states_after_setting_and_some_time(tiny_home_folder, capsys):
+    out = _json(capsys, "states", str(tiny_home_folder), "--set", "toggled_on=stove", "temperature=apple=90",
+                "--seconds", "1", "--object", "apple", "--state", "temperature", "in_contact_objs")  # fmt: skip
+    assert out["time"] == pytest.approx(1.0)
+    assert list(out["objects"]) == ["apple"]
+    assert 88.0 < out["objects"]["apple"]["temperature"] < 90.0
+    assert out["objects"]["apple"]["in_contact_objs"] == ["table"]
+
+
+def test_the_table_is_for_people(tiny_home_folder, capsys):
+    assert cli.call(["states", str(tiny_home_folder)]) == 0
+    text = capsys.readouterr().out
+    assert "temperature [C]" in text and "apple" in text
+
+
+def test_predicates_without_an_expression_list_what_holds(tiny_home_folder, capsys):
+    out = _json(capsys, "predicates", str(tiny_home_folder), "--set", "cooked=apple")
+    holding = {tuple(row) for row in out["holding"]}
+    assert {("on_top", "box", "table"), ("inside", "book", "cabinet"), ("cooked", "apple")} <= holding
+    assert not any(row[0] == "burnt" for row in holding)
+
+
+@pytest.mark.parametrize(("expression", "status"), [("(on_top box table)", 0), ("(cooked apple)", 1)])
+def test_an_expression_gives_the_exit_status_and_says_what_is_missing(tiny_home_folder, capsys, expression, status):
+    out = _json(capsys, "predicates", str(tiny_home_folder), expression, status=status)
+    assert out["holds"] == (status == 0)
+    assert expression in out["explanation"]
+
+
+@pytest.mark.parametrize(
+    ("argv", "words"),
+    [
+        (["states", "--object", "aple"], "near matches: apple"),
+        (["states", "--state", "temperatur"], "near matches: temperature"),
+        (["states", "--set", "cooked"], "STATE=OBJECT"),
+        (["states", "--set", "cooked=apple=maybe"], "neither a number"),
+        (["states", "--set", "cooked=table"], "not cookable"),
+        (["states", "--seconds", "-1"], "not negative"),
+        (["predicates", "(cooked aple)"], "near matches: apple"),
+        (["predicates", "(cooked apple"], "close every bracket"),
+        (["predicates", "--strict", "(cooked table)"], "not cookable"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(tiny_home_folder, capsys, argv, words):
+    assert cli.call([argv[0], str(tiny_home_folder), *argv[1:]]) == 2
+    error = capsys.readouterr().err
+    assert words in error and error.count("\n") == 1
