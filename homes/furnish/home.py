@@ -68,7 +68,7 @@ ORDER = {"kitchen": 0, "living_room": 1, "bathroom": 1, "bedroom": 1, "corridor"
 """Rooms of these kinds get their pieces first in a turn."""
 START = {"corridor": 4, "lobby": 1, "balcony": 3, "staircase": 3}
 """Turn in which a room of this kind gets its first piece; others: 0."""
-STEPS = {"kitchen": 2}
+STEPS = {"kitchen": 2, "dining_room": 2, "living_room": 2}
 """Pieces per turn in homes of at least LARGE things; others: 1."""
 LARGE = 40
 

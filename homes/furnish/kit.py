@@ -103,7 +103,7 @@ class RoomKit:
                 turn = yaw(DEGREES[name])
                 back = wall_gap if height == 0 else FLAT_ON_WALL
                 position = self._against(name, at, -form.low[0] + back, -(form.low[1] + form.high[1]) / 2, turn)
-                position[2] = height + (0 if (height or find(category).fixed) else AIR)
+                position[2] = height - form.low[2] + (0 if (height or find(category).fixed) else AIR)
                 thing = self._thing(category, index, position, turn, fixed)
                 if self._before_window(thing, name, under_window):
                     continue
@@ -128,7 +128,7 @@ class RoomKit:
         index = self.home.index(category) if index is None else index
         form, turn = self._shape(category, index), yaw(degrees)
         middle = turn @ ((form.low + form.high) / 2)
-        lift = height + (0 if find(category).fixed else AIR)
+        lift = height - form.low[2] + (0 if find(category).fixed else AIR)
         position = np.array([xy[0] - middle[0], xy[1] - middle[1], lift])
         thing = self._thing(category, index, position, turn, fixed)
         return thing if self._inside(thing) and self._stand(thing, gap, room_before, ways) else None
