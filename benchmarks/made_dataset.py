@@ -21,6 +21,8 @@ from ig2mj_homes.dataset import build_dataset
 
 SIZES = (20, 60, 120)
 
+TABLE_A7 = ("countertop", "coffee_table", "fridge", "cracker_box")
+
 TOPS = ("countertop", "breakfast_table", "coffee_table", "desk", "console_table")
 """Furniture that carries things."""
 FURNITURE = (
@@ -60,10 +62,12 @@ def scene_name(size: int) -> str:
 
 def write_dataset(root: pathlib.Path, sizes: tuple[int, ...] = SIZES) -> Dataset:
     """Writes the objects, if they are not there yet, and one scene per size. The same bytes every time."""
-    done = root / ".objects_written"
-    if not done.exists():
-        build_dataset(root, only=sorted({"cracker_box", *FURNITURE, *STANDING, *THINGS}), jobs=1)
-        done.touch()
+    note = root / ".objects_written"
+    there = set(note.read_text().split()) if note.exists() else set()
+    wanted = set(TABLE_A7 if set(sizes) <= {20} else (*TABLE_A7, *FURNITURE, *STANDING, *THINGS))
+    if not wanted <= there:
+        build_dataset(root, only=sorted(wanted | there), jobs=1)
+        note.write_text("\n".join(sorted(wanted | there)))
     dataset = Dataset(root)
     for size in sizes:
         _write_scene(dataset, scene_name(size), _table_a7(dataset) if size == 20 else _one_room(dataset, size))
@@ -96,7 +100,7 @@ class _Models:
 
 def _table_a7(dataset: Dataset) -> list[Item]:
     models = _Models(dataset)
-    items = [models.standing(c, k * PITCH, 0.0) for k, c in enumerate(("countertop", "coffee_table", "fridge"))]
+    items = [models.standing(c, k * PITCH, 0.0) for k, c in enumerate(TABLE_A7[:3])]
     top = 2 * items[0].pos[2] - AIR
     for i in range(5):
         for j in range(3):

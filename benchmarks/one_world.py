@@ -1,52 +1,71 @@
-"""One world with everything on, as the benchmarks step it: native physics, view, extended states, guards, a goal."""
+"""One world with everything on, as a `Simulation` steps it: native physics, view, all extended states, and a goal."""
 
 from __future__ import annotations
 
+from typing import Any
+
+import jax
 import mujoco
 import numpy as np
 
+from ig2mj.engine.base import Write
 from ig2mj.engine.native import NativeEngine
-from ig2mj.predicates.compile import CompiledExpression
+from ig2mj.engine.view import PhysicsView
+from ig2mj.predicates.compile import CompiledExpression, Verdict
+from ig2mj.predicates.stepper import StateProgram, StateStepper
 from ig2mj.scene.scene import Scene
+from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
-from ig2mj.worlds.batch import Batch, Worlds
 
 
 class OneWorld:
     """A world of its own; `step` takes one control step of 1/30 s.
 
     Attributes:
-      batch: the world's state. worlds: its functions.
+      engine, physics, view: of physics. states: extended ones. verdict: the goal's, of the last step.
     """
 
     def __init__(self, scene: Scene, model: StateModel, goal: CompiledExpression | None = None):
-        self.scene = scene
-        self.worlds = Worlds(NativeEngine(scene, 1), model, goal=goal)
-        self.batch: Batch = self.worlds.start(0)
+        self.scene, self.model = scene, model
+        self.engine = NativeEngine(scene, 1)
+        self.physics: Any = self.engine.reset()
+        self.view: PhysicsView = self.engine.view(self.physics)
+        self._stepper = StateStepper(StateProgram(model, goal))
+        self.states = initial_states(model, 1)
+        self.verdict: Verdict | None = None
 
     def step(self, ctrl: np.ndarray | None = None) -> None:
-        """Physics, view, states, guards and goal; ctrl [nu]."""
-        self.batch, verdict = self.worlds.step(self.batch, None if ctrl is None else ctrl[None])
-        if verdict is not None:
-            np.asarray(verdict.fraction)  # wait for it, as a user would
+        """Physics, view, states and goal; ctrl [nu]. Waits for the results, as a user of one world does."""
+        self.engine_step(ctrl)
+        self.states, swap, self.verdict = self._stepper.step(self.states, self.view)
+        if swap is not None:
+            self._teleport(swap)
+        jax.block_until_ready((self.states.temperature, self.verdict))
 
-    def engine_step(self) -> None:
+    def engine_step(self, ctrl: np.ndarray | None = None) -> None:
         """Physics and view alone, of the same world."""
-        self.worlds.engine.step(self.batch.world.physics)
+        self.physics, self.view = self.engine.step(self.physics, None if ctrl is None else ctrl[None])
 
     @property
     def mujoco(self) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """Model and live data."""
-        return self.worlds.engine.to_mujoco(self.batch.world.physics, 0)
+        return self.engine.to_mujoco(self.physics, 0)
 
     def awake(self) -> list[str]:
         """Names of the objects that are awake."""
-        awake = np.asarray(self.batch.world.view.awake)[0]
+        awake = np.asarray(self.view.awake)[0]
         return [name for name, a in zip(self.scene.object_names, awake, strict=True) if a]
 
     def bare(self) -> BarePhysics:
         """MuJoCo alone, from the present state on."""
         return BarePhysics(*self.mujoco)
+
+    def _teleport(self, swap: Any) -> None:
+        objects, count = self.model.swap_objects, len(self.scene.object_names)
+        mask, pos, quat = np.zeros((1, count), bool), np.zeros((1, count, 3)), np.zeros((1, count, 4))
+        mask[:, objects], pos[:, objects], quat[:, objects] = swap.mask, swap.pos, swap.quat
+        self.physics = self.engine.write(self.physics, Write(object_mask=mask, object_pos=pos, object_quat=quat))
+        self.view = self.engine.view(self.physics)
 
 
 class BarePhysics:
@@ -56,6 +75,8 @@ class BarePhysics:
         self.model, self.data = model, mujoco.MjData(model)
         mujoco.mj_copyData(self.data, model, data)
 
-    def step(self) -> None:
-        """One control step."""
+    def step(self, ctrl: np.ndarray | None = None) -> None:
+        """One control step; ctrl [nu]."""
+        if ctrl is not None:
+            self.data.ctrl[:] = ctrl
         mujoco.mj_step(self.model, self.data, nstep=4)

@@ -1,7 +1,8 @@
 """Timing of several things side by side: short blocks in turn (A B C A B C ...), medians over the rounds.
 
 Other work on the machine then slows all of them alike. Every block is timed on the wall and by the processor time of
-the process that does the work; on a busy machine the latter is the truer one, on an idle one they agree.
+the process that does the work. With all on one core (`one_core`) the two agree on an idle machine, and on a busy one
+the processor's time tells what the idle one would show: it is what the tables give.
 """
 
 from __future__ import annotations
@@ -41,17 +42,19 @@ def timed(step: Callable[[], object]) -> Block:
     return block
 
 
-def interleave(blocks: Mapping[str, Block], seconds: float, rounds: int, most: int = 10_000) -> dict[str, Rate]:
+def interleave(
+    blocks: Mapping[str, Block], seconds: float, rounds: int, steps: int | None = None, most: int = 10_000
+) -> dict[str, Rate]:
     """Times all blocks in turn, `rounds` times. The first call of each finds out how many steps take `seconds`.
 
     Args:
-      seconds: of one block. most: steps in a block.
+      seconds: of one block. steps: in a block, whatever its time. most: steps in a block.
     """
     counts = {}
     for name, block in blocks.items():
         block(2)  # whatever the first steps still have to set up
         wall, _ = block(3)
-        counts[name] = int(np.clip(seconds / max(wall / 3, 1e-9), 2, most))
+        counts[name] = steps or int(np.clip(seconds / max(wall / 3, 1e-9), 2, most))
     walls: dict[str, list[float]] = {name: [] for name in blocks}
     cpus: dict[str, list[float]] = {name: [] for name in blocks}
     for _ in range(rounds):

@@ -1,0 +1,8 @@
+"""Benchmarks are scripts in a folder of their own; their tests import them from there."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))
