@@ -10,7 +10,6 @@ import contextlib
 import hashlib
 import io
 import json
-import os
 import pathlib
 import tempfile
 import zipfile
@@ -19,19 +18,21 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-import platformdirs
 
-VERSION = 1
+from .cache_folder import cache_folder, prune
+
+VERSION = 2
 """Raise it whenever the code that makes the cached results changes what they are."""
 
-ENVIRONMENT = "IG2MJ_CACHE_DIR"
-"""Environment variable that names another folder."""
+LIMIT = 2**30
+"""Bytes of all entries together; checked once per process, when the first is stored."""
+
+_pruned: set[pathlib.Path] = set()
 
 
 def folder() -> pathlib.Path:
     """Where entries are kept. Not made until the first entry is stored."""
-    root = os.environ.get(ENVIRONMENT) or platformdirs.user_cache_dir("ig2mj")
-    return pathlib.Path(root) / "hulls"
+    return cache_folder("hulls")
 
 
 def key_of(*parts: Any) -> str:
@@ -88,6 +89,9 @@ def store(key: str, facts: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) 
             everything: dict[str, Any] = {"facts": text, **arrays}
             np.savez_compressed(file, **everything)
         pathlib.Path(temporary).replace(path)
+        if folder() not in _pruned:
+            _pruned.add(folder())
+            prune(folder(), ".npz", LIMIT)
     except OSError:
         if temporary is not None:
             with contextlib.suppress(OSError):

@@ -6,10 +6,8 @@ This file: what can be seen without moving anything. `check_motion`: what takes 
 from __future__ import annotations
 
 import copy
-import dataclasses
 import time
 from collections.abc import Callable, Collection
-from typing import Any
 
 import mujoco
 import numpy as np
@@ -17,6 +15,7 @@ import numpy as np
 from ig2mj.scene.manifest import Manifest
 
 from .model_index import ModelIndex, geom_box, index_model
+from .outcome import CheckResult
 
 BOX_TOLERANCE = 0.015
 """Relative, per axis: collision AABB at q = 0 against the asked bounding box (dataset_format.md section 8.15)."""
@@ -26,30 +25,6 @@ MASS_TOLERANCE = 1e-3
 """Relative: the model's mass of an object against the manifest's."""
 PENETRATION_TOLERANCE = 1e-3
 """Metres of overlap at t = 0 that are not listed."""
-
-
-@dataclasses.dataclass
-class CheckResult:
-    """One check.
-
-    Attributes:
-      name: "compiles", "bounding_box", "mass", "penetration", "settle", "joint_sweep", "self_contact",
-        "joint_clearance".
-      passed: nothing to complain about.
-      summary: one line for people.
-      failures: one dict per failing thing, with the key "object" where it is about one.
-      measured: per object name (or joint name) what was measured.
-      seconds: it took.
-      advisory: worth knowing, but no fault of the conversion.
-    """
-
-    name: str
-    passed: bool
-    summary: str
-    failures: list[dict[str, Any]] = dataclasses.field(default_factory=list)
-    measured: dict[str, Any] = dataclasses.field(default_factory=dict)
-    seconds: float = 0.0
-    advisory: bool = False
 
 
 def run_checks(

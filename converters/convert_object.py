@@ -11,6 +11,7 @@ import numpy as np
 from ig2mj.errors import InputError
 from ig2mj.scene.manifest import FORMAT_VERSION, Manifest
 
+from . import inputs
 from .assembly import extent
 from .dataset import Dataset
 from .description import ObjectModel
@@ -80,22 +81,22 @@ def convert_object(
 
 def _read(file: pathlib.Path, category: str, name: str) -> tuple[ObjectModel, Dataset | None]:
     """Reads the URDF, its metadata, and the dataset it lies in, if it does."""
-    if not file.is_file():
+    if not inputs.is_file(file):
         raise InputError(file, "is no file", element="--urdf", mend="name an object's URDF")
     if not name.strip() or not category.strip():
         raise InputError(file, "the object needs a category and a name", element="--category, --model")
     root = _dataset_root(file)
     source = read_urdf(file, category, name)
-    prepared = (file.parent / "misc").is_dir()
+    prepared = inputs.is_folder(file.parent / "misc")
     source.metadata = read_metadata(file.parent, source.warnings if prepared else [])
     return source, None if root is None else Dataset(root)
 
 
 def _dataset_root(file: pathlib.Path) -> pathlib.Path | None:
     """The root of the dataset that holds `objects/<category>/<model>/<model>.urdf`, or None."""
-    parents = file.resolve().parents
+    parents = inputs.real_path(file).parents
     inside = len(parents) > 3 and parents[2].name == "objects"
-    return parents[3] if inside and (parents[3] / "metadata").is_dir() else None
+    return parents[3] if inside and inputs.is_folder(parents[3] / "metadata") else None
 
 
 def _build(
@@ -110,7 +111,16 @@ def _build(
         density = dataset.density(source.category)
     hulls = options.hull_options()
     if bounding_box is None:
-        return build_model(source, np.ones(3), density, hulls, options.bullet_inertia, igibson_visuals=False)
+        return build_model(
+            source,
+            np.ones(3),
+            density,
+            hulls,
+            options.bullet_inertia,
+            igibson_visuals=False,
+            jobs=options.jobs,
+            progress=options.progress,
+        )
     wanted = np.asarray(bounding_box, dtype=float)
     if not np.all(np.isfinite(wanted)) or np.any(wanted <= 0):
         raise InputError(
@@ -118,12 +128,30 @@ def _build(
         )
     size = source.metadata.bbox_size
     if size is None:
-        unscaled = build_model(source, np.ones(3), density, hulls, options.bullet_inertia, igibson_visuals=False)
+        unscaled = build_model(
+            source,
+            np.ones(3),
+            density,
+            hulls,
+            options.bullet_inertia,
+            igibson_visuals=False,
+            jobs=options.jobs,
+            progress=options.progress,
+        )
         low, high = extent(unscaled.assembly, np.eye(4))
         size = high - low
     if np.any(np.asarray(size) <= 0):
         raise InputError(source.file, "is flat: it cannot be scaled to a bounding box", element="--bbox")
-    return build_model(source, wanted / size, density, hulls, options.bullet_inertia, igibson_visuals=False)
+    return build_model(
+        source,
+        wanted / size,
+        density,
+        hulls,
+        options.bullet_inertia,
+        igibson_visuals=False,
+        jobs=options.jobs,
+        progress=options.progress,
+    )
 
 
 def _write(

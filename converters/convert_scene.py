@@ -13,6 +13,7 @@ import numpy as np
 from ig2mj.errors import InputError
 from ig2mj.scene.manifest import FORMAT_VERSION, Manifest, RoomsEntry
 
+from . import inputs
 from .assembly import has_own_look
 from .dataset import Dataset
 from .description import Instance, SceneDescription
@@ -21,7 +22,7 @@ from .manifest_entries import room_entries, task_entry, vec3
 from .mjcf_file import write_model
 from .mjcf_scene import SceneBuild, build_scene, fill_states, rest_start
 from .model_builder import ModelBuilder
-from .model_task import BuiltModel, ModelTask, is_quick, model_task, run_task
+from .model_task import BuiltModel, ModelTask, forget_datasets, is_quick, model_task, run_task
 from .options import ConvertOptions
 from .output import replaced_folder
 from .placements import Placement, complete_parts, make_halves, place_instances
@@ -55,6 +56,7 @@ def convert_scene(
     timings: dict[str, float] = {}
     start = time.perf_counter()
     options.progress("reading the scene", 0, 1)
+    forget_datasets()
     dataset = Dataset(dataset_root)
     scene = dataset.scene(name, urdf, options.scene_options())
     skipped = _drop_missing(dataset, scene, options)
@@ -167,6 +169,8 @@ def _run_tasks(
     work = list(tasks.values())
     labels = [task.label for task in work]
     results = map_tasks(run_task, work, labels, options.jobs, options.progress, is_quick)
+    for result in results:
+        inputs.add(result.inputs)
     by_key = dict(zip(tasks, results, strict=True))
     return {name: by_key[key] for name, key in keys.items()}
 
@@ -189,7 +193,7 @@ def _manifest(
             **version_record(options),
             "kind": "scene",
             "file": scene.file.name,
-            "sha256": hashlib.sha256(pathlib.Path(scene.file).read_bytes()).hexdigest(),
+            "sha256": hashlib.sha256(inputs.content(scene.file)).hexdigest(),
             "dataset_version": dataset.version,
             "models": dict(sorted(models.items())),
         },

@@ -10,6 +10,7 @@ import numpy as np
 
 from ig2mj.errors import InputError, UnknownNameError
 
+from . import inputs
 from .dataset_files import CategorySpec, read_lines, read_overlaps, read_specs, read_version
 from .description import Instance, ObjectModel, SceneDescription
 from .file_access import OutsideError
@@ -35,8 +36,8 @@ class Dataset:
     """
 
     def __init__(self, root: str | os.PathLike):
-        self.root = pathlib.Path(root).resolve()
-        if not (self.root / "objects").is_dir() and not (self.root / "scenes").is_dir():
+        self.root = inputs.real_path(root)
+        if not inputs.is_folder(self.root / "objects") and not inputs.is_folder(self.root / "scenes"):
             raise InputError(
                 root,
                 "is no dataset root: it has neither objects/ nor scenes/",
@@ -53,23 +54,16 @@ class Dataset:
 
     def models(self, category: str) -> list[str]:
         """Model names of a category, sorted; [] where the category has no folder. Hidden entries and files are none."""
-        folder = self._inside("objects", category)
-        if not folder.is_dir():
-            return []
-        return sorted(f.name for f in folder.iterdir() if f.is_dir() and not f.name.startswith("."))
+        return inputs.folders_in(self._inside("objects", category))
 
     def index(self) -> dict[str, list[str]]:
         """category -> model names, both sorted."""
-        folder = self.root / "objects"
-        if not folder.is_dir():
-            return {}
-        names = sorted(f.name for f in folder.iterdir() if f.is_dir() and not f.name.startswith("."))
-        return {name: self.models(name) for name in names}
+        return {name: self.models(name) for name in inputs.folders_in(self.root / "objects")}
 
     def has_model(self, category: str, model: str) -> bool:
         """The model's folder holds its URDF."""
         folder = self._inside("objects", category, model)
-        return any((folder / f"{model}{end}.urdf").is_file() for end in ("", "_simplified"))
+        return any(inputs.is_file(folder / f"{model}{end}.urdf") for end in ("", "_simplified"))
 
     def density(self, category: str) -> float:
         """Bounding-box density of a category, kg/m^3; 67.0 where it has no spec (section 6)."""
@@ -90,7 +84,7 @@ class Dataset:
         key = (category, model)
         if key not in self._models:
             folder = self._inside("objects", category, model)
-            if not folder.is_dir():
+            if not inputs.is_folder(folder):
                 mend = f"known models: {', '.join(self.models(category)[:5]) or 'none'}"
                 raise InputError(folder, "model folder does not exist", element=f"{category}/{model}", mend=mend)
             file = folder / f"{model}.urdf"
@@ -108,7 +102,7 @@ class Dataset:
         if key not in self._buildings:
             folder = self._inside("scenes", scene)
             file = self._building_file(scene, category, model)
-            if not file.is_file():
+            if not inputs.is_file(file):
                 raise InputError(file, "does not exist", element=f"{category} of {scene}")
             self._buildings[key] = read_urdf(file, category, model, self.root, mesh_folder=folder)
         return self._buildings[key]
@@ -136,14 +130,14 @@ class Dataset:
           UnknownNameError: no such scene. InputError: no such file.
         """
         folder = self._inside("scenes", name) / "urdf"
-        if not folder.is_dir():
+        if not inputs.is_folder(folder):
             raise UnknownNameError("scene", name, self.scenes())
         if urdf is not None:
             given = pathlib.Path(urdf)
-            if given.is_file():
+            if inputs.is_file(given):
                 return given
             word = given.name if given.suffix == ".urdf" else f"{given.name}.urdf"
-            if given.parent == pathlib.Path() and (folder / word).is_file():
+            if given.parent == pathlib.Path() and inputs.is_file(folder / word):
                 return folder / word
             known = ", ".join(f.name for f in sorted(folder.glob("*.urdf"))[:6])
             raise InputError(urdf, "does not exist", mend=f"{folder} has {known}")
@@ -152,7 +146,7 @@ class Dataset:
         else:
             names = [f"{name}_best", name]
         for stem in names:
-            if (folder / f"{stem}.urdf").is_file():
+            if inputs.is_file(folder / f"{stem}.urdf"):
                 return folder / f"{stem}.urdf"
         raise InputError(folder / f"{names[0]}.urdf", "does not exist", mend="name the file with --urdf")
 
@@ -181,7 +175,7 @@ class Dataset:
         absent = []
         for instance in scene.instances:
             if instance.kind == "building":
-                there = self._building_file(scene.name, instance.category, instance.model).is_file()
+                there = inputs.is_file(self._building_file(scene.name, instance.category, instance.model))
             else:
                 there = instance.kind != "object" or self.has_model(instance.category, instance.model)
             if not there:
@@ -197,7 +191,7 @@ class Dataset:
             if not part or "/" in part or "\\" in part or part in (".", "..") or "\0" in part:
                 raise OutsideError(self.root, f"'{part}' is no name of a folder", element="/".join(parts))
         path = self.root.joinpath(*parts)
-        if not path.resolve().is_relative_to(self.root):
+        if not inputs.real_path(path).is_relative_to(self.root):
             raise OutsideError(path, "a symbolic link leads outside the dataset root", mend="copy the files instead")
         return path
 

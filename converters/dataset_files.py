@@ -9,6 +9,7 @@ from typing import Any
 
 from ig2mj.errors import InputError
 
+from . import inputs
 from .json_reader import read_json, scalar, vector
 from .xml_reader import read_bytes
 
@@ -30,7 +31,7 @@ class CategorySpec:
 def read_version(root: pathlib.Path, warnings: list[str]) -> str | None:
     """Text of VERSION; a missing or unknown one is a warning."""
     file = root / "VERSION"
-    if not file.is_file():
+    if not inputs.is_file(file):
         warnings.append("the dataset has no VERSION file")
         return None
     text = read_bytes(file, 4096).decode("utf-8", errors="replace").strip()
@@ -47,7 +48,7 @@ def read_lines(root: pathlib.Path, name: str, warnings: list[str]) -> list[str]:
     Empty lines in between stay: a line's number is its meaning. non_sampleable_categories.txt gets floor.n.01 first.
     """
     file = root / "metadata" / name
-    if not file.is_file():
+    if not inputs.is_file(file):
         warnings.append(f"metadata/{name} is missing")
         return []
     lines = [line.strip() for line in read_bytes(file, 2**22).decode("utf-8-sig", errors="replace").splitlines()]
@@ -65,7 +66,7 @@ def read_specs(root: pathlib.Path, warnings: list[str]) -> dict[str, CategorySpe
       InputError: it is no JSON, or a number is not positive.
     """
     file = root / "metadata" / "avg_category_specs.json"
-    if not file.is_file():
+    if not inputs.is_file(file):
         warnings.append("metadata/avg_category_specs.json is missing: every category weighs as the default")
         return {}
     return {name: _spec(entry, file, f"category '{name}'") for name, entry in read_json(file, dict).items()}
@@ -91,7 +92,7 @@ def _spec(entry: Any, file: pathlib.Path, at: str) -> CategorySpec:
 
 def read_overlaps(file: pathlib.Path) -> set[frozenset[str]]:
     """bbox_overlap.json: pairs of instances whose boxes may overlap; empty where there is no file."""
-    if not file.is_file():
+    if not inputs.is_file(file):
         return set()
     pairs = set()
     for i, pair in enumerate(read_json(file, list)):

@@ -30,11 +30,15 @@ LADDER = (
 
 @dataclasses.dataclass
 class Cut:
-    """Convex pieces of one part, where they are from, and what to tell the user."""
+    """Convex pieces of one part, where they are from, and what to tell the user.
+
+    stopped: time or a signal ended a finer try: the pieces may be better on another day, so they are not to be kept.
+    """
 
     hulls: list[Hull]
     source: PieceSource
     warnings: list[str]
+    stopped: bool = False
 
 
 def cut_part(part: Part, options: HullOptions, deadline: float) -> Cut:
@@ -85,11 +89,13 @@ def _coacd(part: Part, options: HullOptions, deadline: float) -> Cut:
             return Cut([h for h in hulls if h is not None], "coacd", list(facts["warnings"]))
     vertices, faces = decimate(part.vertices, part.faces, MOST_FACES)
     warnings: list[str] = []
+    stopped = False
     ladder = LADDER if part.closed else LADDER[1:]  # CoACD rebuilds an open mesh as voxels: slow when fine
     for step, settings in enumerate(ladder):
         left = deadline - time.monotonic()
         if left <= 0:
             warnings.append("convex decomposition ran out of time")
+            stopped = True
             break
         limit = left if step == len(ladder) - 1 else left / 2
         threshold = min(max(settings["threshold"] * options.coacd_threshold, 0.01), 1.0)
@@ -98,6 +104,7 @@ def _coacd(part: Part, options: HullOptions, deadline: float) -> Cut:
             points = workers.run_coacd(vertices, faces, parameters, time_limit=limit, threads=options.threads)
         except workers.WorkerError as e:
             warnings.append(f"convex decomposition (threshold {threshold:g}) {e}")
+            stopped = stopped or e.stopped
             continue
         hulls = [h for h in (solid_hull(p, options.min_thickness)[0] for p in points) if h is not None]
         if not hulls:
@@ -106,9 +113,9 @@ def _coacd(part: Part, options: HullOptions, deadline: float) -> Cut:
         arrays = {f"piece_{i}": h.vertices for i, h in enumerate(hulls)}
         if options.cache and not warnings:
             cache.store(key, {"count": len(hulls), "warnings": warnings}, arrays)
-        return Cut(hulls, "coacd", warnings)
+        return Cut(hulls, "coacd", warnings, stopped)
     warnings.append(f"one hull stands for a shape that is not convex ({_times(part)})")
-    return Cut([part.hull], "fallback", warnings)
+    return Cut([part.hull], "fallback", warnings, stopped)
 
 
 def _times(part: Part) -> str:

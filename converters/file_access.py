@@ -13,6 +13,7 @@ import urllib.parse
 
 from ig2mj.errors import InputError
 
+from . import inputs
 from .xml_reader import read_xml
 
 PACKAGE_SEARCH_DEPTH = 8  # how many folders above an URDF are looked at for its ROS package
@@ -76,7 +77,7 @@ class FileGuard:
                 )
             path = (base or self.folder) / name
         try:
-            real = path.resolve()
+            real = inputs.real_path(path)
         except (OSError, RuntimeError) as e:
             raise InputError(self.file, f"'{name}' cannot be resolved: {e}", element=element) from e
         if self.roots is not None and not any(real.is_relative_to(root) for root in self.roots):
@@ -109,7 +110,7 @@ def package_root(folder: pathlib.Path) -> pathlib.Path | None:
     called urdf, robots or xacro, the folder above it. Resolved; None where there is none."""
     folder = folder.resolve()
     for candidate in _upwards(folder):
-        if (candidate / "package.xml").is_file():
+        if inputs.is_file(candidate / "package.xml"):
             return candidate
     if folder.name in ("urdf", "urdfs", "robots", "xacro") and _is_private(folder.parent):
         return folder.parent
@@ -122,16 +123,16 @@ def find_package(folder: pathlib.Path, package: str) -> pathlib.Path | None:
     First a folder of that name beside the URDF, as Bullet has it. Then walking up: a folder with a package.xml of that
     name, a folder of that name, or a neighbour of that name with a package.xml.
     """
-    if (folder / package).is_dir():
+    if inputs.is_folder(folder / package):
         return (folder / package).resolve()
     for candidate in _upwards(folder.resolve()):
         manifest = candidate / "package.xml"
-        if manifest.is_file() and _package_name(manifest) == package:
+        if inputs.is_file(manifest) and _package_name(manifest) == package:
             return candidate
         if candidate.name == package:
             return candidate
         neighbour = candidate / package
-        if (neighbour / "package.xml").is_file():
+        if inputs.is_file(neighbour / "package.xml"):
             return neighbour.resolve()
     return None
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import dataclasses
+import hashlib
 import importlib.metadata
 import pathlib
 import time
@@ -13,30 +13,14 @@ import mujoco
 
 from ig2mj.scene.manifest import Manifest, check_manifest, save_manifest
 
-from .checks import CheckResult, run_checks
+from .checks import run_checks
 from .description import RoomMaps
 from .joint_rules import openable_ends
 from .model_builder import ModelBuilder
 from .model_task import BuiltModel
 from .options import ConvertOptions
-from .report import ReportInput, write_report
-
-
-@dataclasses.dataclass
-class Outcome:
-    """What a conversion did.
-
-    Attributes:
-      objects: how many. skipped: missing models that were left out, one line each.
-      checks: of the finished model; [] without a report. warnings: how many there are.
-      timings: stage -> seconds.
-    """
-
-    objects: int
-    skipped: list[str]
-    checks: list[CheckResult]
-    warnings: int
-    timings: dict[str, float]
+from .outcome import CheckResult, Outcome
+from .report import RENDERED, ReportInput, write_report
 
 
 def version_record(options: ConvertOptions) -> dict[str, Any]:
@@ -75,6 +59,12 @@ def finish(
     warnings = [*warnings, *builder.textures.warnings, *builder.warnings.get("", [])]
     per_object = {name: _object_warnings(name, model_built, builder) for name, model_built in built.items()}
     checks: list[CheckResult] = []
+    provisional = [
+        f"'{name}': the decomposition of link '{link}' was stopped"
+        for name, model_built in built.items()
+        for link, found in model_built.hulls.items()
+        if found.stopped
+    ]
     if options.report:
         start = time.perf_counter()
         checks = run_checks(model, manifest, overlaps_allowed)
@@ -90,9 +80,12 @@ def finish(
             rooms=rooms,
             encrypted=[name for name, model_built in built.items() if model_built.encrypted],
         )
-        write_report(folder, model, manifest, given, options.renderer, options.view)
+        facts = write_report(folder, model, manifest, given, options.renderer, options.view)
+        if options.renderer is not None and facts["pictures"] != RENDERED:
+            provisional.append(facts["pictures"])
     count = len(warnings) + sum(len(lines) for lines in per_object.values())
-    return Outcome(len(manifest.objects), list(skipped), checks, count, timings)
+    written = hashlib.sha256((folder / "manifest.json").read_bytes()).hexdigest()
+    return Outcome(len(manifest.objects), list(skipped), checks, count, timings, provisional, written)
 
 
 def _object_warnings(name: str, built: BuiltModel, builder: ModelBuilder) -> list[str]:

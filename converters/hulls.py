@@ -58,7 +58,7 @@ def decompose_link(shapes: Sequence[Shape], options: HullOptions | None = None) 
         if known is not None:
             return _unpack(*known)
     result = _decompose(shapes, options)
-    if options.cache:
+    if options.cache and not result.stopped:
         cache.store(key, *_pack(result))
     return result
 
@@ -191,6 +191,7 @@ def _from_soup(
             continue
         cut = cut_part(part, options, deadline)
         out.warnings += [f"{label}: {w}" for w in cut.warnings]
+        out.stopped = out.stopped or cut.stopped
         found += [_Found(h, cut.source) for h in cut.hulls]
     return found
 

@@ -28,6 +28,7 @@ from trimesh.visual.material import SimpleMaterial
 
 from ig2mj.errors import InputError
 
+from . import inputs
 from .description import Mesh
 from .file_access import FileGuard
 from .mesh_limits import MAX_FACES, MAX_MESH_BYTES, MeshError, check_vertices, too_many_faces
@@ -61,7 +62,7 @@ def is_encrypted(file: pathlib.Path) -> bool:
 def encrypted_twin(file: pathlib.Path) -> pathlib.Path | None:
     """The `x.encrypted.obj` that stands where `x.obj` is named and missing."""
     twin = file.with_name(f"{file.stem}.encrypted{file.suffix}")
-    return twin if not file.exists() and twin.is_file() else None
+    return twin if not inputs.is_file(file) and inputs.is_file(twin) else None
 
 
 def read_collision(file: pathlib.Path, guard: FileGuard) -> tuple[list[Mesh], bool]:
@@ -98,7 +99,7 @@ def _suffix(file: pathlib.Path) -> str:
 
 
 def _existing(file: pathlib.Path) -> pathlib.Path:
-    if not file.is_file():
+    if not inputs.is_file(file):
         raise MeshError(file, "mesh does not exist")
     return file
 
@@ -137,7 +138,7 @@ def _texture(
     try:
         if path.suffix.lower() not in _IMAGES:
             raise OSError("not an image format that is read")
-        with Image.open(path) as image:
+        with Image.open(io.BytesIO(inputs.content(path))) as image:
             if image.size[0] * image.size[1] > MAX_PIXELS:
                 raise OSError(f"{image.size[0]} x {image.size[1]} pixels are too many")
             image.verify()
@@ -261,7 +262,7 @@ def _same_image(image: Any, files: _GuardedFiles) -> pathlib.Path | None:
     """The file among those read that holds this image."""
     try:
         for path in files.images:
-            with Image.open(path) as candidate:
+            with Image.open(io.BytesIO(inputs.content(path))) as candidate:
                 if candidate.size == image.size and candidate.tobytes() == image.tobytes():
                     return path
     except Exception:  # a broken image is no texture

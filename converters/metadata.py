@@ -9,6 +9,7 @@ import numpy as np
 
 from ig2mj.errors import InputError
 
+from . import inputs
 from .description import Metadata, MetaLink, ObjectPart, StableOrientation
 from .json_reader import read_json, scalar, vector
 from .poses import wxyz
@@ -21,10 +22,10 @@ def read_metadata(folder: pathlib.Path, warnings: list[str]) -> Metadata:
       InputError: a file is no JSON or a field has the wrong form.
     """
     file = folder / "misc" / "metadata.json"
-    if file.is_file():
+    if inputs.is_file(file):
         return _parse(read_json(file, dict), file, warnings)
     old = folder / "misc" / "bbox.json"
-    if old.is_file():
+    if inputs.is_file(old):
         raw = read_json(old, dict)
         high, low = (vector(raw.get(key), 3, old, f"'{key}'") for key in ("max", "min"))
         size = _positive(high - low, old, "'max' - 'min'")

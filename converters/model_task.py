@@ -5,19 +5,21 @@ from __future__ import annotations
 import dataclasses
 import functools
 import hashlib
-import pathlib
 import time
 
 import numpy as np
 
 from ig2mj.errors import Ig2mjError
 
+from . import inputs
 from .assembly import Assembly, assemble
 from .dataset import Dataset
-from .description import Instance, ObjectModel, SceneDescription
+from .description import Instance, ObjectModel, SceneDescription, Shape
 from .hulls import decompose_link, is_cached
 from .inertia import link_inertials
+from .options import Progress, no_progress
 from .pieces import HullOptions, LinkHulls
+from .pool import map_tasks
 from .scaling import instance_scale, scale_model
 
 
@@ -28,6 +30,7 @@ class BuiltModel:
     Attributes:
       hulls: link -> its collision geometry. encrypted: visuals were replaced by hulls.
       file_hash: of the URDF and its meshes. seconds: the work took.
+      inputs: what was read for it (`inputs.Record.answers`), for when that happened in another process.
     """
 
     assembly: Assembly
@@ -35,6 +38,7 @@ class BuiltModel:
     encrypted: bool
     file_hash: str
     seconds: float
+    inputs: dict[str, str] = dataclasses.field(default_factory=dict)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -71,13 +75,16 @@ def model_task(
 
 def run_task(task: ModelTask) -> BuiltModel:
     """Does the work of a task. Raises InputError as the readers do."""
-    dataset = _dataset(task.root)
-    instance = task.instance
-    model = dataset.instance_model(task.scene, instance)
-    scale = instance_scale(instance, model)
-    weighed = instance.kind != "building" and model.metadata.bbox_size is not None
-    density = dataset.density(instance.category) if weighed else None
-    return build_model(model, scale, density, task.hulls, task.bullet_inertia, igibson_visuals=True)
+    with inputs.recording() as record:
+        dataset = _dataset(task.root)
+        instance = task.instance
+        model = dataset.instance_model(task.scene, instance)
+        scale = instance_scale(instance, model)
+        weighed = instance.kind != "building" and model.metadata.bbox_size is not None
+        density = dataset.density(instance.category) if weighed else None
+        built = build_model(model, scale, density, task.hulls, task.bullet_inertia, igibson_visuals=True)
+    built.inputs = record.answers
+    return built
 
 
 def is_quick(task: ModelTask) -> bool:
@@ -98,20 +105,40 @@ def build_model(
     bullet_inertia: bool,
     *,
     igibson_visuals: bool,
+    jobs: int = 1,
+    progress: Progress = no_progress,
 ) -> BuiltModel:
-    """From a model as read to one ready to be written (see `scale_model`, `decompose_link`, `link_inertials`)."""
+    """From a model as read to one ready to be written (see `scale_model`, `decompose_link`, `link_inertials`).
+
+    jobs: processes that decompose links.
+    """
     start = time.perf_counter()
     scaled = scale_model(model, scale)
-    decomposed = {name: decompose_link(link.collisions, hulls) for name, link in scaled.links.items()}
+    tasks = [(link.collisions, hulls) for link in scaled.links.values()]
+    found = map_tasks(_decompose, tasks, list(scaled.links), jobs, progress, _is_decomposed)
+    decomposed = dict(zip(scaled.links, found, strict=True))
     inertials = link_inertials(scaled, density, bullet_inertia)
-    pieces = {name: found.pieces for name, found in decomposed.items()}
+    pieces = {name: link_hulls.pieces for name, link_hulls in decomposed.items()}
     assembly = assemble(scaled, scale, pieces, inertials, igibson_visuals=igibson_visuals)
-    for name, found in decomposed.items():
-        assembly.warnings += [f"link '{name}': {line}" for line in found.warnings]
-        if model.links[name].collisions and not found.pieces:
+    for name, link_hulls in decomposed.items():
+        assembly.warnings += [f"link '{name}': {line}" for line in link_hulls.warnings]
+        if model.links[name].collisions and not link_hulls.pieces:
             assembly.warnings.append(f"link '{name}' has no usable collision geometry")
     encrypted = any(shape.encrypted for link in model.links.values() for shape in link.visuals)
     return BuiltModel(assembly, decomposed, encrypted, _file_hash(model), time.perf_counter() - start)
+
+
+def _decompose(task: tuple[list[Shape], HullOptions]) -> LinkHulls:
+    return decompose_link(*task)
+
+
+def _is_decomposed(task: tuple[list[Shape], HullOptions]) -> bool:
+    return not task[0] or is_cached(*task)
+
+
+def forget_datasets() -> None:
+    """Makes `run_task` read again what this process has read before: files may have changed since."""
+    _dataset.cache_clear()
 
 
 def _file_hash(model: ObjectModel) -> str:
@@ -120,7 +147,7 @@ def _file_hash(model: ObjectModel) -> str:
     shapes = (s for link in model.links.values() for s in (*link.collisions, *link.visuals))
     files = dict.fromkeys([model.file, *(shape.file for shape in shapes if shape.file is not None)])
     for file in files:
-        digest.update(hashlib.sha256(pathlib.Path(file).read_bytes()).digest())
+        digest.update(hashlib.sha256(inputs.content(file)).digest())
     return digest.hexdigest()[:16]
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Collection
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
-from .pieces import HullOptions
-from .report import Renderer
-from .scene_urdf import SceneOptions
+if TYPE_CHECKING:  # what these import takes seconds, which a conversion out of the cache need not spend
+    from .pieces import HullOptions
+    from .report import Renderer
+    from .scene_urdf import SceneOptions
 
 #: Called with what is worked on, how many units are done, and how many there are.
 Progress = Callable[[str, int, int], None]
@@ -34,7 +35,8 @@ class ConvertOptions:
         every object of a scene is of one flat colour, which tells of the modelling program and not of the things.
       assets: folder that gets `meshes/` and `textures/`, relative to the output's, so that many scenes can share them.
       keep_hovering: start loose objects exactly where the source has them, even in mid-air.
-      jobs: processes. cache: use the cache of decompositions. report: write report.json and report.html.
+      jobs: processes. cache: use the caches of decompositions and of finished outputs.
+      report: write report.json and report.html.
       renderer, view: what draws the report's pictures (see `report.write_report`).
     """
 
@@ -56,11 +58,13 @@ class ConvertOptions:
     cache: bool = True
     report: bool = True
     renderer: Renderer | None = None
-    view: type | None = None
+    view: Callable[..., Any] | None = None
     progress: Progress = no_progress
 
     def hull_options(self, *, building: bool = False) -> HullOptions:
         """How collision geometry is decomposed. Wall segments are never merged: the gaps between them are doors."""
+        from .pieces import HullOptions
+
         return HullOptions(
             max_hulls=None if building else self.max_hulls,
             max_hull_vertices=self.max_hull_vertices,
@@ -70,6 +74,8 @@ class ConvertOptions:
 
     def scene_options(self) -> SceneOptions:
         """What of a scene is read."""
+        from .scene_urdf import SceneOptions
+
         return SceneOptions(
             seed=self.seed,
             fixed_furniture=self.fixed_furniture,

@@ -97,6 +97,7 @@ class LinkHulls:
       source_volume: m3 of the solid the source meshes enclose; None where they do not enclose one.
       method: how the pieces were found, e.g. "groups", "hull", "components", "coacd", "primitives", joined by "+".
       warnings: one line each, for the report.
+      stopped: time or a signal ended a finer decomposition: another run may do better, so it is not cached.
       seconds: it took (of the first run, if cached). cached: it came from the cache.
     """
 
@@ -107,6 +108,7 @@ class LinkHulls:
     source_volume: float | None = None
     method: str = ""
     warnings: list[str] = dataclasses.field(default_factory=list)
+    stopped: bool = False
     seconds: float = 0.0
     cached: bool = False
 

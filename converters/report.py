@@ -6,7 +6,7 @@ import dataclasses
 import json
 import math
 import pathlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
 import mujoco
@@ -21,6 +21,8 @@ from .pieces import LinkHulls
 from .report_pictures import Pictures
 
 FORMAT_VERSION = 1
+RENDERED = "rendered"
+"""What the report says of its pictures where they are no drawings."""
 
 
 class Renderer(Protocol):
@@ -73,7 +75,7 @@ def write_report(
     manifest: Manifest,
     given: ReportInput,
     renderer: Renderer | None = None,
-    view: type | None = None,
+    view: Callable[..., Any] | None = None,
 ) -> dict[str, Any]:
     """Writes `report.json` and the self-contained `report.html` into `folder`; returns what is in `report.json`.
 
@@ -86,7 +88,7 @@ def write_report(
     pictures = Pictures(model, manifest, index, renderer, view)
     scene_pictures = pictures.scene(given.rooms) if given.kind == "scene" else []
     object_pictures = [pictures.object(number) for number in range(len(manifest.objects))]
-    facts["pictures"] = pictures.note or "rendered"
+    facts["pictures"] = pictures.note or RENDERED
     folder = pathlib.Path(folder)
     text = json.dumps(facts, indent=1, allow_nan=False, ensure_ascii=False)
     (folder / "report.json").write_text(text + "\n", encoding="utf-8")

@@ -5,6 +5,7 @@ All layout images are square, 0.01 m per pixel, centred on the world's origin, r
 
 from __future__ import annotations
 
+import io
 import os
 import pathlib
 
@@ -14,6 +15,7 @@ from scipy import ndimage
 
 from ig2mj.errors import InputError
 
+from . import inputs
 from .description import RoomMaps
 
 PIXEL = 0.01  # m, of the layout images
@@ -35,7 +37,7 @@ def read_room_maps(
     """
     layout = scene_folder / "layout"
     semantic_file, instance_file = layout / "floor_semseg_0.png", layout / "floor_insseg_0.png"
-    if not semantic_file.is_file() or not instance_file.is_file():
+    if not inputs.is_file(semantic_file) or not inputs.is_file(instance_file):
         if warnings is not None:
             warnings.append("layout/floor_semseg_0.png or floor_insseg_0.png is missing: the scene has no rooms")
         return None
@@ -44,7 +46,7 @@ def read_room_maps(
         raise InputError(instance_file, f"its size differs from that of {semantic_file.name}")
     room_map, names, types = name_rooms(semantic, instance, room_types, semantic_file)
     free, free_no_obj = (
-        traversable(_open_grey(f)) if f.is_file() else None
+        traversable(_open_grey(f)) if inputs.is_file(f) else None
         for f in (layout / "floor_trav_0.png", layout / "floor_trav_no_obj_0.png")
     )
     return RoomMaps(room_map, names, types, SEG_RESOLUTION, free, free_no_obj, TRAV_RESOLUTION)
@@ -137,7 +139,7 @@ def _open_grey(file: pathlib.Path) -> np.ndarray:
 
 def _open(file: pathlib.Path) -> Image.Image:
     try:
-        with Image.open(file) as image:
+        with Image.open(io.BytesIO(inputs.content(file))) as image:
             if image.size[0] != image.size[1]:
                 raise InputError(file, f"is not square but {image.size[0]} x {image.size[1]} pixels")
             if not 10 <= image.size[0] <= MAX_SIDE:

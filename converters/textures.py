@@ -9,6 +9,7 @@ import pathlib
 import mujoco
 from PIL import Image
 
+from . import inputs
 from .naming import file_slug
 
 #: Longer edges are scaled down to this many pixels: a home has hundreds of textures, and all of them lie in memory.
@@ -50,7 +51,7 @@ class TextureStore:
 
 def _png(image: pathlib.Path) -> bytes:
     """An image file as PNG bytes, RGB, no longer edge than MAX_EDGE, no metadata."""
-    with Image.open(image) as opened:
+    with Image.open(io.BytesIO(inputs.content(image))) as opened:
         picture = opened.convert("RGB")
     if max(picture.size) > MAX_EDGE:
         picture.thumbnail((MAX_EDGE, MAX_EDGE), Image.Resampling.LANCZOS)

@@ -9,6 +9,7 @@ import numpy as np
 
 from ig2mj.errors import InputError
 
+from . import inputs
 from .description import Inertial, Joint, Link, Mimic, ObjectModel
 from .file_access import FileGuard
 from .poses import read_origin
@@ -44,7 +45,7 @@ def read_urdf(
     """
     path = pathlib.Path(file)
     simplified = path.with_name(f"{path.stem}_simplified{path.suffix}")
-    if simplified.is_file():
+    if inputs.is_file(simplified):
         path = simplified
     warnings: list[str] = []
     robot = read_xml(path, "robot", warnings)

@@ -10,6 +10,7 @@ from scipy.spatial import ConvexHull, QhullError
 
 from ig2mj.errors import InputError
 
+from . import inputs
 from .description import Mesh, Shape
 from .file_access import FileGuard
 from .mesh_files import MeshPart, encrypted_twin, is_encrypted, read_collision, read_visual
@@ -72,7 +73,7 @@ class GeometryReader:
         scale = self._scale(mesh)
         path, _ = self._mesh_path(mesh)
         if is_encrypted(path):
-            if not path.is_file():
+            if not inputs.is_file(path):
                 self.warnings.append(f"{where(element)}: the encrypted visual {path.name} does not exist")
             return [dataclasses.replace(shape, scale=scale, file=path, encrypted=True)]
         try:

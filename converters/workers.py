@@ -21,11 +21,14 @@ COMMAND = (sys.executable, "-m", "ig2mj_converters.workers")
 
 
 class WorkerError(Exception):
-    """The worker gave no result; the message says why in a few words. timed_out: it was stopped for its time."""
+    """The worker gave no result; the message says why in a few words.
 
-    def __init__(self, message: str, *, timed_out: bool = False):
+    stopped: it was ended from outside, for its time or by a signal (memory, say): another run may do better.
+    """
+
+    def __init__(self, message: str, *, stopped: bool = False):
         super().__init__(message)
-        self.timed_out = timed_out
+        self.stopped = stopped
 
 
 def run_coacd(
@@ -62,9 +65,9 @@ def run_coacd(
                 check=False,
             )
         except subprocess.TimeoutExpired as e:
-            raise WorkerError(f"took longer than {time_limit:.0f} s", timed_out=True) from e
+            raise WorkerError(f"took longer than {time_limit:.0f} s", stopped=True) from e
         if done.returncode != 0 or not found.exists():
-            raise WorkerError(_reason(done))
+            raise WorkerError(_reason(done), stopped=done.returncode < 0)
         with np.load(found, allow_pickle=False) as file:
             pieces = [file[f"piece_{i}"] for i in range(int(file["count"]))]
     if not pieces:

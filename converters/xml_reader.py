@@ -18,6 +18,8 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  it has no
 
 from ig2mj.errors import InputError
 
+from . import inputs
+
 MAX_XML_BYTES = 128 * 2**20  # the largest cached BEHAVIOR scenes are a few MiB
 MAX_NUMBER = 1e15  # beyond, products of a few numbers are no numbers any more
 Element = Any  # lxml.etree._Element, for which there are no type stubs
@@ -41,11 +43,11 @@ def read_bytes(file: str | os.PathLike, limit: int) -> bytes:
     """A regular file's bytes. Raises InputError: missing, no regular file, unreadable, over the limit."""
     path = pathlib.Path(file)
     try:
-        if not path.is_file():
+        if not inputs.is_file(path):
             raise InputError(file, "is a folder or a device" if path.exists() else "does not exist")
         if (size := path.stat().st_size) > limit:
             raise InputError(file, f"has {size} bytes, more than the limit of {limit}")
-        return path.read_bytes()
+        return inputs.content(path)
     except OSError as e:
         raise InputError(file, f"cannot be read: {e.strerror or e}") from e
     except ValueError as e:  # a null byte in the name

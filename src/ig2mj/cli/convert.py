@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 if TYPE_CHECKING:
-    from ig2mj_converters.finish import Outcome
     from ig2mj_converters.options import ConvertOptions
+    from ig2mj_converters.outcome import Outcome
 
 Flag = tyro.conf.FlagCreatePairsOff
 
@@ -66,11 +66,11 @@ def convert_scene(
       assets: folder for meshes/ and textures/, relative to OUT, that several scenes may share (e.g. "..").
       colours: of visuals without a texture: the source's, or household ones by category; auto prefers the source's,
         unless every object of a scene is of one flat colour.
-      no_cache: do not use the cache of convex decompositions.
+      no_cache: convert anew even if nothing has changed, and keep nothing for the next time.
       no_report: no checks, no report.json and report.html.
       json: print what was done as JSON.
     """
-    from ig2mj_converters.convert_scene import convert_scene as convert
+    from ig2mj_converters.conversion import convert_scene as convert
 
     options = _options(
         seed=seed,
@@ -100,6 +100,7 @@ def convert_object(
     out: pathlib.Path,
     model: str | None = None,
     bbox: tuple[float, float, float] | None = None,
+    jobs: int = 1,
     seed: int = 0,
     max_hulls: int = 16,
     max_hull_vertices: int = 32,
@@ -119,20 +120,22 @@ def convert_object(
       out: folder for the result; an earlier result there is replaced when everything went well.
       model: name of the object; default the file's.
       bbox: wanted size in the axes of its base link, metres; default the size it has.
+      jobs: processes that decompose its links.
       seed: seeds convex decomposition.
       max_hulls: most convex pieces per link; more are merged.
       max_hull_vertices: most vertices per piece.
       bullet_inertia: inertia of each link's box, as Bullet computes it, instead of that of its hulls.
       colours: of visuals without a texture: the source's, or household ones by category; auto prefers the source's,
         unless every object of a scene is of one flat colour.
-      no_cache: do not use the cache of convex decompositions.
+      no_cache: convert anew even if nothing has changed, and keep nothing for the next time.
       no_report: no checks, no report.json and report.html.
       json: print what was done as JSON.
     """
-    from ig2mj_converters.convert_object import convert_object as convert
+    from ig2mj_converters.conversion import convert_object as convert
 
     options = _options(
         seed=seed,
+        jobs=jobs,
         max_hulls=max_hulls,
         max_hull_vertices=max_hull_vertices,
         bullet_inertia=bullet_inertia,
@@ -159,10 +162,22 @@ def _options(**given: Any) -> ConvertOptions:
             element = "--" + name.replace("_", "-")
             raise InputError("command line", f"is {given[name]}, must be at least {least}", element=element)
     if given["report"]:
-        from ig2mj.viewer.offscreen import FreeView, render
-
-        given |= {"renderer": render, "view": FreeView}
+        given |= {"renderer": _render, "view": _free_view}
     return ConvertOptions(**given)
+
+
+def _render(*arguments: Any, **options: Any) -> Any:
+    """`ig2mj.viewer.offscreen.render`, imported when there is something to draw."""
+    from ig2mj.viewer.offscreen import render
+
+    return render(*arguments, **options)
+
+
+def _free_view(*arguments: Any, **options: Any) -> Any:
+    """`ig2mj.viewer.offscreen.FreeView`, likewise."""
+    from ig2mj.viewer.offscreen import FreeView
+
+    return FreeView(*arguments, **options)
 
 
 @contextlib.contextmanager
@@ -199,13 +214,15 @@ def _tell(outcome: Outcome, out: pathlib.Path, main_file: str, as_json: bool) ->
             "skipped": outcome.skipped,
             "warnings": outcome.warnings,
             "checks": {check.name: {"passed": check.passed, "summary": check.summary} for check in outcome.checks},
+            "cached": outcome.cached,
             "seconds": {stage: round(seconds, 3) for stage, seconds in outcome.timings.items()},
         }
         print(json_module.dumps(told, indent=1))
     else:
         seconds = sum(outcome.timings.values())
+        from_cache = " (nothing has changed: taken from the cache)" if outcome.cached else ""
         what = "1 object" if outcome.objects == 1 else f"{outcome.objects} objects"
-        print(f"{out / main_file}: {what}, {outcome.warnings} warnings, {seconds:.1f} s")
+        print(f"{out / main_file}: {what}, {outcome.warnings} warnings, {seconds:.1f} s{from_cache}")
         for line in outcome.skipped:
             print(f"  skipped, not in the dataset: {line}")
         for check in failed:

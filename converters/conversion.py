@@ -1,0 +1,78 @@
+"""The two conversions as commands and programs call them: out of the cache where nothing has changed, else done.
+
+What does the work (`convert_scene`, `convert_object`) is imported only when there is work: that alone takes seconds.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+from . import inputs, output_cache
+from .options import ConvertOptions
+from .outcome import Outcome
+
+Path = str | os.PathLike
+
+
+def convert_scene(
+    dataset_root: Path, name: str, out: Path, *, urdf: Path | None = None, options: ConvertOptions | None = None
+) -> Outcome:
+    """As `convert_scene.convert_scene`, with the cache of finished outputs before it."""
+    options = options or ConvertOptions()
+
+    def work() -> Outcome:
+        from .convert_scene import convert_scene as convert
+
+        return convert(dataset_root, name, out, urdf=urdf, options=options)
+
+    request = {"kind": "scene", "dataset": _absolute(dataset_root), "name": name}
+    if urdf is not None:
+        request |= {"urdf": os.fspath(urdf), "urdf_file": _absolute(urdf)}
+    return _done(request, out, options, work)
+
+
+def convert_object(
+    urdf: Path,
+    category: str,
+    out: Path,
+    *,
+    model: str | None = None,
+    bounding_box: tuple[float, float, float] | None = None,
+    options: ConvertOptions | None = None,
+) -> Outcome:
+    """As `convert_object.convert_object`, with the cache of finished outputs before it."""
+    options = options or ConvertOptions()
+
+    def work() -> Outcome:
+        from .convert_object import convert_object as convert
+
+        return convert(urdf, category, out, model=model, bounding_box=bounding_box, options=options)
+
+    box = None if bounding_box is None else [float(v) for v in bounding_box]
+    request = {"kind": "object", "urdf": _absolute(urdf), "category": category, "model": model, "box": box}
+    return _done(request, out, options, work)
+
+
+def _done(request: dict[str, Any], out: Path, options: ConvertOptions, work: Callable[[], Outcome]) -> Outcome:
+    """Shared assets lie outside the output's folder, so an output that uses them is never kept."""
+    if not options.cache or options.assets != ".":
+        return work()
+    start = time.perf_counter()
+    options.progress("comparing with earlier conversions", 0, 1)
+    key = output_cache.key_of(request, options)
+    known = output_cache.fetch(key, out)
+    if known is not None:
+        known.timings = {"cache": time.perf_counter() - start}
+        return known
+    with inputs.recording() as record:
+        outcome = work()
+    if not outcome.provisional and record.consistent:
+        output_cache.store(key, record, outcome, out)
+    return outcome
+
+
+def _absolute(path: Path) -> str:
+    return os.path.abspath(path)  # noqa: PTH100  pathlib's keeps "..", which would give one folder two names
