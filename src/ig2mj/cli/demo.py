@@ -1,21 +1,29 @@
-"""`ig2mj demo`: the small home from its URDF source to a running scene, with a picture and a report."""
+"""`ig2mj demo`: the small home from its URDF source to a running scene, and a fish that cooks in it."""
 
 from __future__ import annotations
 
 import pathlib
 import time
-from typing import Annotated
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+Step = Callable[[str], Callable[[str, int, int | None], None]]
+"""Opens a line of progress with a title; what it returns moves it: text, done, total."""
 
 
 def run(
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")] = pathlib.Path("out/demo"),
     jobs: int = 2,
 ) -> int:
-    """Build the small home's dataset, convert it, run it, tell what stands where.
+    """Convert the small home, run it, tell what stands where, cook a fish and freeze milk in it.
 
-    Leaves DIR/dataset (the source), DIR/small_home (the scene and report.html) and DIR/pictures.
+    Leaves DIR/dataset (the source), DIR/small_home (the scene and report.html), DIR/pictures and DIR/cooking
+    (temperatures as CSV, JSON and a plot, pictures, a film).
 
     Args:
       out: folder for everything the demo makes.
@@ -24,9 +32,7 @@ def run(
     from ig2mj_homes import small_home
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
-    from rich.table import Table
 
-    from ig2mj.demos import first_home
     from ig2mj.errors import Ig2mjError
 
     if jobs < 1:
@@ -35,35 +41,62 @@ def run(
     console = Console()
     columns = (TextColumn("[bold]{task.description}"), BarColumn(bar_width=24), MofNCompleteColumn(),
                TimeElapsedColumn(), TextColumn("{task.fields[text]}"))  # fmt: skip
-    dataset, scene = out / "dataset", out / small_home.NAME
+    scene = out / small_home.NAME
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
 
-        def step(title: str):
+        def step(title: str) -> Callable[[str, int, int | None], None]:
             task = bar.add_task(title, total=None, text="")
             return lambda text, done, total: bar.update(task, completed=done, total=total, text=text)
 
-        report = step("building the source")
-        count = first_home.build_source(dataset, jobs, lambda done, total: report("", done, total))
-        console.print(f"[bold]source[/]     {dataset}: {count} models, scene '{small_home.NAME}'")
+        failed = _convert(console, step, small_home.NAME, out / "dataset", scene, jobs)
+        _look(console, step, scene, out / "pictures")
+        failed += _cook(console, step, scene, out / "cooking")
+    console.print(f"{time.perf_counter() - start:.0f} s. Look around in it: [bold]ig2mj view {scene}[/]")
+    return 1 if failed else 0
 
-        outcome = first_home.convert(dataset, small_home.NAME, scene, jobs, step("converting"))
-        failed = [check for check in outcome.checks if not check.passed]
-        verdict = f"{len(outcome.checks) - len(failed)} of {len(outcome.checks)} checks passed"
-        console.print(f"[bold]converted[/]  {scene / 'scene.xml'}: {outcome.objects} objects, {verdict}")
-        for check in failed:
-            console.print(f"           check {check.name}: {check.summary}")
 
-        began = time.perf_counter()
-        world, moved = first_home.load_and_run(scene)
-        seconds = time.perf_counter() - began
-        console.print(f"[bold]ran[/]        {world.time:.1f} s of physics in {seconds:.1f} s, loading included; "
-                      f"nothing moved more than {moved * 1000:.1f} mm")  # fmt: skip
+def _convert(console: Console, step: Step, name: str, dataset: pathlib.Path, scene: pathlib.Path, jobs: int) -> int:
+    """Builds the home's dataset, converts it with checks and a report; number of failed checks."""
+    from ig2mj_converters.convert_scene import convert_scene
+    from ig2mj_converters.options import ConvertOptions
+    from ig2mj_homes import small_home
+    from ig2mj_homes.dataset import build_dataset
 
-        step("asking the predicates")("what stands where (the first time compiles)", 0, None)
-        places = first_home.what_stands_where(world)
-        step("taking pictures")("", 0, None)
-        pictures = first_home.take_pictures(world, out / "pictures")
+    from ig2mj.viewer.offscreen import FreeView, render
 
+    report = step("building the source")
+    counts = build_dataset(
+        dataset, only=small_home.categories(), jobs=jobs, progress=lambda done, total: report("", done, total)
+    )
+    small_home.build(dataset)
+    console.print(f"[bold]source[/]     {dataset}: {sum(counts.values())} models, scene '{name}'")
+
+    options = ConvertOptions(jobs=jobs, renderer=render, view=FreeView, progress=step("converting"))
+    outcome = convert_scene(dataset, name, scene, options=options)
+    failed = [check for check in outcome.checks if not check.passed]
+    verdict = f"{len(outcome.checks) - len(failed)} of {len(outcome.checks)} checks passed"
+    console.print(f"[bold]converted[/]  {scene / 'scene.xml'}: {outcome.objects} objects, {verdict}")
+    for check in failed:
+        console.print(f"           check {check.name}: {check.summary}")
+    console.print(f"[bold]report[/]     {scene / 'report.html'}")
+    return len(failed)
+
+
+def _look(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Path) -> None:
+    """Runs the home for two seconds, tells what stands where, takes pictures."""
+    from rich.table import Table
+
+    from ig2mj.demos import first_home
+
+    began = time.perf_counter()
+    world, moved = first_home.load_and_run(scene)
+    seconds = time.perf_counter() - began
+    console.print(f"[bold]ran[/]        {world.time:.1f} s of physics in {seconds:.1f} s, loading included; "
+                  f"nothing moved more than {moved * 1000:.1f} mm")  # fmt: skip
+    step("asking the predicates")("what stands where (the first time compiles)", 0, None)
+    places = first_home.what_stands_where(world)
+    step("taking pictures")("", 0, None)
+    pictures = first_home.take_pictures(world, folder)
     table = Table(title="what stands where", title_justify="left")
     for heading in ("object", "is", "what", "room"):
         table.add_column(heading)
@@ -72,6 +105,53 @@ def run(
     console.print(table)
     for file in pictures:
         console.print(f"[bold]picture[/]    {file}")
-    console.print(f"[bold]report[/]     {scene / 'report.html'}")
-    console.print(f"{time.perf_counter() - start:.0f} s. Look around in it: [bold]ig2mj view {scene}[/]")
-    return 1 if failed else 0
+
+
+def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Path) -> int:
+    """Cooks; leaves table, plot, pictures and film; number of things that were to happen and did not."""
+    from ig2mj.demos import cooking
+    from ig2mj.demos.cooking_film import CookingFilm
+    from ig2mj.demos.cooking_pictures import KitchenCameras, MomentSheet
+    from ig2mj.demos.cooking_plot import plot
+    from ig2mj.demos.kitchen import enter_kitchen
+    from ig2mj.viewer.offscreen import INSTALL_HINT, default_backend
+
+    report = step("cooking")
+    report("compiling the states", 0, None)
+    world, kitchen = enter_kitchen(scene)
+    folder.mkdir(parents=True, exist_ok=True)
+    cameras = KitchenCameras(world, kitchen)
+    sheet = MomentSheet(cameras, kitchen)
+    filming = default_backend() != "warp"  # its pictures take seconds
+    film = CookingFilm(folder / "cooking.mp4", cameras, kitchen) if filming else None
+
+    def watch(log: Any, changed: Any) -> None:
+        if film:
+            film.see(log)
+        sheet.see(f"{log.times[-1]:.1f} s", changed if log.steps else None)
+        report(f"{log.times[-1]:.0f} s" + (f", {changed[-1]}" if changed else ""), log.steps, None)
+
+    began = time.perf_counter()
+    try:
+        log = cooking.cook(world, kitchen, watch)
+    finally:
+        if film:
+            film.close()
+    log.write_csv(folder / "temperatures.csv")
+    log.write_json(folder / "temperatures.json")
+    plot(log, kitchen, folder / "temperatures.png")
+    sheet.write(folder / "moments.png")
+    seconds = time.perf_counter() - began
+    console.print(log.table())
+    console.print(
+        f"[bold]cooked[/]     {log.times[-1] - log.times[0]:.1f} s of the kitchen in {seconds:.1f} s, pictures included"
+    )
+    for word, name in (("numbers", "temperatures.csv"), ("numbers", "temperatures.json"), ("plot", "temperatures.png"),
+                       ("pictures", "moments.png"), *([("film", "cooking.mp4")] if filming else [])):  # fmt: skip
+        console.print(f"[bold]{word:<10}[/] {folder / name}")
+    if not filming:
+        console.print(f"[bold]film[/]       none: it needs OpenGL ({INSTALL_HINT})")
+    absent = cooking.missing(log, kitchen)
+    for what in absent:
+        console.print(f"           did not happen: {what}")
+    return len(absent)
