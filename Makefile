@@ -17,7 +17,7 @@ help:
 	@echo "make test-gpu   the tests that need a CUDA device"
 	@echo "make check      ruff and pyright"
 	@echo "make format     let ruff put the code in order"
-	@echo "make bench      the benchmarks"
+	@echo "make bench      the benchmarks of the native engine; results in benchmarks/results/"
 	@echo "make setup      only the set-up: .venv and OpenGL libraries"
 	@echo "make clean      remove what runs and builds left; make distclean removes .venv too"
 
@@ -66,8 +66,13 @@ format: setup
 	@$(BIN)/ruff check --fix
 	@$(BIN)/ruff format
 
-bench: setup
-	@set -e; for b in benchmarks/*.py; do echo "== $$b"; $(BIN)/python "$$b"; done
+bench: $(VENV)/.benchmarks
+	@set -e; for b in idle_a6 idle_a7 states_share; do echo "== $$b"; $(BIN)/python benchmarks/$$b.py; done
+
+$(VENV)/.benchmarks: $(VENV)/.installed $(VENV)/.gl
+	@if uv --version >/dev/null 2>&1; then uv pip install -q --python $(BIN)/python -e '.[bench]'; \
+	else $(BIN)/python -m pip install -q --disable-pip-version-check -e '.[bench]'; fi
+	@touch $@
 
 clean:
 	rm -rf build dist out *.egg-info .pytest_cache .ruff_cache .hypothesis MUJOCO_LOG.TXT

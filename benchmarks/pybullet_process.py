@@ -23,11 +23,15 @@ class PyBulletProcess:
     def __init__(self, folder: pathlib.Path, renderer: str | None = None):
         """Loads the scene in `folder`; `renderer` "tiny" or "egl" for pictures. Raises PyBulletError."""
         command = [sys.executable, str(WORKER), str(folder), *([renderer] if renderer else [])]
-        self._log = (folder / f"pybullet_{renderer}.log").open("w+")
+        self._log = (folder / f"pybullet_{renderer or 'physics'}.log").open("w+")
         self._process = subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._log, text=True
         )
-        self.num_bodies = int(self._read()["ready"])
+        try:
+            self.num_bodies = int(self._read()["ready"])
+        except PyBulletError:
+            self.close()
+            raise
 
     def ask(self, what: str, **more: Any) -> Any:
         """One request (see the worker). Raises PyBulletError."""
