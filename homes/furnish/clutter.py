@@ -63,7 +63,7 @@ IN_ROOM = {
 ON = {
     "bottom_cabinet": (
         "toaster", "kettle", "chopping_board", "coffee_maker", "bowl", "carving_knife", *FOOD,
-        "paper_towel", "mug",
+        "mug",
     ),
     "countertop": ("chopping_board", "carving_knife", "toaster", *FOOD),
     "breakfast_table": (
@@ -78,7 +78,7 @@ ON = {
     "bed": ("pillow", "hardback", "pajamas", "laptop"),
     "sink": ("soap", "cup", "scrub_brush"),
     "stove": ("saucepan", "kettle", "frying_pan"),
-    "bench": ("gym_shoe", "backpack", "hat"),
+    "bench": ("gym_shoe", "duffel_bag", "hat"),
     "shelf": ("basket", "pot_plant", "candle"),
     "washer": ("detergent", "basket"),
     "dryer": ("hand_towel", "basket"),

@@ -54,7 +54,7 @@ def childs_room(kit: RoomKit) -> Iterator[Thing | None]:
         yield kit.before(desk, "straight_chair", -0.12)
     yield kit.at_wall("toy")
     yield kit.at_wall("picture", height=1.4)
-    yield kit.at_wall("backpack")
+    yield kit.at_wall("duffel_bag")
     yield kit.at_wall("toy")
 
 

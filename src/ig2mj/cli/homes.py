@@ -60,19 +60,68 @@ def build(
         print(f"convert one: ig2mj convert scene --dataset {out} --scene {next(iter(homes))} --out OUT")
 
 
+def convert(
+    dataset: pathlib.Path,
+    out: pathlib.Path,
+    home: tuple[str, ...] = (),
+    jobs: int = 2,
+) -> int:
+    """Convert the homes of a dataset into one folder with shared meshes, as scenes_mjcf/ has them.
+
+    Each home's checks are kept as OUT/HOME/checks.json. Exit status 1 when a check failed.
+
+    Args:
+      dataset: root that `ig2mj homes build` wrote.
+      out: folder for the homes; meshes that no home uses any more are removed from it.
+      home: just these homes.
+      jobs: processes.
+    """
+    import dataclasses
+
+    from ig2mj_converters.convert_scene import convert_scene
+    from ig2mj_converters.options import ConvertOptions
+    from ig2mj_homes.ship import remove_unused, strip_report, total_bytes
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+    scenes = dataset / "scenes"
+    names = list(home) or sorted(p.name for p in scenes.iterdir() if (p / "urdf").is_dir())
+    failed: list[str] = []
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        whole = bar.add_task("homes", total=len(names))
+        for name in names:
+            part = bar.add_task(name, total=None)
+            options = ConvertOptions(jobs=jobs, assets="..")
+            options = dataclasses.replace(
+                options, progress=lambda _, done, total, part=part: bar.update(part, completed=done, total=total)
+            )
+            convert_scene(dataset, name, out / name, options=options)
+            failed += strip_report(out / name)
+            bar.remove_task(part)
+            bar.advance(whole)
+    remove_unused(out)
+    print(f"{out}: {len(names)} homes, {total_bytes(out) / 1e6:.1f} MB, {len(failed)} checks failed")
+    for line in failed:
+        print(f"  {line}")
+    return 1 if failed else 0
+
+
 def list_(
     only: tuple[str, ...] = (),
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> None:
-    """List the categories that can be built: synset, size, mass, number of models.
+    """List the homes that ship with ig2mj, and the categories that can be built: synset, size, mass, models.
 
     Args:
-      only: just these categories.
-      json: print JSON instead of a table.
+      only: just these categories, and no homes.
+      json: print the categories as JSON instead of tables.
     """
     from ig2mj.knowledge import synset
 
     entries = _entries(only)
+    if not only and not json:
+        _print_homes()
     if json:
         _print_json(
             [
@@ -129,6 +178,60 @@ def sheet(
     print(f"{out}: {len(chosen)} models")
 
 
+def pictures(
+    out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")],
+    home: tuple[str, ...] = (),
+    rooms: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+) -> None:
+    """Draw contact sheets of the homes: DIR/homes.jpg, all from above, and DIR/rooms_HOME.jpg, their rooms from inside.
+
+    Args:
+      out: folder for the pictures.
+      home: names or folders of homes; default all that ship with ig2mj.
+      rooms: draw the rooms too, one sheet per home.
+    """
+    from ig2mj.scene.scene import load_scene
+    from ig2mj.viewer.home_sheet import from_above, rooms_inside
+
+    scenes = [load_scene(name) for name in home or [h["home"] for h in shipped_homes()]]
+    scenes.sort(key=lambda scene: scene.tables.num_objects)
+    out.mkdir(parents=True, exist_ok=True)
+    sheets = {"homes.jpg": from_above(scenes)}
+    if rooms:
+        sheets |= {f"rooms_{scene.name}.jpg": rooms_inside([scene]) for scene in scenes}
+    for name, sheet in sheets.items():
+        sheet.save(out / name, quality=82)
+        print(out / name)
+
+
+def shipped_homes() -> list[dict[str, Any]]:
+    """Name, rooms and number of objects (parked ones and the building not counted) of every home in scenes_mjcf/."""
+    from ig2mj.scene.manifest import load_manifest
+    from ig2mj.scene.scene import MANIFEST_FILE, SHIPPED_HOMES
+
+    homes = []
+    for file in sorted(SHIPPED_HOMES.glob(f"*/{MANIFEST_FILE}")):
+        manifest = load_manifest(file)
+        objects = [o for o in manifest.objects if not o.parked and o.category not in ("walls", "floors", "ceilings")]
+        rooms = list(manifest.rooms.instances)
+        loose = sum(not o.fixed for o in objects)
+        homes.append({"home": file.parent.name, "rooms": rooms, "objects": len(objects), "loose": loose})
+    return homes
+
+
+def _print_homes() -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    homes = shipped_homes()
+    table = Table(title=f"{len(homes)} homes, {sum(len(h['rooms']) for h in homes)} rooms (ig2mj view HOME)")
+    for name in ("home", "objects", "loose", "rooms"):
+        table.add_column(name, justify="right" if name in ("objects", "loose") else "left")
+    for h in sorted(homes, key=lambda h: h["objects"]):
+        table.add_row(h["home"], str(h["objects"]), str(h["loose"]), ", ".join(h["rooms"]))
+    Console().print(table)
+
+
 def _entries(only: tuple[str, ...]) -> list[Entry]:
     from ig2mj_homes.catalogue import catalogue, find
 
@@ -141,4 +244,10 @@ def _print_json(data: Any) -> None:
     print(json.dumps(data, indent=1))
 
 
-SUBCOMMANDS: dict[str, Callable[..., int | None]] = {"build": build, "list": list_, "sheet": sheet}
+SUBCOMMANDS: dict[str, Callable[..., int | None]] = {
+    "build": build,
+    "convert": convert,
+    "list": list_,
+    "pictures": pictures,
+    "sheet": sheet,
+}

@@ -1,0 +1,67 @@
+"""Contact sheets of homes: each one from above, and looks into its rooms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from PIL import Image, ImageDraw
+
+from ig2mj.scene.scene import Scene
+from ig2mj.viewer.offscreen import render
+from ig2mj.viewer.overview import home_overview
+
+TILE = (400, 300)  # pixels
+INK, PAPER = (25, 30, 38), (255, 255, 255)
+
+
+def from_above(scenes: Sequence[Scene], columns: int = 4) -> Image.Image:
+    """One RGB picture with a labelled tile per home, seen from above and a little from the south."""
+    tiles = []
+    for scene in scenes:
+        data = _start(scene)
+        view = home_overview(scene, data, elevation=-68.0)
+        objects = sum(not entry.parked for entry in scene.manifest.objects) - 3  # walls, floors, ceilings
+        text = f"{scene.name}: {len(scene.manifest.rooms.instances)} rooms, {objects} objects"
+        tiles.append(_tile(scene, data, view, text))
+    return _sheet(tiles, columns)
+
+
+def rooms_inside(scenes: Sequence[Scene], columns: int = 4) -> Image.Image:
+    """One RGB picture with a labelled tile per room of the homes, from the room's own camera."""
+    tiles = []
+    for scene in scenes:
+        data = _start(scene)
+        cameras = {scene.model.camera(k).name for k in range(scene.model.ncam)}
+        rooms = [room for room in scene.manifest.rooms.instances if room in cameras]
+        tiles += [_tile(scene, data, room, f"{scene.name}: {room}") for room in rooms]
+    return _sheet(tiles, columns)
+
+
+def _start(scene: Scene) -> mujoco.MjData:
+    data = mujoco.MjData(scene.model)
+    if scene.model.nkey:
+        mujoco.mj_resetDataKeyframe(scene.model, data, 0)
+    mujoco.mj_forward(scene.model, data)
+    return data
+
+
+def _tile(scene: Scene, data: mujoco.MjData, view, text: str) -> Image.Image:
+    width, height = TILE
+    drawn = Image.fromarray(render(scene.model, data, view, width=2 * width, height=2 * height))
+    image = drawn.resize(TILE, Image.Resampling.LANCZOS)
+    pen = ImageDraw.Draw(image)
+    pen.rectangle([0, height - 15, 7 * len(text) + 6, height], fill=PAPER)
+    pen.text((4, height - 13), text, fill=INK)
+    return image
+
+
+def _sheet(tiles: list[Image.Image], columns: int) -> Image.Image:
+    width, height = TILE
+    rows = math.ceil(len(tiles) / columns)
+    sheet = Image.fromarray(np.full((rows * height, columns * width, 3), 255, np.uint8))
+    for k, tile in enumerate(tiles):
+        sheet.paste(tile, (k % columns * width, k // columns * height))
+    return sheet
