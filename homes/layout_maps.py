@@ -45,7 +45,7 @@ class Maps:
             floor[cells] = 255
         for opening in plan.openings:
             if opening.walkable and not opening.edge.outer:
-                self._doorway(plan, opening, floor)
+                self._doorway(opening, floor)
         for low, high in stair_boxes(plan):
             floor[self._cells((low[0], low[1], high[0], high[1]))] = 0
         self.trav_no_obj = floor
@@ -57,18 +57,13 @@ class Maps:
                 if low[2] < HIGH and high[2] > LOW:
                     self.trav[self._cells((low[0], low[1], high[0], high[1]))] = 0
 
-    def _doorway(self, plan: Plan, opening, floor: np.ndarray) -> None:
-        """The floor under an opening belongs to the rooms on both sides, up to the wall's middle."""
+    def _doorway(self, opening, floor: np.ndarray) -> None:
+        """The floor under an opening is driven over, and belongs to no room."""
         edge = opening.edge
         post = 0.04 if opening.kind == "door" else 0.0
         half = edge.thickness / 2
-        for room, a, b in ((edge.before, -half, 0.0), (edge.after, 0.0, half)):
-            p, q = edge.point(opening.low + post, a), edge.point(opening.high - post, b)
-            cells = self._cells((p[0], p[1], q[0], q[1]))
-            number = [r.name for r in plan.rooms].index(room)
-            self.insseg[cells] = number + 1
-            self.semseg[cells] = ROOM_TYPES.index(plan.rooms[number].kind) + 1
-            floor[cells] = 255
+        p, q = edge.point(opening.low + post, -half), edge.point(opening.high - post, half)
+        floor[self._cells((p[0], p[1], q[0], q[1]))] = 255
 
     def _cells(self, rect: Rect) -> tuple[slice, slice]:
         x0, y0, x1, y1 = (round(v / PIXEL) + self.side // 2 for v in rect)

@@ -22,7 +22,7 @@ HUBS = ("corridor", "lobby", "living_room", "dining_room", "staircase")
 """Rooms that others are reached through."""
 PRIVATE = ("bathroom", "closet", "storage_room", "pantry_room", "utility_room", "bedroom", "garage", "balcony")
 """Rooms that no way should lead through."""
-DARK = ("closet", "storage_room", "pantry_room", "staircase", "auditorium")
+DARK = ("closet", "storage_room", "pantry_room", "staircase", "garage", "auditorium")
 """Rooms without windows."""
 
 

@@ -108,6 +108,8 @@ MOST = {
     "coffee_table": 3,
 }
 """Small things per host; every other host has at most two."""
+GENEROUS = ("shelf", "fridge", "breakfast_table", "desk")
+"""Hosts that get two things in a turn."""
 
 
 def fill(home: HomeInProgress) -> Iterator[Thing]:
@@ -115,6 +117,7 @@ def fill(home: HomeInProgress) -> Iterator[Thing]:
     kits = {room.name: RoomKit(home, room) for room in home.plan.rooms}
     held: dict[str, int] = {}
     hosts = list(home.things.things.values())
+    hosts += [host for host in hosts if host.category in GENEROUS]
     home.rng.shuffle(hosts)
     known = catalogue()
     idle = 0

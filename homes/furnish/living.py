@@ -57,7 +57,13 @@ def _sofa_and_television(kit: RoomKit):
         if sofa is not None:
             yield sofa
             return sofa, table
-    sofa = kit.at_wall("sofa", place="middle") or kit.at_wall("armchair", place="corner")
+    if television is None:  # no two walls face each other: an open plan
+        television = kit.at_wall("wall_mounted_tv", place="middle", height=TV_HEIGHT)
+        yield television
+    if television is not None:
+        for distance in (2.4, 2.0, 1.6, 1.3):
+            sofa = sofa or kit.before(television, "sofa", distance, ways=True)
+    sofa = sofa or kit.at_wall("sofa", place="middle") or kit.at_wall("armchair", place="corner")
     yield sofa
     return sofa, table
 

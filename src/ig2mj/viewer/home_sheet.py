@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 
@@ -14,6 +15,8 @@ from ig2mj.viewer.offscreen import render
 from ig2mj.viewer.overview import home_overview
 
 TILE = (400, 300)  # pixels
+FURTHER = 1.12
+"""Than the overview that a window opens with: a plan longer than wide fills a tile's height."""
 INK, PAPER = (25, 30, 38), (255, 255, 255)
 
 
@@ -23,6 +26,7 @@ def from_above(scenes: Sequence[Scene], columns: int = 4) -> Image.Image:
     for scene in scenes:
         data = _start(scene)
         view = home_overview(scene, data, elevation=-68.0)
+        view = dataclasses.replace(view, distance=FURTHER * view.distance)
         objects = sum(not entry.parked for entry in scene.manifest.objects) - 3  # walls, floors, ceilings
         text = f"{scene.name}: {len(scene.manifest.rooms.instances)} rooms, {objects} objects"
         tiles.append(_tile(scene, data, view, text))
@@ -53,7 +57,7 @@ def _tile(scene: Scene, data: mujoco.MjData, view, text: str) -> Image.Image:
     drawn = Image.fromarray(render(scene.model, data, view, width=2 * width, height=2 * height))
     image = drawn.resize(TILE, Image.Resampling.LANCZOS)
     pen = ImageDraw.Draw(image)
-    pen.rectangle([0, height - 15, 7 * len(text) + 6, height], fill=PAPER)
+    pen.rectangle([0, height - 15, pen.textlength(text) + 8, height], fill=PAPER)
     pen.text((4, height - 13), text, fill=INK)
     return image
 
