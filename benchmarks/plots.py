@@ -20,7 +20,9 @@ def grouped_bars(
     log: bool = True,
 ) -> None:
     """Bars side by side per group, with their values written on them; None leaves a gap."""
-    figure, axes = plt.subplots(figsize=(max(6.0, 1.1 * len(groups) * len(series) / 2), 4.2), layout="constrained")
+    figure, axes = plt.subplots(
+        figsize=(min(14.0, max(6.0, 0.4 * len(groups) * len(series))), 4.2), layout="constrained"
+    )
     width = 0.8 / len(series)
     for k, (name, values) in enumerate(series.items()):
         places = [g + (k - (len(series) - 1) / 2) * width for g in range(len(groups))]
