@@ -6,14 +6,15 @@ import time
 import numpy as np
 import pytest
 import trimesh
-from ig2mj_converters import cache, workers
+from ig2mj_converters import workers
+from ig2mj_converters.cache_folder import ENVIRONMENT
 from ig2mj_converters.description import Mesh, Shape
 from ig2mj_converters.hulls import HullOptions, decompose_link
 
 
 @pytest.fixture(autouse=True)
 def own_cache(tmp_path, monkeypatch):
-    monkeypatch.setenv(cache.ENVIRONMENT, str(tmp_path / "cache"))
+    monkeypatch.setenv(ENVIRONMENT, str(tmp_path / "cache"))
     return tmp_path / "cache"
 
 
@@ -36,6 +37,23 @@ def test_a_hanging_worker_is_stopped_and_one_hull_stands_in(monkeypatch):
     assert result.method == "fallback" and result.after == 1
     assert any("took longer" in w for w in result.warnings)
     assert any("one hull" in w for w in result.warnings)
+
+
+@pytest.mark.parametrize("mishap", ["import time; time.sleep(60)", "import os; os.abort()"])
+def test_what_time_or_a_signal_made_worse_is_tried_again_next_time(mishap, monkeypatch, own_cache):
+    with monkeypatch.context() as patch:
+        use_worker(patch, mishap)
+        assert decompose_link([bowl()], HullOptions(time_limit=0.8, coacd_threshold=0.4)).stopped
+    assert not list(own_cache.rglob("*.npz"))
+    again = decompose_link([bowl()], HullOptions(coacd_threshold=0.4))
+    assert "coacd" in again.method and not again.stopped
+    assert decompose_link([bowl()], HullOptions(coacd_threshold=0.4)).cached
+
+
+def test_a_decomposition_that_fails_by_itself_is_remembered(monkeypatch):
+    use_worker(monkeypatch, "raise RuntimeError('no luck')")
+    assert decompose_link([bowl()], HullOptions()).method == "fallback"
+    assert decompose_link([bowl()], HullOptions()).cached
 
 
 def test_a_crashing_worker_is_tried_coarser_and_then_one_hull_stands_in(monkeypatch):
@@ -121,5 +139,5 @@ def test_without_cache_nothing_is_written(own_cache):
 
 def test_a_cache_that_cannot_be_written_is_no_error(tmp_path, monkeypatch):
     (tmp_path / "file").write_text("in the way")
-    monkeypatch.setenv(cache.ENVIRONMENT, str(tmp_path / "file"))
+    monkeypatch.setenv(ENVIRONMENT, str(tmp_path / "file"))
     assert decompose_link([box_shape()]).after == 1

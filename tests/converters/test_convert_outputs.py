@@ -11,6 +11,7 @@ import shutil
 import mujoco
 import numpy as np
 import pytest
+from ig2mj_converters import inputs
 from ig2mj_converters.output import replaced_folder
 from tiny_dataset import write_dataset
 from tiny_geometry import box, write_obj
@@ -56,8 +57,12 @@ def test_scene_xml_needs_nothing_but_its_folder(house, tmp_path):
 
 
 def test_equal_input_gives_equal_bytes_and_jobs_make_no_difference(convert, house):
-    again = convert(jobs=2, cache=False)
+    with inputs.recording() as shared:
+        again = convert(jobs=2, cache=False)
     assert hashes(again.folder) == hashes(house.folder)
+    with inputs.recording() as alone:
+        convert(cache=False)
+    assert shared.answers == alone.answers  # the workers tell what they read
 
 
 def test_the_object_command(dataset, tmp_path):

@@ -45,6 +45,13 @@ def test_floating_joints_split_the_object_into_independent_bodies_section_0_fact
     np.testing.assert_allclose(house.data.body("bed_0_link_0").xpos, bed + np.array([-0.8, -0.35, 0.2]), atol=1e-5)
 
 
+def test_only_bodies_of_one_tree_are_excluded_so_that_pillows_lie_on_beds(house, task_house):
+    for scene in (house, task_house):
+        m = scene.model
+        pairs = [(signature >> 16, signature & 0xFFFF) for signature in m.exclude_signature.tolist()]
+        assert pairs and all(m.body_rootid[a] == m.body_rootid[b] for a, b in pairs)
+
+
 def test_a_pillow_rests_on_its_bed_although_both_are_one_object(house):
     m, d = house.model, mujoco.MjData(house.model)
     mujoco.mj_resetDataKeyframe(m, d, 0)

@@ -91,7 +91,7 @@ def test_a_cube_is_no_sphere_although_its_corners_lie_on_one():
 
 
 def test_an_upright_box_keeps_the_axes_of_its_link():
-    fit = fitting.fit_box(convex.hull_of(trimesh.creation.box((0.1, 2.0, 0.5)).vertices + [1, 2, 3]))
+    fit = fitting.fit_box(convex.hull_of(trimesh.creation.box((0.1, 2.0, 0.5)).vertices + np.array([1, 2, 3])))
     np.testing.assert_array_equal(fit.pose[:3, :3], np.eye(3))
     np.testing.assert_allclose(fit.size, (0.1, 2.0, 0.5))
 
