@@ -2,8 +2,8 @@
 
     python benchmarks/multi_gpu.py HOME [--worlds-per-device 8192] [--compare 1024] [--out DIR]
 
-One process, JAX's own sharding (`ig2mj.worlds.sharding`). The same worlds are stepped on one device and on all, and the
-positions compared after two seconds; then the disturbed throughput is measured on one device and on all.
+One process, one program per device (`ig2mj.worlds.sharding`). The same worlds are stepped on one device and on all, and
+the positions compared after two seconds; then the disturbed throughput is measured on one device and on all.
 """
 
 from __future__ import annotations
@@ -14,7 +14,6 @@ import pathlib
 import time
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from throughput import HAND_START, Case
 
@@ -37,36 +36,38 @@ def shared(case: Case, num_worlds: int, devices: list) -> ShardedWorlds:
     return ShardedWorlds(lambda part: make(case, part), num_worlds, devices)
 
 
-def controls(case: Case):
-    return jax.jit(
-        lambda b, c: push_controls(
-            b.world.view.object_com, c, np.array(HAND_START), case.loose, b.world.key, b.world.step, 1 / 30
+def pusher(case: Case):
+    """Controls of the pushing hand, for `ShardedWorlds.rollout`; the carry is the last controls."""
+
+    def control(batch, ctrl):
+        world = batch.world
+        ctrl = push_controls(
+            world.view.object_com, ctrl, np.array(HAND_START), case.loose, world.key, world.step, 1 / 30
         )
-    )
+        return ctrl, ctrl
+
+    return control
+
+
+def still(case: Case, worlds: ShardedWorlds) -> list:
+    """Controls of hands at rest, one array per device."""
+    zeros = np.zeros((worlds.part, case.scene.model.nu), np.float32)
+    return [jax.device_put(zeros, device) for device in worlds.devices]
 
 
 def roll(case: Case, worlds: ShardedWorlds, steps: int):
-    act = controls(case)
-    batch = worlds.start(0)
-    ctrl = worlds.place(jnp.zeros((worlds.num_worlds, case.scene.model.nu), jnp.float32))
-    for _ in range(steps):
-        ctrl = act(batch, ctrl)
-        batch, _ = worlds.step(batch, ctrl)
-    return batch, ctrl
+    shards, _ = worlds.rollout(worlds.start(0), still(case, worlds), pusher(case), steps)
+    return shards
 
 
-def speed(case: Case, worlds: ShardedWorlds, calls: int = 3) -> float:
-    """Median control steps a second of calls of `STEPS` steps; controls are computed on the devices."""
-    act = controls(case)
-    batch, ctrl = roll(case, worlds, 3)
-    jax.block_until_ready(batch)
+def speed(case: Case, worlds: ShardedWorlds, calls: int = 4) -> float:
+    """Median control steps a second of calls of `STEPS` steps; the first call compiles."""
+    control, shards, carries = pusher(case), worlds.start(0), still(case, worlds)
+    shards, carries = jax.block_until_ready(worlds.rollout(shards, carries, control, STEPS))
     times = []
     for _ in range(calls):
         start = time.time()
-        for _ in range(STEPS):
-            ctrl = act(batch, ctrl)
-            batch, _ = worlds.step(batch, ctrl)
-        jax.block_until_ready(batch)
+        shards, carries = jax.block_until_ready(worlds.rollout(shards, carries, control, STEPS))
         times.append(time.time() - start)
     return worlds.num_worlds * STEPS / float(np.median(times))
 
@@ -83,9 +84,10 @@ def main() -> None:
     result: dict = {"devices": len(devices), "device": devices[0].device_kind, "scene": case.scene.name}
     positions, keys = [], []
     for chosen in (devices[:1], devices[:1], devices):
-        batch, _ = roll(case, shared(case, args.compare, chosen), 60)
-        positions.append(np.asarray(batch.world.view.object_com))
-        keys.append(np.asarray(batch.world.key))
+        worlds = shared(case, args.compare, chosen)
+        shards = roll(case, worlds, 60)
+        positions.append(np.asarray(worlds.gather(shards, lambda b: b.world.view.object_com)))
+        keys.append(np.asarray(worlds.gather(shards, lambda b: b.world.key)))
     assert (keys[0] == keys[2]).all()
     for name, a, b in (("same_device_twice", 0, 1), ("one_against_all", 0, 2)):
         gap = np.abs(positions[a] - positions[b]).max((1, 2))

@@ -1,19 +1,25 @@
-"""Worlds shared out over devices with JAX's own sharding: one process, or several hosts under `jax.distributed`.
+"""Worlds shared out over devices: one process, or several hosts under `jax.distributed`.
 
-Each device steps its own part, nothing is sent between them, and the world axis of every array is sharded. A world's
-random streams belong to its global number, so it does not matter on which device it lands.
+Each device runs its own program on its own part of the worlds, from a thread of its own, and nothing is sent between
+devices; what is asked for is put together as one JAX array sharded over the world axis. A world's random streams belong
+to its global number, so it does not matter on which device it lands.
+
+Why not one program for all devices (`shard_map`): XLA crashes while it compiles such a program for two GPUs when it
+holds MJX-Warp's calls (JAX 0.11.2; one device, and two CPU devices, are fine). One program per device needs nothing of
+the compiler, and as no world talks to another it does the same work.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.sharding import Mesh, NamedSharding
-from jax.sharding import PartitionSpec as P
+from flax import struct
+from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array
@@ -23,65 +29,111 @@ from ig2mj.worlds.batch import Batch, Worlds
 
 AXIS = "worlds"
 
-SHARED = ("cdof_tri_col", "cdof_tri_row")
-"""MJX-Warp's arrays that are the same for all worlds and on all devices."""
+Control = Callable[[Batch, Any], tuple[Float[Array, "W nu"] | None, Any]]
+"""Controls of the next step from a device's part of the worlds and a carry, and the new carry. Pure."""
+
+
+@struct.dataclass
+class Shards:
+    """The worlds of this process: one batch per device, in the order of the devices."""
+
+    parts: tuple[Batch, ...]
 
 
 class ShardedWorlds:
-    """The functions of `Worlds`, over several devices. All of them are jitted."""
+    """The functions of `Worlds`, over several devices. All of them are jitted, and use up the shards they are given."""
 
     def __init__(self, make: Callable[[int], Worlds], num_worlds: int, devices: Sequence[Any] | None = None):
         """Shares worlds out.
 
         Args:
           make: builds `Worlds` of a given number of worlds: one device's part.
-          num_worlds: in all.
-          devices: None: all of `jax.devices()`.
+          num_worlds: in all, on all hosts.
+          devices: of this process; None: all of `jax.local_devices()`.
 
         Raises:
           EngineError: the worlds do not divide evenly, or the engine is not pure.
         """
-        chosen = list(devices) if devices is not None else jax.devices()
-        if num_worlds % len(chosen):
-            raise EngineError(
-                f"{num_worlds} worlds cannot be shared by {len(chosen)} devices (take a multiple of {len(chosen)})"
-            )
-        self.mesh = Mesh(np.array(chosen), (AXIS,))
-        self.num_worlds, self.part = num_worlds, num_worlds // len(chosen)
+        self.devices = list(devices) if devices is not None else jax.local_devices()
+        hosts = jax.process_count()
+        count = len(self.devices) * hosts
+        if num_worlds % count:
+            raise EngineError(f"{num_worlds} worlds cannot be shared by {count} devices (take a multiple of {count})")
+        self.num_worlds, self.part = num_worlds, num_worlds // count
         self.local = make(self.part)
         if not self.local.engine.pure:
             raise EngineError(f"the {self.local.engine.name} engine has no devices to share worlds over")
-        shape = jax.eval_shape(self.local.start)
-        self.specs: Batch = jax.tree_util.tree_map_with_path(_spec, shape)
-        self._start = self._mapped(
-            lambda seed: self.local.start(seed, jax.lax.axis_index(AXIS) * self.part), (P(),), self.specs
-        )
-        verdict = P(AXIS)  # of all its arrays
-        self._step = self._mapped(self.local.step, (self.specs, P(AXIS)), (self.specs, verdict), donate=(0,))
-        self._step_held = self._mapped(self.local.step, (self.specs,), (self.specs, verdict), donate=(0,))
-        self._reset = self._mapped(self.local.reset, (self.specs, P(AXIS)), self.specs, donate=(0,))
+        self._first = jax.process_index() * len(self.devices) * self.part
+        self._sharding = NamedSharding(Mesh(np.array(self.devices), (AXIS,)), PartitionSpec(AXIS))
+        self._threads = ThreadPoolExecutor(len(self.devices), "ig2mj-device")
+        self._start = jax.jit(self.local.start)
+        self._step = jax.jit(self.local.step, donate_argnums=0)
+        self._reset = jax.jit(self.local.reset, donate_argnums=0)
+        self._rollout = jax.jit(self._scan, static_argnums=(2, 3), donate_argnums=(0, 1))
 
-    def start(self, seed: int = 0) -> Batch:
+    def start(self, seed: int = 0) -> Shards:
         """All worlds at the start of episode 0."""
-        return self._start(jnp.asarray(seed, jnp.int32))
+        return Shards(tuple(self._each(lambda k: self._start(jnp.int32(seed), jnp.int32(self._first + k * self.part)))))
 
-    def step(self, batch: Batch, ctrl: Float[Array, "W nu"] | None = None) -> tuple[Batch, Verdict | None]:
-        """One control step of every world; the batch given is used up."""
-        return self._step_held(batch) if ctrl is None else self._step(batch, ctrl)
+    def step(self, shards: Shards, ctrl: Float[Array, "W nu"] | None = None) -> tuple[Shards, list[Verdict | None]]:
+        """One control step of every world, and each device's verdicts.
 
-    def reset(self, batch: Batch, mask: Bool[Array, "W"]) -> Batch:
-        """New episodes in the masked worlds; the batch given is used up."""
-        return self._reset(batch, mask)
+        Args:
+          ctrl: of all worlds of this process, or None to keep the controls.
+        """
+        split = self.place(ctrl) if ctrl is not None else None
+        local = None if split is None else [s.data for s in sorted(split.addressable_shards, key=self._order)]
+        done = self._each(lambda k: self._step(shards.parts[k], None if local is None else local[k]))
+        return Shards(tuple(batch for batch, _ in done)), [verdict for _, verdict in done]
 
-    def place(self, array: Array) -> Array:
-        """Puts an array with a leading world axis onto the devices."""
-        return jax.device_put(array, NamedSharding(self.mesh, P(AXIS)))
+    def rollout(
+        self, shards: Shards, carries: Sequence[Any], control: Control, length: int
+    ) -> tuple[Shards, list[Any]]:
+        """`length` control steps without leaving the devices.
 
-    def _mapped(self, act: Callable[..., Any], ins: Any, outs: Any, donate: tuple[int, ...] = ()) -> Callable[..., Any]:
-        mapped = jax.shard_map(act, mesh=self.mesh, in_specs=ins, out_specs=outs, check_vma=False)
-        return jax.jit(mapped, donate_argnums=donate)
+        Args:
+          carries: one per device. control: the same function object each time, or it is compiled again.
+        """
+        done = self._each(lambda k: self._rollout(shards.parts[k], carries[k], control, length))
+        return Shards(tuple(batch for batch, _ in done)), [carry for _, carry in done]
 
+    def reset(self, shards: Shards, mask: Bool[Array, "W"]) -> Shards:
+        """New episodes in the masked worlds of this process."""
+        local = [s.data for s in sorted(self.place(mask).addressable_shards, key=self._order)]
+        return Shards(tuple(self._each(lambda k: self._reset(shards.parts[k], local[k]))))
 
-def _spec(path: Any, leaf: Any) -> P:
-    name = getattr(path[-1], "name", "")
-    return P() if leaf.ndim == 0 or name in SHARED else P(AXIS)
+    def gather(self, shards: Shards, read: Callable[[Batch], Any]) -> Any:
+        """What `read` takes of every part, as arrays over this process's worlds, sharded over its devices.
+
+        `read` gives arrays that begin with the world axis, e.g. `lambda b: b.world.view.object_com`.
+        """
+
+        def one(*pieces: jax.Array) -> jax.Array:
+            shape = (sum(p.shape[0] for p in pieces), *pieces[0].shape[1:])
+            return jax.make_array_from_single_device_arrays(shape, self._sharding, list(pieces))
+
+        return jax.tree.map(one, *(read(part) for part in shards.parts))
+
+    def place(self, array: Array) -> jax.Array:
+        """Puts an array over this process's worlds onto its devices."""
+        return jax.device_put(array, self._sharding)
+
+    def _scan(self, batch: Batch, carry: Any, control: Control, length: int) -> tuple[Batch, Any]:
+        def body(state: tuple[Batch, Any], _: None) -> tuple[tuple[Batch, Any], None]:
+            one, kept = state
+            ctrl, kept = control(one, kept)
+            return (self.local.step(one, ctrl)[0], kept), None
+
+        return jax.lax.scan(body, (batch, carry), None, length)[0]
+
+    def _each(self, act: Callable[[int], Any]) -> list[Any]:
+        """Runs something for every device, each on its own thread with that device as the default."""
+
+        def on(k: int) -> Any:
+            with jax.default_device(self.devices[k]):
+                return act(k)
+
+        return list(self._threads.map(on, range(len(self.devices))))
+
+    def _order(self, shard: Any) -> int:
+        return self.devices.index(shard.device)
