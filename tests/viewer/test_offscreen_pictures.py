@@ -77,6 +77,18 @@ def test_a_picture_may_be_larger_than_the_models_frame_buffer_and_leaves_the_mod
     assert (model.vis.global_.offwidth, model.vis.global_.offheight, model.vis.global_.fovy) == before
 
 
+def test_pictures_of_many_sizes_do_not_spoil_one_another(scene):
+    """Contexts beyond the number that is kept are freed, each in its own OpenGL context."""
+    if offscreen.default_backend() == "warp":
+        pytest.skip("no OpenGL without a display here (`ig2mj doctor` tells how to get it)")
+    offscreen.close()
+    sizes = [(60 + 10 * k, 50) for k in range(offscreen._MAX_RENDERERS)]
+    before = [offscreen.render(*scene, ABOVE, width=w, height=h) for w, h in sizes]
+    offscreen.render(*scene, ABOVE, width=200, height=50)  # the first of the sizes has to go, the last is current
+    for (w, h), picture in list(zip(sizes, before, strict=True))[:0:-1]:
+        assert (offscreen.render(*scene, ABOVE, width=w, height=h) == picture).all()
+
+
 def test_an_unknown_camera_is_named_with_what_there_is(scene):
     with pytest.raises(UnknownNameError, match=r"abov.*near matches: above"):
         offscreen.render(*scene, "abov")

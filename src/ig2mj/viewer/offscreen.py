@@ -241,7 +241,7 @@ def _renderer_for(model: mujoco.MjModel, width: int, height: int) -> mujoco.Rend
         _renderers.move_to_end(key)
         return known
     while len(_renderers) >= _MAX_RENDERERS:
-        _renderers.popitem(last=False)[1].close()
+        _free(_renderers.popitem(last=False)[1])
     size = model.vis.global_
     keep = (size.offwidth, size.offheight)
     size.offwidth, size.offheight = max(width, keep[0]), max(height, keep[1])
@@ -263,4 +263,12 @@ def _close_at_exit() -> None:
 def close() -> None:
     """Frees all OpenGL contexts; the next picture makes new ones."""
     while _renderers:
-        _renderers.popitem()[1].close()
+        _free(_renderers.popitem()[1])
+
+
+def _free(renderer: mujoco.Renderer) -> None:
+    """Closes a renderer in its own context: in another's, OpenGL would free that one's buffers of the same numbers."""
+    context = getattr(renderer, "_gl_context", None)
+    if context is not None:
+        context.make_current()
+    renderer.close()
