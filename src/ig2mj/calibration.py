@@ -28,8 +28,9 @@ from ig2mj.worlds.random_streams import episode_keys
 SAFETY = {"warp": 1.5, "native": 2.0}
 """Factor on the measured peaks."""
 
-SHARE = 0.08
-"""Share of the loose objects that are dropped at the start of a round, on average: a few at once."""
+SHARE, AT_LEAST = 0.08, 3
+"""Share of the loose objects that are dropped at the start of a round, on average: a few at once. In small scenes as
+many as this, on average."""
 
 ROUND = 60
 """Control steps of a round; then every world starts afresh."""
@@ -106,7 +107,8 @@ class _Disturbance:
         return jnp.asarray(episode_keys(self.seed, worlds, jnp.full_like(worlds, round_number)))
 
     def drop(self, view, key: jax.Array):  # a Write
-        return perturb(self.scene.tables, self.loose, view, key, SHARE)
+        share = max(SHARE, min(1.0, AT_LEAST / max(1, len(self.loose))))
+        return perturb(self.scene.tables, self.loose, view, key, share)
 
     def controls(self, view, ctrl: jax.Array, key: jax.Array, step: jax.Array) -> jax.Array:
         if not self.pushes:
@@ -133,10 +135,10 @@ def _measure_native(scene: Scene, worlds: int, rounds: int, seed: int, progress:
             total = 0
             for w in range(worlds):
                 data = engine.to_mujoco(physics, w)[1]
-                peaks["awake_dofs"] = max(peaks["awake_dofs"], data.nv_awake)
-                peaks["constraints"] = max(peaks["constraints"], data.nefc)
+                peaks["awake_dofs"] = max(peaks["awake_dofs"], float(data.nv_awake))
+                peaks["constraints"] = max(peaks["constraints"], float(data.nefc))
                 total = max(total, data.ncon)
-            peaks["contacts"] = peaks["convex_contacts"] = max(peaks["contacts"], total)
+            peaks["contacts"] = peaks["convex_contacts"] = max(peaks["contacts"], float(total))
         progress(number + 1, rounds)
     return peaks
 

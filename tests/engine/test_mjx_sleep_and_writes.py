@@ -160,7 +160,7 @@ def test_a_world_that_is_not_there(small):
 
 def test_what_sleeps_still_touches(full, asleep):
     """Design section 2, fact 7: sleeping pairs have no contacts, so touching is remembered."""
-    physics, view = full.run(full.fresh(asleep), 2)
+    _, view = full.run(full.fresh(asleep), 2)
     assert not np.asarray(view.awake).any()
     for one, other, touch in [("box", "table", True), ("knife", "table", True), ("box", "knife", False)]:
         assert full.touches(view, one, other).tolist() == [touch] * 2

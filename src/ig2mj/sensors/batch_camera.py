@@ -22,9 +22,9 @@ from flax import struct
 from jaxtyping import Float, Int, UInt8
 from mujoco import mjx
 
-from ig2mj.engine.mjx_engine import MjxPhysics
+from ig2mj.engine.base import Engine
+from ig2mj.engine.mjx_engine import MjxEngine, MjxPhysics
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.engine.warp import WarpEngine
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
 from ig2mj.sensors.particle_slots import Slots, fill_slots
@@ -59,7 +59,7 @@ class BatchCamera:
 
     def __init__(
         self,
-        engine: WarpEngine,
+        engine: Engine,
         model: StateModel,
         cameras: Sequence[str],
         *,
@@ -88,10 +88,8 @@ class BatchCamera:
         Raises:
           EngineError: not the Warp engine, or nothing is to be made. UnknownNameError: no such camera.
         """
-        if getattr(engine, "name", "") != "warp":
-            raise EngineError(
-                f"the {getattr(engine, 'name', '?')} engine has no batched cameras (take the warp engine)"
-            )
+        if not isinstance(engine, MjxEngine) or engine.name != "warp":
+            raise EngineError(f"the {engine.name} engine has no batched cameras (take the warp engine)")
         if not (rgb or depth or segmentation) or not cameras or min(width, height) < 1:
             raise EngineError("a camera must have pixels and make at least one of rgb, depth and segmentation")
         self.engine, self.model = engine, model

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import os
 import pathlib
 import zipfile
 import zlib
+from collections.abc import Iterator
 from typing import Any, TypeVar
 
 import jax
@@ -82,16 +85,21 @@ def _name(keys: Any) -> str:
     return jax.tree_util.keystr(keys, simple=True, separator=".")
 
 
-def _open(file: str | os.PathLike) -> Any:
+@contextlib.contextmanager
+def _open(file: str | os.PathLike) -> Iterator[Any]:
+    """The archive, closed afterwards. Raises InputError."""
     try:
-        archive = np.load(file, allow_pickle=False)
+        stream = io.BytesIO(pathlib.Path(file).read_bytes())
     except OSError as e:
         raise InputError(file, f"cannot be read: {e.strerror or e}") from e
-    except (ValueError, EOFError, zipfile.BadZipFile) as e:
+    try:
+        archive = np.load(stream, allow_pickle=False)
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as e:
         raise InputError(file, f"is no npz archive: {e}") from e
     if not hasattr(archive, "files"):  # a single array
         raise InputError(file, "is no npz archive")
-    return archive
+    with archive:
+        yield archive
 
 
 def _header(archive: Any, file: str | os.PathLike) -> dict[str, Any]:

@@ -42,36 +42,40 @@ class Frames:
 
 @struct.dataclass
 class Recording:
-    """A ring of the last S control steps of all worlds. `written`: steps recorded so far."""
+    """A ring of the last S control steps of all worlds. `written`: steps recorded so far.
 
-    frames: Frames
+    `rings`: the arrays of `Frames`, in the order of its leaves, [S, W, ...]; `kind`: how they make up `Frames`.
+    """
+
+    rings: tuple[Array, ...]
     written: Int[Array, ""]
+    kind: Any = struct.field(pytree_node=False)
 
     @property
     def length(self) -> int:
-        return self.frames.physics.qpos.shape[0]
+        return self.rings[0].shape[0]
 
 
 def start_recording(engine: Engine, batch: Batch, length: int = LENGTH) -> Recording:
     """A recording whose first step is the present state."""
-    now = _now(engine, batch)
-    empty = jax.tree.map(lambda a: jnp.zeros((length, *a.shape), a.dtype), now)
-    return record(engine, Recording(empty, jnp.zeros((), jnp.int32)), batch)
+    leaves, kind = jax.tree.flatten(_now(engine, batch))
+    rings = tuple(jnp.zeros((length, *a.shape), a.dtype) for a in leaves)
+    return record(engine, Recording(rings, jnp.zeros((), jnp.int32), kind), batch)
 
 
 def record(engine: Engine, recording: Recording, batch: Batch) -> Recording:
     """Adds the present state, over the oldest one when full. Pure."""
     place = recording.written % recording.length
-    now = _now(engine, batch)
-    frames = jax.tree.map(lambda ring, a: ring.at[place].set(a), recording.frames, now)
-    return Recording(frames, recording.written + 1)
+    now = jax.tree.leaves(_now(engine, batch))
+    rings = tuple(ring.at[place].set(a) for ring, a in zip(recording.rings, now, strict=True))
+    return Recording(rings, recording.written + 1, recording.kind)
 
 
 def frames_of(recording: Recording, world: int) -> Frames:
     """The recorded steps of one world, oldest first: [T, ...]. On the host."""
     written, length = int(recording.written), recording.length
     order = np.arange(max(0, written - length), written) % length
-    return jax.tree.map(lambda a: np.asarray(a[:, world])[order], recording.frames)
+    return jax.tree.unflatten(recording.kind, [np.asarray(ring[:, world])[order] for ring in recording.rings])
 
 
 def save_dump(
@@ -131,4 +135,4 @@ def check_dump(file: str | os.PathLike, scene: str) -> dict[str, Any]:
 
 def _now(engine: Engine, batch: Batch) -> Frames:
     physics = jax.tree.map(jnp.asarray, engine.snapshot(batch.world.physics))
-    return Frames(dataclasses.replace(physics), batch.world.states)
+    return Frames(physics, jax.tree.map(jnp.asarray, batch.world.states))

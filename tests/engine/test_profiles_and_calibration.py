@@ -1,0 +1,107 @@
+"""Engine profiles: safe defaults, files, and measuring a home (issue, item 2)."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import engine_bench
+import msgspec
+import pytest
+
+import ig2mj
+from ig2mj import cli
+from ig2mj.calibration import ALIGN, SAFETY, calibrate
+from ig2mj.engine.profile import PROFILE_FILE, EngineProfile, default_profile, fit, load_profile, save_profile
+from ig2mj.engine.warp import WarpEngine
+from ig2mj.errors import EngineError, InputError
+
+PROFILE = EngineProfile(awake_dofs=12, constraints=64, contacts=16, convex_contacts=8, measured={"peak_contacts": 12.5})
+
+
+def test_a_profile_survives_its_file(tiny_home, tmp_path):
+    assert save_profile(PROFILE, tmp_path) == tmp_path / PROFILE_FILE
+    assert load_profile(tmp_path, tiny_home.model) == PROFILE
+
+
+def test_without_a_file_everything_fits(tiny_home, tmp_path):
+    profile = load_profile(tmp_path, tiny_home.model)
+    assert profile == default_profile(tiny_home.model)
+    assert profile.awake_dofs == tiny_home.model.nv
+    assert profile.constraints > 4 * profile.contacts >= 4 * 64
+
+
+def test_no_more_can_be_awake_than_there_is(tiny_home):
+    assert fit(msgspec.structs.replace(PROFILE, awake_dofs=10_000), tiny_home.model).awake_dofs == tiny_home.model.nv
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("awake", "is no engine profile"),
+        ("[]", "is no engine profile"),
+        ('{"awake_dofs": 12}', "missing required field `constraints`"),
+        ('{"awake_dofs": "x", "constraints": 1, "contacts": 1, "convex_contacts": 1}', "Expected `int`"),
+        (
+            '{"awake_dofs": 12, "constraints": 0, "contacts": 1, "convex_contacts": 1}',
+            "constraints: must be at least 1",
+        ),
+        ('{"awake_dofs": 12, "constraints": 9, "contacts": -4, "convex_contacts": 1}', "contacts: must be at least 1"),
+    ],
+)
+def test_a_broken_file_is_named_with_its_mend(tiny_home, tmp_path, text, says):
+    (tmp_path / PROFILE_FILE).write_text(text)
+    with pytest.raises(InputError) as caught:
+        load_profile(tmp_path, tiny_home.model)
+    message = str(caught.value)
+    assert says in message and str(tmp_path / PROFILE_FILE) in message and "ig2mj calibrate" in message
+
+
+def test_the_warp_engine_reads_the_file_beside_the_manifest(bench_folder, tmp_path):
+    folder = engine_bench.bench_home(bench_folder, True).folder
+    shutil.copytree(folder, tmp_path / "home")
+    scene = ig2mj.load_scene(tmp_path / "home")
+    assert WarpEngine(scene).profile == default_profile(scene.model)
+    save_profile(PROFILE, tmp_path / "home")
+    engine = WarpEngine(scene, 3)
+    assert engine.profile == PROFILE
+    data = engine._template
+    assert data._impl.contact__dist.shape == (3 * 16,) and data._impl.nvmax == 12
+
+
+def test_a_disturbed_home_is_measured_natively(tiny_home):
+    seen = []
+    profile = calibrate(tiny_home, engine="native", num_worlds=2, rounds=1, progress=lambda *a: seen.append(a))
+    assert seen == [(1, 1)]
+    peaks = profile.measured
+    assert 6 <= peaks["peak_awake_dofs"] <= tiny_home.model.nv
+    assert profile.awake_dofs <= tiny_home.model.nv
+    for name in ("constraints", "contacts"):
+        size, peak = getattr(profile, name), float(peaks[f"peak_{name}"])
+        assert peak > 0 and SAFETY["native"] * peak <= size < SAFETY["native"] * peak + ALIGN
+        assert size % ALIGN == 0
+    again = calibrate(tiny_home, engine="native", num_worlds=2, rounds=1)
+    assert again == profile, "the same seed measures the same"
+
+
+@pytest.mark.slow
+def test_the_warp_engine_measures_itself_and_fits_what_it_measured(bench_folder):
+    scene = engine_bench.bench_home(bench_folder, True)
+    profile = calibrate(scene, engine="warp", num_worlds=2, rounds=1)
+    assert profile.measured["engine"] == "warp" and float(profile.measured["peak_contacts"]) > 0
+    assert profile.constraints >= 4
+
+
+def test_only_two_engines_can_measure(tiny_home):
+    with pytest.raises(EngineError, match="there is no engine 'jax' to calibrate with"):
+        calibrate(tiny_home, engine="jax")
+
+
+def test_the_command_writes_the_file_beside_the_manifest(tiny_home_folder, tmp_path, capsys):
+    home = tmp_path / "home"
+    shutil.copytree(tiny_home_folder, home)
+    command = ["calibrate", str(home), "--engine", "native", "--worlds", "1", "--rounds", "1"]
+    assert cli.call([*command, "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out)
+    assert printed == json.loads((home / PROFILE_FILE).read_text())
+    assert printed["measured"]["worlds"] == 1

@@ -1,0 +1,245 @@
+"""Batched cameras: tints and particles of each world, depth and segmentation against MuJoCo (issue, item 7)."""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+
+import engine_bench
+import jax
+import mujoco
+import numpy as np
+import pytest
+
+from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.warp import WarpEngine
+from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.sensors.batch_camera import BatchCamera
+from ig2mj.sensors.particle_slots import fill_slots
+from ig2mj.sensors.render_model import make_render_model
+from ig2mj.sensors.tints import TINTS, tints
+from ig2mj.states import particles
+from ig2mj.states.initial import initial_states
+from ig2mj.states.model import StateModel
+
+WIDTH, HEIGHT = 48, 36
+
+
+@pytest.fixture(scope="session")
+def bench_folder(tmp_path_factory) -> pathlib.Path:
+    return tmp_path_factory.mktemp("bench")
+
+
+@pytest.fixture(scope="module")
+def scene(bench_folder):
+    return engine_bench.bench_home(bench_folder, False)
+
+
+@pytest.fixture(scope="module")
+def model(scene) -> StateModel:
+    return StateModel.of_manifest(scene.tables, scene.manifest)
+
+
+@pytest.fixture(scope="module")
+def view(scene):
+    engine = NativeEngine(scene, 2, threads=1)
+    return engine.view(engine.reset())
+
+
+def dusty(model, states, scene, worlds):
+    """Twenty particles of dust along the table's front edge."""
+    x = np.linspace(-0.4, 0.4, 20)
+    pos = np.stack([x, np.full(20, -0.25), np.full(20, 0.05)], -1)[None].astype(np.float32)
+    body = np.full((1, 20), scene.model.body("table").id, np.int32)
+    normal = np.tile(np.array([0, 0, 1], np.float32), (1, 20, 1))
+    dust, _ = particles.place(states.dust, 0, body, pos, normal, np.ones((1, 20), bool), 20, np.asarray(worlds))
+    return dataclasses.replace(states, dust=dust)
+
+
+def with_value(states, field: str, world: int, thing: int, value: float):
+    return dataclasses.replace(states, **{field: getattr(states, field).at[world, thing].set(value)})
+
+
+# Tints.
+
+
+def test_the_first_true_state_wins(model, scene):
+    """spec/states.md section 13: frozen, burnt, cooked, soaked, toggled on."""
+    box = scene.object_index("box")
+    assert [t.predicate.name for t in TINTS] == ["frozen", "burnt", "cooked", "soaked", "toggled_on"]
+    states = initial_states(model, 1)
+    assert not np.asarray(tints(model, states).on).any()
+    for field, value, weight, colour in (
+        ("wetness", 1e6, 0.5, (0, 0, 200 / 255)),
+        ("max_temperature", 100.0, 0.5, (139 / 255, 69 / 255, 19 / 255)),
+        ("max_temperature", 300.0, 0.8, (0, 0, 0)),
+        ("temperature", -30.0, 0.8, (1, 1, 1)),
+    ):
+        states = with_value(states, field, 0, box, value)
+        tint = tints(model, states)
+        assert np.asarray(tint.on)[0].tolist() == [name == "box" for name in scene.object_names]
+        assert float(tint.weight[0, box]) == pytest.approx(weight)
+        assert np.asarray(tint.colour)[0, box] == pytest.approx(colour)
+
+
+def test_a_switched_on_thing_is_brighter(tiny_home):
+    model = StateModel.of_manifest(tiny_home.tables, tiny_home.manifest)
+    stove = tiny_home.object_index("stove")
+    states = initial_states(model, 1)
+    states = dataclasses.replace(states, toggled=states.toggled.at[0, stove].set(True))
+    colour = tints(model, states).apply(np.array([[0.4, 0.8, 0.2]], np.float32), np.array([stove]))
+    assert np.asarray(colour)[0, 0] == pytest.approx([0.6, 1.0, 0.3])
+
+
+# Particles.
+
+
+def test_slots_hold_the_first_particles_that_are_there(model, scene, view):
+    states = dusty(model, initial_states(model, 2), scene, [False, True])
+    alive = np.array(states.dust.alive)
+    alive[1, 0, [0, 3]] = False
+    states = dataclasses.replace(states, dust=dataclasses.replace(states.dust, alive=alive))
+    slots = fill_slots(model, states, view, 16)
+    assert (np.asarray(slots.owner)[0] == -1).all() and (np.asarray(slots.pos)[0, :, 2] < -10).all()
+    assert (np.asarray(slots.owner)[1] == scene.object_index("table")).all()
+    x = np.asarray(slots.pos)[1, :, 0]
+    expected = np.delete(np.linspace(-0.4, 0.4, 20), [0, 3])[:16]
+    assert x == pytest.approx(expected, abs=1e-6)
+    assert np.asarray(slots.pos)[1, :, 2] == pytest.approx(0.4, abs=1e-6)
+    np.testing.assert_allclose(np.asarray(slots.rotation)[1, 0], np.eye(3), atol=1e-6)
+
+
+def test_slots_are_turned_to_the_surface(model, scene, view):
+    states = dusty(model, initial_states(model, 2), scene, [True, True])
+    normal = np.zeros((2, 1, 20, 3), np.float32)
+    normal[..., 2], normal[0, 0, 0], normal[0, 0, 1] = 1, [1, 0, 0], [0, 0, -1]
+    normal[0, 0, 2] = [0.6, 0.0, 0.8]
+    states = dataclasses.replace(states, dust=dataclasses.replace(states.dust, normal=normal))
+    axis = np.asarray(fill_slots(model, states, view, 20).rotation)[..., 2]
+    np.testing.assert_allclose(axis, normal[:, 0], atol=1e-5)
+
+
+def test_the_render_model_keeps_ids_and_moves_nothing(scene):
+    render = make_render_model(scene, 5)
+    assert (render.nv, render.nu, render.neq) == (0, 0, 0)
+    assert [render.geom(g).name for g in range(scene.model.ngeom)] == [
+        scene.model.geom(g).name for g in range(scene.model.ngeom)
+    ]
+    assert [render.camera(c).name for c in range(2)] == [scene.model.camera(c).name for c in range(2)]
+
+
+def test_a_home_with_keyframes_and_meshes_has_a_render_model(tiny_home):
+    assert make_render_model(tiny_home, 0).ngeom == tiny_home.model.ngeom
+
+
+# Pictures.
+
+
+@pytest.fixture(scope="module")
+def engine(scene) -> WarpEngine:
+    return WarpEngine(scene, 2)
+
+
+@pytest.fixture(scope="module")
+def physics(engine, scene):
+    return engine.reset()
+
+
+@pytest.fixture(scope="module")
+def shoot(engine, model, physics):
+    camera = BatchCamera(
+        engine, model, ["front", "hand/eye"], width=WIDTH, height=HEIGHT, depth=True, segmentation=True, particles=32
+    )
+    call = jax.jit(camera.__call__)
+    view = engine.view(physics)
+    return lambda states, now=physics: jax.tree.map(np.asarray, call(now, view, states))
+
+
+@pytest.mark.slow
+def test_a_cooked_object_changes_colour_in_its_world_only(shoot, model, scene):
+    plain = initial_states(model, 2)
+    before, after = shoot(plain), shoot(with_value(plain, "max_temperature", 1, scene.object_index("box"), 100.0))
+    assert before.rgb.dtype == np.uint8 and before.rgb.shape == (2, 2, HEIGHT, WIDTH, 3)
+    np.testing.assert_array_equal(before.rgb[0], after.rgb[0])
+    changed = (before.rgb[1] != after.rgb[1]).any(-1)
+    assert changed.any()
+    box = before.segmentation[1] == scene.object_index("box")
+    assert (changed <= box).all(), "nothing but the box"
+    colour = after.rgb[1][box & changed].astype(float)
+    assert (colour[:, 0] > colour[:, 2]).mean() > 0.9, "brown: more red than blue"
+
+
+@pytest.mark.slow
+def test_dust_is_seen_until_it_is_gone(shoot, model, scene):
+    plain = initial_states(model, 2)
+    clean, dirty = shoot(plain), shoot(dusty(model, plain, scene, [True, False]))
+    assert (clean.rgb[0, 1] != dirty.rgb[0, 1]).any(-1).sum() > 10
+    np.testing.assert_array_equal(clean.rgb[1], dirty.rgb[1])
+    dust = dusty(model, plain, scene, [True, False])
+    gone = dataclasses.replace(dust, dust=particles.remove(dust.dust, 0))
+    np.testing.assert_array_equal(shoot(gone).rgb, clean.rgb)
+    table = scene.object_index("table")
+    assert (dirty.segmentation[0, 1] == clean.segmentation[0, 1]).mean() > 0.95
+    assert (dirty.segmentation[0, 1][clean.rgb[0, 1].sum(-1) != dirty.rgb[0, 1].sum(-1)] == table).any()
+
+
+@pytest.mark.slow
+def test_depth_and_objects_are_mujocos(shoot, model, scene, engine, physics):
+    """Against MuJoCo's own rays through the pixels' centres: planar depth in metres."""
+    images = shoot(initial_states(model, 2))
+    host, data = engine.to_mujoco(physics, 0)
+    number = host.camera("front").id
+    eye, frame = data.cam_xpos[number], data.cam_xmat[number].reshape(3, 3)
+    half = np.tan(np.radians(host.cam_fovy[number]) / 2)
+    groups = np.array([1, 1, 1, 0, 0, 0], np.uint8)
+    owner = scene.tables.geom_object
+    wrong_depth = wrong_object = 0
+    for row in range(HEIGHT):
+        for column in range(WIDTH):
+            x = half * WIDTH / HEIGHT * (2 * (column + 0.5) / WIDTH - 1)
+            y = half * (1 - 2 * (row + 0.5) / HEIGHT)
+            ahead = frame @ (np.array([x, y, -1.0]) / np.linalg.norm([x, y, -1.0]))
+            geom = np.zeros(1, np.int32)
+            far = mujoco.mj_ray(host, data, eye, ahead, groups, 1, -1, geom)
+            depth = 0.0 if far < 0 else far * float(ahead @ -frame[:, 2])
+            seen = -1 if far < 0 else owner[geom[0]]
+            wrong_depth += abs(images.depth[0, 0, row, column] - depth) > 1e-3
+            wrong_object += images.segmentation[0, 0, row, column] != seen
+    assert wrong_depth <= 0.01 * WIDTH * HEIGHT and wrong_object <= 0.01 * WIDTH * HEIGHT, "edges only"
+    assert set(np.unique(images.segmentation)) >= {-1, scene.object_index("table"), scene.object_index("box")}
+
+
+@pytest.mark.slow
+def test_cameras_ride_on_their_bodies(shoot, model, engine):
+    """The hand's eye goes where the hand goes, in world 1 only."""
+    import jax.numpy as jnp
+
+    states = initial_states(model, 2)
+    snapshot = jax.tree.map(np.array, engine.snapshot(engine.reset()))
+    address = engine.scene.model.joint("hand_z").qposadr[0]
+    snapshot.qpos[1, address] = 0.15
+    moved = jax.jit(engine.load)(engine.reset(), jax.tree.map(jnp.asarray, snapshot))
+    before, after = shoot(states), shoot(states, moved)
+    np.testing.assert_array_equal(before.depth[0], after.depth[0])
+    np.testing.assert_array_equal(before.depth[1, 0], after.depth[1, 0])
+    middle = (HEIGHT // 2, WIDTH // 3)
+    assert after.depth[1, 1][middle] - before.depth[1, 1][middle] == pytest.approx(0.15, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("cameras", "options", "error", "says"),
+    [
+        (["frnt"], {}, UnknownNameError, "no camera is named 'frnt'; near matches: front"),
+        ([], {}, EngineError, "a camera must have pixels"),
+        (["front"], {"rgb": False}, EngineError, "a camera must have pixels"),
+        (["front"], {"width": 0}, EngineError, "a camera must have pixels"),
+    ],
+)
+def test_mistakes_are_typed(engine, model, cameras, options, error, says):
+    with pytest.raises(error, match=says):
+        BatchCamera(engine, model, cameras, **options)
+
+
+def test_other_engines_have_no_batched_cameras(scene, model):
+    with pytest.raises(EngineError, match="the native engine has no batched cameras"):
+        BatchCamera(NativeEngine(scene), model, ["front"])  # type: ignore[arg-type]

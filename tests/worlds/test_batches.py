@@ -1,0 +1,245 @@
+"""`Worlds`: episodes, resets from a pool, random streams, guards (issue, items 1, 3, 4 and 5)."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import engine_bench
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from ig2mj.engine.base import Write
+from ig2mj.engine.health import Overflow
+from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.profile import EngineProfile
+from ig2mj.engine.warp import WarpEngine
+from ig2mj.errors import EngineError
+from ig2mj.predicates.compile import compile_expression
+from ig2mj.states.initial import initial_states
+from ig2mj.states.model import StateModel
+from ig2mj.worlds import guards
+from ig2mj.worlds.batch import Worlds
+from ig2mj.worlds.guards import Flag
+from ig2mj.worlds.random_streams import episode_keys, pick_rows, step_keys
+
+
+@pytest.fixture(scope="module")
+def scene(bench_folder):
+    return engine_bench.bench_home(bench_folder, True)
+
+
+@pytest.fixture(scope="module")
+def model(scene) -> StateModel:
+    return StateModel.of_manifest(scene.tables, scene.manifest)
+
+
+def native(scene, model, count: int, pool=None, **more) -> Worlds:
+    return Worlds(NativeEngine(scene, count, threads=1), model, pool, **more)
+
+
+def box_x(batch, scene) -> np.ndarray:
+    return np.asarray(batch.world.view.object_pos)[:, scene.object_index("box"), 0]
+
+
+def teleport(worlds: Worlds, batch, name: str, pos, world: int):
+    """Puts an object somewhere in one world."""
+    engine, tables = worlds.engine, worlds.model.tables
+    mask = np.zeros((engine.num_worlds, tables.num_objects), bool)
+    at, turn = np.zeros((*mask.shape, 3), np.float32), np.zeros((*mask.shape, 4), np.float32)
+    index = tables.object_names.index(name)
+    mask[world, index], at[world, index], turn[..., 0] = True, pos, 1
+    physics = engine.write(batch.world.physics, Write(object_mask=mask, object_pos=at, object_quat=turn))
+    return dataclasses.replace(batch, world=dataclasses.replace(batch.world, physics=physics))
+
+
+# Random streams.
+
+
+def test_streams_belong_to_seed_world_and_episode():
+    world = jnp.arange(5)
+    few = np.asarray(episode_keys(3, world[:2], jnp.zeros(2, jnp.int32)))
+    many = np.asarray(episode_keys(3, world, jnp.zeros(5, jnp.int32)))
+    np.testing.assert_array_equal(few, many[:2])
+    assert len(np.unique(many, axis=0)) == 5
+    assert (many != np.asarray(episode_keys(3, world, jnp.ones(5, jnp.int32)))).any(1).all()
+    assert (many != np.asarray(episode_keys(4, world, jnp.zeros(5, jnp.int32)))).any(1).all()
+    steps = np.asarray(step_keys(jnp.asarray(many), jnp.arange(5)))
+    assert len(np.unique(np.concatenate([steps, many]), axis=0)) == 10
+
+
+def test_rows_are_picked_evenly():
+    key = episode_keys(0, jnp.arange(3000), jnp.zeros(3000, jnp.int32))
+    counts = np.bincount(np.asarray(pick_rows(key, 3)), minlength=3)
+    assert len(counts) == 3 and (np.abs(counts - 1000) < 100).all()
+
+
+# Episodes, natively.
+
+
+def test_an_episode_begins_with_a_row_of_the_pool(scene, model, bench_pool):
+    batch = native(scene, model, 8, bench_pool).start(seed=1)
+    row = np.round(10 * box_x(batch, scene)).astype(int)
+    assert 10 * box_x(batch, scene) == pytest.approx(row, abs=0.05)
+    assert set(row.tolist()) <= {-1, 0, 1} and len(set(row.tolist())) > 1
+    assert not np.asarray(batch.world.view.awake).any(), "settled states are asleep"
+    assert np.asarray(batch.world.step).tolist() == [0] * 8 and np.asarray(batch.episode).tolist() == [0] * 8
+
+
+def test_world_0_is_the_same_among_two_and_among_five(scene, model, bench_pool):
+    runs = []
+    for count in (2, 5):
+        worlds = native(scene, model, count, bench_pool)
+        batch = teleport(worlds, worlds.start(seed=7), "knife", [0.02, 0, 0.7], 0)
+        for _ in range(15):
+            batch, _ = worlds.step(batch)
+        batch = worlds.reset(batch, jnp.asarray(np.arange(count) == 0))
+        runs.append([np.asarray(leaf)[0] for leaf in jax.tree.leaves((batch.world.view, batch.world.states))])
+        runs[-1].append(np.asarray(batch.world.key)[0])
+    for one, other in zip(*runs, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_reset_touches_the_masked_worlds_only(scene, model, bench_pool):
+    worlds = native(scene, model, 3, bench_pool)
+    batch = worlds.start(seed=2)
+    for world in range(3):
+        batch = teleport(worlds, batch, "box", [0.0, 0.2, 0.46], world)
+    warm = dataclasses.replace(batch.world.states, temperature=batch.world.states.temperature + 50)
+    batch = dataclasses.replace(batch, world=dataclasses.replace(batch.world, states=warm))
+    for _ in range(3):
+        batch, _ = worlds.step(batch)
+    batch = worlds.reset(batch, jnp.array([False, True, False]))
+    assert np.asarray(batch.episode).tolist() == [0, 1, 0]
+    assert np.asarray(batch.world.step).tolist() == [3, 0, 3]
+    assert np.asarray(batch.world.time) == pytest.approx([0.1, 0.0, 0.1])
+    y = np.asarray(batch.world.view.object_pos)[:, scene.object_index("box"), 1]
+    assert y == pytest.approx([0.2, 0.0, 0.2], abs=1e-3)
+    heat = np.asarray(batch.world.states.temperature)[:, scene.object_index("box")]
+    assert heat[1] == pytest.approx(23.0) and (heat[[0, 2]] > 60).all()
+
+
+def test_without_a_pool_episodes_start_where_the_scene_does(scene, model):
+    values = initial_states(model, 1)
+    values = dataclasses.replace(values, wetness=values.wetness + 7)
+    worlds = native(scene, model, 2, initial_values=values)
+    batch = worlds.start()
+    assert (np.asarray(batch.world.states.wetness) == 7).all()
+    assert box_x(batch, scene) == pytest.approx(0.0)
+
+
+def test_the_goal_is_evaluated_after_the_step(scene, model, bench_pool):
+    goal = compile_expression(model, "(and (on_top box table) (on_top knife box))")
+    worlds = native(scene, model, 2, bench_pool, goal=goal)
+    batch = worlds.start()
+    place = np.asarray(batch.world.view.object_pos)[1, scene.object_index("box")]
+    batch = teleport(worlds, batch, "knife", place + np.array([0, 0, 0.0705]), 1)
+    for _ in range(20):
+        batch, verdict = worlds.step(batch)
+    assert np.asarray(verdict.holds).tolist() == [False, True]
+    assert np.asarray(verdict.fraction) == pytest.approx([0.5, 1.0])
+
+
+# Guards.
+
+
+def test_an_object_below_the_floor_is_flagged_once_and_put_right(scene, model, bench_pool):
+    worlds = native(scene, model, 3, bench_pool)
+    batch = teleport(worlds, worlds.start(), "box", [0, 0, -2.0], 1)
+    for _ in range(2):
+        batch, _ = worlds.step(batch)
+    assert np.asarray(batch.flags).tolist() == [0, int(Flag.FELL), 0]
+    assert worlds.metrics(batch) == {"episodes": 3, "overflow": 0, "not_finite": 0, "fell": 1, "too_fast": 0}
+    with pytest.raises(EngineError, match=r"^world 1: fell$"):
+        worlds.raise_flagged(batch)
+    batch = worlds.reset(batch, batch.flags != 0)
+    assert not np.asarray(batch.flags).any()
+    assert worlds.metrics(batch) == {"episodes": 4, "overflow": 0, "not_finite": 0, "fell": 1, "too_fast": 0}
+    batch, _ = worlds.step(batch)
+    assert not np.asarray(batch.flags).any()
+
+
+def test_an_object_shot_away_is_too_fast(scene, model):
+    worlds = native(scene, model, 2)
+    batch = worlds.start()
+    rows = worlds.engine.snapshot(batch.world.physics)
+    qvel = np.array(rows.qvel)
+    qvel[0, 2] = 25.0
+    physics = worlds.engine.load(batch.world.physics, dataclasses.replace(rows, qvel=qvel))
+    batch = dataclasses.replace(batch, world=dataclasses.replace(batch.world, physics=physics))
+    batch, _ = worlds.step(batch)
+    assert np.asarray(batch.flags).tolist() == [int(Flag.TOO_FAST), 0]
+
+
+def test_fixed_furniture_and_parked_halves_are_where_they_belong(tiny_home, home_model):
+    worlds = native(tiny_home, home_model, 1)
+    batch = worlds.start()
+    batch, _ = worlds.step(batch)
+    assert not np.asarray(batch.flags).any()
+
+
+def test_what_is_lost_names_the_setting_to_raise():
+    overflow = int(Overflow.NVMAX | Overflow.CCD | Overflow.ITERATIONS)
+    text = guards.explain(12, int(Flag.OVERFLOW), overflow)
+    assert text.startswith("world 12: overflow (CCD, NVMAX; raise awake_dofs, convex_contacts in engine_profile.json")
+    assert "ig2mj calibrate" in text and "ITERATIONS" not in text
+
+
+# Warp.
+
+
+@pytest.fixture(scope="module")
+def warp_worlds(scene, model, bench_pool) -> Worlds:
+    goal = compile_expression(model, "(on_top box table)")
+    return Worlds(WarpEngine(scene, 2), model, bench_pool, goal)
+
+
+@pytest.mark.slow
+def test_reset_inside_scan_with_autoreset(warp_worlds, scene):
+    """Issue, item 1: a step and its resets are pure functions that `lax.scan` runs; world 1 falls again and again."""
+
+    def body(batch, _):
+        batch, verdict = warp_worlds.step(batch)
+        flagged = batch.flags != 0
+        batch = warp_worlds.reset(batch, flagged | (batch.world.step >= 5))
+        return batch, (flagged, batch.world.step, verdict.holds)
+
+    batch = teleport(warp_worlds, warp_worlds.start(seed=3), "box", [0, 0, -2.0], 1)
+    batch, (flagged, steps, holds) = jax.jit(lambda b: jax.lax.scan(body, b, length=12))(batch)
+    assert np.asarray(flagged).T.tolist() == [[False] * 12, [True] + [False] * 11]
+    assert np.asarray(steps)[:, 0].tolist() == [1, 2, 3, 4, 0, 1, 2, 3, 4, 0, 1, 2]
+    assert np.asarray(steps)[:, 1].tolist() == [0, 1, 2, 3, 4, 0, 1, 2, 3, 4, 0, 1]
+    assert np.asarray(holds)[:, 0].all() and np.asarray(holds)[1:, 1].all() and not holds[0, 1]
+    assert np.asarray(batch.episode).tolist() == [2, 3]
+    assert warp_worlds.metrics(batch)["fell"] == 1
+
+
+@pytest.mark.slow
+def test_a_state_that_is_not_finite_is_flagged_in_its_world(warp_worlds):
+    batch = warp_worlds.start()
+    rows = warp_worlds.engine.snapshot(batch.world.physics)
+    rows = jax.tree.map(np.array, rows)
+    rows.qvel[1, 0], rows.tree_asleep[1] = np.nan, -11
+    physics = jax.jit(warp_worlds.engine.load)(batch.world.physics, rows)
+    batch = dataclasses.replace(batch, world=dataclasses.replace(batch.world, physics=physics))
+    batch, _ = jax.jit(warp_worlds.step)(batch)
+    assert np.asarray(batch.flags).tolist() == [0, int(Flag.NOT_FINITE)]
+    batch = jax.jit(warp_worlds.reset)(batch, batch.flags != 0)
+    batch, _ = jax.jit(warp_worlds.step)(batch)
+    assert not np.asarray(batch.flags).any(), "the pool's row replaces all that was not a number"
+
+
+@pytest.mark.slow
+def test_buffers_that_are_too_small_are_flagged(scene, model, bench_pool):
+    """Issue, item 3. One contact has no room for its constraint rows where there are four corners on the table."""
+    tiny = EngineProfile(awake_dofs=12, constraints=4, contacts=16, convex_contacts=16)
+    engine = WarpEngine(scene, 1, profile=tiny, initial=jax.tree.map(lambda a: np.asarray(a[0]), bench_pool.physics))
+    worlds = Worlds(engine, model, bench_pool)
+    batch = teleport(worlds, worlds.start(), "box", [0, 0, 0.4495], 0)
+    batch, _ = jax.jit(worlds.step)(batch)
+    assert np.asarray(batch.flags).tolist() == [int(Flag.OVERFLOW)]
+    with pytest.raises(EngineError, match=r"world 0: overflow \(NEFC; raise constraints in engine_profile.json"):
+        worlds.raise_flagged(batch)
+    batch = jax.jit(worlds.reset)(batch, batch.flags != 0)
+    assert not np.asarray(batch.world.physics.overflow).any() and not np.asarray(batch.flags).any()

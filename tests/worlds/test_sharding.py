@@ -1,0 +1,85 @@
+"""Worlds on two devices: the same as on one (issue, item 6). Runs in a process that has two CPU devices."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import engine_bench
+import pytest
+
+from ig2mj.engine.native import NativeEngine
+from ig2mj.errors import EngineError
+from ig2mj.states.model import StateModel
+from ig2mj.worlds.batch import Worlds
+from ig2mj.worlds.sharding import ShardedWorlds
+
+SCRIPT = """
+import json, sys
+import jax, jax.numpy as jnp, numpy as np
+import ig2mj
+from ig2mj.engine.jax import JaxEngine
+from ig2mj.engine.warp import WarpEngine
+from ig2mj.states.model import StateModel
+from ig2mj.predicates.compile import compile_expression
+from ig2mj.worlds.batch import Worlds
+from ig2mj.worlds.sharding import ShardedWorlds
+
+scene = ig2mj.load_scene(sys.argv[1])
+kind = {"jax": JaxEngine, "warp": WarpEngine}[sys.argv[2]]
+model = StateModel.of_manifest(scene.tables, scene.manifest)
+goal = compile_expression(model, "(on_top box table)")
+out = {"devices": len(jax.devices())}
+for name, devices in (("one", jax.devices()[:1]), ("two", jax.devices()[:2])):
+    worlds = ShardedWorlds(lambda count: Worlds(kind(scene, count), model, None, goal), 2, devices)
+    batch = worlds.start(seed=4)
+    for _ in range(3):
+        batch, verdict = worlds.step(batch)
+    batch = worlds.reset(batch, worlds.place(jnp.array([False, True])))
+    batch, verdict = worlds.step(batch)
+    out[name] = {
+        "pos": np.asarray(batch.world.view.object_pos).tolist(),
+        "key": np.asarray(batch.world.key).tolist(),
+        "number": np.asarray(batch.number).tolist(),
+        "episode": np.asarray(batch.episode).tolist(),
+        "holds": np.asarray(verdict.holds).tolist(),
+        "on": len(batch.world.view.object_pos.sharding.device_set),
+    }
+print("RESULT" + json.dumps(out))
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("engine", ["warp"])
+def test_two_devices_give_what_one_gives(bench_folder, engine, request):
+    scene = engine_bench.bench_home(bench_folder, True)
+    flags = "--xla_force_host_platform_device_count=2 --xla_cpu_multi_thread_eigen=false"
+    environment = {**os.environ, "JAX_PLATFORMS": "cpu", "XLA_FLAGS": flags}
+    command = [sys.executable, "-c", SCRIPT, str(scene.folder), engine]
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, cwd=Path.cwd())
+    assert done.returncode == 0, done.stderr[-3000:]
+    result = json.loads(done.stdout.split("RESULT")[1])
+    one, two = result["one"], result["two"]
+    assert result["devices"] == 2 and one.pop("on") == 1 and two.pop("on") == 2
+    assert two["number"] == [0, 1] and two["episode"] == [0, 1]
+    assert one == two, "to the last digit"
+
+
+def make(scene):
+    model = StateModel.of_manifest(scene.tables, scene.manifest)
+    return lambda count: Worlds(NativeEngine(scene, count, threads=1), model)
+
+
+def test_worlds_must_divide_evenly(bench_folder):
+    scene = engine_bench.bench_home(bench_folder, True)
+    with pytest.raises(EngineError, match="3 worlds cannot be shared by 2 devices"):
+        ShardedWorlds(make(scene), 3, ["a", "b"])
+
+
+def test_the_native_engine_cannot_be_shared_out(bench_folder):
+    scene = engine_bench.bench_home(bench_folder, True)
+    with pytest.raises(EngineError, match="the native engine has no devices"):
+        ShardedWorlds(make(scene), 2)
