@@ -1,4 +1,4 @@
-"""The made home of benchmarks with abilities, so that every extended state has work to do, and a goal of ten literals."""
+"""The made home of benchmarks with abilities for every extended state, and a goal of ten literals."""
 
 from __future__ import annotations
 

@@ -83,6 +83,26 @@ def test_every_step_is_bitwise_the_same(options):
         assert short > 5
 
 
+def test_a_settled_world_is_left_alone_and_a_cooling_one_is_not():
+    model = HOME.model()
+    stepper = StateStepper(StateProgram(model, compile_expression(model, "(cooked fish)")))
+    states = _start(model)
+    for _ in range(3):
+        states, _, _ = stepper.step(states, VIEWS[0])
+    again, _, verdict = stepper.step(states, VIEWS[0])
+    assert again is states and not verdict.holds[0]
+    states = states.replace(temperature=states.temperature.at[0, 1].set(80.0))
+    for _ in range(3):
+        cooler, _, verdict = stepper.step(states, VIEWS[0])
+        assert cooler.temperature[0, 1] < states.temperature[0, 1] and verdict.holds[0]
+        states = cooler
+    # Near 23 C single precision comes to rest, and is noticed.
+    states = states.replace(temperature=states.temperature.at[0, 1].set(23.00001))
+    for _ in range(70):
+        before, (states, _, _) = states, stepper.step(states, VIEWS[0])
+    assert states is before
+
+
 def test_states_changed_from_outside_are_seen():
     model = HOME.model()
     goal = compile_expression(model, "(toggled_on oven)")

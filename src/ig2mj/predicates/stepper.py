@@ -2,12 +2,13 @@
 
 `ig2mj.states.update` computes everything for all worlds in every step, which is right where thousands of worlds run on
 a device. One world beside the native engine mostly lies still, and there even an operation on nothing costs
-microseconds. So the work is cut in two, with the same functions and bitwise the same results:
+microseconds. So the work is cut up, with the same functions and bitwise the same results:
 
 - the whole step, where the view or the states are others than those of the last step, or the last step changed more
   than temperatures. Relations come from a memo (`ig2mj.states.relations`).
 - temperatures and what follows from them, where the view and the states are the very objects of the last step, and
   that step changed nothing else: then neither would this one.
+- nothing, where that step did not change temperatures either.
 
 Arrays that a step hands through are not given to XLA as results at all, which would copy them.
 
@@ -17,10 +18,12 @@ Axes: W worlds, O objects, S heat sources, I facts.
 from __future__ import annotations
 
 import dataclasses
+import os
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float
 
@@ -31,6 +34,20 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.relations import Memo, RelationPlan
 from ig2mj.states.update import events, heat, queries
 from ig2mj.states.world import ExtendedStates, Swap
+
+
+def run_inline() -> None:
+    """Makes JAX run small CPU programs in the calling thread, for the rest of the process.
+
+    By default it hands them to another thread, which costs more than a step of the states takes. Has an effect only
+    before JAX is first used; does nothing where the user has decided (JAX_CPU_ENABLE_ASYNC_DISPATCH).
+    """
+    if "JAX_CPU_ENABLE_ASYNC_DISPATCH" not in os.environ:
+        jax.config.update("jax_cpu_enable_async_dispatch", False)
+
+
+LOOK_EVERY = 30
+"""Steps of temperatures between two looks whether they still change; a look costs microseconds."""
 
 
 class Step(NamedTuple):
@@ -46,13 +63,13 @@ class _Kept:
     """What the next step may go on with.
 
     Attributes:
-      acts: source on object. facts: of the goal. flags: whether the step changed nothing but temperatures, and whether
-      it asks for teleports. memo: of relations.
+      acts: source on object. facts: of the goal. flags: whether the step changed nothing but temperatures, whether it
+      asks for teleports, and whether it changed no temperature. memo: of relations.
     """
 
     acts: Bool[Array, "W O S"]
     facts: Bool[Array, "W I"]
-    flags: Bool[Array, "2"]
+    flags: Bool[Array, "3"]
     memo: Memo
 
 
@@ -84,7 +101,8 @@ class StateProgram:
         if self.goal is not None:
             facts = self.goal.literals.facts(self.goal.context(new, view, relations))
         cuts = swap.mask.shape[1] > 0
-        flags = jnp.stack([jnp.all(jnp.array(same)), jnp.any(swap.mask)])
+        cold = jnp.all(new.temperature == after.temperature) & jnp.all(new.max_temperature == after.max_temperature)
+        flags = jnp.stack([jnp.all(jnp.array(same)), jnp.any(swap.mask), cold])
         verdict = self.goal.verdict_of(facts, new) if self.goal else None
         leaves = jax.tree.leaves(new)
         self.changed = [i for i, (a, b) in enumerate(zip(before, leaves, strict=True)) if a is not b]
@@ -120,21 +138,37 @@ class StateStepper:
         self._view: PhysicsView | None = None
         self._states: ExtendedStates | None = None
         self._kept: _Kept | None = None
+        self._verdict: Verdict | None = None
+        self._settled = False
+        self._heat_steps = 0
 
     def step(self, states: ExtendedStates, view: PhysicsView) -> Step:
         """One control step: `view` is physics after it."""
         if view is self._view and states is self._states and self._kept is not None:
-            warm, hottest, verdict = self.program.heat(
-                states.temperature, states.max_temperature, states.sliced, self._kept.acts, self._kept.facts
-            )
-            self._states = dataclasses.replace(states, temperature=warm, max_temperature=hottest)
-            return Step(self._states, None, verdict)
+            if not self._settled:
+                self._heat(states, self._kept)
+            assert self._states is not None
+            return Step(self._states, None, self._verdict)
+        return self._everything(states, view)
+
+    def _heat(self, states: ExtendedStates, kept: _Kept) -> None:
+        warm, hottest, self._verdict = self.program.heat(
+            states.temperature, states.max_temperature, states.sliced, kept.acts, kept.facts
+        )
+        if self._heat_steps % LOOK_EVERY == 0:
+            before, after = jax.device_get(((states.temperature, states.max_temperature), (warm, hottest)))
+            self._settled = all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
+        self._heat_steps += 1
+        self._states = dataclasses.replace(states, temperature=warm, max_temperature=hottest)
+
+    def _everything(self, states: ExtendedStates, view: PhysicsView) -> Step:
         found, swap, verdict, kept = self.program.whole(states, view, self._memo)
         leaves, structure = jax.tree.flatten(states)
         for place, leaf in zip(self.program.changed, found, strict=True):
             leaves[place] = leaf
         new = jax.tree.unflatten(structure, leaves)
-        quiet, swapped = jax.device_get(kept.flags)
-        self._memo, self._view, self._states = kept.memo, view, new
+        quiet, swapped, self._settled = jax.device_get(kept.flags).tolist()
+        self._memo, self._view, self._states, self._verdict = kept.memo, view, new, verdict
+        self._heat_steps = 0
         self._kept = kept if quiet and not self.program.model.options.contact_heat_rate else None
         return Step(new, swap if swapped else None, verdict)

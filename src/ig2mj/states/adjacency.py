@@ -70,20 +70,6 @@ class AdjacencyPairs:
         """Whether the target is on the positive and on the negative side, for each of `HORIZONTAL_LINES`."""
         return self._lines(view, HORIZONTAL_LINES, HORIZONTAL_LENGTH)
 
-    def inside(self, view: PhysicsView) -> Bool[Array, "W P"]:
-        """Whether two orthogonal axes through the object's centre of mass meet the target on both sides.
-
-        Either the vertical and any horizontal axis, or both axes of one of the four planes (table A.1, Inside; iGibson
-        asks beforehand that the centre is in the target's box, which follows from this for an exact box).
-        """
-        lines = np.concatenate([HORIZONTAL_LINES, VERTICAL_LINE])
-        across, upright = HORIZONTAL_LENGTH[self._compat], VERTICAL_LENGTH[self._compat]
-        lengths = np.array([across] * len(HORIZONTAL_LINES) + [upright], np.float32)
-        positive, negative = self._enter(view, lines, lengths)
-        both = positive & negative
-        planes = both[..., 0:4] & both[..., 4:8]
-        return (both[..., 8] & jnp.any(both[..., :8], axis=-1)) | jnp.any(planes, axis=-1)
-
     @property
     def _compat(self) -> str:
         return self.model.options.compat

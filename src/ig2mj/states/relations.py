@@ -25,6 +25,7 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.states.adjacency import AdjacencyPairs
+from ig2mj.states.containment import ContainerPairs
 from ig2mj.states.model import StateModel
 from ig2mj.states.nearness import NearPairs, boxes_near
 
@@ -102,9 +103,10 @@ class RelationPlan:
         return {kind: {pair: i for i, pair in enumerate(pairs)} for kind, pairs in self.pairs.items()}
 
     @functools.cached_property
-    def _work(self) -> dict[Kind, AdjacencyPairs | NearPairs]:
+    def _work(self) -> dict[Kind, AdjacencyPairs | ContainerPairs | NearPairs]:
+        make = {"inside": ContainerPairs, "near": NearPairs}
         return {
-            kind: (NearPairs if kind == "near" else AdjacencyPairs).build(self.model, np.array(pairs, int))
+            kind: make.get(kind, AdjacencyPairs).build(self.model, np.array(pairs, int))
             for kind, pairs in self.pairs.items()
             if pairs
         }
@@ -120,7 +122,7 @@ class RelationPlan:
 
     def evaluate(self, view: PhysicsView) -> Relations:
         """All answers, computed now."""
-        values = {kind: self._gate(kind, view)[..., None] & self._compute(kind, view) for kind in self._work}
+        values = {kind: self._compute(kind, view, self._gate(kind, view)) for kind in self._work}
         return Relations(self, self._padded(values, view))
 
     def evaluate_changed(self, view: PhysicsView, memo: Memo) -> tuple[Relations, Memo]:
@@ -133,22 +135,25 @@ class RelationPlan:
             needed = changed & self._gate(kind, view)
             computed = jax.lax.cond(
                 jnp.any(needed),
-                lambda kind=kind: self._compute(kind, view),
+                lambda kind=kind, needed=needed: self._compute(kind, view, needed),
                 lambda kind=kind: jnp.zeros(memo.values[kind].shape, bool),
             )
-            values[kind] = jnp.where(changed[..., None], needed[..., None] & computed, memo.values[kind])
+            values[kind] = jnp.where(changed[..., None], computed, memo.values[kind])
         return Relations(self, self._padded(values, view)), Memo(inputs, values)
 
-    def _compute(self, kind: Kind, view: PhysicsView) -> Bool[Array, "W P V"]:
+    def _compute(self, kind: Kind, view: PhysicsView, needed: Bool[Array, "W P"]) -> Bool[Array, "W P V"]:
+        """Answers where they are needed, false elsewhere."""
         work = self._work[kind]
+        if isinstance(work, ContainerPairs):
+            return work.inside(view, needed)[..., None]
         if isinstance(work, NearPairs):
-            return work.near(view)[..., None]
-        if kind == "inside":
-            return work.inside(view)[..., None]
-        if kind == "vertical":
-            return jnp.stack(work.vertical(view), axis=-1)
-        positive, negative = work.horizontal(view)
-        return jnp.any(positive | negative, axis=-1)[..., None]
+            values = work.near(view)[..., None]
+        elif kind == "vertical":
+            values = jnp.stack(work.vertical(view), axis=-1)
+        else:
+            positive, negative = work.horizontal(view)
+            values = jnp.any(positive | negative, axis=-1)[..., None]
+        return needed[..., None] & values
 
     def _gate(self, kind: Kind, view: PhysicsView) -> Bool[Array, "W P"]:
         """Cheap necessary conditions from world boxes: false means that the answer is no."""

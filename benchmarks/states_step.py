@@ -1,0 +1,167 @@
+"""What extended states and a goal of ten literals cost, beside physics.
+
+    python benchmarks/states_step.py [--objects 60] [--worlds 64 512] [--json FILE]
+
+One world beside the native engine (microseconds per control step, on one core): everything asleep; one thing that
+moves; the same without states. Many worlds (microseconds per world and step of the one jitted function that also runs
+on a GPU).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+import platform
+import tempfile
+import time
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+import msgspec
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.table import Table
+from stateful_home import GOAL, write_stateful_home
+
+import ig2mj
+from ig2mj.engine.native import NativeEngine
+from ig2mj.predicates import compile_expression
+from ig2mj.predicates.stepper import StateProgram, StateStepper, run_inline
+from ig2mj.states import RelationPlan, StateModel, initial_states, queries, update
+
+SETTLE_STEPS = 200
+"""Control steps given to the home to come to rest."""
+
+TURN = 0.05
+"""Seconds of one turn of a measurement; the best of many turns counts, for other work only ever slows one."""
+
+
+@dataclasses.dataclass
+class Args:
+    """What to measure."""
+
+    objects: int = 60
+    """Number of objects of the home made for the benchmark."""
+    worlds: tuple[int, ...] = (64, 512)
+    """Numbers of worlds of the batched cases."""
+    seconds: float = 3.0
+    """Time spent on each figure."""
+    json: pathlib.Path | None = None
+    """Where to write the figures as JSON."""
+
+
+@dataclasses.dataclass
+class Row:
+    """One figure: microseconds per control step and world."""
+
+    case: str
+    microseconds: float
+
+
+def best(actions: dict[str, Callable[[], object]], seconds: float) -> list[Row]:
+    """Microseconds per call of each action, in turns."""
+    found = dict.fromkeys(actions, float("inf"))
+    for action in actions.values():
+        action()
+    for _ in range(max(3, round(seconds / TURN))):
+        for name, action in actions.items():
+            count, start = 0, time.perf_counter()
+            while (passed := time.perf_counter() - start) < TURN:
+                action()
+                count += 1
+            found[name] = min(found[name], 1e6 * passed / count)
+    return [Row(name, value) for name, value in found.items()]
+
+
+def one_world(scene: ig2mj.Scene, model: StateModel, seconds: float) -> list[Row]:
+    """Beside the native engine."""
+    goal = compile_expression(model, GOAL)
+    program = StateProgram(model, goal)
+    engine = NativeEngine(scene)
+    physics = engine.reset()
+    for _ in range(SETTLE_STEPS):
+        physics, view = engine.step(physics)
+    loose = np.flatnonzero(~scene.tables.object_fixed)
+    moved = [jax.tree.map(np.copy, view) for _ in range(2)]
+    moved[1].object_com[0, loose[0]] += 1e-3  # one thing moves a millimetre, back and forth
+    moved[1].body_pos[0, scene.tables.object_root[loose[0]]] += 1e-3
+
+    still, moving, beside = (Stepped(program, model) for _ in range(3))
+
+    def with_physics() -> None:
+        nonlocal physics
+        physics, now = engine.step(physics)
+        beside.step(now)
+
+    def physics_alone() -> None:
+        nonlocal physics
+        physics, _ = engine.step(physics)
+
+    return best(
+        {
+            "native engine with view, asleep": physics_alone,
+            "the same with states and goal": with_physics,
+            "states and goal, nothing moves": lambda: still.step(view),
+            "states and goal, one thing moves": lambda: moving.step(moved[moving.count % 2]),
+        },
+        seconds,
+    )
+
+
+class Stepped:
+    """States that go on from step to step; every step waits for its verdict."""
+
+    def __init__(self, program: StateProgram, model: StateModel):
+        self.stepper, self.states, self.count = StateStepper(program), initial_states(model, 1), 0
+
+    def step(self, view: ig2mj.engine.view.PhysicsView) -> bool:
+        self.states, _, verdict = self.stepper.step(self.states, view)
+        self.count += 1
+        assert verdict is not None
+        return bool(np.asarray(verdict.holds)[0])
+
+
+def many_worlds(scene: ig2mj.Scene, model: StateModel, worlds: int, seconds: float) -> Row:
+    """The one function of a batch: relations, states, goal."""
+    goal = compile_expression(model, GOAL)
+    plan = RelationPlan.build(model, [*queries(model), *goal.queries])
+    engine = NativeEngine(scene)
+    view = jax.tree.map(lambda leaf: jnp.repeat(jnp.asarray(leaf), worlds, axis=0), engine.view(engine.reset()))
+
+    @jax.jit
+    def step(states, view):
+        relations = plan.evaluate(view)
+        states, swap = update(model, states, view, relations)
+        return states, goal.verdict(states, view, relations), swap
+
+    states = initial_states(model, worlds)
+    (row,) = best({f"{worlds} worlds in one function": lambda: jax.block_until_ready(step(states, view))}, seconds)
+    return Row(row.case, row.microseconds / worlds)
+
+
+def main(args: Args) -> None:
+    run_inline()
+    with tempfile.TemporaryDirectory() as folder:
+        scene = ig2mj.load_scene(write_stateful_home(pathlib.Path(folder) / "home", args.objects))
+    model = StateModel.of_manifest(scene.tables, scene.manifest)
+    rows = one_world(scene, model, args.seconds)
+    rows += [many_worlds(scene, model, count, args.seconds) for count in args.worlds]
+    table = Table(title=f"{args.objects} objects, goal of 10 literals, {jax.devices()[0].device_kind}")
+    table.add_column("case")
+    table.add_column("us per world and step", justify="right")
+    for row in rows:
+        table.add_row(row.case, f"{row.microseconds:.1f}")
+    Console().print(table)
+    if args.json is not None:
+        machine = {
+            "machine": platform.processor() or platform.machine(),
+            "jax": jax.__version__,
+            "objects": args.objects,
+        }
+        args.json.write_bytes(msgspec.json.encode({**machine, "rows": [dataclasses.asdict(r) for r in rows]}))
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Args, description=__doc__))
