@@ -12,13 +12,15 @@ import numpy as np
 from ig2mj.demos.kitchen import Kitchen
 from ig2mj.demos.temperature_log import Moment
 from ig2mj.simulation import Simulation
-from ig2mj.viewer.offscreen import FreeView
+from ig2mj.viewer.offscreen import FreeView, default_backend
 
 if TYPE_CHECKING:
     from PIL import Image, ImageDraw, ImageFont
 
 GLASS = 0.15
 """Opacity of the fridge's doors in these pictures."""
+HIDDEN_GROUP = 5
+"""A geom group that no picture shows (`ig2mj.viewer.offscreen.VISIBLE_GROUPS`)."""
 
 
 class KitchenCameras:
@@ -39,19 +41,21 @@ class KitchenCameras:
         return self._world.render(self._stove, width=width, height=height)
 
     def milk(self, width: int, height: int) -> np.ndarray:
-        """uint8 [height, width, 3]: the fridge as if its closed doors were of glass."""
+        """uint8 [height, width, 3]: the fridge as if its closed doors were of glass, or not there without OpenGL."""
         with self._glass():
             return self._world.render(self._milk, width=width, height=height)
 
     @contextlib.contextmanager
     def _glass(self) -> Iterator[None]:
         model = self._world.model
-        keep = model.geom_rgba[self._doors].copy()
+        colour, group = model.geom_rgba[self._doors], model.geom_group[self._doors]  # copies
         model.geom_rgba[self._doors, 3] = GLASS
+        if default_backend() == "warp":  # knows no transparency
+            model.geom_group[self._doors] = HIDDEN_GROUP
         try:
             yield
         finally:
-            model.geom_rgba[self._doors] = keep
+            model.geom_rgba[self._doors], model.geom_group[self._doors] = colour, group
 
 
 class MomentSheet:
