@@ -102,3 +102,20 @@ def test_a_simulation_is_one_world(tiny_home):
     with pytest.raises(EngineError, match="the engine has 2"):
         ig2mj.Simulation(tiny_home, NativeEngine(tiny_home, 2))
     assert ig2mj.Simulation(tiny_home, NativeEngine(tiny_home, substeps=1)).engine.substeps == 1
+
+
+def test_a_simulation_goes_on_from_a_world_of_a_batch(tiny_home):
+    """How one looks at world 1 of many: `engine.export(world)`."""
+    engine = NativeEngine(tiny_home, 2)
+    physics = engine.reset()
+    for _ in range(3):
+        physics, view = engine.step(physics)
+    states = ig2mj.Simulation(tiny_home).states
+    wet = states.replace(wetness=states.wetness + 4)
+    simulation = ig2mj.Simulation.from_snapshot(tiny_home, engine.export(physics, 1), wet)
+    assert simulation.time == pytest.approx(0.1)
+    np.testing.assert_array_equal(simulation.view.object_pos[0], view.object_pos[1])
+    assert (np.asarray(simulation.states.wetness) == 4).all()
+    simulation.step(count=5)
+    simulation.reset()
+    np.testing.assert_array_equal(simulation.view.object_pos[0], view.object_pos[1])

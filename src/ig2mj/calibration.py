@@ -102,7 +102,7 @@ class _Disturbance:
         self.home = np.array(model.body_pos[scene.tables.agent_body[0]]) if self.pushes else np.zeros(3)
         self.seconds = engine.substeps * engine.timestep
 
-    def key(self, round_number: int) -> jax.Array:
+    def key(self, round_number: int | jax.Array) -> jax.Array:
         worlds = jnp.arange(self.engine.num_worlds)
         return jnp.asarray(episode_keys(self.seed, worlds, jnp.full_like(worlds, round_number)))
 

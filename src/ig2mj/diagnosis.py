@@ -204,18 +204,14 @@ def cache_checks(warp: dict[str, Any]) -> list[Check]:
     folders = {"ig2mj (decompositions)": (own, "IG2MJ_CACHE_DIR")}
     if "cache" in warp:
         folders["Warp (compiled kernels)"] = (warp["cache"], "WARP_CACHE_PATH")
-    jax = os.environ.get("JAX_COMPILATION_CACHE_DIR")
-    if jax:
-        folders["JAX (compiled programs)"] = (jax, "JAX_COMPILATION_CACHE_DIR")
+    jax = os.environ.get("JAX_COMPILATION_CACHE_DIR") or str(pathlib.Path(own) / "jax")
+    folders["JAX (compiled programs)"] = (jax, "JAX_COMPILATION_CACHE_DIR")
     checks = []
     for name, (folder, variable) in folders.items():
         path = pathlib.Path(folder).expanduser()
         ok = _writable(path)
         found = f"{path}: {_size(path)}" + ("" if ok else ", not writable")
         checks.append(Check("caches", name, ok, found, mend="" if ok else f"export {variable}=<a folder of yours>"))
-    if not jax:
-        text = "none: programs are compiled anew in every process"
-        checks.append(Check("caches", "JAX (compiled programs)", True, text))
     return checks
 
 

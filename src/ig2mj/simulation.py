@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ig2mj.engine.base import Engine, Write
+from ig2mj.engine.base import Engine, Snapshot, Write
 from ig2mj.engine.registry import make_engine
 from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import EngineError, PoseError, UnknownNameError
@@ -17,6 +17,7 @@ from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.simulation_states import SimulationStates
 from ig2mj.states.model import DEFAULTS
 from ig2mj.states.options import StateOptions
+from ig2mj.states.world import ExtendedStates
 
 Vector = Sequence[float | int] | np.ndarray
 
@@ -53,6 +54,31 @@ class Simulation(SimulationStates):
         self.physics = self.engine.reset()
         self._initial = self.engine.export(self.physics, 0)
         self._start_states(states, seed)
+
+    @classmethod
+    def from_snapshot(
+        cls, scene: Scene, snapshot: Snapshot, states: ExtendedStates | None = None, **options: Any
+    ) -> Simulation:
+        """Goes on, on the native engine, from a world of another one: how to look at world 1,234 of a batch.
+
+            Simulation.from_snapshot(scene, engine.export(batch.world.physics, 1234)).launch_viewer()
+
+        Args:
+          scene: that the world belongs to, with its agents.
+          snapshot: without the world axis. `reset` comes back to it, with the scene's first states.
+          states: extended states of that world, with a world axis of length 1; None: as the scene starts.
+          options: as of the constructor.
+
+        Raises:
+          EngineError: the snapshot is of another scene.
+        """
+        simulation = cls(scene, **options)
+        simulation.physics = simulation.engine.load(simulation.physics, snapshot)
+        simulation._initial = simulation.engine.export(simulation.physics, 0)
+        if states is not None:
+            assert simulation.states is not None  # made at the first question
+            simulation._states = states
+        return simulation
 
     @property
     def time(self) -> float:

@@ -36,9 +36,9 @@ def run(
     from rich.table import Table
 
     from ig2mj.agents.floating_hand import add_floating_hand
+    from ig2mj.calibration import calibrate
     from ig2mj.engine.profile import default_profile, save_profile
     from ig2mj.scene.scene import load_scene
-    from ig2mj.calibration import calibrate
 
     loaded = load_scene(scene, [add_floating_hand] if hand else [])
     with Progress(console=Console(stderr=True), transient=True) as bar:

@@ -132,6 +132,7 @@ def _replay(scene, dump, picture, video, camera, eye, target, size, seconds, col
         count = replay.video(video, view, width=size[0], height=size[1])
         print(f"wrote {video} ({count} steps)", file=sys.stderr)
         return
+    assert picture is not None
     groups = (3,) if collision else VISIBLE_GROUPS
     image = render(replay.scene.model, replay.data, view, width=size[0], height=size[1], groups=groups)
     Image.fromarray(image).save(picture)

@@ -20,6 +20,7 @@ from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 
 from ig2mj.engine.base import BOX_RULES, PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snapshot, Write
+from ig2mj.engine.compile_cache import keep_jax_programs
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.mjx_contacts import Contacts, link_forces, touching_units
@@ -95,6 +96,7 @@ class MjxEngine(abc.ABC):
             raise EngineError(
                 f"num_worlds = {num_worlds}, substeps = {substeps}, timestep = {timestep}: all must be positive"
             )
+        keep_jax_programs()
         self.scene, self.tables, self.num_worlds = scene, scene.tables, num_worlds
         self.substeps, self.timestep, self.boxes = substeps, timestep, boxes
         self.touch_tolerance = touch_tolerance

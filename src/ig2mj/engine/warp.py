@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 
 from ig2mj.engine.base import Snapshot
+from ig2mj.engine.compile_cache import report_warp_compilation
 from ig2mj.engine.health import Usage
 from ig2mj.engine.mjx_contacts import Contacts, warp_contacts
 from ig2mj.engine.mjx_engine import MjxEngine, MjxPhysics
@@ -52,6 +53,7 @@ class WarpEngine(MjxEngine):
           print_overflow: let Warp print a line per overflowing world and step. The flags are kept in any case.
         """
         keep_external_streams()
+        report_warp_compilation()
         self.profile = fit(profile, scene.model) if profile else load_profile(scene.folder, scene.model)
         self._print_overflow = print_overflow
         self._iterations = iterations or int(scene.model.opt.iterations)

@@ -67,7 +67,7 @@ def record(engine: Engine, recording: Recording, batch: Batch) -> Recording:
     """Adds the present state, over the oldest one when full. Pure."""
     place = recording.written % recording.length
     now = jax.tree.leaves(_now(engine, batch))
-    rings = tuple(ring.at[place].set(a) for ring, a in zip(recording.rings, now, strict=True))
+    rings = tuple(jnp.asarray(ring).at[place].set(a) for ring, a in zip(recording.rings, now, strict=True))
     return Recording(rings, recording.written + 1, recording.kind)
 
 
