@@ -111,7 +111,7 @@ def test_table_a6_runs(home, tmp_path) -> None:
 @pytest.mark.slow
 def test_states_share_runs(home, tmp_path) -> None:
     args = states_share.Args(
-        homes=(str(home.folder),), rest_steps=60, episode=6, rounds=1, seconds=0.02, work=tmp_path, out=tmp_path
+        homes=(str(home.folder),), rest_steps=60, episode=30, rounds=1, seconds=0.02, work=tmp_path, out=tmp_path
     )
     rows = states_share.main(args)
     assert [row["case"] for row in rows] == ["settled", "idle robot", "disturbed"]
