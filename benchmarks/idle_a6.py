@@ -6,8 +6,8 @@ Protocol (spec robots_tasks_sensors.md 6.5): four physics steps of 1/120 s in a 
 on, 2000 steps; a home's value is the mean over its last 100 steps, by when most objects are asleep. The table gives
 mean, largest and smallest value over the homes. With pictures, every step of the last 100 also draws colour and depth
 from the robot's eye (the steps before them do not, which changes nothing but the time this takes). The last 100 are
-taken several times, all kinds in turn, and the median given, by processor time. HOME is the name of a shipped home or a converted folder; without any, all
-shipped homes, or where there are none those made for benchmarks.
+taken several times, all kinds in turn, and the median given, by processor time. HOME is the name of a shipped home or a
+converted folder; without any, all shipped homes, or where there are none those made for benchmarks.
 """
 
 from __future__ import annotations
