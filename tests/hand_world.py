@@ -19,7 +19,16 @@ import numpy as np
 
 from ig2mj.engine.view import PhysicsView
 from ig2mj.scene.tables import LinkKind, PieceKind, SceneTables
-from ig2mj.states import ExtendedStates, StateModel, StateOptions, Swap, update
+from ig2mj.states import (
+    ExtendedStates,
+    RelationPlan,
+    Relations,
+    StateModel,
+    StateOptions,
+    Swap,
+    WorldState,
+    update,
+)
 from ig2mj.states.parameters import Part
 
 UNIT_CUBE = (((0.0, 0.0, 0.0), (0.5, 0.5, 0.5)),)
@@ -230,6 +239,18 @@ class HandWorld:
 def stepper(model: StateModel) -> Callable[[ExtendedStates, PhysicsView], tuple[ExtendedStates, Swap]]:
     """`update` of a model, jitted: op by op it would be compiled op by op."""
     return jax.jit(lambda states, view: update(model, states, view))
+
+
+def answers(plan: RelationPlan, view: PhysicsView) -> Relations:
+    """`plan.evaluate`, jitted."""
+    return Relations(plan, jax.jit(lambda v: plan.evaluate(v).values)(view))
+
+
+def world_of(view: PhysicsView, states: ExtendedStates) -> WorldState:
+    """A world at step 0 with no physics behind it."""
+    worlds = view.object_com.shape[0]
+    zeros = np.zeros(worlds, np.float32)
+    return WorldState(None, view, states, np.zeros((worlds, 2), np.uint32), zeros.astype(np.int32), zeros)
 
 
 def step(model: StateModel, states: ExtendedStates, view: PhysicsView) -> ExtendedStates:

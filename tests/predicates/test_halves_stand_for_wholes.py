@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing
+from hand_world import HandWorld, Thing, world_of
 
 from ig2mj.predicates import compile_expression
 from ig2mj.states import initial_states
@@ -26,7 +26,7 @@ def _holds(text: str, touching: list[tuple[str, str]], cut: bool = True, **tempe
     for name, value in temperature.items():
         states = states.replace(temperature=states.temperature.at[0, HOME.index[name]].set(value))
     goal = compile_expression(HOME.model(), text)
-    return bool(goal.verdict(states, HOME.view(touching=touching)).holds[0])
+    return bool(goal(world_of(HOME.view(touching=touching), states))[0])
 
 
 @pytest.mark.parametrize(("left", "right", "frozen"), [(-1.0, -1.0, True), (-1.0, 5.0, False)])
@@ -63,7 +63,5 @@ def test_explain_says_that_halves_judge():
     states = initial_states(HOME.model(), 1)
     states = states.replace(sliced=states.sliced.at[0, :3].set(True))
     goal = compile_expression(HOME.model(), "(frozen apple)")
-    from ig2mj.predicates.explain import explain
-
-    assert "halves" in explain(goal, states, HOME.view(), 0)
-    assert np.asarray(goal.verdict(states, HOME.view()).fraction).tolist() == [0.0]
+    assert "halves" in goal.explain(world_of(HOME.view(), states))
+    assert np.asarray(goal.fraction(world_of(HOME.view(), states))).tolist() == [0.0]

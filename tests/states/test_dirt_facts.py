@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -30,6 +31,10 @@ PLACES = np.stack([np.linspace(-0.95, 0.95, NUM_PARTICLES), np.zeros(NUM_PARTICL
 UP = np.tile([0.0, 0.0, 1.0], (NUM_PARTICLES, 1))
 
 
+_set_dusty = jax.jit(dust.set_dusty, static_argnums=(0, 2))
+_set_stained = jax.jit(stain.set_stained, static_argnums=(0, 2))
+
+
 def _points(valid: int = NUM_PARTICLES):
     """Arguments of set_dusty and set_stained: body, pos, normal, valid."""
     return (
@@ -45,8 +50,8 @@ def _dirty():
     """A dusty and stained table in a clean room."""
     model = ROOM.model()
     states = initial_states(model, 1)
-    dusty, done = dust.set_dusty(model, states.dust, 0, *_points())
-    stained, _ = stain.set_stained(model, states.stain, 0, *_points())
+    dusty, done = _set_dusty(model, states.dust, 0, *_points())
+    stained, _ = _set_stained(model, states.stain, 0, *_points())
     assert bool(done.all())
     return states.replace(dust=dusty, stain=stained)
 
@@ -68,7 +73,7 @@ def test_section_22_twenty_placed_are_dirty_at_eleven_and_clean_at_ten(alive, di
 def test_section_22_floors_are_dirty_at_sixteen_and_clean_at_fifteen_in_igibsons_code(alive, dirty):
     home = HandWorld(Thing("floor", abilities=DIRT, category="floors", floor=True))
     model = home.model(compat="igibson")
-    rows, _ = dust.set_dusty(model, initial_states(model, 1).dust, 0, *_points())
+    rows, _ = _set_dusty(model, initial_states(model, 1).dust, 0, *_points())
     rows = rows.replace(alive=rows.alive & (np.arange(NUM_PARTICLES) < alive))
     assert bool(dust.dusty(model, rows)[0, 0]) == dirty
     assert bool(dust.dusty(home.model(), rows)[0, 0])  # the paper's threshold is one half for all
@@ -77,7 +82,7 @@ def test_section_22_floors_are_dirty_at_sixteen_and_clean_at_fifteen_in_igibsons
 def test_table_a1_the_threshold_is_configurable_per_model():
     home = HandWorld(Thing("shelf", abilities={"dustyable": {"dusty_threshold": 0.1}}))
     model = home.model()
-    rows, _ = dust.set_dusty(model, initial_states(model, 1).dust, 0, *_points())
+    rows, _ = _set_dusty(model, initial_states(model, 1).dust, 0, *_points())
     rows = rows.replace(alive=rows.alive & (np.arange(NUM_PARTICLES) < 3))
     assert bool(dust.dusty(model, rows)[0, 0])
 
@@ -144,7 +149,7 @@ def test_section_19_8_dirtying_what_is_dirty_replaces_the_particles():
     model = ROOM.model()
     half = _dirty().dust
     half = half.replace(alive=half.alive & (np.arange(NUM_PARTICLES) < 5))
-    again, done = dust.set_dusty(model, half, 0, *_points())
+    again, done = _set_dusty(model, half, 0, *_points())
     assert bool(done[0]) and int(again.alive.sum()) == 20
 
 
@@ -161,7 +166,7 @@ def test_table_a5_dusty_false_removes_all_particles():
 )
 def test_section_17_row_19_how_many_particles_must_find_a_place(compat, valid, works):
     model = ROOM.model(compat=compat)
-    rows, done = dust.set_dusty(model, initial_states(model, 1).dust, 0, *_points(valid))
+    rows, done = _set_dusty(model, initial_states(model, 1).dust, 0, *_points(valid))
     assert bool(done[0]) == works
     assert int(rows.alive.sum()) == (valid if works else 0)
     assert bool(dust.dusty(model, rows)[0, 0]) == works
@@ -177,9 +182,7 @@ def test_section_19_8_the_number_placed_is_part_of_the_state():
 
 def test_setting_dirt_in_some_worlds_leaves_the_others():
     model = ROOM.model()
-    rows, _ = stain.set_stained(
-        model, initial_states(model, 3).stain, 0, *_points(), worlds=jnp.array([True, False, True])
-    )
+    rows, _ = _set_stained(model, initial_states(model, 3).stain, 0, *_points(), worlds=jnp.array([True, False, True]))
     assert rows.alive.sum(axis=(1, 2)).tolist() == [20, 0, 20]
 
 

@@ -22,6 +22,9 @@ HOME = HandWorld(
 )
 
 
+_sample = jax.jit(opened.sample_open, static_argnums=(0, 3), static_argnames="fully")
+
+
 def _open(joints: list[float], compat: str = "paper") -> list[bool]:
     value = opened.is_open(HOME.model(compat=compat), jnp.asarray([joints], jnp.float32))
     return value[0].tolist()
@@ -63,7 +66,7 @@ def test_table_a5_sampled_joints_make_open_true_or_false(value, compat):
     model = HOME.model(compat=compat)
     start = jnp.tile(jnp.asarray([0.0, 0.0, 0.5, 0.0, 0.7]), (50, 1))
     everything = jnp.ones((50, 5), bool)
-    joints, moved = opened.sample_open(model, start, everything, value, jax.random.key(3))
+    joints, moved = _sample(model, start, everything, value, jax.random.key(3))
     state = np.asarray(opened.is_open(model, joints))
     assert (state[:, :3] == value).all()
     low, high = np.array([0, 0, -0.5, 0]), np.array([1.57, 0.4, 0.5, 1.0])
@@ -74,7 +77,7 @@ def test_table_a5_sampled_joints_make_open_true_or_false(value, compat):
 def test_table_a5_a_random_subset_of_the_joints_is_opened():
     model = HOME.model()
     start = jnp.tile(jnp.asarray([0.0, 0.0, 0.5, 0.0, 0.0]), (200, 1))
-    _, moved = opened.sample_open(model, start, jnp.ones((200, 5), bool), True, jax.random.key(0))
+    _, moved = _sample(model, start, jnp.ones((200, 5), bool), True, jax.random.key(0))
     pairs = np.asarray(moved[:, 1:3])
     assert pairs.any(axis=1).all()
     both, first, second = pairs.all(axis=1), pairs[:, 0] & ~pairs[:, 1], ~pairs[:, 0] & pairs[:, 1]
@@ -85,16 +88,14 @@ def test_table_a5_a_random_subset_of_the_joints_is_opened():
 def test_section_19_9_each_joint_keeps_its_own_direction():
     model = HOME.model()
     start = jnp.tile(jnp.asarray([0.0, 0.0, 0.5, 0.0, 0.0]), (60, 1))
-    joints, moved = opened.sample_open(model, start, jnp.ones((60, 5), bool), True, jax.random.key(1))
+    joints, moved = _sample(model, start, jnp.ones((60, 5), bool), True, jax.random.key(1))
     second = np.asarray(joints[:, 2])[np.asarray(moved[:, 2])]
     assert len(second) and (second < 0.45).all()  # towards its own open end
 
 
 def test_fully_open_is_at_the_end():
     model = HOME.model()
-    joints, _ = opened.sample_open(
-        model, jnp.zeros((1, 5)), jnp.ones((1, 5), bool), True, jax.random.key(0), fully=True
-    )
+    joints, _ = _sample(model, jnp.zeros((1, 5)), jnp.ones((1, 5), bool), True, jax.random.key(0), fully=True)
     assert np.allclose(joints[0, :4], [1.57, 0.4, -0.5, 1.0])
-    joints, _ = opened.sample_open(model, joints, jnp.ones((1, 5), bool), False, jax.random.key(0), fully=True)
+    joints, _ = _sample(model, joints, jnp.ones((1, 5), bool), False, jax.random.key(0), fully=True)
     assert np.allclose(joints[0, :4], [0, 0, 0.5, 0], atol=1e-6)
