@@ -236,3 +236,41 @@ def test_substeps_and_timestep_make_the_control_step(tiny_home):
     physics, _ = engine.step(engine.reset())
     assert engine.time(physics)[0] == pytest.approx(1 / 240)
     assert tiny_home.model.opt.timestep == pytest.approx(1 / 120), "the scene's own model is left alone"
+
+
+def test_a_world_that_sleeps_as_a_whole_is_left_as_mujoco_would_leave_it(tiny_home):
+    """The native engine passes over the physics of a sleeping world; MuJoCo itself must agree to the bit."""
+    engine = NativeEngine(tiny_home)
+    physics = engine.reset()
+    for _ in range(150):
+        physics, view = engine.step(physics)
+    assert not np.asarray(view.awake).any()
+    before = engine.export(physics, 0)
+    model, data = engine.to_mujoco(physics, 0)
+    other = mujoco.MjData(model)
+    mujoco.mj_copyData(other, model, data)
+    for _ in range(5):
+        physics, _ = engine.step(physics)
+    mujoco.mj_step2(model, other)
+    mujoco.mj_step(model, other, nstep=5 * engine.substeps - 1)
+    after = engine.export(physics, 0)
+    for name in ("qpos", "qvel", "qacc_warmstart", "tree_asleep", "act"):
+        np.testing.assert_array_equal(getattr(after, name), getattr(before, name), err_msg=name)
+        np.testing.assert_array_equal(getattr(after, name), getattr(other, name), err_msg=name)
+    assert float(after.time) == other.time
+
+
+def test_a_push_from_outside_wakes_a_sleeping_world(tiny_home):
+    """A force applied by hand, as the viewer's mouse does, is not passed over."""
+    engine = NativeEngine(tiny_home)
+    physics = engine.reset()
+    for _ in range(150):
+        physics, view = engine.step(physics)
+    ball = tiny_home.object_index("ball")
+    start = np.array(view.object_pos)[0, ball]
+    _, data = engine.to_mujoco(physics, 0)
+    data.xfrc_applied[tiny_home.tables.object_root[ball], 2] = 50.0
+    for _ in range(5):
+        physics, view = engine.step(physics)
+    assert np.asarray(view.awake)[0, ball]
+    assert np.linalg.norm(np.asarray(view.object_pos)[0, ball] - start) > 0.01
