@@ -24,11 +24,12 @@ from ig2mj.agents.floating_hand import add_floating_hand
 from ig2mj.agents.pushing import push_controls
 from ig2mj.calibration import calibrate
 from ig2mj.engine.health import CAPACITY, Overflow
-from ig2mj.engine.profile import EngineProfile
+from ig2mj.engine.profile import PROFILE_FILE, EngineProfile, load_profile
 from ig2mj.engine.warp import WarpEngine
 from ig2mj.predicates.compile import compile_expression
 from ig2mj.sampling.perturbation import loose_objects
 from ig2mj.sampling.settled import make_pool
+from ig2mj.sensors.batch_camera import BatchCamera
 from ig2mj.states.model import StateModel
 from ig2mj.worlds.batch import Worlds
 from ig2mj.worlds.pool import Pool
@@ -70,6 +71,8 @@ class Case:
         self.pool: Pool = make_pool(self.scene, self.model, pool_rows, share=0.2)
         self.pool_seconds = time.time() - start
         start = time.time()
+        if profile is None and (self.scene.folder / PROFILE_FILE).exists():
+            profile = load_profile(self.scene.folder, self.scene.model)
         self.profile = profile or calibrate(self.scene, rounds=4)
         self.calibration_seconds = time.time() - start
         self.goal = compile_expression(self.model, ten_literals(self.model))
@@ -90,11 +93,17 @@ def run(case: Case, num_worlds: int, disturbed: bool, what: str, calls: int = 4,
         world = batch.world
         return push_controls(com, ctrl, np.array(HAND_START), case.loose, world.key, world.step, seconds)
 
+    camera = BatchCamera(engine, model, ["hand/eye"], width=128, height=128, depth=True) if what == "camera" else None
+
     def full(carry, _):
         batch, ctrl, com = carry
         ctrl = control(batch, ctrl, com)
         batch, verdict = worlds.step(batch, ctrl)
-        return (batch, ctrl, batch.world.view.object_com), verdict.fraction.mean()
+        seen = verdict.fraction.mean()
+        if camera is not None:
+            images = camera(batch.world.physics, batch.world.view, batch.world.states)
+            seen += images.rgb.astype(jnp.float32).mean() + images.depth.mean()
+        return (batch, ctrl, batch.world.view.object_com), seen
 
     def physics(carry, _):
         """Of the view only what the hand needs, unless the whole of it is asked for."""
@@ -106,17 +115,17 @@ def run(case: Case, num_worlds: int, disturbed: bool, what: str, calls: int = 4,
             world = world.replace(view=view)
         return (batch.replace(world=world), ctrl, view.object_com), view.object_com[:, 0, 2].mean()
 
-    body = full if what == "full" else physics
-    call = jax.jit(lambda carry: jax.lax.scan(body, carry, None, STEPS)[0], donate_argnums=0)
+    body = physics if what in ("physics", "view") else full
+    call = jax.jit(lambda carry: jax.lax.scan(body, carry, None, STEPS), donate_argnums=0)
     start = time.time()
     batch = jax.block_until_ready(jax.jit(worlds.start)(0))
     ctrl = jnp.zeros((num_worlds, scene.model.nu), jnp.float32)
-    carry = jax.block_until_ready(call((batch, ctrl, batch.world.view.object_com + 0.0)))
+    carry, _ = jax.block_until_ready(call((batch, ctrl, batch.world.view.object_com + 0.0)))
     compile_seconds = time.time() - start
     times, awake = [], []
     for _ in range(calls):
         start = time.time()
-        carry = jax.block_until_ready(call(carry))
+        carry, seen = jax.block_until_ready(call(carry))
         times.append(time.time() - start)
         awake.append(int(engine.usage(carry[0].world.physics).awake_dofs.max()))
     batch = carry[0]
@@ -137,7 +146,8 @@ def run(case: Case, num_worlds: int, disturbed: bool, what: str, calls: int = 4,
         "iteration_limits": int(((overflow & int(Overflow.ITERATIONS | Overflow.LS_ITERATIONS)) != 0).sum()),
         "non_finite": int((~np.asarray(engine.health(batch.world.physics).finite)).sum()),
         "peak_device_MB_per_world": round(memory / num_worlds / 1e6, 3),
-        "troubles": worlds.metrics(batch) if what == "full" else {},
+        "mean_seen": float(np.asarray(seen).mean()),
+        "troubles": worlds.metrics(batch) if what in ("full", "camera") else {},
     }
     print(json.dumps(row), flush=True)
     return row
@@ -152,7 +162,7 @@ def main() -> None:
         "--what",
         nargs="+",
         default=["full"],
-        choices=["physics", "view", "full"],
+        choices=["physics", "view", "full", "camera"],
         help="full: with states, guards and goal; the others for comparison",
     )
     parser.add_argument("--iterations", type=int, nargs="+", default=[0], help="solver limits to try; 0: the engine's")
