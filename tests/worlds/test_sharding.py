@@ -18,8 +18,8 @@ from ig2mj.worlds.batch import Worlds
 from ig2mj.worlds.sharding import ShardedWorlds
 
 SCRIPT = """
-import json, sys
-import jax, jax.numpy as jnp, numpy as np
+import json, operator, sys
+import jax, numpy as np
 import ig2mj
 from ig2mj.engine.jax import JaxEngine
 from ig2mj.engine.warp import WarpEngine
@@ -35,26 +35,23 @@ goal = compile_expression(model, "(on_top box table)")
 out = {"devices": len(jax.devices())}
 for name, devices in (("one", jax.devices()[:1]), ("two", jax.devices()[:2])):
     worlds = ShardedWorlds(lambda count: Worlds(kind(scene, count), model, None, goal), 2, devices)
-    batch = worlds.start(seed=4)
-    for _ in range(3):
-        batch, verdict = worlds.step(batch)
-    batch = worlds.reset(batch, worlds.place(jnp.array([False, True])))
-    batch, verdict = worlds.step(batch)
-    out[name] = {
-        "pos": np.asarray(batch.world.view.object_pos).tolist(),
-        "key": np.asarray(batch.world.key).tolist(),
-        "number": np.asarray(batch.number).tolist(),
-        "episode": np.asarray(batch.episode).tolist(),
-        "holds": np.asarray(verdict.holds).tolist(),
-        "on": len(batch.world.view.object_pos.sharding.device_set),
-    }
+    shards = worlds.start(seed=4)
+    for _ in range(2):
+        shards, _ = worlds.step(shards)
+    shards = worlds.reset(shards, np.array([False, True]))
+    shards, verdicts = worlds.step(shards)
+    fields = ("world.view.object_pos", "world.key", "number", "episode")
+    out[name] = {f: np.asarray(worlds.gather(shards, operator.attrgetter(f))).tolist() for f in fields}
+    out[name]["holds"] = np.concatenate([np.asarray(v.holds) for v in verdicts]).tolist()
+    out[name]["on"] = len(worlds.gather(shards, operator.attrgetter("number")).sharding.device_set)
 print("RESULT" + json.dumps(out))
 """
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(600)
 @pytest.mark.parametrize("engine", ["warp"])
-def test_two_devices_give_what_one_gives(bench_folder, engine, request):
+def test_two_devices_give_what_one_gives(bench_folder, engine):
     scene = engine_bench.bench_home(bench_folder, True)
     flags = "--xla_force_host_platform_device_count=2 --xla_cpu_multi_thread_eigen=false"
     environment = {**os.environ, "JAX_PLATFORMS": "cpu", "XLA_FLAGS": flags}
