@@ -25,7 +25,7 @@ class Shape:
       hulls: collision hulls, [n, 3] each; links: the link number of each.
       normals: outward face normals of each hull, [m, 3], without repeats.
       low, high: corners of the box around all hulls.
-      swept: hulls of the moving parts, with their normals, at steps of each joint's range.
+      swept: hulls around the moving parts between each two steps of each joint's range, with their normals.
     """
 
     model: HouseholdObject
@@ -41,7 +41,7 @@ class Shape:
         return self.high - self.low
 
 
-SWEEP_AT = (0.02, 0.04, 0.07, 0.12, 0.2, 0.35, 0.5, 0.65, 0.8, 1.0)
+SWEEP_AT = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
 """Shares of a joint's range at which what it moves is looked at; dense where a door's far corner swings widest."""
 
 
@@ -195,13 +195,16 @@ def _swept(model: HouseholdObject) -> tuple[Hull, ...]:
         for name in moved:
             moved += children.get(name, [])
         hulls = [points + links[name].origin for name in moved for points in links[name].hulls]
-        normals = [_normals(points) for points in hulls]
         pivot, axis = links[joint.child].origin, np.array(joint.axis) / np.linalg.norm(joint.axis)
+        earlier: list[np.ndarray] = []
         for share in SWEEP_AT:
             q = joint.limits[0] + (joint.limits[1] - joint.limits[0]) * share
             turn = np.eye(3) if joint.kind == "prismatic" else _about(axis, q)
             shift = axis * q if joint.kind == "prismatic" else pivot - turn @ pivot
-            found += [(points @ turn.T + shift, n @ turn.T) for points, n in zip(hulls, normals, strict=True)]
+            now = [points @ turn.T + shift for points in hulls]
+            between = [np.concatenate(pair) for pair in zip(earlier, now, strict=True)] if earlier else []
+            found += [(points, _normals(points)) for points in between]
+            earlier = now
     return tuple(found)
 
 
