@@ -254,7 +254,13 @@ def _page(facts: dict, scene_pictures: list[tuple[str, str]], object_pictures: l
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    environment.filters |= {"metres": _metres, "percent": _percent, "kg": _kilograms, "words": _words}
+    environment.filters |= {
+        "metres": _metres,
+        "percent": _percent,
+        "kg": _kilograms,
+        "counted": _counted,
+        "words": _words,
+    }
     return environment.get_template("report.html.j2").render(
         facts=facts, totals=facts["totals"], scene_pictures=scene_pictures, object_pictures=object_pictures
     )
@@ -265,7 +271,15 @@ def _metres(values: Sequence[float] | None) -> str:
 
 
 def _percent(value: float | None) -> str:
-    return "" if value is None else f"{value:+.1%}"
+    if value is None:
+        return ""
+    return f"{value:+.1%}" if abs(value) >= 0.0005 else "0.0%"
+
+
+def _counted(kinds: Mapping[str, int]) -> str:
+    """{"box": 2, "hull": 1} -> "2 boxes, 1 hull"."""
+    plural = {kind: f"{kind}es" if kind.endswith("x") else f"{kind}s" for kind in kinds}
+    return ", ".join(f"{count} {kind if count == 1 else plural[kind]}" for kind, count in kinds.items())
 
 
 def _kilograms(value: float) -> str:

@@ -178,7 +178,7 @@ def numbers(
         if default is None:
             raise InputError(file, f"attribute '{attribute}' is missing", element=where(element))
         return np.array(default, dtype=float)
-    words = text.split()
+    words = [word.removesuffix(",") for word in text.split()]  # "0.1, 0, 0" is common, and harmless
     if len(words) != count:
         raise InputError(
             file, f"{attribute}='{_short(text)}' has {len(words)} numbers instead of {count}", element=where(element)

@@ -11,7 +11,7 @@ import shutil
 import mujoco
 import numpy as np
 import pytest
-from ig2mj_converters import inputs
+from ig2mj_converters import inputs, model_task
 from ig2mj_converters.output import replaced_folder
 from tiny_dataset import write_dataset
 from tiny_geometry import box, write_obj
@@ -76,6 +76,20 @@ def test_the_object_command(dataset, tmp_path):
     model = mujoco.MjModel.from_xml_path(str(out / "object.xml"))
     assert model.joint("fr0_joint_0").type[0] == mujoco.mjtJoint.mjJNT_HINGE
     assert entry.mass == pytest.approx(90.0 / (0.6 * 0.6 * 1.6) * 0.6 * 0.6 * 1.6, rel=1e-6)
+
+
+def test_the_links_of_one_object_are_shared_among_the_jobs(dataset, tmp_path, monkeypatch):
+    seen = []
+
+    def here(function, tasks, labels, jobs, *_):
+        seen.append((list(labels), jobs))
+        return [pickle.loads(pickle.dumps(function(pickle.loads(pickle.dumps(task))))) for task in tasks]
+
+    monkeypatch.setattr(model_task, "map_tasks", here)
+    urdf = dataset / "objects" / "bottom_cabinet" / "cab0" / "cab0.urdf"
+    args = ["convert", "object", "--urdf", str(urdf), "--category", "bottom_cabinet", "--no-report", "--no-cache"]
+    assert call([*args, "--jobs", "3", "--out", str(tmp_path / "out")]) == 0
+    assert seen == [(["base_link", "link_0", "link_1"], 3)]
 
 
 def test_the_object_command_scales_to_a_bounding_box(dataset, tmp_path):

@@ -183,7 +183,8 @@ def folder_of_a_ycb_like_urdf(tmp_path) -> pathlib.Path:
     write_obj(tmp_path / "can.obj", groups(box((0.1, 0.1, 0.1))))
     (tmp_path / "can.urdf").write_text(
         '<robot name="can"><link name="baseLink"><contact><lateral_friction value="1.0"/>'
-        '<rolling_friction value="0.0"/><inertia_scaling value="3.0"/><contact_cfm value="0.0"/><contact_erp value="1.0"/></contact>'
+        '<rolling_friction value="0.0"/><inertia_scaling value="3.0"/><contact_cfm value="0.0"/>'
+        '<contact_erp value="1.0"/></contact>'
         '<inertial><mass value="0.3"/><inertia ixx="1e-3" ixy="0" ixz="0" iyy="1e-3" iyz="0" izz="1e-3"/></inertial>'
         '<collision><geometry><mesh filename="can.obj"/></geometry></collision></link></robot>'
     )

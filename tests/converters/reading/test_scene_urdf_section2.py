@@ -118,6 +118,16 @@ def test_numbers_are_split_on_runs_of_blanks_and_rpy_may_be_missing(root):
     assert found["a"].pose[:3, :3] == pytest.approx(np.eye(3))
 
 
+def test_commas_after_numbers_are_harmless(root):
+    found = instances(
+        root,
+        "<link name='a' category='cup' model='m' bounding_box='1, 2, 3'/>"
+        "<joint name='j' type='fixed'><origin xyz='1, 0, .5'/><child link='a'/><parent link='world'/></joint>",
+    )
+    assert found["a"].bounding_box == pytest.approx([1, 2, 3])
+    assert found["a"].pose[:3, 3] == pytest.approx([1, 0, 0.5])
+
+
 def test_scale_box_and_neither(root, make):
     found = instances(
         root, placed(make, "a", scale="1 2 3"), placed(make, "b", bounding_box="1 2 3"), placed(make, "c")
