@@ -88,7 +88,9 @@ def one_world(scene: ig2mj.Scene, model: StateModel, seconds: float) -> list[Row
     moved[1].object_com[0, loose[0]] += 1e-3  # one thing moves a millimetre, back and forth
     moved[1].body_pos[0, scene.tables.object_root[loose[0]]] += 1e-3
 
-    still, moving, beside = (Stepped(program, model) for _ in range(3))
+    still, cooling, moving, beside = (Stepped(program, model) for _ in range(4))
+    # Not a number never equals the one before: this world never settles, as one in which something cools.
+    cooling.states = cooling.states.replace(temperature=cooling.states.temperature.at[0, loose[0]].set(jnp.nan))
 
     def with_physics() -> None:
         nonlocal physics
@@ -104,6 +106,7 @@ def one_world(scene: ig2mj.Scene, model: StateModel, seconds: float) -> list[Row
             "native engine with view, asleep": physics_alone,
             "the same with states and goal": with_physics,
             "states and goal, nothing moves": lambda: still.step(view),
+            "states and goal, a thing cools": lambda: cooling.step(view),
             "states and goal, one thing moves": lambda: moving.step(moved[moving.count % 2]),
         },
         seconds,
