@@ -167,7 +167,7 @@ class StateStepper:
         for place, leaf in zip(self.program.changed, found, strict=True):
             leaves[place] = leaf
         new = jax.tree.unflatten(structure, leaves)
-        quiet, swapped, self._settled = jax.device_get(kept.flags).tolist()
+        quiet, swapped, self._settled = np.asarray(kept.flags).tolist()
         self._memo, self._view, self._states, self._verdict = kept.memo, view, new, verdict
         self._heat_steps = 0
         self._kept = kept if quiet and not self.program.model.options.contact_heat_rate else None
