@@ -50,7 +50,8 @@ def write_home(folder: pathlib.Path, num_objects: int, seed: int = 0) -> pathlib
     exclude = "".join(f'<exclude body1="{a}" body2="{b}"/>' for a, b in excludes)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "scene.xml").write_text(
-        f'<mujoco><compiler angle="radian"/><option timestep="{1 / 120!r}" gravity="0 0 -9.8" integrator="implicitfast">'
+        f'<mujoco><compiler angle="radian"/>'
+        f'<option timestep="{1 / 120!r}" gravity="0 0 -9.8" integrator="implicitfast">'
         f'<flag sleep="enable"/></option><asset>{"".join(meshes)}</asset>'
         f"<worldbody>{''.join(bodies)}</worldbody><contact>{exclude}</contact></mujoco>"
     )

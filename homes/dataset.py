@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import json
+import multiprocessing
 import pathlib
 import shutil
 from collections.abc import Callable, Iterable
@@ -103,7 +104,8 @@ def _run(chunks: list[tuple[str, int, list[tuple[str, int]]]], jobs: int | None)
         for chunk in chunks:
             yield from _write_chunk(chunk)
         return
-    with concurrent.futures.ProcessPoolExecutor(jobs) as pool:
+    context = multiprocessing.get_context("spawn")  # forking a process that has threads, as JAX does, can hang
+    with concurrent.futures.ProcessPoolExecutor(jobs, context) as pool:
         for results in pool.map(_write_chunk, chunks):
             yield from results
 
