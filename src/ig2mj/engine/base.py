@@ -23,6 +23,7 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.health import Health
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.errors import EngineError
 from ig2mj.scene.tables import SceneTables
 
 PHYSICS_TIMESTEP = 1 / 120
@@ -40,6 +41,17 @@ BOX_RULES = ("tight", "igibson")
 "tight": smallest world box around the collision geometry. "igibson": each body's box in its own frame, rotated into the
 world and enclosed, plus Bullet's margin (spec/states.md 4.2 and 24).
 """
+
+
+def check_arguments(boxes: str, num_worlds: int, substeps: int, timestep: float) -> None:
+    """What every engine asks of its arguments. Raises EngineError."""
+    if boxes not in BOX_RULES:
+        raise EngineError(f"there is no box rule '{boxes}' (rules: {', '.join(BOX_RULES)})")
+    if num_worlds < 1 or substeps < 1 or not timestep > 0:
+        raise EngineError(
+            f"num_worlds = {num_worlds}, substeps = {substeps}, timestep = {timestep}: all must be positive"
+        )
+
 
 Physics = Any
 """An engine's physics state of all worlds; opaque to everyone but the engine."""

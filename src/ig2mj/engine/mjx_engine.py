@@ -19,7 +19,7 @@ from flax import struct
 from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 
-from ig2mj.engine.base import BOX_RULES, PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snapshot, Write
+from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snapshot, Write, check_arguments
 from ig2mj.engine.compile_cache import keep_jax_programs
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
@@ -90,12 +90,7 @@ class MjxEngine(abc.ABC):
         Raises:
           EngineError: an argument is out of range, or MJX cannot run the scene.
         """
-        if boxes not in BOX_RULES:
-            raise EngineError(f"there is no box rule '{boxes}' (rules: {', '.join(BOX_RULES)})")
-        if num_worlds < 1 or substeps < 1 or not timestep > 0:
-            raise EngineError(
-                f"num_worlds = {num_worlds}, substeps = {substeps}, timestep = {timestep}: all must be positive"
-            )
+        check_arguments(boxes, num_worlds, substeps, timestep)
         keep_jax_programs()
         self.scene, self.tables, self.num_worlds = scene, scene.tables, num_worlds
         self.substeps, self.timestep, self.boxes = substeps, timestep, boxes

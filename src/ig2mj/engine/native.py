@@ -23,7 +23,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ig2mj.engine.base import BOX_RULES, PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snapshot, Write
+from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snapshot, Write, check_arguments
 from ig2mj.engine.boxes import make_box_table
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
@@ -99,12 +99,7 @@ class NativeEngine:
         Raises:
           EngineError: an argument is out of range.
         """
-        if boxes not in BOX_RULES:
-            raise EngineError(f"there is no box rule '{boxes}' (rules: {', '.join(BOX_RULES)})")
-        if num_worlds < 1 or substeps < 1 or not timestep > 0:
-            raise EngineError(
-                f"num_worlds = {num_worlds}, substeps = {substeps}, timestep = {timestep}: all must be positive"
-            )
+        check_arguments(boxes, num_worlds, substeps, timestep)
         if threads is not None and threads < 1:
             raise EngineError(f"threads = {threads}: at least one is needed")
         self.scene, self.tables, self.num_worlds = scene, scene.tables, num_worlds
