@@ -8,7 +8,7 @@ import pytest
 import tiny_home as homes
 
 import ig2mj
-from ig2mj.engine.boxes import BULLET_MARGIN_COMPOUND, BULLET_MARGIN_SINGLE
+from ig2mj.geometry.boxes import BULLET_MARGIN_COMPOUND, BULLET_MARGIN_SINGLE
 
 TURN = np.array([0.8, 0.3, -0.4, 0.33])
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import jax
 import numpy as np
 import pytest
 
@@ -62,19 +61,6 @@ def test_points_are_even_within_a_face(shapes):
     top = sample.points[sample.normals[:, 2] > 0.99]
     np.testing.assert_allclose(top[:, :2].mean(axis=0), 0.0, atol=0.03 * half.max())
     np.testing.assert_allclose(top[:, :2].std(axis=0), half[:2] / np.sqrt(3), rtol=0.05)
-
-
-def test_jax_samples_follow_the_same_law_and_the_key(shapes):
-    table = table_of(shapes, [1, 3])
-    draw = jax.jit(lambda key: surface.sample_surface_jax(table, key, (4, 3000)))
-    points, normals, piece = draw(jax.random.key(0))
-    assert points.shape == (4, 3000, 3) and normals.shape == (4, 3000, 3) and piece.shape == (4, 3000)
-    np.testing.assert_array_equal(points, draw(jax.random.key(0))[0])
-    assert not np.array_equal(points, draw(jax.random.key(1))[0])
-    host = surface.sample_surface(table, 12_000, np.random.default_rng(3))
-    np.testing.assert_allclose(np.mean(piece), host.piece.mean(), atol=0.02)
-    np.testing.assert_allclose(np.mean(points, axis=(0, 1)), host.points.mean(axis=0), atol=0.01)
-    np.testing.assert_allclose(np.std(points, axis=(0, 1)), host.points.std(axis=0), atol=0.01)
 
 
 def test_faces_inside_other_pieces_can_be_left_out():

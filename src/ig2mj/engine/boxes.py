@@ -1,5 +1,7 @@
 """World boxes of objects from body poses, by the tight rule or by iGibson's (see `ig2mj.engine.base.BOX_RULES`).
 
+Which things' boxes make up which object's; the rules themselves are in `ig2mj.geometry.boxes`.
+
 Axes: K boxed things (convex pieces by the tight rule, bodies by iGibson's), sorted by object; V corners of the largest.
 """
 
@@ -11,10 +13,8 @@ import mujoco
 import numpy as np
 
 from ig2mj.engine.layout import ModelLayout
-from ig2mj.scene.tables import PieceKind, SceneTables
-
-BULLET_MARGIN_SINGLE, BULLET_MARGIN_COMPOUND = 0.003, 0.004
-"""Metres that pybullet's box stands off one hull, and a compound of hulls (spec/states.md section 24)."""
+from ig2mj.geometry.boxes import core_boxes, link_boxes, piece_cores, turned_boxes
+from ig2mj.scene.tables import SceneTables
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -62,23 +62,15 @@ class BoxPlan:
 
 def make_box_table(rule: str, model: mujoco.MjModel, tables: SceneTables, layout: ModelLayout) -> BoxTable:
     """The table for a rule, "tight" or "igibson"."""
-    rotation = _matrices(tables.piece_quat)
-    points, radius, axis = _cores(tables, rotation)
+    points, radius, axis = piece_cores(
+        tables.piece_kind, tables.piece_size, tables.piece_vertices, tables.piece_pos, tables.piece_quat
+    )
     owner, body = tables.piece_object, tables.piece_body
-    width = points.shape[2] if len(points) else 1
     if rule == "igibson":
         kept = ~np.isin(body, _split_off(model, tables, layout))
-        owner, body = owner[kept], body[kept]
-        spread = radius[kept] * np.sqrt(np.maximum(0.0, 1.0 - axis[kept] ** 2))
-        low, high = points[kept].min(-1, initial=np.inf) - spread, points[kept].max(-1, initial=-np.inf) + spread
-        bodies, group, count = np.unique(body, return_inverse=True, return_counts=True)
-        box_low, box_high = np.full((len(bodies), 3), np.inf), np.full((len(bodies), 3), -np.inf)
-        np.minimum.at(box_low, group, low)
-        np.maximum.at(box_high, group, high)
-        owner, body = tables.body_object[bodies], bodies
-        center, half = (box_low + box_high) / 2, (box_high - box_low) / 2
-        margin = np.where(count > 1, BULLET_MARGIN_COMPOUND, BULLET_MARGIN_SINGLE)[:, None]
-        points, radius, axis = np.zeros((len(bodies), 3, 1)), np.zeros((len(bodies), 1)), np.zeros((len(bodies), 3))
+        body, center, half, margin = link_boxes(body[kept], points[kept], radius[kept], axis[kept])
+        owner, count = tables.body_object[body], len(body)
+        points, radius, axis = np.zeros((count, 3, 1)), np.zeros((count, 1)), np.zeros((count, 3))
     else:
         center, half, margin = np.zeros((len(owner), 3)), np.zeros((len(owner), 3)), np.zeros((len(owner), 1))
     bare = np.setdiff1d(np.arange(tables.num_objects), owner)
@@ -93,7 +85,7 @@ def make_box_table(rule: str, model: mujoco.MjModel, tables: SceneTables, layout
         rule=rule,
         owner=owner[order].astype(int),
         body=body[order].astype(int),
-        points=padded(points, 3, width if rule == "tight" else 1),
+        points=padded(points, *points.shape[1:]),
         radius=padded(radius, 1),
         axis=padded(axis, 3),
         center=padded(center, 3),
@@ -133,37 +125,14 @@ def world_boxes(rule: str, plan: BoxPlan, xpos: np.ndarray, xmat: np.ndarray) ->
     """
     rotation = xmat[plan.body].reshape(-1, 3, 3)
     if rule == "tight":
-        turned = rotation @ plan.points
-        low, high = turned.min(-1), turned.max(-1)
-        if plan.round:
-            along = (rotation @ plan.axis[..., None])[..., 0]
-            reach = plan.radius * np.sqrt(np.maximum(0.0, 1.0 - along * along))
-            low, high = low - reach, high + reach
+        low, high = core_boxes(rotation, plan.points, plan.radius if plan.round else None, plan.axis)
     else:
-        center = (rotation @ plan.center[..., None])[..., 0]
-        half = (np.abs(rotation) @ plan.half[..., None])[..., 0] + plan.margin
-        low, high = center - half, center + half
+        low, high = turned_boxes(rotation, plan.center, plan.half, plan.margin)
     position = xpos[plan.body]
-    low, high = low + position, high + position
+    low, high = np.add(low, position), np.add(high, position)
     if len(plan.starts) == len(plan.body):
         return low, high
     return np.minimum.reduceat(low, plan.starts), np.maximum.reduceat(high, plan.starts)
-
-
-def _cores(tables: SceneTables, rotation: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Points [K, 3, V], radius [K, 1] and flat axis [K, 3] of every piece in its body's frame."""
-    kind, size = tables.piece_kind, tables.piece_size
-    local = np.array(tables.piece_vertices)
-    round_piece = kind != PieceKind.POLYHEDRON
-    length = np.where(kind == PieceKind.SPHERE, 0.0, size[:, 1])
-    if round_piece.any():
-        ends = np.zeros((int(round_piece.sum()), local.shape[1], 3))
-        ends[:, :, 2] = np.where(np.arange(local.shape[1]) % 2, 1.0, -1.0) * length[round_piece, None]
-        local[round_piece] = ends
-    points = rotation @ local.transpose(0, 2, 1) + tables.piece_pos[..., None]
-    radius = np.where(round_piece, size[:, 0], 0.0)[:, None]
-    axis = np.where((kind == PieceKind.CYLINDER)[:, None], rotation[:, :, 2], 0.0)
-    return points, radius, axis
 
 
 def _split_off(model: mujoco.MjModel, tables: SceneTables, layout: ModelLayout) -> np.ndarray:
@@ -174,11 +143,3 @@ def _split_off(model: mujoco.MjModel, tables: SceneTables, layout: ModelLayout) 
     for body in range(1, model.nbody):  # parents come first
         found[body] |= found[parents[body]]
     return np.flatnonzero(found & (tables.body_object >= 0))
-
-
-def _matrices(quat: np.ndarray) -> np.ndarray:
-    """Rotation matrices [n, 3, 3] of quaternions [n, 4], w-x-y-z."""
-    out = np.zeros((len(quat), 9))
-    for row, q in zip(out, quat, strict=True):
-        mujoco.mju_quat2Mat(row, q)
-    return out.reshape(-1, 3, 3)

@@ -18,6 +18,7 @@ from jaxtyping import Bool, Float
 from ig2mj.engine.boxes import BoxTable, make_box_table
 from ig2mj.engine.layout import ModelLayout
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.boxes import core_boxes, turned_boxes
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
 from ig2mj.scene.tables import SceneTables
 
@@ -118,17 +119,11 @@ def object_boxes(
     table = plan.boxes
     rotation = quat_to_matrix(body_quat[:, table.body])  # W K 3 3
     if table.rule == "tight":
-        turned = jnp.einsum("wkij,kjv->wkiv", rotation, jnp.asarray(table.points, jnp.float32))
-        low, high = turned.min(-1), turned.max(-1)
-        if table.any_round:
-            along = jnp.einsum("wkij,kj->wki", rotation, jnp.asarray(table.axis, jnp.float32))
-            reach = jnp.asarray(table.radius, jnp.float32) * jnp.sqrt(jnp.maximum(0.0, 1.0 - along * along))
-            low, high = low - reach, high + reach
+        points, radius, axis = (jnp.asarray(a, jnp.float32) for a in (table.points, table.radius, table.axis))
+        low, high = core_boxes(rotation, points, radius if table.any_round else None, axis)
     else:
-        center = jnp.einsum("wkij,kj->wki", rotation, jnp.asarray(table.center, jnp.float32))
-        half = jnp.einsum("wkij,kj->wki", jnp.abs(rotation), jnp.asarray(table.half, jnp.float32))
-        half = half + jnp.asarray(table.margin, jnp.float32)
-        low, high = center - half, center + half
+        center, half, margin = (jnp.asarray(a, jnp.float32) for a in (table.center, table.half, table.margin))
+        low, high = turned_boxes(rotation, center, half, margin)
     position = body_pos[:, table.body]
     low, high = low + position, high + position
     taken = (plan.box_slots >= 0)[..., None]

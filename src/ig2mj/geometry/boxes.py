@@ -1,10 +1,14 @@
-"""Axis-aligned boxes: of posed pieces, of objects, and what can be asked of them. Metres, world axes.
+"""Axis-aligned boxes: the two rules that give an object's box, and what can be asked of boxes. Metres, world axes.
 
-Two rules give an object's box. Tight: the smallest box around its pieces. iGibson's: per link the box of the link's
-whole shape in the link's frame, turned into the world (a box around a turned box, so it is looser), plus Bullet's
-margin (spec/states.md 4.2 and section 24).
+Tight: the smallest box around the object's pieces (`core_boxes`). iGibson's: per link the box of the link's whole shape
+in the link's frame (`link_boxes`, made once), turned into the world, which makes it looser, plus Bullet's margin
+(`turned_boxes`; spec/states.md 4.2 and section 24).
+
+`core_boxes` and `turned_boxes` work on NumPy arrays and on JAX's alike and return what they are given.
 
 An object without pieces has the empty box, low = inf and high = -inf: no point is in it and its gap to any box is inf.
+
+Axes: K pieces, V points of the largest, N links.
 """
 
 from __future__ import annotations
@@ -13,77 +17,91 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from ig2mj.geometry.poses import AnyArray, length, quat_rotate, quat_to_matrix
+from ig2mj.geometry.poses import AnyArray, length, matrices_on_host
 from ig2mj.scene.tables import PieceKind
 
-Boxes = tuple[Float[Array, "*b 3"], Float[Array, "*b 3"]]
+Boxes = tuple[Float[AnyArray, "*b K 3"], Float[AnyArray, "*b K 3"]]
 
 BULLET_MARGIN_SINGLE, BULLET_MARGIN_COMPOUND = 0.003, 0.004
 """Metres by which pybullet's box stands off one hull, and off a compound of hulls (spec/states.md section 24)."""
 
+EDGE_ON = 1e-14
+"""Of the squared sine of the angle between a cylinder's axis and a world axis: below, the gradient is cut to 0."""
 
-def piece_boxes(
-    kind: Int[AnyArray, "*#b"],
-    size: Float[AnyArray, "*#b 3"],
-    vertices: Float[AnyArray, "*#b V 3"],
-    pos: Float[AnyArray, "*#b 3"],
-    quat: Float[AnyArray, "*#b 4"],
+
+def piece_cores(
+    kind: Int[np.ndarray, "K"],
+    size: Float[np.ndarray, "K 3"],
+    vertices: Float[np.ndarray, "K V 3"],
+    pos: Float[np.ndarray, "K 3"],
+    quat: Float[np.ndarray, "K 4"],
+) -> tuple[Float[np.ndarray, "K 3 V"], Float[np.ndarray, "K 1"], Float[np.ndarray, "K 3"]]:
+    """What `core_boxes` needs of pieces that are posed in a frame, a body's for instance: (points, radius, axis).
+
+    Points are a polyhedron's vertices, or the ends of a round piece's axis. `radius` is 0 for polyhedra; `axis` is the
+    unit vector along a cylinder, and zero for everything else. Host side, once per scene.
+    """
+    rotation = matrices_on_host(quat)
+    local = np.array(vertices, np.float64)
+    round_piece = kind != PieceKind.POLYHEDRON
+    half = np.where(kind == PieceKind.SPHERE, 0.0, size[:, 1])
+    ends = np.zeros((int(round_piece.sum()), *local.shape[1:]))
+    ends[:, :, 2] = np.where(np.arange(local.shape[1]) % 2, 1.0, -1.0) * half[round_piece, None]
+    local[round_piece] = ends
+    points = rotation @ local.transpose(0, 2, 1) + np.asarray(pos)[..., None]
+    radius = np.where(round_piece, size[:, 0], 0.0)[:, None]
+    return points, radius, np.where((kind == PieceKind.CYLINDER)[:, None], rotation[:, :, 2], 0.0)
+
+
+def core_boxes(
+    rotation: Float[AnyArray, "*b K 3 3"],
+    points: Float[AnyArray, "K 3 V"],
+    radius: Float[AnyArray, "K 1"] | None,
+    axis: Float[AnyArray, "K 3"],
 ) -> Boxes:
-    """Smallest boxes (low, high) around posed pieces; `vertices` count for polyhedra only."""
-    turned = quat_rotate(quat[..., None, :], vertices)
-    low, high = jnp.min(turned, axis=-2), jnp.max(turned, axis=-2)
-    reach = _round_reach(kind, size, quat)
-    hull = (kind == PieceKind.POLYHEDRON)[..., None]
-    return jnp.add(pos, jnp.where(hull, low, -reach)), jnp.add(pos, jnp.where(hull, high, reach))
+    """The tight rule: boxes (low, high) about the origin of each piece's frame, which `rotation` turns into the world.
+
+    `radius` None says that no piece is round. Gradients are finite, also of an upright cylinder.
+    """
+    turned = rotation @ points
+    low, high = turned.min(-1), turned.max(-1)
+    if radius is None:
+        return low, high
+    xp = rotation.__array_namespace__()
+    along = (rotation @ axis[..., None])[..., 0]
+    reach = radius * xp.sqrt(xp.maximum(1.0 - along * along, EDGE_ON))
+    return low - reach, high + reach
 
 
-def rotated_boxes(
-    center: Float[AnyArray, "*#b 3"],
-    half: Float[AnyArray, "*#b 3"],
-    pos: Float[AnyArray, "*#b 3"],
-    quat: Float[AnyArray, "*#b 4"],
-    margin: Float[AnyArray, "*#b"] | float = 0.0,
+def turned_boxes(
+    rotation: Float[AnyArray, "*b K 3 3"],
+    center: Float[AnyArray, "K 3"],
+    half: Float[AnyArray, "K 3"],
+    margin: Float[AnyArray, "K 1"],
 ) -> Boxes:
-    """Boxes (low, high) around local boxes that are posed in the world; `margin` is added on every side."""
-    middle = jnp.add(pos, quat_rotate(quat, center))
-    reach = jnp.sum(jnp.abs(quat_to_matrix(quat)) * half[..., None, :], axis=-1) + jnp.asarray(margin)[..., None]
+    """iGibson's rule: boxes (low, high) around turned local boxes, about their frames' origins, plus the margin."""
+    middle = (rotation @ center[..., None])[..., 0]
+    reach = (abs(rotation) @ half[..., None])[..., 0] + margin
     return middle - reach, middle + reach
 
 
 def link_boxes(
-    piece_body: Int[np.ndarray, "K"],
-    piece_kind: Int[np.ndarray, "K"],
-    piece_size: Float[np.ndarray, "K 3"],
-    piece_vertices: Float[np.ndarray, "K V 3"],
-    piece_pos: Float[np.ndarray, "K 3"],
-    piece_quat: Float[np.ndarray, "K 4"],
-) -> tuple[Int[np.ndarray, "N"], Float[np.ndarray, "N 3"], Float[np.ndarray, "N 3"], Float[np.ndarray, "N"]]:
+    body: Int[np.ndarray, "K"],
+    points: Float[np.ndarray, "K 3 V"],
+    radius: Float[np.ndarray, "K 1"],
+    axis: Float[np.ndarray, "K 3"],
+) -> tuple[Int[np.ndarray, "N"], Float[np.ndarray, "N 3"], Float[np.ndarray, "N 3"], Float[np.ndarray, "N 1"]]:
     """iGibson's local boxes, one for each body that has pieces: (body, centre, half size, Bullet's margin).
 
-    Host side, once per scene; `rotated_boxes` turns them into world boxes. Poses of pieces are those in their bodies.
+    Arguments as `piece_cores` gives them for pieces posed in their bodies. Host side, once per scene.
     """
-    low, high = (np.asarray(a) for a in piece_boxes(piece_kind, piece_size, piece_vertices, piece_pos, piece_quat))
-    body, group, count = np.unique(piece_body, return_inverse=True, return_counts=True)
-    box_low, box_high = np.full((len(body), 3), np.inf, np.float32), np.full((len(body), 3), -np.inf, np.float32)
+    low, high = core_boxes(np.broadcast_to(np.eye(3), (len(body), 3, 3)), points, radius, axis)
+    bodies, group, count = np.unique(body, return_inverse=True, return_counts=True)
+    box_low, box_high = np.full((len(bodies), 3), np.inf), np.full((len(bodies), 3), -np.inf)
     np.minimum.at(box_low, group, low)
     np.maximum.at(box_high, group, high)
-    margin = np.where(count > 1, BULLET_MARGIN_COMPOUND, BULLET_MARGIN_SINGLE).astype(np.float32)
-    return body, (box_low + box_high) / 2, (box_high - box_low) / 2, margin
-
-
-def union_boxes(
-    low: Float[AnyArray, "*b K 3"], high: Float[AnyArray, "*b K 3"], owner: Int[np.ndarray, "K"], num_owners: int
-) -> tuple[Float[Array, "*b O 3"], Float[Array, "*b O 3"]]:
-    """Boxes around all boxes of each owner; `owner` is known before tracing and -1 belongs to nobody."""
-    members = [np.flatnonzero(owner == o) for o in range(num_owners)]
-    slots = np.full((num_owners, max((len(m) for m in members), default=0)), len(owner))
-    for row, m in zip(slots, members, strict=True):
-        row[: len(m)] = m
-    nobody = jnp.full((*low.shape[:-2], 1, 3), jnp.inf)
-    return (
-        jnp.min(jnp.concatenate([low, nobody], axis=-2)[..., slots, :], axis=-2, initial=jnp.inf),
-        jnp.max(jnp.concatenate([high, -nobody], axis=-2)[..., slots, :], axis=-2, initial=-jnp.inf),
-    )
+    margin = np.where(count > 1, BULLET_MARGIN_COMPOUND, BULLET_MARGIN_SINGLE)[:, None]
+    return bodies, (box_low + box_high) / 2, (box_high - box_low) / 2, margin
 
 
 def point_in_box(
@@ -104,31 +122,3 @@ def box_gap(
     endless = gap == jnp.inf  # of an empty box; kept out of the square root for its gradient
     distance = length(jnp.maximum(jnp.where(endless, 0.0, gap), 0.0))
     return jnp.where(jnp.any(endless, axis=-1), jnp.inf, distance)
-
-
-def point_box_distance(
-    point: Float[AnyArray, "*#b 3"], low: Float[AnyArray, "*#b 3"], high: Float[AnyArray, "*#b 3"]
-) -> Float[Array, "*b"]:
-    """Distance of a point from a box, 0 inside, inf for the empty box."""
-    return box_gap(point, point, low, high)
-
-
-def box_corners(low: Float[AnyArray, "*#b 3"], high: Float[AnyArray, "*#b 3"]) -> Float[Array, "*b 8 3"]:
-    """The eight corners, x changing slowest."""
-    upper = np.array([[(i >> 2) & 1, (i >> 1) & 1, i & 1] for i in range(8)], bool)
-    return jnp.where(upper, high[..., None, :], low[..., None, :])
-
-
-def _round_reach(
-    kind: Int[AnyArray, "*#b"], size: Float[AnyArray, "*#b 3"], quat: Float[AnyArray, "*#b 4"]
-) -> Float[Array, "*b 3"]:
-    """Half extent along the world axes of spheres, capsules and cylinders (0 for polyhedra)."""
-    axis = quat_to_matrix(quat)[..., :, 2]
-    radius, half = size[..., 0, None], size[..., 1, None]
-    across = jnp.maximum(1.0 - axis * axis, 0.0)
-    flat = jnp.sqrt(jnp.where(across > 0.0, across, 1.0)) * (across > 0.0)
-    return jnp.select(
-        [(kind == k)[..., None] for k in (PieceKind.SPHERE, PieceKind.CAPSULE, PieceKind.CYLINDER)],
-        [jnp.broadcast_to(radius, axis.shape), jnp.abs(axis) * half + radius, jnp.abs(axis) * half + flat * radius],
-        0.0,
-    )

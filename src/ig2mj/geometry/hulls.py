@@ -74,18 +74,6 @@ def core_radius(kind: Int[AnyArray, "*#b"], size: Float[AnyArray, "*#b 3"]) -> F
     return jnp.where((kind == PieceKind.SPHERE) | (kind == PieceKind.CAPSULE), size[..., 0], 0.0)
 
 
-def bounding_radius(
-    kind: Int[AnyArray, "*#b"], size: Float[AnyArray, "*#b 3"], vertices: Float[AnyArray, "*#b V 3"]
-) -> Float[Array, "*b"]:
-    """Radius of a ball about the frame's origin that holds the piece."""
-    radius, half = size[..., 0], size[..., 1]
-    return jnp.select(
-        [kind == k for k in (PieceKind.SPHERE, PieceKind.CAPSULE, PieceKind.CYLINDER)],
-        [radius, radius + half, jnp.sqrt(radius * radius + half * half)],
-        jnp.max(jnp.sqrt(jnp.sum(jnp.square(vertices), axis=-1)), axis=-1),
-    )
-
-
 def core_support(
     kind: Int[AnyArray, "*#b"],
     size: Float[AnyArray, "*#b 3"],

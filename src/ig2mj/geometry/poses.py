@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 import numpy as np
+import scipy.spatial.transform
 from jaxtyping import Array, Float
 
 AnyArray = Array | np.ndarray
@@ -78,6 +79,11 @@ def quat_to_matrix(q: Quat) -> Float[Array, "*b 3 3"]:
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
     return jnp.stack([jnp.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def matrices_on_host(q: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 3 3"]:
+    """`quat_to_matrix` in float64 and without JAX: for constants, also while something is traced."""
+    return scipy.spatial.transform.Rotation.from_quat(np.roll(q, -1, axis=-1)).as_matrix()  # SciPy: x-y-z-w
 
 
 def matrix_to_quat(m: Float[AnyArray, "*b 3 3"]) -> Float[Array, "*b 4"]:

@@ -20,10 +20,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from ig2mj.geometry.poses import quat_rotate_inverse
+from ig2mj.geometry.poses import AnyArray, quat_rotate_inverse
 from ig2mj.scene.tables import PieceKind
 
-AnyArray = Array | np.ndarray
 Interval = tuple[Float[Array, "*b"], Float[Array, "*b"]]
 
 UNBOUNDED = 1e30
@@ -64,13 +63,6 @@ def enters(
 ) -> Bool[Array, "*b"]:
     """Whether the ray along the line's direction enters the shape at 0 <= t <= length."""
     return jnp.logical_and(low >= 0.0, (low <= length) & (low <= high))
-
-
-def enters_backwards(
-    low: Float[AnyArray, "*#b"], high: Float[AnyArray, "*#b"], length: Float[AnyArray, "*#b"] | float
-) -> Bool[Array, "*b"]:
-    """The same for the ray against the line's direction: one interval answers both."""
-    return jnp.logical_and(high <= 0.0, (-high <= length) & (low <= high))
 
 
 def piece_interval(
@@ -192,12 +184,15 @@ def clip_line(
 
 def fractions_enter(
     low: Float[Array, "*#b"],
-    low_by: Float[Array, "*#b"],
+    low_by: Float[Array, "*#b"] | float,
     high: Float[Array, "*#b"],
-    high_by: Float[Array, "*#b"],
-    length: Float[AnyArray, "*#b"],
+    high_by: Float[Array, "*#b"] | float,
+    length: Float[AnyArray, "*#b"] | float,
 ) -> tuple[Bool[Array, "*b"], Bool[Array, "*b"]]:
-    """`enters` and `enters_backwards` on what `clip_line` returns, again without a division."""
+    """Whether the rays along and against the line's direction enter, from what `clip_line` returns.
+
+    As `enters`, and as it would be for the interval [-high, -low]; again without a division.
+    """
     meets = low * high_by <= high * low_by
     forwards = meets & (low >= 0.0) & (low <= length * low_by)
     return forwards, meets & (high <= 0.0) & (-high <= length * high_by)

@@ -1,22 +1,20 @@
 """Points on the surfaces of pieces, drawn evenly by area, with outward normals: where dust and stains may sit.
 
-`SurfaceTable` is made once on the host from the pieces' shapes; `sample_surface` draws from it on the host,
-`sample_surface_jax` inside jitted code. Round pieces are represented by triangles whose corners lie on them, so
-sampled points lie up to 0.5 % of the radius below the round surface.
+`SurfaceTable` is made once from the pieces' shapes, and `sample_surface` draws from it, both on the host. Round pieces
+are represented by triangles whose corners lie on them, so sampled points lie up to 0.5 % of the radius below the round
+surface.
 """
 
 from __future__ import annotations
 
 import dataclasses
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 import scipy.spatial
-from jaxtyping import Array, Float, Int
+from jaxtyping import Float, Int
 
 from ig2mj.geometry.hulls import signed_depth
-from ig2mj.geometry.poses import quat_to_matrix
+from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.scene.tables import PieceKind
 
 SEGMENTS = 32
@@ -61,7 +59,7 @@ def surface_table(
 ) -> SurfaceTable:
     """Triangles of K >= 1 pieces, posed by `pos` and `quat` in the common frame (a body's, an object's)."""
     assert len(kind) > 0, "a surface needs at least one piece"
-    turn = np.asarray(quat_to_matrix(np.asarray(quat, np.float32)), np.float64)
+    turn = matrices_on_host(quat)
     corners, piece = [], []
     for k in range(len(kind)):
         points = _outline(PieceKind(kind[k]), np.asarray(size[k], np.float64), np.asarray(vertices[k], np.float64))
@@ -90,25 +88,6 @@ def sample_surface(table: SurfaceTable, count: int, rng: np.random.Generator) ->
     return SurfaceSample(points, table.normals[triangle], table.piece[triangle])
 
 
-def sample_surface_jax(
-    table: SurfaceTable, key: Array, shape: tuple[int, ...]
-) -> tuple[Float[Array, "*n 3"], Float[Array, "*n 3"], Int[Array, "*n"]]:
-    """Points, normals and pieces of the given leading shape, evenly by area, from a JAX random key."""
-    pick, place = jax.random.split(key)
-    uniform = jax.random.uniform(pick, shape)
-    triangle = jnp.searchsorted(jnp.asarray(table.cumulative, jnp.float32), uniform, side="right")
-    triangle = jnp.minimum(triangle, len(table.cumulative) - 1)
-    uv = jax.random.uniform(place, (*shape, 2))
-    uv = jnp.where(jnp.sum(uv, axis=-1, keepdims=True) > 1.0, 1.0 - uv, uv)
-    weights = jnp.concatenate([1.0 - jnp.sum(uv, axis=-1, keepdims=True), uv], axis=-1)
-    corners = jnp.asarray(table.corners, jnp.float32)[triangle]
-    return (
-        jnp.sum(weights[..., None] * corners, axis=-2),
-        jnp.asarray(table.normals, jnp.float32)[triangle],
-        jnp.asarray(table.piece)[triangle],
-    )
-
-
 def uncovered(
     sample: SurfaceSample,
     kind: Int[np.ndarray, "K"],
@@ -118,7 +97,7 @@ def uncovered(
     quat: Float[np.ndarray, "K 4"],
 ) -> SurfaceSample:
     """Those points of a sample that lie in no other of the K pieces: a decomposed object's real outside."""
-    turn = np.asarray(quat_to_matrix(np.asarray(quat, np.float32)))
+    turn = matrices_on_host(quat)
     local = np.einsum("knx,kxy->kny", sample.points[None] - pos[:, None], turn).astype(np.float32)
     depth = np.asarray(signed_depth(kind[:, None], size[:, None], planes[:, None], local))
     covered = (depth > BURIED) & (sample.piece[None] != np.arange(len(kind))[:, None])

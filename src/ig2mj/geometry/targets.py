@@ -19,10 +19,8 @@ import numpy as np
 from jaxtyping import Array, Bool, Float, Int, UInt8
 
 from ig2mj.geometry import rays
-from ig2mj.geometry.poses import quat_to_matrix
+from ig2mj.geometry.poses import AnyArray, matrices_on_host, quat_to_matrix
 from ig2mj.scene.tables import PieceKind, SceneTables
-
-AnyArray = Array | np.ndarray
 
 PLANE_STEPS = (6, 12, 24, 48, 96, 192, 384, 768)
 """Polyhedra are grouped by number of half-spaces, rounded up to one of these: a box is not charged for 60 faces."""
@@ -93,7 +91,7 @@ class RayTargets:
         pair = np.concatenate([np.full(len(o), p) for p, o in enumerate(owned)] or [np.zeros(0)]).astype(int)
         piece = np.concatenate([*owned, np.zeros(0)]).astype(int)
         steps = _plane_steps(piece_kind, piece_planes)
-        rotation = _matrices(piece_quat)
+        rotation = matrices_on_host(piece_quat)
         groups, order = [], []
         for kind, step in sorted({(int(piece_kind[k]), int(steps[k])) for k in piece}):
             members = np.flatnonzero((piece_kind[piece] == kind) & (steps[piece] == step))
@@ -265,8 +263,3 @@ def _slots(pair: Int[np.ndarray, "E"], num_pairs: int) -> Int[np.ndarray, "P S"]
     for row, m in zip(slots, members, strict=True):
         row[: len(m)] = m
     return slots
-
-
-def _matrices(quat: Float[np.ndarray, "K 4"]) -> Float[np.ndarray, "K 3 3"]:
-    with jax.ensure_compile_time_eval():  # plans may be built while something is traced
-        return np.asarray(quat_to_matrix(np.asarray(quat, np.float32)), np.float64)

@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.frustum import BLOCKING, Camera, points_in_frustum
+from ig2mj.geometry.frustum import Camera, points_in_frustum
 from ig2mj.geometry.poses import quat_rotate
 from ig2mj.geometry.surface import sample_surface, surface_table
 from ig2mj.geometry.targets import RayTargets, rays_enter_targets
@@ -30,6 +30,10 @@ NUM_POINTS = 48
 
 NEAR, FAR = 0.1, 100.0
 """Metres; iGibson's camera (spec/robots_tasks_sensors.md 3.1)."""
+
+BLOCKING = 0.999
+"""Share of the way to a point within which something stands in front of it: a point on a surface does not hide itself
+behind that surface by rounding."""
 
 SIGHT_BUDGET = 2**24
 """Numbers that the lines of sight may fill at a time; more worlds are taken in turns."""

@@ -177,7 +177,7 @@ def _piece_columns(model: mujoco.MjModel, geom_object: np.ndarray, file: object)
     count = len(pieces)
     planes = np.zeros((count, max((len(p.planes) for p in pieces), default=0), 4))
     planes[..., 3] = 1.0
-    vertices = np.zeros((count, max((len(p.vertices) for p in pieces), default=0), 3))
+    vertices = np.zeros((count, max((len(p.vertices) for p in pieces), default=1), 3))
     for k, piece in enumerate(pieces):
         planes[k, : len(piece.planes)] = piece.planes
         vertices[k] = piece.vertices[0]
