@@ -17,7 +17,7 @@ from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.sensors.batch_camera import BatchCamera
 from ig2mj.sensors.particle_slots import fill_slots
 from ig2mj.sensors.render_model import make_render_model
-from ig2mj.sensors.tints import TINTS, tints
+from ig2mj.sensors.tints import TINTS, UNTINTED, tinted, tints, tints_of_geoms
 from ig2mj.states import particles
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
@@ -68,18 +68,19 @@ def test_the_first_true_state_wins(model, scene):
     box = scene.object_index("box")
     assert [t.predicate.name for t in TINTS] == ["frozen", "burnt", "cooked", "soaked", "toggled_on"]
     states = initial_states(model, 1)
-    assert not np.asarray(tints(model, states).on).any()
-    for field, value, weight, colour in (
-        ("wetness", 1e6, 0.5, (0, 0, 200 / 255)),
-        ("max_temperature", 100.0, 0.5, (139 / 255, 69 / 255, 19 / 255)),
-        ("max_temperature", 300.0, 0.8, (0, 0, 0)),
-        ("temperature", -30.0, 0.8, (1, 1, 1)),
+    assert (np.asarray(tints(model, states)) == UNTINTED).all()
+    grey = np.full((1, 3), 0.5, np.float32)
+    for field, value, name, colour in (
+        ("wetness", 1e6, "soaked", (0.25, 0.25, 0.25 + 100 / 255)),
+        ("max_temperature", 100.0, "cooked", (0.25 + 69.5 / 255, 0.25 + 34.5 / 255, 0.25 + 9.5 / 255)),
+        ("max_temperature", 300.0, "burnt", (0.1, 0.1, 0.1)),
+        ("temperature", -30.0, "frozen", (0.9, 0.9, 0.9)),
     ):
         states = with_value(states, field, 0, box, value)
-        tint = tints(model, states)
-        assert np.asarray(tint.on)[0].tolist() == [name == "box" for name in scene.object_names]
-        assert float(tint.weight[0, box]) == pytest.approx(weight)
-        assert np.asarray(tint.colour)[0, box] == pytest.approx(colour)
+        tint = np.asarray(tints(model, states))
+        assert (tint[0] != UNTINTED).tolist() == [name == "box" for name in scene.object_names]
+        assert TINTS[tint[0, box]].predicate.name == name
+        assert np.asarray(tinted(grey, tint[:, [box]]))[0, 0] == pytest.approx(colour)
 
 
 def test_a_switched_on_thing_is_brighter(tiny_home):
@@ -87,8 +88,10 @@ def test_a_switched_on_thing_is_brighter(tiny_home):
     stove = tiny_home.object_index("stove")
     states = initial_states(model, 1)
     states = dataclasses.replace(states, toggled=states.toggled.at[0, stove].set(True))
-    colour = tints(model, states).apply(np.array([[0.4, 0.8, 0.2]], np.float32), np.array([stove]))
-    assert np.asarray(colour)[0, 0] == pytest.approx([0.6, 1.0, 0.3])
+    of_geoms = tints_of_geoms(tints(model, states), np.array([stove, -1]))
+    colour = np.asarray(tinted(np.array([[0.4, 0.8, 0.2]] * 2, np.float32), of_geoms))[0]
+    assert colour[0] == pytest.approx([0.6, 1.0, 0.3])
+    assert colour[1] == pytest.approx([0.4, 0.8, 0.2]), "what belongs to no object has no tint"
 
 
 # Particles.

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 import ig2mj
+from ig2mj.sensors.tints import TINTS, UNTINTED
 from ig2mj.viewer.interactive import ViewerState
-from ig2mj.viewer.state_marks import TINTS, Tinter, marks, tint_of_objects
+from ig2mj.viewer.state_marks import Tinter, marks, tint_of_objects
 from ig2mj.viewer.states_overlay import StatesOverlay, describe
 
 
@@ -19,7 +20,7 @@ def world(tiny_home) -> ig2mj.Simulation:
 
 def _tint(world, name: str) -> str | None:
     index = tint_of_objects(world.state_model, world.states)[world.scene.object_index(name)]
-    return TINTS[index].state if index >= 0 else None
+    return TINTS[index].predicate.name if index != UNTINTED else None
 
 
 def test_section_3_7_the_state_of_highest_priority_colours_an_object(world):
@@ -36,8 +37,8 @@ def test_section_3_7_tints_mix_and_are_taken_back(world):
     model, tables = world.model, world.scene.tables
     before = model.geom_rgba.copy()
     tint = np.full(tables.num_objects, -1)
-    tint[world.scene.object_index("box")] = [t.state for t in TINTS].index("burnt")
-    tint[world.scene.object_index("stove")] = [t.state for t in TINTS].index("toggled_on")
+    tint[world.scene.object_index("box")] = [t.predicate.name for t in TINTS].index("burnt")
+    tint[world.scene.object_index("stove")] = [t.predicate.name for t in TINTS].index("toggled_on")
     with Tinter(model, tables).shown(tint):
         box, stove = model.geom("box/visual_0").id, model.geom("stove/visual_0").id
         assert np.allclose(model.geom_rgba[box, :3], 0.2 * before[box, :3])

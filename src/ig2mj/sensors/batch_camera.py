@@ -28,13 +28,10 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
 from ig2mj.sensors.particle_slots import Slots, fill_slots
-from ig2mj.sensors.render_model import make_render_model, mean_colours
-from ig2mj.sensors.tints import tints
+from ig2mj.sensors.render_model import BACKGROUND, make_render_model, mean_colours
+from ig2mj.sensors.tints import UNTINTED, tinted, tints, tints_of_geoms
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
-
-BACKGROUND = (0.86, 0.90, 0.94, 1.0)
-"""rgba where nothing is hit."""
 
 NOTHING = -1
 """In a segmentation: no object there (sky, agents, the world's own geoms)."""
@@ -151,7 +148,7 @@ class BatchCamera:
         """Constants of the model, on the host."""
         slots = self.slots
         self._owner = np.concatenate([self.model.tables.geom_object, np.full(slots, -1)])
-        self._plain = mean_colours(host)
+        self._plain = mean_colours(host, np.arange(host.ngeom))
         self._material = np.array(host.geom_matid, np.int32)
         self._size = np.array(host.geom_size, np.float32)
         self._camera_in_body = (host.cam_bodyid, _f32(host.cam_pos), _f32(host.cam_quat))
@@ -181,16 +178,14 @@ class BatchCamera:
     def _look(self, states: ExtendedStates, slots: Slots) -> dict[str, Array]:
         """Fields of the model that differ per world: colour and material of tinted geoms, size and colour of slots."""
         worlds, geoms = self.engine.num_worlds, len(self._plain) - self.slots
-        tint = tints(self.model, states)
-        tinted = (tint.on[:, np.maximum(self._owner, 0)] & (self._owner >= 0))[..., None]
+        tint = tints_of_geoms(tints(self.model, states), self._owner)
         plain = jnp.asarray(self._plain)
-        colour = jnp.where(tinted, tint.apply(plain[:, :3], self._owner), plain[:, :3])
-        colour = jnp.concatenate([colour[:, :geoms], slots.colour], axis=1)
+        colour = jnp.concatenate([tinted(plain[:, :3], tint)[:, :geoms], slots.colour], axis=1)
         alpha = jnp.broadcast_to(plain[:, 3:], (worlds, len(self._plain), 1))
         size = jnp.broadcast_to(jnp.asarray(self._size[:geoms]), (worlds, geoms, 3))
         return {
             "geom_rgba": jnp.concatenate([colour, alpha], axis=-1),
-            "geom_matid": jnp.where(tinted[..., 0], -1, jnp.asarray(self._material)),
+            "geom_matid": jnp.where(tint == UNTINTED, jnp.asarray(self._material), -1),
             "geom_size": jnp.concatenate([size, slots.size], axis=1),
         }
 

@@ -8,10 +8,13 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ig2mj.errors import EngineError
 from ig2mj.scene.scene import Scene
+
+BACKGROUND = (0.86, 0.90, 0.94, 1.0)
+"""rgba where nothing is hit."""
 
 NOWHERE = (0.0, 0.0, -50.0)
 """Metres, world frame: where slots are that show nothing."""
@@ -47,16 +50,16 @@ def make_render_model(scene: Scene, slots: int) -> mujoco.MjModel:
     return model
 
 
-def mean_colours(model: mujoco.MjModel) -> Float[np.ndarray, "G 4"]:
-    """rgba (0..1) of every geom: its own, or its material's times the mean of the material's texture."""
-    return np.stack([mean_colour(model, g) for g in range(model.ngeom)]).astype(np.float32).reshape(-1, 4)
+def mean_colours(model: mujoco.MjModel, geoms: Int[np.ndarray, "G"]) -> Float[np.ndarray, "G 4"]:
+    """rgba (0..1) of these geoms: their own, or their material's times the mean of the material's texture."""
+    rgba = np.array(model.geom_rgba[geoms], np.float32)
+    material = model.geom_matid[geoms]
+    for number in np.unique(material[material >= 0]):
+        rgba[material == number] = _material_colour(model, int(number))
+    return rgba
 
 
-def mean_colour(model: mujoco.MjModel, geom: int) -> Float[np.ndarray, "4"]:
-    """rgba (0..1) of one geom, see `mean_colours`."""
-    material = int(model.geom_matid[geom])
-    if material < 0:
-        return np.array(model.geom_rgba[geom], np.float32)
+def _material_colour(model: mujoco.MjModel, material: int) -> Float[np.ndarray, "4"]:
     colour = np.array(model.mat_rgba[material], np.float32)
     texture = int(model.mat_texid[material, int(mujoco.mjtTextureRole.mjTEXROLE_RGB)])
     if texture >= 0 and model.tex_nchannel[texture] >= 3 and model.tex_adr[texture] >= 0:

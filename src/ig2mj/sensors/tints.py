@@ -3,7 +3,7 @@
 Of the states that are true the first of `TINTS` is shown. iGibson mixes the state's colour into the object's texture;
 here it is mixed into the object's colour, per world. Shared by cameras and viewers.
 
-Axes: W worlds, O objects, T tints.
+Axes: W worlds, O objects, G geoms.
 """
 
 from __future__ import annotations
@@ -12,8 +12,7 @@ import dataclasses
 
 import jax.numpy as jnp
 import numpy as np
-from flax import struct
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
 from ig2mj.predicates.base import Predicate
@@ -46,37 +45,31 @@ TINTS = (
 """Highest priority first (spec/states.md section 13)."""
 
 
-@struct.dataclass
-class ObjectTints:
-    """What to do to each object's colour. `on`: anything at all; `weight`, `colour`, `brightness` as in `Tint`."""
-
-    on: Bool[Array, "W O"]
-    weight: Float[Array, "W O"]
-    colour: Float[Array, "W O 3"]
-    brightness: Float[Array, "W O"]
-
-    def apply(self, rgb: Float[Array, "G 3"] | Float[np.ndarray, "G 3"], owner: np.ndarray) -> Float[Array, "W G 3"]:
-        """Colours of things that belong to objects: `owner` [G], -1 where nothing is tinted."""
-        at = np.maximum(owner, 0)
-        weight = self.weight[:, at, None]
-        mixed = ((1 - weight) * jnp.asarray(rgb) + weight * self.colour[:, at]) * self.brightness[:, at, None]
-        return jnp.where((self.on[:, at] & (owner >= 0))[..., None], jnp.clip(mixed, 0.0, 1.0), jnp.asarray(rgb))
+UNTINTED = -1
+"""Where no state shows."""
 
 
-def tints(model: StateModel, states: ExtendedStates) -> ObjectTints:
-    """The tint of every object in every world. Pure."""
+def tints(model: StateModel, states: ExtendedStates) -> Int[Array, "W O"]:
+    """Which of `TINTS` every object has in every world, or `UNTINTED`. Pure."""
     true: list[Bool[Array, "W O"]] = []
     for tint in TINTS:
         of_states = tint.predicate.per_object
         assert of_states is not None
         able = model.parameters.has(tint.predicate.ability or "")
         true.append(jnp.asarray(of_states(model, states)) & able)
-    stacked = jnp.stack(true, axis=-1)  # W O T
-    first = jnp.argmax(stacked, axis=-1)
-    on = stacked.any(-1)
-    return ObjectTints(
-        on=on,
-        weight=jnp.where(on, jnp.array([t.weight for t in TINTS], jnp.float32)[first], 0.0),
-        colour=jnp.array([t.colour for t in TINTS], jnp.float32)[first],
-        brightness=jnp.where(on, jnp.array([t.brightness for t in TINTS], jnp.float32)[first], 1.0),
-    )
+    stacked = jnp.stack(true, axis=-1)  # one column for each tint
+    return jnp.where(stacked.any(-1), jnp.argmax(stacked, axis=-1), UNTINTED)
+
+
+def tints_of_geoms(tint: Int[Array, "W O"], owner: Int[np.ndarray, "G"]) -> Int[Array, "W G"]:
+    """The tints of objects' geoms; `owner` is -1 for what belongs to no object."""
+    return jnp.where(owner >= 0, tint[:, np.maximum(owner, 0)], UNTINTED)
+
+
+def tinted(rgb: Float[Array, "G 3"], tint: Int[Array, "W G"]) -> Float[Array, "W G 3"]:
+    """Colours (0..1) in their tints."""
+    weight = jnp.array([t.weight for t in TINTS], jnp.float32)[tint][..., None]
+    colour = jnp.array([t.colour for t in TINTS], jnp.float32)[tint]
+    brightness = jnp.array([t.brightness for t in TINTS], jnp.float32)[tint][..., None]
+    mixed = jnp.clip(((1 - weight) * jnp.asarray(rgb) + weight * colour) * brightness, 0.0, 1.0)
+    return jnp.where((tint == UNTINTED)[..., None], jnp.asarray(rgb), mixed)

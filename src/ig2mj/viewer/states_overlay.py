@@ -9,10 +9,11 @@ import numpy as np
 
 from ig2mj.engine.view import PhysicsView
 from ig2mj.scene.scene import Scene
+from ig2mj.sensors.tints import TINTS, UNTINTED
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 from ig2mj.viewer.overlays import Label
-from ig2mj.viewer.state_marks import TINTS, Mark, Tinter, marks, tint_of_objects
+from ig2mj.viewer.state_marks import Mark, Tinter, marks, tint_of_objects
 
 CHANGED_BY = 0.5
 """Degrees from room temperature at which a temperature is worth a text."""
@@ -78,8 +79,8 @@ def describe(model: StateModel, states: ExtendedStates, world: int = 0) -> dict[
         words = []
         if p.thermal[o] and abs(host["temperature"][o] - 23.0) > CHANGED_BY:
             words.append(f"{host['temperature'][o]:.0f} C")
-        if tint[o] >= 0:
-            words.append(TINTS[tint[o]].state.replace("_", " "))
+        if tint[o] != UNTINTED:
+            words.append(TINTS[tint[o]].predicate.name.replace("_", " "))
         if host["wetness"][o] > 0:
             words.append(f"wet {host['wetness'][o]:g}")
         words += [f"{name} {count[o]}" for name, count in dirt.items() if count.get(o)]

@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any, cast
 
 import mujoco
 import numpy as np
+from jaxtyping import Float, Int
+
+from ig2mj.sensors.render_model import BACKGROUND, mean_colours
 
 if TYPE_CHECKING:
     from ig2mj.viewer.offscreen import FreeView
-
-BACKGROUND = (0.86, 0.90, 0.94, 1.0)
 
 
 def render(
@@ -42,8 +43,11 @@ def _cast(model, data, camera, width: int, height: int, groups: Sequence[int], s
     import warp as wp
     from mujoco.mjx.third_party import mujoco_warp as mjw
 
-    geoms = [g for g in range(model.ngeom) if model.geom_group[g] in groups and _colour(model, g)[3] > 0]
-    static = _snapshot(model, data, geoms, camera)
+    geoms = np.flatnonzero(np.isin(model.geom_group, groups))
+    colours = mean_colours(model, geoms)
+    shown = colours[:, 3] > 0
+    geoms = geoms[shown]
+    static = _snapshot(model, data, geoms, colours[shown], camera)
     state = mujoco.MjData(static)
     mujoco.mj_forward(static, state)
     context = mjw.create_render_context(
@@ -71,7 +75,13 @@ def _cast(model, data, camera, width: int, height: int, groups: Sequence[int], s
     return np.clip(seen.numpy()[0] * 255 + 0.5, 0, 255).astype(np.uint8)
 
 
-def _snapshot(model: mujoco.MjModel, data: mujoco.MjData, geoms: list[int], camera: int | FreeView) -> mujoco.MjModel:
+def _snapshot(
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    geoms: Int[np.ndarray, "G"],
+    colours: Float[np.ndarray, "G 4"],
+    camera: int | FreeView,
+) -> mujoco.MjModel:
     """A model of these geoms where they are now, in this order, with one camera and the headlight."""
     spec = mujoco.MjSpec()
     spec.visual.headlight.ambient = np.full(3, 0.4)
@@ -79,11 +89,11 @@ def _snapshot(model: mujoco.MjModel, data: mujoco.MjData, geoms: list[int], came
     spec.visual.headlight.specular = np.zeros(3)
     spec.stat.extent, spec.stat.center = model.stat.extent, model.stat.center
     meshes: dict[int, str] = {}
-    for g in geoms:
+    for g, rgba in zip(geoms, colours, strict=True):
         geom = spec.worldbody.add_geom()
         geom.type = mujoco.mjtGeom(int(model.geom_type[g]))
         geom.pos, geom.quat = data.geom_xpos[g], _quaternion(data.geom_xmat[g])
-        geom.rgba, geom.contype, geom.conaffinity, geom.group = _colour(model, g), 0, 0, 0
+        geom.rgba, geom.contype, geom.conaffinity, geom.group = rgba, 0, 0, 0
         if geom.type == mujoco.mjtGeom.mjGEOM_MESH:
             number = int(model.geom_dataid[g])
             if number not in meshes:
@@ -129,18 +139,3 @@ def _add_mesh(spec: mujoco.MjSpec, model: mujoco.MjModel, number: int) -> str:
     mesh.userface = model.mesh_face[f : f + nf].ravel()
     mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL  # sheets enclose no volume
     return mesh.name
-
-
-def _colour(model: mujoco.MjModel, geom: int) -> np.ndarray:
-    """rgba of the geom, of its material where it has one, times the mean of the material's texture."""
-    material = int(model.geom_matid[geom])
-    if material < 0:
-        return model.geom_rgba[geom]
-    colour = model.mat_rgba[material].copy()
-    texture = int(model.mat_texid[material, int(mujoco.mjtTextureRole.mjTEXROLE_RGB)])
-    if texture >= 0 and model.tex_nchannel[texture] >= 3:
-        channels = int(model.tex_nchannel[texture])
-        size = int(model.tex_height[texture] * model.tex_width[texture]) * channels
-        start = int(model.tex_adr[texture])
-        colour[:3] *= model.tex_data[start : start + size].reshape(-1, channels)[:, :3].mean(axis=0) / 255
-    return colour
