@@ -21,6 +21,7 @@ from ig2mj.engine.mjx_engine import MjxEngine, MjxPhysics
 from ig2mj.engine.profile import EngineProfile, fit, load_profile
 from ig2mj.engine.settle import settle
 from ig2mj.engine.view import Array
+from ig2mj.engine.warp_kernels import use_awake_kernels
 from ig2mj.engine.warp_streams import keep_external_streams
 from ig2mj.scene.scene import Scene
 
@@ -53,6 +54,7 @@ class WarpEngine(MjxEngine):
           print_overflow: let Warp print a line per overflowing world and step. The flags are kept in any case.
         """
         keep_external_streams()
+        use_awake_kernels()
         report_warp_compilation()
         self.profile = fit(profile, scene.model) if profile else load_profile(scene.folder, scene.model)
         self._print_overflow = print_overflow

@@ -1,0 +1,81 @@
+"""The kernels put in place of MuJoCo Warp's own give the same results."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+from mujoco.mjx.third_party import mujoco_warp
+from mujoco.mjx.third_party.mujoco_warp._src import block_cholesky, forward, passive, solver
+
+from ig2mj.engine import warp_kernels
+
+STEPS = 60
+AWAKE = 40  # buffer: over 32, where the blocked factorisation begins, and below the model's 51
+
+ROW = "".join(
+    f'<body name="box_{k}" pos="{0.15 * k} 0 0.04"><freejoint/><geom type="box" size="0.04 0.04 0.04"/></body>'
+    for k in range(8)
+)
+SCENE = f"""<mujoco><option timestep="0.00833333" integrator="implicitfast"><flag sleep="enable"/></option>
+<worldbody><geom type="plane" size="5 5 1"/>{ROW}
+<body name="arm" pos="-0.3 0 0.04" gravcomp="1"><joint name="x" type="slide" axis="1 0 0"/><joint name="z" type="slide"
+ axis="0 0 1"/><geom type="sphere" size="0.03"/><body pos="0 0 0.1" gravcomp="0.5"><joint name="tip" axis="0 1 0"
+ damping="0.01"/><geom type="capsule" size="0.01 0.03"/></body></body></worldbody>
+<actuator><position joint="x" kp="300" kv="30"/><position joint="z" kp="300" kv="30"/></actuator></mujoco>"""
+
+
+def _roll(model: mujoco.MjModel, start: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
+    """An arm pushes a row of sleeping boxes in two worlds, in one of them far enough to reach. Positions and velocities after each
+    step [STEPS, 2, nq + nv], and how much is awake [STEPS, 2]."""
+    put = mujoco_warp.put_model(model)
+    assert put.is_sparse
+    put.opt.warn_overflow = 0
+    data = mujoco_warp.put_data(model, start, nworld=2, naconmax=128, naccdmax=128, njmax=200, nvmax=AWAKE)
+    ctrl = np.zeros((2, model.nu), np.float32)
+    seen, awake = [], []
+    for step in range(STEPS):
+        ctrl[:, 0] = np.array([0.15, 0.3]) * min(1.0, 2 * step / STEPS)
+        data.ctrl.assign(ctrl)
+        mujoco_warp.step(put, data)
+        seen.append(np.concatenate([data.qpos.numpy(), data.qvel.numpy()], axis=1))
+        awake.append(data.nv_awake.numpy().copy())
+    assert not data.overflow.numpy().any()
+    return np.array(seen), np.array(awake)
+
+
+@pytest.mark.slow
+def test_an_arm_among_sleeping_boxes_moves_as_upstream():
+    model = mujoco.MjModel.from_xml_string(SCENE)
+    assert model.nv > AWAKE
+    start = mujoco.MjData(model)
+    mujoco.mj_step(model, start, nstep=240)
+    assert start.nv_awake == 3
+    assert warp_kernels.use_awake_kernels()
+    own, awake = _roll(model, start)
+    with warp_kernels.upstream_kernels():
+        upstream, _ = _roll(model, start)
+    assert awake[0].tolist() == [3, 3]
+    assert awake[:, 0].max() == 3 and awake[:, 1].max() >= 15, "one arm stops short, the other pushes boxes"
+    assert np.abs(own - upstream)[:20].max() < 1e-5
+    assert np.abs(own - upstream).max() < 1e-3
+    assert np.abs(own[:, :, model.jnt_qposadr[model.joint("z").id]]).max() < 1e-3, "gravity is compensated"
+
+
+def test_upstream_comes_back_and_goes_again():
+    assert warp_kernels.use_awake_kernels()
+    own = (solver._cholesky_factorize_solve, passive.passive, forward._advance)
+    with warp_kernels.upstream_kernels():
+        for function in (solver._cholesky_factorize_solve, passive.passive, forward._advance):
+            assert "mujoco_warp" in function.__module__
+    assert (solver._cholesky_factorize_solve, passive.passive, forward._advance) == own
+    assert all(function.__module__ == "ig2mj.engine.warp_kernels" for function in own)
+
+
+def test_another_mujoco_warp_is_left_as_it_is(monkeypatch):
+    monkeypatch.setattr(warp_kernels, "_upstream", {})
+    monkeypatch.delattr(block_cholesky, "create_blocked_cholesky_solve_newton_func")
+    before = solver.smooth_solve_compact
+    with pytest.warns(UserWarning, match="create_blocked_cholesky_solve_newton_func"):
+        assert not warp_kernels.use_awake_kernels()
+    assert solver.smooth_solve_compact is before
