@@ -35,7 +35,7 @@ def _roll(model: mujoco.MjModel, start: mujoco.MjData) -> tuple[np.ndarray, np.n
     ctrl = np.zeros((2, model.nu), np.float32)
     seen, awake = [], []
     for step in range(STEPS):
-        ctrl[:, 0] = np.array([0.15, 0.3]) * min(1.0, 2 * step / STEPS)
+        ctrl[:, 0] = np.array([0.15, 0.6]) * min(1.0, 2 * step / STEPS)
         data.ctrl.assign(ctrl)
         mujoco_warp.step(put, data)
         seen.append(np.concatenate([data.qpos.numpy(), data.qvel.numpy()], axis=1))
