@@ -11,9 +11,12 @@ import random
 from collections.abc import Callable, Mapping
 from typing import Any
 
+import numpy as np
+
 from ig2mj.errors import UnknownNameError
 
 from .halves import add_halves
+from .hinges import friction
 from .materials import Material
 from .model import HouseholdObject, ObjectBuilder
 
@@ -87,6 +90,9 @@ def build_model(entry: Entry, index: int, seed: int = 0) -> HouseholdObject:
     builder = ObjectBuilder(entry.category, "", size, rng, index, entry.rest)
     entry.build(builder, **entry.options)
     model = builder.finish()
+    mass = entry.mass * float(np.prod(size) / np.prod(entry.size))
+    for joint in model.joints:
+        joint.friction = friction(model, joint, mass)
     # iGibson's task sampler takes only models named articulated_* where a small object must open.
     moving = any(joint.openable for joint in model.joints) and not entry.fixed
     model.model = f"{'articulated_' if moving else ''}{entry.category}_{index:02d}"

@@ -20,10 +20,6 @@ from .solids import Mesh, Solid, Vec
 POINT_LINKS = ("heat_source", "toggle_button", "water_source", "water_sink")
 BOX_LINKS = ("slicer", "cleaning_tool_area")
 
-SLIDE_FRICTION = 5.0  # N, a drawer stays where it is left
-RIM_FRICTION = 4.0  # N at the farthest point of what turns on a hinge
-HINGE_FRICTION = 1.0  # N m, the most that a hinge has
-
 
 @dataclasses.dataclass
 class Area:
@@ -46,7 +42,7 @@ class Joint:
     axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
     limits: tuple[float, float] = (0.0, 0.0)
     openable: int = 0
-    friction: float = 0.0  # Coulomb friction, N or N m; set by ObjectBuilder.finish
+    friction: float = 0.0  # Coulomb friction, N or N m; set by catalogue.build_model
 
 
 class LinkBuilder:
@@ -183,19 +179,9 @@ class ObjectBuilder:
     def finish(self) -> HouseholdObject:
         for link in self.links:
             assert link.hulls, f"{self.category}/{self.model}: link {link.name} has no collision"
-        for joint in self.joints:
-            joint.friction = self._friction(joint)
         return HouseholdObject(
             self.category, self.model, self.links, self.joints, self.areas, self.rest, self.both_sides
         )
-
-    def _friction(self, joint: Joint) -> float:
-        if joint.kind == "prismatic":
-            return SLIDE_FRICTION
-        link = next(link for link in self.links if link.name == joint.child)
-        points = np.concatenate(link.hulls)
-        across = points - np.outer(points @ np.array(joint.axis), joint.axis)
-        return min(HINGE_FRICTION, RIM_FRICTION * float(np.linalg.norm(across, axis=1).max()))
 
 
 def hull_mesh(points: np.ndarray) -> trimesh.Trimesh:

@@ -21,7 +21,7 @@ ATTEMPTS = 24
 
 
 def plan(seed: int = 0) -> Plan:
-    """One room of 5.4 m by 4.2 m, its kitchen at the northern wall, the front door in the western one."""
+    """One room of 5.4 m by 4.2 m, its kitchen at the northern wall, the front door in the southern one."""
     kitchen = Room("kitchen_0", "kitchen", (-2.7, 0.1, 2.7, 2.2))
     living = Room("living_room_0", "living_room", (-2.7, -2.2, 2.7, 0.1))
     rng = random.Random(f"{seed}/{NAME}/plan")
@@ -70,7 +70,7 @@ def _kitchen_and_food(kitchen: RoomKit, index: int) -> None:
 
 
 def _living_room(kitchen: RoomKit, living: RoomKit, index: int) -> None:
-    table = _must(living.at("breakfast_table", (1.5, -0.8), 0, index=index, gap=0.02))
+    table = _must(living.at("breakfast_table", (1.4, -0.75), 0, index=index, gap=0.02))
     for along in (-0.3, 0.3):
         _must(living.before(table, "straight_chair", -0.12, index=index, along=along))
     sofa = _must(living.at_wall("sofa", side="south", near=(-0.7, -2.2), index=index))

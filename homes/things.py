@@ -10,11 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from .catalogue import build_model, find
-from .model import HouseholdObject, hull_mesh
+from .model import HouseholdObject
 from .poses import stable_orientations
-
-Hull = tuple[np.ndarray, np.ndarray]
-"""Points [n, 3], outward face normals [m, 3] without repeats."""
+from .sweeps import Hull, face_normals, swept
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -25,7 +23,7 @@ class Shape:
       hulls: collision hulls, [n, 3] each; links: the link number of each.
       normals: outward face normals of each hull, [m, 3], without repeats.
       low, high: corners of the box around all hulls.
-      swept: hulls around the moving parts between each two steps of each joint's range, with their normals.
+      swept: hulls around all that the moving parts go through (see sweeps.py), with their normals.
     """
 
     model: HouseholdObject
@@ -41,10 +39,6 @@ class Shape:
         return self.high - self.low
 
 
-SWEEP_AT = (0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0)
-"""Shares of a joint's range at which what it moves is looked at; dense where a door's far corner swings widest."""
-
-
 @functools.cache
 def shape(category: str, index: int, seed: int = 0) -> Shape:
     """The model number `index` of a category of the catalogue. Raises UnknownNameError."""
@@ -58,9 +52,9 @@ def shape(category: str, index: int, seed: int = 0) -> Shape:
             signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
             hulls.append(signs * half @ _rpy(area.rpy).T + area.xyz)
             links.append(0)
-    normals = tuple(_normals(h) for h in hulls)
+    normals = tuple(face_normals(h) for h in hulls)
     low, high = model.bounds()
-    return Shape(model, tuple(hulls), tuple(links), normals, low, high, _swept(model))
+    return Shape(model, tuple(hulls), tuple(links), normals, low, high, tuple(swept(model)))
 
 
 def lying(category: str, index: int, which: int, seed: int = 0) -> np.ndarray:
@@ -147,10 +141,6 @@ def boxes_of(hulls: Sequence[Hull]) -> np.ndarray:
     return np.array([[points.min(0), points.max(0)] for points, _ in hulls]).reshape(-1, 2, 3)
 
 
-def _normals(points: np.ndarray) -> np.ndarray:
-    return np.unique(np.asarray(hull_mesh(points).face_normals).round(5), axis=0)
-
-
 def yaw(degrees: float) -> np.ndarray:
     """Rotation [3, 3] about z; exact at right angles."""
     if degrees % 90 == 0:
@@ -179,36 +169,3 @@ def _rpy(rpy: tuple[float, float, float]) -> np.ndarray:
             [-sp, cp * sr, cp * cr],
         ]
     )
-
-
-def _swept(model: HouseholdObject) -> tuple[Hull, ...]:
-    """Hulls of each moving link (with all that hangs on it) at steps of its joint, base frame."""
-    children: dict[str, list[str]] = {}
-    for joint in model.joints:
-        children.setdefault(joint.parent, []).append(joint.child)
-    links = {link.name: link for link in model.links}
-    found: list[Hull] = []
-    for joint in model.joints:
-        if joint.kind not in ("revolute", "prismatic"):
-            continue
-        moved = [joint.child]
-        for name in moved:
-            moved += children.get(name, [])
-        hulls = [points + links[name].origin for name in moved for points in links[name].hulls]
-        pivot, axis = links[joint.child].origin, np.array(joint.axis) / np.linalg.norm(joint.axis)
-        earlier: list[np.ndarray] = []
-        for share in SWEEP_AT:
-            q = joint.limits[0] + (joint.limits[1] - joint.limits[0]) * share
-            turn = np.eye(3) if joint.kind == "prismatic" else _about(axis, q)
-            shift = axis * q if joint.kind == "prismatic" else pivot - turn @ pivot
-            now = [points @ turn.T + shift for points in hulls]
-            between = [np.concatenate(pair) for pair in zip(earlier, now, strict=True)] if earlier else []
-            found += [(points, _normals(points)) for points in between]
-            earlier = now
-    return tuple(found)
-
-
-def _about(axis: np.ndarray, angle: float) -> np.ndarray:
-    x, y, z = axis
-    k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return np.eye(3) + math.sin(angle) * k + (1 - math.cos(angle)) * k @ k

@@ -23,11 +23,11 @@ def dishwasher(b: ObjectBuilder) -> None:
     """A hollow case with a front flap and two baskets that slide out once it is open."""
     x, y, z = b.size
     body, chrome = _casing(b), materials.metal("chrome")
-    leaf, foot = 0.05, 0.09
+    leaf, foot = 0.05, 0.11
     depth = x - leaf - 0.045
     shift = -(x - depth) / 2
     b.add(block((depth - 0.05, y - 0.01, foot), (shift, 0, foot / 2)), materials.plain("black"))
-    b.add(carcass(depth, y, z - foot, 0.025, back=0.025).at(shift, 0, foot), body)
+    b.add(carcass(depth, y, z - foot, 0.03, back=0.03).at(shift, 0, foot), body)
     plane = shift + depth / 2
     wire = materials.metal("light_grey")
     room_z = (z - foot - 0.06) / 2
@@ -46,6 +46,7 @@ def dishwasher(b: ObjectBuilder) -> None:
         bow_handle(0.7 * y, 0.04, 0.009),
         chrome,
         depth=leaf,
+        skin=0.003,
         angle=1.5,
     )
     link.add(block((0.004, y - 0.02, 0.06), (plane + leaf, 0, z - 0.04)).seen(), materials.plain("black"))
@@ -251,7 +252,7 @@ def range_hood(b: ObjectBuilder) -> None:
 
 
 CATEGORIES = [
-    Entry("dishwasher", dishwasher, (0.60, 0.60, 0.84), 45.0, 6, fixed=True, rest="upright", vary=0.04),
+    Entry("dishwasher", dishwasher, (0.60, 0.60, 0.84), 32.0, 6, fixed=True, rest="upright", vary=0.04),
     Entry("washer", drum, (0.60, 0.60, 0.85), 68.0, 6, fixed=True, rest="upright", vary=0.04),
     Entry(
         "dryer", drum, (0.62, 0.60, 0.86), 48.0, 5, fixed=True, rest="upright", vary=0.04, options={"washing": False}

@@ -58,15 +58,17 @@ def toilet(b: ObjectBuilder) -> None:
     b.add(soft_box(tank, y, z - seat, 0.03).at(-x / 2 + tank / 2, 0, seat), WHITE)
     b.add(soft_box(tank + 0.012, y + 0.01, 0.03, 0.01).seen().at(-x / 2 + tank / 2, 0, z - 0.02), WHITE)
     b.add(cylinder(0.025, 0.006, 14).seen().at(-x / 2 + tank / 2, 0, z + 0.008), materials.metal("chrome"))
-    ring_outline = [(px * 0.99, py * 0.97) for px, py in outline]
+    # The lid ends before the cistern, so that it has room there when it stands up.
+    rear = 0.036 - bowl_x / 2
+    ring_outline = [(max(px * 0.99, rear), py * 0.97) for px, py in outline]
     cover = prism(ring_outline, 0.02).at(cx, 0, seat + 0.004)
     lid(
         b,
         "lid",
         cover,
         b.pick((WHITE, materials.wood("oak", b.rng), materials.plain("black"))),
-        -x / 2 + tank + 0.01,
-        seat + 0.014,
+        cx + rear,
+        seat + 0.004,
         angle=1.6,
         openable=False,
     )

@@ -7,7 +7,7 @@ import math
 from .. import materials, textures
 from ..catalogue import Entry
 from ..model import ObjectBuilder
-from ..solids import Solid, arc, block, box, decal, hull, prism, soft_box, tube
+from ..solids import Solid, arc, block, box, decal, hull, join, prism, soft_box, tube
 from ..vessels import tray, turned_vessel
 from .packages import printed
 from .parts import lid
@@ -76,12 +76,12 @@ def carton(b: ObjectBuilder) -> None:
 
 
 def chest(b: ObjectBuilder) -> None:
-    """A wooden trunk with a hinged lid and iron bands."""
+    """A wooden trunk with a hollow hinged lid, light enough for its hinge, and iron bands."""
     x, y, z = b.size
     wood = materials.wood(b.pick(("oak", "walnut", "cherry", "pine")), b.rng)
     iron = materials.metal(b.pick(("iron", "brass")))
     body = 0.74 * z
-    b.add(tray(x, y, body, 0.015), wood)
+    b.add(tray(x, y, body, 0.02, floor=0.03), wood)
     top = [
         (-x / 2, body + 0.003),
         (x / 2, body + 0.003),
@@ -101,9 +101,21 @@ def chest(b: ObjectBuilder) -> None:
     link.add(block((0.008, 0.06, 0.06), (x / 2 + 0.003, 0, body + 0.02)).seen(), iron)
 
 
-def _vault(outline: list[tuple[float, float]], y: float) -> Solid:
-    """A solid lid: the outline (x, z) extruded over the width y."""
-    return prism(outline, y).turned("x", 90).at(0, y / 2)
+def _vault(outline: list[tuple[float, float]], y: float, board: float = 0.004) -> Solid:
+    """A lid hollow from below: the outline (x, z), whose first edge is open, of boards over the width y."""
+    cx, cz = (sum(p[k] for p in outline) / len(outline) for k in (0, 1))
+    low, width, height = outline[0][1], outline[1][0] - outline[0][0], max(p[1] for p in outline) - outline[0][1]
+    inner = [
+        (px - (px - cx) / width * 2 * board, max(low, cz + (pz - cz) * (1 - 2 * board / height))) for px, pz in outline
+    ]
+    inner[0], inner[1] = (inner[0][0], low), (inner[1][0], low)
+    boards = [prism(outline, board).turned("x", 90).at(0, s * y / 2 + (board if s > 0 else 0)) for s in (1, -1)]
+    count = len(outline)
+    for k in range(1, count):
+        n = (k + 1) % count
+        corners = [outline[k], outline[n], inner[n], inner[k]]
+        boards.append(hull([(px, side * y / 2, pz) for px, pz in corners for side in (-1, 1)]))
+    return join(boards)
 
 
 def small_box(b: ObjectBuilder) -> None:
@@ -264,7 +276,7 @@ CATEGORIES = [
     Entry("bucket", bucket, (0.290, 0.290, 0.270), 0.9, 4, rest="upright", uniform=True),
     Entry("basket", basket, (0.300, 0.400, 0.330), 0.8, 5, rest="upright", vary=0.1),
     Entry("carton", carton, (0.320, 0.420, 0.300), 0.7, 5, rest="upright", vary=0.15),
-    Entry("chest", chest, (0.480, 0.800, 0.480), 18.0, 4, rest="upright", vary=0.1),
+    Entry("chest", chest, (0.480, 0.800, 0.480), 10.0, 4, rest="upright", vary=0.1),
     Entry("pencil_box", small_box, (0.085, 0.210, 0.040), 0.14, 3, rest="upright"),
     Entry("package", parcel, (0.220, 0.300, 0.130), 0.6, 4, rest="upright", vary=0.12),
     Entry("briefcase", briefcase, (0.340, 0.420, 0.110), 2.0, 4, rest="upright"),

@@ -53,7 +53,9 @@ def door(b: ObjectBuilder) -> None:
     width, height = y - 2 * FRAME - 0.008, z - FRAME - 0.012
     s = 1 if left else -1
     front = (depth - KNOB) / 2 - LEAF / 2
-    link = b.hinge("leaf", (front, s * width / 2, 0.008 + height / 2), (0, 0, s), math.radians(100))
+    # The axis runs along the leaf's edge on the side it opens to: about its middle it would turn into the post.
+    axis = (front + LEAF / 2, s * width / 2, 0.008 + height / 2)
+    link = b.hinge("leaf", axis, (0, 0, s), math.radians(100))
     centre = (front, 0.0, 0.008 + height / 2)
     if plan == "glazed":
         _glazed_leaf(link, centre, (width, height), wood)
@@ -123,7 +125,8 @@ def window(b: ObjectBuilder) -> None:
         [(-width / 2, width / 2, True)] if plan == "one" else [(0.002, width / 2, True), (-width / 2, -0.002, False)]
     )
     for k, (low, high, left) in enumerate(leaves):
-        link = b.hinge(f"sash_{k}", (front, high if left else low, middle), (0, 0, 1 if left else -1), math.pi / 2)
+        axis = (x / 2, high if left else low, middle)
+        link = b.hinge(f"sash_{k}", axis, (0, 0, 1 if left else -1), math.pi / 2)
         _sash(link, (front, (low + high) / 2, middle), (high - low, height), depth, look)
         at = low + 0.02 if left else high - 0.02
         link.add(block((0.03, 0.02, 0.1), (front + depth / 2 + 0.012, at, middle)).seen(), metal)

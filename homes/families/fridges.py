@@ -76,7 +76,10 @@ def fridge(b: ObjectBuilder) -> None:
 
 
 def _leaf(b, name, plane, y, z, body, metal, left, depth) -> LinkBuilder:
-    height = z[1] - z[0]
+    """A door that fills the span y but for what its free edge swings beyond it: the leaf is thick."""
+    height, width = z[1] - z[0], y[1] - y[0]
+    air = depth**2 / (2 * width) + 0.001
+    y = (y[0] + air, y[1]) if left else (y[0], y[1] - air)
     handle = bow_handle(min(0.45, 0.5 * height), 0.035, 0.008, upright=True)
     return door(b, name, plane, y, z, body, handle, metal, left=left, depth=depth, angle=1.9)
 

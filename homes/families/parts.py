@@ -124,14 +124,21 @@ def flap(
     *,
     y: float = 0.0,
     depth: float = 0.03,
+    skin: float = 0.008,
     angle: float = math.pi / 2,
     openable: bool = True,
 ) -> LinkBuilder:
-    """An oven's or dishwasher's door: hinged along its lower edge, closing the plane x = `plane`."""
+    """An oven's or dishwasher's door: hinged along its lower edge, closing the plane x = `plane`.
+
+    It is felt as two sheets, `skin` thick, with air between them: solid, it would be heavier than its hinge can hold
+    (hinges.friction) and a hand can close.
+    """
     middle, height = (z[0] + z[1]) / 2, z[1] - z[0]
     # The axis runs along the outer lower edge, so that the open flap does not reach below its closed place.
     link = b.hinge(name, (plane + depth, y, z[0]), (0, 1, 0), angle, openable)
-    link.add(block((depth, width, height), (plane + depth / 2, y, middle)), face)
+    link.add(block((depth, width, height), (plane + depth / 2, y, middle)).seen(), face)
+    for at in (plane + skin / 2, plane + depth - skin / 2):
+        link.add(block((skin, width, height), (at, y, middle)).felt(), face)
     if handle is not None:
         link.add(handle.at(plane + depth, y, z[1] - 0.08 * height - 0.01), metal)
     return link

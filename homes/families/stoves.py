@@ -56,9 +56,9 @@ def _cavity(
             )
 
 
-def _oven_door(b: ObjectBuilder, plane: float, y: float, z: tuple[float, float], body: Material) -> None:
+def _oven_door(b: ObjectBuilder, plane: float, y: float, z: tuple[float, float], body: Material, skin: float) -> None:
     handle = bow_handle(0.75 * y, 0.04, 0.009)
-    link = flap(b, "door", plane, y, z, body, handle, materials.metal("chrome"), depth=0.035, angle=1.45)
+    link = flap(b, "door", plane, y, z, body, handle, materials.metal("chrome"), depth=0.035, skin=skin, angle=1.45)
     pane = block((0.003, 0.7 * y, 0.5 * (z[1] - z[0])), (plane + 0.0365, 0, (z[0] + z[1]) / 2 - 0.02)).seen()
     link.add(pane, materials.plain("black", shine=0.8))
 
@@ -88,7 +88,7 @@ def stove(b: ObjectBuilder) -> None:
         b.add(knob(0.02, 0.022).seen().at(plane + leaf, (k - 2) * y / 6, top - panel / 2), dial)
     b.point("toggle_button", (plane + leaf + 0.02, 0, top - panel / 2))
     b.point("heat_source", (shift, 0, z + 0.02))
-    _oven_door(b, plane, y - 0.004, (0.105, top - panel - 0.005), body)
+    _oven_door(b, plane, y - 0.004, (0.105, top - panel - 0.005), body, 0.004)
 
 
 def burner(b: ObjectBuilder) -> None:
@@ -119,7 +119,7 @@ def oven(b: ObjectBuilder) -> None:
     b.add(decal(0.25 * y, 0.04).at(plane + leaf + 0.001, 0, z - panel / 2), face)
     b.point("toggle_button", (plane + leaf + 0.01, 0.3 * y, z - panel / 2))
     b.point("heat_source", (shift, 0, (z - panel) / 2))
-    _oven_door(b, plane, y - 0.004, (0.004, z - panel - 0.004), body)
+    _oven_door(b, plane, y - 0.004, (0.004, z - panel - 0.004), body, 0.0065)
 
 
 def microwave(b: ObjectBuilder) -> None:
@@ -211,7 +211,7 @@ def grill(b: ObjectBuilder) -> None:
             block((x, 0.012, 0.2), (0, -0.3 * y, rack + 0.104)),
         ]
     )
-    link = lid(b, "lid", dome, iron, -x / 2, rack + 0.004, angle=1.5, openable=False)
+    link = lid(b, "lid", dome, iron, -x / 2, rack + 0.004, angle=1.75, openable=False)
     link.add(bow_handle(0.3 * y).at(x / 2, 0, rack + 0.06), steel)
 
 
@@ -234,9 +234,9 @@ def toaster(b: ObjectBuilder) -> None:
 
 
 CATEGORIES = [
-    Entry("stove", stove, (0.66, 0.70, 0.91), 65.0, 8, fixed=True, rest="upright", vary=0.06),
+    Entry("stove", stove, (0.66, 0.70, 0.91), 48.0, 8, fixed=True, rest="upright", vary=0.06),
     Entry("burner", burner, (0.52, 0.60, 0.055), 9.0, 5, rest="upright", fixed=True, vary=0.06),
-    Entry("oven", oven, (0.58, 0.60, 0.60), 36.0, 6, fixed=True, rest="upright", vary=0.05),
+    Entry("oven", oven, (0.58, 0.60, 0.60), 30.0, 6, fixed=True, rest="upright", vary=0.05),
     Entry("microwave", microwave, (0.38, 0.50, 0.29), 13.0, 8, fixed=True, rest="upright", vary=0.08),
     Entry("grill", grill, (0.50, 1.10, 1.05), 35.0, 4, fixed=True, rest="upright", vary=0.06),
     Entry("toaster", toaster, (0.30, 0.19, 0.19), 1.6, 4, rest="upright", vary=0.06),
