@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 
 import jax
 import jax.numpy as jnp
@@ -50,16 +51,31 @@ def _start(model):
     return states.replace(dust=rows)
 
 
-@pytest.mark.parametrize("options", [{}, {"contact_heat_rate": 0.1, "drying_rate": 0.5}])
-def test_every_step_is_bitwise_the_same(options):
+@functools.cache
+def _rules(text=GOAL, **options):
+    """Model, program and the plain functions of a set of options and a goal; compiled once for all tests."""
     model = HOME.model(**options)
-    goal = compile_expression(model, GOAL)
-    stepper = StateStepper(StateProgram(model, goal))
+    goal = compile_expression(model, text)
 
     @jax.jit
     def reference(states, view):
         states, swap = update(model, states, view)
         return states, swap, goal.verdict(states, view)
+
+    return model, StateProgram(model, goal), reference
+
+
+def _assert_same(ours, theirs, verdict, expected, where):
+    for a, b in zip(jax.tree.leaves(ours), jax.tree.leaves(theirs), strict=True):
+        assert np.array_equal(np.asarray(a), np.asarray(b), equal_nan=True), where
+    for field in dataclasses.fields(expected):
+        assert np.array_equal(getattr(verdict, field.name), getattr(expected, field.name)), (where, field.name)
+
+
+@pytest.mark.parametrize("options", [{}, {"contact_heat_rate": 0.1, "drying_rate": 0.5}])
+def test_every_step_is_bitwise_the_same(options):
+    model, program, reference = _rules(**options)
+    stepper = StateStepper(program)
 
     ours = theirs = _start(model)
     swaps, short = 0, 0
@@ -70,17 +86,91 @@ def test_every_step_is_bitwise_the_same(options):
         short += stepper._kept is not None and stepper._view is VIEWS[number]
         ours, swap, verdict = stepper.step(ours, VIEWS[number])
         theirs, expected_swap, expected = reference(theirs, VIEWS[number])
-        for a, b in zip(jax.tree.leaves(ours), jax.tree.leaves(theirs), strict=True):
-            assert np.array_equal(np.asarray(a), np.asarray(b), equal_nan=True), f"step {k}"
+        _assert_same(ours, theirs, verdict, expected, f"step {k}")
         assert (swap is not None) == bool(expected_swap.mask.any())
         swaps += swap is not None
-        for field in dataclasses.fields(expected):
-            assert np.array_equal(getattr(verdict, field.name), getattr(expected, field.name)), (k, field.name)
     assert swaps == 1
     assert ours.sliced[0, HOME.index["half"]]
     assert ours.wetness[0, HOME.index["rag"]] > 0 and int(ours.dust.alive.sum()) == 0
     if not options:
         assert short > 5
+
+
+def _changed(view, rng):
+    """The view with one number of one field changed: a little, or to somewhere near the oven or the fish."""
+    name = str(rng.choice([f.name for f in dataclasses.fields(view) if getattr(view, f.name).size]))
+    array = np.array(getattr(view, name))
+    places = {"finger_pos": 1, "body_pos": 3, "body_quat": 3}.get(name, 1)
+    for place in rng.integers(array.size, size=places):
+        old = array.flat[place]
+        array.flat[place] = ~old if array.dtype == bool else rng.choice([old + 1e-6, old + 1e-3, 0.0, 0.5, 3.0, 30.0])
+    return name, dataclasses.replace(view, **{name: array})
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_whatever_changes_in_the_view_is_seen(seed):
+    model, program, reference = _rules()
+    rng, stepper, ours, view = np.random.default_rng(seed), StateStepper(program), _start(model), VIEWS[0]
+    seen, theirs = set(), ours
+    for k in range(150):
+        if rng.random() < 0.6:
+            name, view = _changed(view, rng)
+            seen.add(name)
+        elif rng.random() < 0.3:  # back to where nothing happens
+            view = VIEWS[int(rng.integers(len(VIEWS)))]
+        ours, _, verdict = stepper.step(ours, view)
+        theirs, _, expected = reference(theirs, view)
+        _assert_same(ours, theirs, verdict, expected, (k, sorted(seen)))
+    assert seen >= {"object_com", "body_pos", "touching", "link_pos", "finger_pos", "aabb_low"}
+
+
+def test_an_agent_that_moves_far_from_buttons_is_no_work_for_the_states():
+    model, program, _ = _rules()
+    stepper, states, view = StateStepper(program), _start(model), VIEWS[0]
+    for _ in range(3):
+        states, _, _ = stepper.step(states, view)
+    whole = stepper._kept
+    assert whole is not None
+    for k in range(4):
+        world = np.array(view.body_pos)
+        world[:, 0] += 0.1 * k  # row 0 is no object's, as an agent's are not
+        view = dataclasses.replace(view, body_pos=world, agent_pos=view.agent_pos + 1, finger_pos=view.finger_pos + k)
+        states, _, _ = stepper.step(states, view)
+        assert stepper._kept is whole
+    fingers = np.array([[[0, 0, 0.5]]], np.float32)
+    states, _, _ = stepper.step(states, dataclasses.replace(view, finger_pos=fingers))
+    assert stepper._kept is None and int(states.press_count[0, HOME.index["oven"]]) == 1
+
+
+def test_a_goal_about_the_agent_follows_it():
+    model, program, _ = _rules("(in_reach_of_agent fish)")
+    stepper, states = StateStepper(program), _start(model)
+    for x, near in ((0.0, False), (2.0, True), (2.5, True), (9.0, False)):
+        states, _, verdict = stepper.step(states, HOME.view(fingers=AWAY, agent_pos=(x, 0, 1)))
+        assert bool(verdict.holds[0]) == near
+
+
+def test_a_step_looks_only_at_what_it_depends_on():
+    _, program, _ = _rules()
+    StateStepper(program).step(_start(program.model), VIEWS[0])
+    assert not {"agent_pos", "eye_pos", "eye_quat", "awake", "grasped"} & set(program.view_reads)
+    assert {"object_com", "body_pos", "touching", "link_force", "finger_pos"} <= set(program.view_reads)
+
+
+def test_it_looks_at_every_number_it_depends_on():
+    model, program, _ = _rules()
+    stepper, states = StateStepper(program), _start(model)
+    for _ in range(3):
+        states, _, _ = stepper.step(states, VIEWS[0])
+    for name in program.view_reads:
+        old = np.asarray(getattr(VIEWS[0], name))
+        rows = old[:, 1:] if name in ("body_pos", "body_quat") else old  # row 0 is no object's body
+        for place in np.ndindex(rows.shape):
+            new = old.copy()
+            at = place if rows is old else (place[0], place[1] + 1, *place[2:])
+            new[at] = ~old[at] if old.dtype == bool else old[at] + 1e-6 + 1e-6 * abs(old[at])
+            same = stepper._says_the_same(dataclasses.replace(VIEWS[0], **{name: new}))
+            assert same == (name == "finger_pos"), (name, at)
 
 
 def test_a_settled_world_is_left_alone_and_a_cooling_one_is_not():

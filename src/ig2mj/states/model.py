@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Int
 
 from ig2mj.scene.manifest import Manifest
-from ig2mj.scene.tables import SceneTables
+from ig2mj.scene.tables import LinkKind, SceneTables
 from ig2mj.states.options import StateOptions
 from ig2mj.states.parameters import Abilities, Part, StateParameters, make_parameters, parameters_of_manifest
 
@@ -51,3 +51,10 @@ class StateModel:
         """Objects that slicing moves, wholes first: the M axis of `Swap`."""
         wholes = np.unique(self.parameters.half_whole)
         return np.concatenate([wholes, self.parameters.half_object]).astype(int)
+
+    @functools.cached_property
+    def buttons(self) -> Int[np.ndarray, "B"]:
+        """Annotated links that are buttons of objects with a switch."""
+        tables = self.tables
+        buttons = np.flatnonzero(tables.link_kind == LinkKind.TOGGLE_BUTTON)
+        return buttons[self.parameters.has("toggleable")[tables.link_object[buttons]]]

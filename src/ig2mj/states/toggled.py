@@ -14,11 +14,13 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.scene.tables import LinkKind
 from ig2mj.states.model import StateModel
 
 REACH = 0.10
 """Metres between a finger's frame and the button (iGibson's toggle.py)."""
+
+SURELY = 0.01
+"""Metres beyond the reach where no rounding can bring a finger back within it."""
 
 HOLD = 5
 """Consecutive updates within reach after which the switch flips (iGibson's toggle.py)."""
@@ -28,9 +30,7 @@ def update(
     model: StateModel, toggled: Bool[Array, "W O"], press_count: Int[Array, "W O"], view: PhysicsView
 ) -> tuple[Bool[Array, "W O"], Int[Array, "W O"]]:
     """One step: the switches and the counts."""
-    tables = model.tables
-    buttons = np.flatnonzero(tables.link_kind == LinkKind.TOGGLE_BUTTON)
-    buttons = buttons[model.parameters.has("toggleable")[tables.link_object[buttons]]]
+    tables, buttons = model.tables, model.buttons
     if len(buttons) == 0 or view.finger_pos.shape[1] == 0:
         return toggled, press_count
     offset = jnp.asarray(view.finger_pos)[:, None] - jnp.asarray(view.link_pos)[:, buttons, None]
@@ -41,6 +41,16 @@ def update(
     # Beyond HOLD the count stands, so that it can be held for ever.
     count = jnp.where(pressed, jnp.minimum(press_count, HOLD) + 1, 0)
     return toggled ^ (count == HOLD), count
+
+
+def all_out_of_reach(model: StateModel, view: PhysicsView) -> bool:
+    """On the host: no finger of any world is anywhere near a button, however distances are rounded.
+
+    Fingers change nothing then; false where anything is not finite.
+    """
+    fingers = np.asarray(view.finger_pos)[:, :, None]
+    offset = np.abs(fingers - np.asarray(view.link_pos)[:, None, model.buttons]).max(axis=-1)
+    return bool((offset > REACH + SURELY).all())
 
 
 def set_toggled_on(
