@@ -13,7 +13,6 @@ import json
 import os
 import pathlib
 import platform
-import shutil
 import subprocess
 import sys
 from collections.abc import Callable, Iterable
@@ -22,7 +21,7 @@ from typing import Any
 import platformdirs
 from packaging.requirements import Requirement
 
-from ig2mj.install_hint import pip_install
+from ig2mj.install_hint import pip_install, pip_install_extra, requirements
 
 #: Longest that one probe may take. Importing JAX with CUDA on a cold disk takes about half a minute.
 PROBE_TIMEOUT_S = 120.0
@@ -59,7 +58,7 @@ def diagnose(progress: Callable[[str], None] = lambda text: None) -> list[Check]
     nvidia = nvidia_driver()
     return [
         *machine_checks(nvidia),
-        *package_checks(_requirements()),
+        *package_checks(requirements()),
         mujoco_check(mujoco),
         *accelerator_checks(jax, warp, nvidia),
         *picture_checks(drawn),
@@ -103,12 +102,14 @@ def machine_checks(nvidia: tuple[str, int] | None) -> list[Check]:
     return [*checks, Check("machine", "display", display is not None, display or "none", mend=mend)]
 
 
-def package_checks(requirements: Iterable[Requirement]) -> list[Check]:
-    """Versions of required packages, and of each extra's packages, against what ig2mj asks for."""
+def package_checks(wanted: Iterable[tuple[Requirement, str | None]]) -> list[Check]:
+    """Versions of required packages, and of each extra's packages, against what ig2mj asks for.
+
+    `wanted` as `ig2mj.install_hint.requirements` gives it.
+    """
     base: list[Requirement] = []
     extras: dict[str, list[Requirement]] = {}
-    for requirement in requirements:
-        extra = _extra(requirement)
+    for requirement, extra in wanted:
         if extra is None:
             base.append(requirement)
         elif requirement.name != "ig2mj":  # an extra made of other extras
@@ -118,12 +119,12 @@ def package_checks(requirements: Iterable[Requirement]) -> list[Check]:
         found, ok = _installed(requirement)
         mend = "" if ok else pip_install(str(requirement))
         checks.append(Check("packages", requirement.name, ok, found, True, mend))
-    for extra, wanted in extras.items():
+    for extra, packages in extras.items():
         if extra.startswith("gpu"):
             continue  # judged by the devices that JAX finds
-        lacking = [r.name for r in wanted if not _installed(r)[1]]
-        found = f"missing or too old: {', '.join(lacking)}" if lacking else ", ".join(r.name for r in wanted)
-        mend = pip_install(f"ig2mj[{extra}]") if lacking else ""
+        lacking = [r.name for r in packages if not _installed(r)[1]]
+        found = f"missing or too old: {', '.join(lacking)}" if lacking else ", ".join(r.name for r in packages)
+        mend = pip_install_extra(extra) if lacking else ""
         checks.append(Check("packages", f"extra [{extra}]", not lacking, found, mend=mend))
     return checks
 
@@ -152,7 +153,7 @@ def accelerator_checks(jax: dict[str, Any], warp: dict[str, Any], nvidia: tuple[
         devices = jax["devices"]
         checks.append(Check("engines", "JAX", True, f"{', '.join(devices)}; default {jax['backend']}", True))
         cuda = [d for d in devices if d.startswith(("cuda", "gpu"))]
-        mend = pip_install(f"ig2mj[{extra}]") if nvidia and not cuda else ""
+        mend = pip_install_extra(extra) if nvidia and not cuda else ""
         checks.append(Check("engines", "JAX on CUDA", bool(cuda), ", ".join(cuda) or "no CUDA device", mend=mend))
     if "error" in warp:
         mend = _reinstall("warp-lang==1.18.0")
@@ -186,6 +187,7 @@ def tool_checks() -> list[Check]:
     """Programs beside Python, and the data that must come with the packages."""
     from ig2mj.errors import Ig2mjError
     from ig2mj.knowledge import categories
+    from ig2mj.viewer.film import ffmpeg_program
 
     try:
         found, ok = f"{len(categories())} categories", True
@@ -193,15 +195,17 @@ def tool_checks() -> list[Check]:
         found, ok = str(e), False
     mend = "" if ok else _reinstall("bddl==1.0.1")
     checks = [Check("tools", "taxonomy (bddl)", ok, found, True, mend)]
-    ffmpeg = shutil.which("ffmpeg") or _bundled_ffmpeg()
-    mend = "" if ffmpeg else pip_install("ig2mj[demo]")
-    return [*checks, Check("tools", "ffmpeg (films)", ffmpeg is not None, ffmpeg or "none", mend=mend)]
+    try:
+        found, mend = ffmpeg_program(), ""
+    except Ig2mjError:
+        found, mend = "none", pip_install_extra("demo")
+    return [*checks, Check("tools", "ffmpeg (films)", not mend, found, mend=mend)]
 
 
 def cache_checks(warp: dict[str, Any]) -> list[Check]:
     """Cache folders: where, how large, writable."""
     own = os.environ.get("IG2MJ_CACHE_DIR") or platformdirs.user_cache_dir("ig2mj")
-    folders = {"ig2mj (decompositions)": (own, "IG2MJ_CACHE_DIR")}
+    folders = {"ig2mj (converted things)": (own, "IG2MJ_CACHE_DIR")}
     if "cache" in warp:
         folders["Warp (compiled kernels)"] = (warp["cache"], "WARP_CACHE_PATH")
     jax = os.environ.get("JAX_COMPILATION_CACHE_DIR") or str(pathlib.Path(own) / "jax")
@@ -232,15 +236,6 @@ def _pictures() -> dict[str, str | None]:
     return available_backends()
 
 
-def _requirements() -> list[Requirement]:
-    return [Requirement(text) for text in importlib.metadata.requires("ig2mj") or []]
-
-
-def _extra(requirement: Requirement) -> str | None:
-    marker = str(requirement.marker or "")
-    return marker.split("extra ==")[1].strip(" '\"") if "extra ==" in marker else None
-
-
 def _installed(requirement: Requirement) -> tuple[str, bool]:
     """The installed version, and whether it is one that is asked for."""
     try:
@@ -254,15 +249,6 @@ def _installed(requirement: Requirement) -> tuple[str, bool]:
 
 def _reinstall(what: str) -> str:
     return pip_install(what) + " --force-reinstall"
-
-
-def _bundled_ffmpeg() -> str | None:
-    try:
-        import imageio_ffmpeg
-
-        return imageio_ffmpeg.get_ffmpeg_exe()
-    except (ImportError, RuntimeError):
-        return None
 
 
 def _memory() -> str:

@@ -1,26 +1,86 @@
-"""The command line that installs a Python package into the environment that runs."""
+"""The command line that installs a Python package, or an extra of ig2mj, into the environment that runs."""
 
 from __future__ import annotations
 
 import importlib.metadata
 import importlib.util
+import json
+import pathlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from packaging.requirements import Requirement
+
+CHECKOUT = pathlib.Path(__file__).resolve().parents[2]
+"""Where pyproject.toml stands, if this is a checkout of the project."""
+
+PACKAGE_OF_MODULE = {"PIL": "pillow", "collada": "pycollada", "imageio_ffmpeg": "imageio-ffmpeg", "warp": "warp-lang"}
+"""Where the name that is imported is not the name that is installed."""
 
 
 def pip_install(what: str) -> str:
-    """E.g. `pip install "ig2mj[convert]"`; with uv where the environment has no pip of its own."""
-    tool = "pip" if importlib.util.find_spec("pip") is not None else "uv pip"
-    return f'{tool} install "{what}"'
+    """E.g. `pip install "bddl==1.0.1"`; with uv where the environment has no pip of its own."""
+    return f'{_installer()} install "{what}"'
+
+
+def pip_install_extra(extra: str) -> str:
+    """The command that installs what an extra of ig2mj asks for, from where ig2mj itself came from.
+
+    From a checkout that is `pip install -e ".[convert]"`, with the folder's path if it is not the working directory.
+    """
+    if (CHECKOUT / "pyproject.toml").is_file():
+        folder = "." if pathlib.Path.cwd() == CHECKOUT else str(CHECKOUT)
+        return f'{_installer()} install -e "{folder}[{extra}]"'
+    source = _source()
+    return pip_install(f"ig2mj[{extra}] @ {source}" if source else f"ig2mj[{extra}]")
 
 
 def pip_install_module(module: str) -> str:
     """The command that makes `import module` work: the extra of ig2mj that asks for it, else the package itself."""
-    package = module.partition(".")[0].replace("_", "-").lower()
+    top = module.partition(".")[0]
+    name = _plain(PACKAGE_OF_MODULE.get(top, top))
+    for requirement, extra in requirements():
+        if _plain(requirement.name) == name:
+            return pip_install_extra(extra) if extra else pip_install(f"{requirement.name}{requirement.specifier}")
+    return pip_install(name)
+
+
+def requirements() -> list[tuple[Requirement, str | None]]:
+    """What ig2mj asks for on this machine, and the extra that asks for it (None: ig2mj itself), as its metadata say."""
+    from packaging.requirements import Requirement
+
     try:
-        requirements = importlib.metadata.requires("ig2mj") or []
+        metadata = importlib.metadata.metadata("ig2mj")
     except importlib.metadata.PackageNotFoundError:
-        requirements = []
-    for requirement in requirements:
-        if requirement.lower().replace("_", "-").startswith(package) and "extra ==" in requirement:
-            extra = requirement.split("extra ==")[1].strip(" '\"")
-            return pip_install(f"ig2mj[{extra}]")
-    return pip_install(package)
+        return []
+    extras = metadata.get_all("Provides-Extra") or []
+    found: list[tuple[Requirement, str | None]] = []
+    for text in metadata.get_all("Requires-Dist") or []:
+        requirement = Requirement(text)
+        marker = requirement.marker
+        if marker is None or marker.evaluate({"extra": ""}):
+            found.append((requirement, None))
+        else:
+            found += [(requirement, extra) for extra in extras if marker.evaluate({"extra": extra})]
+    return found
+
+
+def _installer() -> str:
+    return "pip" if importlib.util.find_spec("pip") is not None else "uv pip"
+
+
+def _source() -> str:
+    """The URL that ig2mj was installed from, as pip recorded it; '' for a package index."""
+    try:
+        record = importlib.metadata.distribution("ig2mj").read_text("direct_url.json")
+    except importlib.metadata.PackageNotFoundError:
+        return ""
+    if not record:
+        return ""
+    data = json.loads(record)
+    vcs = data.get("vcs_info", {}).get("vcs")
+    return f"{vcs}+{data['url']}" if vcs else data["url"]
+
+
+def _plain(name: str) -> str:
+    return name.replace("_", "-").lower()

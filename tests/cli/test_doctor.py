@@ -11,6 +11,7 @@ from packaging.requirements import Requirement
 
 from ig2mj import cli, diagnosis
 from ig2mj.diagnosis import Check
+from ig2mj.install_hint import requirements
 
 GPU = ("NVIDIA H200", 580)
 
@@ -27,7 +28,9 @@ def test_a_lacking_optional_thing_is_healthy_and_a_lacking_required_one_is_not()
 
 def test_a_package_that_is_absent_or_too_old_names_the_line_that_installs_it():
     checks = by_name(
-        diagnosis.package_checks([Requirement("numpy>=1000"), Requirement("no-such-package==1.0"), Requirement("rich")])
+        diagnosis.package_checks(
+            [(Requirement(text), None) for text in ("numpy>=1000", "no-such-package==1.0", "rich")]
+        )
     )
     assert not checks["numpy"].ok
     assert "but >=1000 is needed" in checks["numpy"].found
@@ -38,20 +41,18 @@ def test_a_package_that_is_absent_or_too_old_names_the_line_that_installs_it():
 
 
 def test_a_lacking_extra_is_optional_and_names_the_extra():
-    (check,) = diagnosis.package_checks(
-        [Requirement('no-such-package; extra == "learn"'), Requirement('rich; extra == "learn"')]
-    )
+    (check,) = diagnosis.package_checks([(Requirement("no-such-package"), "learn"), (Requirement("rich"), "learn")])
     assert not check.ok
     assert not check.required
-    assert check.mend.endswith('install "ig2mj[learn]"')
+    assert check.mend.endswith('[learn]"')
     assert "no-such-package" in check.found
     assert "rich" not in check.found
 
 
 def test_what_ig2mj_asks_for_is_installed_here():
-    requirements = diagnosis._requirements()
-    assert diagnosis.healthy(diagnosis.package_checks(requirements))
-    assert {"mujoco", "jax", "bddl"} <= {r.name for r in requirements}
+    wanted = requirements()
+    assert diagnosis.healthy(diagnosis.package_checks(wanted))
+    assert {("mujoco", None), ("jax", None), ("coacd", "convert")} <= {(r.name, extra) for r, extra in wanted}
 
 
 @pytest.mark.parametrize(("driver", "extra"), [(580, "gpu"), (550, "gpu-cuda12")])
@@ -59,7 +60,7 @@ def test_a_gpu_that_jax_does_not_see_gets_the_extra_for_its_driver(driver, extra
     jax = {"devices": ["cpu:0 cpu"], "backend": "cpu"}
     warp = {"devices": ["cpu CPU"], "cuda": [], "cache": "/tmp"}
     checks = by_name(diagnosis.accelerator_checks(jax, warp, ("NVIDIA H200", driver)))
-    assert checks["JAX on CUDA"].mend.endswith(f'install "ig2mj[{extra}]"')
+    assert checks["JAX on CUDA"].mend.endswith(f'[{extra}]"')
     assert checks["Warp on CUDA"].mend
     assert diagnosis.healthy(checks.values())
 
@@ -96,7 +97,7 @@ def test_a_cache_folder_that_cannot_be_written_names_its_variable(monkeypatch, t
     file = tmp_path / "file"
     file.write_text("x")
     monkeypatch.setenv("IG2MJ_CACHE_DIR", str(file / "cache"))
-    check = by_name(diagnosis.cache_checks({}))["ig2mj (decompositions)"]
+    check = by_name(diagnosis.cache_checks({}))["ig2mj (converted things)"]
     assert not check.ok
     assert "IG2MJ_CACHE_DIR" in check.mend
 
@@ -104,7 +105,7 @@ def test_a_cache_folder_that_cannot_be_written_names_its_variable(monkeypatch, t
 def test_cache_sizes_are_counted(monkeypatch, tmp_path):
     (tmp_path / "a").write_bytes(b"0" * 3 * 2**20)
     monkeypatch.setenv("IG2MJ_CACHE_DIR", str(tmp_path))
-    assert "3 MiB in 1 files" in by_name(diagnosis.cache_checks({}))["ig2mj (decompositions)"].found
+    assert "3 MiB in 1 files" in by_name(diagnosis.cache_checks({}))["ig2mj (converted things)"].found
 
 
 def test_the_mujoco_probe_steps_in_a_process_of_its_own():

@@ -12,6 +12,7 @@ from ig2mj.errors import Ig2mjError
 Vec3 = tuple[float, float, float]
 
 VIDEOS = (".mp4", ".gif")
+"""As `ig2mj.viewer.film.FORMATS`."""
 
 
 def run(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pathlib
-import subprocess
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from ig2mj.demos.cooking_pictures import KitchenCameras, caption_at, font
 from ig2mj.demos.cooking_plot import FISH_COLOUR, MILK_COLOUR
 from ig2mj.demos.kitchen import Kitchen
 from ig2mj.demos.temperature_log import TemperatureLog
-from ig2mj.errors import EngineError, MissingDependencyError
+from ig2mj.viewer.film import Film
 
 WIDTH, HEIGHT, STRIP = 640, 480, 160
 """Pixels; the strip with the temperatures is part of the height."""
@@ -29,16 +28,12 @@ class CookingFilm:
     def __init__(self, file: pathlib.Path, cameras: KitchenCameras, kitchen: Kitchen):
         self._cameras, self._kitchen = cameras, kitchen
         self._words, self._small = font(20), font(13)
-        self._file, self._ffmpeg = file, _start_ffmpeg(file)
+        self._film = Film(file, WIDTH, HEIGHT, FRAMES_PER_SECOND)
 
     def see(self, log: TemperatureLog) -> None:
         """Adds a frame if one is due. Raises EngineError if ffmpeg does not take it."""
         if log.steps % STRIDE == 0:
-            assert self._ffmpeg.stdin is not None
-            try:
-                self._ffmpeg.stdin.write(self.frame(log).tobytes())
-            except BrokenPipeError:
-                self.close()
+            self._film.add(self.frame(log))
 
     def frame(self, log: TemperatureLog) -> np.ndarray:
         """uint8 [HEIGHT, WIDTH, 3]: the world and its past."""
@@ -96,28 +91,4 @@ class CookingFilm:
 
     def close(self) -> None:
         """Ends the file, once. Raises EngineError if ffmpeg could not write it."""
-        assert self._ffmpeg.stdin is not None
-        if self._ffmpeg.stdin.closed:
-            return
-        _, complaint = self._ffmpeg.communicate()
-        if self._ffmpeg.returncode:
-            lines = complaint.decode(errors="replace").strip().splitlines() or ["no reason given"]
-            raise EngineError(f"{self._file}: ffmpeg wrote no film: {lines[-1]}")
-
-
-def _start_ffmpeg(file: pathlib.Path) -> subprocess.Popen[bytes]:
-    """ffmpeg that reads raw frames. Not through imageio_ffmpeg's writer, which forks: JAX's threads forbid that."""
-    import imageio_ffmpeg
-
-    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{WIDTH}x{HEIGHT}", "-r", str(FRAMES_PER_SECOND), "-i", "-"]
-    target = ["-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart", str(file)]
-    try:
-        program = imageio_ffmpeg.get_ffmpeg_exe()
-    except RuntimeError as e:
-        raise MissingDependencyError(f"no film without ffmpeg: {e}") from e
-    return subprocess.Popen(
-        [program, "-y", "-loglevel", "error", *source, *target],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-    )
+        self._film.close()

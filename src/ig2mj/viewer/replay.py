@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import pathlib
 from collections.abc import Sequence
 from typing import Any
 
 import mujoco
 import numpy as np
+from jaxtyping import Int
 
 from ig2mj.engine.base import Snapshot
 from ig2mj.errors import EngineError, InputError
@@ -74,10 +74,7 @@ class Replay:
         Raises:
           EngineError: there is none.
         """
-        good = np.flatnonzero(np.isfinite(np.asarray(self.frames.qpos)).all(1))
-        if not len(good):
-            raise EngineError("no step of the dump has finite positions: there is nothing to show")
-        self.show(int(good[-1]))
+        self.show(int(self._finite_steps()[-1]))
         return self.at
 
     def launch(self, **options: Any) -> None:
@@ -94,21 +91,26 @@ class Replay:
           camera: as of `ig2mj.viewer.offscreen.render`; None: an overview.
 
         Raises:
-          MissingDependencyError: there is nothing to draw with. ModuleNotFoundError: imageio is absent.
+          MissingDependencyError: there is nothing to draw with, or no ffmpeg. InputError: no such format.
+          EngineError: ffmpeg cannot write the file.
         """
-        import imageio.v2 as imageio
-
+        from ig2mj.viewer.film import Film
         from ig2mj.viewer.offscreen import render
 
-        good = np.flatnonzero(np.isfinite(np.asarray(self.frames.qpos)).all(1))
-        gif = pathlib.Path(file).suffix.lower() == ".gif"
-        options = {"duration": 1000 / FRAMES_PER_SECOND} if gif else {"fps": FRAMES_PER_SECOND}
-        with imageio.get_writer(file, **options) as writer:  # type: ignore[arg-type]
+        good = self._finite_steps()
+        with Film(file, width, height, FRAMES_PER_SECOND) as film:
             for step in good:
                 self.show(int(step))
                 view = home_overview(self.scene, self.data) if camera is None else camera
-                writer.append_data(render(self.scene.model, self.data, view, width=width, height=height))  # type: ignore[attr-defined]
+                film.add(render(self.scene.model, self.data, view, width=width, height=height))
         return len(good)
+
+    def _finite_steps(self) -> Int[np.ndarray, "N"]:
+        """Steps all of whose positions are numbers. Raises EngineError if there is none."""
+        good = np.flatnonzero(np.isfinite(np.asarray(self.frames.qpos)).all(1))
+        if not len(good):
+            raise EngineError("no step of the dump has finite positions: there is nothing to show")
+        return good
 
 
 def _with_model(scene: Scene, model: mujoco.MjModel, file: str | os.PathLike) -> Scene:
