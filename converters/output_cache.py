@@ -37,8 +37,8 @@ PACKAGES = (
 )  # fmt: skip
 """Distributions whose version may change what comes out."""
 
-SOURCES = ("ig2mj_converters", "ig2mj.knowledge", "ig2mj.scene", "ig2mj.viewer")
-"""Packages of this project whose files decide what comes out (the viewer draws the report's pictures)."""
+SOURCES = ("ig2mj_converters", "ig2mj.knowledge", "ig2mj.scene", "ig2mj.sensors", "ig2mj.viewer")
+"""Packages of this project whose files decide what comes out (sensors and viewer draw the report's pictures)."""
 
 _FACTS = "ig2mj-cache.json"
 _PACKED = (".png", ".npz", ".jpg")

@@ -205,7 +205,7 @@ def tool_checks() -> list[Check]:
 def cache_checks(warp: dict[str, Any]) -> list[Check]:
     """Cache folders: where, how large, writable."""
     own = os.environ.get("IG2MJ_CACHE_DIR") or platformdirs.user_cache_dir("ig2mj")
-    folders = {"ig2mj (converted things)": (own, "IG2MJ_CACHE_DIR")}
+    folders = {"ig2mj (conversions)": (own, "IG2MJ_CACHE_DIR")}
     if "cache" in warp:
         folders["Warp (compiled kernels)"] = (warp["cache"], "WARP_CACHE_PATH")
     jax = os.environ.get("JAX_COMPILATION_CACHE_DIR") or str(pathlib.Path(own) / "jax")

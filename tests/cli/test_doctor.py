@@ -97,7 +97,7 @@ def test_a_cache_folder_that_cannot_be_written_names_its_variable(monkeypatch, t
     file = tmp_path / "file"
     file.write_text("x")
     monkeypatch.setenv("IG2MJ_CACHE_DIR", str(file / "cache"))
-    check = by_name(diagnosis.cache_checks({}))["ig2mj (converted things)"]
+    check = by_name(diagnosis.cache_checks({}))["ig2mj (conversions)"]
     assert not check.ok
     assert "IG2MJ_CACHE_DIR" in check.mend
 
@@ -105,7 +105,7 @@ def test_a_cache_folder_that_cannot_be_written_names_its_variable(monkeypatch, t
 def test_cache_sizes_are_counted(monkeypatch, tmp_path):
     (tmp_path / "a").write_bytes(b"0" * 3 * 2**20)
     monkeypatch.setenv("IG2MJ_CACHE_DIR", str(tmp_path))
-    assert "3 MiB in 1 files" in by_name(diagnosis.cache_checks({}))["ig2mj (converted things)"].found
+    assert "3 MiB in 1 files" in by_name(diagnosis.cache_checks({}))["ig2mj (conversions)"].found
 
 
 def test_the_mujoco_probe_steps_in_a_process_of_its_own():

@@ -57,7 +57,7 @@ def run(
 
 def _convert(console: Console, step: Step, name: str, dataset: pathlib.Path, scene: pathlib.Path, jobs: int) -> int:
     """Builds the home's dataset, converts it with checks and a report; number of failed checks."""
-    from ig2mj_converters.convert_scene import convert_scene
+    from ig2mj_converters.conversion import convert_scene
     from ig2mj_converters.options import ConvertOptions
     from ig2mj_homes import small_home
     from ig2mj_homes.dataset import build_dataset
@@ -75,7 +75,8 @@ def _convert(console: Console, step: Step, name: str, dataset: pathlib.Path, sce
     outcome = convert_scene(dataset, name, scene, options=options)
     failed = [check for check in outcome.checks if not check.passed]
     verdict = f"{len(outcome.checks) - len(failed)} of {len(outcome.checks)} checks passed"
-    console.print(f"[bold]converted[/]  {scene / 'scene.xml'}: {outcome.objects} objects, {verdict}")
+    cached = " (nothing has changed: taken from the cache)" if outcome.cached else ""
+    console.print(f"[bold]converted[/]  {scene / 'scene.xml'}: {outcome.objects} objects, {verdict}{cached}")
     for check in failed:
         console.print(f"           check {check.name}: {check.summary}")
     console.print(f"[bold]report[/]     {scene / 'report.html'}")
