@@ -22,7 +22,7 @@ ENVIRONMENT = "IG2MJ_CACHE_DIR"
 MODULES = 80
 """About as many Warp modules does a home's step need."""
 
-WORTH_KEEPING = 0.5
+WORTH_KEEPING = 0.1
 """Seconds. Programs that XLA compiles faster than this are not kept."""
 
 _REPORTING = "_ig2mj_reports_compilation"

@@ -106,6 +106,11 @@ class MjxEngine(abc.ABC):
             self._template = self._put_data(self.host_model, self._host_data())
         except (NotImplementedError, ValueError) as e:
             raise EngineError(f"MJX ({self.name}) cannot run scene '{scene.name}': {e}") from e
+        # One program each, not hundreds of little ones; and what several programs contain is traced once.
+        self._first = jax.jit(self._start_all)
+        self._row = jax.jit(lambda physics, world: jax.tree.map(lambda a: a[world], self.snapshot(physics)))
+        self._view = jax.jit(self._make_view)
+        self._mapped = jax.jit(self._map, static_argnums=0)
 
     # What the implementations differ in.
 
@@ -134,20 +139,7 @@ class MjxEngine(abc.ABC):
 
     def reset(self) -> MjxPhysics:
         """All worlds at the initial state."""
-        worlds, tables = self.num_worlds, self.tables
-        spread = jax.vmap(lambda ctrl: self._template.replace(ctrl=ctrl))
-        data = spread(jnp.tile(self._template.ctrl, (worlds, 1)))
-        units = self.layout.num_units
-        physics = MjxPhysics(
-            data=data,
-            eq_data=jnp.tile(jnp.asarray(self.host_model.eq_data, jnp.float32), (worlds, 1, 1)),
-            touching=jnp.zeros((worlds, units, units), bool),
-            link_force=jnp.zeros((worlds, len(tables.link_object), tables.num_objects), jnp.float32),
-            overflow=jnp.zeros(worlds, jnp.int32),
-        )
-        if self._initial is not None:
-            return jax.jit(self.load)(physics, self._initial)
-        return jax.jit(self._refresh)(physics)
+        return self._first(self._template, self._initial)
 
     def step(self, physics: MjxPhysics, ctrl: Float[Array, "W nu"] | None = None) -> tuple[MjxPhysics, PhysicsView]:
         """One control step of every world; see `Engine.step`."""
@@ -158,7 +150,7 @@ class MjxEngine(abc.ABC):
         def substep(carry: Any, _: Any) -> tuple[Any, None]:
             data, force, overflow, _ = carry
             awake = self._tree_asleep(data) < 0
-            data = self._advance(data, physics.eq_data)
+            data = self._mapped(mjx.step, self.model, data, physics.eq_data)
             if self._has_blades:
                 force = jnp.maximum(force, self._link_forces(data))
             return (data, force, overflow | self._overflow(data), awake), None
@@ -177,17 +169,7 @@ class MjxEngine(abc.ABC):
 
     def view(self, physics: MjxPhysics) -> PhysicsView:
         """The view of the present state."""
-        data = physics.data
-        return make_view(
-            self.plan,
-            data.qpos,
-            data.xpos,
-            data.xquat,
-            self._tree_asleep(data) < 0,
-            physics.touching,
-            physics.link_force,
-            data.eq_active.astype(bool),
-        )
+        return self._view(physics)
 
     def time(self, physics: MjxPhysics) -> Float[Array, "W"]:
         """Simulated seconds since each world's reset."""
@@ -222,7 +204,7 @@ class MjxEngine(abc.ABC):
         """One world as a snapshot in numpy arrays of its own."""
         if not 0 <= world < self.num_worlds:
             raise EngineError(f"there is no world {world}: this engine has {self.num_worlds}")
-        return jax.tree.map(lambda a: np.array(a[world]), self.snapshot(physics))
+        return jax.tree.map(np.array, self._row(physics, world))
 
     def load(self, physics: MjxPhysics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> MjxPhysics:
         """Replaces worlds by snapshots; see `Engine.load`. Raises EngineError where it is of another scene."""
@@ -276,6 +258,20 @@ class MjxEngine(abc.ABC):
 
     # Stages.
 
+    def _start_all(self, template: mjx.Data, initial: Snapshot | None) -> MjxPhysics:
+        """Every world at the template, or at `initial`, which has no world axis."""
+        worlds, tables = self.num_worlds, self.tables
+        spread = jax.vmap(lambda ctrl: template.replace(ctrl=ctrl))
+        units = self.layout.num_units
+        physics = MjxPhysics(
+            data=spread(jnp.tile(template.ctrl, (worlds, 1))),
+            eq_data=jnp.tile(jnp.asarray(self.host_model.eq_data, jnp.float32), (worlds, 1, 1)),
+            touching=jnp.zeros((worlds, units, units), bool),
+            link_force=jnp.zeros((worlds, len(tables.link_object), tables.num_objects), jnp.float32),
+            overflow=jnp.zeros(worlds, jnp.int32),
+        )
+        return self._refresh(physics) if initial is None else self.load(physics, initial)
+
     def _trees_joined(
         self, physics: MjxPhysics, eq_active: Bool[Array, "W E"], eq_data: Float[Array, "W E 12"]
     ) -> Bool[Array, "W T"]:
@@ -287,9 +283,18 @@ class MjxEngine(abc.ABC):
         of_tree = (self.layout.equality_tree[..., None] == np.arange(model.ntree)).any(1)
         return reaches(changed, of_tree)
 
-    def _advance(self, data: mjx.Data, eq_data: Float[Array, "W E 12"]) -> mjx.Data:
-        """One physics step of every world."""
-        return self._mapped(mjx.step, data, eq_data)
+    def _make_view(self, physics: MjxPhysics) -> PhysicsView:
+        data = physics.data
+        return make_view(
+            self.plan,
+            data.qpos,
+            data.xpos,
+            data.xquat,
+            self._tree_asleep(data) < 0,
+            physics.touching,
+            physics.link_force,
+            data.eq_active.astype(bool),
+        )
 
     def _kinematics(self, data: mjx.Data) -> mjx.Data:
         """Body poses of the present positions."""
@@ -297,7 +302,7 @@ class MjxEngine(abc.ABC):
 
     def _refresh(self, physics: MjxPhysics) -> MjxPhysics:
         """Everything derived, of the present positions; wakes what was marked. No forces are reported."""
-        data = self._mapped(mjx.forward, physics.data, physics.eq_data)
+        data = self._mapped(mjx.forward, self.model, physics.data, physics.eq_data)
         awake = self._tree_asleep(data) < 0
         return dataclasses.replace(
             physics,
@@ -306,10 +311,11 @@ class MjxEngine(abc.ABC):
             link_force=jnp.zeros_like(physics.link_force),
         )
 
-    def _mapped(self, act: Any, data: mjx.Data, eq_data: Float[Array, "W E 12"]) -> mjx.Data:
+    def _map(self, act: Any, model: mjx.Model, data: mjx.Data, eq_data: Float[Array, "W E 12"]) -> mjx.Data:
+        """A function of MJX on every world. The model comes as an argument, so that a program holds it only once."""
         if self.host_model.neq == 0:
-            return jax.vmap(lambda d: act(self.model, d))(data)
-        return jax.vmap(lambda e, d: act(self.model.replace(eq_data=e), d))(eq_data, data)
+            return jax.vmap(lambda d: act(model, d))(data)
+        return jax.vmap(lambda e, d: act(model.replace(eq_data=e), d))(eq_data, data)
 
     def _touching(
         self, data: mjx.Data, remembered: Bool[Array, "W U U"], tree_awake: Bool[Array, "W T"]

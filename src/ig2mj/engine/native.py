@@ -25,6 +25,7 @@ from jaxtyping import Bool, Float
 
 from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snapshot, Write, check_arguments
 from ig2mj.engine.boxes import make_box_table
+from ig2mj.engine.compile_cache import keep_jax_programs
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.native_world import FIELDS, Changed, Statics, World
@@ -100,6 +101,7 @@ class NativeEngine:
           EngineError: an argument is out of range.
         """
         check_arguments(boxes, num_worlds, substeps, timestep)
+        keep_jax_programs()
         if threads is not None and threads < 1:
             raise EngineError(f"threads = {threads}: at least one is needed")
         self.scene, self.tables, self.num_worlds = scene, scene.tables, num_worlds

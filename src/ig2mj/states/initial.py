@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -28,7 +29,14 @@ FIELDS = {
 
 def initial_states(model: StateModel, num_worlds: int) -> ExtendedStates:
     """Everything at room temperature, dry, clean, switched off, whole."""
-    shape = (num_worlds, model.tables.num_objects)
+    p = model.parameters
+    return _plain(num_worlds, model.tables.num_objects, len(p.water_object), len(p.dust_rows), len(p.stain_rows))
+
+
+@functools.partial(jax.jit, static_argnums=(0, 1, 2, 3, 4))
+def _plain(num_worlds: int, objects: int, sources: int, dust_rows: int, stain_rows: int) -> ExtendedStates:
+    """One program instead of one per array."""
+    shape = (num_worlds, objects)
     return ExtendedStates(
         temperature=temperature.initial(*shape),
         max_temperature=max_temperature.initial(*shape),
@@ -36,9 +44,9 @@ def initial_states(model: StateModel, num_worlds: int) -> ExtendedStates:
         toggled=jnp.zeros(shape, bool),
         press_count=jnp.zeros(shape, jnp.int32),
         sliced=jnp.zeros(shape, bool),
-        water=water.no_drops(num_worlds, len(model.parameters.water_object)),
-        dust=particles.no_particles(num_worlds, len(model.parameters.dust_rows)),
-        stain=particles.no_particles(num_worlds, len(model.parameters.stain_rows)),
+        water=water.no_drops(num_worlds, sources),
+        dust=particles.no_particles(num_worlds, dust_rows),
+        stain=particles.no_particles(num_worlds, stain_rows),
     )
 
 
@@ -66,7 +74,7 @@ def states_of_manifest(
                 _fill(getattr(states, key), int(row), entry.state.get(key, ()), bodies)
         for source in np.flatnonzero(p.water_object == o):
             _fill_water(states.water, int(source), entry.state.get("water", {}))
-    return jax.tree.map(lambda leaf: jnp.asarray(np.repeat(leaf, num_worlds, axis=0)), states)
+    return jax.device_put(jax.tree.map(lambda leaf: np.repeat(leaf, num_worlds, axis=0), states))
 
 
 def _fill(

@@ -23,7 +23,7 @@ import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float, Int
 
-from ig2mj.engine.base import Engine, Write
+from ig2mj.engine.base import Engine, Physics, Write
 from ig2mj.engine.health import Health
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.predicates.compile import CompiledExpression, Verdict
@@ -78,21 +78,27 @@ class Worlds:
         self.engine, self.model, self.goal = engine, model, goal
         asked = queries(model) + (goal.queries if goal is not None else [])
         self.plan = RelationPlan.build(model, asked)
-        if pool is None:
-            physics = engine.reset()
-            row = engine.export(physics, 0)
-            states = initial_values if initial_values is not None else initial_states(model, 1)
-            pool = Pool(physics=jax.tree.map(lambda a: np.asarray(a)[None], row), states=states)
-        self.pool: Pool = jax.tree.map(_single_precision, pool)
-        self._floor = self._lowest()
+        jit_if_pure = jax.jit if engine.pure else (lambda function, **_: function)
+        self._begin = jit_if_pure(self._episode_0, donate_argnums=0)
         self._react = self._rules if engine.pure else jax.jit(self._rules)
+        physics = engine.reset()
+        view = jit_if_pure(lambda p: jax.tree.map(lambda a: a[:1], engine.view(p)))(physics)
+        self._floor = guards.lowest_support(view, model.tables.object_fixed)
+        if pool is None:
+            row = jax.tree.map(lambda a: a[None], engine.export(physics, 0))
+            states = initial_values if initial_values is not None else initial_states(model, 1)
+            pool = Pool(physics=row, states=states)
+        self.pool: Pool = jax.device_put(jax.tree.map(_single_precision, pool))
 
     def start(self, seed: int | Int[Array, ""] = 0, first: int | Int[Array, ""] = 0) -> Batch:
         """All worlds at the start of episode 0. `first`: global number of the first one."""
+        return self._begin(self.engine.reset(), seed, first)
+
+    def _episode_0(self, physics: Physics, seed: int | Int[Array, ""], first: int | Int[Array, ""]) -> Batch:
+        """The start, from physics in any state."""
         count = self.engine.num_worlds
         number = first + jnp.arange(count, dtype=jnp.int32)
         episode = jnp.zeros(count, jnp.int32)
-        physics = self.engine.reset()
         world = WorldState(
             physics=physics,
             view=self.engine.view(physics),
@@ -182,13 +188,7 @@ class Worlds:
             object_quat=quat.at[:, objects].set(swap.quat),
         )
 
-    def _lowest(self) -> np.ndarray:
-        """Heights below which objects have left the house, from the pool's first row."""
-        physics = self.engine.reset()
-        view = self.engine.view(physics)
-        return guards.lowest_support(view, self.model.tables.object_fixed)
 
-
-def _single_precision(array: Array) -> Array:
+def _single_precision(array: Array) -> np.ndarray:
     values = np.asarray(array)
-    return jnp.asarray(values.astype(np.float32) if values.dtype == np.float64 else values)
+    return values.astype(np.float32) if values.dtype == np.float64 else values
