@@ -10,6 +10,7 @@ import numpy as np
 
 from . import materials, textures
 from .floor_plans.plan import HEIGHT, Edge, Plan
+from .floor_plans.porch import porch_rails, porch_slab
 from .materials import Material
 from .model import hull_mesh
 from .solids import block, join
@@ -126,9 +127,10 @@ def write_building(plan: Plan, scene: pathlib.Path, rng: random.Random) -> None:
     paint = materials.plain(rng.choice(WALL_COLOURS), "wall", 0.1)
     stairs = stair_boxes(plan)
     wood = materials.wood("oak", rng)
-    walls = [(paint, wall_boxes(plan)), *([(wood, stairs)] if len(stairs) else [])]
+    walls = [(paint, np.concatenate([wall_boxes(plan), porch_rails(plan)])), *([(wood, stairs)] if len(stairs) else [])]
     look = {kind: flooring(kind, rng) for kind in dict.fromkeys(room.kind for room in plan.rooms)}
     floors = [(look[room.kind], box[None]) for room, box in zip(plan.rooms, floor_boxes(plan), strict=True)]
+    floors.append((materials.stone("grey", rng), porch_slab(plan)))
     ceilings = [(materials.plain("white", "wall", 0.1), ceiling_boxes(plan))]
     names: dict[str, Material] = {}
     for part, groups in (("wall", walls), ("floor", floors), ("ceiling", ceilings)):
