@@ -15,9 +15,9 @@ import time
 
 import jax
 import numpy as np
-from throughput import HAND_START, Case
+from throughput import Case
 
-from ig2mj.agents.pushing import push_controls
+from ig2mj.agents.pushing import push, start_pushing
 from ig2mj.engine.warp import WarpEngine
 from ig2mj.worlds.batch import Worlds
 from ig2mj.worlds.sharding import ShardedWorlds
@@ -37,32 +37,31 @@ def shared(case: Case, num_worlds: int, devices: list) -> ShardedWorlds:
 
 
 def pusher(case: Case):
-    """Controls of the pushing hand, for `ShardedWorlds.rollout`; the carry is the last controls."""
+    """Controls of the pushing hand, for `ShardedWorlds.rollout`; the carry is the `Pusher`."""
 
-    def control(batch, ctrl):
+    def control(batch, pusher):
         world = batch.world
-        ctrl = push_controls(
-            world.view.object_com, ctrl, np.array(HAND_START), case.loose, world.key, world.step, 1 / 30
-        )
-        return ctrl, ctrl
+        view = world.view
+        pusher = push(case.reach, pusher, view.object_com, view.agent_pos[:, 0], world.key, world.step, 1 / 30)
+        return pusher.ctrl, pusher
 
     return control
 
 
-def still(case: Case, worlds: ShardedWorlds) -> list:
-    """Controls of hands at rest, one array per device."""
-    zeros = np.zeros((worlds.part, case.scene.model.nu), np.float32)
-    return [jax.device_put(zeros, device) for device in worlds.devices]
+def ready(case: Case, worlds: ShardedWorlds) -> list:
+    """Hands at their start, one `Pusher` per device."""
+    pusher = start_pushing(case.reach, worlds.part, case.scene.model.nu)
+    return [jax.device_put(pusher, device) for device in worlds.devices]
 
 
 def roll(case: Case, worlds: ShardedWorlds, steps: int):
-    shards, _ = worlds.rollout(worlds.start(0), still(case, worlds), pusher(case), steps)
+    shards, _ = worlds.rollout(worlds.start(0), ready(case, worlds), pusher(case), steps)
     return shards
 
 
 def speed(case: Case, worlds: ShardedWorlds, calls: int = 4) -> float:
     """Median control steps a second of calls of `STEPS` steps; the first call compiles."""
-    control, shards, carries = pusher(case), worlds.start(0), still(case, worlds)
+    control, shards, carries = pusher(case), worlds.start(0), ready(case, worlds)
     shards, carries = jax.block_until_ready(worlds.rollout(shards, carries, control, STEPS))
     times = []
     for _ in range(calls):

@@ -36,15 +36,12 @@ from timing import Block, interleave, timed
 
 import ig2mj
 from ig2mj.agents.floating_hand import add_floating_hand
-from ig2mj.agents.pushing import push_controls
+from ig2mj.agents.pushing import push, start_pushing
+from ig2mj.agents.reach import Reach, find_reach
 from ig2mj.predicates.compile import compile_expression
-from ig2mj.sampling.perturbation import loose_objects
 from ig2mj.scene.scene import Scene
 from ig2mj.states.model import StateModel
 from ig2mj.worlds.random_streams import episode_keys
-
-HAND_HEIGHT = 0.4
-"""Metres above a loose object, where the hand starts."""
 
 VARIANTS = {"mujoco": "MuJoCo", "engine": "view", "states": "states", "goal": "10 literals"}
 """In the order in which each adds to the one before."""
@@ -91,21 +88,22 @@ class Replay:
         return self._controls[number]
 
 
-def record(scene: Scene, model: StateModel, rest_steps: int, steps: int) -> tuple[OneWorld, np.ndarray, float]:
+def record(
+    scene: Scene, model: StateModel, reach: Reach, rest_steps: int, steps: int
+) -> tuple[OneWorld, np.ndarray, float]:
     """A world at rest with a hand in it, controls [steps, nu] that push objects about, and how many are awake then."""
     world = OneWorld(scene, model)
     for _ in range(rest_steps):
         world.engine_step()
     start = world.engine.export(world.physics, 0)
-    hand = np.array(world.view.agent_pos)[0, 0]
-    loose = loose_objects(scene.tables)
     key = episode_keys(0, np.zeros(1, np.int32), np.zeros(1, np.int32))
     seconds = world.engine.substeps * world.engine.timestep
-    push = jax.jit(lambda com, ctrl, step: push_controls(com, ctrl, hand, loose, key, step, seconds))
-    ctrl, rows, awake = np.zeros((1, scene.model.nu), np.float32), [], []
+    act = jax.jit(lambda pusher, com, palm, step: push(reach, pusher, com, palm, key, step, seconds))
+    pusher, rows, awake = start_pushing(reach, 1, scene.model.nu), [], []
     for step in range(steps):
-        ctrl = np.asarray(push(world.view.object_com, ctrl, np.array([step], np.int32)))
-        rows.append(ctrl[0].astype(np.float64))
+        view = world.view
+        pusher = act(pusher, view.object_com, view.agent_pos[:, 0], np.array([step], np.int32))
+        rows.append(np.asarray(pusher.ctrl[0], np.float64))
         world.engine_step(rows[-1])
         awake.append(int(np.asarray(world.view.awake).sum()))
     world.physics = world.engine.load(world.physics, start)
@@ -115,15 +113,16 @@ def record(scene: Scene, model: StateModel, rest_steps: int, steps: int) -> tupl
 
 def measure(home: Home, case: str, args: Args) -> dict[str, Any]:
     """One home in one case ("settled", "idle robot", "disturbed")."""
-    scene = home.load(home.robot_place() if case == "idle robot" else None)
+    scene, reach = home.load(home.robot_place() if case == "idle robot" else None), None
     if case == "disturbed":
-        scene = ig2mj.load_scene(home.folder, [functools.partial(add_floating_hand, pos=_over_things(scene))])
+        reach = find_reach(scene)
+        scene = ig2mj.load_scene(home.folder, [functools.partial(add_floating_hand, pos=reach.start)])
     model = StateModel.of_manifest(scene.tables, scene.manifest)
     goal = compile_expression(model, ten_literals(model))
     worlds = {"engine": OneWorld(scene, model), "states": OneWorld(scene, model), "goal": OneWorld(scene, model, goal)}
     resting, controls, awake = None, None, 0.0
-    if case == "disturbed":
-        resting, controls, awake = record(scene, model, args.rest_steps, args.episode)
+    if reach is not None:
+        resting, controls, awake = record(scene, model, reach, args.rest_steps, args.episode)
         start = resting.engine.export(resting.physics, 0)
         for world in worlds.values():
             world.physics = world.engine.load(world.physics, start)
@@ -150,14 +149,6 @@ def measure(home: Home, case: str, args: Args) -> dict[str, Any]:
         "parts": _parts(micro),
         "share": max(0.0, 1 - micro["engine"] / micro["goal"]),
     }
-
-
-def _over_things(scene: Scene) -> tuple[float, float, float]:
-    """Above the loose object nearest to the middle of all of them."""
-    world = OneWorld(scene, StateModel.of_manifest(scene.tables, scene.manifest))
-    places = np.array(world.view.object_com)[0, loose_objects(scene.tables)]
-    x, y, z = places[np.argmin(np.linalg.norm(places - np.median(places, axis=0), axis=1))]
-    return float(x), float(y), float(z) + HAND_HEIGHT
 
 
 def _copy(bare: BarePhysics) -> mujoco.MjData:

@@ -3,8 +3,9 @@
     python benchmarks/throughput.py HOME [HOME ...] --worlds 1024 4096 16384 [--idle] [--what full] [--out DIR]
 
 A control step is four physics steps of 1/120 s, the view, all extended states, guards and a goal of up to ten literals,
-in one jitted function under `lax.scan`; a floating hand pushes objects about unless `--idle`. Every run reports the
-overflow and non-finite counts next to its speed: a run with any is no result.
+in one jitted function under `lax.scan`; a floating hand pushes objects about unless `--idle`. Every row says what the
+hand really did (`benchmarks/disturbance.py`) and how many worlds overflowed or lost their numbers: a row with any, or a
+disturbed one whose hand touches nothing, does not count (`counts` is false).
 """
 
 from __future__ import annotations
@@ -17,11 +18,14 @@ import time
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
+from disturbance import LEAST, Watch, join, summary
 
 import ig2mj
 from ig2mj.agents.floating_hand import add_floating_hand
-from ig2mj.agents.pushing import push_controls
+from ig2mj.agents.pushing import push, start_pushing
+from ig2mj.agents.reach import find_reach
 from ig2mj.calibration import calibrate
 from ig2mj.engine.health import CAPACITY, Overflow
 from ig2mj.engine.profile import PROFILE_FILE, EngineProfile, load_profile
@@ -29,6 +33,7 @@ from ig2mj.engine.warp import WarpEngine
 from ig2mj.predicates.compile import compile_expression
 from ig2mj.sampling.perturbation import loose_objects
 from ig2mj.sampling.settled import make_pool
+from ig2mj.scene.manifest import AgentEntry
 from ig2mj.sensors.batch_camera import BatchCamera
 from ig2mj.states.model import StateModel
 from ig2mj.worlds.batch import Worlds
@@ -37,7 +42,16 @@ from ig2mj.worlds.pool import Pool
 STEPS = 30
 """Control steps of one timed call."""
 
-HAND_START = (0.0, 0.0, 1.2)
+HAND_DOFS = 16
+
+Place = tuple[float, float, float]
+
+
+def add_eye(spec: mujoco.MjSpec, pos: Place) -> AgentEntry:
+    """A camera that hangs in the room, where there is no hand to carry it."""
+    eye = spec.worldbody.add_body(name="eye", pos=list(pos))
+    eye.add_camera(name="eye/eye", fovy=60.0)
+    return AgentEntry(name="eye", body="eye", camera="eye/eye")
 
 
 def ten_literals(model: StateModel) -> str:
@@ -63,17 +77,20 @@ class Case:
     """One scene, made ready: profile, pool, goal."""
 
     def __init__(self, home: str, hand: bool, pool_rows: int, profile: EngineProfile | None):
-        agents = [functools.partial(add_floating_hand, pos=HAND_START)] if hand else []
-        self.scene = ig2mj.load_scene(home, agents)
+        start = time.time()
+        self.reach = find_reach(ig2mj.load_scene(home))
+        self.reach_seconds = time.time() - start
+        add = functools.partial(add_floating_hand if hand else add_eye, pos=tuple(self.reach.start))
+        self.eye = "hand/eye" if hand else "eye/eye"
+        self.scene = ig2mj.load_scene(home, [add])
         self.model = StateModel.of_manifest(self.scene.tables, self.scene.manifest)
-        self.loose = loose_objects(self.scene.tables)
         start = time.time()
         self.pool: Pool = make_pool(self.scene, self.model, pool_rows, share=0.2)
         self.pool_seconds = time.time() - start
         start = time.time()
         if profile is None and (self.scene.folder / PROFILE_FILE).exists():
             profile = load_profile(self.scene.folder, self.scene.model)
-        self.profile = profile or calibrate(self.scene, rounds=4)
+        self.profile = profile or calibrate(self.scene, self.reach if hand else None, rounds=4)
         self.calibration_seconds = time.time() - start
         self.goal = compile_expression(self.model, ten_literals(self.model))
 
@@ -87,70 +104,91 @@ def run(case: Case, num_worlds: int, disturbed: bool, what: str, calls: int = 4,
     worlds = Worlds(engine, model, case.pool, case.goal)
     seconds = engine.substeps * engine.timestep
 
-    def control(batch, ctrl, com):
-        if not disturbed:
-            return ctrl
-        world = batch.world
-        return push_controls(com, ctrl, np.array(HAND_START), case.loose, world.key, world.step, seconds)
+    watch = Watch(engine)
 
-    camera = BatchCamera(engine, model, ["hand/eye"], width=128, height=128, depth=True) if what == "camera" else None
+    def control(batch, pusher, com, palm):
+        if not disturbed:
+            return pusher
+        return push(case.reach, pusher, com, palm, batch.world.key, batch.world.step, seconds)
+
+    camera = BatchCamera(engine, model, [case.eye], width=128, height=128, depth=True) if what == "camera" else None
 
     def full(carry, _):
-        batch, ctrl, com = carry
-        ctrl = control(batch, ctrl, com)
-        batch, verdict = worlds.step(batch, ctrl)
+        batch, pusher, com, palm = carry
+        pusher = control(batch, pusher, com, palm)
+        batch, verdict = worlds.step(batch, pusher.ctrl)
         seen = verdict.fraction.mean()
+        view, physics = batch.world.view, batch.world.physics
         if camera is not None:
-            images = camera(batch.world.physics, batch.world.view, batch.world.states)
+            images = camera(physics, view, batch.world.states)
             seen += images.rgb.astype(jnp.float32).mean() + images.depth.mean()
-        return (batch, ctrl, batch.world.view.object_com), seen
+        return (batch, pusher, view.object_com, view.agent_pos[:, 0]), (seen, watch.step(physics))
 
     def physics(carry, _):
         """Of the view only what the hand needs, unless the whole of it is asked for."""
-        batch, ctrl, com = carry
-        ctrl = control(batch, ctrl, com)
-        state, view = engine.step(batch.world.physics, ctrl)
+        batch, pusher, com, palm = carry
+        pusher = control(batch, pusher, com, palm)
+        state, view = engine.step(batch.world.physics, pusher.ctrl)
         world = batch.world.replace(physics=state, step=batch.world.step + 1)
         if what == "view":
             world = world.replace(view=view)
-        return (batch.replace(world=world), ctrl, view.object_com), view.object_com[:, 0, 2].mean()
+        seen = view.object_com[:, 0, 2].mean()
+        return (batch.replace(world=world), pusher, view.object_com, view.agent_pos[:, 0]), (seen, watch.step(state))
 
     body = physics if what in ("physics", "view") else full
     call = jax.jit(lambda carry: jax.lax.scan(body, carry, None, STEPS), donate_argnums=0)
     start = time.time()
     batch = jax.block_until_ready(jax.jit(worlds.start)(0))
-    ctrl = jnp.zeros((num_worlds, scene.model.nu), jnp.float32)
-    carry, _ = jax.block_until_ready(call((batch, ctrl, batch.world.view.object_com + 0.0)))
+    before = np.asarray(batch.world.view.object_com)
+    pusher = start_pushing(case.reach, num_worlds, scene.model.nu)
+    # Copies: what is donated must not be in the batch as well.
+    carry = (batch, pusher, batch.world.view.object_com + 0.0, batch.world.view.agent_pos[:, 0] + 0.0)
+    carry, _ = jax.block_until_ready(call(carry))
     compile_seconds = time.time() - start
-    times, awake = [], []
+    times, activity = [], []
     for _ in range(calls):
         start = time.time()
-        carry, seen = jax.block_until_ready(call(carry))
+        carry, (seen, acts) = jax.block_until_ready(call(carry))
         times.append(time.time() - start)
-        awake.append(int(engine.usage(carry[0].world.physics).awake_dofs.max()))
+        activity.append(acts)
     batch = carry[0]
     overflow = np.asarray(batch.world.physics.overflow)
     memory = (jax.devices()[0].memory_stats() or {}).get("peak_bytes_in_use", 0)
+    did = summary(join(activity), HAND_DOFS if disturbed else 0)
     row = {
         "scene": scene.name,
         "objects": scene.tables.num_objects,
         "worlds": num_worlds,
-        "disturbed": disturbed,
+        "case": "disturbed" if disturbed else "idle",
         "what": what,
         **solver,
         "control_steps_per_s": round(num_worlds * STEPS / float(np.median(times))),
         "ms_per_control_step": round(1e3 * float(np.median(times)) / STEPS, 3),
         "compile_s": round(compile_seconds, 1),
-        "awake_dofs_peak": max(awake),
+        "simulated_s": round((calls + 1) * STEPS * seconds, 2),
+        **did,
+        "moved_objects_per_world": round(watch.moved(before, carry[2]), 2),
         "capacity_overflows": int(((overflow & int(CAPACITY)) != 0).sum()),
+        "overflow_bits": _bits(overflow),
         "iteration_limits": int(((overflow & int(Overflow.ITERATIONS | Overflow.LS_ITERATIONS)) != 0).sum()),
         "non_finite": int((~np.asarray(engine.health(batch.world.physics).finite)).sum()),
         "peak_device_MB_per_world": round(memory / num_worlds / 1e6, 3),
         "mean_seen": float(np.asarray(seen).mean()),
         "troubles": worlds.metrics(batch) if what in ("full", "camera") else {},
     }
+    row["counts"] = (
+        row["capacity_overflows"] == 0
+        and row["non_finite"] == 0
+        and (not disturbed or row["hand_contact_share"] >= LEAST)
+    )
     print(json.dumps(row), flush=True)
     return row
+
+
+def _bits(overflow: np.ndarray) -> dict[str, int]:
+    """Worlds by flag of capacity."""
+    counts = {f.name: int(((overflow & int(f)) != 0).sum()) for f in Overflow if f & CAPACITY and f.name}
+    return {name: count for name, count in counts.items() if count}
 
 
 def main() -> None:
@@ -183,6 +221,8 @@ def main() -> None:
                     "ngeom": int(model.ngeom),
                     "nbody": int(model.nbody),
                     "profile": str(case.profile),
+                    "reachable": len(case.reach.objects),
+                    "reach_s": round(case.reach_seconds, 1),
                     "pool_s": round(case.pool_seconds, 1),
                     "calibration_s": round(case.calibration_seconds, 1),
                 }

@@ -15,7 +15,8 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from ig2mj.agents.pushing import push_controls
+from ig2mj.agents.pushing import Pusher, push, start_pushing
+from ig2mj.agents.reach import Reach
 from ig2mj.engine.native import NativeEngine
 from ig2mj.engine.profile import EngineProfile, default_profile
 from ig2mj.engine.settle import settle
@@ -43,6 +44,7 @@ Progress = Callable[[int, int], None]
 
 def calibrate(
     scene: Scene,
+    reach: Reach | None = None,
     *,
     engine: str = "",
     num_worlds: int = 0,
@@ -54,7 +56,8 @@ def calibrate(
     """Measures a scene.
 
     Args:
-      scene: with or without an agent; a floating hand that is its only agent pushes objects about.
+      scene: with or without an agent.
+      reach: of the floating hand that is its only agent; it pushes objects about. None: things are only dropped.
       engine: "warp" or "native"; "": warp where JAX has a GPU.
       num_worlds: measured side by side; 0: 1,024 on warp, 8 on native.
       rounds: of two simulated seconds each.
@@ -70,7 +73,7 @@ def calibrate(
         raise EngineError(f"there is no engine '{engine}' to calibrate with (engines: {', '.join(SAFETY)})")
     worlds = num_worlds or {"warp": 1024, "native": 8}[engine]
     measure = _measure_warp if engine == "warp" else _measure_native
-    peaks = measure(scene, worlds, rounds, seed, progress)
+    peaks = measure(scene, reach, worlds, rounds, seed, progress)
     factor = safety or SAFETY[engine]
     widest = default_profile(scene.model)
     names = ("awake_dofs", "constraints", "contacts", "convex_contacts")
@@ -94,33 +97,35 @@ def calibrate(
 class _Disturbance:
     """What happens to the worlds of a measurement: drops at the start of each round, a hand that pushes, if any."""
 
-    def __init__(self, scene: Scene, engine: NativeEngine | WarpEngine, seed: int):
-        self.scene, self.engine, self.seed = scene, engine, seed
+    def __init__(self, scene: Scene, reach: Reach | None, engine: NativeEngine | WarpEngine, seed: int):
+        self.scene, self.reach, self.engine, self.seed = scene, reach, engine, seed
         self.loose = loose_objects(scene.tables)
-        model = scene.model
-        self.pushes = len(scene.tables.agent_body) == 1 and model.nu >= 3 and len(self.loose) > 0
-        self.home = np.array(model.body_pos[scene.tables.agent_body[0]]) if self.pushes else np.zeros(3)
         self.seconds = engine.substeps * engine.timestep
 
     def key(self, round_number: int | jax.Array) -> jax.Array:
         worlds = jnp.arange(self.engine.num_worlds)
         return jnp.asarray(episode_keys(self.seed, worlds, jnp.full_like(worlds, round_number)))
 
+    def start(self) -> Pusher | None:
+        return start_pushing(self.reach, self.engine.num_worlds, self.scene.model.nu) if self.reach else None
+
     def drop(self, view, key: jax.Array):  # a Write
         share = max(SHARE, min(1.0, AT_LEAST / max(1, len(self.loose))))
         return perturb(self.scene.tables, self.loose, view, key, share)
 
-    def controls(self, view, ctrl: jax.Array, key: jax.Array, step: jax.Array) -> jax.Array:
-        if not self.pushes:
-            return ctrl
-        return jnp.asarray(push_controls(view.object_com, ctrl, self.home, self.loose, key, step, self.seconds))
+    def controls(self, view, pusher: Pusher | None, key: jax.Array, step: jax.Array) -> Pusher | None:
+        if self.reach is None or pusher is None:
+            return None
+        return push(self.reach, pusher, view.object_com, view.agent_pos[:, 0], key, step, self.seconds)
 
 
-def _measure_native(scene: Scene, worlds: int, rounds: int, seed: int, progress: Progress) -> dict[str, float]:
+def _measure_native(
+    scene: Scene, reach: Reach | None, worlds: int, rounds: int, seed: int, progress: Progress
+) -> dict[str, float]:
     engine = NativeEngine(scene, worlds)
     start = settle(scene)
     physics = engine.load(engine.reset(), start)
-    act = _Disturbance(scene, engine, seed)
+    act = _Disturbance(scene, reach, engine, seed)
     drop, controls = jax.jit(act.drop), jax.jit(act.controls)
     peaks: dict[str, float] = dict.fromkeys(("awake_dofs", "constraints", "contacts", "convex_contacts"), 0.0)
     for number in range(rounds):
@@ -128,10 +133,10 @@ def _measure_native(scene: Scene, worlds: int, rounds: int, seed: int, progress:
         key = act.key(number)
         view = engine.view(physics)
         physics = engine.write(physics, jax.device_get(drop(view, key)))
-        ctrl = jnp.zeros((worlds, scene.model.nu), jnp.float32)
+        pusher = act.start()
         for step in range(ROUND):
-            physics, view = engine.step(physics, np.asarray(ctrl))
-            ctrl = controls(view, ctrl, key, jnp.full(worlds, step))
+            physics, view = engine.step(physics, None if pusher is None else np.asarray(pusher.ctrl))
+            pusher = controls(view, pusher, key, jnp.full(worlds, step))
             total = 0
             for w in range(worlds):
                 data = engine.to_mujoco(physics, w)[1]
@@ -143,9 +148,11 @@ def _measure_native(scene: Scene, worlds: int, rounds: int, seed: int, progress:
     return peaks
 
 
-def _measure_warp(scene: Scene, worlds: int, rounds: int, seed: int, progress: Progress) -> dict[str, float]:
+def _measure_warp(
+    scene: Scene, reach: Reach | None, worlds: int, rounds: int, seed: int, progress: Progress
+) -> dict[str, float]:
     engine = WarpEngine(scene, worlds, profile=default_profile(scene.model), initial=settle(scene))
-    act = _Disturbance(scene, engine, seed)
+    act = _Disturbance(scene, reach, engine, seed)
     first = engine.reset()
 
     def one_round(physics, number):
@@ -154,17 +161,16 @@ def _measure_warp(scene: Scene, worlds: int, rounds: int, seed: int, progress: P
         physics = engine.write(physics, act.drop(view, key))
 
         def body(carry, step):
-            physics, view, ctrl = carry
-            ctrl = act.controls(view, ctrl, key, jnp.full(worlds, step))
-            physics, view = engine.step(physics, ctrl)
+            physics, view, pusher = carry
+            pusher = act.controls(view, pusher, key, jnp.full(worlds, step))
+            physics, view = engine.step(physics, None if pusher is None else pusher.ctrl)
             use = engine.usage(physics)
             use = jnp.array(
                 [use.awake_dofs.max(), use.constraints.max(), use.contacts / worlds, use.convex_contacts / worlds]
             )
-            return (physics, view, ctrl), use
+            return (physics, view, pusher), use
 
-        ctrl = jnp.zeros((worlds, scene.model.nu), jnp.float32)
-        (physics, _, _), use = jax.lax.scan(body, (physics, view, ctrl), jnp.arange(ROUND))
+        (physics, _, _), use = jax.lax.scan(body, (physics, view, act.start()), jnp.arange(ROUND))
         return use.max(0), engine.health(physics)
 
     run = jax.jit(one_round)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import pathlib
 from typing import Annotated, Literal
 
@@ -36,15 +37,20 @@ def run(
     from rich.table import Table
 
     from ig2mj.agents.floating_hand import add_floating_hand
+    from ig2mj.agents.reach import find_reach
     from ig2mj.calibration import calibrate
     from ig2mj.engine.profile import default_profile, save_profile
     from ig2mj.scene.scene import load_scene
 
-    loaded = load_scene(scene, [add_floating_hand] if hand else [])
+    loaded, reach = load_scene(scene), None
+    if hand:
+        reach = find_reach(loaded)
+        loaded = load_scene(scene, [functools.partial(add_floating_hand, pos=reach.start)])
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(f"disturbing {loaded.name}", total=rounds)
         profile = calibrate(
             loaded,
+            reach,
             engine="" if engine == "auto" else engine,
             num_worlds=worlds,
             rounds=rounds,
