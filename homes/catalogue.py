@@ -21,6 +21,7 @@ from .materials import Material
 from .model import HouseholdObject, ObjectBuilder
 
 Family = Callable[..., None]
+IN_WALLS = ("door", "window")
 AG_MASS = 5.0  # kg: lighter free objects may be held by assisted grasping (`enable_ag`)
 
 
@@ -90,6 +91,7 @@ def build_model(entry: Entry, index: int, seed: int = 0) -> HouseholdObject:
     builder = ObjectBuilder(entry.category, "", size, rng, index, entry.rest)
     entry.build(builder, **entry.options)
     model = builder.finish()
+    model.furniture = entry.fixed and entry.category not in IN_WALLS
     mass = entry.mass * float(np.prod(size) / np.prod(entry.size))
     for joint in model.joints:
         joint.friction = friction(model, joint, mass)

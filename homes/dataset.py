@@ -18,6 +18,7 @@ from ig2mj.knowledge import synset
 from .catalogue import Entry, build_model, catalogue
 from .material_library import write_material_library
 from .specs import category_spec
+from .sweeps import self_clashes
 from .writer import write_model
 
 VERSION = "2.2.0"  # iGibson 2.2.2 accepts 2.0.6 <= version < 2.2.3
@@ -115,6 +116,7 @@ def _write_chunk(chunk: tuple[str, int, list[tuple[str, int]]]) -> list[tuple[st
     written = []
     for category, index in tasks:
         model = build_model(catalogue()[category], index, seed)
+        assert not (clashes := self_clashes(model)), f"{model.model}: moving parts meet others: {clashes}"
         write_model(model, pathlib.Path(objects))
         low, high = model.bounds()
         written.append((category, [float(v) for v in high - low]))

@@ -14,6 +14,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
+from .height_maps import write_height_maps
 from .materials import Material
 from .model import HouseholdObject, LinkBuilder, hull_mesh
 from .poses import stable_orientations
@@ -39,6 +40,8 @@ def write_model(model: HouseholdObject, objects: pathlib.Path) -> pathlib.Path:
         {f: kinds.index(k) + 1 for f, k in groups.items()},
     ]
     _text(folder / "misc/material_groups.json", json.dumps(numbered) + "\n")
+    if model.furniture:
+        write_height_maps(model, folder / "misc")
     for part in model.parts:
         write_model(part.model, objects)
     return folder

@@ -147,6 +147,20 @@ def test_a_neighbour_in_the_way_of_a_drawer_is_a_note_only_if_it_is_fixed():
     assert loose.passed
 
 
+@pytest.mark.parametrize(("air", "clear"), [(0.0018, False), (0.0025, True)])
+def test_a_door_whose_far_corner_swings_into_the_wall_beside_it_is_noted(air: float, clear: bool):
+    """A leaf 0.7 m by 5.5 cm reaches 2.2 mm beyond its free edge at 4.5 degrees, and nowhere else."""
+    body = f"""<body name="cabinet" pos="0 0 .5">
+      <geom name="cabinet/collision_0" type="box" size=".3 .3 .4" pos="-.4 0 0" mass="8" {GEOM}/>
+      <body name="cabinet_door" pos=".055 .35 0"><joint name="cabinet_hinge" axis="0 0 1" range="0 1.9" limited="true"/>
+        <geom name="cabinet_door/collision_0" type="box" size=".0275 .35 .4" pos="-.0275 -.35 0" {GEOM}/></body></body>
+      <body name="wall" pos="0 {-0.45 - air} .5"><geom name="wall/collision_0" type="box" size="1 .1 .5" {GEOM}/></body>"""
+    joint = JointEntry("cabinet_hinge", "hinge", (0.0, 1.9))
+    given = [entry("cabinet", (0.8, 0.7, 0.8), 10.0, True, joints=[joint]), entry("wall", (2, 0.2, 1), fixed=True)]
+    note = check([body], given, '<exclude body1="cabinet" body2="cabinet_door"/>')["joint_clearance"]
+    assert note.passed == clear
+
+
 def test_joints_tied_together_are_swept_together():
     """A mimic joint moves with the one it follows; holding it still would jam both."""
     body = f"""<body name="cabinet" pos="0 0 1">
