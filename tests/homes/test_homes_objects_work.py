@@ -9,21 +9,30 @@ import numpy as np
 import pytest
 from ig2mj_converters.convert_object import convert_object
 from ig2mj_converters.options import ConvertOptions
+from ig2mj_homes.catalogue import build_model, catalogue, find
 from ig2mj_homes.dataset import build_dataset
+from ig2mj_homes.opening import open_joint
 
 from ig2mj.scene.manifest import Manifest, load_manifest
 
 pytestmark = pytest.mark.slow
 
 SECONDS = 120  # steps in one second
+OPENABLE = [name for name, entry in catalogue().items() if any(j.openable for j in build_model(entry, 0).joints)]
 
 
 class Converted:
     """One converted object, with things added to its world, stepped from rest."""
 
     def __init__(
-        self, folder: pathlib.Path, *, fixed: bool = False, balls: list[tuple[list[float], float]] | None = None
+        self,
+        folder: pathlib.Path,
+        *,
+        fixed: bool = False,
+        balls: list[tuple[list[float], float]] | None = None,
+        inside: tuple[pathlib.Path, list[float]] | None = None,
     ):
+        """balls: place, radius. inside: another converted object, loose, and its place; its body is named "book"."""
         self.manifest: Manifest = load_manifest(folder)
         self.name = self.manifest.objects[0].name
         spec = mujoco.MjSpec.from_file(str(folder / "object.xml"))
@@ -39,6 +48,14 @@ class Converted:
             body.add_geom(size=[radius, 0, 0], mass=0.05, friction=[0.25, 0.005, 0.0001], condim=6)
             for key in list(spec.keys):
                 spec.delete(key)
+        if inside is not None:
+            other = mujoco.MjSpec.from_file(str(inside[0] / "object.xml"))
+            for made in (spec, other):
+                for key in list(made.keys):
+                    made.delete(key)
+            body = next(b for b in other.worldbody.bodies if b.name)
+            body.name = "book"
+            spec.worldbody.add_frame(pos=inside[1]).attach_body(body, "in-", "")
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         mujoco.mj_forward(self.model, self.data)
@@ -47,6 +64,22 @@ class Converted:
         """(position address, velocity address) of the object's k-th openable joint."""
         index = self.model.joint(self.manifest.objects[0].openable[k].joint).id
         return int(self.model.jnt_qposadr[index]), int(self.model.jnt_dofadr[index])
+
+    def place(self, body: str) -> np.ndarray:
+        name = next(self.model.body(k).name for k in range(self.model.nbody) if self.model.body(k).name.endswith(body))
+        return self.data.xpos[self.model.body(name).id].copy()
+
+    def place_in(self, joint: str, body: str) -> np.ndarray:
+        """Place of a body relative to the one that a joint moves."""
+        return self.place(body) - self.data.xpos[self.model.jnt_bodyid[self.model.joint(joint).id]]
+
+    def box_of(self, joint: str) -> np.ndarray:
+        """[2, 3] world box of the boxes (along the axes; a round knob is none) of the body that a joint moves."""
+        body = self.model.jnt_bodyid[self.model.joint(joint).id]
+        boxes = (self.model.geom_group == 3) & (self.model.geom_type == mujoco.mjtGeom.mjGEOM_BOX)
+        geoms = np.flatnonzero((self.model.geom_bodyid == body) & boxes)
+        middle, half = self.data.geom_xpos[geoms], self.model.geom_size[geoms]
+        return np.array([(middle - half).min(0), (middle + half).max(0)])
 
     def run(self, seconds: float, push: dict[int, float] | None = None) -> None:
         for _ in range(round(seconds * SECONDS)):
@@ -102,55 +135,65 @@ def test_a_vessel_holds_a_ball(convert, category: str):
     assert ball[2] - radius < top - 0.2 * box[2], "the ball lies inside, not on the rim"
 
 
-def test_a_drawer_opens_under_20_newtons_carries_a_ball_and_stays(convert):
-    folder = convert("desk")
-    still = Converted(folder, fixed=True)
-    name = still.manifest.objects[0].openable[0].joint
-    body = still.model.jnt_bodyid[still.model.joint(name).id]
-    place = still.data.xipos[body] + [-0.05, 0, 0.02]
-    desk = Converted(folder, fixed=True, balls=[(list(place), 0.02)])
+@pytest.mark.parametrize("index", range(find("bowl").count))
+def test_every_bowl_holds_a_ball(convert, index: int):
+    folder = convert("bowl", index)
+    size = load_manifest(folder).objects[0].bounding_box
+    empty = Converted(folder, fixed=True)
+    low = empty.data.xpos[empty.model.body(empty.name).id] + empty.manifest.objects[0].base_link_offset
+    bottom, radius = low[2] - size[2] / 2, 0.15 * min(size[:2])
+    bowl = Converted(folder, fixed=True, balls=[([*low[:2], bottom + size[2] + radius], radius)])
+    bowl.data.qvel[:2] = 0.1  # the ball comes in at an angle
+    bowl.run(3.0)
+    ball = bowl.data.xpos[bowl.model.body("ball_0").id]
+    assert np.linalg.norm(ball[:2] - low[:2]) < 0.3 * min(size[:2])
+    assert bottom < ball[2] - radius < bottom + 0.6 * size[2]
+
+
+@pytest.mark.parametrize("category", ["desk", "stand", "bottom_cabinet"])
+def test_a_drawer_holds_a_book_while_it_is_pulled_out_and_pushed_in(convert, category: str):
+    """A real book of ours; 20 N pull the drawer out to its end and push it back, and the book lies in it still."""
+    index = next(k for k in range(9) if any("drawer" in j.name for j in build_model(find(category), k).joints))
+    folder, book = convert(category, index), convert("hardback")
+    empty = Converted(folder, fixed=True)
+    openable = next(o for o in empty.manifest.objects[0].openable if "drawer" in o.joint)
+    number = [o.joint for o in empty.manifest.objects[0].openable].index(openable.joint)
+    low, high = empty.box_of(openable.joint)
+    desk = Converted(folder, fixed=True, inside=(book, [(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2] + 0.03]))
     desk.run(1.0)
-    qpos, dof = desk.joint(0)
-    upper = desk.manifest.objects[0].openable[0].open
-    desk.run(4.0, {dof: 20.0})
-    assert desk.data.qpos[qpos] > 0.97 * upper
-    desk.run(1.0)
-    assert desk.data.qpos[qpos] > 0.95 * upper, "it stays where it is left"
-    drawer = desk.data.xpos[body]
-    ball = desk.data.xpos[desk.model.body("ball_0").id]
-    assert ball[0] > place[0] + 0.5 * upper, "the ball came along"
-    assert abs(ball[1] - drawer[1]) < 0.25 and ball[2] > drawer[2] - 0.2
+    qpos, dof = desk.joint(number)
+    start = desk.place_in(openable.joint, "book")
+    for force, goal in ((20.0, openable.open), (-20.0, openable.closed)):
+        desk.run(2.0, {dof: force})
+        assert desk.data.qpos[qpos] == pytest.approx(goal, abs=0.02 * openable.open)
+        moved = desk.place_in(openable.joint, "book") - start
+        assert abs(moved[2]) < 0.01, "it lies on the drawer's floor"
+        (x, y, _), (low, high) = desk.place("book"), desk.box_of(openable.joint)
+        assert low[0] < x < high[0] and low[1] < y < high[1]
 
 
-@pytest.mark.parametrize(
-    "category",
-    ["bottom_cabinet", "dishwasher", "fridge", "jar", "laptop", "microwave", "oven", "top_cabinet", "washer"],
-)
-def test_every_openable_joint_opens_under_5_newton_metres_or_20_newtons_and_stays(convert, category: str):
-    moving = Converted(convert(category), fixed=True)
-    entry = moving.manifest.objects[0]
-    kinds = {joint.name: joint.type for joint in entry.joints}
-    push, goals = {}, {}
-    for openable in entry.openable:
-        index = moving.model.joint(openable.joint).id
-        push[int(moving.model.jnt_dofadr[index])] = 5.0 if kinds[openable.joint] == "hinge" else 20.0
-        goals[int(moving.model.jnt_qposadr[index])] = openable.open
-    if category == "jar":  # its lid weighs a few grams: a gentler hand
-        push = dict.fromkeys(push, 0.5)
-    moving.run(4.0, push)
-    moving.run(1.0)
-    for qpos, upper in goals.items():
-        assert moving.data.qpos[qpos] > 0.93 * upper
+@pytest.mark.parametrize("category", OPENABLE)
+def test_every_joint_of_every_model_opens_under_5_newton_metres_or_20_newtons_and_stays(convert, category: str):
+    """Open and half open; loose things are held by their base."""
+    for index in range(find(category).count):
+        moving = Converted(convert(category, index), fixed=True)
+        for openable in moving.manifest.objects[0].openable:
+            result = open_joint(moving.model, openable.joint, openable.closed, openable.open)
+            assert result.works, (index, result)
 
 
-def test_a_closed_fridge_stays_closed_when_bumped_gently(convert):
-    fridge = Converted(convert("fridge"), fixed=True)
-    qpos, dof = fridge.joint(0)
-    fridge.run(0.5)
-    fridge.run(0.1, {dof: 1.5})
-    fridge.run(0.5)
-    entry = fridge.manifest.objects[0].openable[0]
-    assert fridge.data.qpos[qpos] < entry.closed + 0.05 * (entry.open - entry.closed)
+@pytest.mark.parametrize("index", range(find("fridge").count))
+def test_a_closed_fridge_stays_closed_when_bumped_gently(convert, index: int):
+    """0.3 N s outwards at each door's free edge, as of 0.6 kg at 0.5 m/s."""
+    fridge = Converted(convert("fridge", index), fixed=True)
+    for number, openable in enumerate(fridge.manifest.objects[0].openable):
+        mujoco.mj_resetData(fridge.model, fridge.data)
+        qpos, dof = fridge.joint(number)
+        width = float(np.ptp(fridge.box_of(openable.joint), axis=0)[1])
+        fridge.run(1 / SECONDS, {dof: 0.3 * SECONDS * (width if "door" in openable.joint else 1.0)})
+        fridge.run(1.0)
+        moved = (fridge.data.qpos[qpos] - openable.closed) / (openable.open - openable.closed)
+        assert 0 <= moved < 0.05, "from 5 % of its range on it counts as open (states.md)"
 
 
 def test_halves_of_an_apple_lie_still(convert):
