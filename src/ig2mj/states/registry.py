@@ -6,12 +6,15 @@ Names are those of `ig2mj.knowledge`; the paper's (table A.4) and iGibson's clas
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from typing import Any
 
+import jax
 import numpy as np
+from jaxtyping import Bool, Float
 
-from ig2mj.engine.view import PhysicsView
+from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import UnknownNameError
 from ig2mj.states import adjacency, dust, heat_source, particles, rooms, stain
 from ig2mj.states.model import StateModel
@@ -45,8 +48,17 @@ class ObjectState:
         return self.abilities is None or bool(set(self.abilities) & set(model.parameters.abilities[obj]))
 
 
+_particle_level = jax.jit(particles.level)
+_is_open = jax.jit(is_open, static_argnums=0)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def _switched_on(model: StateModel, toggled: Bool[Array, "W O"], joint_pos: Float[Array, "W J"]) -> Bool[Array, "W S"]:
+    return heat_source.switched_on(model, toggled, is_open(model, joint_pos))
+
+
 def _field(name: str, kind: type) -> Get:
-    return lambda model, states, view, o, w: kind(getattr(states, name)[w, o])
+    return lambda model, states, view, o, w: kind(np.asarray(getattr(states, name))[w, o])
 
 
 def _pose(model: StateModel, states: ExtendedStates, view: PhysicsView, o: int, w: int) -> Any:
@@ -72,24 +84,24 @@ def _beside(which: str) -> Get:
 def _level(field: str, row_of: Callable[[StateModel, int], int | None]) -> Get:
     def get(model: StateModel, states: ExtendedStates, view: PhysicsView, o: int, w: int) -> float:
         row = row_of(model, o)
-        return 0.0 if row is None else float(particles.level(getattr(states, field))[w, row])
+        return 0.0 if row is None else float(np.asarray(_particle_level(getattr(states, field)))[w, row])
 
     return get
 
 
 def _open(model: StateModel, states: ExtendedStates, view: PhysicsView, o: int, w: int) -> bool:
-    return bool(is_open(model, view.joint_pos)[w, o])
+    return bool(np.asarray(_is_open(model, view.joint_pos))[w, o])
 
 
 def _heat_source(model: StateModel, states: ExtendedStates, view: PhysicsView, o: int, w: int) -> bool:
-    on = heat_source.switched_on(model, states.toggled, is_open(model, view.joint_pos))
+    on = np.asarray(_switched_on(model, states.toggled, view.joint_pos))
     mine = np.flatnonzero(model.parameters.heat_object == o)
     return bool(len(mine) and on[w, mine[0]])
 
 
 def _water_source(model: StateModel, states: ExtendedStates, view: PhysicsView, o: int, w: int) -> int:
     mine = np.flatnonzero(model.parameters.water_object == o)
-    return int(states.water.active[w, mine].sum()) if len(mine) else 0
+    return int(np.asarray(states.water.active)[w, mine].sum()) if len(mine) else 0
 
 
 def _rooms(model: StateModel, states: ExtendedStates, view: PhysicsView, o: int, w: int) -> list[str]:
