@@ -2,44 +2,119 @@
 
 from __future__ import annotations
 
+import io
 import pathlib
 import subprocess
 import sys
+import time
 
 import jax
 import pytest
 
-from ig2mj.engine.compile_cache import CompileReport, cache_folder, keep_jax_programs
+from ig2mj.engine import waiting
+from ig2mj.engine.compile_cache import cache_folder, keep_jax_programs, kernels_text, xla_text
+from ig2mj.engine.waiting import Waiting
 
 
-def test_without_a_terminal_every_tenth_module_is_told(capsys):
-    report = CompileReport()
-    assert [report.during(lambda: True) for _ in range(21)] == [True] * 21
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert err.splitlines() == [f"compiling physics kernels {n}/80, once per machine" for n in (1, 11, 21)]
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def impatient(monkeypatch) -> Waiting:
+    """A line after 0.05 s, and another every 0.2 s."""
+    for name, seconds in (("PATIENCE", 0.05), ("EVERY", 0.2), ("REDRAW", 0.02), ("PAUSE", 0.1)):
+        monkeypatch.setattr(waiting, name, seconds)
+    return Waiting()
+
+
+def until(condition) -> None:
+    deadline = time.monotonic() + 20
+    while not condition():
+        assert time.monotonic() < deadline
+        time.sleep(0.01)
+
+
+def test_long_work_is_told_on_stderr_again_and_again(impatient, monkeypatch):
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    with impatient.during(lambda: "working"):
+        until(lambda: sys.stderr.getvalue().count("\n") >= 3)  # type: ignore[attr-defined]
+    lines = sys.stderr.getvalue().splitlines()  # type: ignore[attr-defined]
+    assert lines[:3] == ["working (0 s)"] * 3
+
+
+def test_short_work_is_not_told(impatient, monkeypatch):
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    monkeypatch.setattr(waiting, "PATIENCE", 60.0)
+    with impatient.during(lambda: "working"):
+        time.sleep(0.05)
+    assert sys.stderr.getvalue() == ""  # type: ignore[attr-defined]
+
+
+def test_many_short_works_in_a_row_are_one_wait(impatient, monkeypatch):
+    """80 modules of a second each: the first is told once patience is over, the others now and then."""
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    monkeypatch.setattr(waiting, "PAUSE", 60.0)
+    for number in range(40):
+        with impatient.during(lambda n=number: kernels_text(n + 1)):
+            time.sleep(0.02)
+    lines = sys.stderr.getvalue().splitlines()  # type: ignore[attr-defined]
+    assert 2 <= len(lines) < 20 and not lines[0].startswith(kernels_text(1))
+
+
+def test_in_a_terminal_the_line_goes_when_the_work_is_done(impatient, monkeypatch):
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    with impatient.during(lambda: "working"):
+        until(lambda: sys.stderr.getvalue().count("\r") >= 2)  # type: ignore[attr-defined]
+    text = sys.stderr.getvalue()  # type: ignore[attr-defined]
+    assert text.startswith("\rworking (0 s)\x1b[K\rworking") and text.endswith("\r\x1b[K") and "\n" not in text
+
+
+def test_what_goes_wrong_is_not_swallowed_and_ends_the_wait(impatient):
+    for _ in range(2):
+        with pytest.raises(RuntimeError, match="no compiler"), impatient.during(lambda: "working"):
+            raise RuntimeError("no compiler")
+    assert not impatient._works
+
+
+def test_a_closed_stderr_harms_nobody(impatient, monkeypatch):
+    closed = io.StringIO()
+    monkeypatch.setattr(closed, "isatty", lambda: False)
+    closed.close()
+    monkeypatch.setattr(sys, "stderr", closed)
+    with impatient.during(lambda: "working"):
+        until(lambda: impatient._told > float("-inf"))
+
+
+def test_work_within_work_does_not_wait_for_itself(impatient):
+    with impatient.during(lambda: "outer"), impatient.during(lambda: "inner"):
+        assert [text() for _, text in impatient._works] == ["outer", "inner"]
 
 
 def test_more_modules_than_usual_are_told_as_they_are():
-    report = CompileReport()
-    report.done = 94
-    assert report.text() == "compiling physics kernels 95/95, once per machine"
+    assert kernels_text(3) == "compiling physics kernels 3/80, once per machine"
+    assert kernels_text(95) == "compiling physics kernels 95/95, once per machine"
 
 
-def test_what_goes_wrong_while_compiling_is_not_swallowed():
-    report = CompileReport()
+def test_what_xla_compiles_is_told(monkeypatch):
+    """By JAX's own monitoring; the compiled function is a new one, so it is in no cache."""
+    keep_jax_programs()
+    begun = []
 
-    def broken() -> bool:
-        raise RuntimeError("no compiler")
+    class Told(Waiting):
+        def begin(self, text):
+            begun.append(text())
+            return super().begin(text)
 
-    for _ in range(2):
-        with pytest.raises(RuntimeError, match="no compiler"):
-            report.during(broken)
+    told = Told()
+    monkeypatch.setattr("ig2mj.engine.compile_cache.WAITING", told)
 
+    def some_step(x):
+        return x + 1
 
-def test_work_within_work_does_not_wait_for_itself():
-    report = CompileReport()
-    assert report.during(lambda: report.during(lambda: True))
+    jax.jit(some_step)(1.0)
+    assert xla_text("jit(some_step)") in begun and not told._works
 
 
 def test_the_cache_folder_can_be_moved(monkeypatch, tmp_path):

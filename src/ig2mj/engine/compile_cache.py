@@ -7,15 +7,19 @@ JAX was given a folder already. `ig2mj doctor` lists the folders; IG2MJ_CACHE_DI
 
 from __future__ import annotations
 
+import functools
+import itertools
 import os
 import pathlib
-import sys
 import threading
 from collections.abc import Callable
 from typing import Any
 
 import jax
+import jax.monitoring
 import platformdirs
+
+from ig2mj.engine.waiting import WAITING
 
 ENVIRONMENT = "IG2MJ_CACHE_DIR"
 
@@ -24,6 +28,9 @@ MODULES = 80
 
 WORTH_KEEPING = 0.1
 """Seconds. Programs that XLA compiles faster than this are not kept."""
+
+XLA_EVENT = "/jax/core/compile/backend_compile_duration"
+"""JAX's event: a scalar where a compilation (or a look into the cache) begins, a duration where it ends."""
 
 _REPORTING = "_ig2mj_reports_compilation"
 
@@ -34,10 +41,14 @@ def cache_folder() -> pathlib.Path:
 
 
 def keep_jax_programs() -> pathlib.Path | None:
-    """Lets JAX keep compiled programs from one process to the next. Says where; None: it cannot.
+    """Lets JAX keep compiled programs from one process to the next, and tells of long compilations.
 
     What the user told JAX (its option `jax_compilation_cache_dir`, or the variable of that name in capitals) stands.
+
+    Returns:
+      The folder; None: there is none to write to.
     """
+    report_xla_compilation()
     chosen = getattr(jax.config, "jax_compilation_cache_dir", None)
     if chosen:
         return pathlib.Path(chosen)
@@ -51,6 +62,31 @@ def keep_jax_programs() -> pathlib.Path | None:
     jax.config.update("jax_compilation_cache_dir", str(folder))
     jax.config.update("jax_persistent_cache_min_compile_time_secs", WORTH_KEEPING)
     return folder
+
+
+@functools.cache
+def report_xla_compilation() -> None:
+    """From now on this process tells on stderr that XLA compiles a program, where that takes long."""
+    begun: dict[tuple[int, str], object] = {}
+
+    def key(name: str) -> tuple[int, str]:
+        return threading.get_ident(), name
+
+    def begin(event: str, value: float | int, *, fun_name: str = "", **_: Any) -> None:
+        if event == XLA_EVENT:
+            begun[key(fun_name)] = WAITING.begin(lambda: xla_text(fun_name))
+
+    def end(event: str, seconds: float, *, fun_name: str = "", **_: Any) -> None:
+        if event == XLA_EVENT and key(fun_name) in begun:
+            WAITING.end(begun.pop(key(fun_name)))
+
+    jax.monitoring.register_scalar_listener(begin)
+    jax.monitoring.register_event_duration_secs_listener(end)
+
+
+def xla_text(program: str) -> str:
+    """What is told of a program of XLA."""
+    return f"compiling {program or 'a program'}, once per machine, scene and number of worlds"
 
 
 def report_warp_compilation() -> None:
@@ -68,51 +104,19 @@ def report_warp_compilation() -> None:
     compile_module: Callable[..., bool] | None = getattr(module, "_compile", None)
     if module is None or compile_module is None or getattr(module, _REPORTING, False):
         return
-    report = CompileReport()
+    numbers = itertools.count(1)
 
     def compile_and_report(self: Any, device: Any = None, output_dir: Any = None, output_name: Any = None, *args, **kw):
-        def work() -> bool:
-            return compile_module(self, device, output_dir, output_name, *args, **kw)
-
         if output_dir is None or output_name is None or pathlib.Path(output_dir, output_name).exists():
-            return work()
-        return report.during(work)
+            return compile_module(self, device, output_dir, output_name, *args, **kw)
+        text = kernels_text(next(numbers))
+        with WAITING.during(lambda: text):
+            return compile_module(self, device, output_dir, output_name, *args, **kw)
 
     module._compile = compile_and_report
     setattr(module, _REPORTING, True)
 
 
-class CompileReport:
-    """Tells how many modules were compiled: in a terminal a line that comes and goes, elsewhere a line now and then."""
-
-    EVERY = 10
-    """Modules between two lines where there is no terminal."""
-
-    def __init__(self) -> None:
-        self.done = 0
-        self._one = threading.Lock()
-
-    def during(self, work: Callable[[], bool]) -> bool:
-        """Does the work and tells of it."""
-        from rich.console import Console
-
-        if not self._one.acquire(blocking=False):  # another thread compiles, and tells
-            return work()
-        try:
-            console = Console(file=sys.stderr)
-            if console.is_terminal:
-                try:
-                    with console.status(f"{self.text()} ..."):
-                        return work()
-                finally:
-                    self.done += 1
-            if self.done % self.EVERY == 0:
-                print(self.text(), file=sys.stderr, flush=True)
-            self.done += 1
-            return work()
-        finally:
-            self._one.release()
-
-    def text(self) -> str:
-        """The line."""
-        return f"compiling physics kernels {self.done + 1}/{max(MODULES, self.done + 1)}, once per machine"
+def kernels_text(number: int) -> str:
+    """What is told of the module of that number, from 1."""
+    return f"compiling physics kernels {number}/{max(MODULES, number)}, once per machine"
