@@ -69,16 +69,15 @@ def report_xla_compilation() -> None:
     """From now on this process tells on stderr that XLA compiles a program, where that takes long."""
     begun: dict[tuple[int, str], object] = {}
 
-    def key(name: str) -> tuple[int, str]:
-        return threading.get_ident(), name
-
-    def begin(event: str, value: float | int, *, fun_name: str = "", **_: Any) -> None:
+    def begin(event: str, value: float | int, **about: str | int) -> None:
         if event == XLA_EVENT:
-            begun[key(fun_name)] = WAITING.begin(lambda: xla_text(fun_name))
+            name = str(about.get("fun_name", ""))
+            begun[threading.get_ident(), name] = WAITING.begin(lambda: xla_text(name))
 
-    def end(event: str, seconds: float, *, fun_name: str = "", **_: Any) -> None:
-        if event == XLA_EVENT and key(fun_name) in begun:
-            WAITING.end(begun.pop(key(fun_name)))
+    def end(event: str, duration_secs: float, **about: str | int) -> None:
+        key = threading.get_ident(), str(about.get("fun_name", ""))
+        if event == XLA_EVENT and key in begun:
+            WAITING.end(begun.pop(key))
 
     jax.monitoring.register_scalar_listener(begin)
     jax.monitoring.register_event_duration_secs_listener(end)
