@@ -8,7 +8,7 @@ JOBS ?= 2
 PYTEST_ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-slow test-gpu check format bench clean distclean
+.PHONY: help setup demo test test-slow test-gpu check homes-check format bench clean distclean
 
 help:
 	@echo "make demo       convert the small home, run it, cook a fish in it; leaves pictures, a plot, a film, a report"
@@ -16,6 +16,7 @@ help:
 	@echo "make test-slow  the tests that take long"
 	@echo "make test-gpu   the tests that need a CUDA device"
 	@echo "make check      ruff and pyright"
+	@echo "make homes-check  build and convert all homes anew and compare them byte for byte with scenes_mjcf/"
 	@echo "make format     let ruff put the code in order"
 	@echo "make bench      the benchmarks of the native engine; results in benchmarks/results/"
 	@echo "make setup      only the set-up: .venv and OpenGL libraries"
@@ -61,6 +62,14 @@ check: setup
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
 	@PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright
+
+# Engine profiles lie beside the scenes but are measured, not converted.
+homes-check: setup
+	@set -e; made=$$(mktemp -d); trap 'rm -rf "$$made"' EXIT; \
+	$(BIN)/ig2mj homes build --out $$made/dataset; \
+	$(BIN)/ig2mj homes convert --dataset $$made/dataset --out $$made/homes; \
+	diff -rq -x engine_profile.json $$made/homes scenes_mjcf; \
+	echo "scenes_mjcf/ is what this code builds and converts, byte for byte"
 
 format: setup
 	@$(BIN)/ruff check --fix
