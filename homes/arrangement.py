@@ -6,7 +6,7 @@ each other edge to edge by little, and never the other way round.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -14,6 +14,8 @@ from .things import Hull, Thing, boxes_of
 
 AIR = 0.0008
 """m, kept between a thing and what it stands on: it settles by less than the converter's 5 mm."""
+FLAT = ("carpet", "mat")
+"""Categories that are walked and driven over: they need no air around them and block no way."""
 
 
 class Arrangement:
@@ -26,10 +28,18 @@ class Arrangement:
     def __init__(self, blocks: np.ndarray):
         """blocks: [n, 2, 3] boxes of walls; nothing may stand in them."""
         self.things: dict[str, Thing] = {}
-        self._solid = [_Group(None, _block_hulls(np.asarray(blocks, float).reshape(-1, 2, 3)))]
-        self._swept: list[_Group] = []
+        self._solid = _Groups([_Group(None, _block_hulls(np.asarray(blocks, float).reshape(-1, 2, 3)))])
+        self._swept = _Groups([])
         self._ways: list[tuple[str, np.ndarray]] = []
         self._counts: dict[str, int] = {}
+
+    def copy(self) -> Arrangement:
+        """The same things, free to get others than this one."""
+        other = Arrangement(np.zeros((0, 2, 3)))
+        other.things, other._counts = dict(self.things), dict(self._counts)
+        other._solid, other._swept = _Groups(self._solid.groups), _Groups(self._swept.groups)
+        other._ways = list(self._ways)
+        return other
 
     def name(self, category: str) -> str:
         """The next free name of a category: fridge_0, fridge_1, ..."""
@@ -40,10 +50,10 @@ class Arrangement:
     def put(self, thing: Thing) -> Thing:
         """Adds a thing where it is; ask `fits` first."""
         self.things[thing.name] = thing
-        self._solid.append(_Group(thing, thing.parts()))
+        self._solid.add(_Group(thing, thing.parts()))
         swept = thing.swept()
         if swept:
-            self._swept.append(_Group(thing, swept))
+            self._swept.add(_Group(thing, swept))
         return thing
 
     def keep_free(self, owner: str, boxes: np.ndarray) -> None:
@@ -60,22 +70,26 @@ class Arrangement:
           ways: mind zones that are kept free, too.
         """
         mine = _Group(thing, thing.parts())
-        if any(mine.meets(other, gap if other.thing else 0.0) for other in self._solid):
-            return False
         ignored = {*ignore, thing.name, thing.host}
-        for other in self._swept:
-            if other.name not in ignored and mine.meets(other):
-                return False
         if ways and any(owner not in ignored and _overlaps(mine.boxes, zone).any() for owner, zone in self._ways):
             return False
+        if any(mine.meets(other, 0.0 if other.low_lying else gap) for other in self._solid.near(mine, gap)):
+            return False
+        for other in self._swept.near(mine):
+            if other.name not in ignored and mine.meets(other):
+                return False
         if not thing.shape.swept:
             return True
         moving = _Group(thing, thing.swept())
-        return not any(moving.meets(o) for o in self._solid if o.thing is None or o.thing.fixed)
+        return not any(moving.meets(o) for o in self._solid.near(moving) if o.thing is None or o.thing.fixed)
 
     def free(self, zone: np.ndarray) -> bool:
-        """Whether nothing stands in a box [2, 3]."""
-        return not any(_overlaps(zone[None], group.boxes).any() for group in self._solid)
+        """Whether nothing but a carpet lies in a box [2, 3]."""
+        wanted = _Group(None, _block_hulls(zone[None]))
+        near = self._solid.near(wanted)
+        return not any(
+            _overlaps(wanted.boxes, group.boxes).any() for group in near if group.thing is None or not group.low_lying
+        )
 
     def overlapping_boxes(self) -> list[list[str]]:
         """Pairs of names whose world boxes intersect: misc/bbox_overlap.json."""
@@ -83,6 +97,25 @@ class Arrangement:
         boxes = np.array([self.things[n].box() for n in names]).reshape(-1, 2, 3)
         hit = np.triu(_overlaps(boxes, boxes), 1)
         return [sorted((names[i], names[j])) for i, j in np.argwhere(hit)]
+
+
+class _Groups:
+    """Groups that are found by where they are."""
+
+    def __init__(self, groups: Iterable[_Group]):
+        self.groups = list(groups)
+        self._low, self._high = np.zeros((0, 3)), np.zeros((0, 3))
+
+    def add(self, group: _Group) -> None:
+        self.groups.append(group)
+
+    def near(self, group: _Group, gap: float = 0.0) -> Iterator[_Group]:
+        """Those whose box comes within `gap` of a group's."""
+        if len(self._low) < len(self.groups):
+            self._low = np.array([g.low for g in self.groups])
+            self._high = np.array([g.high for g in self.groups])
+        hit = np.all((self._low < group.high + gap) & (self._high > group.low - gap), axis=1)
+        return (self.groups[k] for k in np.flatnonzero(hit))
 
 
 class _Group:
@@ -97,6 +130,11 @@ class _Group:
     @property
     def name(self) -> str | None:
         return self.thing.name if self.thing else None
+
+    @property
+    def low_lying(self) -> bool:
+        """The building, or what one walks on: nothing keeps a distance from it."""
+        return self.thing is None or self.thing.category in FLAT
 
     def meets(self, other: _Group, gap: float = 0.0) -> bool:
         if np.any(self.low - gap >= other.high) or np.any(self.high + gap <= other.low):

@@ -12,7 +12,7 @@ import numpy as np
 from PIL import Image
 from scipy import ndimage
 
-from .arrangement import Arrangement
+from .arrangement import FLAT, Arrangement
 from .building import stair_boxes
 from .dataset import ROOM_TYPES
 from .floor_plans.plan import Plan, Rect
@@ -20,9 +20,6 @@ from .floor_plans.plan import Plan, Rect
 PIXEL = 0.01
 BORDER = 0.5  # m, around the house
 LOW, HIGH = 0.05, 1.5  # m: what reaches into this range of heights is in a robot's way
-
-FLAT = ("carpet", "mat")
-"""Categories that are driven over."""
 
 
 class Maps:

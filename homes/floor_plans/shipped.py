@@ -40,29 +40,29 @@ class Drawing:
 
 
 DRAWINGS: dict[str, Drawing] = {
-    "alder": Drawing(48, (3.4, 2.0, 3.2), (3.0, 1.4, 3.6), "B T O / C C C / L L K", ("LK",), ("CL",)),
+    "alder": Drawing(84, (3.4, 2.0, 3.2), (3.0, 1.4, 3.6), "B T O / C C C / L L K", ("LK",), ("CL",)),
     "aspen": Drawing(20, (3.4, 2.1), (2.2, 3.3), "K T / L L", ("KL",)),
     "birch": Drawing(60, (3.2, 2.1, 3.8), (2.9, 1.4, 3.0), "B T L / C C L / K K L", ("KL",)),
-    "cedar": Drawing(54, (3.1, 1.4, 3.6), (3.2, 2.4, 2.9), "B C L / T C L / H C K", ("LK",), ("CL",)),
-    "elm": Drawing(66, (3.2, 2.2, 2.2, 3.4), (3.0, 1.4, 3.4), "B T P K / C C C K / L L L D", ("KD",), ("CL", "LD")),
-    "fir": Drawing(72, (3.4, 1.4, 2.9, 3.0), (2.9, 2.1, 3.2), "B C L L / T C L L / H C K D", ("KD",), ("CL", "LD")),
-    "hazel": Drawing(32, (3.2, 2.2, 3.3), (2.4, 3.5), "K T B / L L B", ("KL",)),
-    "juniper": Drawing(78, (3.2, 2.2, 2.1, 3.7), (3.1, 1.4, 3.4), "B T W G / C C C G / L L L K", ("LK",), ("CL",)),
-    "larch": Drawing(84, (3.4, 2.1, 3.0, 3.2), (3.2, 1.4, 3.5), "B T O K / C C C K / M L L D", ("KD",), ("CL", "LD")),
-    "linden": Drawing(88, (3.4, 1.4, 3.5), (3.1, 2.2, 2.8, 3.2), "B C L / T C L / Q C K / H C D", ("KD",), ("CL",)),
-    "maple": Drawing(96, (3.3, 2.3, 2.8, 3.6), (3.2, 1.5, 3.6), "B T R L / C C C L / M K K D", ("KD",), ("LD",)),
+    "cedar": Drawing(86, (3.1, 1.4, 3.6), (3.2, 2.4, 2.9), "B C L / T C L / H C K", ("LK",), ("CL",)),
+    "elm": Drawing(100, (3.2, 2.2, 2.2, 3.4), (3.0, 1.4, 3.4), "B T P K / C C C K / L L L D", ("KD",), ("CL", "LD")),
+    "fir": Drawing(108, (3.4, 1.4, 2.9, 3.0), (2.9, 2.1, 3.2), "B C L L / T C L L / H C K D", ("KD",), ("CL", "LD")),
+    "hazel": Drawing(52, (3.2, 2.2, 3.3), (2.4, 3.5), "K T B / L L B", ("KL",)),
+    "juniper": Drawing(110, (3.2, 2.2, 2.1, 4.7), (3.1, 1.4, 3.4), "B T W G / C C C G / L L L K", ("LK",), ("CL",)),
+    "larch": Drawing(124, (3.4, 2.1, 3.0, 3.2), (3.2, 1.4, 3.5), "B T O K / C C C K / M L L D", ("KD",), ("CL", "LD")),
+    "linden": Drawing(128, (3.4, 1.4, 3.5), (3.1, 2.2, 2.8, 3.2), "B C L / T C L / Q C K / H C D", ("KD",), ("CL",)),
+    "maple": Drawing(136, (3.3, 2.3, 2.8, 3.6), (3.2, 1.5, 3.6), "B T R L / C C C L / M K K D", ("KD",), ("LD",)),
     "poplar": Drawing(
-        104, (3.4, 2.2, 3.2, 2.2, 3.5), (3.3, 1.4, 3.6), "B T X W K / C C C C K / M L L L D", ("KD",), ("CL", "LD")
+        140, (3.4, 2.2, 3.2, 2.2, 3.5), (3.3, 1.4, 3.6), "B T X W K / C C C C K / M L L L D", ("KD",), ("CL", "LD")
     ),
     "rowan": Drawing(
-        110, (3.4, 1.4, 4.0, 1.8), (3.1, 2.2, 2.5, 3.1), "B C L V / T C L V / S C K K / O C D D", ("KD",), ("CL",)
+        146, (3.4, 1.4, 4.0, 1.8), (3.1, 2.2, 2.5, 3.1), "B C L V / T C L V / S C K K / O C D D", ("KD",), ("CL",)
     ),
     "spruce": Drawing(
         120, (3.6, 2.2, 2.4, 3.0, 3.6), (3.4, 1.5, 3.7), "B N T H K / C C C C K / E L L Z D", ("KD",), ("CL", "CK")
     ),
     "willow": Drawing(
-        140,
-        (3.7, 2.1, 2.4, 3.2, 2.2, 3.6),
+        150,
+        (4.7, 2.1, 2.4, 3.2, 2.2, 3.6),
         (3.4, 1.5, 4.5),
         "B U T M P K / C C C C C K / G Y L L L D",
         ("KD",),

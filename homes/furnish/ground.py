@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..arrangement import FLAT
 from ..building import stair_boxes
 from ..floor_plans.plan import Plan, Rect
-from ..layout_maps import FLAT, HIGH, LOW, reachable
+from ..layout_maps import HIGH, LOW, reachable
 from ..things import Thing
 
 CELL = 0.05  # m

@@ -5,12 +5,13 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterator
 
-from ..floor_plans.plan import Plan
+from ..floor_plans.plan import Plan, Room
 from ..things import Thing
 from . import kitchen, living, sleeping, working
 from .clutter import fill
-from .kit import HomeInProgress, RoomKit
-from .start import start_home
+from .kit import RoomKit
+from .room import ROOMY, HomeInProgress
+from .start import lay_doormat, start_home
 
 Rule = Callable[[RoomKit], Iterator[Thing | None]]
 
@@ -38,25 +39,29 @@ RULES: dict[str, Rule] = {
 }
 """Room kind -> a generator that gives after each thing it put (or None where there was no room for one)."""
 
-FURNITURE_SHARE = 0.66
+FURNITURE_SHARE = 0.64
 """Of the things that are neither doors nor windows: furniture comes first, small things take what is left."""
+SMALL_SHARE = 0.8
+"""The same in homes of less than ROOMY things: a kitchen without a stove is none."""
 
 
 def furnish_home(plan: Plan, objects: int, seed: int = 0) -> HomeInProgress:
     """Furnishes a plan. objects: how many things in all, doors and windows included; fewer where nothing more fits."""
     home = start_home(plan, random.Random(f"{seed}/{plan.name}/things"), seed=seed, limit=objects)
     openings = len(home.things.things)
-    limit = openings + round(FURNITURE_SHARE * (objects - openings))
+    if home.roomy:
+        lay_doormat(home)
+    share = FURNITURE_SHARE if home.roomy else SMALL_SHARE
+    limit = openings + round(share * (objects - openings))
     rooms = sorted(plan.rooms, key=lambda room: ORDER.get(room.kind, 2))
-    running = [(room.kind, RULES[room.kind](RoomKit(home, room))) for room in rooms]
-    steps = STEPS if objects >= LARGE else {}
+    running = [(room, RULES[room.kind](RoomKit(home, room))) for room in rooms]
     turn = 0
     while running and len(home.things.things) < limit:
-        for kind, rule in list(running):
+        for room, rule in list(running):
             if len(home.things.things) >= limit:
                 break
-            if turn >= START.get(kind, 0) and not any([_advance(rule) for _ in range(steps.get(kind, 1))]):
-                running.remove((kind, rule))
+            if turn >= START.get(room.kind, 0) and not any([_advance(rule) for _ in range(_steps(room, objects))]):
+                running.remove((room, rule))
         turn += 1
     small = fill(home)
     while not home.full and next(small, None) is not None:
@@ -66,11 +71,19 @@ def furnish_home(plan: Plan, objects: int, seed: int = 0) -> HomeInProgress:
 
 ORDER = {"kitchen": 0, "living_room": 1, "bathroom": 1, "bedroom": 1, "corridor": 4}
 """Rooms of these kinds get their pieces first in a turn."""
-START = {"corridor": 4, "lobby": 1, "balcony": 3, "staircase": 3}
+START = {"corridor": 2, "lobby": 1, "balcony": 2, "staircase": 2}
 """Turn in which a room of this kind gets its first piece; others: 0."""
-STEPS = {"kitchen": 2, "dining_room": 2, "living_room": 2}
-"""Pieces per turn in homes of at least LARGE things; others: 1."""
-LARGE = 40
+PLAIN = ("balcony", "bathroom", "closet", "corridor", "garage", "lobby", "pantry_room", "staircase", "storage_room",
+         "utility_room")  # fmt: skip
+"""Rooms that get one piece in a turn; others two, or more by their area."""
+PIECE_AREA = 9.0  # m2 for each
+
+
+def _steps(room: Room, objects: int) -> int:
+    """Pieces that a room gets in a turn."""
+    if objects < ROOMY:
+        return 2 if room.kind == "kitchen" else 1
+    return 1 if room.kind in PLAIN else min(3, max(2, round(room.area / PIECE_AREA)))
 
 
 def _advance(rule: Iterator[Thing | None]) -> bool:

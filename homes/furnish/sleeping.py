@@ -4,35 +4,61 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..things import Thing
+import numpy as np
+
+from ..things import Thing, yaw
 from .kit import RoomKit
+from .kitchen import with_doors
+from .living import middle_carpet, shoes
+from .room import degrees_of
 
 LID = 0.2
 """m, behind a chest: its lid tips backwards."""
 
 
 def bedroom(kit: RoomKit) -> Iterator[Thing | None]:
-    """The bed's head at a wall, a stand with a lamp on each side, a chest of drawers, a wardrobe shelf, a desk."""
+    """The bed's head at a wall, a stand with a lamp on each side, a chest of drawers, shelves, a desk, a carpet."""
     bed = kit.at_wall("bed", place="middle", under_window=False) or kit.at_wall("bed")
     yield bed
     if bed is not None:
+        index = kit.home.index("stand")
         for which in (1, -1):
-            stand = kit.beside(bed, "stand", which)
+            stand = kit.beside(bed, "stand", which, index=index)
             yield stand
             if stand is not None:
                 yield kit.on(stand, "table_lamp", at="middle", degrees=0)
         yield kit.on(bed, "pillow", degrees=0, at=_head(bed, 0.22))
         yield kit.on(bed, "pillow", degrees=0, at=_head(bed, -0.22))
     yield kit.at_wall("bottom_cabinet", room_before=0.5, place="corner", under_window=False)
+    if bed is not None:
+        yield _beside_bed(kit, bed)
+        yield kit.above(bed, "painting", 1.4)
     yield kit.at_wall("shelf", under_window=False, place="corner")
-    yield kit.at_wall("painting", height=1.4)
     desk = kit.at_wall("desk", room_before=0.6)
     yield desk
     if desk is not None:
-        yield kit.before(desk, "straight_chair", -0.12)
-    yield kit.at_wall("mirror", height=1.0)
+        yield kit.seat_at(desk, "straight_chair")
+    yield kit.hang("mirror", 0.95)
+    yield kit.under_window("heater")
     yield kit.at_wall("pot_plant", place="corner")
+    yield kit.hang("picture", 1.45)
+    yield kit.at_wall("armchair", place="corner")
     yield kit.at_wall("basket", place="corner")
+    yield from shoes(kit, category="sandal")
+
+
+def _beside_bed(kit: RoomKit, bed: Thing) -> Thing | None:
+    """A carpet at the bed's foot or along one of its sides."""
+    places = ((0.0, 0), (90.0, 1), (270.0, 1))
+    for side, axis in places:
+        turned = degrees_of(bed) + side
+        way = np.round(yaw(turned)[:2, 0])
+        for depth in (1.2, 0.9, 0.7):
+            middle = bed.centre[:2] + way * (float(bed.size[axis]) / 2 + 0.04 + depth / 2)
+            carpet = kit.spread((float(middle[0]), float(middle[1])), turned, (depth, float(bed.size[1 - axis])))
+            if carpet is not None:
+                return carpet
+    return None
 
 
 def _head(bed: Thing, side: float) -> tuple[float, float]:
@@ -51,26 +77,33 @@ def childs_room(kit: RoomKit) -> Iterator[Thing | None]:
     desk = kit.at_wall("desk", room_before=0.6)
     yield desk
     if desk is not None:
-        yield kit.before(desk, "straight_chair", -0.12)
-    yield kit.at_wall("toy")
-    yield kit.at_wall("picture", height=1.4)
-    yield kit.at_wall("duffel_bag")
-    yield kit.at_wall("toy")
+        yield kit.seat_at(desk, "straight_chair")
+    yield middle_carpet(kit)
+    yield kit.hang("picture", 1.4)
+    yield kit.at_wall("backpack", place="corner")
+    yield kit.at_wall("toy", place="corner")
+    yield kit.under_window("heater")
+    yield kit.at_wall("stand", place="corner")
+    yield kit.hang("picture", 1.4)
+    yield kit.at_wall("basket", place="corner")
 
 
 def playroom(kit: RoomKit) -> Iterator[Thing | None]:
     """Toys, a game table, a shelf, a board."""
     yield kit.at_wall("shelf", under_window=False, place="corner")
     yield kit.at_wall("chest", room_before=0.4, wall_gap=LID)
-    for _ in range(2):
-        yield kit.at_wall("toy")
     table = kit.at_wall("gaming_table", room_before=0.6)
     yield table
     if table is not None:
         yield kit.before(table, "stool", -0.1)
-    yield kit.at_wall("whiteboard", height=0.9)
-    yield kit.at_wall("toy", place="corner")
+    yield middle_carpet(kit)
+    yield kit.hang("whiteboard", 0.9)
+    yield kit.at_wall("shelf", under_window=False, place="corner")
+    yield kit.at_wall("armchair", place="corner")
+    yield kit.hang("picture", 1.4)
     yield kit.at_wall("basket", place="corner")
+    yield kit.under_window("heater")
+    yield kit.at_wall("toy", place="corner")
 
 
 def closet(kit: RoomKit) -> Iterator[Thing | None]:
@@ -78,20 +111,28 @@ def closet(kit: RoomKit) -> Iterator[Thing | None]:
     for _ in range(2):
         yield kit.at_wall("shelf", place="corner")
     yield kit.at_wall("bottom_cabinet", room_before=0.5, place="corner")
+    yield kit.hang("mirror", 0.6)
+    yield from shoes(kit)
     yield kit.at_wall("duffel_bag", place="corner")
-    yield kit.at_wall("gym_shoe")
+    yield kit.at_wall("stool", place="corner")
 
 
 def bathroom(kit: RoomKit) -> Iterator[Thing | None]:
     """Bathtub or shower, toilet, washbasin with a mirror, towels."""
     big = "bathtub" if kit.room.area > 5.5 else "shower"
-    yield kit.at_wall(big, place="corner", under_window=big == "bathtub") or kit.at_wall("shower", place="corner")
+    tub = kit.at_wall(big, place="corner", under_window=big == "bathtub") or kit.at_wall("shower", place="corner")
+    yield tub
     yield kit.at_wall("toilet", room_before=0.35)
-    sink = kit.at_wall("sink", room_before=0.45, under_window=False)
+    below = with_doors if kit.room.area > 5.5 else None
+    sink = kit.at_wall("sink", room_before=0.45, under_window=False, index=kit.home.index("sink", below))
     yield sink
     if sink is not None:
         yield kit.above(sink, "mirror", 1.25)
-    yield kit.at_wall("towel_rack", height=1.2)
-    yield kit.at_wall("mat", place="middle")
+    yield kit.hang("towel_rack", 1.2)
+    if tub is not None:
+        sides = (90.0, 270.0) if tub.size[0] > 1.2 * tub.size[1] else (0.0,)
+        yield next((mat for side in sides if (mat := kit.before(tub, "mat", 0.05, side=side)) is not None), None)
     yield kit.at_wall("trash_can", place="corner")
+    yield kit.at_wall("shelf", place="corner", under_window=False)
     yield kit.at_wall("stool", place="corner")
+    yield kit.at_wall("basket", place="corner")

@@ -6,6 +6,8 @@ from collections.abc import Iterator
 
 from ..things import Thing
 from .kit import RoomKit
+from .kitchen import in_the_middle
+from .living import middle_carpet, shoes
 
 
 def home_office(kit: RoomKit) -> Iterator[Thing | None]:
@@ -13,7 +15,7 @@ def home_office(kit: RoomKit) -> Iterator[Thing | None]:
     desk = kit.at_wall("desk", room_before=0.75)
     yield desk
     if desk is not None:
-        yield kit.before(desk, "swivel_chair", -0.1)
+        yield kit.seat_at(desk, "swivel_chair")
         yield kit.on(desk, "monitor", at=(-0.22 * float(desk.size[0]), 0.0), degrees=0, highest=True)
         yield kit.on(desk, "keyboard", at=(0.15 * float(desk.size[0]), 0.0), degrees=0, highest=True)
         yield kit.on(desk, "mouse", at=(0.17 * float(desk.size[0]), -0.3), degrees=0, highest=True)
@@ -22,29 +24,44 @@ def home_office(kit: RoomKit) -> Iterator[Thing | None]:
     yield table
     if table is not None:
         yield kit.on(table, "printer", degrees=0)
-    yield kit.at_wall("bulletin_board", height=1.2)
+    yield kit.hang("bulletin_board", 1.2)
     yield kit.at_wall("shelf", under_window=False)
+    yield middle_carpet(kit)
     yield kit.at_wall("trash_can", place="corner")
+    yield kit.under_window("heater")
     yield kit.at_wall("pot_plant", place="corner")
     yield kit.at_wall("armchair", place="corner")
+    yield kit.hang("painting", 1.4)
+    yield kit.at_wall("briefcase", place="corner")
 
 
 def garage(kit: RoomKit) -> Iterator[Thing | None]:
     """A car where it fits, shelves with tools, a ladder, boxes."""
-    x0, y0, x1, y1 = kit.rect
-    for degrees in (90.0, 0.0):
-        long_enough = (y1 - y0 if degrees == 90.0 else x1 - x0) > 4.0
-        car = kit.at("car", (x0 + 1.05, (y0 + y1) / 2 + 0.1), degrees) if long_enough else None
-        if car is not None:
-            yield car
-            break
+    yield _car(kit)
     yield kit.at_wall("shelf", place="corner")
     yield kit.at_wall("ladder", place="corner")
     yield kit.at_wall("carton", place="corner")
     yield kit.at_wall("pegboard", height=1.1)
     yield kit.at_wall("lawn_mower", place="corner")
-    yield kit.at_wall("carton")
-    yield kit.at_wall("bucket")
+    yield kit.at_wall("shelf", place="corner")
+    yield kit.at_wall("carton", place="corner")
+    yield kit.at_wall("bucket", place="corner")
+    yield kit.at_wall("hose", place="corner")
+
+
+def _car(kit: RoomKit) -> Thing | None:
+    """A car along the room's long side, where its doors can open."""
+    x0, y0, x1, y1 = kit.rect
+    cx, cy = (x0 + x1) / 2, (y0 + y1) / 2
+    along_y = y1 - y0 > x1 - x0
+    for index in range(kit.home.models):
+        for aside in (0.0, 0.1, -0.1, 0.2, -0.2, 0.3, -0.3):
+            for shift in (0.0, 0.2, -0.2, 0.3, -0.3):
+                spot = (cx + aside, cy + shift) if along_y else (cx + shift, cy + aside)
+                car = kit.at("car", spot, 90.0 if along_y else 0.0, index=index)
+                if car is not None:
+                    return car
+    return None
 
 
 def storage_room(kit: RoomKit) -> Iterator[Thing | None]:
@@ -58,9 +75,13 @@ def storage_room(kit: RoomKit) -> Iterator[Thing | None]:
 def exercise_room(kit: RoomKit) -> Iterator[Thing | None]:
     """A treadmill, a bench, a mat, balls."""
     yield kit.at_wall("treadmill", place="corner", room_before=0.4)
-    yield kit.at_wall("bench")
-    yield kit.at_wall("mirror", height=0.8)
-    yield kit.at_wall("mat", place="middle")
+    yield in_the_middle(kit, "mat", 0.2)
+    yield kit.hang("mirror", 0.6)
+    yield kit.at_wall("bench", under_window=False)
     yield kit.at_wall("shelf", under_window=False, place="corner")
-    yield kit.at_wall("duffel_bag")
+    yield kit.at_wall("ball", place="corner")
+    yield kit.at_wall("duffel_bag", place="corner")
     yield kit.at_wall("loudspeaker", place="corner")
+    yield kit.under_window("heater")
+    yield kit.hang("wall_clock", 1.8)
+    yield from shoes(kit)
