@@ -90,30 +90,27 @@ def chest(b: ObjectBuilder) -> None:
         (-0.2 * x, z),
         (-0.45 * x, 0.9 * z),
     ]
-    shell = _vault(top, y)
-    link = lid(b, "lid", shell, wood, -x / 2, body + 0.003, angle=1.7)
+    board = 0.004
+    gables = [prism(top, board).turned("x", 90).at(0, at) for at in (y / 2, board - y / 2)]
+    link = lid(b, "lid", join([_vault(top, y, board), *gables]), wood, -x / 2, body + 0.003, angle=1.7)
+    band = [(px * 1.004, pz + (0.002 if pz > body + 0.01 else 0.0)) for px, pz in top]
     for s in (-1, 1):
         for side in (-1, 1):
             b.add(block((0.004, 0.04, body), (side * x / 2, s * 0.3 * y, body / 2)).seen(), iron)
-        band = [(px * 1.004, pz + (0.002 if pz > body + 0.01 else 0.0)) for px, pz in top]
-        strip = prism(band, 0.04).seen().at(z=-0.02).turned("x", 90).at(0, s * 0.3 * y)
-        link.add(strip, iron)
+        link.add(_vault(band, 0.04, 0.002).seen().at(0, s * 0.3 * y), iron)
     link.add(block((0.008, 0.06, 0.06), (x / 2 + 0.003, 0, body + 0.02)).seen(), iron)
 
 
-def _vault(outline: list[tuple[float, float]], y: float, board: float = 0.004) -> Solid:
-    """A lid hollow from below: the outline (x, z), whose first edge is open, of boards over the width y."""
+def _vault(outline: list[tuple[float, float]], y: float, board: float) -> Solid:
+    """Boards along all edges but the first of an outline (x, z), over the width y: a lid hollow from below."""
     cx, cz = (sum(p[k] for p in outline) / len(outline) for k in (0, 1))
-    low, width, height = outline[0][1], outline[1][0] - outline[0][0], max(p[1] for p in outline) - outline[0][1]
-    inner = [
-        (px - (px - cx) / width * 2 * board, max(low, cz + (pz - cz) * (1 - 2 * board / height))) for px, pz in outline
-    ]
-    inner[0], inner[1] = (inner[0][0], low), (inner[1][0], low)
-    boards = [prism(outline, board).turned("x", 90).at(0, s * y / 2 + (board if s > 0 else 0)) for s in (1, -1)]
-    count = len(outline)
-    for k in range(1, count):
-        n = (k + 1) % count
-        corners = [outline[k], outline[n], inner[n], inner[k]]
+    (left, low), (right, _) = outline[:2]
+    shrink_x, shrink_z = 1 - 2 * board / (right - left), 1 - 2 * board / (max(p[1] for p in outline) - low)
+    inner = [(cx + (px - cx) * shrink_x, low if pz == low else cz + (pz - cz) * shrink_z) for px, pz in outline]
+    boards = []
+    for k in range(1, len(outline)):
+        n = (k + 1) % len(outline)
+        corners = (outline[k], outline[n], inner[n], inner[k])
         boards.append(hull([(px, side * y / 2, pz) for px, pz in corners for side in (-1, 1)]))
     return join(boards)
 
