@@ -10,7 +10,8 @@ from idle_robot import add_idle_robot, free_place
 from made_dataset import SIZES, scene_name, write_dataset
 
 import ig2mj
-from ig2mj.scene.scene import SHIPPED_HOMES, Scene
+from ig2mj.scene.paths import SHIPPED_HOMES
+from ig2mj.scene.scene import Scene
 
 WORK = pathlib.Path(__file__).resolve().parents[1] / "out" / "benchmarks"
 """What is built for benchmarks and used again the next time; not under version control."""

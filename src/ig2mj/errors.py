@@ -45,12 +45,21 @@ class ManifestError(InputError):
 
 
 class UnknownNameError(Ig2mjError):
-    """A name (object, state, predicate, scene, ...) that does not exist; lists near matches."""
+    """A name (object, state, predicate, scene, ...) that does not exist; lists near matches, else what there is."""
+
+    FEW = 20
+    """So many names are listed where none is near."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str]):
         self.kind, self.name = kind, name
-        near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
-        hint = f"; near matches: {', '.join(near)}" if near else ""
+        names = [k for k in known if k]
+        near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)
+        if near:
+            hint = f"; near matches: {', '.join(near)}"
+        elif names and len(names) <= self.FEW:
+            hint = f" (there is {', '.join(names)})"
+        else:
+            hint = "" if names else " (there is none)"
         super().__init__(f"no {kind} is named '{name}'{hint}")
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import json
+import pathlib
 import resource
 import subprocess
 import sys
@@ -122,6 +123,17 @@ def test_typed_parameters_are_the_command_line(command, capsys):
     assert cli.call(["probe", "--number", "4", "--slow"]) == 2
 
 
+def test_help_tells_defaults_but_not_those_that_say_nothing(command, capsys):
+    def run(file: pathlib.Path | None = None, names: tuple[str, ...] = (), fast: bool = False, number: int = 7) -> None:
+        """Does it."""
+
+    command(run)
+    assert cli.call(["probe", "--help"]) == 0
+    out = capsys.readouterr().out
+    assert out.count("(default") == 1 and "(default: 7)" in out
+    assert "None" not in out and "--file PATH" in out
+
+
 def test_nested_commands_are_found_listed_and_corrected(command, capsys):
     def scene(name: str = "a") -> None:
         """Does a scene."""
@@ -152,7 +164,8 @@ def test_version_is_that_of_the_package(capsys):
 def test_help_lists_every_command(capsys):
     assert cli.call(["--help"]) == 0
     out = capsys.readouterr().out
-    assert all(f"  {name} " in out and text in out for name, text in cli.COMMANDS.items())
+    assert all(len(line) < 80 for line in out.splitlines())
+    assert all(f"  {name} " in out and text in " ".join(out.split()) for name, text in cli.COMMANDS.items())
 
 
 def test_no_arguments_give_the_help_and_status_2(capsys):

@@ -7,6 +7,7 @@ import json
 import pytest
 
 from ig2mj import cli
+from ig2mj.scene import paths
 from ig2mj.scene.manifest import load_manifest
 
 
@@ -72,8 +73,16 @@ def test_a_folder_without_a_manifest_is_status_2(tmp_path, capsys):
 
 
 def test_a_home_that_comes_with_ig2mj_goes_by_its_bare_name(tiny_home_folder, capsys, monkeypatch, tmp_path):
-    import ig2mj.scene.scene
-
-    monkeypatch.setattr(ig2mj.scene.scene, "SHIPPED_HOMES", tiny_home_folder.parent)
+    monkeypatch.setattr(paths, "SHIPPED_HOMES", tiny_home_folder.parent)
     monkeypatch.chdir(tmp_path)
     assert inspect_json(capsys, tiny_home_folder.name)["name"] == load_manifest(tiny_home_folder).name
+
+
+def test_a_home_that_does_not_exist_suggests_near_names(tiny_home_folder, capsys, monkeypatch, tmp_path):
+    monkeypatch.setattr(paths, "SHIPPED_HOMES", tiny_home_folder.parent)
+    monkeypatch.chdir(tmp_path)
+    assert cli.call(["inspect", tiny_home_folder.name + "y"]) == 2
+    error = capsys.readouterr().err
+    assert "there is no such scene" in error and f"near matches: {tiny_home_folder.name}" in error
+    assert cli.call(["inspect", "zzzzzz"]) == 2
+    assert f"or one of {tiny_home_folder.name}" in capsys.readouterr().err

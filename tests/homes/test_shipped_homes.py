@@ -16,8 +16,9 @@ from ig2mj_homes.shipped_homes import home_names
 
 from ig2mj.cli.homes import shipped_homes
 from ig2mj.scene.manifest import load_manifest
+from ig2mj.scene.paths import SHIPPED_HOMES
 from ig2mj.scene.rooms import load_rooms
-from ig2mj.scene.scene import SHIPPED_HOMES, Scene, load_scene
+from ig2mj.scene.scene import Scene, load_scene
 
 BUILDING = ("walls", "floors", "ceilings")
 FEW = ("small_home", "aspen", "birch")

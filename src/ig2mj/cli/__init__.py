@@ -36,6 +36,7 @@ import difflib
 import importlib
 import os
 import sys
+import textwrap
 from collections.abc import Callable, Mapping, Sequence
 from inspect import getdoc
 from typing import Any
@@ -129,9 +130,9 @@ def _dispatch(args: list[str]) -> int:
 
 
 def _run(function: Callable[..., Any], prog: str, args: list[str]) -> int:
-    import tyro
+    from ig2mj.cli.parsing import parse_and_call
 
-    return _exit_status(tyro.cli(function, prog=prog, args=args))
+    return _exit_status(parse_and_call(function, prog, args))
 
 
 def _exit_status(value: object) -> int:
@@ -152,11 +153,20 @@ def _help() -> str:
         "",
         "commands:",
     ]
-    lines += [f"  {name:<12} {text}" for name, text in COMMANDS.items()]
+    lines += [_entry(name, text) for name, text in COMMANDS.items()]
     lines += ["", "options:"]
-    lines += [f"  {'--debug':<12} show the traceback of an error", f"  {'--version':<12} print the version"]
-    lines += ["", "`ig2mj COMMAND --help` lists a command's options; `ig2mj doctor` tells what this machine can run."]
+    lines += [_entry("--debug", "show the traceback of an error"), _entry("--version", "print the version")]
+    lines += [
+        "",
+        "`ig2mj COMMAND --help` lists a command's options;",
+        "`ig2mj doctor` tells what this machine can run.",
+    ]
     return "\n".join(lines)
+
+
+def _entry(name: str, text: str) -> str:
+    """A line of help, folded to a terminal of 80 columns."""
+    return textwrap.fill(text, 79, initial_indent=f"  {name:<12} ", subsequent_indent=" " * 15)
 
 
 def _nested_help(name: str, doc: str | None, subcommands: Mapping[str, Callable[..., Any]]) -> str:
@@ -164,7 +174,7 @@ def _nested_help(name: str, doc: str | None, subcommands: Mapping[str, Callable[
     lines = [f"usage: ig2mj {name} COMMAND ...", "", *summary, "commands:"]
     for sub, function in subcommands.items():
         text = (getdoc(function) or "").split("\n", 1)[0]
-        lines.append(f"  {sub:<12} {text}")
+        lines.append(_entry(sub, text))
     return "\n".join([*lines, "", f"`ig2mj {name} COMMAND --help` lists a command's options."])
 
 

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-import json as json_module
 import pathlib
-import sys
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -185,27 +183,17 @@ def _progress(title: str) -> Iterator[Any]:
     """A progress bar on stderr; yields a function that makes options report to it."""
     import dataclasses
 
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+    from ig2mj.cli.printing import add_bar, progress_bar
 
-    columns = (
-        TextColumn("[bold]{task.description}"),
-        BarColumn(bar_width=24),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("{task.fields[text]}"),
-    )
-    with Progress(*columns, console=Console(file=sys.stderr), transient=True) as bar:
-        task = bar.add_task(title, total=None, text="")
-
-        def report(text: str, done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total, text=text)
-
+    with progress_bar() as bar:
+        report = add_bar(bar, title)
         yield lambda options: dataclasses.replace(options, progress=report)
 
 
 def _tell(outcome: Outcome, out: pathlib.Path, main_file: str, as_json: bool) -> int:
     """Prints what was done and where it lies; the exit status."""
+    from ig2mj.cli.printing import print_json
+
     failed = [check for check in outcome.checks if not check.passed]
     if as_json:
         told = {
@@ -217,7 +205,7 @@ def _tell(outcome: Outcome, out: pathlib.Path, main_file: str, as_json: bool) ->
             "cached": outcome.cached,
             "seconds": {stage: round(seconds, 3) for stage, seconds in outcome.timings.items()},
         }
-        print(json_module.dumps(told, indent=1))
+        print_json(told)
     else:
         seconds = sum(outcome.timings.values())
         from_cache = " (nothing has changed: taken from the cache)" if outcome.cached else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import pathlib
 import time
 from collections.abc import Callable
@@ -30,24 +31,17 @@ def run(
       jobs: processes.
     """
     from ig2mj_homes import small_home
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+    from ig2mj.cli.printing import add_bar, progress_bar, stdout_console
     from ig2mj.errors import Ig2mjError
 
     if jobs < 1:
         raise Ig2mjError(f"--jobs {jobs}: at least one process is needed")
     start = time.perf_counter()
-    console = Console()
-    columns = (TextColumn("[bold]{task.description}"), BarColumn(bar_width=24), MofNCompleteColumn(),
-               TimeElapsedColumn(), TextColumn("{task.fields[text]}"))  # fmt: skip
+    console = stdout_console()
     scene = out / small_home.NAME
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-
-        def step(title: str) -> Callable[[str, int, int | None], None]:
-            task = bar.add_task(title, total=None, text="")
-            return lambda text, done, total: bar.update(task, completed=done, total=total, text=text)
-
+    with progress_bar() as bar:
+        step = functools.partial(add_bar, bar)
         failed = _convert(console, step, small_home.NAME, out / "dataset", scene, jobs)
         _look(console, step, scene, out / "pictures")
         failed += _cook(console, step, scene, out / "cooking")
@@ -85,8 +79,7 @@ def _convert(console: Console, step: Step, name: str, dataset: pathlib.Path, sce
 
 def _look(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Path) -> None:
     """Runs the home for two seconds, tells what stands where, takes pictures."""
-    from rich.table import Table
-
+    from ig2mj.cli.printing import make_table
     from ig2mj.demos import first_home
 
     began = time.perf_counter()
@@ -98,12 +91,8 @@ def _look(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
     places = first_home.what_stands_where(world)
     step("taking pictures")("", 0, None)
     pictures = first_home.take_pictures(world, folder)
-    table = Table(title="what stands where", title_justify="left")
-    for heading in ("object", "is", "what", "room"):
-        table.add_column(heading)
-    for place in places:
-        table.add_row(place.object, place.relation, place.support, place.room)
-    console.print(table)
+    rows = [(place.object, place.relation, place.support, place.room) for place in places]
+    console.print(make_table("what stands where", ("object", "is", "what", "room"), rows))
     for file in pictures:
         console.print(f"[bold]picture[/]    {file}")
 

@@ -32,17 +32,18 @@ def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
 
 def _print_json(checks, ok: bool) -> None:
     import dataclasses
-    import json
     from importlib.metadata import version
 
-    report = {"ig2mj": version("ig2mj"), "ok": ok, "checks": [dataclasses.asdict(c) for c in checks]}
-    print(json.dumps(report, indent=1))
+    from ig2mj.cli.printing import print_json
+
+    print_json({"ig2mj": version("ig2mj"), "ok": ok, "checks": [dataclasses.asdict(c) for c in checks]})
 
 
 def _print_table(checks, ok: bool) -> None:
-    from rich.console import Console
     from rich.markup import escape
     from rich.table import Table
+
+    from ig2mj.cli.printing import stdout_console
 
     table = Table(box=None, pad_edge=False, show_header=False)
     table.add_column(no_wrap=True)
@@ -57,7 +58,7 @@ def _print_table(checks, ok: bool) -> None:
         table.add_row(mark, f"  {escape(check.name)}", escape(check.found))
         if check.mend:
             table.add_row("", "", f"[cyan]-> {escape(check.mend)}[/cyan]")
-    console = Console(highlight=False)
+    console = stdout_console()
     console.print(table)
     if ok:
         console.print("\nEverything that ig2mj needs is here. [yellow]--[/yellow] marks optional things.")

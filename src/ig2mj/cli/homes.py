@@ -11,6 +11,8 @@ import tyro
 if TYPE_CHECKING:
     from ig2mj_homes.catalogue import Entry
 
+Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
+
 
 def build(
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DATASET")],
@@ -18,7 +20,7 @@ def build(
     only: tuple[str, ...] = (),
     jobs: int | None = None,
     home: tuple[str, ...] = (),
-    json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    json: Flag = False,
 ) -> None:
     """Write a dataset root in iGibson's layout: VERSION, metadata, objects and scenes.
 
@@ -32,28 +34,25 @@ def build(
     """
     from ig2mj_homes.dataset import build_dataset
     from ig2mj_homes.shipped_homes import build_homes, categories_of, furnished
-    from rich.console import Console
-    from rich.progress import Progress
+
+    from ig2mj.cli.printing import add_bar, print_json, progress_bar
 
     if home and not only:
         only = tuple(sorted({c for name in home for c in categories_of(furnished(name, seed))}))
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("building household objects", total=None)
+    with progress_bar() as bar:
+        report = add_bar(bar, "building household objects")
         built = build_dataset(
             out,
             seed=seed,
             only=only or None,
             jobs=jobs,
-            progress=lambda done, total: bar.update(task, completed=done, total=total),
+            progress=lambda done, total: report("", done, total),
         )
         homes: dict[str, int] = {}
         if home or not only:
-            task = bar.add_task("furnishing homes", total=None)
-            homes = build_homes(
-                out, home or None, seed, lambda name, done, total: bar.update(task, completed=done, total=total)
-            )
+            homes = build_homes(out, home or None, seed, add_bar(bar, "furnishing homes"))
     if json:
-        _print_json({"dataset": str(out), "seed": seed, "categories": built, "homes": homes})
+        print_json({"dataset": str(out), "seed": seed, "categories": built, "homes": homes})
         return
     print(f"{out}: {sum(built.values())} models of {len(built)} categories, {len(homes)} homes")
     if homes:
@@ -76,30 +75,22 @@ def convert(
       home: just these homes.
       jobs: processes.
     """
-    import dataclasses
-
     from ig2mj_converters.convert_scene import convert_scene
     from ig2mj_converters.options import ConvertOptions
     from ig2mj_homes.ship import remove_unused, strip_report, total_bytes
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
-    scenes = dataset / "scenes"
-    names = list(home) or sorted(p.name for p in scenes.iterdir() if (p / "urdf").is_dir())
+    from ig2mj.cli.printing import add_bar, progress_bar
+
+    names = _scenes_of(dataset, home)
     failed: list[str] = []
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        whole = bar.add_task("homes", total=len(names))
-        for name in names:
-            part = bar.add_task(name, total=None)
-            options = ConvertOptions(jobs=jobs, assets="..")
-            options = dataclasses.replace(
-                options, progress=lambda _, done, total, part=part: bar.update(part, completed=done, total=total)
-            )
-            convert_scene(dataset, name, out / name, options=options)
+    with progress_bar() as bar:
+        whole = add_bar(bar, "homes")
+        for number, name in enumerate(names):
+            whole(name, number, len(names))
+            part = add_bar(bar, name)
+            convert_scene(dataset, name, out / name, options=ConvertOptions(jobs=jobs, assets="..", progress=part))
             failed += strip_report(out / name)
-            bar.remove_task(part)
-            bar.advance(whole)
+            bar.remove_task(bar.task_ids[-1])
     remove_unused(out)
     print(f"{out}: {len(names)} homes, {total_bytes(out) / 1e6:.1f} MB, {len(failed)} checks failed")
     for line in failed:
@@ -107,48 +98,68 @@ def convert(
     return 1 if failed else 0
 
 
+def _scenes_of(dataset: pathlib.Path, wanted: tuple[str, ...]) -> list[str]:
+    """Scenes of a dataset, all or the wanted ones. Raises InputError, UnknownNameError."""
+    from ig2mj.errors import InputError, UnknownNameError
+
+    found = sorted(folder.parent.name for folder in (dataset / "scenes").glob("*/urdf"))
+    if not found:
+        raise InputError(dataset, "holds no scenes/*/urdf", mend="give the folder that `ig2mj homes build` wrote")
+    for name in wanted:
+        if name not in found:
+            raise UnknownNameError(f"home of {dataset}", name, found)
+    return list(wanted) or found
+
+
 def list_(
+    objects: Flag = False,
     only: tuple[str, ...] = (),
-    json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    json: Flag = False,
 ) -> None:
-    """List the homes that ship with ig2mj, and the categories that can be built: synset, size, mass, models.
+    """List the homes that ship with ig2mj, or the categories of objects that can be built.
 
     Args:
-      only: just these categories, and no homes.
-      json: print the categories as JSON instead of tables.
+      objects: list the categories: synset, size, mass, number of models.
+      only: just these categories.
+      json: print JSON instead of a table.
     """
+    from ig2mj.cli.printing import make_table, print_json, stdout_console
+
+    kind, data = ("categories", _categories(only)) if objects or only else ("homes", shipped_homes())
+    if json:
+        print_json(data)
+        return
+    if kind == "homes":
+        title = f"{len(data)} homes, {sum(len(h['rooms']) for h in data)} rooms (ig2mj view HOME)"
+        columns = ("home", ">objects", ">loose", "rooms")
+        data.sort(key=lambda h: h["objects"])
+        rows = [(h["home"], h["objects"], h["loose"], ", ".join(h["rooms"])) for h in data]
+    else:
+        title = f"{sum(c['models'] for c in data)} models of {len(data)} categories"
+        columns = ("category", "?synset", ">size x y z (m)", ">kg", "fixed", ">models")
+        rows = [
+            (c["category"], c["synset"] or "-", " ".join(f"{v:g}" for v in c["size"]), f"{c['mass']:g}",
+             "yes" if c["fixed"] else "", c["models"])
+            for c in data
+        ]  # fmt: skip
+    console = stdout_console()
+    console.print(make_table(title, columns, rows, console.width))
+
+
+def _categories(only: tuple[str, ...]) -> list[dict[str, Any]]:
     from ig2mj.knowledge import synset
 
-    entries = _entries(only)
-    if not only and not json:
-        _print_homes()
-    if json:
-        _print_json(
-            [
-                {
-                    "category": e.category,
-                    "synset": synset(e.category),
-                    "size": e.size,
-                    "mass": e.mass,
-                    "fixed": e.fixed,
-                    "models": e.count,
-                }
-                for e in entries
-            ]
-        )
-        return
-    from rich.console import Console
-    from rich.table import Table
-
-    table = Table(title=f"{sum(e.count for e in entries)} models of {len(entries)} categories")
-    for name in ("category", "synset", "size x y z (m)", "mass (kg)", "fixed", "models"):
-        table.add_column(name, justify="left" if name in ("category", "synset") else "right")
-    for e in entries:
-        size = " ".join(f"{v:g}" for v in e.size)
-        table.add_row(
-            e.category, synset(e.category) or "-", size, f"{e.mass:g}", "yes" if e.fixed else "", str(e.count)
-        )
-    Console().print(table)
+    return [
+        {
+            "category": e.category,
+            "synset": synset(e.category),
+            "size": e.size,
+            "mass": e.mass,
+            "fixed": e.fixed,
+            "models": e.count,
+        }
+        for e in _entries(only)
+    ]
 
 
 def sheet(
@@ -156,8 +167,8 @@ def sheet(
     only: tuple[str, ...] = (),
     models: int = 1,
     seed: int = 0,
-    opened: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
-    collision: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    opened: Flag = False,
+    collision: Flag = False,
 ) -> None:
     """Draw a contact sheet of models; needs OpenGL (see `ig2mj doctor`).
 
@@ -172,8 +183,16 @@ def sheet(
     from ig2mj_homes.catalogue import build_model
     from ig2mj_homes.sheet import contact_sheet
 
-    chosen = [build_model(e, k, seed) for e in _entries(only) for k in range(min(models, e.count))]
-    out.parent.mkdir(parents=True, exist_ok=True)
+    from ig2mj.cli.files import check_picture
+    from ig2mj.errors import Ig2mjError
+    from ig2mj.viewer.offscreen import use_opengl
+
+    if models < 1:
+        raise Ig2mjError(f"--models {models}: at least one is needed")
+    entries = _entries(only)
+    check_picture(out)
+    use_opengl()
+    chosen = [build_model(e, k, seed) for e in entries for k in range(min(models, e.count))]
     contact_sheet(chosen, opened=opened, felt=collision).save(out)
     print(f"{out}: {len(chosen)} models")
 
@@ -181,7 +200,7 @@ def sheet(
 def pictures(
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")],
     home: tuple[str, ...] = (),
-    rooms: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    rooms: Flag = False,
 ) -> None:
     """Draw contact sheets of the homes: DIR/homes.jpg, all from above, and DIR/rooms_HOME.jpg, their rooms from inside.
 
@@ -206,42 +225,23 @@ def pictures(
 
 def shipped_homes() -> list[dict[str, Any]]:
     """Name, rooms and number of objects (parked ones and the building not counted) of every home in scenes_mjcf/."""
+    from ig2mj.scene import paths
     from ig2mj.scene.manifest import load_manifest
-    from ig2mj.scene.scene import MANIFEST_FILE, SHIPPED_HOMES
 
     homes = []
-    for file in sorted(SHIPPED_HOMES.glob(f"*/{MANIFEST_FILE}")):
-        manifest = load_manifest(file)
+    for name in paths.shipped_homes():
+        manifest = load_manifest(paths.SHIPPED_HOMES / name)
         objects = [o for o in manifest.objects if not o.parked and o.category not in ("walls", "floors", "ceilings")]
         rooms = list(manifest.rooms.instances)
         loose = sum(not o.fixed for o in objects)
-        homes.append({"home": file.parent.name, "rooms": rooms, "objects": len(objects), "loose": loose})
+        homes.append({"home": name, "rooms": rooms, "objects": len(objects), "loose": loose})
     return homes
-
-
-def _print_homes() -> None:
-    from rich.console import Console
-    from rich.table import Table
-
-    homes = shipped_homes()
-    table = Table(title=f"{len(homes)} homes, {sum(len(h['rooms']) for h in homes)} rooms (ig2mj view HOME)")
-    for name in ("home", "objects", "loose", "rooms"):
-        table.add_column(name, justify="right" if name in ("objects", "loose") else "left")
-    for h in sorted(homes, key=lambda h: h["objects"]):
-        table.add_row(h["home"], str(h["objects"]), str(h["loose"]), ", ".join(h["rooms"]))
-    Console().print(table)
 
 
 def _entries(only: tuple[str, ...]) -> list[Entry]:
     from ig2mj_homes.catalogue import catalogue, find
 
     return [find(name) for name in only] if only else list(catalogue().values())
-
-
-def _print_json(data: Any) -> None:
-    import json
-
-    print(json.dumps(data, indent=1))
 
 
 SUBCOMMANDS: dict[str, Callable[..., int | None]] = {

@@ -31,13 +31,9 @@ def run(
       json: print JSON instead of tables.
     """
     from ig2mj.scene.manifest import load_manifest
+    from ig2mj.scene.paths import scene_folder
 
-    if not scene.exists() and len(scene.parts) == 1:
-        from ig2mj.scene.scene import SHIPPED_HOMES
-
-        if (SHIPPED_HOMES / scene).is_dir():
-            scene = SHIPPED_HOMES / scene
-    manifest = load_manifest(scene.parent if scene.suffix == ".xml" else scene)
+    manifest = load_manifest(scene_folder(scene))
     objects = _select(manifest, room, category)
     if json:
         _print_json(manifest, objects, show)
@@ -62,6 +58,8 @@ def _select(manifest: Manifest, room: str | None, category: str | None) -> list[
 
 def _print_json(manifest: Manifest, objects: list[ObjectEntry], show: tuple[Kind, ...]) -> None:
     import msgspec
+
+    from ig2mj.cli.printing import print_json
 
     out: dict[str, Any] = {"name": manifest.name}
     if "rooms" in show:
@@ -88,11 +86,11 @@ def _print_json(manifest: Manifest, objects: list[ObjectEntry], show: tuple[Kind
             name: {o.name: o.abilities[name] for o in objects if name in o.abilities}
             for name in sorted({a for o in objects for a in o.abilities})
         }
-    print(msgspec.json.format(msgspec.json.encode(out), indent=1).decode())
+    print_json(out)
 
 
 def _print_tables(manifest: Manifest, objects: list[ObjectEntry], show: tuple[Kind, ...]) -> None:
-    from ig2mj.cli.tables import make_table, stdout_console
+    from ig2mj.cli.printing import make_table, stdout_console
 
     console = stdout_console()
     movable = sum(not o.fixed for o in objects)
@@ -108,7 +106,7 @@ def _print_tables(manifest: Manifest, objects: list[ObjectEntry], show: tuple[Ki
         columns, rows = makers[kind](manifest, objects)
         if rows:
             console.print()
-            console.print(make_table(kind, columns, rows))
+            console.print(make_table(kind, columns, rows, console.width))
 
 
 def _room_rows(manifest: Manifest, objects: list[ObjectEntry]):
@@ -131,7 +129,17 @@ def _object_rows(manifest: Manifest, objects: list[ObjectEntry]):
         )
         for o in objects
     ]
-    columns = ("object", "category", "model", "synset", "rooms", ">kg", "box (m)", ">joints", "abilities, [links]")
+    columns = (
+        "object",
+        "?category",
+        "?model",
+        "?synset",
+        "rooms",
+        ">kg",
+        "?box (m)",
+        "?>joints",
+        "abilities, [links]",
+    )
     return columns, rows
 
 

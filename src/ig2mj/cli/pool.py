@@ -28,24 +28,26 @@ def run(
       threads: 0: one per processor.
       hand: make it for the scene with a floating hand.
     """
-    from rich.console import Console
-    from rich.progress import Progress
-
     from ig2mj.agents.floating_hand import add_floating_hand
-    from ig2mj.errors import EngineError
+    from ig2mj.cli.files import check_folder_of
+    from ig2mj.cli.printing import add_bar, progress_bar
+    from ig2mj.errors import Ig2mjError
     from ig2mj.sampling.settled import make_pool
     from ig2mj.scene.scene import load_scene
     from ig2mj.states.model import StateModel
     from ig2mj.worlds.pool import save_pool
 
     if count < 1:
-        raise EngineError(f"--count {count}: a pool needs at least one row")
+        raise Ig2mjError(f"--count {count}: a pool needs at least one row")
     if not 0 <= share <= 1:
-        raise EngineError(f"--share {share}: a probability is between 0 and 1")
+        raise Ig2mjError(f"--share {share}: a probability is between 0 and 1")
+    if threads < 0:
+        raise Ig2mjError(f"--threads {threads}: 0 takes one per processor, else at least one is needed")
     loaded = load_scene(scene, [add_floating_hand] if hand else [])
     file = out or loaded.folder / "pool.npz"
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(f"settling {loaded.name}", total=count)
+    check_folder_of(file)
+    with progress_bar() as bar:
+        report = add_bar(bar, f"settling {loaded.name}")
         pool = make_pool(
             loaded,
             StateModel.of_manifest(loaded.tables, loaded.manifest),
@@ -53,7 +55,7 @@ def run(
             seed=seed,
             share=share,
             threads=threads or None,
-            progress=lambda done: bar.update(task, completed=done),
+            progress=lambda done: report("", done, count),
         )
     save_pool(pool, file, loaded.name, {"seed": seed, "share": share, "hand": hand})
     print(f"{file}: {pool.size} settled states of {loaded.name}")

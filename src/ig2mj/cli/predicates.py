@@ -17,7 +17,7 @@ BUILDING = ("walls", "floors", "ceilings")
 
 def run(
     scene: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="SCENE")],
-    expression: Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="EXPRESSION")] = None,
+    expression: Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="[EXPRESSION]")] = None,
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="STATE=OBJECT[=VALUE] ...")] = (),
     seconds: Annotated[float, tyro.conf.arg(metavar="S")] = 0.0,
     compat: Literal["paper", "igibson"] = "paper",
@@ -64,7 +64,7 @@ def _print_holding(world: Simulation, json: bool) -> None:
     if json:
         _print_json(world, {"holding": [[a.predicate, *a.arguments] for a in holding]})
         return
-    from ig2mj.cli.tables import make_table, stdout_console
+    from ig2mj.cli.printing import make_table, stdout_console
     from ig2mj.predicates import PREDICATES
 
     console = stdout_console()
@@ -76,14 +76,14 @@ def _print_holding(world: Simulation, json: bool) -> None:
     known = [
         [p.name, ", ".join(p.arguments), p.ability or "any object", ", ".join(p.reads)] for p in PREDICATES.values()
     ]
-    console.print(make_table("all predicates", ["name", "arguments", "for", "reads"], known))
+    console.print()
+    console.print(make_table("all predicates", ["name", "arguments", "for", "?reads"], known, console.width))
 
 
 def _print_json(world: Simulation, found: dict) -> None:
-    import msgspec
+    from ig2mj.cli.printing import print_json
 
-    out = {"name": world.scene.name, "time": round(world.time, 6), **found}
-    print(msgspec.json.format(msgspec.json.encode(out), indent=1).decode())
+    print_json({"name": world.scene.name, "time": round(world.time, 6), **found})
 
 
 def _holding(world: Simulation) -> list[Atom]:
@@ -103,6 +103,7 @@ def _candidates(world: Simulation) -> list[Atom]:
     """Predicates of one object that has the ability; of two that touch, or one of which is in the other's box."""
     import numpy as np
 
+    from ig2mj.geometry.boxes import point_in_box
     from ig2mj.predicates import PREDICATES, atom
 
     tables, view, names = world.scene.tables, world.view, world.scene.object_names
@@ -114,7 +115,7 @@ def _candidates(world: Simulation) -> list[Atom]:
     touching = np.asarray(view.touching)[0]
     asked += [atom("on_top", names[a], names[b]) for a, b in np.argwhere(touching) if not tables.object_fixed[a]]
     com = np.asarray(view.object_com)[0][:, None]
-    within = np.all((np.asarray(view.aabb_low)[0] <= com) & (com <= np.asarray(view.aabb_high)[0]), axis=-1)
+    within = np.asarray(point_in_box(com, np.asarray(view.aabb_low)[0], np.asarray(view.aabb_high)[0]))
     pairs = np.argwhere(within & ~np.eye(len(names), dtype=bool))
     building = np.isin(tables.object_categories, BUILDING)
     loose = ~tables.object_fixed

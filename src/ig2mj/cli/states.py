@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import pathlib
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import tyro
+
+if TYPE_CHECKING:
+    from ig2mj.simulation import Simulation
 
 #: States that every object has and that fill a table by themselves: shown where they are asked for.
 PHYSICAL = (
@@ -42,6 +46,7 @@ def run(
       compat: rules of the paper, or of iGibson's code where it differs.
       json: print JSON instead of a table.
     """
+    from ig2mj.cli.printing import print_json
     from ig2mj.cli.worlds import started
     from ig2mj.errors import UnknownNameError
     from ig2mj.states import registry
@@ -61,34 +66,38 @@ def run(
             if kind.belongs_to(world.state_model, world.scene.object_index(o)):
                 rows.setdefault(o, {})[name] = world.state(name, o)
     if json:
-        _print_json(world, rows)
+        print_json({"name": world.scene.name, "time": round(world.time, 6), "objects": rows})
     else:
         _print_table(world, names, rows)
 
 
-def _print_json(world: Any, rows: dict[str, dict[str, Any]]) -> None:
-    import msgspec
-
-    out = {"name": world.scene.name, "time": round(world.time, 6), "objects": rows}
-    print(msgspec.json.format(msgspec.json.encode(out), indent=1).decode())
-
-
-def _print_table(world: Any, names: list[str], rows: dict[str, dict[str, Any]]) -> None:
-    from ig2mj.cli.tables import make_table, stdout_console
+def _print_table(world: Simulation, names: list[str], rows: dict[str, dict[str, Any]]) -> None:
+    """One column for each state; where that does not fit, one line for each object that lists its states."""
+    from ig2mj.cli.printing import least_width, make_table, stdout_console
     from ig2mj.states.registry import STATES
 
     used = [n for n in names if any(n in r for r in rows.values())]
-    heads = [f"{n} [{STATES[n].unit}]" if STATES[n].unit else n for n in used]
+    columns = ["object", *(f"{n} [{STATES[n].unit}]" if STATES[n].unit else n for n in used)]
     body = [[o, *(_text(values[n]) if n in values else "" for n in used)] for o, values in rows.items()]
+    console = stdout_console()
+    if least_width(columns, body) > console.width:
+        columns = ["object", "states"]
+        body = [[o, ", ".join(_named(n, v, STATES[n].unit) for n, v in values.items())] for o, values in rows.items()]
     title = f"{world.scene.name}, {world.time:.2f} s: {len(rows)} objects"
-    stdout_console().print(make_table(title, ["object", *heads], body))
+    console.print(make_table(title, columns, body))
+
+
+def _named(name: str, value: Any, unit: str) -> str:
+    """E.g. "temperature 23 C"; units that are words are left to the wide table."""
+    text = _text(value)
+    return f"{name} {text} {unit}" if len(unit) == 1 and text != "-" else f"{name} {text}"
 
 
 def _text(value: Any) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, float):
-        return f"{value:.4g}"
+        return f"{value:.4g}" if math.isfinite(value) else "-"
     if isinstance(value, (list, tuple)):
         return "-" if not value else ", ".join(_text(v) for v in value)
     return str(value)

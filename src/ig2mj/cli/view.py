@@ -80,12 +80,9 @@ def _check(picture, camera, eye, target, size, seconds) -> None:
     if picture is None and (camera is not None or eye is not None):
         raise Ig2mjError("--camera, --from and --at are for --picture; in the window the mouse moves the camera")
     if picture is not None:
-        from PIL import Image
+        from ig2mj.cli.files import check_picture
 
-        if picture.suffix.lower() not in {*Image.registered_extensions(), *VIDEOS}:
-            raise Ig2mjError(f"{picture}: is no kind of picture that can be written (use .png or .jpg)")
-        if not picture.parent.is_dir():
-            raise Ig2mjError(f"{picture}: the folder {picture.parent} does not exist")
+        check_picture(picture, VIDEOS)
 
 
 def _view(home, data, camera: str | None, eye: Vec3 | None, target: Vec3 | None):

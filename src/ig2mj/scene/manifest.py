@@ -140,8 +140,10 @@ def load_manifest(path: str | os.PathLike) -> Manifest:
         file = file / "manifest.json"
     try:
         raw = file.read_bytes()
+    except FileNotFoundError as e:
+        raise ManifestError(file, "there is no such file", mend="give the folder that `ig2mj convert` wrote") from e
     except OSError as e:
-        raise ManifestError(file, f"cannot be read: {e.strerror or e}", mend="convert the scene again") from e
+        raise ManifestError(file, f"cannot be read: {e.strerror or e}") from e
     try:
         manifest = msgspec.json.decode(raw, type=Manifest)
     except msgspec.ValidationError as e:

@@ -13,13 +13,9 @@ import mujoco
 from ig2mj.errors import InputError, UnknownNameError
 from ig2mj.scene.build_tables import build_tables
 from ig2mj.scene.manifest import AgentEntry, Manifest, ObjectEntry, load_manifest
+from ig2mj.scene.paths import MANIFEST_FILE, model_file
 from ig2mj.scene.rooms import Rooms, load_rooms
 from ig2mj.scene.tables import SceneTables
-
-MODEL_FILES, MANIFEST_FILE = ("scene.xml", "object.xml"), "manifest.json"
-
-SHIPPED_HOMES = pathlib.Path(__file__).resolve().parents[3] / "scenes_mjcf"
-"""Homes that come with a checkout of the project; `load_scene` finds them by their bare names."""
 
 AddAgent = Callable[[mujoco.MjSpec], AgentEntry]
 """Adds an agent's bodies to a scene that is not compiled yet, and says what it added (see `ig2mj.agents`)."""
@@ -66,7 +62,7 @@ class Scene:
 
     def spec(self) -> mujoco.MjSpec:
         """The scene with its agents, read again, to be changed and compiled; ids are those of `model`."""
-        spec = read_spec(_model_file(self.folder))
+        spec = read_spec(model_file(self.folder))
         for add in self.agents:
             add(spec)
         return spec
@@ -86,7 +82,7 @@ def load_scene(path: str | os.PathLike, agents: Sequence[AddAgent] = ()) -> Scen
       InputError: a file is missing or is no valid MJCF.
       ManifestError: the manifest is broken, or does not belong to the scene.xml.
     """
-    file = _model_file(pathlib.Path(path))
+    file = model_file(path)
     folder = file.parent
     manifest = load_manifest(folder / MANIFEST_FILE)
     if agents:
@@ -118,24 +114,3 @@ def _compile(spec: mujoco.MjSpec | None, file: pathlib.Path) -> mujoco.MjModel:
 
 def _not_mjcf(file: pathlib.Path, e: Exception) -> InputError:
     return InputError(file, f"MuJoCo cannot load it: {e}", mend="convert the scene again")
-
-
-def _model_file(path: pathlib.Path) -> pathlib.Path:
-    """The MJCF file that `path` means: itself, the one in that folder, or the one of the shipped home of that name."""
-    mend = "give the folder that `ig2mj convert` wrote"
-    if not path.exists() and len(path.parts) == 1 and (SHIPPED_HOMES / path).is_dir():
-        path = SHIPPED_HOMES / path
-    if path.is_dir():
-        folder = path
-    elif path.is_file():
-        folder = path.parent
-        if path.name in MODEL_FILES:
-            return path
-    else:
-        shipped = sorted(p.parent.name for p in SHIPPED_HOMES.glob(f"*/{MANIFEST_FILE}"))
-        homes = f", or one of {', '.join(shipped)}" if shipped and len(path.parts) == 1 else ""
-        raise InputError(path, "there is no such scene", mend=mend + homes)
-    for name in MODEL_FILES:
-        if (folder / name).is_file():
-            return folder / name
-    raise InputError(folder, f"holds no {MODEL_FILES[0]}", mend=mend)

@@ -116,6 +116,19 @@ def default_backend() -> str:
     raise MissingDependencyError(f"no way to draw pictures works here; for OpenGL without a display: {INSTALL_HINT}")
 
 
+def use_opengl() -> str:
+    """Makes every `mujoco.Renderer` of this process draw with OpenGL that works without a display; says with which.
+
+    Raises:
+      MissingDependencyError: none works here.
+    """
+    name = next((b for b in ("egl", "osmesa") if b == _loaded_gl or (_loaded_gl is None and probe(b) is None)), None)
+    if name is None:
+        raise MissingDependencyError(f"no OpenGL without a display works here; try: {INSTALL_HINT}")
+    _use_gl(name)
+    return name
+
+
 def available_backends() -> dict[str, str | None]:
     """Tries every backend in a process of its own. Value None: it drew; else one line that says what went wrong."""
     return {name: probe(name) for name in BACKENDS}

@@ -1,0 +1,25 @@
+"""Checks of the files that a command is to write, before it works for minutes."""
+
+from __future__ import annotations
+
+import pathlib
+from collections.abc import Iterable
+
+from ig2mj.errors import InputError
+
+
+def check_folder_of(file: pathlib.Path) -> None:
+    """The folder must be there. Raises InputError."""
+    if not file.parent.is_dir():
+        raise InputError(file, f"the folder {file.parent} does not exist", mend="make it, or choose another place")
+
+
+def check_picture(file: pathlib.Path, others: Iterable[str] = ()) -> None:
+    """The ending must be one that Pillow writes, or of `others`, and the folder must be there. Raises InputError."""
+    from PIL import Image
+
+    Image.init()
+    endings = {ending for ending, form in Image.registered_extensions().items() if form in Image.SAVE}
+    if file.suffix.lower() not in {*endings, *others}:
+        raise InputError(file, "is no kind of picture that can be written", mend="use .png or .jpg")
+    check_folder_of(file)

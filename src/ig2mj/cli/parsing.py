@@ -1,0 +1,33 @@
+"""A function's typed parameters as a command line, by tyro."""
+
+from __future__ import annotations
+
+import inspect
+import typing
+from collections.abc import Callable, Sequence
+from typing import Annotated, Any
+
+import tyro
+
+
+def parse_and_call(function: Callable[..., Any], prog: str, args: Sequence[str]) -> Any:
+    """Calls the function with what the command line says, and returns its answer. Raises SystemExit, as tyro does."""
+    return tyro.cli(_with_quiet_defaults(function), prog=prog, args=args, config=(tyro.conf.DisallowNone,))
+
+
+def _with_quiet_defaults(function: Callable[..., Any]) -> Callable[..., Any]:
+    """The same function, but its help says no "(default: None)", "(default: )" or "(default: False)".
+
+    A plain wrapper would not do: tyro looks through `functools.wraps`.
+    """
+    hints = typing.get_type_hints(function, include_extras=True)
+    signature = inspect.signature(function)
+    for name, parameter in signature.parameters.items():
+        if name in hints and (parameter.default in (None, ()) or parameter.default is False):
+            hints[name] = Annotated[hints[name], tyro.conf.arg(help_behavior_hint="")]
+
+    call = lambda *args, **given: function(*args, **given)  # noqa: E731  a def gets wrapped where types are checked
+    call.__name__, call.__doc__, call.__annotations__ = function.__name__, function.__doc__, hints
+    parameters = [p.replace(annotation=hints.get(n, p.annotation)) for n, p in signature.parameters.items()]
+    call.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    return call

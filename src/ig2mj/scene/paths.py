@@ -1,0 +1,58 @@
+"""Which folder and which file a scene's name means: a path, or the bare name of a home that ships with the project."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import pathlib
+
+from ig2mj.errors import InputError
+
+MODEL_FILES, MANIFEST_FILE = ("scene.xml", "object.xml"), "manifest.json"
+
+SHIPPED_HOMES = pathlib.Path(__file__).resolve().parents[3] / "scenes_mjcf"
+"""Homes that come with a checkout of the project; `load_scene` finds them by their bare names."""
+
+_MEND = "give the folder that `ig2mj convert` wrote"
+
+
+def shipped_homes() -> list[str]:
+    """Names of the homes in `SHIPPED_HOMES`, sorted."""
+    return sorted(file.parent.name for file in SHIPPED_HOMES.glob(f"*/{MANIFEST_FILE}"))
+
+
+def scene_folder(path: str | os.PathLike) -> pathlib.Path:
+    """The folder of a converted scene: the path itself, or where that file lies, or the shipped home of that name.
+
+    Raises:
+      InputError: there is no such path; near names of homes are told.
+    """
+    path = pathlib.Path(path)
+    if path.is_dir():
+        return path
+    if path.is_file():
+        return path.parent
+    bare = len(path.parts) == 1
+    if bare and (SHIPPED_HOMES / path).is_dir():
+        return SHIPPED_HOMES / path
+    mend = _MEND
+    if bare and (homes := shipped_homes()):
+        near = difflib.get_close_matches(path.name, homes, n=3, cutoff=0.5)
+        mend += (
+            f", or a home that `ig2mj homes list` names; near matches: {', '.join(near)}"
+            if near
+            else (f", or one of {', '.join(homes)}")
+        )
+    raise InputError(path, "there is no such scene", mend=mend)
+
+
+def model_file(path: str | os.PathLike) -> pathlib.Path:
+    """The MJCF file of a scene: `path` itself, or the one in `scene_folder(path)`. Raises InputError."""
+    path = pathlib.Path(path)
+    if path.is_file() and path.name in MODEL_FILES:
+        return path
+    folder = scene_folder(path)
+    for name in MODEL_FILES:
+        if (folder / name).is_file():
+            return folder / name
+    raise InputError(folder, f"holds no {MODEL_FILES[0]}", mend=_MEND)
