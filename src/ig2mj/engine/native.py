@@ -31,6 +31,7 @@ from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.native_world import FIELDS, Changed, Statics, World
 from ig2mj.engine.native_write import apply_write
 from ig2mj.engine.snapshot_check import check_snapshot
+from ig2mj.engine.vicinity import Masks, VicinityTable
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
 from ig2mj.scene.scene import Scene
@@ -118,11 +119,13 @@ class NativeEngine:
             body_tree=np.asarray(model.body_treeid, int),
             contact_unit=np.where(self.layout.collides, self.layout.geom_unit, -1),
             unit_starts=unit_starts,
+            vicinity=VicinityTable.build(model, self.layout.equality_tree),
             force_links=bool((self.tables.link_geom >= 0).any()),
             pyramidal=model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL,
             tolerance=touch_tolerance,
             substeps=substeps,
         )
+        self._masks = [Masks(self._statics.vicinity, model) for model in self._models]
         self._shares = np.array_split(np.arange(num_worlds), self.threads)
         self._pool = ThreadPoolExecutor(self.threads, "ig2mj-native") if self.threads > 1 else None
 
@@ -130,7 +133,7 @@ class NativeEngine:
         """New worlds at the scene's initial state: its first keyframe, else the zero pose; everything awake."""
         arrays = _working_arrays(self.num_worlds, self.tables)
         worlds = [
-            World(self._statics, self._models[share], {n: a[w] for n, a in arrays.items()}, int(w))
+            World(self._statics, self._models[share], self._masks[share], {n: a[w] for n, a in arrays.items()}, int(w))
             for share, numbers in enumerate(self._shares)
             for w in numbers
         ]
@@ -211,6 +214,7 @@ class NativeEngine:
     def to_mujoco(self, physics: NativePhysics, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """The live model and data of a world. Do not step them."""
         one = physics.worlds[world]
+        one.masks.open()
         one.model.eq_data[:] = one.eq_data
         return one.model, one.data
 

@@ -11,6 +11,7 @@ from ig2mj.engine.boxes import BoxPlan, BoxTable, plan_boxes, world_boxes
 from ig2mj.engine.contacts import add_link_forces, touching_units
 from ig2mj.engine.layout import ModelLayout
 from ig2mj.engine.sleep import restore_sleep, wake_trees
+from ig2mj.engine.vicinity import Masks, Vicinity, VicinityTable
 from ig2mj.errors import EngineError
 from ig2mj.scene.tables import SceneTables
 
@@ -71,6 +72,7 @@ class Statics:
     body_tree: np.ndarray
     contact_unit: np.ndarray
     unit_starts: np.ndarray
+    vicinity: VicinityTable
     force_links: bool
     pyramidal: bool
     tolerance: float
@@ -100,9 +102,10 @@ class World:
       eq_data: [E, 11] this world's equality parameters; its engine puts them into the model before it steps.
     """
 
-    def __init__(self, statics: Statics, model: mujoco.MjModel, rows: dict[str, np.ndarray], number: int):
-        self.statics, self.model, self.rows, self.number = statics, model, rows, number
+    def __init__(self, statics: Statics, model: mujoco.MjModel, masks: Masks, rows: dict[str, np.ndarray], number: int):
+        self.statics, self.model, self.masks, self.rows, self.number = statics, model, masks, rows, number
         self.data = mujoco.MjData(model)
+        self._near = Vicinity(statics.vicinity, model, self.data)
         self.units = np.zeros((statics.layout.num_units, statics.layout.num_units), bool)
         self.eq_data = np.array(model.eq_data)
         self._plans: dict[bytes, _Plan] = {}
@@ -124,19 +127,30 @@ class World:
                 data.time += model.opt.timestep
             return self._refresh_grasped()
         changed = self.clear_force()
+        self._near.begin()
+        self._let_near()
         mujoco.mj_step2(model, data)
-        if statics.force_links and data.ntree_awake:
-            found = self._collect_force()
-            for _ in range(statics.substeps - 1):
-                mujoco.mj_step(model, data)
-                found |= self._collect_force()
-            if found:
-                self._has_force = True
-                changed |= Changed.FORCE
-        elif statics.substeps > 1:
-            mujoco.mj_step(model, data, nstep=statics.substeps - 1)
+        found = statics.force_links and self._collect_force()
+        for _ in range(statics.substeps - 1):
+            self._near.moved()
+            self._let_near()
+            mujoco.mj_step(model, data)
+            found |= statics.force_links and self._collect_force()
+        self._near.moved()
+        self._let_near()
         mujoco.mj_step1(model, data)
+        if found:
+            self._has_force = True
+            changed |= Changed.FORCE
         return changed | self.refresh()
+
+    def _let_near(self) -> None:
+        self.masks.put(self._near.contype, self._near.conaffinity)
+
+    def disturbed(self) -> None:
+        """To be called before `mj_step1` where the data was changed by another way than a step."""
+        self._near.forget()
+        self._let_near()
 
     def _is_left_alone(self) -> bool:
         """Whether nothing reaches in from outside that could wake a sleeping tree (MuJoCo looks at just these).
@@ -167,6 +181,7 @@ class World:
 
     def start(self) -> int:
         """The scene's initial state: its first keyframe, else the zero pose."""
+        self.disturbed()
         model, data = self.model, self.data
         if model.nkey:
             mujoco.mj_resetDataKeyframe(model, data, 0)
@@ -190,6 +205,7 @@ class World:
 
     def load(self, fields: dict[str, np.ndarray]) -> int:
         """Takes the fields of a snapshot, and refreshes everything."""
+        self.disturbed()
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
         self.eq_data = np.array(fields["eq_data"], np.float64)

@@ -45,6 +45,7 @@ def apply_write(world: World, rows: dict[str, np.ndarray]) -> int:
         trees[free[free >= 0]] = True
     if rows and not trees.any():
         return Changed.NOTHING
+    world.disturbed()
     wake_trees(model, data, np.flatnonzero(trees))
     mujoco.mj_step1(model, data)
     return world.clear_force() | world.refresh()
