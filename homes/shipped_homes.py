@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from ig2mj.errors import UnknownNameError
 
 from . import small_home
+from .clearances import blocked
 from .floor_plans.shipped import DRAWINGS, plan
 from .furnish.home import furnish_home
 from .furnish.kit import HomeInProgress
@@ -50,6 +51,8 @@ def build_homes(
         if progress:
             progress(name, done, len(chosen))
         home = furnished(name, seed)
+        jams = blocked(home.plan, home.things.things.values())
+        assert not jams, f"{name}: no room to open: {jams}"
         write_scene(root, home.plan, home.things, seed)
         counts[name] = len(home.things.things)
     return counts

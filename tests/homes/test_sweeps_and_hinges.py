@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from ig2mj_homes.arrangement import Arrangement
 from ig2mj_homes.catalogue import build_model, catalogue, find
+from ig2mj_homes.clearances import blocked
 from ig2mj_homes.hinges import GRAVITY, friction, gravity_torque
 from ig2mj_homes.materials import plain
 from ig2mj_homes.model import HouseholdObject, ObjectBuilder
 from ig2mj_homes.opening import STRENGTH
+from ig2mj_homes.shipped_homes import build_homes, furnished
 from ig2mj_homes.solids import block
 from ig2mj_homes.sweeps import BULGE, self_clashes, sweep, turn
 from ig2mj_homes.things import Thing, shape
@@ -78,6 +80,23 @@ def test_a_door_is_kept_from_a_wall_that_its_corner_would_meet():
         at = -side * (edge + gap)
         wall = np.sort(np.array([[0.2, at, 0], [3.0, at - side * 0.1, 2]]), axis=0)
         assert Arrangement(wall[None]).fits(lying) == fits, gap
+
+
+def test_a_home_with_a_door_that_cannot_open_is_not_written(monkeypatch, tmp_path):
+    """The fridge is moved until its open door meets the wall beside it; then what it would meet is named."""
+    home = furnished("small_home")
+    assert blocked(home.plan, home.things.things.values()) == []
+    fridge = next(thing for thing in home.things.things.values() if thing.category == "fridge")
+    walls = home.plan.inside(home.plan.room("kitchen_0"))
+    (low, high), hinge = fridge.box(), shape("fridge", fridge.index).model.joints[0].origin[1]
+    left = fridge.rotation[0, 1] * hinge < 0  # the hinge's side, seen along x
+    fridge.position[0] += (walls[0] + 0.001 - low[0]) if left else (walls[2] - 0.001 - high[0])
+    jams = blocked(home.plan, [fridge])
+    assert jams == [(fridge.name, "walls")]
+    monkeypatch.setattr("ig2mj_homes.shipped_homes.furnished", lambda name, seed: home)
+    with pytest.raises(AssertionError, match="fridge_0"):
+        build_homes(tmp_path, ["small_home"])
+    assert not (tmp_path / "scenes").exists()
 
 
 @pytest.mark.slow
