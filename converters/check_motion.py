@@ -10,8 +10,9 @@ import numpy as np
 
 from ig2mj.scene.manifest import Manifest
 
-from .checks import CheckResult, awake_copy, deep_pairs, start_data
+from .check_still import awake_copy, deep_pairs, start_data
 from .model_index import ModelIndex
+from .outcome import CheckResult
 
 SETTLE_TIME = 1.0
 """Seconds."""

@@ -110,10 +110,11 @@ def _build(
     if dataset is not None and not own_masses and source.metadata.bbox_size is not None:
         density = dataset.density(source.category)
     hulls = options.hull_options()
-    if bounding_box is None:
+
+    def built(scale: np.ndarray) -> BuiltModel:
         return build_model(
             source,
-            np.ones(3),
+            scale,
             density,
             hulls,
             options.bullet_inertia,
@@ -121,6 +122,9 @@ def _build(
             jobs=options.jobs,
             progress=options.progress,
         )
+
+    if bounding_box is None:
+        return built(np.ones(3))
     wanted = np.asarray(bounding_box, dtype=float)
     if not np.all(np.isfinite(wanted)) or np.any(wanted <= 0):
         raise InputError(
@@ -128,30 +132,11 @@ def _build(
         )
     size = source.metadata.bbox_size
     if size is None:
-        unscaled = build_model(
-            source,
-            np.ones(3),
-            density,
-            hulls,
-            options.bullet_inertia,
-            igibson_visuals=False,
-            jobs=options.jobs,
-            progress=options.progress,
-        )
-        low, high = extent(unscaled.assembly, np.eye(4))
+        low, high = extent(built(np.ones(3)).assembly, np.eye(4))
         size = high - low
     if np.any(np.asarray(size) <= 0):
         raise InputError(source.file, "is flat: it cannot be scaled to a bounding box", element="--bbox")
-    return build_model(
-        source,
-        wanted / size,
-        density,
-        hulls,
-        options.bullet_inertia,
-        igibson_visuals=False,
-        jobs=options.jobs,
-        progress=options.progress,
-    )
+    return built(wanted / size)
 
 
 def _write(

@@ -14,9 +14,9 @@ import numpy as np
 
 from ig2mj.scene.manifest import Manifest, ObjectEntry
 
-from .checks import CheckResult
 from .description import RoomMaps
 from .model_index import ModelIndex, index_model
+from .outcome import CheckResult
 from .pieces import LinkHulls
 from .report_pictures import Pictures
 

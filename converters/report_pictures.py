@@ -14,7 +14,7 @@ from PIL import Image
 
 from ig2mj.scene.manifest import Manifest, ObjectEntry
 
-from .checks import start_data
+from .check_still import start_data
 from .description import RoomMaps
 from .drawing import draw
 from .model_index import ModelIndex, geom_box

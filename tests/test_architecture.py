@@ -5,8 +5,10 @@ from __future__ import annotations
 import ast
 import fnmatch
 import pathlib
+import re
 import tomllib
 
+import networkx
 import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
@@ -55,10 +57,10 @@ GUESTS = {
 GUEST_NAMES = {"ig2mj_converters", "ig2mj_homes"}
 
 
-def imports_of(file: pathlib.Path) -> list[tuple[int, str]]:
-    """(line, absolute module name) of every import that runs, also those inside functions.
+def imports_of(file: pathlib.Path, typing_too: bool = False) -> list[tuple[int, str]]:
+    """(line, absolute module name) of every import that runs, also those inside functions and by `import_module`.
 
-    What stands under `if TYPE_CHECKING` never runs and does not count. `from a import b` gives "a.b".
+    What stands under `if TYPE_CHECKING` never runs and counts only with `typing_too`. `from a import b` gives "a.b".
     """
     tree = ast.parse(file.read_text(encoding="utf-8"), str(file))
     typing_only = {
@@ -71,15 +73,21 @@ def imports_of(file: pathlib.Path) -> list[tuple[int, str]]:
     package = module_name(file).split(".") if file.name == "__init__.py" else module_name(file).split(".")[:-1]
     found = []
     for node in ast.walk(tree):
-        if id(node) in typing_only:
+        if id(node) in typing_only and not typing_too:
             continue
         if isinstance(node, ast.Import):
             found += [(node.lineno, alias.name) for alias in node.names]
+        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module"):
+            found += [(node.lineno, arg.value) for arg in node.args if isinstance(arg, ast.Constant)]
         elif isinstance(node, ast.ImportFrom):
             base = package[: len(package) - node.level + 1] if node.level else []
             module = ".".join([*base, *([node.module] if node.module else [])])
             found += [(node.lineno, f"{module}.{alias.name}") for alias in node.names]
     return found
+
+
+def modules() -> dict[str, pathlib.Path]:
+    return {module_name(f): f for f in sources(SRC, ROOT / "converters", ROOT / "homes")}
 
 
 def module_name(file: pathlib.Path) -> str:
@@ -103,13 +111,24 @@ def test_every_room_of_the_package_has_its_place_in_the_order():
     assert rooms <= set(LAYERS), f"give {sorted(rooms - set(LAYERS))} a place in LAYERS and in docs/architecture.md"
 
 
+def test_the_order_is_that_of_the_document():
+    """docs/architecture.md lists the rooms that there are, in the order of LAYERS."""
+    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1] for line in text.splitlines() if line.startswith("| `")]
+    told = [name for row in rows for name in re.findall(r"`(\w+)`", row) if name in LAYERS]
+    there = {room_of(f) for f in sources(SRC)} - {"__init__", "__main__"}
+    assert there <= set(told)
+    assert told == sorted(told, key=LAYERS.index)
+
+
 def test_imports_run_downwards_only():
+    """Also those that only type checkers see: who knows a type knows the room."""
     wrong = []
     for file in sources(SRC):
         room = room_of(file)
         if room == "__init__":
             continue
-        for line, name in imports_of(file):
+        for line, name in imports_of(file, typing_too=True):
             parts = name.split(".")
             if parts[0] == "ig2mj" and len(parts) > 1 and parts[1] in LAYERS:
                 if LAYERS.index(parts[1]) > LAYERS.index(room):
@@ -117,6 +136,19 @@ def test_imports_run_downwards_only():
             elif parts[0] == "ig2mj" and room not in ("cli", "demos", "__main__"):
                 wrong.append(f"{file.relative_to(ROOT)}:{line}: imports {name} from the public surface")
     assert not wrong, "\n".join(wrong)
+
+
+def test_no_module_imports_itself_by_way_of_others():
+    graph = networkx.DiGraph()
+    names = {name: file for name, file in modules().items() if not name.startswith("ig2mj_homes")}
+    for name, file in names.items():
+        for _, wanted in imports_of(file):
+            found = wanted if wanted in names else wanted.rpartition(".")[0]
+            if found in names and found != name:
+                graph.add_edge(name, found)
+    assert graph.number_of_edges() > 500
+    circles = [sorted(circle) for circle in networkx.strongly_connected_components(graph) if len(circle) > 1]
+    assert not circles
 
 
 def test_only_the_command_line_imports_converters_and_homes():

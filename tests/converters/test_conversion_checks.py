@@ -3,7 +3,8 @@
 import mujoco
 import numpy as np
 import pytest
-from ig2mj_converters.checks import CheckResult, run_checks
+from ig2mj_converters.checks import run_checks
+from ig2mj_converters.outcome import CheckResult
 
 from ig2mj.scene.manifest import JointEntry, LinkEntry, Manifest, ObjectEntry
 
@@ -154,7 +155,8 @@ def test_a_door_whose_far_corner_swings_into_the_wall_beside_it_is_noted(air: fl
       <geom name="cabinet/collision_0" type="box" size=".3 .3 .4" pos="-.4 0 0" mass="8" {GEOM}/>
       <body name="cabinet_door" pos=".055 .35 0"><joint name="cabinet_hinge" axis="0 0 1" range="0 1.9" limited="true"/>
         <geom name="cabinet_door/collision_0" type="box" size=".0275 .35 .4" pos="-.0275 -.35 0" {GEOM}/></body></body>
-      <body name="wall" pos="0 {-0.45 - air} .5"><geom name="wall/collision_0" type="box" size="1 .1 .5" {GEOM}/></body>"""
+      <body name="wall" pos="0 {-0.45 - air} .5">
+        <geom name="wall/collision_0" type="box" size="1 .1 .5" {GEOM}/></body>"""
     joint = JointEntry("cabinet_hinge", "hinge", (0.0, 1.9))
     given = [entry("cabinet", (0.8, 0.7, 0.8), 10.0, True, joints=[joint]), entry("wall", (2, 0.2, 1), fixed=True)]
     note = check([body], given, '<exclude body1="cabinet" body2="cabinet_door"/>')["joint_clearance"]
