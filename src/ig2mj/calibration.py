@@ -1,22 +1,28 @@
-"""Measuring how large the Warp engine's buffers must be for a scene: it is disturbed, and the peaks are kept.
+"""Measuring how large the Warp engine's buffers must be for a scene: it is disturbed, and what it asks for is counted.
 
-Where there is a GPU, the Warp engine itself is measured, in many worlds. Else C MuJoCo is: it lists about as many
-contacts and constraint rows (four contacts per face against face, where Warp keeps up to as many), so the safety factor
-is larger.
+C MuJoCo is measured first, in a few worlds: it tells the pairs of the broad phase, which Warp does not, and gives the
+sizes to begin with. Where there is a GPU, the Warp engine itself is measured then, in many worlds, and again with
+larger buffers where some overflow. Without one, C MuJoCo is all there is: it lists about as many contacts and
+constraint rows (four contacts per face against face, where Warp keeps up to as many), so a factor is put on top.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
+import msgspec
 import mujoco
 import numpy as np
 
 from ig2mj.agents.pushing import Pusher, push, start_pushing
 from ig2mj.agents.reach import Reach
+from ig2mj.engine.base import Snapshot
+from ig2mj.engine.buffer_sizes import QUANTITIES, Measurement, Tail, profile_of
+from ig2mj.engine.candidate_pairs import CandidatePairs
+from ig2mj.engine.health import CAPACITY, SETTING
+from ig2mj.engine.mjx_contacts import warp_contacts
 from ig2mj.engine.native import NativeEngine
 from ig2mj.engine.profile import EngineProfile, default_profile
 from ig2mj.engine.settle import settle
@@ -26,8 +32,13 @@ from ig2mj.sampling.perturbation import loose_objects, perturb
 from ig2mj.scene.scene import Scene
 from ig2mj.worlds.random_streams import episode_keys
 
-SAFETY = {"warp": 1.5, "native": 2.0}
-"""Factor on the measured peaks."""
+SAFETY = {"warp": 1.0, "native": 1.4}
+"""Factor on all sizes, by what was measured (see `ig2mj.engine.buffer_sizes` for what is reckoned with anyway)."""
+
+WORLDS = {"warp": 1024, "native": 16}
+
+FIRST_GUESS, WIDEN, TRIES = 1.5, 2.0, 4
+"""Factors on the sizes from C MuJoCo, to measure Warp with; on a buffer that overflows; how often that may happen."""
 
 SHARE, AT_LEAST = 0.08, 3
 """Share of the loose objects that are dropped at the start of a round, on average: a few at once. In small scenes as
@@ -36,8 +47,8 @@ many as this, on average."""
 ROUND = 60
 """Control steps of a round; then every world starts afresh."""
 
-ALIGN = 4
-"""Sizes are rounded up to a multiple of this."""
+BINS = 1 << 14
+"""Counts of constraint rows and of contacts are kept up to this; more is counted as this much."""
 
 Progress = Callable[[int, int], None]
 
@@ -59,31 +70,44 @@ def calibrate(
       scene: with or without an agent.
       reach: of the floating hand that is its only agent; it pushes objects about. None: things are only dropped.
       engine: "warp" or "native"; "": warp where JAX has a GPU.
-      num_worlds: measured side by side; 0: 1,024 on warp, 8 on native.
+      num_worlds: measured side by side; 0: `WORLDS`.
       rounds: of two simulated seconds each.
       seed: of the disturbance.
-      safety: factor on the peaks; 0: `SAFETY`.
+      safety: factor on the sizes; 0: `SAFETY`.
       progress: called with rounds done and in all.
 
     Raises:
-      EngineError: no such engine, or the measurement itself overflowed.
+      EngineError: no such engine, or the measurement itself overflowed time and again.
     """
     engine = engine or ("warp" if jax.default_backend() == "gpu" else "native")
     if engine not in SAFETY:
         raise EngineError(f"there is no engine '{engine}' to calibrate with (engines: {', '.join(SAFETY)})")
-    worlds = num_worlds or {"warp": 1024, "native": 8}[engine]
-    measure = _measure_warp if engine == "warp" else _measure_native
-    peaks = measure(scene, reach, worlds, rounds, seed, progress)
+    worlds = num_worlds or WORLDS[engine]
+    start = settle(scene)
+    first = engine == "warp"
+    native_rounds = 1 if first else rounds
+    measured = _measure_native(
+        scene,
+        reach,
+        start,
+        min(worlds, WORLDS["native"]) if first else worlds,
+        native_rounds,
+        seed,
+        lambda done, _: progress(done, native_rounds + (rounds if first else 0)),
+    )
+    if first:
+        on_warp = _measure_warp(
+            scene, reach, start, measured, worlds, rounds, seed, lambda d, n: progress(d + 1, n + 1)
+        )
+        measured = Measurement(
+            tails={**measured.tails, **on_warp.tails},
+            means={n: max(measured.means[n], on_warp.means.get(n, 0.0)) for n in measured.means},
+        )
     factor = safety or SAFETY[engine]
-    widest = default_profile(scene.model)
-    names = ("awake_dofs", "constraints", "contacts", "convex_contacts")
-    sizes = {n: ALIGN * math.ceil(max(1.0, factor * peaks[n]) / ALIGN) for n in names}
-    sizes["awake_dofs"] = min(sizes["awake_dofs"], widest.awake_dofs)
-    # Contacts come as one list for all worlds: its average is what counts, with room for a batch that is all disturbed.
-    return EngineProfile(
-        **sizes,
+    return msgspec.structs.replace(
+        profile_of(measured, scene.model, factor),
         measured={
-            **{f"peak_{n}": round(float(peaks[n]), 2) for n in names},
+            **measured.summary(),
             "engine": engine,
             "worlds": worlds,
             "rounds": rounds,
@@ -120,40 +144,80 @@ class _Disturbance:
 
 
 def _measure_native(
-    scene: Scene, reach: Reach | None, worlds: int, rounds: int, seed: int, progress: Progress
-) -> dict[str, float]:
+    scene: Scene, reach: Reach | None, start: Snapshot, worlds: int, rounds: int, seed: int, progress: Progress
+) -> Measurement:
     engine = NativeEngine(scene, worlds)
-    start = settle(scene)
+    pairs = CandidatePairs(scene.model)
     physics = engine.load(engine.reset(), start)
     act = _Disturbance(scene, reach, engine, seed)
     drop, controls = jax.jit(act.drop), jax.jit(act.controls)
-    peaks: dict[str, float] = dict.fromkeys(("awake_dofs", "constraints", "contacts", "convex_contacts"), 0.0)
+    seen = np.zeros((rounds, ROUND, worlds, len(QUANTITIES)), np.int64)
     for number in range(rounds):
         physics = engine.load(physics, start)
         key = act.key(number)
-        view = engine.view(physics)
-        physics = engine.write(physics, jax.device_get(drop(view, key)))
+        physics = engine.write(physics, jax.device_get(drop(engine.view(physics), key)))
         pusher = act.start()
         for step in range(ROUND):
             physics, view = engine.step(physics, None if pusher is None else np.asarray(pusher.ctrl))
             pusher = controls(view, pusher, key, jnp.full(worlds, step))
-            total = 0
             for w in range(worlds):
                 data = engine.to_mujoco(physics, w)[1]
-                peaks["awake_dofs"] = max(peaks["awake_dofs"], float(data.nv_awake))
-                peaks["constraints"] = max(peaks["constraints"], float(data.nefc))
-                total = max(total, data.ncon)
-            peaks["contacts"] = peaks["convex_contacts"] = max(peaks["contacts"], float(total))
+                seen[number, step, w] = data.nv_awake, data.nefc, data.ncon, pairs.count(data)
         progress(number + 1, rounds)
-    return peaks
+    means = seen.mean(2).max((0, 1))
+    return Measurement(
+        tails={name: Tail.of(seen[..., k]) for k, name in enumerate(QUANTITIES)},
+        means={name: float(means[k]) for k, name in enumerate(QUANTITIES) if name in ("contacts", "pairs")},
+    )
 
 
 def _measure_warp(
-    scene: Scene, reach: Reach | None, worlds: int, rounds: int, seed: int, progress: Progress
-) -> dict[str, float]:
-    engine = WarpEngine(scene, worlds, profile=default_profile(scene.model), initial=settle(scene))
+    scene: Scene,
+    reach: Reach | None,
+    start: Snapshot,
+    native: Measurement,
+    worlds: int,
+    rounds: int,
+    seed: int,
+    progress: Progress,
+) -> Measurement:
+    """As the Warp engine sees it; with larger buffers, until they hold everything."""
+    profile = profile_of(native, scene.model, FIRST_GUESS)
+    for _ in range(TRIES):
+        measured, overflow = _count_warp(scene, reach, start, profile, worlds, rounds, seed, progress)
+        if not overflow:
+            return measured
+        profile = _wider(profile, overflow, scene.model)
+    raise EngineError(
+        f"buffers overflow in scene '{scene.name}' even at {profile} (does anything in it explode? try `ig2mj view`)"
+    )
+
+
+def _wider(profile: EngineProfile, overflow: int, model: mujoco.MjModel) -> EngineProfile:
+    """The profile with what overflowed (flags of capacity) made larger."""
+    names = {SETTING[flag] for flag in SETTING if overflow & flag} or set(SETTING.values())
+    names |= {f"spare_{n}" for n in names if n in ("contacts", "convex_contacts")}
+    larger = {n: int(WIDEN * getattr(profile, n)) for n in names}
+    widest = default_profile(model)
+    if "awake_dofs" in larger:
+        larger["awake_dofs"] = min(larger["awake_dofs"], widest.awake_dofs)
+    return msgspec.structs.replace(profile, **larger)
+
+
+def _count_warp(
+    scene: Scene,
+    reach: Reach | None,
+    start: Snapshot,
+    profile: EngineProfile,
+    worlds: int,
+    rounds: int,
+    seed: int,
+    progress: Progress,
+) -> tuple[Measurement, int]:
+    """One measurement, and the capacity flags that any world raised (the count then is of a world that lost things)."""
+    engine = WarpEngine(scene, worlds, profile=profile.for_worlds(worlds), initial=start)
     act = _Disturbance(scene, reach, engine, seed)
-    first = engine.reset()
+    bins = {"awake_dofs": scene.model.nv + 1, "constraints": BINS, "contacts": BINS}
 
     def one_round(physics, number):
         key = act.key(number)
@@ -161,22 +225,30 @@ def _measure_warp(
         physics = engine.write(physics, act.drop(view, key))
 
         def body(carry, step):
-            physics, view, pusher = carry
+            physics, view, pusher, tails, mean = carry
             pusher = act.controls(view, pusher, key, jnp.full(worlds, step))
             physics, view = engine.step(physics, None if pusher is None else pusher.ctrl)
-            use = engine.usage(physics)
-            use = jnp.array(
-                [use.awake_dofs.max(), use.constraints.max(), use.contacts / worlds, use.convex_contacts / worlds]
-            )
-            return (physics, view, pusher), use
+            use, contacts = engine.usage(physics), warp_contacts(physics.data)
+            own = jnp.zeros(worlds, jnp.int32)
+            own = own.at[jnp.where(contacts.valid, contacts.world, worlds)].add(1, mode="drop")
+            now = {"awake_dofs": use.awake_dofs, "constraints": use.constraints, "contacts": own}
+            tails = {n: tails[n].at[jnp.clip(now[n], 0, bins[n] - 1)].add(1) for n in bins}
+            return (physics, view, pusher, tails, jnp.maximum(mean, use.contacts / worlds)), None
 
-        (physics, _, _), use = jax.lax.scan(body, (physics, view, act.start()), jnp.arange(ROUND))
-        return use.max(0), engine.health(physics)
+        tails = {name: jnp.zeros(count, jnp.int32) for name, count in bins.items()}
+        carry = (physics, view, act.start(), tails, jnp.float32(0.0))
+        (physics, _, _, tails, mean), _ = jax.lax.scan(body, carry, jnp.arange(ROUND))
+        flags = jax.lax.reduce(engine.health(physics).overflow, jnp.int32(0), jax.lax.bitwise_or, (0,))
+        return tails, mean, flags & int(CAPACITY)
 
-    run = jax.jit(one_round)
-    peaks = np.zeros(4)
+    run, first = jax.jit(one_round), engine.reset()
+    measured, overflow = None, 0
     for number in range(rounds):
-        use, _ = run(first, number)
-        peaks = np.maximum(peaks, np.asarray(use))
+        tails, mean, flags = run(first, number)
+        part = Measurement({n: Tail(np.asarray(c, np.int64)) for n, c in tails.items()}, {"contacts": float(mean)})
+        measured, overflow = part if measured is None else measured.joined(part), overflow | int(flags)
         progress(number + 1, rounds)
-    return dict(zip(("awake_dofs", "constraints", "contacts", "convex_contacts"), map(float, peaks), strict=True))
+        if overflow:
+            break
+    assert measured is not None
+    return measured, overflow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import json
 import shutil
 
@@ -11,7 +12,11 @@ import pytest
 
 import ig2mj
 from ig2mj import cli
-from ig2mj.calibration import ALIGN, SAFETY, calibrate
+from ig2mj.agents.floating_hand import add_floating_hand
+from ig2mj.agents.reach import find_reach
+from ig2mj.calibration import SAFETY, _wider, calibrate
+from ig2mj.engine.buffer_sizes import ALIGN
+from ig2mj.engine.health import Overflow
 from ig2mj.engine.profile import PROFILE_FILE, EngineProfile, default_profile, fit, load_profile, save_profile
 from ig2mj.engine.warp import WarpEngine
 from ig2mj.errors import EngineError, InputError
@@ -47,6 +52,10 @@ def test_no_more_can_be_awake_than_there_is(tiny_home):
             "constraints: must be at least 1",
         ),
         ('{"awake_dofs": 12, "constraints": 9, "contacts": -4, "convex_contacts": 1}', "contacts: must be at least 1"),
+        (
+            '{"awake_dofs": 1, "constraints": 9, "contacts": 4, "convex_contacts": 1, "spare_contacts": -1}',
+            "spare_contacts: must not be negative",
+        ),
     ],
 )
 def test_a_broken_file_is_named_with_its_mend(tiny_home, tmp_path, text, says):
@@ -69,27 +78,59 @@ def test_the_warp_engine_reads_the_file_beside_the_manifest(bench_folder, tmp_pa
     assert data._impl.contact__dist.shape == (3 * 16,) and data._impl.nvmax == 12
 
 
+def test_a_profile_holds_one_worlds_worst_in_any_batch():
+    profile = msgspec.structs.replace(PROFILE, spare_contacts=100, spare_convex_contacts=10)
+    alone, many = profile.for_worlds(1), profile.for_worlds(1000)
+    assert (alone.contacts, alone.convex_contacts) == (116, 18)
+    assert (many.contacts, many.convex_contacts) == (17, 9)
+    assert alone.spare_contacts == many.spare_contacts == 0
+    assert alone.for_worlds(1) == alone
+
+
 def test_a_disturbed_home_is_measured_natively(tiny_home):
     seen = []
     profile = calibrate(tiny_home, engine="native", num_worlds=2, rounds=1, progress=lambda *a: seen.append(a))
     assert seen == [(1, 1)]
-    peaks = profile.measured
-    assert 6 <= peaks["peak_awake_dofs"] <= tiny_home.model.nv
-    assert profile.awake_dofs <= tiny_home.model.nv
+    measured = profile.measured
+    assert 6 <= measured["peak_awake_dofs"] <= profile.awake_dofs <= tiny_home.model.nv
     for name in ("constraints", "contacts"):
-        size, peak = getattr(profile, name), float(peaks[f"peak_{name}"])
-        assert peak > 0 and SAFETY["native"] * peak <= size < SAFETY["native"] * peak + ALIGN
-        assert size % ALIGN == 0
+        size, peak = getattr(profile, name), float(measured[f"peak_{name}"])
+        assert measured[f"p99_{name}"] <= measured[f"p9999_{name}"] <= peak
+        size += profile.spare_contacts if name == "contacts" else 0
+        assert size >= SAFETY["native"] * peak > 0
+        assert getattr(profile, name) % ALIGN == 0
+    assert measured["mean_pairs"] > 0
     again = calibrate(tiny_home, engine="native", num_worlds=2, rounds=1)
     assert again == profile, "the same seed measures the same"
+
+
+def test_a_hand_that_pushes_asks_for_more(tiny_home_folder):
+    bare = ig2mj.load_scene(tiny_home_folder)
+    reach = find_reach(bare)
+    scene = ig2mj.load_scene(tiny_home_folder, [functools.partial(add_floating_hand, pos=reach.start)])
+    without = calibrate(bare, engine="native", num_worlds=1, rounds=1)
+    with_hand = calibrate(scene, reach, engine="native", num_worlds=1, rounds=1)
+    assert with_hand.measured["peak_awake_dofs"] >= without.measured["peak_awake_dofs"] + 16
 
 
 @pytest.mark.slow
 def test_the_warp_engine_measures_itself_and_fits_what_it_measured(bench_folder):
     scene = engine_bench.bench_home(bench_folder, True)
     profile = calibrate(scene, engine="warp", num_worlds=2, rounds=1)
-    assert profile.measured["engine"] == "warp" and float(profile.measured["peak_contacts"]) > 0
-    assert profile.constraints >= 4
+    measured = profile.measured
+    assert measured["engine"] == "warp"
+    assert measured["peak_contacts"] > 0
+    assert profile.constraints >= measured["peak_constraints"]
+    assert profile.for_worlds(1).contacts >= measured["peak_contacts"]
+
+
+def test_what_overflows_is_made_larger_and_only_that(tiny_home):
+    wider = _wider(PROFILE, int(Overflow.NARROWPHASE), tiny_home.model)
+    assert wider.contacts == 2 * PROFILE.contacts
+    assert (wider.constraints, wider.awake_dofs) == (PROFILE.constraints, PROFILE.awake_dofs)
+    assert _wider(PROFILE, int(Overflow.NVMAX), tiny_home.model).awake_dofs == 2 * PROFILE.awake_dofs
+    full = msgspec.structs.replace(PROFILE, awake_dofs=int(tiny_home.model.nv))
+    assert _wider(full, int(Overflow.NVMAX), tiny_home.model).awake_dofs == tiny_home.model.nv
 
 
 def test_only_two_engines_can_measure(tiny_home):
@@ -97,11 +138,23 @@ def test_only_two_engines_can_measure(tiny_home):
         calibrate(tiny_home, engine="jax")
 
 
-def test_the_command_writes_the_file_beside_the_manifest(tiny_home_folder, tmp_path, capsys):
+def test_the_command_writes_the_files_where_it_is_told(tiny_home_folder, tmp_path, capsys):
     home = tmp_path / "home"
     shutil.copytree(tiny_home_folder, home)
     command = ["calibrate", str(home), "--engine", "native", "--worlds", "1", "--rounds", "1"]
     assert cli.call([*command, "--json"]) == 0
     printed = json.loads(capsys.readouterr().out)
-    assert printed == json.loads((home / PROFILE_FILE).read_text())
-    assert printed["measured"]["worlds"] == 1
+    assert list(printed.values()) == [json.loads((home / PROFILE_FILE).read_text())]
+    (profile,) = printed.values()
+    assert profile["measured"]["worlds"] == 1
+    (home / PROFILE_FILE).unlink()
+    assert cli.call([*command, "--no-hand", "--out", str(tmp_path / "profiles")]) == 0
+    assert (tmp_path / "profiles" / "home" / PROFILE_FILE).exists() and not (home / PROFILE_FILE).exists()
+    assert "geom pairs" in capsys.readouterr().out
+
+
+def test_the_command_names_what_it_cannot_take(capsys):
+    assert cli.call(["calibrate"]) != 0
+    assert "name at least one scene" in capsys.readouterr().err
+    assert cli.call(["calibrate", "aspen", "--rounds", "0"]) != 0
+    assert "--rounds must be at least 1" in capsys.readouterr().err

@@ -7,6 +7,7 @@ batch fast (design section 2, fact 4), so they are measured per scene and kept b
 
 from __future__ import annotations
 
+import math
 import os
 import pathlib
 
@@ -26,6 +27,8 @@ class EngineProfile(msgspec.Struct, omit_defaults=True):
       constraints: constraint rows (`njmax`).
       contacts: contacts, on average over the worlds of a batch: the list is shared by all (`naconmax` / W).
       convex_contacts: contacts found by the general convex routine, likewise (`naccdmax` / W).
+      spare_contacts, spare_convex_contacts: added once for the whole batch: what one world may have beyond the average.
+        In a batch of one world it is what counts.
       measured: what the sizes come from: peaks, safety factor, versions. For people; not read back.
     """
 
@@ -33,7 +36,19 @@ class EngineProfile(msgspec.Struct, omit_defaults=True):
     constraints: int
     contacts: int
     convex_contacts: int
+    spare_contacts: int = 0
+    spare_convex_contacts: int = 0
     measured: dict[str, float | int | str] = {}
+
+    def for_worlds(self, num_worlds: int) -> EngineProfile:
+        """The same buffers for a batch of this size, with the spare ones shared out among the worlds."""
+        return msgspec.structs.replace(
+            self,
+            contacts=self.contacts + math.ceil(self.spare_contacts / num_worlds),
+            convex_contacts=self.convex_contacts + math.ceil(self.spare_convex_contacts / num_worlds),
+            spare_contacts=0,
+            spare_convex_contacts=0,
+        )
 
 
 def default_profile(model: mujoco.MjModel) -> EngineProfile:
@@ -68,6 +83,9 @@ def load_profile(folder: str | os.PathLike, model: mujoco.MjModel) -> EngineProf
     for name in ("awake_dofs", "constraints", "contacts", "convex_contacts"):
         if getattr(profile, name) < 1:
             raise InputError(file, "must be at least 1", element=name, mend=mend)
+    for name in ("spare_contacts", "spare_convex_contacts"):
+        if getattr(profile, name) < 0:
+            raise InputError(file, "must not be negative", element=name, mend=mend)
     return fit(profile, model)
 
 
