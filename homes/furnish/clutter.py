@@ -20,7 +20,7 @@ TOYS = ("toy", "board_game", "ball", "video_game", "hardback")
 IN = {
     "fridge": (
         "milk", "juice", "butter", "cheese", "yogurt", "egg", "lettuce", "beer", "catsup", "jam",
-        "water", "steak",
+        "water", "steak", "mayonnaise", "wine_bottle", "pop", "salad",
     ),
     "top_cabinet": ("mug", "glass", "plate", "bowl", "cup", "salt", "sugar_jar", "cereal", "jar"),
     "dishwasher": ("plate", "bowl", "mug"),
@@ -74,7 +74,7 @@ ON = {
     "countertop": ("bowl", "chopping_board", "carving_knife", "paper_towel", "jar", "teapot", *FOOD[:3]),
     "breakfast_table": ("dinner_napkin", "carafe", "salt", "candle", "mug"),
     "pedestal_table": ("mug", "pot_plant", "glass"),
-    "coffee_table": ("magazine", "hardback", "mug", "candle", "bowl", "glass", "tray"),
+    "coffee_table": ("magazine", "hardback", "mug", "candle", "bowl", "glass", "tray", "newspaper"),
     "console_table": ("pot_plant", "table_lamp", "hardback", "candle", "bowl", "watch"),
     "desk": ("notebook", "pen", "mug", "calculator", "laptop", "pencil", "sticky_note", "table_lamp", "document"),
     "stand": ("alarm", "hardback", "watch", "mug", "lotion"),
@@ -96,14 +96,14 @@ ON = {
 }  # fmt: skip
 
 ON_ROOM = {
-    ("bedroom", "bottom_cabinet"): ("perfume", "hat", "jewel", "table_lamp", "hairbrush", "candle"),
+    ("bedroom", "bottom_cabinet"): ("perfume", "hat", "necklace", "table_lamp", "hairbrush", "candle", "folderal"),
     ("utility_room", "bottom_cabinet"): ("iron", "detergent", "basket", "paper_towel"),
     ("dining_room", "bottom_cabinet"): ("carafe", "platter", "candle", "wine_bottle", "pot_plant", "bowl"),
     ("dining_room", "console_table"): ("candle", "bowl", "wine_bottle", "pot_plant", "carafe"),
     ("childs_room", "carpet"): TOYS[:3],
     ("playroom", "carpet"): TOYS[:3],
     ("home_office", "console_table"): ("folder", "document", "hardback", "pot_plant"),
-    ("bathroom", "sink"): ("soap", "toothbrush", "toothpaste", "cup", "lotion"),
+    ("bathroom", "sink"): ("soap", "toothbrush", "toothpaste", "cup", "lotion", "hairbrush", "cologne"),
     ("closet", "bottom_cabinet"): ("hat", "watch", "scarf"),
     ("childs_room", "desk"): ("pencil", "notebook", "toy", "hardback", "table_lamp"),
 }  # fmt: skip

@@ -71,7 +71,7 @@ def furnish_home(plan: Plan, objects: int, seed: int = 0) -> HomeInProgress:
 
 ORDER = {"kitchen": 0, "living_room": 1, "bathroom": 1, "bedroom": 1, "corridor": 4}
 """Rooms of these kinds get their pieces first in a turn."""
-START = {"corridor": 2, "lobby": 1, "balcony": 2, "staircase": 2}
+START = {"corridor": 1, "lobby": 1, "balcony": 2, "staircase": 2}
 """Turn in which a room of this kind gets its first piece; others: 0."""
 PLAIN = ("balcony", "bathroom", "closet", "corridor", "garage", "lobby", "pantry_room", "staircase", "storage_room",
          "utility_room")  # fmt: skip
@@ -82,7 +82,7 @@ PIECE_AREA = 9.0  # m2 for each
 def _steps(room: Room, objects: int) -> int:
     """Pieces that a room gets in a turn."""
     if objects < ROOMY:
-        return 2 if room.kind == "kitchen" else 1
+        return 1
     return 1 if room.kind in PLAIN else min(3, max(2, round(room.area / PIECE_AREA)))
 
 

@@ -157,7 +157,21 @@ class RoomKit(LooseKit):
             category, place, degrees_of(anchor) + side + turn, index=index, gap=gap, ways=ways, carpet=carpet
         )
 
-    def seat_at(self, desk: Thing, category: str) -> Thing | None:
+    def desk_with(self, chair: str) -> list[Thing]:
+        """Stands a desk at a wall and a chair before it; empty where there is no place for both."""
+        start = self.home.now()
+        for side in self.shuffled(list(SIDES)):
+            for place in ("any", "middle", "corner"):
+                desk = self.at_wall("desk", side=side, place=place, room_before=0.6)
+                if desk is None:
+                    continue
+                seat = self._seat_at(desk, chair)
+                if seat is not None:
+                    return [desk, seat]
+                self.home.back_to(start)
+        return []
+
+    def _seat_at(self, desk: Thing, category: str) -> Thing | None:
         """Stands a chair before a desk, as far under it as it goes."""
         index = self.home.index(category)
         for distance in (-0.15, -0.05, 0.04, 0.12):

@@ -103,7 +103,7 @@ def library(kit: RoomKit) -> Iterator[Thing | None]:
     for _ in range(3):
         yield kit.at_wall("shelf", under_window=False, place="corner")
     yield from reading_corner(kit)
-    yield kit.at_wall("desk", room_before=0.6)
+    yield from kit.desk_with("straight_chair")
     yield kit.at_wall("shelf", under_window=False)
     yield kit.at_wall("grandfather_clock")
     yield middle_carpet(kit)

@@ -34,10 +34,7 @@ def bedroom(kit: RoomKit) -> Iterator[Thing | None]:
         yield _beside_bed(kit, bed)
         yield kit.above(bed, "painting", 1.4)
     yield kit.at_wall("shelf", under_window=False, place="corner")
-    desk = kit.at_wall("desk", room_before=0.6)
-    yield desk
-    if desk is not None:
-        yield kit.seat_at(desk, "straight_chair")
+    yield from kit.desk_with("straight_chair")
     yield kit.hang("mirror", 0.95)
     yield kit.under_window("heater")
     yield kit.at_wall("pot_plant", place="corner")
@@ -74,10 +71,7 @@ def childs_room(kit: RoomKit) -> Iterator[Thing | None]:
     if bed is not None:
         yield kit.on(bed, "pillow", degrees=0, at=_head(bed, 0.0))
     yield kit.at_wall("chest", room_before=0.4, wall_gap=LID)
-    desk = kit.at_wall("desk", room_before=0.6)
-    yield desk
-    if desk is not None:
-        yield kit.seat_at(desk, "straight_chair")
+    yield from kit.desk_with("straight_chair")
     yield middle_carpet(kit)
     yield kit.hang("picture", 1.4)
     yield kit.at_wall("backpack", place="corner")

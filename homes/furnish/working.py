@@ -12,10 +12,10 @@ from .living import middle_carpet, shoes
 
 def home_office(kit: RoomKit) -> Iterator[Thing | None]:
     """A desk with a monitor and a keyboard, a swivel chair before it, shelves, a printer."""
-    desk = kit.at_wall("desk", room_before=0.75)
-    yield desk
-    if desk is not None:
-        yield kit.seat_at(desk, "swivel_chair")
+    workplace = kit.desk_with("swivel_chair")
+    yield from workplace
+    if workplace:
+        desk = workplace[0]
         yield kit.on(desk, "monitor", at=(-0.22 * float(desk.size[0]), 0.0), degrees=0, highest=True)
         yield kit.on(desk, "keyboard", at=(0.15 * float(desk.size[0]), 0.0), degrees=0, highest=True)
         yield kit.on(desk, "mouse", at=(0.17 * float(desk.size[0]), -0.3), degrees=0, highest=True)

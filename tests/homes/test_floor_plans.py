@@ -11,6 +11,7 @@ from ig2mj_homes.building import PARAPET, floor_boxes, stair_boxes, wall_boxes
 from ig2mj_homes.dataset import ROOM_TYPES
 from ig2mj_homes.floor_plans.openings import opening_things
 from ig2mj_homes.floor_plans.plan import HEIGHT, Plan, grid_rooms, make_edges
+from ig2mj_homes.floor_plans.porch import front_door, porch_rails, porch_slab
 from ig2mj_homes.floor_plans.shipped import DRAWINGS, plan
 from ig2mj_homes.furnish.ground import CELL, RADIUS, Ground
 from ig2mj_homes.layout_maps import reachable
@@ -117,6 +118,30 @@ def test_floors_cover_all_rooms_and_their_doorways(name: str):
     places += [room.centre for room in home.rooms]
     for x, y in places:
         assert any(np.all(box[0, :2] <= [x, y]) and np.all([x, y] <= box[1, :2]) for box in floors)
+
+
+@each_home
+def test_outside_the_front_door_is_a_landing_that_nobody_falls_from(name: str):
+    home = cached_plan(name)
+    door = front_door(home)
+    assert door is not None and len(door.edge.rooms) == 1
+    (slab,), rails = porch_slab(home), porch_rails(home)
+    floors = np.concatenate([floor_boxes(home), slab[None]])
+    assert slab[1, 2] == 0.0
+    way = -1.0 if door.edge.before is None else 1.0
+    for across in np.arange(-0.3, 1.2, 0.02):  # from the room through the door to the parapet
+        x, y = door.edge.point(door.centre, way * across)
+        assert np.any(np.all((floors[:, 0, :2] <= [x + 1e-6, y + 1e-6]) & (floors[:, 1, :2] >= [x, y]), axis=1))
+    for along in (door.low - 0.2, door.centre, door.high + 0.2):
+        end = np.array([*door.edge.point(along, way * (slab_depth(door, slab) - 0.01)), 0.5])
+        assert np.any(np.all((rails[:, 0] < end) & (end < rails[:, 1]), axis=1)), "a parapet all along"
+    assert not boxes_overlap(np.concatenate([wall_boxes(home), floor_boxes(home)]), np.array([*rails, slab])).any()
+
+
+def slab_depth(door, slab: np.ndarray) -> float:
+    """m from the wall's line to the landing's far edge."""
+    axis = 1 if door.edge.axis == "x" else 0
+    return float(np.abs(slab[:, axis] - door.edge.at).max())
 
 
 def test_stairs_rise_to_the_ceiling_and_a_balcony_has_a_parapet():

@@ -7,7 +7,7 @@ import functools
 import numpy as np
 import pytest
 from ig2mj_homes.arrangement import AIR, Arrangement
-from ig2mj_homes.floor_plans.shipped import DRAWINGS
+from ig2mj_homes.floor_plans.shipped import DRAWINGS, plan
 from ig2mj_homes.furnish.ground import CELL, Ground
 from ig2mj_homes.furnish.home import RULES
 from ig2mj_homes.layout_maps import Maps, reachable
@@ -20,7 +20,8 @@ from ig2mj.errors import UnknownNameError
 
 home = functools.cache(furnished)
 SMALL = ("aspen", "hazel", "small_home")
-"""Homes that are furnished in a second or two."""
+"""Homes that are furnished in half a second."""
+each_home = pytest.mark.parametrize("name", home_names())
 
 
 def things(name: str, category: str) -> list[Thing]:
@@ -32,10 +33,10 @@ def box_thing(x: float, y: float, z: float = 0.0, degrees: float = 0.0) -> Thing
 
 
 def test_every_room_kind_of_the_plans_has_a_rule():
-    assert {room.kind for name in SMALL[:2] for room in home(name).plan.rooms} <= set(RULES)
+    assert {room.kind for name in DRAWINGS for room in plan(name).rooms} <= set(RULES)
 
 
-@pytest.mark.parametrize("name", SMALL[:2])
+@pytest.mark.parametrize("name", sorted(DRAWINGS))
 def test_a_home_holds_as_many_things_as_asked(name: str):
     assert len(home(name).things.things) == DRAWINGS[name].objects
 
@@ -52,7 +53,7 @@ def test_another_seed_gives_another_home():
     assert texts[0] != texts[1]
 
 
-@pytest.mark.parametrize("name", SMALL)
+@each_home
 def test_nothing_overlaps(name: str):
     placed = Arrangement(np.zeros((0, 2, 3)))
     for thing in home(name).things.things.values():
@@ -60,7 +61,7 @@ def test_nothing_overlaps(name: str):
         placed.put(thing)
 
 
-@pytest.mark.parametrize("name", SMALL)
+@each_home
 def test_a_disc_of_30_cm_reaches_every_room_with_the_furniture_in_place(name: str):
     maps = Maps(home(name).plan, home(name).things)
     reach = reachable(maps.trav == 255, 0.30, 0.01)
@@ -68,7 +69,7 @@ def test_a_disc_of_30_cm_reaches_every_room_with_the_furniture_in_place(name: st
         assert (reach & (maps.insseg == number + 1)).any(), room.name
 
 
-@pytest.mark.parametrize("name", SMALL)
+@each_home
 def test_loose_things_stand_on_something_right_below_them(name: str):
     all_things = list(home(name).things.things.values())
     for thing in all_things:
@@ -152,14 +153,36 @@ def test_what_opens_is_kept_free():
     assert placed.fits(box_thing(before + 1.0, 0.0))
 
 
+def test_what_was_tried_is_taken_back():
+    tried = furnished("aspen")
+    before, free = list(tried.things.things), tried.ground.free.copy()
+    earlier = tried.now()
+    thing = box_thing(0.0, 0.0)
+    tried.things.put(thing)
+    tried.ground.occupy(thing)
+    tried.back_to(earlier)
+    assert list(tried.things.things) == before
+    assert np.array_equal(tried.ground.free, free)
+    assert tried.things.fits(box_thing(0.0, 0.0), ways=False) == home("aspen").things.fits(box_thing(0, 0), ways=False)
+
+
+def test_carpets_need_no_air_around_them_and_block_no_way():
+    placed = Arrangement(np.zeros((0, 2, 3)))
+    placed.put(Thing("carpet_0", "carpet", 0, np.zeros(3), np.eye(3), True))
+    length = float(shape("carpet", 0).size[0])
+    assert placed.fits(box_thing(length / 2 + 0.2, 0.0), gap=0.1)
+    assert not placed.fits(box_thing(length / 2 + 0.1, 0.0)), "half on it"
+    assert placed.free(np.array([[-0.2, -0.2, 0.0], [0.2, 0.2, 1.0]]))
+
+
 def test_furniture_that_would_block_a_doorway_is_refused():
-    plan = home("aspen").plan
-    ground = Ground(plan)
-    door = next(o for o in plan.openings if o.kind == "door" and not o.edge.outer)
+    drawn = home("aspen").plan
+    ground = Ground(drawn)
+    door = next(o for o in drawn.openings if o.kind == "door" and not o.edge.outer)
     x, y = door.edge.point(door.centre)
     assert not ground.allows(box_thing(x, y))
     occupied = int(ground.free.sum())
-    ground.occupy(box_thing(*plan.room("living_room_0").centre))
+    ground.occupy(box_thing(*drawn.room("living_room_0").centre))
     assert (occupied - ground.free.sum()) * CELL**2 > 0.02
 
 
