@@ -116,16 +116,19 @@ class World:
         self._none_awake = False
         self._steady_plan = self._plan(self._awake)
         self._has_force = False
+        self._timestep = float(model.opt.timestep)
+        self._has_grasps = len(statics.layout.grasp_equality) > 0
+        outside = (self.data.qvel, self.data.xfrc_applied, self.data.qfrc_applied)
+        self._from_outside = tuple((array, np.zeros_like(array).tobytes()) for array in outside)
+        self._never_left_alone = model.nmocap > 0
 
     def step(self, ctrl: np.ndarray | None) -> int:
         """One control step, and the refresh after it. The data stands after `mj_step1` before and after."""
         model, data, statics = self.model, self.data, self.statics
         if ctrl is not None:
             data.ctrl[:] = ctrl
-        if self._none_awake and not data.ntree_awake and not self._has_force and self._is_left_alone():
-            for _ in range(statics.substeps):
-                data.time += model.opt.timestep
-            return self._refresh_grasped()
+        if self.only_time_passes():
+            return Changed.NOTHING
         changed = self.clear_force()
         self._near.begin()
         self._let_near()
@@ -152,13 +155,25 @@ class World:
         self._near.forget()
         self._let_near()
 
-    def _is_left_alone(self) -> bool:
-        """Whether nothing reaches in from outside that could wake a sleeping tree (MuJoCo looks at just these).
+    def only_time_passes(self) -> bool:
+        """Lets time pass by one control step where that is all that happens; false where the world must be stepped.
 
-        A step of a world that sleeps as a whole then only lets time pass, though MuJoCo still goes through every geom.
+        So it is where all trees sleep and nothing reaches in from outside that could wake one (MuJoCo, too, looks at
+        the bytes of just these arrays). MuJoCo would still go through every geom.
         """
         data = self.data
-        return not (self.model.nmocap or data.qvel.any() or data.xfrc_applied.any() or data.qfrc_applied.any())
+        if not self._none_awake or self._has_force or data.ntree_awake or self._never_left_alone:
+            return False
+        for array, zeros in self._from_outside:
+            if array.tobytes() != zeros:
+                return False
+        if self._has_grasps and self._active_grasps().tobytes() != self._eq_key:
+            return False
+        time, timestep = data.time, self._timestep
+        for _ in range(self.statics.substeps):
+            time += timestep
+        data.time = time
+        return True
 
     def refresh(self, everything: bool = False) -> int:
         """Brings the rows up to date with `data`, whose position stage is.
@@ -347,10 +362,9 @@ class World:
         return Changed.AWAKE
 
     def _refresh_grasped(self) -> int:
-        layout = self.statics.layout
-        if not len(layout.grasp_equality):
+        if not self._has_grasps:
             return Changed.NOTHING
-        active = self.data.eq_active[layout.grasp_equality].astype(bool)
+        layout, active = self.statics.layout, self._active_grasps()
         key = active.tobytes()
         if key == self._eq_key:
             return Changed.NOTHING
@@ -359,6 +373,9 @@ class World:
         grasped[:] = False
         grasped[layout.grasp_agent[active], layout.grasp_object[active]] = True
         return Changed.GRASPED
+
+    def _active_grasps(self) -> np.ndarray:
+        return self.data.eq_active[self.statics.layout.grasp_equality].astype(bool)
 
     def _refresh_touching(self, everything: bool) -> int:
         statics, data = self.statics, self.data

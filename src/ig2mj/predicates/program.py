@@ -12,7 +12,7 @@ Axes: W worlds, O objects, S heat sources, I facts.
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -27,6 +27,8 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.relations import Memo, RelationPlan
 from ig2mj.states.update import events, heat, queries
 from ig2mj.states.world import ExtendedStates, Swap
+
+T = TypeVar("T")
 
 FIELDS = tuple(field.name for field in dataclasses.fields(PhysicsView))
 
@@ -74,8 +76,9 @@ class StateProgram:
         self.plan = RelationPlan.build(model, [*queries(model), *(goal.queries if goal else [])])
         template = initial_states(model, num_worlds)
         self._template = template
-        leaves, self.structure = jax.tree.flatten(template)
-        self.heats = [i for i, x in enumerate(leaves) if x is template.temperature or x is template.max_temperature]
+        named, self.structure = jax.tree_util.tree_flatten_with_path(template)
+        self._paths = [tuple(key.name for key in path) for path, _ in named]
+        self.heats = [self._paths.index((name,)) for name in ("temperature", "max_temperature")]
         self._empty_memo, self._memo_structure = jax.tree.flatten(self.plan.empty_memo(num_worlds))
         self.heat = jax.jit(self._heat_step)
         self.view_reads: tuple[str, ...] = ()
@@ -99,6 +102,25 @@ class StateProgram:
             assert self._whole is not None
         taken = [leaves[i] for i in self._takes]
         return Found(*self._whole(taken, [getattr(view, name) for name in self.view_reads], memo))
+
+    def with_leaves(self, states: ExtendedStates, places: list[int], leaves: list[Array]) -> ExtendedStates:
+        """A copy of the states in which the leaves at some places are others.
+
+        `dataclasses.replace` and unflattening run the constructors of frozen dataclasses, which take longer than a step
+        of temperatures.
+        """
+        new = _copied(states)
+        fields, copied = new.__dict__, set()
+        for place, leaf in zip(places, leaves, strict=True):
+            name, *inner = self._paths[place]
+            if inner:
+                if name not in copied:
+                    copied.add(name)
+                    fields[name] = _copied(fields[name])
+                fields[name].__dict__[inner[0]] = leaf
+            else:
+                fields[name] = leaf
+        return new
 
     def _trace(self, leaves: list[Array], view: PhysicsView, memo: list[Array]) -> None:
         fields = [getattr(view, name) for name in FIELDS]
@@ -175,6 +197,12 @@ def verdict_of(fields: tuple[Array, Array, Array] | None) -> Verdict | None:
 def swap_of(fields: tuple[Array, Array, Array] | None) -> Swap | None:
     """A swap from what the compiled functions give."""
     return None if fields is None else Swap(*fields)
+
+
+def _copied(node: T) -> T:
+    new = object.__new__(type(node))
+    new.__dict__.update(node.__dict__)
+    return new
 
 
 def _verdict_fields(verdict: Verdict) -> tuple[Array, Array, Array]:

@@ -19,7 +19,6 @@ Axes: W worlds.
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from typing import NamedTuple
 
@@ -115,23 +114,19 @@ class StateStepper:
             before, after = jax.device_get(((states.temperature, states.max_temperature), (warm, hottest)))
             self._settled = all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
         self._heat_steps += 1
-        states = dataclasses.replace(states, temperature=warm, max_temperature=hottest)
-        leaves = list(self._leaves)
-        for place, leaf in zip(self.program.heats, (warm, hottest), strict=True):
-            leaves[place] = leaf
-        self._leaves = leaves
+        states = self.program.with_leaves(states, self.program.heats, [warm, hottest])
+        self._put(self.program.heats, [warm, hottest])
         self._step = Step(states, None, verdict_of(verdict))
         return self._step
 
     def _everything(self, states: ExtendedStates, leaves: list[Array], view: PhysicsView) -> Step:
         program = self.program
         found = program.whole(leaves, view, self._memo)
-        leaves = list(leaves)
-        for place, leaf in zip(program.gives, found.leaves, strict=True):
-            leaves[place] = leaf
-        new = jax.tree.unflatten(program.structure, leaves)
+        self._leaves = leaves
+        self._put(program.gives, found.leaves)
+        new = program.with_leaves(states, program.gives, found.leaves)
         quiet, swapped, self._settled = np.asarray(found.flags).tolist()
-        self._memo, self._view, self._leaves, self._heat_steps = found.memo, view, leaves, 0
+        self._memo, self._view, self._heat_steps = found.memo, view, 0
         self._step = Step(new, None, verdict_of(found.verdict))
         self._kept = None
         if quiet and not program.model.options.contact_heat_rate:
@@ -140,3 +135,7 @@ class StateStepper:
             self._bytes = [None] * len(self._seen)
             self._fingers_away = "finger_pos" in program.view_reads and self._away(view)
         return self._step._replace(swap=swap_of(found.swap)) if swapped else self._step
+
+    def _put(self, places: list[int], leaves: list[Array]) -> None:
+        for place, leaf in zip(places, leaves, strict=True):
+            self._leaves[place] = leaf
