@@ -76,7 +76,7 @@ START = {"corridor": 1, "lobby": 1, "balcony": 2, "staircase": 2}
 PLAIN = ("balcony", "bathroom", "closet", "corridor", "garage", "lobby", "pantry_room", "staircase", "storage_room",
          "utility_room")  # fmt: skip
 """Rooms that get one piece in a turn; others two, or more by their area."""
-PIECE_AREA = 9.0  # m2 for each
+PIECE_AREA = 6.0  # m2 for each
 
 
 def _steps(room: Room, objects: int) -> int:
