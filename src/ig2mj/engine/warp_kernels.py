@@ -11,6 +11,13 @@ puts these in their place; results are the same up to rounding:
   `qfrc_bias`) that the next step computes anew from positions and velocities. Here they are those of the step's
   beginning, as they are without sleep.
 
+Two more, for safety:
+
+- In a world without any constraint the compacted solver reads constraint forces that were never written (its model says
+  that it is dense, and the kernel that zeroes them is for sparse ones). Where that memory holds no numbers, the world
+  is lost: one of ten thousand in a minute, as soon as all that moves is in the air. Here they are zeroed.
+- Contacts are checked against their geoms (`ig2mj.engine.warp_contacts`).
+
 On an H200 the first is a third to a half of a step, the third a fifth (docs/notes.md has the figures). The functions
 replaced are private to MuJoCo Warp, which is pinned; a version without them is left as it is, with a warning.
 """
@@ -29,7 +36,17 @@ from collections.abc import Iterator
 from typing import Any, no_type_check
 
 import warp as wp
-from mujoco.mjx.third_party.mujoco_warp._src import block_cholesky, forward, passive, solver, support, types
+from mujoco.mjx.third_party.mujoco_warp._src import (
+    block_cholesky,
+    collision_driver,
+    forward,
+    passive,
+    solver,
+    support,
+    types,
+)
+
+from ig2mj.engine.warp_contacts import mend_contacts
 
 TILE = 16
 """Rows of a block of the blocked factorisations (`types.TILE_SIZE_JTDAJ_DENSE`)."""
@@ -45,6 +62,7 @@ _NEEDED = {
         "_gather_M_sparse",
         "_gather_rhs_compact",
         "_scatter_solution",
+        "_solve_init_dof",
     ),
     block_cholesky: (
         "create_blocked_cholesky_factorize_solve_func",
@@ -52,6 +70,7 @@ _NEEDED = {
         "create_blocked_cholesky_solve_newton_func",
     ),
     passive: ("passive",),
+    collision_driver: ("collision",),
     forward: ("_advance", "fwd_velocity"),
 }
 
@@ -71,7 +90,9 @@ def use_awake_kernels() -> bool:
         (solver, "_cholesky_factorize_solve", _cholesky_factorize_solve),
         (solver, "_update_gradient_init_h_sparse", _init_hessian),
         (solver, "smooth_solve_compact", _smooth_solve_compact),
+        (solver, "_solve_init_dof", _solve_init_dof),
         (passive, "passive", _passive),
+        (collision_driver, "collision", _collision),
         (forward, "_advance", _advance),
         (forward, "fwd_velocity", _fwd_velocity),
     ):
@@ -257,6 +278,13 @@ def _cholesky_factorize_solve(
     wp.launch_tiled(kernel, dim=d.nworld, inputs=inputs, outputs=outputs, block_dim=block_dim)
 
 
+def _solve_init_dof(warmstart: bool, sparse: bool) -> wp.Kernel:
+    """Start of a solve; also zeroes the constraint forces of worlds without constraints, which a dense model needs as
+    much as a sparse one."""
+    del sparse
+    return _upstream[solver, "_solve_init_dof"](warmstart, True)
+
+
 def _smooth_solve_compact(m: Any, d: Any) -> None:
     """Accelerations without constraints, of what is awake."""
     size = d.nvmax_pad
@@ -343,6 +371,15 @@ def _passive(m: Any, d: Any) -> None:
         ],
         outputs=[d.qfrc_gravcomp, d.qfrc_passive],
     )
+
+
+# Collision detection.
+
+
+def _collision(m: Any, d: Any, awake_prev: Any = None) -> None:
+    _upstream[collision_driver, "collision"](m, d, awake_prev)
+    if d.naconmax > 0:
+        mend_contacts(m, d)
 
 
 # The velocity stage.
