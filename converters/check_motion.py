@@ -166,6 +166,7 @@ class _Isolated:
             share = min(1.0, 4 * (step + 1) / steps)  # grows slowly, then stays
             limit = m.dof_frictionloss[v] + share * (most - m.dof_frictionloss[v])
             wished = inertia * (speed - data.qvel[v]) / (5 * m.opt.timestep) + sign * m.dof_frictionloss[v]
+            wished += m.dof_damping[v] * speed
             data.qfrc_applied[v] = np.clip(wished, -limit, limit)
             mujoco.mj_step(m, data)
             data.qpos[held_q] = self.home[held_q]

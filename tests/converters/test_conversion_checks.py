@@ -130,6 +130,19 @@ def test_dry_friction_of_fact_10_does_not_count_as_jamming():
     assert check([body], [CABINET], outside)["joint_sweep"].passed
 
 
+def test_damping_does_not_count_as_jamming():
+    """A jar's lid: 30 g, held back by the damping that every hinge gets more than by its inertia."""
+    body = f"""<body name="jar" pos="0 0 .2"><freejoint name="jar/free"/>
+      <geom name="jar/collision_0" type="box" size=".04 .04 .06" mass=".4" {GEOM}/>
+      <body name="jar_lid" pos="-.04 0 .07"><joint name="jar_hinge" axis="0 -1 0" range="0 2" limited="true"
+          frictionloss=".36" damping=".05" armature=".001"/>
+        <geom name="jar_lid/collision_0" type="box" size=".04 .04 .005" pos=".04 0 0" mass=".03" {GEOM}/>
+      </body></body>"""
+    given = entry("jar", (0.08, 0.08, 0.135), 0.43, joints=[JointEntry("jar_hinge", "hinge", (0.0, 2.0))])
+    results = check([body], [given], '<exclude body1="jar" body2="jar_lid"/>')
+    assert results["joint_sweep"].passed, results["joint_sweep"].failures
+
+
 def test_an_object_that_touches_itself_is_named():
     body, _ = cabinet(exclude=False)
     near = body.replace('pos="0 0 .1"', 'pos="0 0 .06"')
