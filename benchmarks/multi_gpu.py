@@ -15,7 +15,7 @@ import time
 
 import jax
 import numpy as np
-from throughput import Case
+from batch_case import Case
 
 from ig2mj.agents.pushing import push, start_pushing
 from ig2mj.engine.warp import WarpEngine
@@ -27,9 +27,8 @@ STEPS = 30
 
 def make(case: Case, num_worlds: int) -> Worlds:
     start = jax.tree.map(lambda a: a[0], case.pool.physics)
-    return Worlds(
-        WarpEngine(case.scene, num_worlds, profile=case.profile, initial=start), case.model, case.pool, case.goal
-    )
+    engine = WarpEngine(case.scene, num_worlds, profile=case.profile.for_worlds(num_worlds), initial=start)
+    return Worlds(engine, case.model, case.pool, case.goal)
 
 
 def shared(case: Case, num_worlds: int, devices: list) -> ShardedWorlds:
@@ -79,7 +78,7 @@ def main() -> None:
     parser.add_argument("--out", type=pathlib.Path)
     args = parser.parse_args()
     devices = jax.devices()
-    case = Case(args.home, True, 16, None)
+    case = Case(args.home, True)
     result: dict = {"devices": len(devices), "device": devices[0].device_kind, "scene": case.scene.name}
     positions, keys = [], []
     for chosen in (devices[:1], devices[:1], devices):

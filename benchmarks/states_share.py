@@ -28,10 +28,10 @@ import numpy as np
 import plots
 import results
 import tyro
+from batch_case import ten_literals
 from homes_at_hand import WORK, Home, made_homes, named_homes
 from one_world import BarePhysics, OneWorld
 from rich.console import Console
-from throughput import ten_literals
 from timing import Block, interleave, timed
 
 import ig2mj

@@ -1,117 +1,118 @@
 """Control steps per second of the batched engine: worlds x scenes, idle and disturbed, with states and a goal.
 
-    python benchmarks/throughput.py HOME [HOME ...] --worlds 1024 4096 16384 [--idle] [--what full] [--out DIR]
+    python benchmarks/throughput.py HOME [HOME ...] --worlds 1024 4096 16384 [--idle] [--what full] [--rows FILE]
 
 A control step is four physics steps of 1/120 s, the view, all extended states, guards and a goal of up to ten literals,
 in one jitted function under `lax.scan`; a floating hand pushes objects about unless `--idle`. Every row says what the
 hand really did (`benchmarks/disturbance.py`) and how many worlds overflowed or lost their numbers: a row with any, or a
 disturbed one whose hand touches nothing, does not count (`counts` is false).
+
+Several of these may run at once (`gpu_suite.py`): what is timed runs under a lock, everything else beside each other.
 """
 
 from __future__ import annotations
 
 import argparse
-import functools
+import contextlib
+import fcntl
 import json
+import os
 import pathlib
 import time
+from collections.abc import Iterator
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+import warp as wp
+from batch_case import HAND_DOFS, Case
 from disturbance import LEAST, Watch, join, summary
 
-import ig2mj
-from ig2mj.agents.floating_hand import add_floating_hand
 from ig2mj.agents.pushing import push, start_pushing
-from ig2mj.agents.reach import find_reach
-from ig2mj.calibration import calibrate
 from ig2mj.engine.health import CAPACITY, Overflow
-from ig2mj.engine.profile import PROFILE_FILE, EngineProfile, load_profile
 from ig2mj.engine.warp import WarpEngine
-from ig2mj.predicates.compile import compile_expression
-from ig2mj.sampling.perturbation import loose_objects
-from ig2mj.sampling.settled import make_pool
-from ig2mj.scene.manifest import AgentEntry
 from ig2mj.sensors.batch_camera import BatchCamera
-from ig2mj.states.model import StateModel
 from ig2mj.worlds.batch import Worlds
-from ig2mj.worlds.pool import Pool
 
 STEPS = 30
 """Control steps of one timed call."""
 
-HAND_DOFS = 16
+CALLS, LEAST_CALLS, CALL_SECONDS = 4, 2, 15.0
+"""Timed calls; fewer, down to `LEAST_CALLS`, where they would take longer than this together."""
 
-Place = tuple[float, float, float]
-
-
-def add_eye(spec: mujoco.MjSpec, pos: Place) -> AgentEntry:
-    """A camera that hangs in the room, where there is no hand to carry it."""
-    eye = spec.worldbody.add_body(name="eye", pos=list(pos))
-    eye.add_camera(name="eye/eye", fovy=60.0)
-    return AgentEntry(name="eye", body="eye", camera="eye/eye")
+SIZE = 128
+"""Pixels a side of the pictures."""
 
 
-def ten_literals(model: StateModel) -> str:
-    """A goal of ten literals over the first loose objects: where they are, and what they have become."""
-    tables = model.tables
-    loose = [tables.object_names[i] for i in loose_objects(tables)]
-    fixed = [
-        n
-        for n, f, c in zip(tables.object_names, tables.object_fixed, tables.object_categories, strict=True)
-        if f and c not in ("walls", "floors", "ceilings")
-    ]
-    pairs = [(loose[i % len(loose)], fixed[(3 * i) % len(fixed)]) for i in range(7)]
-    words = ["on_top", "inside", "next_to", "under", "on_top", "inside", "touching"]
-    atoms = [f"({w} {a} {b})" for w, (a, b) in zip(words, pairs, strict=True)]
-    atoms.append(f"(in_contact_with {loose[0]} {loose[-1]})")
-    able = model.parameters
-    for word, has in (("frozen", np.isfinite(able.freeze_temperature)), ("burnt", np.isfinite(able.burn_temperature))):
-        atoms += [f"(not ({word} {tables.object_names[int(i)]}))" for i in np.flatnonzero(has)[:1]]
-    return "(and " + " ".join(atoms) + ")"
-
-
-class Case:
-    """One scene, made ready: profile, pool, goal."""
-
-    def __init__(self, home: str, hand: bool, pool_rows: int, profile: EngineProfile | None):
-        start = time.time()
-        self.reach = find_reach(ig2mj.load_scene(home))
-        self.reach_seconds = time.time() - start
-        add = functools.partial(add_floating_hand if hand else add_eye, pos=tuple(self.reach.start))
-        self.eye = "hand/eye" if hand else "eye/eye"
-        self.scene = ig2mj.load_scene(home, [add])
-        self.model = StateModel.of_manifest(self.scene.tables, self.scene.manifest)
-        start = time.time()
-        self.pool: Pool = make_pool(self.scene, self.model, pool_rows, share=0.2)
-        self.pool_seconds = time.time() - start
-        start = time.time()
-        if profile is None and (self.scene.folder / PROFILE_FILE).exists():
-            profile = load_profile(self.scene.folder, self.scene.model)
-        self.profile = profile or calibrate(self.scene, self.reach if hand else None, rounds=4)
-        self.calibration_seconds = time.time() - start
-        self.goal = compile_expression(self.model, ten_literals(self.model))
-
-
-def run(case: Case, num_worlds: int, disturbed: bool, what: str, calls: int = 4, **solver: int) -> dict:
-    """Times one batch. The first call compiles and is not counted."""
+def run(case: Case, num_worlds: int, disturbed: bool, what: str, lock: pathlib.Path | None, **solver: int) -> dict:
+    """Times one batch. The first call is not counted."""
+    start = time.time()
     scene, model = case.scene, case.model
+    profile = case.profile.for_worlds(num_worlds)
     engine = WarpEngine(
-        scene, num_worlds, profile=case.profile, initial=jax.tree.map(lambda a: a[0], case.pool.physics), **solver
+        scene, num_worlds, profile=profile, initial=jax.tree.map(lambda a: a[0], case.pool.physics), **solver
     )
     worlds = Worlds(engine, model, case.pool, case.goal)
-    seconds = engine.substeps * engine.timestep
+    watch, seconds = Watch(engine), engine.substeps * engine.timestep
+    call, carry = _program(case, worlds, watch, disturbed, what)
+    before = np.asarray(carry[0].world.view.object_com)
+    compiled = call.lower(carry).compile()
+    compile_seconds = time.time() - start
+    with exclusive(lock):
+        start = time.time()
+        carry, _ = jax.block_until_ready(compiled(carry))
+        first = time.time() - start
+        times, activity, seen = [], [], np.zeros(1)
+        while len(times) < LEAST_CALLS or (len(times) < CALLS and sum(times) + times[-1] < CALL_SECONDS):
+            start = time.time()
+            carry, (seen, acts) = jax.block_until_ready(compiled(carry))
+            times.append(time.time() - start)
+            activity.append(acts)
+    batch = carry[0]
+    overflow = np.asarray(batch.world.physics.overflow)
+    row: dict[str, Any] = {
+        "scene": scene.name,
+        "objects": scene.tables.num_objects,
+        "worlds": num_worlds,
+        "case": "disturbed" if disturbed else "idle",
+        "what": what,
+        **solver,
+        "control_steps_per_s": round(num_worlds * STEPS / float(np.median(times))),
+        "ms_per_control_step": round(1e3 * float(np.median(times)) / STEPS, 3),
+        "spread": round((max(times) - min(times)) / float(np.median(times)), 3),
+        "compile_s": round(compile_seconds, 1),
+        "first_call_s": round(first, 1),
+        "simulated_s": round((len(times) + 1) * STEPS * seconds, 2),
+        **summary(join(activity), HAND_DOFS if disturbed else 0),
+        "moved_objects_per_world": round(watch.moved(before, carry[2]), 2),
+        "capacity_overflows": int(((overflow & int(CAPACITY)) != 0).sum()),
+        "overflow_bits": _bits(overflow),
+        "iteration_limits": int(((overflow & int(Overflow.ITERATIONS | Overflow.LS_ITERATIONS)) != 0).sum()),
+        "non_finite": int((~np.asarray(engine.health(batch.world.physics).finite)).sum()),
+        **memory(num_worlds),
+        "profile": [profile.awake_dofs, profile.constraints, profile.contacts, profile.convex_contacts],
+        "mean_seen": float(np.asarray(seen).mean()),
+        "troubles": worlds.metrics(batch) if what in ("full", "camera") else {},
+    }
+    sound = row["capacity_overflows"] == 0 and row["non_finite"] == 0
+    row["counts"] = sound and (not disturbed or row["hand_contact_share"] >= LEAST)
+    return row
 
-    watch = Watch(engine)
+
+def _program(case: Case, worlds: Worlds, watch: Watch, disturbed: bool, what: str):
+    """The jitted function of `STEPS` control steps, and the carry to begin with."""
+    engine = watch.engine
+    seconds = engine.substeps * engine.timestep
+    camera = None
+    if what == "camera":
+        camera = BatchCamera(engine, case.model, [case.eye], width=SIZE, height=SIZE, depth=True)
 
     def control(batch, pusher, com, palm):
         if not disturbed:
             return pusher
         return push(case.reach, pusher, com, palm, batch.world.key, batch.world.step, seconds)
-
-    camera = BatchCamera(engine, model, [case.eye], width=128, height=128, depth=True) if what == "camera" else None
 
     def full(carry, _):
         batch, pusher, com, palm = carry
@@ -137,58 +138,54 @@ def run(case: Case, num_worlds: int, disturbed: bool, what: str, calls: int = 4,
 
     body = physics if what in ("physics", "view") else full
     call = jax.jit(lambda carry: jax.lax.scan(body, carry, None, STEPS), donate_argnums=0)
-    start = time.time()
-    batch = jax.block_until_ready(jax.jit(worlds.start)(0))
-    before = np.asarray(batch.world.view.object_com)
-    pusher = start_pushing(case.reach, num_worlds, scene.model.nu)
+    batch = jax.block_until_ready(worlds.start(0))
+    pusher = start_pushing(case.reach, engine.num_worlds, case.scene.model.nu)
     # Copies: what is donated must not be in the batch as well.
-    carry = (batch, pusher, batch.world.view.object_com + 0.0, batch.world.view.agent_pos[:, 0] + 0.0)
-    carry, _ = jax.block_until_ready(call(carry))
-    compile_seconds = time.time() - start
-    times, activity = [], []
-    for _ in range(calls):
-        start = time.time()
-        carry, (seen, acts) = jax.block_until_ready(call(carry))
-        times.append(time.time() - start)
-        activity.append(acts)
-    batch = carry[0]
-    overflow = np.asarray(batch.world.physics.overflow)
-    memory = (jax.devices()[0].memory_stats() or {}).get("peak_bytes_in_use", 0)
-    did = summary(join(activity), HAND_DOFS if disturbed else 0)
-    row = {
-        "scene": scene.name,
-        "objects": scene.tables.num_objects,
-        "worlds": num_worlds,
-        "case": "disturbed" if disturbed else "idle",
-        "what": what,
-        **solver,
-        "control_steps_per_s": round(num_worlds * STEPS / float(np.median(times))),
-        "ms_per_control_step": round(1e3 * float(np.median(times)) / STEPS, 3),
-        "compile_s": round(compile_seconds, 1),
-        "simulated_s": round((calls + 1) * STEPS * seconds, 2),
-        **did,
-        "moved_objects_per_world": round(watch.moved(before, carry[2]), 2),
-        "capacity_overflows": int(((overflow & int(CAPACITY)) != 0).sum()),
-        "overflow_bits": _bits(overflow),
-        "iteration_limits": int(((overflow & int(Overflow.ITERATIONS | Overflow.LS_ITERATIONS)) != 0).sum()),
-        "non_finite": int((~np.asarray(engine.health(batch.world.physics).finite)).sum()),
-        "peak_device_MB_per_world": round(memory / num_worlds / 1e6, 3),
-        "mean_seen": float(np.asarray(seen).mean()),
-        "troubles": worlds.metrics(batch) if what in ("full", "camera") else {},
+    view = batch.world.view
+    return call, (batch, pusher, view.object_com + 0.0, view.agent_pos[:, 0] + 0.0)
+
+
+@contextlib.contextmanager
+def exclusive(lock: pathlib.Path | None) -> Iterator[None]:
+    """Holds the lock file; others who time something wait. Whoever holds it is served first by the processor."""
+    if lock is None:
+        yield
+        return
+    with lock.open("a") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        nice = os.getpriority(os.PRIO_PROCESS, 0)
+        with contextlib.suppress(PermissionError):
+            os.setpriority(os.PRIO_PROCESS, 0, 0)
+        try:
+            yield
+        finally:
+            os.setpriority(os.PRIO_PROCESS, 0, nice)
+
+
+def memory(num_worlds: int) -> dict[str, float]:
+    """Most device memory of this process so far, JAX's and Warp's own, MB per world. 0 on a CPU."""
+    of_jax = (jax.devices()[0].memory_stats() or {}).get("peak_bytes_in_use", 0)
+    of_warp = wp.get_mempool_used_mem_high(wp.get_device("cuda:0")) if wp.is_cuda_available() else 0
+    return {
+        "peak_device_MB_per_world": round((of_jax + of_warp) / num_worlds / 1e6, 3),
+        "of_that_warps_MB_per_world": round(of_warp / num_worlds / 1e6, 3),
     }
-    row["counts"] = (
-        row["capacity_overflows"] == 0
-        and row["non_finite"] == 0
-        and (not disturbed or row["hand_contact_share"] >= LEAST)
-    )
-    print(json.dumps(row), flush=True)
-    return row
 
 
 def _bits(overflow: np.ndarray) -> dict[str, int]:
     """Worlds by flag of capacity."""
     counts = {f.name: int(((overflow & int(f)) != 0).sum()) for f in Overflow if f & CAPACITY and f.name}
     return {name: count for name, count in counts.items() if count}
+
+
+def device() -> dict[str, str]:
+    """What this ran on."""
+    return {
+        "device": str(jax.devices()[0].device_kind),
+        "jax": jax.__version__,
+        "warp": wp.__version__,
+        "mujoco": mujoco.__version__,
+    }
 
 
 def main() -> None:
@@ -204,40 +201,25 @@ def main() -> None:
         help="full: with states, guards and goal; the others for comparison",
     )
     parser.add_argument("--iterations", type=int, nargs="+", default=[0], help="solver limits to try; 0: the engine's")
-    parser.add_argument("--pool", type=int, default=16)
-    parser.add_argument("--out", type=pathlib.Path)
+    parser.add_argument("--pool", type=int, default=16, help="rows of initial states")
+    parser.add_argument("--profiles", type=pathlib.Path, help="folder with <home>/engine_profile.json")
+    parser.add_argument("--label", default="", help="a remark for the rows")
+    parser.add_argument("--lock", type=pathlib.Path, help="file to lock while timing")
+    parser.add_argument("--rows", type=pathlib.Path, help="rows are added to this file, as JSON lines")
     args = parser.parse_args()
-    device = jax.devices()[0]
-    rows = []
     for home in args.homes:
-        case = Case(home, not args.idle, args.pool, None)
-        model = case.scene.model
-        print(
-            json.dumps(
-                {
-                    "scene": case.scene.name,
-                    "objects": case.scene.tables.num_objects,
-                    "nv": int(model.nv),
-                    "ngeom": int(model.ngeom),
-                    "nbody": int(model.nbody),
-                    "profile": str(case.profile),
-                    "reachable": len(case.reach.objects),
-                    "reach_s": round(case.reach_seconds, 1),
-                    "pool_s": round(case.pool_seconds, 1),
-                    "calibration_s": round(case.calibration_seconds, 1),
-                }
-            ),
-            flush=True,
-        )
+        case = Case(home, not args.idle, args.pool, args.profiles)
         for worlds in args.worlds:
             for what in args.what:
                 for limit in args.iterations:
                     solver = {"iterations": limit, "ls_iterations": limit} if limit else {}
-                    rows.append(run(case, worlds, not args.idle, what, **solver))
-    if args.out:
-        args.out.mkdir(parents=True, exist_ok=True)
-        report = {"device": str(device.device_kind), "jax": jax.__version__, "rows": rows}
-        (args.out / "throughput.json").write_text(json.dumps(report, indent=1))
+                    row = run(case, worlds, not args.idle, what, args.lock, **solver)
+                    row |= {"ready_s": case.seconds, "label": args.label, **device()}
+                    line = json.dumps(row)
+                    print(line, flush=True)
+                    if args.rows:
+                        with args.rows.open("a") as file:
+                            file.write(line + "\n")
 
 
 if __name__ == "__main__":
