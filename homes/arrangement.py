@@ -61,8 +61,8 @@ class Arrangement:
         self._ways.append((owner, np.asarray(boxes, float).reshape(-1, 2, 3)))
 
     def fits(self, thing: Thing, *, ignore: Iterable[str] = (), gap: float = 0.0, ways: bool = True) -> bool:
-        """Whether a thing overlaps nothing that stands and nothing that moves, and its own moving parts meet nothing
-        but what it stands on.
+        """Whether a thing overlaps nothing that stands and nothing that moves, and its own moving parts meet
+        nothing.
 
         Args:
           ignore: owners whose moving parts do not count (a cupboard's, for what lies in its drawer).
@@ -81,7 +81,7 @@ class Arrangement:
         if not thing.shape.swept:
             return True
         moving = _Group(thing, thing.swept())
-        return not any(moving.meets(o) for o in self._solid.near(moving) if o.thing is None or o.name != thing.host)
+        return not any(moving.meets(o) for o in self._solid.near(moving))
 
     def free(self, zone: np.ndarray) -> bool:
         """Whether nothing but a carpet lies in a box [2, 3]."""
