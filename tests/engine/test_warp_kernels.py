@@ -28,8 +28,10 @@ SCENE = f"""<mujoco>
 
 
 def _roll(model: mujoco.MjModel, start: mujoco.MjData) -> tuple[np.ndarray, np.ndarray]:
-    """An arm pushes a row of sleeping boxes in two worlds, in one of them far enough to reach. Positions and velocities after each
-    step [STEPS, 2, nq + nv], and how much is awake [STEPS, 2]."""
+    """An arm pushes towards a row of sleeping boxes in two worlds, in one of them far enough to reach it.
+
+    Positions and velocities after each step [STEPS, 2, nq + nv], and how much is awake [STEPS, 2].
+    """
     put = mujoco_warp.put_model(model)
     assert put.is_sparse
     put.opt.warn_overflow = 0
