@@ -220,8 +220,6 @@ class HandWorld:
                 [np.concatenate([normals, np.tile(h, 2)[:, None]], axis=1) for _, _, h in pieces], np.float32
             ).reshape(-1, 6, 4),
             piece_vertices=np.array([CORNERS * h for _, _, h in pieces], np.float32).reshape(-1, 8, 3),
-            piece_box_center=np.zeros((len(pieces), 3), np.float32),
-            piece_box_half=np.array([h for _, _, h in pieces], np.float32).reshape(-1, 3),
             room_names=tuple(rooms),
             room_types=tuple(name.rsplit("_", 1)[0] for name in rooms),
             room_map=room_map if rooms else np.zeros((0, 0), int),

@@ -33,8 +33,6 @@ class Shapes:
     size: np.ndarray
     planes: np.ndarray
     vertices: np.ndarray
-    box_center: np.ndarray
-    box_half: np.ndarray
 
     def _repr_pretty_(self, printer, cycle: bool) -> None:
         printer.text(f"{self.count} shapes")  # hypothesis prints arguments of failing examples
@@ -81,7 +79,6 @@ def _row(model: mujoco.MjModel, geom: int) -> tuple:
     kind = KINDS[shape]
     vertices = np.zeros((VERTICES, 3), np.float32)
     planes = np.tile(np.array([0, 0, 0, 1], np.float32), (PLANES, 1))
-    box = model.geom_aabb[geom].astype(np.float32)
     if kind is PieceKind.POLYHEDRON:
         if shape == mujoco.mjtGeom.mjGEOM_MESH:
             mesh = model.geom_dataid[geom]
@@ -92,7 +89,7 @@ def _row(model: mujoco.MjModel, geom: int) -> tuple:
         planes[: len(equations)] = equations * [1, 1, 1, -1]
         vertices[:] = points[0]
         vertices[: len(points)] = points
-    return int(kind), size, planes, vertices, box[:3], box[3:]
+    return int(kind), size, planes, vertices
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ import pytest
 
 from ig2mj.geometry import poses, rays
 from ig2mj.geometry.hulls import signed_depth
-from ig2mj.geometry.targets import RayTargets, fall_contact, lines_enter_targets, rays_enter_targets
+from ig2mj.geometry.targets import RayTargets, fall_contact, lines_enter_targets
 
 hit_pieces = jax.jit(rays.rays_hit_pieces, static_argnames="inflate")
 W, BODIES = 6, 4
@@ -63,7 +63,7 @@ def test_planned_lines_agree_with_plain_rays_both_ways(house, inflate):
     np.testing.assert_array_equal(backwards, plain_entries(house, origins, -DIRECTIONS, LENGTHS, inflate))
     assert 0.05 < np.asarray(forwards).mean() < 0.95, "the example shall have both answers"
     assert not np.asarray(forwards)[:, PAIR_TARGETS == 3].any(), "an object without pieces is never entered"
-    one_way = jax.jit(lambda o: rays_enter_targets(targets, body_pos, body_quat, o, DIRECTIONS, LENGTHS, inflate))
+    one_way = jax.jit(lambda o: lines_enter_targets(targets, body_pos, body_quat, o, DIRECTIONS, LENGTHS, inflate)[0])
     np.testing.assert_array_equal(one_way(origins), forwards)
 
 
@@ -97,7 +97,7 @@ def test_no_pairs_and_no_pieces_are_fine(house):
         0
     ].shape == (W, 0, 3)
     bare = RayTargets.from_pieces(np.array([3]), **tables)
-    assert not np.any(rays_enter_targets(bare, body_pos, body_quat, np.zeros((W, 1, 3)), DIRECTIONS, LENGTHS))
+    assert not np.any(lines_enter_targets(bare, body_pos, body_quat, np.zeros((W, 1, 3)), DIRECTIONS, LENGTHS))
 
 
 def test_a_falling_point_stops_at_the_first_surface_or_at_once_when_inside(house):

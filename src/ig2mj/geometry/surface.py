@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 
 from ig2mj.geometry.hulls import signed_depth
 from ig2mj.geometry.poses import matrices_on_host
-from ig2mj.scene.tables import PieceKind
+from ig2mj.scene.tables import PieceKind, SceneTables
 
 SEGMENTS = 32
 """Around a round piece; 1 - cos(pi / 32) = 0.5 %."""
@@ -78,6 +78,16 @@ def surface_table(
         cumulative=cumulative / cumulative[-1],
         area=float(cumulative[-1] / 2),
     )
+
+
+def object_surfaces(tables: SceneTables, obj: int) -> dict[int, SurfaceTable]:
+    """Surfaces of an object's bodies that have pieces, each in its body's frame, by body."""
+    mine = tables.piece_object == obj
+    columns = (tables.piece_kind, tables.piece_size, tables.piece_vertices, tables.piece_pos, tables.piece_quat)
+    return {
+        int(body): surface_table(*(column[mine & (tables.piece_body == body)] for column in columns))
+        for body in np.unique(tables.piece_body[mine])
+    }
 
 
 def sample_surface(table: SurfaceTable, count: int, rng: np.random.Generator) -> SurfaceSample:

@@ -130,19 +130,6 @@ def lines_enter_targets(
     return (sides & FORWARDS) > 0, (sides & BACKWARDS) > 0
 
 
-def rays_enter_targets(
-    targets: RayTargets,
-    body_pos: Float[AnyArray, "W B 3"],
-    body_quat: Float[AnyArray, "W B 4"],
-    origins: Float[AnyArray, "W P 3"],
-    directions: Float[AnyArray, "R 3"],
-    lengths: Float[AnyArray, "R"],
-    inflate: float = 0.0,
-) -> Bool[Array, "W P R"]:
-    """As `lines_enter_targets`, forwards only."""
-    return lines_enter_targets(targets, body_pos, body_quat, origins, directions, lengths, inflate)[0]
-
-
 def fall_contact(
     targets: RayTargets,
     body_pos: Float[AnyArray, "W B 3"],

@@ -20,8 +20,8 @@ from jaxtyping import Bool, Float
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.frustum import Camera, points_in_frustum
 from ig2mj.geometry.poses import quat_rotate
-from ig2mj.geometry.surface import sample_surface, surface_table
-from ig2mj.geometry.targets import RayTargets, rays_enter_targets
+from ig2mj.geometry.surface import object_surfaces, sample_surface
+from ig2mj.geometry.targets import RayTargets, lines_enter_targets
 from ig2mj.predicates.base import Arguments, Context, Predicate
 from ig2mj.scene.tables import SceneTables
 
@@ -90,7 +90,7 @@ def _hidden(
 
     def of_world(world: tuple[Array, Array, Array, Array]) -> Bool[Array, "P N O"]:
         body_pos, body_quat, at, start = world
-        hit = rays_enter_targets(
+        hit, _ = lines_enter_targets(
             targets,
             body_pos[None],
             body_quat[None],
@@ -119,27 +119,15 @@ def _points(tables: SceneTables, view: PhysicsView, objects: np.ndarray) -> Floa
 @functools.lru_cache(maxsize=4096)
 def surface_points(tables: SceneTables, obj: int) -> tuple[np.ndarray, np.ndarray]:
     """Bodies [N] and places [N, 3] in them of an object's sample points; the same for every call."""
-    pieces = np.flatnonzero(tables.piece_object == obj)
-    bodies = tables.piece_body[pieces]
-    surfaces = [(body, surface_table(*_columns(tables, pieces[bodies == body]))) for body in np.unique(bodies)]
-    areas = [surface.area for _, surface in surfaces]
+    surfaces = object_surfaces(tables, obj)
+    areas = [surface.area for surface in surfaces.values()]
     found_body, found_pos = [], []
     share = np.diff(np.round(NUM_POINTS * np.cumsum([0.0, *areas]) / sum(areas)).astype(int))
     rng = np.random.default_rng(obj)
-    for (body, surface), count in zip(surfaces, share, strict=True):
+    for (body, surface), count in zip(surfaces.items(), share, strict=True):
         found_pos.append(sample_surface(surface, int(count), rng).points)
         found_body.append(np.full(count, body))
     return np.concatenate(found_body), np.concatenate(found_pos).astype(np.float32)
-
-
-def _columns(tables: SceneTables, k: np.ndarray) -> tuple[np.ndarray, ...]:
-    return (
-        tables.piece_kind[k],
-        tables.piece_size[k],
-        tables.piece_vertices[k],
-        tables.piece_pos[k],
-        tables.piece_quat[k],
-    )
 
 
 IN_FOV_OF_AGENT = Predicate(

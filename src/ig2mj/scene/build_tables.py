@@ -192,8 +192,6 @@ def _piece_columns(model: mujoco.MjModel, geom_object: np.ndarray, file: object)
         "piece_size": np.array(model.geom_size[geoms]),
         "piece_planes": planes,
         "piece_vertices": vertices,
-        "piece_box_center": np.array([p.center for p in pieces]).reshape(-1, 3),
-        "piece_box_half": np.array([p.half for p in pieces]).reshape(-1, 3),
     }
 
 

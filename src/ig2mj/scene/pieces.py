@@ -1,4 +1,4 @@
-"""Convex collision pieces of a compiled model: the half-spaces, corners and local boxes of `SceneTables.piece_*`.
+"""Convex collision pieces of a compiled model: the half-spaces and corners of `SceneTables.piece_*`.
 
 All in the geom's own frame as MuJoCo compiled it: the compiler moves a mesh to its centre of inertia and principal axes
 and moves the geom's pose the other way, so the compiled vertices and the compiled geom pose belong together.
@@ -32,14 +32,11 @@ class Piece:
 
     planes [n, 4]: half-spaces (nx, ny, nz, d) with n.x <= d, unit normals; empty for round primitives.
     vertices [v, 3]: corners; of a round primitive the corners of its box.
-    center, half: [3] box in the piece's frame.
     """
 
     kind: PieceKind
     planes: np.ndarray
     vertices: np.ndarray
-    center: np.ndarray
-    half: np.ndarray
 
 
 def hull_planes(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -110,6 +107,5 @@ def make_pieces(model: mujoco.MjModel, geoms: np.ndarray) -> list[Piece]:
             planes, vertices = _box_piece(half)
             if kind != PieceKind.POLYHEDRON:
                 planes = np.zeros((0, 4))
-        low, high = vertices.min(0), vertices.max(0)
-        pieces.append(Piece(kind, planes, vertices, (low + high) / 2, (high - low) / 2))
+        pieces.append(Piece(kind, planes, vertices))
     return pieces

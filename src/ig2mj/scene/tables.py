@@ -50,8 +50,8 @@ class SceneTables:
         site).
       piece_*: convex collision pieces of objects: geom id, owner, body, pose in the body, kind, size as MuJoCo's
         geom_size for the primitive kinds; half-spaces (n, d) with n.x <= d in the piece's frame, padded with
-        (0, 0, 0, 1); vertices in the piece's frame, padded by repeating the first one; local box half size about
-        local centre (also for primitives).
+        (0, 0, 0, 1); vertices in the piece's frame, padded by repeating the first one (of a round primitive the corners
+        of its box).
       room_names: room instances; room_types: type of each. room_map: index + 1 of the room instance per pixel, 0 none;
         row is y, column is x (spec/dataset_format.md 2.5). room_resolution: metres a pixel.
       object_rooms: annotated rooms of fixed objects, [O, R].
@@ -92,8 +92,6 @@ class SceneTables:
     piece_size: Float[np.ndarray, "K 3"]
     piece_planes: Float[np.ndarray, "K N 4"]
     piece_vertices: Float[np.ndarray, "K V 3"]
-    piece_box_center: Float[np.ndarray, "K 3"]
-    piece_box_half: Float[np.ndarray, "K 3"]
     room_names: tuple[str, ...]
     room_types: tuple[str, ...]
     room_map: Int[np.ndarray, "Y X"]

@@ -23,14 +23,22 @@ Tree = TypeVar("Tree")
 
 
 def save_tree(file: str | os.PathLike, tree: Any, header: dict[str, Any]) -> None:
-    """Writes all leaves of a pytree and a header; the file appears only when it is complete."""
+    """Writes all leaves of a pytree and a header; the file appears only when it is complete.
+
+    Raises:
+      InputError: it cannot be written there.
+    """
     path = pathlib.Path(file)
     arrays = {_name(keys): np.asarray(leaf) for keys, leaf in jax.tree_util.tree_flatten_with_path(tree)[0]}
     arrays[HEADER] = np.frombuffer(msgspec.json.encode(header), np.uint8)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
-    with unfinished.open("wb") as out:
-        np.savez_compressed(out, allow_pickle=False, **arrays)
-    unfinished.replace(path)
+    try:
+        with unfinished.open("wb") as out:
+            np.savez_compressed(out, allow_pickle=False, **arrays)
+        unfinished.replace(path)
+    except OSError as e:
+        unfinished.unlink(missing_ok=True)
+        raise InputError(path, f"cannot be written: {e.strerror or e}", mend="choose another place") from e
 
 
 def read_header(file: str | os.PathLike) -> dict[str, Any]:
