@@ -37,10 +37,12 @@ class OneWorld:
     def step(self, ctrl: np.ndarray | None = None) -> None:
         """Physics, view, states and goal; ctrl [nu]. Waits for the results, as a user of one world does."""
         self.engine_step(ctrl)
-        self.states, swap, self.verdict = self._stepper.step(self.states, self.view)
+        before = self.states
+        self.states, swap, self.verdict = self._stepper.step(before, self.view)
         if swap is not None:
             self._teleport(swap)
-        jax.block_until_ready((self.states.temperature, self.verdict))
+        if self.states is not before:
+            jax.block_until_ready((self.states.temperature, self.verdict))
 
     def engine_step(self, ctrl: np.ndarray | None = None) -> None:
         """Physics and view alone, of the same world."""

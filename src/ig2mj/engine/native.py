@@ -28,7 +28,8 @@ from ig2mj.engine.boxes import make_box_table
 from ig2mj.engine.compile_cache import keep_jax_programs
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
-from ig2mj.engine.native_world import FIELDS, Changed, Statics, World
+from ig2mj.engine.native_poses import FIELDS, Changed, PoseRows
+from ig2mj.engine.native_world import Statics, World
 from ig2mj.engine.native_write import apply_write
 from ig2mj.engine.snapshot_check import check_snapshot
 from ig2mj.engine.vicinity import Masks, VicinityTable
@@ -116,8 +117,12 @@ class NativeEngine:
         self._statics = Statics(
             tables=self.tables,
             layout=self.layout,
-            boxes=make_box_table(boxes, model, self.tables, self.layout),
-            body_tree=np.asarray(model.body_treeid, int),
+            poses=PoseRows(
+                self.tables,
+                self.layout,
+                make_box_table(boxes, model, self.tables, self.layout),
+                np.asarray(model.body_treeid, int),
+            ),
             contact_unit=np.where(self.layout.collides, self.layout.geom_unit, -1),
             unit_starts=unit_starts,
             vicinity=VicinityTable.build(model, self.layout.equality_tree),

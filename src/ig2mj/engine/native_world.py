@@ -7,52 +7,13 @@ import dataclasses
 import mujoco
 import numpy as np
 
-from ig2mj.engine.boxes import BoxPlan, BoxTable, plan_boxes, world_boxes
 from ig2mj.engine.contacts import add_link_forces, touching_units
 from ig2mj.engine.layout import ModelLayout
+from ig2mj.engine.native_poses import Changed, PosePlan, PoseRows
 from ig2mj.engine.sleep import restore_sleep, wake_trees
 from ig2mj.engine.vicinity import Masks, Vicinity, VicinityTable
 from ig2mj.errors import EngineError
 from ig2mj.scene.tables import SceneTables
-
-
-class Changed:
-    """Groups of view fields that a refresh wrote: bits of an int (plain ones; an IntFlag costs a microsecond a use)."""
-
-    NOTHING = 0
-    BODIES = 1
-    OBJECTS = 2
-    LINKS = 4
-    JOINTS = 8
-    TOUCHING = 16
-    FORCE = 32
-    AWAKE = 64
-    AGENT = 128
-    GRASPED = 256
-    ALL = 511
-
-
-FIELDS: dict[str, int] = {
-    "object_pos": Changed.OBJECTS,
-    "object_quat": Changed.OBJECTS,
-    "object_com": Changed.OBJECTS,
-    "aabb_low": Changed.OBJECTS,
-    "aabb_high": Changed.OBJECTS,
-    "body_pos": Changed.BODIES,
-    "body_quat": Changed.BODIES,
-    "link_pos": Changed.LINKS,
-    "link_quat": Changed.LINKS,
-    "joint_pos": Changed.JOINTS,
-    "touching": Changed.TOUCHING,
-    "link_force": Changed.FORCE,
-    "awake": Changed.AWAKE,
-    "agent_pos": Changed.AGENT,
-    "eye_pos": Changed.AGENT,
-    "eye_quat": Changed.AGENT,
-    "finger_pos": Changed.AGENT,
-    "grasped": Changed.GRASPED,
-}
-"""The view's fields, and the group that each is written with."""
 
 _STATE = ("qpos", "qvel", "act", "ctrl", "qacc_warmstart", "eq_active", "mocap_pos", "mocap_quat")
 
@@ -63,13 +24,12 @@ class Statics:
 
     Attributes:
       unit_starts: [O] first unit of each object. force_links: some annotated link is a geom.
-      See `ig2mj.engine.layout` and `ig2mj.engine.boxes` for the rest.
+      See `ig2mj.engine.layout`, `ig2mj.engine.native_poses` and `ig2mj.engine.vicinity` for the rest.
     """
 
     tables: SceneTables
     layout: ModelLayout
-    boxes: BoxTable
-    body_tree: np.ndarray
+    poses: PoseRows
     contact_unit: np.ndarray
     unit_starts: np.ndarray
     vicinity: VicinityTable
@@ -77,20 +37,6 @@ class Statics:
     pyramidal: bool
     tolerance: float
     substeps: int
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class _Plan:
-    """Which rows of the view move with a set of trees."""
-
-    bodies: np.ndarray
-    objects: np.ndarray
-    roots: np.ndarray
-    links: np.ndarray
-    link_bodies: np.ndarray
-    boxes: BoxPlan
-    agents: bool
-    joints: bool
 
 
 class World:
@@ -108,7 +54,7 @@ class World:
         self._near = Vicinity(statics.vicinity, model, self.data)
         self.units = np.zeros((statics.layout.num_units, statics.layout.num_units), bool)
         self.eq_data = np.array(model.eq_data)
-        self._plans: dict[bytes, _Plan] = {}
+        self._plans: dict[bytes, PosePlan] = {}
         self._fresh = np.zeros_like(self.units)  # [U, U] pairs with an awake unit
         self._any_fresh = False
         self._awake_key = self._eq_key = b""
@@ -189,7 +135,7 @@ class World:
         else:
             plan = self._plan(self._awake | self._awake_before) if changed else self._steady_plan
             self._check_finite()
-        changed |= self._refresh_poses(plan) | self._refresh_grasped()
+        changed |= self.statics.poses.refresh(plan, self.data, self.rows) | self._refresh_grasped()
         if self._any_fresh or changed & Changed.AWAKE or everything:
             changed |= self._refresh_touching(everything)
         return changed
@@ -272,74 +218,15 @@ class World:
             "(reset the world; a smaller timestep or weaker controls may mend it)"
         )
 
-    def _plan(self, trees: np.ndarray | None) -> _Plan:
+    def _plan(self, trees: np.ndarray | None) -> PosePlan:
         """What moves with the given trees [T]; None: everything there is."""
         key = b"all" if trees is None else trees.tobytes()
         plan = self._plans.get(key)
         if plan is None:
             if len(self._plans) > 256:  # one per set of awake trees; sets repeat, but not for ever
                 self._plans.clear()
-            plan = self._plans[key] = self._make_plan(trees)
+            plan = self._plans[key] = self.statics.poses.plan(trees)
         return plan
-
-    def _make_plan(self, trees: np.ndarray | None) -> _Plan:
-        statics, tables, layout = self.statics, self.statics.tables, self.statics.layout
-        if trees is None:
-            moves, chosen = np.ones(len(statics.body_tree), bool), np.ones(tables.num_objects, bool)
-        else:
-            moves = np.concatenate([trees, [False]])[statics.body_tree]
-            chosen = np.any(layout.object_trees & trees, axis=1)
-        links = np.flatnonzero(moves[tables.link_body])
-        return _Plan(
-            bodies=np.flatnonzero(moves),
-            objects=np.flatnonzero(chosen),
-            roots=tables.object_root[chosen],
-            links=links,
-            link_bodies=tables.link_body[links],
-            boxes=plan_boxes(statics.boxes, chosen),
-            agents=bool(moves[tables.agent_body].any() or moves[tables.finger_body].any()),
-            joints=bool(chosen[tables.openable_object].any()),
-        )
-
-    def _refresh_poses(self, plan: _Plan) -> int:
-        data, rows, tables = self.data, self.rows, self.statics.tables
-        changed = Changed.NOTHING
-        xpos, xquat, xmat = data.xpos, data.xquat, data.xmat
-        if len(plan.bodies):
-            rows["body_pos"][plan.bodies] = xpos[plan.bodies]
-            rows["body_quat"][plan.bodies] = xquat[plan.bodies]
-            changed |= Changed.BODIES
-        if len(plan.objects):
-            rows["object_pos"][plan.objects] = xpos[plan.roots]
-            rows["object_quat"][plan.objects] = xquat[plan.roots]
-            rows["object_com"][plan.objects] = data.xipos[plan.roots]
-            rows["aabb_low"][plan.objects], rows["aabb_high"][plan.objects] = world_boxes(
-                self.statics.boxes.rule, plan.boxes, xpos, xmat
-            )
-            changed |= Changed.OBJECTS
-        if plan.joints:
-            rows["joint_pos"][:] = data.qpos[tables.openable_qposadr]
-            changed |= Changed.JOINTS
-        if len(plan.links):
-            turn = xmat[plan.link_bodies].reshape(-1, 3, 3)
-            offset = (turn @ tables.link_pos[plan.links][..., None])[..., 0]
-            rows["link_pos"][plan.links] = xpos[plan.link_bodies] + offset
-            rows["link_quat"][plan.links] = _multiply(xquat[plan.link_bodies], tables.link_quat[plan.links])
-            changed |= Changed.LINKS
-        if plan.agents:
-            rows["agent_pos"][:] = xpos[tables.agent_body]
-            rows["finger_pos"][:] = xpos[tables.finger_body]
-            quat = np.zeros(4)
-            for agent, camera in enumerate(tables.agent_camera):
-                if camera >= 0:
-                    rows["eye_pos"][agent] = data.cam_xpos[camera]
-                    mujoco.mju_mat2Quat(quat, data.cam_xmat[camera])
-                    rows["eye_quat"][agent] = quat
-                else:
-                    rows["eye_pos"][agent] = xpos[tables.agent_body[agent]]
-                    rows["eye_quat"][agent] = xquat[tables.agent_body[agent]]
-            changed |= Changed.AGENT
-        return changed
 
     def _note_awake(self) -> int:
         """Takes over which trees are awake, and everything that hangs on it alone."""
@@ -391,11 +278,3 @@ class World:
             touching[:] = np.logical_or.reduceat(np.logical_or.reduceat(units, starts, 0), starts, 1)
         np.fill_diagonal(touching, False)
         return Changed.TOUCHING
-
-
-def _multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Products of quaternions [n, 4], w-x-y-z."""
-    w, v = p[:, :1], p[:, 1:]
-    s, u = q[:, :1], q[:, 1:]
-    real = w * s - (v * u).sum(1, keepdims=True)
-    return np.concatenate([real, w * u + s * v + np.cross(v, u)], 1)

@@ -5,7 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from ig2mj.engine.native_world import Changed, World
+from ig2mj.engine.native_poses import Changed
+from ig2mj.engine.native_world import World
 from ig2mj.engine.sleep import wake_trees
 
 
