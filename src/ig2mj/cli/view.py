@@ -148,10 +148,7 @@ def _write_picture(scene, file, camera, eye, target, size, seconds, collision) -
     from ig2mj.viewer.offscreen import VISIBLE_GROUPS, default_backend, render
 
     home = load_scene(scene)
-    data = mujoco.MjData(home.model)
-    if home.model.nkey:
-        mujoco.mj_resetDataKeyframe(home.model, data, 0)
-    mujoco.mj_forward(home.model, data)
+    data = home.start_data()
     if seconds > 0:
         mujoco.mj_step(home.model, data, nstep=max(1, round(seconds / home.model.opt.timestep)))
     view = _view(home, data, camera, eye, target)

@@ -46,8 +46,7 @@ class Kitchen:
     def of(cls, scene: Scene) -> Kitchen:
         """Finds everything. Raises StateError where something is missing."""
         fish, milk, stove, fridge = (_only(scene, c) for c in ("fish", "milk", "stove", "fridge"))
-        model, data = scene.model, mujoco.MjData(scene.model)
-        mujoco.mj_kinematics(model, data)
+        data = scene.start_data()
         button, heat = (_link_pos(scene, data, stove, kind) for kind in ("toggle_button", "heat_source"))
         frame = data.body(scene.object(stove).bodies[0]).xmat.reshape(3, 3)
         sides = np.array([sign * frame[:, k] for k in (0, 1) for sign in (1, -1)])

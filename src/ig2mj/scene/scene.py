@@ -67,6 +67,14 @@ class Scene:
             add(spec)
         return spec
 
+    def start_data(self) -> mujoco.MjData:
+        """New data at the scene's start, everything derived up to date: the first keyframe, else the zero pose."""
+        data = mujoco.MjData(self.model)
+        if self.model.nkey:
+            mujoco.mj_resetDataKeyframe(self.model, data, 0)
+        mujoco.mj_forward(self.model, data)
+        return data
+
     def __repr__(self) -> str:
         return f"Scene('{self.name}', {len(self.object_names)} objects, {self.folder})"
 

@@ -24,7 +24,7 @@ def from_above(scenes: Sequence[Scene], columns: int = 4) -> Image.Image:
     """One RGB picture with a labelled tile per home, seen from above and a little from the south."""
     tiles = []
     for scene in scenes:
-        data = _start(scene)
+        data = scene.start_data()
         view = home_overview(scene, data, elevation=-68.0)
         view = dataclasses.replace(view, distance=FURTHER * view.distance)
         objects = sum(not entry.parked for entry in scene.manifest.objects) - 3  # walls, floors, ceilings
@@ -37,19 +37,11 @@ def rooms_inside(scenes: Sequence[Scene], columns: int = 4) -> Image.Image:
     """One RGB picture with a labelled tile per room of the homes, from the room's own camera."""
     tiles = []
     for scene in scenes:
-        data = _start(scene)
+        data = scene.start_data()
         cameras = {scene.model.camera(k).name for k in range(scene.model.ncam)}
         rooms = [room for room in scene.manifest.rooms.instances if room in cameras]
         tiles += [_tile(scene, data, room, f"{scene.name}: {room}") for room in rooms]
     return _sheet(tiles, columns)
-
-
-def _start(scene: Scene) -> mujoco.MjData:
-    data = mujoco.MjData(scene.model)
-    if scene.model.nkey:
-        mujoco.mj_resetDataKeyframe(scene.model, data, 0)
-    mujoco.mj_forward(scene.model, data)
-    return data
 
 
 def _tile(scene: Scene, data: mujoco.MjData, view, text: str) -> Image.Image:
