@@ -71,3 +71,31 @@ def lines(
     axes.legend(fontsize=7, ncols=2)
     figure.savefig(file, dpi=130)
     plt.close(figure)
+
+
+def curves(
+    file: pathlib.Path,
+    panels: Mapping[str, Mapping[str, tuple[Sequence[float], Sequence[float]]]],
+    xlabel: str,
+    ylabel: str,
+    log: bool = True,
+) -> None:
+    """A panel per name, in each a line per series of points (x, y). x is logarithmic, y too unless told otherwise."""
+    count = max(1, len(panels))
+    figure, row = plt.subplots(1, count, figsize=(4.2 * count + 0.8, 4.2), layout="constrained", squeeze=False)
+    for axes, (title, series) in zip(row[0], panels.items(), strict=False):
+        for name, (x, y) in series.items():
+            axes.plot(x, y, marker="o", markersize=3, linewidth=1.2, label=name)
+        axes.set_xscale("log", base=2)
+        if log:
+            axes.set_yscale("log")
+        else:
+            axes.set_ylim(bottom=0)
+        axes.set_xlabel(xlabel)
+        axes.set_title(title, fontsize=10)
+        axes.grid(alpha=0.3)
+        if series:
+            axes.legend(fontsize=7)
+    row[0][0].set_ylabel(ylabel)
+    figure.savefig(file, dpi=130)
+    plt.close(figure)

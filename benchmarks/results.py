@@ -47,15 +47,19 @@ def save(
     rows: list[dict[str, Any]],
     tables: Sequence[Table],
     out: pathlib.Path,
+    measured_on: dict[str, Any] | None = None,
 ) -> pathlib.Path:
-    """Writes JSON and tables below `out`, prints the tables, and returns the benchmark's folder."""
+    """Writes JSON and tables below `out`, prints the tables, and returns the benchmark's folder.
+
+    `measured_on`: the machine, where that is another one than this; with "what" in a few words.
+    """
     folder = out / name
     folder.mkdir(parents=True, exist_ok=True)
     result = {
         "benchmark": name,
         "date": datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds"),
         "command": command(),
-        "machine": machine(core),
+        "machine": measured_on or machine(core),
         "settings": settings,
         "rows": rows,
     }
@@ -66,7 +70,8 @@ def save(
         console.print(table)
         text += [f"### {table.title}", "", *_markdown(table), ""]
     who = result["machine"]
-    text.append(f"{who['processor']}, {who['cores_used']} core used; `{result['command']}`; {result['date'][:10]}")
+    where = who["what"] if measured_on else f"{who['processor']}, {who['cores_used']} core used"
+    text.append(f"{where}; `{result['command']}`; {result['date'][:10]}")
     (folder / "table.md").write_text("\n".join(text) + "\n")
     return folder
 
