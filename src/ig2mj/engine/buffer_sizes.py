@@ -23,8 +23,8 @@ from ig2mj.engine.profile import EngineProfile, default_profile
 RARE = 1e-8
 """Share of world-steps that may overflow a world's own buffers: one in 6,000 control steps of 16,384 worlds."""
 
-TAIL_FROM, TAIL_LEAST = 1e-2, 20
-"""The tail is followed from the value exceeded in this share of world-steps to that exceeded this many times."""
+TAIL_LEAST, TAIL_LENGTH = 20, 1.5
+"""A tail's slope is taken up to the value exceeded in this many world-steps, from this many decades more often."""
 
 SHARED = 1.5
 """Factor on the largest mean over the worlds, for buffers that all worlds share."""
@@ -71,9 +71,8 @@ class Tail:
             return 0.0
         if share * self.total >= TAIL_LEAST:
             return float(self.exceeded(share))
-        seen = min(TAIL_FROM / 10, TAIL_LEAST / self.total) if self.total > 10 * TAIL_LEAST / TAIL_FROM else TAIL_FROM
-        start = TAIL_FROM if seen < TAIL_FROM else 0.5
-        decade = (self.exceeded(seen) - self.exceeded(start)) / math.log10(start / seen)
+        seen = min(0.05, TAIL_LEAST / self.total)
+        decade = (self.exceeded(seen) - self.exceeded(seen * 10**TAIL_LENGTH)) / TAIL_LENGTH
         from_peak = self.peak + decade * math.log10(max(1.0, 1 / (self.total * share)))
         return max(from_peak, self.exceeded(seen) + decade * math.log10(seen / share))
 
