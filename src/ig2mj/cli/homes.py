@@ -194,7 +194,7 @@ def sheet(
     use_opengl()
     chosen = [build_model(e, k, seed) for e in entries for k in range(min(models, e.count))]
     contact_sheet(chosen, opened=opened, felt=collision).save(out)
-    print(f"{out}: {len(chosen)} models")
+    print(f"{out}: {len(chosen)} model{'s' * (len(chosen) != 1)}")
 
 
 def pictures(

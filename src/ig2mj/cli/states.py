@@ -83,7 +83,7 @@ def _print_table(world: Simulation, names: list[str], rows: dict[str, dict[str, 
     if least_width(columns, body) > console.width:
         columns = ["object", "states"]
         body = [[o, ", ".join(_named(n, v, STATES[n].unit) for n, v in values.items())] for o, values in rows.items()]
-    title = f"{world.scene.name}, {world.time:.2f} s: {len(rows)} objects"
+    title = f"{world.scene.name}, {world.time:.2f} s: {len(rows)} object{'s' * (len(rows) != 1)}"
     console.print(make_table(title, columns, body))
 
 

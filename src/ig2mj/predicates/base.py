@@ -95,6 +95,11 @@ class Predicate:
         return len(self.arguments)
 
 
+def celsius(value: float) -> str:
+    """For `why` texts; a highest temperature is minus infinity until the first step."""
+    return f"{value:.1f} C" if value > -np.inf else "not known yet"
+
+
 def yes(value: object) -> str:
     """For `why` texts."""
     return "yes" if bool(value) else "no"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from jaxtyping import Bool
 
 from ig2mj.engine.view import Array
-from ig2mj.predicates.base import Context, Predicate
+from ig2mj.predicates.base import Context, Predicate, celsius
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 
@@ -18,8 +18,8 @@ def _cooked(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O"]:
 
 def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
     p, o = context.model.parameters, arguments[0]
-    text = f"highest temperature {float(context.states.max_temperature[world, o]):.1f} C, cooks at "
-    text += f"{p.cook_temperature[o]:.1f} C"
+    reached = celsius(float(context.states.max_temperature[world, o]))
+    text = f"highest temperature {reached}, cooks at {p.cook_temperature[o]:.1f} C"
     return text + (f", burns at {p.burn_temperature[o]:.1f} C" if context.model.paper else "")
 
 
