@@ -13,7 +13,7 @@ from .plan import Edge, Opening, Plan, Room, make_edges
 AIR = 0.004  # m, around a door's or window's frame in its opening
 CORNER = 0.30  # m, least distance of an opening from a room's corner: a leaf that opens by 100 degrees needs it
 PASSAGE_WIDTH, PASSAGE_TOP = 1.30, 2.10  # m
-SILL = 0.90  # m, height of window sills
+SILL, COUNTER_SILL = 0.90, 1.0  # m, height of window sills; in kitchens, where cupboards stand below
 LONG = 4.0  # m of outer wall from which there are two windows in it
 LARGE = 15.0  # m2 of room from which there are windows in two walls
 KNOB = 0.053  # m, by which a door's box is deeper than its frame (families/doors_windows.py)
@@ -147,7 +147,8 @@ def _windows(room: Room, edges: list[Edge], index: int, taken: list[Opening], se
             centre = edge.low + edge.length * (k + 0.5) / count
             low, high = centre - width / 2 - 0.25, centre + width / 2 + 0.25
             if all(o.edge != edge or o.high < low or o.low > high for o in taken):
-                found.append(Opening("window", edge, centre, width, SILL, SILL + height, index, room.name))
+                sill = COUNTER_SILL if room.kind == "kitchen" else SILL
+                found.append(Opening("window", edge, centre, width, sill, sill + height, index, room.name))
     return found
 
 

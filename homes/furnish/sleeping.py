@@ -14,6 +14,8 @@ from .room import degrees_of
 
 LID = 0.2
 """m, behind a chest: its lid tips backwards."""
+ATTEMPTS = 12
+"""At the three fittings of a bathroom."""
 
 
 def bedroom(kit: RoomKit) -> Iterator[Thing | None]:
@@ -113,12 +115,9 @@ def closet(kit: RoomKit) -> Iterator[Thing | None]:
 
 def bathroom(kit: RoomKit) -> Iterator[Thing | None]:
     """Bathtub or shower, toilet, washbasin with a mirror, towels."""
-    big = "bathtub" if kit.room.area > 5.5 else "shower"
-    tub = kit.at_wall(big, place="corner", under_window=big == "bathtub") or kit.at_wall("shower", place="corner")
+    tub, toilet, sink = _fittings(kit)
     yield tub
-    yield kit.at_wall("toilet", room_before=0.35)
-    below = with_doors if kit.room.area > 5.5 else None
-    sink = kit.at_wall("sink", room_before=0.45, under_window=False, index=kit.home.index("sink", below))
+    yield toilet
     yield sink
     if sink is not None:
         yield kit.above(sink, "mirror", 1.25)
@@ -130,3 +129,20 @@ def bathroom(kit: RoomKit) -> Iterator[Thing | None]:
     yield kit.at_wall("shelf", place="corner", under_window=False)
     yield kit.at_wall("stool", place="corner")
     yield kit.at_wall("basket", place="corner")
+
+
+def _fittings(kit: RoomKit) -> list[Thing | None]:
+    """Bathtub or shower, toilet and washbasin, tried until all three have found a place."""
+    large = kit.room.area > 5.5
+    start, found = kit.home.now(), []
+    for attempt in range(ATTEMPTS):
+        kit.home.back_to(start)
+        tub = kit.at_wall("bathtub", place="corner") if large and attempt < ATTEMPTS / 2 else None
+        tub = tub or kit.at_wall("shower", place="corner", under_window=False)
+        toilet = kit.at_wall("toilet", room_before=0.35, place="corner" if attempt % 2 else "any")
+        index = kit.home.index("sink", with_doors if large else None)
+        sink = kit.at_wall("sink", room_before=0.45, under_window=False, index=index)
+        found = [tub, toilet, sink]
+        if all(found):
+            break
+    return found

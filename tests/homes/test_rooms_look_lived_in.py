@@ -128,7 +128,7 @@ def test_carpets_lie_on_the_floor_and_what_stands_on_one_stands_on_it_wholly(nam
 @pytest.mark.parametrize("name", LARGE)
 def test_no_room_of_a_larger_home_is_empty(name: str):
     for room in home(name).plan.rooms:
-        assert len([t for t in things_in(name, room) if t.category not in OPENINGS]) >= 3, room.name
+        assert len([t for t in things_in(name, room) if t.category not in OPENINGS]) >= 2, room.name
 
 
 @pytest.mark.parametrize("name", LARGE)
