@@ -62,9 +62,9 @@ def run(case: Case, num_worlds: int, disturbed: bool, what: str, lock: pathlib.P
     compile_seconds = time.time() - start
     with exclusive(lock):
         start = time.time()
-        carry, _ = jax.block_until_ready(compiled(carry))
+        carry, (seen, acts) = jax.block_until_ready(compiled(carry))
         first = time.time() - start
-        times, activity, seen = [], [], np.zeros(1)
+        times, activity = [], [acts]
         while len(times) < LEAST_CALLS or (len(times) < CALLS and sum(times) + times[-1] < CALL_SECONDS):
             start = time.time()
             carry, (seen, acts) = jax.block_until_ready(compiled(carry))
