@@ -43,21 +43,10 @@ class BoxTable:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BoxPlan:
-    """The rows of a `BoxTable` for some objects, gathered once.
-
-    Attributes:
-      starts: [n] first row of each of the n objects. round: some row has a radius. The others: as in the table.
-    """
+    """The rows of a `BoxTable` for some objects, gathered once. `starts`: [n] first row of each of the n objects."""
 
     starts: np.ndarray
-    body: np.ndarray
-    points: np.ndarray
-    radius: np.ndarray
-    axis: np.ndarray
-    center: np.ndarray
-    half: np.ndarray
-    margin: np.ndarray
-    round: bool
+    rows: BoxTable
 
 
 def make_box_table(rule: str, model: mujoco.MjModel, tables: SceneTables, layout: ModelLayout) -> BoxTable:
@@ -98,19 +87,10 @@ def make_box_table(rule: str, model: mujoco.MjModel, tables: SceneTables, layout
 def plan_boxes(table: BoxTable, chosen: np.ndarray) -> BoxPlan:
     """Prepares boxes of the chosen objects, mask [O]; they come in the objects' order."""
     rows = np.flatnonzero(chosen[table.owner])
-    owner = table.owner[rows]
-    radius = table.radius[rows]
-    return BoxPlan(
-        starts=np.flatnonzero(np.diff(owner, prepend=-1)),
-        body=table.body[rows],
-        points=table.points[rows],
-        radius=radius,
-        axis=table.axis[rows],
-        center=table.center[rows],
-        half=table.half[rows],
-        margin=table.margin[rows],
-        round=bool(radius.any()),
-    )
+    columns = {f.name: getattr(table, f.name) for f in dataclasses.fields(table)}
+    gathered = {name: column[rows] for name, column in columns.items() if isinstance(column, np.ndarray)}
+    picked = dataclasses.replace(table, **gathered, any_round=bool(gathered["radius"].any()))
+    return BoxPlan(np.flatnonzero(np.diff(picked.owner, prepend=-1)), picked)
 
 
 def world_boxes(rule: str, plan: BoxPlan, xpos: np.ndarray, xmat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -123,14 +103,15 @@ def world_boxes(rule: str, plan: BoxPlan, xpos: np.ndarray, xmat: np.ndarray) ->
     Returns:
       low, high: [n, 3] float64, world frame.
     """
-    rotation = xmat[plan.body].reshape(-1, 3, 3)
+    rows = plan.rows
+    rotation = xmat[rows.body].reshape(-1, 3, 3)
     if rule == "tight":
-        low, high = core_boxes(rotation, plan.points, plan.radius if plan.round else None, plan.axis)
+        low, high = core_boxes(rotation, rows.points, rows.radius if rows.any_round else None, rows.axis)
     else:
-        low, high = turned_boxes(rotation, plan.center, plan.half, plan.margin)
-    position = xpos[plan.body]
+        low, high = turned_boxes(rotation, rows.center, rows.half, rows.margin)
+    position = xpos[rows.body]
     low, high = np.add(low, position), np.add(high, position)
-    if len(plan.starts) == len(plan.body):
+    if len(plan.starts) == len(rows.body):
         return low, high
     return np.minimum.reduceat(low, plan.starts), np.maximum.reduceat(high, plan.starts)
 
