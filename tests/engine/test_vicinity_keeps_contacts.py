@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 from collections.abc import Callable
 
 import mujoco
 import numpy as np
 import pytest
 
+import ig2mj
+from ig2mj.agents.floating_hand import add_floating_hand, hand_ctrl
 from ig2mj.engine import vicinity
+from ig2mj.engine.native import NativeEngine
 from ig2mj.engine.vicinity import Masks, Vicinity, VicinityTable
 
 Act = Callable[[int, mujoco.MjData, np.random.Generator], None]
@@ -214,3 +219,22 @@ def test_planes_and_the_world_stay_in():
     near = Vicinity(VicinityTable.build(model, np.zeros((0, 2), int)), model, data)
     near.begin()
     assert np.flatnonzero(near.contype).tolist() == [0, 1, 2]
+
+
+def test_the_engine_with_a_hand_is_bitwise_the_same_and_shows_no_mask(tiny_home_folder, monkeypatch):
+    monkeypatch.setattr(vicinity, "WORTHWHILE", 1.0)  # the home is small
+    scene = ig2mj.load_scene(tiny_home_folder, agents=[functools.partial(add_floating_hand, pos=(0.1, 0.2, 0.65))])
+    ours = NativeEngine(scene)
+    build = VicinityTable.build
+    monkeypatch.setattr(VicinityTable, "build", lambda *args: dataclasses.replace(build(*args), usable=False))
+    plain, closed = NativeEngine(scene), 0
+    one, two = ours.reset(), plain.reset()
+    for step in range(60):
+        ctrl = hand_ctrl((0.01 * min(step, 20), -0.02 * step, 0.0), (0, 0, 0), closed=0.0)[None]
+        (one, a), (two, b) = ours.step(one, ctrl), plain.step(two, ctrl)
+        closed += not one.worlds[0]._near.open
+        assert two.worlds[0]._near.open
+        for field in dataclasses.fields(a):
+            np.testing.assert_array_equal(getattr(a, field.name), getattr(b, field.name), err_msg=field.name)
+        np.testing.assert_array_equal(ours.to_mujoco(one, 0)[0].body_contype, scene.model.body_contype)
+    assert closed > 10

@@ -222,7 +222,6 @@ class NativeEngine:
     def to_mujoco(self, physics: NativePhysics, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """The live model and data of a world. Do not step them."""
         one = physics.worlds[world]
-        one.masks.open()
         one.model.eq_data[:] = one.eq_data
         return one.model, one.data
 

@@ -62,6 +62,7 @@ class World:
         self._none_awake = False
         self._steady_plan = self._plan(self._awake)
         self._has_force = False
+        self._numbers = self.data.qpos, self.data.qvel
         self._timestep = float(model.opt.timestep)
         self._has_grasps = len(statics.layout.grasp_equality) > 0
         outside = (self.data.qvel, self.data.xfrc_applied, self.data.qfrc_applied)
@@ -88,6 +89,7 @@ class World:
         self._near.moved()
         self._let_near()
         mujoco.mj_step1(model, data)
+        self.masks.open()  # nobody else is to see a model with masks
         if found:
             self._has_force = True
             changed |= Changed.FORCE
@@ -97,9 +99,8 @@ class World:
         self.masks.put(self._near.contype, self._near.conaffinity)
 
     def disturbed(self) -> None:
-        """To be called before `mj_step1` where the data was changed by another way than a step."""
+        """To be called where the data was changed by another way than a step."""
         self._near.forget()
-        self._let_near()
 
     def only_time_passes(self) -> bool:
         """Lets time pass by one control step where that is all that happens; false where the world must be stepped.
@@ -201,10 +202,9 @@ class World:
         )
 
     def _check_finite(self) -> None:
-        data = self.data
-        if abs(float(data.qpos.sum())) < mujoco.mjMAXVAL and abs(float(data.qvel.sum())) < mujoco.mjMAXVAL:
-            return  # false for NaN, too
-        model = self.model
+        data, model, (qpos, qvel) = self.data, self.model, self._numbers
+        if qpos.dot(qpos) < mujoco.mjMAXVAL and qvel.dot(qvel) < mujoco.mjMAXVAL:
+            return  # false for NaN, too; what is larger is looked at closely
         wrong = ~(np.abs(data.qvel) < mujoco.mjMAXVAL)
         bodies = set(model.dof_bodyid[wrong])
         coordinates = np.flatnonzero(~(np.abs(data.qpos) < mujoco.mjMAXVAL))

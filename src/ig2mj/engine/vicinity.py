@@ -18,6 +18,7 @@ Axes: B bodies, G geoms, T trees, V degrees of freedom.
 from __future__ import annotations
 
 import dataclasses
+import math
 
 import mujoco
 import numpy as np
@@ -33,6 +34,9 @@ WORTHWHILE = 0.7
 
 PATIENCE = 30
 """Control steps until it is tried again, where it was not worth it or fewer trees are awake than when last tried."""
+
+HARDLY = 1e-4
+"""Metres of a physics step that need not be known better."""
 
 _NEVER = 1e30
 """Weight of the speed of what must not move."""
@@ -200,6 +204,7 @@ class Vicinity:
         self._weights, self._speeds = np.zeros(model.nv), np.zeros(model.nv)
         self._bits, self._still = self._qvel.view(np.int64), np.zeros(model.nv, np.int64)
         self._left = 0.0  # metres that a body may still move
+        self._loose = 0.0  # metres per unit of the speeds' norm
         self._looked_at = b"", b""  # trees awake, equalities active
         self._wait = 0
         self._let_in()
@@ -232,7 +237,9 @@ class Vicinity:
         """After positions were integrated, before the next collision."""
         if self.open:
             return
-        self._left -= self._travel()
+        # First a bound that is quick to compute and loose; it is all that an agent at rest needs.
+        travel = math.sqrt(self._qvel.dot(self._qvel)) * self._loose
+        self._left -= travel if travel < HARDLY else self._travel()
         if not self._left >= 0.0:
             self._look((self._tree_awake.tobytes(), self._eq_active.tobytes()))
 
@@ -258,6 +265,7 @@ class Vicinity:
             return self._let_in()
         sure = self._trees[table.dof_tree]
         self._weights = np.where(sure, table.levers.weights(self._data), _NEVER)
+        self._loose = max(1.0, float(np.linalg.norm(self._weights[sure]))) * table.timestep
         self._still = np.where(sure, 0, -1)
         self._left = REACH - ROUNDING - self._travel()
         if not self._left >= 0.0:
