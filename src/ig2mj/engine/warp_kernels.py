@@ -1,11 +1,12 @@
 """Warp kernels that cost what is awake, not what could be: changes to MuJoCo Warp 3.17 for households.
 
-Nearly everything in a home sleeps, but four parts of MuJoCo Warp's step cost as if nothing did. `use_awake_kernels`
+Nearly everything in a home sleeps, but five parts of MuJoCo Warp's step cost as if nothing did. `use_awake_kernels`
 puts these in their place; results are the same up to rounding:
 
 - The factorisations of the compacted solver run over the buffer (`nvmax`, sized for the worst moment of the busiest
   world) though the rest of it is identity. Here they stop after the degrees of freedom awake in each world.
 - The same for filling those matrices.
+- The broad phase of collision detection goes through all pairs of geoms (`ig2mj.engine.warp_broadphase`).
 - Gravity compensation is launched for every (world, body, degree of freedom). Here it is for every (world, body).
 - The velocity stage runs again at the end of a step with sleep, only to renew derived quantities (`cvel`,
   `qfrc_bias`) that the next step computes anew from positions and velocities. Here they are those of the step's
@@ -46,6 +47,7 @@ from mujoco.mjx.third_party.mujoco_warp._src import (
     types,
 )
 
+from ig2mj.engine import warp_broadphase
 from ig2mj.engine.warp_contacts import mend_contacts
 
 TILE = 16
@@ -70,7 +72,7 @@ _NEEDED = {
         "create_blocked_cholesky_solve_newton_func",
     ),
     passive: ("passive",),
-    collision_driver: ("collision",),
+    collision_driver: ("collision", *warp_broadphase.NEEDED),
     forward: ("_advance", "fwd_velocity"),
 }
 
@@ -93,6 +95,8 @@ def use_awake_kernels() -> bool:
         (solver, "_solve_init_dof", _solve_init_dof),
         (passive, "passive", _passive),
         (collision_driver, "collision", _collision),
+        (collision_driver, "nxn_broadphase", functools.partial(_broadphase, "nxn_broadphase")),
+        (collision_driver, "sap_broadphase", functools.partial(_broadphase, "sap_broadphase")),
         (forward, "_advance", _advance),
         (forward, "fwd_velocity", _fwd_velocity),
     ):
@@ -374,6 +378,14 @@ def _passive(m: Any, d: Any) -> None:
 
 
 # Collision detection.
+
+
+def _broadphase(name: str, m: Any, d: Any, ctx: Any, awake_prev: Any = None) -> None:
+    """`name`: the broad phase that MuJoCo Warp chose."""
+    if warp_broadphase.serves(m):
+        warp_broadphase.awake_broadphase(m, d, ctx, awake_prev)
+    else:
+        _upstream[collision_driver, name](m, d, ctx, awake_prev)
 
 
 def _collision(m: Any, d: Any, awake_prev: Any = None) -> None:
