@@ -52,6 +52,8 @@ def kitchen(kit: RoomKit) -> Iterator[Thing | None]:
     counters = [thing for thing in run if thing.category == "bottom_cabinet"]
     if counters:
         yield kit.on(counters[-1], "microwave", degrees=0, at="middle")
+        if kit.home.roomy:
+            yield kit.on(counters[0], "paper_towel", degrees=0)
     if not any(room.kind == "dining_room" for room in kit.home.plan.rooms):
         yield from table_with_chairs(kit, "breakfast_table", 2)
     elif kit.room.area > ISLAND:

@@ -70,13 +70,13 @@ def childs_room(kit: RoomKit) -> Iterator[Thing | None]:
     bed = kit.at_wall("bed", place="corner") or kit.at_wall("crib", place="corner")
     yield bed
     yield kit.at_wall("shelf", under_window=False, place="corner")
+    yield kit.at_wall("backpack", place="corner")
     if bed is not None:
         yield kit.on(bed, "pillow", degrees=0, at=_head(bed, 0.0))
     yield kit.at_wall("chest", room_before=0.4, wall_gap=LID)
     yield from kit.desk_with("straight_chair")
     yield middle_carpet(kit)
     yield kit.hang("picture", 1.4)
-    yield kit.at_wall("backpack", place="corner")
     yield kit.at_wall("toy", place="corner")
     yield kit.under_window("heater")
     yield kit.at_wall("stand", place="corner")
