@@ -33,11 +33,8 @@ def run(
       out: folder; profiles go to OUT/<scene's name>/ instead of beside the manifests.
       json: print the profiles as JSON, by scene.
     """
-    import msgspec
-    from rich.console import Console
-    from rich.progress import Progress
-
     from ig2mj.calibration import calibrate
+    from ig2mj.cli.printing import add_bar, print_json, progress_bar, stdout_console
     from ig2mj.engine.profile import save_profile
     from ig2mj.errors import Ig2mjError
 
@@ -48,8 +45,8 @@ def run(
     profiles = {}
     for scene in scenes:
         loaded, reach = _with_hand(scene, hand)
-        with Progress(console=Console(stderr=True), transient=True) as bar:
-            task = bar.add_task(f"disturbing {loaded.name}", total=None)
+        with progress_bar() as bar:
+            report = add_bar(bar, f"disturbing {loaded.name}")
             profile = calibrate(
                 loaded,
                 reach,
@@ -58,16 +55,16 @@ def run(
                 rounds=rounds,
                 seed=seed,
                 safety=safety,
-                progress=lambda done, total, bar=bar, task=task: bar.update(task, completed=done, total=total),
+                progress=lambda done, total, report=report: report("", done, total),
             )
         folder = loaded.folder if out is None else out / loaded.folder.name
         folder.mkdir(parents=True, exist_ok=True)
         file = save_profile(profile, folder)
         profiles[loaded.name] = profile
         if not json:
-            Console().print(_table(f"{loaded.name}: {file}", profile, loaded.model))
+            stdout_console().print(_table(f"{loaded.name}: {file}", profile, loaded.model))
     if json:
-        print(msgspec.json.encode(profiles).decode())
+        print_json(profiles)
 
 
 def _with_hand(scene: pathlib.Path, hand: bool):
