@@ -1,0 +1,64 @@
+"""Cases of the throughput benchmark: the hand where it reaches things, buffer sizes from where they are told to be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from batch_case import Case
+from disturbance import Activity, geoms_of, join, summary
+from made_home import write_home
+
+from ig2mj.engine.profile import EngineProfile, save_profile
+
+PROFILE = EngineProfile(awake_dofs=40, constraints=200, contacts=30, convex_contacts=20)
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A made home of 20, and beside it a folder with its buffer sizes."""
+    folder = tmp_path_factory.mktemp("cases")
+    (folder / "profiles" / "made_20").mkdir(parents=True)
+    save_profile(PROFILE, folder / "profiles" / "made_20")
+    return write_home(folder / "made_20", 20)
+
+
+def test_a_disturbed_case_has_a_hand_where_it_reaches_things(home):
+    case = Case(str(home), True, 1, home.parent / "profiles")
+    assert case.scene.model.nu == 16 and case.eye == "hand/eye"
+    hand = case.scene.tables.agent_body[0]
+    assert np.allclose(case.scene.model.body_pos[hand], case.reach.start)
+    assert len(case.reach.objects) == 16
+    assert case.profile == PROFILE
+    assert case.pool.size == 1 and set(case.seconds) == {"reach", "pool", "profile"}
+
+
+def test_an_idle_case_has_a_camera_there_and_nothing_that_moves(home):
+    case = Case(str(home), False, 1, home.parent / "profiles")
+    model = case.scene.model
+    assert model.nu == 0 and case.eye == "eye/eye"
+    assert np.allclose(model.body_pos[model.body("eye").id], case.reach.start)
+    assert model.body_treeid[model.body("eye").id] == -1
+
+
+def test_touch_is_between_the_hands_solid_geoms_and_loose_objects(home):
+    case = Case(str(home), True, 1, home.parent / "profiles")
+    hand, thing = geoms_of(case.scene)
+    model = case.scene.model
+    assert {model.geom(g).name.split("/")[1] for g in np.flatnonzero(hand)} == {"collision_0"}
+    assert hand.sum() == 11 and not (hand & thing).any()
+    names = {model.geom(g).name.split("/")[0] for g in np.flatnonzero(thing)}
+    assert names == {f"thing_{k}" for k in range(16)}
+
+
+def test_what_a_row_says_of_a_hand_is_a_mean_over_steps_and_worlds():
+    touched = np.array([[True, False, False, False], [True, True, False, False]])
+    one = Activity(touched=touched, awake_mean=np.array([20.0, 22.0]), awake_most=np.array([30.0, 28.0]))
+    row = summary(join([one, one]), 16)
+    assert row == {
+        "hand_contact_share": 0.375,
+        "worlds_touched_share": 0.5,
+        "awake_dofs_beside_the_hand": 5.0,
+        "awake_dofs_peak": 30,
+    }
