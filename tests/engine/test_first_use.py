@@ -57,10 +57,21 @@ def test_many_short_works_in_a_row_are_one_wait(impatient, monkeypatch):
     monkeypatch.setattr(sys, "stderr", io.StringIO())
     monkeypatch.setattr(waiting, "PAUSE", 60.0)
     for number in range(40):
-        with impatient.during(lambda n=number: kernels_text(n + 1)):
+        with impatient.during(lambda n=number: kernels_text(n + 1), in_row=True):
             time.sleep(0.02)
     lines = sys.stderr.getvalue().splitlines()  # type: ignore[attr-defined]
     assert 2 <= len(lines) < 20 and not lines[0].startswith(kernels_text(1))
+
+
+def test_many_short_works_that_are_no_row_are_not_told(impatient, monkeypatch):
+    """Little programs that XLA compiles one after the other, as code outside `jit` makes them."""
+    monkeypatch.setattr(sys, "stderr", io.StringIO())
+    monkeypatch.setattr(waiting, "PATIENCE", 2.0)
+    deadline = time.monotonic() + 2.5
+    while time.monotonic() < deadline:
+        with impatient.during(lambda: "working"):
+            time.sleep(0.01)
+    assert sys.stderr.getvalue() == ""  # type: ignore[attr-defined]
 
 
 def test_in_a_terminal_the_line_goes_when_the_work_is_done(impatient, monkeypatch):
@@ -89,7 +100,7 @@ def test_a_closed_stderr_harms_nobody(impatient, monkeypatch):
 
 def test_work_within_work_does_not_wait_for_itself(impatient):
     with impatient.during(lambda: "outer"), impatient.during(lambda: "inner"):
-        assert [text() for _, text in impatient._works] == ["outer", "inner"]
+        assert [work.text() for work in impatient._works] == ["outer", "inner"]
 
 
 def test_more_modules_than_usual_are_told_as_they_are():
@@ -103,9 +114,9 @@ def test_what_xla_compiles_is_told(monkeypatch):
     begun = []
 
     class Told(Waiting):
-        def begin(self, text):
+        def begin(self, text, in_row=False):
             begun.append(text())
-            return super().begin(text)
+            return super().begin(text, in_row)
 
     told = Told()
     monkeypatch.setattr("ig2mj.engine.compile_cache.WAITING", told)

@@ -19,7 +19,7 @@ import jax
 import jax.monitoring
 import platformdirs
 
-from ig2mj.engine.waiting import WAITING
+from ig2mj.engine.waiting import WAITING, Work
 
 ENVIRONMENT = "IG2MJ_CACHE_DIR"
 
@@ -67,7 +67,7 @@ def keep_jax_programs() -> pathlib.Path | None:
 @functools.cache
 def report_xla_compilation() -> None:
     """From now on this process tells on stderr that XLA compiles a program, where that takes long."""
-    begun: dict[tuple[int, str], object] = {}
+    begun: dict[tuple[int, str], Work] = {}
 
     def begin(event: str, value: float | int, **about: str | int) -> None:
         if event == XLA_EVENT:
@@ -109,7 +109,7 @@ def report_warp_compilation() -> None:
         if output_dir is None or output_name is None or pathlib.Path(output_dir, output_name).exists():
             return compile_module(self, device, output_dir, output_name, *args, **kw)
         text = kernels_text(next(numbers))
-        with WAITING.during(lambda: text):
+        with WAITING.during(lambda: text, in_row=True):
             return compile_module(self, device, output_dir, output_name, *args, **kw)
 
     module._compile = compile_and_report

@@ -4,6 +4,7 @@ then. For work that other libraries do inside a call, where no progress bar can 
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import sys
 import threading
 import time
@@ -19,9 +20,18 @@ REDRAW = 0.5
 """Seconds between two drawings of the line in a terminal."""
 
 PAUSE = 3.0
-"""Seconds without work after which the next work is told as a new wait."""
+"""Seconds without work after which the next piece is the first of a new row."""
 
 Text = Callable[[], str]
+
+
+@dataclasses.dataclass(eq=False)
+class Work:
+    """One piece of work. `began`: seconds of the monotonic clock; of the first piece, where it is one of a row."""
+
+    text: Text
+    began: float
+    in_row: bool
 
 
 class Waiting:
@@ -29,53 +39,58 @@ class Waiting:
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
-        self._works: list[tuple[object, Text]] = []
+        self._works: list[Work] = []
         self._thread: threading.Thread | None = None
-        self._began = self._ended = self._told = float("-inf")
+        self._row_began = self._row_ended = self._told = float("-inf")
         self._drawn = False
 
     @contextlib.contextmanager
-    def during(self, text: Text) -> Iterator[None]:
-        """Tells `text()` while the block runs."""
-        token = self.begin(text)
+    def during(self, text: Text, in_row: bool = False) -> Iterator[None]:
+        """Tells `text()` while the block runs; `in_row`: see `begin`."""
+        work = self.begin(text, in_row)
         try:
             yield
         finally:
-            self.end(token)
+            self.end(work)
 
-    def begin(self, text: Text) -> object:
-        """Work begins; returns what `end` takes."""
-        token, now = object(), time.monotonic()
+    def begin(self, text: Text, in_row: bool = False) -> Work:
+        """Work begins; returns what `end` takes.
+
+        Args:
+          in_row: one of many pieces, together one wait. Others are each a wait of their own.
+        """
+        now = time.monotonic()
         with self._changed:
-            if not self._works and now - self._ended > PAUSE:
-                self._began, self._told = now, float("-inf")
-            self._works.append((token, text))
+            if in_row and now - self._row_ended > PAUSE and not any(w.in_row for w in self._works):
+                self._row_began = now
+            work = Work(text, self._row_began if in_row else now, in_row)
+            self._works.append(work)
             if self._thread is None:
                 self._thread = threading.Thread(target=self._tell_while_working, name="ig2mj-waiting", daemon=True)
                 self._thread.start()
-        return token
+            self._changed.notify_all()
+        return work
 
-    def end(self, token: object) -> None:
+    def end(self, work: Work) -> None:
         """Work has ended, well or not; the line in the terminal goes."""
         with self._changed:
-            self._works = [(t, text) for t, text in self._works if t is not token]
-            if not self._works:
-                self._ended = time.monotonic()
-                if self._drawn:
-                    _write("\r\x1b[K")
-                    self._drawn = False
+            self._works.remove(work)
+            if work.in_row:
+                self._row_ended = time.monotonic()
+            if self._drawn and not self._works:
+                _write("\r\x1b[K")
+                self._drawn = False
             self._changed.notify_all()
 
     def _tell_while_working(self) -> None:
         with self._changed:
             while self._works:
-                in_terminal = sys.stderr.isatty()
-                now = time.monotonic()
-                due = max(self._began + PATIENCE, self._told + (REDRAW if in_terminal else EVERY))
+                in_terminal, now, work = sys.stderr.isatty(), time.monotonic(), self._works[-1]
+                due = max(work.began + PATIENCE, self._told + (REDRAW if in_terminal else EVERY))
                 if now < due:
                     self._changed.wait(due - now)
                     continue
-                line = f"{self._works[-1][1]()} ({now - self._began:.0f} s)"
+                line = f"{work.text()} ({now - work.began:.0f} s)"
                 _write(f"\r{line}\x1b[K" if in_terminal else f"{line}\n")
                 self._drawn, self._told = in_terminal, now
             self._thread = None

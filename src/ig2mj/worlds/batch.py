@@ -57,7 +57,11 @@ class Batch:
 
 
 class Worlds:
-    """The functions of a batch; holds constants only."""
+    """The functions of a batch; holds constants only.
+
+    Attributes:
+      floor: [O] metres; the height below which each object has left the house.
+    """
 
     def __init__(
         self,
@@ -83,7 +87,7 @@ class Worlds:
         self._react = self._rules if engine.pure else jax.jit(self._rules)
         physics = engine.reset()
         view = jit_if_pure(lambda p: jax.tree.map(lambda a: a[:1], engine.view(p)))(physics)
-        self._floor = guards.lowest_support(view, model.tables.object_fixed)
+        self.floor = guards.lowest_support(view, model.tables.object_fixed)
         if pool is None:
             row = jax.tree.map(lambda a: a[None], engine.export(physics, 0))
             states = initial_values if initial_values is not None else initial_states(model, 1)
@@ -175,7 +179,7 @@ class Worlds:
         states, swap = update(self.model, states, view, relations)
         teleports = self._teleports(swap, view) if len(self.model.swap_objects) else None
         verdict = None if self.goal is None else self.goal.verdict(states, view, relations)
-        return states, teleports, verdict, guards.check(health, view, self._floor)
+        return states, teleports, verdict, guards.check(health, view, self.floor)
 
     def _teleports(self, swap: Swap, view: PhysicsView) -> Write:
         """The engine's write for what slicing asks."""

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import os
 import pathlib
+from typing import Any, Protocol, runtime_checkable
 
 import jax
+import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from ig2mj.engine.base import Snapshot
+from ig2mj.engine.health import Usage
+from ig2mj.engine.profile import EngineProfile
 from ig2mj.engine.view import Array
 from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import Verdict
@@ -57,13 +62,67 @@ class DebugWorlds:
     def _report(self, batch: Batch, world: int) -> str:
         assert self._recording is not None
         scene = self.scene
-        health = self.worlds.engine.health(batch.world.physics)
-        flags, overflow = int(np.asarray(batch.flags)[world]), int(np.asarray(health.overflow)[world])
+        overflow = int(np.asarray(self.worlds.engine.health(batch.world.physics).overflow)[world])
+        flags = int(np.asarray(batch.flags)[world])
         step = int(np.asarray(batch.world.step)[world])
-        speed = float(np.asarray(health.top_speed)[world])
         self.folder.mkdir(parents=True, exist_ok=True)
         file = self.folder / f"world{world}_step{step}.npz"
-        text = guards.explain(world, flags, overflow) + f"; step {step}, top speed {speed:.3g} m/s"
+        values = "; ".join(self._values(batch, world, flags))
+        text = f"{guards.explain(world, flags, overflow)}: {values}; step {step}"
         note = {"world": world, "step": step, "flags": flags, "overflow": overflow, "text": text}
         save_dump(frames_of(self._recording, world), file, scene.name, note, scene.model)
         return f"{text}; the last {self.length} steps: ig2mj view {scene.folder} --dump {file}"
+
+    def _values(self, batch: Batch, world: int, flags: int) -> list[str]:
+        """For every flag, the number that is beyond its limit."""
+        engine, physics, scene = self.worlds.engine, batch.world.physics, self.scene
+        row = engine.export(physics, world)
+        finite = np.isfinite(row.qpos).all() and np.isfinite(row.qvel).all()
+        said = []
+        if flags & guards.Flag.OVERFLOW and isinstance(engine, HasBuffers):
+            usage, profile, worlds = engine.usage(physics), engine.profile, engine.num_worlds
+            used = {
+                "awake_dofs": (np.asarray(usage.awake_dofs)[world], profile.awake_dofs),
+                "constraints": (np.asarray(usage.constraints)[world], profile.constraints),
+                "contacts of all worlds": (usage.contacts, worlds * profile.contacts),
+                "convex_contacts of all worlds": (usage.convex_contacts, worlds * profile.convex_contacts),
+            }
+            said.append("last physics step: " + ", ".join(f"{int(n)} of {m} {what}" for what, (n, m) in used.items()))
+        if flags & guards.Flag.NOT_FINITE and not finite:
+            said.append(f"body '{self._first_lost(row)}' has no finite position or velocity")
+        if flags & guards.Flag.FELL:
+            height = np.asarray(batch.world.view.object_com)[world, :, 2]
+            below = height - self.worlds.floor
+            lowest = int(np.nanargmin(below))
+            name = scene.object_names[lowest]
+            said.append(f"'{name}' at z = {height[lowest]:.3g} m, limit {self.worlds.floor[lowest]:.3g} m")
+        if flags & guards.Flag.TOO_FAST:
+            speed = float(np.asarray(engine.health(physics).top_speed)[world])
+            said.append(f"{speed:.3g} m/s, limit {guards.TOP_SPEED:g} m/s")
+        return said or ["right again by now"]
+
+    def _first_lost(self, row: Snapshot) -> str:
+        """The first body whose position or velocity is not a number any more."""
+        model = self.scene.model
+        lost = [
+            int(model.jnt_bodyid[j]) for j in range(model.njnt) if not np.isfinite(_coordinates(model, row, j)).all()
+        ]
+        return model.body(lost[0]).name
+
+
+def _coordinates(model: mujoco.MjModel, row: Snapshot, joint: int) -> np.ndarray:
+    """Positions and velocities of a joint."""
+    q, v = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+    counts = {int(mujoco.mjtJoint.mjJNT_FREE): (7, 6), int(mujoco.mjtJoint.mjJNT_BALL): (4, 3)}
+    nq, nv = counts.get(int(model.jnt_type[joint]), (1, 1))
+    return np.concatenate([row.qpos[q : q + nq], row.qvel[v : v + nv]])
+
+
+@runtime_checkable
+class HasBuffers(Protocol):
+    """An engine whose buffers can overflow (Warp's)."""
+
+    num_worlds: int
+    profile: EngineProfile
+
+    def usage(self, physics: Any) -> Usage: ...

@@ -8,6 +8,7 @@ Axes: S steps kept, W worlds, T steps of a dump.
 from __future__ import annotations
 
 import dataclasses
+import functools
 import os
 from typing import Any
 
@@ -59,16 +60,23 @@ class Recording:
 def start_recording(engine: Engine, batch: Batch, length: int = LENGTH) -> Recording:
     """A recording whose first step is the present state."""
     leaves, kind = jax.tree.flatten(_now(engine, batch))
-    rings = tuple(jnp.zeros((length, *a.shape), a.dtype) for a in leaves)
-    return record(engine, Recording(rings, jnp.zeros((), jnp.int32), kind), batch)
+    return record(engine, Recording(_empty(leaves, length), jnp.zeros((), jnp.int32), kind), batch)
 
 
 def record(engine: Engine, recording: Recording, batch: Batch) -> Recording:
-    """Adds the present state, over the oldest one when full. Pure."""
-    place = recording.written % recording.length
-    now = jax.tree.leaves(_now(engine, batch))
-    rings = tuple(jnp.asarray(ring).at[place].set(a) for ring, a in zip(recording.rings, now, strict=True))
+    """Adds the present state, over the oldest one when full. Pure, and uses up the recording it is given."""
+    rings = _put(recording.rings, recording.written % recording.length, jax.tree.leaves(_now(engine, batch)))
     return Recording(rings, recording.written + 1, recording.kind)
+
+
+@functools.partial(jax.jit, static_argnums=1)
+def _empty(now: list[Array], length: int) -> tuple[jax.Array, ...]:
+    return tuple(jnp.zeros((length, *a.shape), a.dtype) for a in now)
+
+
+@functools.partial(jax.jit, donate_argnums=0)
+def _put(rings: tuple[Array, ...], place: Int[Array, ""], now: list[Array]) -> tuple[jax.Array, ...]:
+    return tuple(ring.at[place].set(a) for ring, a in zip(rings, now, strict=True))
 
 
 def frames_of(recording: Recording, world: int) -> Frames:
@@ -134,5 +142,4 @@ def check_dump(file: str | os.PathLike, scene: str) -> dict[str, Any]:
 
 
 def _now(engine: Engine, batch: Batch) -> Frames:
-    physics = jax.tree.map(jnp.asarray, engine.snapshot(batch.world.physics))
-    return Frames(physics, jax.tree.map(jnp.asarray, batch.world.states))
+    return Frames(engine.snapshot(batch.world.physics), batch.world.states)
