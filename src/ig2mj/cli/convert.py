@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import pathlib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any, Literal
@@ -13,7 +14,40 @@ if TYPE_CHECKING:
     from ig2mj_converters.options import ConvertOptions
     from ig2mj_converters.outcome import Outcome
 
-Flag = tyro.conf.FlagCreatePairsOff
+Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help_behavior_hint="")]
+
+COLOURS = Literal["auto", "source", "category"]
+
+
+@dataclasses.dataclass(frozen=True)
+class Common:
+    """What both conversions take.
+
+    Attributes:
+      jobs: processes that work on the models.
+      seed: seeds convex decomposition, and chooses models that a scene names "random".
+      max_hulls: most convex pieces per link; more are merged.
+      max_hull_vertices: most vertices per piece.
+      bullet_inertia: inertia of each link's box, as Bullet computes it, instead of that of its hulls.
+      colours: of visuals without a texture: the source's, or household ones by category; auto prefers the source's,
+        unless every object of a scene is of one flat colour.
+      no_cache: convert anew even if nothing has changed, and keep nothing for the next time.
+      no_report: no checks, no report.json and report.html.
+      json: print what was done as JSON.
+    """
+
+    jobs: int = 1
+    seed: int = 0
+    max_hulls: int = 16
+    max_hull_vertices: int = 32
+    bullet_inertia: Flag = False
+    colours: COLOURS = "auto"
+    no_cache: Flag = False
+    no_report: Flag = False
+    json: Flag = False
+
+
+DEFAULTS = Common()
 
 #: Exit status of a conversion that left models out (`--skip-missing`).
 SKIPPED = 3
@@ -24,22 +58,14 @@ def convert_scene(
     scene: str,
     out: pathlib.Path,
     urdf: pathlib.Path | None = None,
-    jobs: int = 1,
-    seed: int = 0,
-    skip_missing: Annotated[bool, Flag] = False,
-    fixed_furniture: Annotated[bool, Flag] = False,
+    skip_missing: Flag = False,
+    fixed_furniture: Flag = False,
     only_rooms: tuple[str, ...] = (),
     only_categories: tuple[str, ...] = (),
-    max_hulls: int = 16,
-    max_hull_vertices: int = 32,
-    bullet_inertia: Annotated[bool, Flag] = False,
-    ceiling_collision: Annotated[bool, Flag] = False,
-    keep_hovering: Annotated[bool, Flag] = False,
+    ceiling_collision: Flag = False,
+    keep_hovering: Flag = False,
     assets: Annotated[str, tyro.conf.arg(metavar="DIR")] = ".",
-    colours: Literal["auto", "source", "category"] = "auto",
-    no_cache: Annotated[bool, Flag] = False,
-    no_report: Annotated[bool, Flag] = False,
-    json: Annotated[bool, Flag] = False,
+    common: Annotated[Common, tyro.conf.OmitArgPrefixes] = DEFAULTS,
 ) -> int:
     """Converts a scene of a dataset in iGibson's layout: OUT/scene.xml, manifest.json, meshes/, rooms.npz, report.html.
 
@@ -50,46 +76,29 @@ def convert_scene(
       scene: name of a folder in scenes/.
       out: folder for the result; an earlier result there is replaced when everything went well.
       urdf: scene file to use instead of the default one.
-      jobs: processes that work on the models.
-      seed: chooses models named "random", and seeds convex decomposition.
       skip_missing: leave out models that the dataset lacks.
       fixed_furniture: fix cabinets, shelves, tables and desks to the floor, as BEHAVIOR does.
       only_rooms: keep objects of these rooms (kitchen_0) or kinds of room (kitchen); building parts always stay.
       only_categories: keep objects of these categories; building parts always stay.
-      max_hulls: most convex pieces per link; more are merged.
-      max_hull_vertices: most vertices per piece.
-      bullet_inertia: inertia of each link's box, as Bullet computes it, instead of that of its hulls.
       ceiling_collision: let ceilings collide.
       keep_hovering: start loose objects exactly where the source has them; by default those in mid-air are let down.
       assets: folder for meshes/ and textures/, relative to OUT, that several scenes may share (e.g. "..").
-      colours: of visuals without a texture: the source's, or household ones by category; auto prefers the source's,
-        unless every object of a scene is of one flat colour.
-      no_cache: convert anew even if nothing has changed, and keep nothing for the next time.
-      no_report: no checks, no report.json and report.html.
-      json: print what was done as JSON.
     """
     from ig2mj_converters.conversion import convert_scene as convert
 
     options = _options(
-        seed=seed,
+        common,
         fixed_furniture=fixed_furniture,
         only_rooms=only_rooms or None,
         only_categories=only_categories or None,
         skip_missing=skip_missing,
         ceiling_collision=ceiling_collision,
-        max_hulls=max_hulls,
-        max_hull_vertices=max_hull_vertices,
-        bullet_inertia=bullet_inertia,
-        colours=colours,
         keep_hovering=keep_hovering,
         assets=assets,
-        jobs=jobs,
-        cache=not no_cache,
-        report=not no_report,
     )
     with _progress(f"converting {scene}") as options_with:
         outcome = convert(dataset, scene, out, urdf=urdf, options=options_with(options))
-    return _tell(outcome, out, "scene.xml", json)
+    return _tell(outcome, out, "scene.xml", common.json)
 
 
 def convert_object(
@@ -98,15 +107,7 @@ def convert_object(
     out: pathlib.Path,
     model: str | None = None,
     bbox: tuple[float, float, float] | None = None,
-    jobs: int = 1,
-    seed: int = 0,
-    max_hulls: int = 16,
-    max_hull_vertices: int = 32,
-    bullet_inertia: Annotated[bool, Flag] = False,
-    colours: Literal["auto", "source", "category"] = "auto",
-    no_cache: Annotated[bool, Flag] = False,
-    no_report: Annotated[bool, Flag] = False,
-    json: Annotated[bool, Flag] = False,
+    common: Annotated[Common, tyro.conf.OmitArgPrefixes] = DEFAULTS,
 ) -> int:
     """Converts one URDF object, iGibson's or any other: OUT/object.xml, manifest.json, meshes/, report.html.
 
@@ -118,50 +119,41 @@ def convert_object(
       out: folder for the result; an earlier result there is replaced when everything went well.
       model: name of the object; default the file's.
       bbox: wanted size in the axes of its base link, metres; default the size it has.
-      jobs: processes that decompose its links.
-      seed: seeds convex decomposition.
-      max_hulls: most convex pieces per link; more are merged.
-      max_hull_vertices: most vertices per piece.
-      bullet_inertia: inertia of each link's box, as Bullet computes it, instead of that of its hulls.
-      colours: of visuals without a texture: the source's, or household ones by category; auto prefers the source's,
-        unless every object of a scene is of one flat colour.
-      no_cache: convert anew even if nothing has changed, and keep nothing for the next time.
-      no_report: no checks, no report.json and report.html.
-      json: print what was done as JSON.
     """
     from ig2mj_converters.conversion import convert_object as convert
 
-    options = _options(
-        seed=seed,
-        jobs=jobs,
-        max_hulls=max_hulls,
-        max_hull_vertices=max_hull_vertices,
-        bullet_inertia=bullet_inertia,
-        colours=colours,
-        cache=not no_cache,
-        report=not no_report,
-    )
+    options = _options(common)
     with _progress(f"converting {urdf.name}") as options_with:
         outcome = convert(urdf, category, out, model=model, bounding_box=bbox, options=options_with(options))
-    return _tell(outcome, out, "object.xml", json)
+    return _tell(outcome, out, "object.xml", common.json)
 
 
 SUBCOMMANDS = {"scene": convert_scene, "object": convert_object}
 
 
-def _options(**given: Any) -> ConvertOptions:
+def _options(common: Common, **of_scene: Any) -> ConvertOptions:
     """Conversion options from the command line, and the renderer for the report's pictures."""
     from ig2mj_converters.options import ConvertOptions
 
     from ig2mj.errors import InputError
 
     for name, least in (("jobs", 1), ("max_hulls", 1), ("max_hull_vertices", 8)):
-        if given.get(name, least) < least:
+        if (given := getattr(common, name)) < least:
             element = "--" + name.replace("_", "-")
-            raise InputError("command line", f"is {given[name]}, must be at least {least}", element=element)
-    if given["report"]:
-        given |= {"renderer": _render, "view": _free_view}
-    return ConvertOptions(**given)
+            raise InputError("command line", f"is {given}, must be at least {least}", element=element)
+    return ConvertOptions(
+        jobs=common.jobs,
+        seed=common.seed,
+        max_hulls=common.max_hulls,
+        max_hull_vertices=common.max_hull_vertices,
+        bullet_inertia=common.bullet_inertia,
+        colours=common.colours,
+        cache=not common.no_cache,
+        report=not common.no_report,
+        renderer=None if common.no_report else _render,
+        view=None if common.no_report else _free_view,
+        **of_scene,
+    )
 
 
 def _render(*arguments: Any, **options: Any) -> Any:
@@ -181,8 +173,6 @@ def _free_view(*arguments: Any, **options: Any) -> Any:
 @contextlib.contextmanager
 def _progress(title: str) -> Iterator[Any]:
     """A progress bar on stderr; yields a function that makes options report to it."""
-    import dataclasses
-
     from ig2mj.cli.printing import add_bar, progress_bar
 
     with progress_bar() as bar:
