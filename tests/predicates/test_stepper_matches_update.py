@@ -38,6 +38,7 @@ VIEWS = [
     HOME.view({"fish": (3, 0, 0.08)}, touching=[("fish", "table")], fingers=AWAY),
     HOME.view(force={("knife", "fish"): 50.0}, fingers=AWAY),
 ]
+VIEWS = [jax.tree.map(np.asarray, view) for view in VIEWS]  # as the native engine gives them
 # Which view each step sees; runs of one view let the stepper take its short way.
 STORY = [0] * 4 + [1] * 8 + [0] * 3 + [2] * 5 + [3] * 4 + [0] * 6 + [4] * 3 + [0] * 3
 

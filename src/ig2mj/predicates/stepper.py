@@ -92,18 +92,20 @@ class StateStepper:
                 continue
             if name == "finger_pos" and self._fingers_away and self._away(view):
                 continue
+            if not isinstance(now, np.ndarray) or not isinstance(seen, np.ndarray):
+                return False  # on a device: to fetch it would take as long as the step
             chosen = rows if name in BODY_FIELDS else slice(None)
             before = self._bytes[k]
             if before is None:
-                before = self._bytes[k] = np.asarray(seen)[:, chosen].tobytes()
-            if np.asarray(now)[:, chosen].tobytes() != before:
+                before = self._bytes[k] = seen[:, chosen].tobytes()
+            if now[:, chosen].tobytes() != before:
                 return False
             self._seen[k] = now
         self._view = view
         return True
 
     def _away(self, view: PhysicsView) -> bool:
-        return toggled.all_out_of_reach(self.program.model, view)
+        return isinstance(view.finger_pos, np.ndarray) and toggled.all_out_of_reach(self.program.model, view)
 
     def _heat(self, last: Step, kept: Found) -> Step:
         states = last.states
