@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import pathlib
 import time
@@ -60,13 +61,21 @@ class Case:
       model, pool, goal, profile: of the scene. seconds: what each part of making it ready took.
     """
 
-    def __init__(self, home: str, hand: bool, pool_rows: int = 16, profiles: pathlib.Path | None = None):
+    def __init__(
+        self,
+        home: str,
+        hand: bool,
+        pool_rows: int = 16,
+        profiles: pathlib.Path | None = None,
+        alone: contextlib.AbstractContextManager[None] | None = None,
+    ):
         """Makes a case.
 
         Args:
           home: folder, or name of a shipped home.
           hand: with a hand that can push; else nothing moves.
           profiles: folder with `<home>/engine_profile.json`; then the one beside the manifest; then it is measured.
+          alone: held while buffer sizes are measured, where nobody else's timing may be disturbed.
         """
         self.seconds: dict[str, float] = {}
         bare = ig2mj.load_scene(home)
@@ -76,15 +85,18 @@ class Case:
         self.scene = ig2mj.load_scene(home, [add])
         self.model = StateModel.of_manifest(self.scene.tables, self.scene.manifest)
         self.pool: Pool = self._timed("pool", lambda: make_pool(self.scene, self.model, pool_rows, share=0.2))
-        self.profile: EngineProfile = self._timed("profile", lambda: self._profile(hand, profiles))
+        self.profile: EngineProfile = self._timed("profile", lambda: self._profile(hand, profiles, alone))
         self.goal = compile_expression(self.model, ten_literals(self.model))
 
-    def _profile(self, hand: bool, profiles: pathlib.Path | None) -> EngineProfile:
+    def _profile(
+        self, hand: bool, profiles: pathlib.Path | None, alone: contextlib.AbstractContextManager[None] | None
+    ) -> EngineProfile:
         folder = self.scene.folder
         for place in (profiles / folder.name if profiles else None, folder):
             if place and (place / PROFILE_FILE).exists():
                 return load_profile(place, self.scene.model)
-        return calibrate(self.scene, self.reach if hand else None)
+        with alone or contextlib.nullcontext():
+            return calibrate(self.scene, self.reach if hand else None)
 
     def _timed(self, name: str, act):
         start = time.time()

@@ -57,7 +57,7 @@ def run(case: Case, num_worlds: int, disturbed: bool, what: str, lock: pathlib.P
     worlds = Worlds(engine, model, case.pool, case.goal)
     watch, seconds = Watch(engine), engine.substeps * engine.timestep
     call, carry = _program(case, worlds, watch, disturbed, what)
-    before = np.asarray(carry[0].world.view.object_com)
+    before = np.array(carry[0].world.view.object_com)
     compiled = call.lower(carry).compile()
     compile_seconds = time.time() - start
     with exclusive(lock):
@@ -208,7 +208,7 @@ def main() -> None:
     parser.add_argument("--rows", type=pathlib.Path, help="rows are added to this file, as JSON lines")
     args = parser.parse_args()
     for home in args.homes:
-        case = Case(home, not args.idle, args.pool, args.profiles)
+        case = Case(home, not args.idle, args.pool, args.profiles, exclusive(args.lock))
         for worlds in args.worlds:
             for what in args.what:
                 for limit in args.iterations:
