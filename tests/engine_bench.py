@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import pathlib
 from typing import Any
@@ -22,9 +23,9 @@ class Bench:
     def __init__(self, scene: Scene, name: str, num_worlds: int, **options: Any):
         self.scene = scene
         self.engine: Engine = make_engine(name, scene, num_worlds, **options)
-        wrap = jax.jit if self.engine.pure else (lambda function: function)
-        self.step, self.write, self.load = wrap(self.engine.step), wrap(self.engine.write), wrap(self.engine.load)
-        self.view = wrap(self.engine.view)
+        self._wrap = jax.jit if self.engine.pure else (lambda function: function)
+        self.step, self.write = self._wrap(self.engine.step), self._wrap(self.engine.write)
+        self.load, self.view = self._wrap(self.engine.load), self._wrap(self.engine.view)
         physics = self.engine.reset()
         self.first: Snapshot = self.engine.export(physics, 0)
         self._blank = physics
@@ -49,6 +50,13 @@ class Bench:
         for _ in range(steps):
             physics, view = self.step(physics, ctrl)
         return physics, view
+
+    @functools.cached_property
+    def physics_step(self) -> Any:
+        """A single physics step of 1/120 s; of the MJX engines (compiled when first asked for)."""
+        single = copy.copy(self.engine)
+        single.substeps = 1
+        return self._wrap(single.step)
 
     def teleport(self, name: str, pos: Any, quat: Any = (1, 0, 0, 0), worlds: Any = None) -> Write:
         """A write that puts an object somewhere, in the worlds given (all)."""

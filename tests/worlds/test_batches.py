@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import engine_bench
 import jax
@@ -14,13 +15,17 @@ from ig2mj.engine.base import Write
 from ig2mj.engine.health import Overflow
 from ig2mj.engine.native import NativeEngine
 from ig2mj.engine.profile import EngineProfile
+from ig2mj.engine.sleep import FULLY_AWAKE
 from ig2mj.engine.warp import WarpEngine
 from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import compile_expression
+from ig2mj.simulation import Simulation
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
+from ig2mj.viewer.replay import Replay
 from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Worlds
+from ig2mj.worlds.debug import DebugWorlds
 from ig2mj.worlds.guards import Flag
 from ig2mj.worlds.random_streams import episode_keys, pick_rows, step_keys
 
@@ -50,7 +55,8 @@ def teleport(worlds: Worlds, batch, name: str, pos, world: int):
     at, turn = np.zeros((*mask.shape, 3), np.float32), np.zeros((*mask.shape, 4), np.float32)
     index = tables.object_names.index(name)
     mask[world, index], at[world, index], turn[..., 0] = True, pos, 1
-    physics = engine.write(batch.world.physics, Write(object_mask=mask, object_pos=at, object_quat=turn))
+    write = jax.jit(engine.write) if engine.pure else engine.write
+    physics = write(batch.world.physics, Write(object_mask=mask, object_pos=at, object_quat=turn))
     return dataclasses.replace(batch, world=dataclasses.replace(batch.world, physics=physics))
 
 
@@ -230,16 +236,70 @@ def test_a_state_that_is_not_finite_is_flagged_in_its_world(warp_worlds):
     assert not np.asarray(batch.flags).any(), "the pool's row replaces all that was not a number"
 
 
-@pytest.mark.slow
-def test_buffers_that_are_too_small_are_flagged(scene, model, bench_pool):
-    """Issue, item 3. One contact has no room for its constraint rows where there are four corners on the table."""
+@pytest.fixture(scope="module")
+def overflowing(scene, model, bench_pool, tmp_path_factory) -> DebugWorlds:
+    """Two worlds under watch; one contact has no room for its constraint rows where the box has four corners."""
     tiny = EngineProfile(awake_dofs=12, constraints=4, contacts=16, convex_contacts=16)
-    engine = WarpEngine(scene, 1, profile=tiny, initial=jax.tree.map(lambda a: np.asarray(a[0]), bench_pool.physics))
-    worlds = Worlds(engine, model, bench_pool)
-    batch = teleport(worlds, worlds.start(), "box", [0, 0, 0.4495], 0)
-    batch, _ = jax.jit(worlds.step)(batch)
-    assert np.asarray(batch.flags).tolist() == [int(Flag.OVERFLOW)]
+    row = jax.tree.map(lambda a: np.array(a[1]), bench_pool.physics)
+    row.qpos[scene.model.joint("box/free").qposadr[0] + 2] = 0.4495
+    row.tree_asleep[:] = FULLY_AWAKE
+    engine = WarpEngine(scene, 2, profile=tiny, initial=row)
+    return DebugWorlds(Worlds(engine, model), scene, tmp_path_factory.mktemp("dumps"))
+
+
+@pytest.mark.slow
+def test_buffers_that_are_too_small_are_an_error_with_a_dump(overflowing, scene):
+    """Issue, item 3: world, flag, value, the setting to raise, and the last 50 steps to look at."""
+    with pytest.raises(EngineError) as caught:
+        overflowing.step(overflowing.start())
+    said = re.fullmatch(
+        r"world 0: overflow \(NEFC; raise constraints in engine_profile.json, or run `ig2mj calibrate`\): "
+        r"last physics step: 12 of 12 awake_dofs, (\d+) of 4 constraints, \d+ of 32 contacts of all worlds, "
+        r"\d+ of 32 convex_contacts of all worlds; step 1; the last 50 steps: ig2mj view (\S+) --dump (\S+)",
+        str(caught.value),
+    )
+    assert said, str(caught.value)
+    assert int(said[1]) > 4 and said[2] == str(scene.folder)
+    replay = Replay(scene, said[3])
+    assert len(replay) == 2 and replay.data.body("box").xpos[2] == pytest.approx(0.4495, abs=1e-5)
+
+
+@pytest.mark.slow
+def test_a_world_that_overflowed_is_put_right_by_a_reset(overflowing):
+    batch = overflowing.start()
+    with pytest.raises(EngineError):
+        overflowing.step(batch)
+    batch, _ = overflowing._step(batch)
+    assert np.asarray(batch.flags).tolist() == [int(Flag.OVERFLOW)] * 2
     with pytest.raises(EngineError, match=r"world 0: overflow \(NEFC; raise constraints in engine_profile.json"):
-        worlds.raise_flagged(batch)
-    batch = jax.jit(worlds.reset)(batch, batch.flags != 0)
-    assert not np.asarray(batch.world.physics.overflow).any() and not np.asarray(batch.flags).any()
+        overflowing.worlds.raise_flagged(batch)
+    batch = overflowing.reset(batch, np.array([True, False]))
+    assert not np.asarray(batch.world.physics.overflow)[0] and np.asarray(batch.flags).tolist() == [0, 1]
+
+
+@pytest.mark.slow
+def test_a_world_of_many_goes_on_in_a_simulation(warp_worlds, scene):
+    """Issue, item 5: `engine.export(world)` continued natively, states and all."""
+    batch = warp_worlds.start(seed=5)
+    rows = jax.tree.map(np.array, warp_worlds.engine.snapshot(batch.world.physics))
+    address = scene.model.joint("box/free").qposadr[0]
+    rows.qpos[1, address + 2], rows.tree_asleep[1] = 0.7, FULLY_AWAKE
+    physics = jax.jit(warp_worlds.engine.load)(batch.world.physics, rows)
+    hot = batch.world.states.replace(temperature=batch.world.states.temperature + 50)
+    batch = dataclasses.replace(batch, world=dataclasses.replace(batch.world, physics=physics, states=hot))
+    step = jax.jit(warp_worlds.step)
+    for _ in range(3):
+        batch, _ = step(batch)
+    states = jax.tree.map(lambda a: np.asarray(a)[1:], batch.world.states)
+    simulation = Simulation.from_snapshot(scene, warp_worlds.engine.export(batch.world.physics, 1), states)
+    assert simulation.time == pytest.approx(0.1, abs=1e-5)
+    assert simulation.state("temperature", "box") == pytest.approx(float(states.temperature[0, 1]), abs=1e-5)
+    for _ in range(3):
+        batch, _ = step(batch)
+    view = simulation.step(count=3)
+    np.testing.assert_allclose(view.object_pos[0], np.asarray(batch.world.view.object_pos)[1], atol=1e-4)
+    heat = float(np.asarray(batch.world.states.temperature)[1, 1])
+    assert 23 < heat < 73 and simulation.state("temperature", "box") == pytest.approx(heat, abs=1e-3)
+    assert simulation.predicate("on_top", "box", "table") is False
+    simulation.step(count=30)
+    assert simulation.predicate("on_top", "box", "table") is True

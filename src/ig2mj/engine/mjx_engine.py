@@ -26,6 +26,7 @@ from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.mjx_contacts import Contacts, link_forces, touching_units
 from ig2mj.engine.mjx_view import ViewPlan, make_view, plan_view
 from ig2mj.engine.mjx_write import apply_write, reaches
+from ig2mj.engine.native import NativeEngine
 from ig2mj.engine.sleep import FULLY_AWAKE, restore_sleep
 from ig2mj.engine.snapshot_check import check_snapshot
 from ig2mj.engine.view import Array, PhysicsView
@@ -98,7 +99,7 @@ class MjxEngine(abc.ABC):
         self.host_model = self._host_model(scene.model)
         self.layout: ModelLayout = make_layout(self.host_model, self.tables)
         self.plan: ViewPlan = plan_view(self.host_model, self.tables, self.layout, boxes)
-        self._initial = initial
+        self._initial = initial if initial is not None else self._scene_start(touch_tolerance)
         self._pyramidal = self.host_model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
         self._has_blades = bool((self.tables.link_geom >= 0).any())
         try:
@@ -258,8 +259,13 @@ class MjxEngine(abc.ABC):
 
     # Stages.
 
-    def _start_all(self, template: mjx.Data, initial: Snapshot | None) -> MjxPhysics:
-        """Every world at the template, or at `initial`, which has no world axis."""
+    def _scene_start(self, touch_tolerance: float) -> Snapshot:
+        """The scene's initial state, by C MuJoCo: all engines begin alike, and MJX need not compile a forward pass."""
+        native = NativeEngine(self.scene, timestep=self.timestep, touch_tolerance=touch_tolerance)
+        return native.export(native.reset(), 0)
+
+    def _start_all(self, template: mjx.Data, initial: Snapshot) -> MjxPhysics:
+        """Every world at `initial`, which has no world axis; the rest of the data is the template's."""
         worlds, tables = self.num_worlds, self.tables
         spread = jax.vmap(lambda ctrl: template.replace(ctrl=ctrl))
         units = self.layout.num_units
@@ -270,7 +276,7 @@ class MjxEngine(abc.ABC):
             link_force=jnp.zeros((worlds, len(tables.link_object), tables.num_objects), jnp.float32),
             overflow=jnp.zeros(worlds, jnp.int32),
         )
-        return self._refresh(physics) if initial is None else self.load(physics, initial)
+        return self.load(physics, initial)
 
     def _trees_joined(
         self, physics: MjxPhysics, eq_active: Bool[Array, "W E"], eq_data: Float[Array, "W E 12"]
