@@ -15,22 +15,27 @@ if os.environ["JAX_PLATFORMS"] == "cpu":
     os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
 os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")
 
-import hypothesis
 import jaxtyping
 import pytest
+
+try:
+    import hypothesis
+except ModuleNotFoundError:  # a GPU machine that runs only the tests that need it
+    hypothesis = None
 
 # Must stand before the first import of ig2mj: the hook works on modules as they are loaded.
 jaxtyping.install_import_hook("ig2mj", "beartype.beartype")
 
-hypothesis.settings.register_profile(
-    "lean",
-    max_examples=20,
-    deadline=None,  # the first example compiles
-    derandomize=True,
-    database=None,
-    suppress_health_check=[hypothesis.HealthCheck.too_slow, hypothesis.HealthCheck.function_scoped_fixture],
-)
-hypothesis.settings.load_profile("lean")
+if hypothesis is not None:
+    hypothesis.settings.register_profile(
+        "lean",
+        max_examples=20,
+        deadline=None,  # the first example compiles
+        derandomize=True,
+        database=None,
+        suppress_health_check=[hypothesis.HealthCheck.too_slow, hypothesis.HealthCheck.function_scoped_fixture],
+    )
+    hypothesis.settings.load_profile("lean")
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 
