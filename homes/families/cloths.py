@@ -104,7 +104,7 @@ CATEGORIES = [
     Entry("bath_towel", folded, (0.300, 0.360, 0.090), 0.55, 5, options={"wipes": True, "layers": 5}),
     Entry("rag", spread, (0.320, 0.280, 0.018), 0.05, 5, vary=0.12, options={"wipes": True}),
     Entry("dinner_napkin", folded, (0.190, 0.190, 0.008), 0.035, 3, options={"wipes": True, "layers": 3}),
-    Entry("paper_towel", kitchen_roll, (0.120, 0.120, 0.260), 0.25, 3, uniform=True),
+    Entry("paper_towel", kitchen_roll, (0.120, 0.120, 0.260), 0.25, 3, rest="standing", uniform=True),
     Entry("sheet", folded, (0.320, 0.420, 0.070), 0.80, 4, options={"layers": 6}),
     Entry("pillow", pillow, (0.420, 0.580, 0.150), 0.70, 5),
     Entry("carpet", carpet, (2.000, 1.400, 0.012), 9.0, 5, fixed=True, rest="upright", vary=0.15),
