@@ -20,6 +20,7 @@ from ig2mj.engine.health import Overflow
 from ig2mj.engine.profile import PROFILE_FILE, EngineProfile, default_profile, fit, load_profile, save_profile
 from ig2mj.engine.warp import WarpEngine
 from ig2mj.errors import EngineError, InputError
+from ig2mj.scene import manifest as mf
 
 PROFILE = EngineProfile(awake_dofs=12, constraints=64, contacts=16, convex_contacts=8, measured={"peak_contacts": 12.5})
 
@@ -151,6 +152,28 @@ def test_the_command_writes_the_files_where_it_is_told(tiny_home_folder, tmp_pat
     assert cli.call([*command, "--no-hand", "--out", str(tmp_path / "profiles")]) == 0
     assert (tmp_path / "profiles" / "home" / PROFILE_FILE).exists() and not (home / PROFILE_FILE).exists()
     assert "geom pairs" in capsys.readouterr().out
+
+
+def test_a_home_with_nothing_to_push_is_measured_without_a_hand(tmp_path, capsys):
+    """All there is lies in a closed box."""
+    home = tmp_path / "bare"
+    home.mkdir()
+    sides = [(f"{x} 0 0", "0.01 0.3 0.3") for x in (-0.3, 0.3)] + [(f"0 {y} 0", "0.3 0.01 0.3") for y in (-0.3, 0.3)]
+    sides += [(f"0 0 {z}", "0.3 0.3 0.01") for z in (-0.3, 0.3)]
+    shell = [f'<geom name="shell/collision_{k}" type="box" size="{s}" pos="{p}"/>' for k, (p, s) in enumerate(sides)]
+    (home / "scene.xml").write_text(
+        '<mujoco><option><flag sleep="enable"/></option><worldbody>'
+        f'<body name="shell">{"".join(shell)}</body><body name="thing" pos="0 0 -0.2"><freejoint name="thing/free"/>'
+        '<geom name="thing/collision_0" type="box" size="0.03 0.03 0.03"/></body></worldbody></mujoco>'
+    )
+    objects = [
+        mf.ObjectEntry("shell", "shelf", "made", ["shell"], True, (0.6, 0.6, 0.6), 1.0),
+        mf.ObjectEntry("thing", "apple", "made", ["thing"], False, (0.06, 0.06, 0.06), 1.0),
+    ]
+    mf.save_manifest(mf.Manifest(mf.FORMAT_VERSION, "bare", objects), home / "manifest.json")
+    assert cli.call(["calibrate", str(home), "--engine", "native", "--worlds", "1", "--rounds", "1"]) == 0
+    assert "no loose object that a hand can get at; measured without a hand" in capsys.readouterr().err
+    assert (home / PROFILE_FILE).exists()
 
 
 def test_the_command_names_what_it_cannot_take(capsys):

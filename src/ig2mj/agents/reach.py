@@ -112,8 +112,9 @@ def find_reach(scene: Scene, settled: Snapshot | None = None) -> Reach:
     place = search.com + search.over[:, None] * np.array([0.0, 0.0, 1.0])
     loose = loose_objects(scene.tables)
     stations = {int(o): s for o in loose if (s := _station(search, int(o), place[o])) is not None}
+    nothing = f"in scene '{scene.name}' there is no loose object that a hand can get at"
     if not stations:
-        raise EngineError(f"in scene '{scene.name}' there is no loose object that a hand can get at")
+        raise EngineError(nothing)
     objects, station = np.array(list(stations), int), np.array(list(stations.values()))
     nodes = np.concatenate([place[objects], station, _grid(search, scene.tables, station)])
     ways = _ways(search, objects, nodes)
@@ -127,7 +128,9 @@ def find_reach(scene: Scene, settled: Snapshot | None = None) -> Reach:
     same = group[:, None] == group
     score = (np.exp(-beside / FAR) * same).sum(1)
     order = np.argsort(-score, kind="stable")
-    first = int(next((k for k in order if not search.enclosed(station[k])), order[0]))
+    first = next((int(k) for k in order if not search.enclosed(station[k])), None)
+    if first is None:
+        raise EngineError(nothing)
 
     kept = np.flatnonzero(same[first])
     weight = np.exp(-between[np.ix_(kept, kept)] / NEARNESS)

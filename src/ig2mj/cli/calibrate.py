@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import pathlib
+import sys
 from typing import Annotated, Literal
 
 import tyro
@@ -68,15 +69,20 @@ def run(
 
 
 def _with_hand(scene: pathlib.Path, hand: bool):
-    """The scene, with a hand where it reaches most, and what that hand reaches."""
+    """The scene, with a hand where it reaches most, and what it reaches; without one where it reaches nothing."""
     from ig2mj.agents.floating_hand import add_floating_hand
     from ig2mj.agents.reach import find_reach
+    from ig2mj.errors import EngineError
     from ig2mj.scene.scene import load_scene
 
     loaded = load_scene(scene)
     if not hand:
         return loaded, None
-    reach = find_reach(loaded)
+    try:
+        reach = find_reach(loaded)
+    except EngineError as e:
+        print(f"note: {e}; measured without a hand", file=sys.stderr)
+        return loaded, None
     return load_scene(scene, [functools.partial(add_floating_hand, pos=reach.start)]), reach
 
 
