@@ -114,7 +114,9 @@ def _drive_and_kick(step: int, data: mujoco.MjData, rng: np.random.Generator) ->
 
 @pytest.fixture(autouse=True)
 def _looks_often(monkeypatch):
-    monkeypatch.setattr(vicinity, "PATIENCE", 8)
+    """Small scenes, too, and whatever moves in them."""
+    for name, value in (("PATIENCE", 8), ("WORTHWHILE", 1), ("LASTING", 0)):
+        monkeypatch.setattr(vicinity, name, value)
 
 
 @pytest.mark.parametrize("reach", [0.25, 0.1])
@@ -192,6 +194,20 @@ def test_a_tower_far_away_is_kept_out_and_one_in_reach_is_let_in_whole():
     assert near.contype is not table.contype and (near.contype <= table.contype).all()
 
 
+def test_where_masks_do_not_last_everything_stays_in(monkeypatch):
+    monkeypatch.setattr(vicinity, "LASTING", 6)
+    model = _home(np.random.default_rng(0))
+    assert 0 < _assert_same(model, 240, _drive) < _masked_always(model, monkeypatch)
+    monkeypatch.setattr(vicinity, "WORTHWHILE", 10_000)
+    assert not VicinityTable.build(model, _equality_tree(model)).usable
+
+
+def _masked_always(model: mujoco.MjModel, monkeypatch) -> int:
+    with monkeypatch.context() as within:
+        within.setattr(vicinity, "LASTING", 0)
+        return _run(model, 240, True, _drive)[1]
+
+
 def test_models_that_are_not_understood_are_left_alone():
     xml = """<mujoco><worldbody><body name="m" mocap="true"><geom size="0.1"/></body>
       <body pos="0 0 1"><freejoint/><geom size="0.1"/></body></worldbody></mujoco>"""
@@ -222,7 +238,6 @@ def test_planes_and_the_world_stay_in():
 
 
 def test_the_engine_with_a_hand_is_bitwise_the_same_and_shows_no_mask(tiny_home_folder, monkeypatch):
-    monkeypatch.setattr(vicinity, "WORTHWHILE", 1.0)  # the home is small
     scene = ig2mj.load_scene(tiny_home_folder, agents=[functools.partial(add_floating_hand, pos=(0.1, 0.2, 0.65))])
     ours = NativeEngine(scene)
     build = VicinityTable.build
