@@ -68,7 +68,7 @@ def calibrations(homes: dict[str, str], out: pathlib.Path, worlds: int) -> list[
     """One per home: made ones, those of Table A.7's sizes, then the others."""
     first = [*(f"made_{n}" for n in SIZES), "aspen", "birch", "spruce"]
     order = [*first, *sorted(set(homes) - set(first))]
-    words = ("-m", "ig2mj", "calibrate", "--out", str(out / "profiles"), "--worlds", str(worlds))
+    words = (str(HERE / "calibrate_home.py"), "--out", str(out / "profiles"), "--worlds", str(worlds))
     return [Job(name, (*words, homes[name])) for name in order if name in homes]
 
 
