@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from ig2mj_homes.floor_plans.shipped import DRAWINGS, plan
 from ig2mj_homes.layout_maps import reachable
+from ig2mj_homes.opening import open_joint
 from ig2mj_homes.ship import SHARED, total_bytes, used_assets
 from ig2mj_homes.shipped_homes import home_names
 
@@ -74,6 +75,13 @@ def test_a_disc_of_30_cm_reaches_every_room_by_the_homes_own_map(name: str):
 
 
 @each_home
+def test_walls_floors_and_ceilings_are_there(name: str):
+    """floor.n.01, the one synset of BEHAVIOR-100's things that no household object stands for."""
+    found = [o.category for o in load_manifest(SHIPPED_HOMES / name).objects if o.category in BUILDING]
+    assert sorted(found) == sorted(BUILDING)
+
+
+@each_home
 def test_doors_between_rooms_name_both(name: str):
     manifest = load_manifest(SHIPPED_HOMES / name)
     doors = [o for o in manifest.objects if o.category == "door"]
@@ -113,7 +121,7 @@ def _loads_and_rests(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", FEW[:1])
-def test_everything_opens_under_20_newtons_or_5_newton_metres_and_stays(name: str):
+def test_everything_opens_under_20_newtons_or_5_newton_metres_and_stays_open_and_half_open(name: str):
     _opens_and_stays(name)
 
 
@@ -124,42 +132,37 @@ def test_everything_opens_and_stays_in_every_other_home(name: str):
 
 
 def _opens_and_stays(name: str) -> None:
+    """Every joint that opens something, loose things' too, with all else in the home as it stands."""
     scene = load(name)
-    model, failed = scene.model, []
-    for entry in scene.manifest.objects:
-        for openable in entry.openable if not entry.parked and entry.fixed else ():
-            joint = model.joint(openable.joint)
-            q, v = int(joint.qposadr[0]), int(joint.dofadr[0])
-            force = 20.0 if joint.type[0] == mujoco.mjtJoint.mjJNT_SLIDE else 5.0
-            data = start(model)
-            span = openable.open - openable.closed
-            for _ in range(4 * 120):
-                data.qfrc_applied[v] = np.sign(span) * force
-                mujoco.mj_step(model, data)
-                if (data.qpos[q] - openable.closed) / span > 0.98:
-                    break
-            opened = (data.qpos[q] - openable.closed) / span
-            data.qfrc_applied[v] = 0.0
-            data.qvel[v] = 0.0
-            mujoco.mj_step(model, data, nstep=120)
-            stayed = (data.qpos[q] - openable.closed) / span
-            if opened < 0.97 or stayed < 0.9:
-                failed.append((openable.joint, round(float(opened), 2), round(float(stayed), 2)))
-    assert not failed, failed
+    opened = [
+        open_joint(scene.model, openable.joint, openable.closed, openable.open)
+        for entry in scene.manifest.objects
+        for openable in entry.openable
+        if not entry.parked
+    ]
+    assert len(opened) >= 10
+    assert not [result for result in opened if not result.works]
 
 
-def test_a_closed_fridge_stays_closed_when_bumped_gently():
-    scene = load("small_home")
-    fridge = next(o for o in scene.manifest.objects if o.category == "fridge")
-    model, data = scene.model, start(scene.model)
-    for openable in fridge.openable:
-        data.qfrc_applied[int(model.joint(openable.joint).dofadr[0])] = 0.5
-    mujoco.mj_step(model, data, nstep=12)
-    data.qfrc_applied[:] = 0
-    mujoco.mj_step(model, data, nstep=60)
-    for openable in fridge.openable:
-        q = data.qpos[int(model.joint(openable.joint).qposadr[0])]
-        assert abs(q - openable.closed) < 0.05 * abs(openable.open - openable.closed)
+@pytest.mark.parametrize("name", FEW)
+def test_a_closed_fridge_stays_closed_when_bumped_gently(name: str):
+    """A bump of 0.3 N s at the free edge, outwards: something of 0.6 kg at 0.5 m/s."""
+    scene = load(name)
+    model = scene.model
+    doors = [o for f in scene.manifest.objects if f.category == "fridge" for o in f.openable]
+    assert doors
+    for openable in doors:
+        data = start(model)
+        joint = model.joint(openable.joint)
+        hinge = joint.type[0] == mujoco.mjtJoint.mjJNT_HINGE
+        leaf = np.flatnonzero((model.geom_bodyid == model.jnt_bodyid[joint.id]) & (model.geom_group == 3))[0]
+        v, arm = int(joint.dofadr[0]), 2 * model.geom_size[leaf, 1] if hinge else 1.0
+        data.qfrc_applied[v] = np.sign(openable.open - openable.closed) * 0.3 * arm * 120
+        mujoco.mj_step(model, data)
+        data.qfrc_applied[v] = 0.0
+        mujoco.mj_step(model, data, nstep=120)
+        moved = (data.qpos[int(joint.qposadr[0])] - openable.closed) / (openable.open - openable.closed)
+        assert 0 <= moved < 0.05, f"{openable.joint}: from 5 % of its range on it counts as open (states.md)"
 
 
 def test_the_bowl_holds_its_apple_when_the_table_is_shaken():
