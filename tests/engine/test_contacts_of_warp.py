@@ -8,8 +8,8 @@ import pytest
 from mujoco.mjx.third_party import mujoco_warp
 from mujoco.mjx.third_party.mujoco_warp._src import collision_driver
 
-from ig2mj.engine.warp_contacts import FAR, mend_contacts
 from ig2mj.engine.warp_kernels import upstream_kernels, use_awake_kernels
+from ig2mj.engine.warp_kernels.contacts import FAR, mend_contacts
 
 FLOOR = 6.0
 HALF = np.array([0.05, 0.04, 0.03])
@@ -57,7 +57,7 @@ def test_a_floors_contacts_point_up(tilt: float):
     assert use_awake_kernels()
     with upstream_kernels():
         collision_driver.collision(put, worlds)
-        assert _slanted(worlds) > 0, "upstream is sound by now: `warp_contacts` may go"
+        assert _slanted(worlds) > 0, "upstream is sound by now: `contacts` may go"
     collision_driver.collision(put, worlds)
     assert _slanted(worlds) == 0
     count = int(worlds.nacon.numpy()[0])
