@@ -56,7 +56,8 @@ class WarpEngine(MjxEngine):
         keep_external_streams()
         use_awake_kernels()
         report_warp_compilation()
-        self.profile = fit(profile, scene.model) if profile else load_profile(scene.folder, scene.model)
+        sizes = fit(profile, scene.model) if profile else load_profile(scene.folder, scene.model)
+        self.profile = sizes.for_worlds(num_worlds)
         self._print_overflow = print_overflow
         self._iterations = iterations or int(scene.model.opt.iterations)
         self._ls_iterations = ls_iterations or int(scene.model.opt.ls_iterations)
