@@ -32,9 +32,9 @@ def restore_sleep(model: mujoco.MjModel, data: mujoco.MjData, tree_asleep: np.nd
     data.tree_awake[:] = tree_awake
     tree = model.body_treeid
     mocap = model.body_mocapid[model.body_rootid] >= 0
-    body = np.where(tree >= 0, np.where(tree_awake[tree], _AWAKE, _ASLEEP), np.where(mocap, _AWAKE, _STATIC))
-    if model.ntree == 0:
-        body = np.where(mocap, _AWAKE, _STATIC)
+    body = np.where(mocap, _AWAKE, _STATIC)
+    moving = tree >= 0
+    body[moving] = np.where(tree_awake[tree[moving]], _AWAKE, _ASLEEP)
     data.body_awake[:] = body
     body_list = np.flatnonzero(body != _ASLEEP)
     parent_list = 1 + np.flatnonzero(body[model.body_parentid[1:]] != _ASLEEP)
