@@ -10,11 +10,13 @@ from collections.abc import Callable
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
-from ig2mj.engine.base import Snapshot
+from ig2mj.engine.base import Snapshot, Write
 from ig2mj.engine.native import NativeEngine, NativePhysics
 from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import EngineError
+from ig2mj.sampling.overlap import Overlaps
 from ig2mj.sampling.perturbation import loose_objects, perturb
 from ig2mj.scene.scene import Scene
 from ig2mj.states.initial import states_of_manifest
@@ -28,6 +30,13 @@ SECONDS = 6.0
 
 TRIES = 4
 """Times as many rows as asked for may be tried before giving up."""
+
+OVERLAP, RESTING_OVERLAP = 0.002, 0.004
+"""Metres deeper than at the start that a disturbed object may stand in something: as it is let go, and at rest. What
+stands deeper and is asleep flies off as soon as something wakes it."""
+
+TAKEN_BACK = 3
+"""Times that disturbed objects are looked through; each time those that overlap go back to where they were."""
 
 Progress = Callable[[int], None]
 
@@ -53,7 +62,7 @@ def make_pool(
       progress: called with the number of rows done so far.
 
     Raises:
-      EngineError: too few rows come to rest with everything still in the house.
+      EngineError: too few rows come to rest with everything still in the house and nothing stuck in something.
     """
     width = min(count, 16)
     engine = NativeEngine(scene, width, threads=threads)
@@ -62,6 +71,8 @@ def make_pool(
     start = engine.export(physics, 0)
     floor = lowest_support(view, scene.tables.object_fixed)
     loose = loose_objects(scene.tables)
+    overlaps = Overlaps(scene)
+    usual = overlaps.deepest(np.asarray(start.qpos))
     bodies = {scene.model.body(b).name: b for b in range(scene.model.nbody)}
     states = states_of_manifest(model, scene.manifest, bodies)
     rows: list[Snapshot] = []
@@ -70,22 +81,43 @@ def make_pool(
         if tried >= TRIES * count + width:
             raise EngineError(
                 f"of {tried} disturbed states of '{scene.name}' only {len(rows)} came to rest with everything in the "
-                f"house (convert the scene with its checks and mend what does not settle)"
+                f"house and apart (convert the scene with its checks and mend what does not settle)"
             )
         physics = engine.load(physics, start)
         world = jnp.arange(tried, tried + width)
         key = episode_keys(seed, world, jnp.zeros_like(world))
-        physics = engine.write(physics, jax.device_get(perturb(scene.tables, loose, engine.view(physics), key, share)))
+        write = jax.device_get(perturb(scene.tables, loose, engine.view(physics), key, share))
+        physics = _disturbed(engine, physics, write, overlaps, usual)
         physics, view = _rest(engine, physics)
         asleep = ~np.asarray(view.awake).any(1)
         inside = (np.asarray(view.object_com)[..., 2] >= floor).all(1)
         for w in np.flatnonzero(asleep & inside):
-            if len(rows) < count:
-                rows.append(engine.export(physics, int(w)))
+            row = engine.export(physics, int(w))
+            apart = (overlaps.deepest(np.asarray(row.qpos)) <= usual + RESTING_OVERLAP).all()
+            if apart and len(rows) < count:
+                rows.append(row)
         tried += width
         progress(len(rows))
     one = [Pool(physics=jax.tree.map(lambda a: np.asarray(a)[None], row), states=states) for row in rows]
     return stack(one)
+
+
+def _disturbed(
+    engine: NativeEngine, physics: NativePhysics, write: Write, overlaps: Overlaps, usual: Float[np.ndarray, "O"]
+) -> NativePhysics:
+    """Physics after a write of objects, but for those that it put into something: they stay where they were."""
+    view = engine.view(physics)
+    place, turn = np.array(view.object_pos), np.array(view.object_quat)
+    moved = np.array(write.object_mask)
+    physics = engine.write(physics, write)
+    for _ in range(TAKEN_BACK):
+        qpos = np.asarray(engine.snapshot(physics).qpos)
+        deep = np.array([overlaps.deepest(row) > usual + OVERLAP for row in qpos]) & moved
+        if not deep.any():
+            break
+        physics = engine.write(physics, Write(object_mask=deep, object_pos=place, object_quat=turn))
+        moved &= ~deep
+    return physics
 
 
 def _rest(engine: NativeEngine, physics: NativePhysics) -> tuple[NativePhysics, PhysicsView]:
