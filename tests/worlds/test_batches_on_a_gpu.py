@@ -171,9 +171,10 @@ def test_measured_buffers_hold_while_hands_push_things_about(pushed, batch_of_ma
 def test_world_0_is_the_same_among_few_and_among_many(scene, model, pool, profile, reach, batch_of_many, pushed):
     """Issue, item 5. Streams and starts to the bit; the first two seconds within what a GPU's order of sums does to it.
 
-    Two runs on one device differ too, most after contacts: in benchmarks/results/multi_gpu (another home) by 33 mm in the
-    median after two seconds of pushing. On an H200 this test, then with a bound of 1e-3, found by world, in metres:
-    1.1e-3 1.2e-3 1.2e-5 6.6e-3 5.4e-5 7.9e-6 1.1e-3 1.1e-3, a median of 1.14e-3. The bound is about four times that.
+    Two runs on one device differ too, most after contacts: by 33 mm in the median after two seconds of pushing in
+    another home (benchmarks/results/multi_gpu). On an H200 this test, then with a bound of 1e-3, found by world, in
+    metres: 1.1e-3 1.2e-3 1.2e-5 6.6e-3 5.4e-5 7.9e-6 1.1e-3 1.1e-3, a median of 1.14e-3. The bound is over four times
+    that.
     """
     few = make(scene, model, pool, profile, 8)
     start = few.start(seed=7)
