@@ -57,8 +57,7 @@ def convert_object(
 
 
 def _done(request: dict[str, Any], out: Path, options: ConvertOptions, work: Callable[[], Outcome]) -> Outcome:
-    """Shared assets lie outside the output's folder, so an output that uses them is never kept."""
-    if not options.cache or options.assets != ".":
+    if not options.cache:
         return work()
     start = time.perf_counter()
     options.progress("comparing with earlier conversions", 0, 1)

@@ -85,7 +85,9 @@ def finish(
             provisional.append(facts["pictures"])
     count = len(warnings) + sum(len(lines) for lines in per_object.values())
     written = hashlib.sha256((folder / "manifest.json").read_bytes()).hexdigest()
-    return Outcome(len(manifest.objects), list(skipped), checks, count, timings, provisional, written)
+    return Outcome(
+        len(manifest.objects), list(skipped), checks, count, timings, provisional, written, builder.files_outside()
+    )
 
 
 def _object_warnings(name: str, built: BuiltModel, builder: ModelBuilder) -> list[str]:

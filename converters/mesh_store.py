@@ -34,6 +34,11 @@ class MeshStore:
     def __len__(self) -> int:
         return len(self._names)
 
+    @property
+    def files(self) -> list[str]:
+        """Names of the files written so far, sorted."""
+        return sorted(f"{name}.obj" for name in self._names.values())
+
     def add(
         self,
         vertices: np.ndarray,

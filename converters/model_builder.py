@@ -55,6 +55,13 @@ class ModelBuilder:
         self.visual_class = self.spec.add_default("visual", self.spec.default)
         _set_classes(self.collision_class.geom, self.visual_class.geom)
 
+    def files_outside(self) -> list[str]:
+        """Meshes and textures that were not written into `folder`, relative to it."""
+        if pathlib.PurePosixPath(self.spec.meshdir) == pathlib.PurePosixPath(MESH_FOLDER):
+            return []
+        meshes = [f"{self.spec.meshdir}/{name}" for name in self.meshes.files]
+        return meshes + [f"{self.spec.texturedir}/{name}" for name in self.textures.files]
+
     def warn(self, owner: str, text: str) -> None:
         """Notes a warning about an object, or about the whole model for owner ''."""
         self.warnings.setdefault(owner, []).append(text)

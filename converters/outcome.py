@@ -42,6 +42,7 @@ class Outcome:
       provisional: why another run might do better (a decomposition ran out of time, nothing could render), one line
         each; such a result is not kept in the cache.
       manifest_hash: SHA-256 of the manifest that was written.
+      shared: files outside the output's folder that it uses (see `ConvertOptions.assets`), relative to the folder.
       cached: the result came out of the cache.
     """
 
@@ -52,6 +53,7 @@ class Outcome:
     timings: dict[str, float]
     provisional: list[str] = dataclasses.field(default_factory=list)
     manifest_hash: str = ""
+    shared: list[str] = dataclasses.field(default_factory=list)
     cached: bool = False
 
     def to_json(self) -> str:

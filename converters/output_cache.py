@@ -1,9 +1,10 @@
 """Finished outputs, kept between runs: the same conversion of the same input is copied instead of done again.
 
 An entry is one zip file named after the request: the command's arguments, the options that decide what comes out, and
-the versions of everything that takes part, down to the converter's own source. Inside it stand the output's files and
-the record of all input the conversion looked at (see `inputs`); it is used only while every file of that record still
-has the same content, and what was absent still is. Nothing heavy is imported here.
+the versions of everything that takes part, down to the converter's own source. Inside it stand the output's files,
+those that it shares with other outputs, and the record of all input the conversion looked at (see `inputs`); it is used
+only while every file of that record still has the same content, and what was absent still is. Nothing heavy is imported
+here.
 """
 
 from __future__ import annotations
@@ -41,6 +42,8 @@ SOURCES = ("ig2mj_converters", "ig2mj.knowledge", "ig2mj.scene", "ig2mj.sensors"
 """Packages of this project whose files decide what comes out (sensors and viewer draw the report's pictures)."""
 
 _FACTS = "ig2mj-cache.json"
+_SHARED = "ig2mj-shared/"
+"""Before the number of a file that lies outside the output's folder."""
 _PACKED = (".png", ".npz", ".jpg")
 
 
@@ -51,6 +54,7 @@ def key_of(request: Mapping[str, Any], options: ConvertOptions) -> str:
         "options": options.record(),
         "skip_missing": options.skip_missing,
         "report": options.report,
+        "assets": options.assets,
         "pictures": options.renderer is not None and os.environ.get("MUJOCO_GL", ""),
         "versions": [sys.version, *(_version(name) for name in PACKAGES)],
         "sources": [_source_hash(name) for name in SOURCES],
@@ -59,7 +63,10 @@ def key_of(request: Mapping[str, Any], options: ConvertOptions) -> str:
 
 
 def fetch(key: str, out: str | os.PathLike) -> Outcome | None:
-    """Puts an entry's output in place of `out`. None: there is no entry, its input has changed, or it is damaged.
+    """Puts an entry's output in place of `out`, and beside it the files that it shares with others.
+
+    Returns:
+      None: there is no entry, its input has changed, or it is damaged.
 
     Raises:
       InputError: `out` may not be replaced (see `replaced_folder`).
@@ -71,11 +78,14 @@ def fetch(key: str, out: str | os.PathLike) -> Outcome | None:
             if facts["key"] != key or not Record(facts["inputs"]).holds_still():
                 return None
             outcome = Outcome.from_json(facts["outcome"])
-            names = [name for name in archive.namelist() if name != _FACTS]
+            names = [name for name in archive.namelist() if name != _FACTS and not name.startswith(_SHARED)]
+            shared = {name: archive.read(f"{_SHARED}{k}") for k, name in enumerate(outcome.shared)}
             with replaced_folder(out) as folder:
                 archive.extractall(folder, names)  # checks each file's CRC
                 if hashlib.sha256((folder / MARK).read_bytes()).hexdigest() != outcome.manifest_hash:
                     raise ValueError("not the manifest that was kept")
+                for name, raw in shared.items():
+                    _put(folder / name, raw)
         os.utime(path)
     except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile, zlib.error):
         return None
@@ -93,10 +103,12 @@ def store(key: str, record: Record, outcome: Outcome, out: str | os.PathLike) ->
         with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as file:
             temporary = pathlib.Path(file.name)
             with zipfile.ZipFile(file, "w", compresslevel=1) as archive:
-                for source in sorted(folder.rglob("*")):
-                    if source.is_file():
-                        method = zipfile.ZIP_STORED if source.suffix in _PACKED else zipfile.ZIP_DEFLATED
-                        archive.write(source, source.relative_to(folder).as_posix(), method)
+                files = {s.relative_to(folder).as_posix(): s for s in sorted(folder.rglob("*")) if s.is_file()}
+                files |= {f"{_SHARED}{k}": folder / name for k, name in enumerate(outcome.shared)}
+                for name, source in files.items():
+                    archive.write(
+                        source, name, zipfile.ZIP_STORED if source.suffix in _PACKED else zipfile.ZIP_DEFLATED
+                    )
                 archive.writestr(_FACTS, json.dumps(facts), zipfile.ZIP_DEFLATED)
         if temporary.stat().st_size <= LIMIT:
             temporary.replace(path)
@@ -108,6 +120,16 @@ def store(key: str, record: Record, outcome: Outcome, out: str | os.PathLike) ->
         if temporary is not None:
             with contextlib.suppress(OSError):
                 temporary.unlink()
+
+
+def _put(file: pathlib.Path, raw: bytes) -> None:
+    """Writes a file that other outputs may use too; one that has these bytes already is left alone."""
+    try:
+        if file.read_bytes() == raw:
+            return
+    except FileNotFoundError:
+        file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(raw)
 
 
 def _path(key: str) -> pathlib.Path:

@@ -25,6 +25,11 @@ class TextureStore:
         self._names: set[str] = set()
         self.warnings: list[str] = []
 
+    @property
+    def files(self) -> list[str]:
+        """Names of the files written so far, sorted."""
+        return sorted(f"{name}.png" for name in self._names)
+
     def material(self, image: str) -> str | None:
         """Name of the material that shows an image file; None (and a warning) where it cannot be read."""
         if image not in self._by_file:

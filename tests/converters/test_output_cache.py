@@ -7,6 +7,7 @@ import hashlib
 import json
 import os
 import pathlib
+import re
 import shutil
 import sys
 
@@ -46,6 +47,7 @@ def own(tmp_path, dataset) -> pathlib.Path:
     model = root / "objects" / "stove" / "st0"
     write_obj(model / "shape" / "visual" / "v.obj", [("", box((0.6, 0.6, 0.9)))])
     text = (model / "shape" / "visual" / "v.obj").read_text()
+    text = re.sub(r"(?m)^f (\d+) (\d+) (\d+)$", r"f \1/1 \2/1 \3/1", text)
     (model / "shape" / "visual" / "v.obj").write_text(f"mtllib d.mtl\nvt 0 0\nusemtl d\n{text}")
     (model / "shape" / "visual" / "d.mtl").write_text("newmtl d\nmap_Kd ../../material/DIFFUSE.png\n")
     (model / "material").mkdir()
@@ -252,3 +254,28 @@ def test_pipes_are_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "pipe.png")
     with pytest.raises(OSError, match="no regular file"):
         inputs.content(tmp_path / "pipe.png")
+
+
+def test_homes_with_shared_meshes_come_out_of_the_cache_with_them(own, tmp_path, capsys):
+    """Issue 5: a second `homes convert` of what has not changed takes no time and gives the same bytes."""
+
+    def convert(out: str, *options: str) -> tuple[dict[str, str], bool]:
+        call(["homes", "convert", "--dataset", str(own), "--out", str(tmp_path / out), "--jobs", "1", *options])
+        return contents(tmp_path / out), "1 have not changed: taken from the cache" in capsys.readouterr().out
+
+    first, cached = convert("a")
+    assert not cached and any(f.startswith("meshes/") for f in first) and any(f.startswith("textures/") for f in first)
+    assert f"{SCENE}/checks.json" in first and not any(f.startswith(f"{SCENE}/meshes") for f in first)
+    assert convert("b") == (first, True), "into another folder"
+    lost, damaged = sorted((tmp_path / "a" / "meshes").iterdir())[:2]
+    lost.unlink()
+    damaged.write_bytes(b"v 0 0 0\n")
+    assert convert("a") == (first, True), "over an output that is not whole any more"
+    assert convert("c", "--no-cache") == (first, False)
+    write_obj(own / "objects" / "stove" / "st0" / "shape" / "visual" / "v.obj", [("", box((0.5, 0.6, 0.9)))])
+    changed, cached = convert("a")
+    assert not cached and changed != first
+
+
+def test_outputs_with_shared_meshes_have_entries_of_their_own():
+    assert output_cache.key_of({}, dataclasses.replace(BARE, assets="..")) != output_cache.key_of({}, BARE)

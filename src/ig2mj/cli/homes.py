@@ -64,6 +64,7 @@ def convert(
     out: pathlib.Path,
     home: tuple[str, ...] = (),
     jobs: int = 2,
+    no_cache: Flag = False,
 ) -> int:
     """Convert the homes of a dataset into one folder with shared meshes, as scenes_mjcf/ has them.
 
@@ -74,8 +75,9 @@ def convert(
       out: folder for the homes; meshes that no home uses any more are removed from it.
       home: just these homes.
       jobs: processes.
+      no_cache: convert anew even what has not changed, and keep nothing for the next time.
     """
-    from ig2mj_converters.convert_scene import convert_scene
+    from ig2mj_converters.conversion import convert_scene
     from ig2mj_converters.options import ConvertOptions
     from ig2mj_homes.ship import remove_unused, strip_report, total_bytes
 
@@ -83,16 +85,19 @@ def convert(
 
     names = _scenes_of(dataset, home)
     failed: list[str] = []
+    cached = 0
     with progress_bar() as bar:
         whole = add_bar(bar, "homes")
         for number, name in enumerate(names):
             whole(name, number, len(names))
             part = add_bar(bar, name)
-            convert_scene(dataset, name, out / name, options=ConvertOptions(jobs=jobs, assets="..", progress=part))
+            options = ConvertOptions(jobs=jobs, assets="..", cache=not no_cache, progress=part)
+            cached += convert_scene(dataset, name, out / name, options=options).cached
             failed += strip_report(out / name)
             bar.remove_task(bar.task_ids[-1])
     remove_unused(out)
-    print(f"{out}: {len(names)} homes, {total_bytes(out) / 1e6:.1f} MB, {len(failed)} checks failed")
+    kept = f" ({cached} have not changed: taken from the cache)" if cached else ""
+    print(f"{out}: {len(names)} homes, {total_bytes(out) / 1e6:.1f} MB, {len(failed)} checks failed{kept}")
     for line in failed:
         print(f"  {line}")
     return 1 if failed else 0
