@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import pathlib
 import sys
 from typing import Annotated, Literal
@@ -70,8 +69,7 @@ def run(
 
 def _with_hand(scene: pathlib.Path, hand: bool):
     """The scene, with a hand where it reaches most, and what it reaches; without one where it reaches nothing."""
-    from ig2mj.agents.floating_hand import add_floating_hand
-    from ig2mj.agents.reach import find_reach
+    from ig2mj.cli.hand import with_hand
     from ig2mj.errors import EngineError
     from ig2mj.scene.scene import load_scene
 
@@ -79,11 +77,10 @@ def _with_hand(scene: pathlib.Path, hand: bool):
     if not hand:
         return loaded, None
     try:
-        reach = find_reach(loaded)
+        return with_hand(loaded, scene)
     except EngineError as e:
         print(f"note: {e}; measured without a hand", file=sys.stderr)
         return loaded, None
-    return load_scene(scene, [functools.partial(add_floating_hand, pos=reach.start)]), reach
 
 
 def _table(title: str, profile, model):

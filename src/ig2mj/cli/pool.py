@@ -26,10 +26,11 @@ def run(
       seed: the same seed gives the same pool.
       share: probability that a loose object is moved, per row.
       threads: 0: one per processor.
-      hand: make it for the scene with a floating hand.
+      hand: make it for the scene with a floating hand, in the free place from which it reaches most loose objects
+        (`ig2mj.agents.reach.find_reach`), as `ig2mj calibrate` has it.
     """
-    from ig2mj.agents.floating_hand import add_floating_hand
     from ig2mj.cli.files import check_folder_of
+    from ig2mj.cli.hand import with_hand
     from ig2mj.cli.printing import add_bar, progress_bar
     from ig2mj.errors import Ig2mjError
     from ig2mj.sampling.settled import make_pool
@@ -43,9 +44,13 @@ def run(
         raise Ig2mjError(f"--share {share}: a probability is between 0 and 1")
     if threads < 0:
         raise Ig2mjError(f"--threads {threads}: 0 takes one per processor, else at least one is needed")
-    loaded = load_scene(scene, [add_floating_hand] if hand else [])
+    loaded = load_scene(scene)
     file = out or loaded.folder / "pool.npz"
     check_folder_of(file)
+    start: list[float] | None = None
+    if hand:
+        loaded, reach = with_hand(loaded, scene)
+        start = reach.start.tolist()
     with progress_bar() as bar:
         report = add_bar(bar, f"settling {loaded.name}")
         pool = make_pool(
@@ -57,5 +62,6 @@ def run(
             threads=threads or None,
             progress=lambda done: report("", done, count),
         )
-    save_pool(pool, file, loaded.name, {"seed": seed, "share": share, "hand": hand})
-    print(f"{file}: {pool.size} settled states of {loaded.name}")
+    save_pool(pool, file, loaded.name, {"seed": seed, "share": share, "hand": start})
+    place = "" if start is None else f" with a hand at ({', '.join(f'{x:.3f}' for x in start)})"
+    print(f"{file}: {pool.size} settled states of {loaded.name}{place}")
