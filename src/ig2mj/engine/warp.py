@@ -57,7 +57,7 @@ class WarpEngine(MjxEngine):
         use_awake_kernels()
         report_warp_compilation()
         sizes = fit(profile, scene.model) if profile else load_profile(scene.folder, scene.model)
-        self.profile = sizes.for_worlds(num_worlds)
+        self.profile = sizes.for_worlds(max(num_worlds, 1))  # a wrong number is told by `MjxEngine`
         self._print_overflow = print_overflow
         self._iterations = iterations or int(scene.model.opt.iterations)
         self._ls_iterations = ls_iterations or int(scene.model.opt.ls_iterations)
