@@ -76,7 +76,7 @@ def _empty(now: list[Array], length: int) -> tuple[jax.Array, ...]:
 
 @functools.partial(jax.jit, donate_argnums=0)
 def _put(rings: tuple[Array, ...], place: Int[Array, ""], now: list[Array]) -> tuple[jax.Array, ...]:
-    return tuple(ring.at[place].set(a) for ring, a in zip(rings, now, strict=True))
+    return tuple(jnp.asarray(ring).at[place].set(a) for ring, a in zip(rings, now, strict=True))
 
 
 def frames_of(recording: Recording, world: int) -> Frames:
