@@ -77,3 +77,23 @@ def test_models_that_reach_further_than_spheres_say_keep_upstreams():
     assert serves(mujoco_warp.put_model(_model()))
     assert not serves(mujoco_warp.put_model(_model(sleep="disable")))
     assert not serves(mujoco_warp.put_model(_model(extra='<pair geom1="t0" geom2="t5" margin="1"/>')))
+
+
+@pytest.mark.slow
+def test_too_many_pairs_are_flagged_though_the_second_pass_finds_none():
+    """Everything is awake and lies close: the first pass has all pairs, the second none."""
+    model, flag = _model(), int(types.OverflowType.BROADPHASE)
+    put = mujoco_warp.put_model(model)
+    put.opt.warn_overflow = 0
+    assert use_awake_kernels()
+    flags, counted = {}, {}
+    for room in (8, 400):
+        data = mujoco_warp.put_data(model, mujoco.MjData(model), nworld=1, naconmax=room, naccdmax=room, njmax=600)
+        mujoco_warp.step(put, data)
+        flags[room], counted[room] = int(data.overflow.numpy()[0]) & flag, int(data.ncollision.numpy()[0])
+    assert counted[400] > 8
+    assert flags == {8: flag, 400: 0}
+    with upstream_kernels():
+        data = mujoco_warp.put_data(model, mujoco.MjData(model), nworld=1, naconmax=8, naccdmax=8, njmax=600)
+        mujoco_warp.step(put, data)
+        assert not int(data.overflow.numpy()[0]) & flag, "upstream tells by now: `_keep_larger` may go"

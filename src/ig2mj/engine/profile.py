@@ -1,8 +1,8 @@
 """`EngineProfile`: how large the Warp engine's buffers are. Written by `ig2mj calibrate`, read by the engine.
 
 MJX-Warp allocates per world for the most degrees of freedom awake at once, the most constraint rows and the most
-contacts. What does not fit is lost, and the world is flagged (`ig2mj.engine.guards`). Tight buffers are what makes a
-batch fast (design section 2, fact 4), so they are measured per scene and kept beside its manifest.
+contacts. What does not fit is lost, and the world is flagged (`ig2mj.worlds.guards`). Sizes that hold everything would
+take far more memory than homes ever use, so they are measured per scene and kept beside its manifest.
 """
 
 from __future__ import annotations

@@ -1,7 +1,8 @@
 """The Warp engine: MJX `impl='warp'`. Thousands of worlds on a GPU; on a CPU it runs too, slowly, for parity tests.
 
-Speed comes from sleep and from tight buffers (`ig2mj.engine.profile`). Where the buffers do not hold the whole scene
-awake, worlds start from a settled, sleeping state.
+Speed comes from sleep and from kernels that cost what is awake (`ig2mj.engine.warp_kernels`); buffers
+(`ig2mj.engine.profile`) cost memory. Where they do not hold the whole scene awake, worlds start from a settled,
+sleeping state.
 """
 
 from __future__ import annotations

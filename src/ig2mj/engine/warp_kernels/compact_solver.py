@@ -174,12 +174,14 @@ def _init_hessian_kernel() -> wp.Kernel:
 
 
 def init_hessian(compact: bool) -> wp.Kernel:
+    """The kernel that begins a Hessian with the inertia; upstream's where the solver is not compacted."""
     if not compact:
         return original(solver, "_update_gradient_init_h_sparse")(compact)
     return _init_hessian_kernel()
 
 
 def cholesky_factorize_solve(m: Any, d: Any, ctx: Any, skip_unchanged: bool = False, skip_noflip: bool = False) -> None:
+    """Factorises the Hessian and solves for the search direction, of what is awake."""
     if not solver._sparse_compact(ctx) or m.nv <= solver._BLOCK_CHOLESKY_DIM:
         original(solver, "_cholesky_factorize_solve")(m, d, ctx, skip_unchanged, skip_noflip)
         return

@@ -3,7 +3,7 @@
 Its convex collision works in single precision. Where a small thing rests on a wide box, as everything does on a floor,
 by a hundredth of a millimetre, it gives
 
-- about once in a hundred thousand steps a contact metres away from the thing. Such a lever makes the solver's matrix
+- now and then a contact metres away from the thing. Such a lever makes the solver's matrix
   singular, and the world is lost (not finite) or the thing flies off. A contact belongs within the bounding boxes of
   both geoms; what lies outside by more than its own depth is dropped, and the pair's next step gives a sound one;
 - in up to one of twenty steps (floor of 12 m, thing nearly flat) a normal that is not the floor's. Where a shallow
