@@ -5,65 +5,25 @@ Families (homes/families/*.py) each export `CATEGORIES`, a list of `Entry`; this
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import random
-from collections.abc import Callable, Mapping
-from typing import Any
 
 import numpy as np
 
 from ig2mj.errors import UnknownNameError
 
+from .entry import Entry
+from .families import FAMILIES
 from .halves import add_halves
 from .hinges import friction
-from .materials import Material
 from .model import HouseholdObject, ObjectBuilder
 
-Family = Callable[..., None]
 IN_WALLS = ("door", "window")
-AG_MASS = 5.0  # kg: lighter free objects may be held by assisted grasping (`enable_ag`)
-
-
-@dataclasses.dataclass(frozen=True)
-class Entry:
-    """One line of the catalogue.
-
-    Attributes:
-      category: iGibson's category name.
-      build: the family function; called as build(builder, **options).
-      size: real (depth x, width y, height z) in metres as it stands; the front looks along +x.
-      mass: kilograms of a model of that size, contents included.
-      count: how many models.
-      fixed: furniture that is screwed or too heavy to be free in a scene.
-      rest: "any" (put down on any stable side), "standing" (mostly as built) or "upright" (only as built).
-      vary: each edge is multiplied by a random factor of 1 +- vary; uniform: all three by the same.
-      flesh: material of the cut faces; given for sliceable categories, whose models then come with halves.
-      options: further keyword arguments of `build`.
-    """
-
-    category: str
-    build: Family
-    size: tuple[float, float, float]
-    mass: float
-    count: int = 3
-    fixed: bool = False
-    rest: str = "any"
-    vary: float = 0.08
-    uniform: bool = False
-    flesh: Callable[[random.Random], Material] | None = None
-    options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
-
-    @property
-    def enable_ag(self) -> bool:
-        return not self.fixed and self.mass <= AG_MASS
 
 
 @functools.cache
 def catalogue() -> dict[str, Entry]:
     """All entries by category name, in alphabetical order."""
-    from .families import FAMILIES
-
     entries: dict[str, Entry] = {}
     for family in FAMILIES:
         for entry in family.CATEGORIES:

@@ -15,7 +15,8 @@ from collections.abc import Callable, Iterable
 from ig2mj.errors import UnknownNameError
 from ig2mj.knowledge import synset
 
-from .catalogue import Entry, build_model, catalogue
+from .catalogue import build_model, catalogue
+from .entry import Entry
 from .material_library import write_material_library
 from .specs import category_spec
 from .sweeps import self_clashes

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from .catalogue import Entry
+from .entry import Entry
 
 Spec = dict[str, object]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from .. import materials, textures
-from ..catalogue import Entry
+from ..entry import Entry
 from ..materials import Material
 from ..model import ObjectBuilder
 from ..solids import block, box, cylinder, decal, hull, join, lathe, rod, soft_box, tube

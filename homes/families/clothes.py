@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from .. import materials, textures
-from ..catalogue import Entry
+from ..entry import Entry
 from ..model import ObjectBuilder
 from ..solids import arc, ball, block, box, cylinder, decal, extrusion, hull, lathe, prism, rod, soft_box, tube
 from ..vessels import ring

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from .. import materials, textures
-from ..catalogue import Entry
+from ..entry import Entry
 from ..model import ObjectBuilder
 from ..solids import Solid, ball, block, box, cylinder, decal, extrusion, hull, lathe, rod, sleeve, soft_box, tube
 from ..vessels import ring

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from .. import materials
-from ..catalogue import Entry
+from ..entry import Entry
 from ..materials import Material
 from ..model import LinkBuilder, ObjectBuilder
 from ..solids import Solid, block, join, soft_box

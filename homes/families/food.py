@@ -8,7 +8,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from .. import materials
-from ..catalogue import Entry
+from ..entry import Entry
 from ..model import ObjectBuilder
 from ..solids import Solid, ball, block, box, cylinder, decal, hull, lathe, prism, rod, soft_box, tube
 from ..vessels import tray, turned_vessel

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .. import materials
-from ..catalogue import Entry
+from ..entry import Entry
 from ..model import LinkBuilder, ObjectBuilder
 from ..solids import block
 from .parts import GAP, bow_handle, carcass, door, drawer

@@ -7,7 +7,7 @@ import random
 from collections.abc import Callable
 
 from .. import materials
-from ..catalogue import Entry, Family
+from ..entry import Entry, Family
 from ..halves import cut_half
 from ..materials import Material
 from ..model import ObjectBuilder

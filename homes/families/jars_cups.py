@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from .. import materials
-from ..catalogue import Entry
+from ..entry import Entry
 from ..model import ObjectBuilder
 from ..solids import (
     ball,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .. import materials, textures
-from ..catalogue import Entry
+from ..entry import Entry
 from ..model import ObjectBuilder
 from ..solids import (
     ball,

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from .. import materials
-from ..catalogue import Entry
+from ..entry import Entry
 from ..model import ObjectBuilder
 from ..solids import (
     ball,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .. import materials
-from ..catalogue import Entry
+from ..entry import Entry
 from ..model import ObjectBuilder
 from ..solids import Solid, arc, block, cylinder, join, lathe, tube
 from .parts import bow_handle, carcass, door

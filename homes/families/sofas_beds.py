@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from .. import materials
-from ..catalogue import Entry
+from ..entry import Entry
 from ..model import ObjectBuilder
 from ..solids import block, box, join, rod, sheet, soft_box
 from .chairs import padded

@@ -9,7 +9,7 @@ import random
 import numpy as np
 
 from .. import materials
-from ..catalogue import Entry
+from ..entry import Entry
 from ..model import ObjectBuilder
 from ..solids import Solid, ball, block, cylinder, hull, lathe, rod, soft_box, tube
 from .fruit import onion, round_fruit

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 if TYPE_CHECKING:
-    from ig2mj_homes.catalogue import Entry
+    from ig2mj_homes.entry import Entry
 
 Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
 
