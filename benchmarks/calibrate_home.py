@@ -19,7 +19,7 @@ import ig2mj
 from ig2mj.agents.floating_hand import add_floating_hand
 from ig2mj.agents.reach import find_reach
 from ig2mj.calibration import calibrate
-from ig2mj.engine.profile import save_profile
+from ig2mj.engine.warp.profile import save_profile
 
 
 def main() -> None:

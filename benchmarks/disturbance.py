@@ -11,9 +11,9 @@ import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float
 
-from ig2mj.engine.mjx_contacts import warp_contacts
+from ig2mj.engine.mjx.contacts import warp_contacts
 from ig2mj.engine.view import Array
-from ig2mj.engine.warp import WarpEngine
+from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.sampling.perturbation import loose_objects
 from ig2mj.scene.scene import Scene
 

@@ -48,8 +48,8 @@ def made_homes(sizes: tuple[int, ...] = SIZES, work: pathlib.Path = WORK) -> lis
 
 def convert(dataset: pathlib.Path, scene: str, work: pathlib.Path = WORK) -> Home:
     """Converts a scene of a dataset root into the working folder."""
+    from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.convert_scene import convert_scene
-    from ig2mj_converters.options import ConvertOptions
 
     folder = work / "converted" / scene
     convert_scene(dataset, scene, folder, options=ConvertOptions(report=False))

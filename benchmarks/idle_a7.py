@@ -245,7 +245,7 @@ def main(args: Args) -> list[dict[str, Any]]:
         if args.dataset is None:
             homes = made_homes(args.sizes, args.work)
         else:
-            from ig2mj_converters.dataset import Dataset
+            from ig2mj_converters.reading.dataset import Dataset
 
             homes = [convert(args.dataset, s, args.work) for s in args.scenes or Dataset(args.dataset).scenes()]
         backend = gl_backend() if args.pictures else None

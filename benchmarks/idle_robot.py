@@ -15,7 +15,7 @@ import numpy as np
 from pybullet_scene import BulletBody, BulletCamera
 from scipy import ndimage
 
-from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.scene import Scene
 

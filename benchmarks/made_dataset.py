@@ -16,8 +16,8 @@ import shutil
 import sys
 
 import numpy as np
-from ig2mj_converters.dataset import Dataset
-from ig2mj_homes.dataset import build_dataset
+from ig2mj_converters.reading.dataset import Dataset
+from ig2mj_homes.dataset.root import build_dataset
 
 SIZES = (20, 60, 120)
 

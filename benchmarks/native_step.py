@@ -27,7 +27,7 @@ from rich.table import Table
 
 import ig2mj
 from ig2mj.agents.floating_hand import add_floating_hand, hand_ctrl
-from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import EngineError
 
 EPISODE_STEPS = 90

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from ig2mj.engine.base import Write
-from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.view import PhysicsView
 from ig2mj.predicates.compile import CompiledExpression, Verdict
 from ig2mj.predicates.stepper import StateProgram, StateStepper

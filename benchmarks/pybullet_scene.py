@@ -18,12 +18,12 @@ from xml.sax.saxutils import quoteattr
 import msgspec
 import mujoco
 import numpy as np
-from ig2mj_converters.assembly import Assembly, BodyPlan, VisualPart
-from ig2mj_converters.dataset import Dataset
-from ig2mj_converters.joint_limits import joint_range, unit_axis
-from ig2mj_converters.joint_rules import FRICTION, FRICTION_BY_CATEGORY
+from ig2mj_converters.base.options import ConvertOptions
+from ig2mj_converters.bodies.assembly import Assembly, BodyPlan, VisualPart
+from ig2mj_converters.bodies.joint_rules import FRICTION, FRICTION_BY_CATEGORY
 from ig2mj_converters.model_task import build_model
-from ig2mj_converters.options import ConvertOptions
+from ig2mj_converters.reading.dataset import Dataset
+from ig2mj_converters.reading.joint_limits import joint_range, unit_axis
 from scipy.spatial.transform import Rotation
 
 from ig2mj.scene.manifest import ObjectEntry

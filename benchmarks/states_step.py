@@ -26,7 +26,7 @@ from rich.table import Table
 from stateful_home import GOAL, write_stateful_home
 
 import ig2mj
-from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.predicates import compile_expression
 from ig2mj.predicates.stepper import StateProgram, StateStepper, run_inline
 from ig2mj.states import RelationPlan, StateModel, initial_states, queries, update

@@ -32,7 +32,7 @@ from disturbance import LEAST, Watch, join, summary
 
 from ig2mj.agents.pushing import push, start_pushing
 from ig2mj.engine.health import CAPACITY, Overflow
-from ig2mj.engine.warp import WarpEngine
+from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.sensors.batch_camera import BatchCamera
 from ig2mj.worlds.batch import Worlds
 

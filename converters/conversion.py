@@ -10,9 +10,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from . import inputs, output_cache
-from .options import ConvertOptions
-from .outcome import Outcome
+from .base import inputs, output_cache
+from .base.options import ConvertOptions
+from .base.outcome import Outcome
 
 Path = str | os.PathLike
 

@@ -11,24 +11,24 @@ import numpy as np
 from ig2mj.errors import InputError
 from ig2mj.scene.manifest import FORMAT_VERSION, Manifest
 
-from . import inputs
-from .assembly import extent
-from .dataset import Dataset
-from .description import ObjectModel
+from .base import inputs
+from .base.description import ObjectModel
+from .base.options import ConvertOptions
+from .base.output import replaced_folder
+from .bodies.assembly import extent
 from .finish import Outcome, finish, version_record
-from .joint_limits import clamp
-from .manifest_entries import object_entry
-from .metadata import read_metadata
-from .mjcf_file import write_model
-from .mjcf_object import add_object
-from .mjcf_scene import add_start_key
-from .model_builder import ModelBuilder
+from .mjcf.appearance import add_ground, add_setting
+from .mjcf.file import write_model
+from .mjcf.manifest_entries import object_entry
+from .mjcf.model_builder import ModelBuilder
+from .mjcf.object import add_object
+from .mjcf.parking import resting_pose
+from .mjcf.scene import add_start_key
 from .model_task import BuiltModel, build_model
-from .options import ConvertOptions
-from .output import replaced_folder
-from .parking import resting_pose
-from .setting import add_ground, add_setting
-from .urdf import read_urdf
+from .reading.dataset import Dataset
+from .reading.joint_limits import clamp
+from .reading.metadata import read_metadata
+from .reading.urdf import read_urdf
 
 
 def convert_object(

@@ -13,23 +13,23 @@ import numpy as np
 from ig2mj.errors import InputError
 from ig2mj.scene.manifest import FORMAT_VERSION, Manifest, RoomsEntry
 
-from . import inputs
-from .assembly import has_own_look
-from .dataset import Dataset
-from .description import Instance, SceneDescription
+from .base import inputs
+from .base.description import Instance, SceneDescription
+from .base.options import ConvertOptions
+from .base.output import replaced_folder
+from .base.process_pool import map_tasks
+from .base.transforms import quat_from_rotation
+from .bodies.assembly import has_own_look
+from .bodies.placements import Placement, complete_parts, make_halves, place_instances
 from .finish import Outcome, finish, version_record
-from .manifest_entries import room_entries, task_entry, vec3
-from .mjcf_file import write_model
-from .mjcf_scene import SceneBuild, build_scene, fill_states, rest_start
-from .model_builder import ModelBuilder
+from .mjcf.file import write_model
+from .mjcf.manifest_entries import room_entries, task_entry, vec3
+from .mjcf.model_builder import ModelBuilder
+from .mjcf.scene import SceneBuild, build_scene, fill_states, rest_start
 from .model_task import BuiltModel, ModelTask, forget_datasets, is_quick, model_task, run_task
-from .options import ConvertOptions
-from .output import replaced_folder
-from .placements import Placement, complete_parts, make_halves, place_instances
-from .pool import map_tasks
-from .poses import quat_from_rotation
-from .room_maps import write_rooms
-from .scene_urdf import parse_object_scope
+from .reading.dataset import Dataset
+from .reading.room_maps import write_rooms
+from .reading.scene_urdf import parse_object_scope
 
 ROOMS_FILE = "rooms.npz"
 

@@ -13,14 +13,14 @@ import mujoco
 
 from ig2mj.scene.manifest import Manifest, check_manifest, save_manifest
 
-from .checks import run_checks
-from .description import RoomMaps
-from .joint_rules import openable_ends
-from .model_builder import ModelBuilder
+from .base.description import RoomMaps
+from .base.options import ConvertOptions
+from .base.outcome import CheckResult, Outcome
+from .bodies.joint_rules import openable_ends
+from .mjcf.model_builder import ModelBuilder
 from .model_task import BuiltModel
-from .options import ConvertOptions
-from .outcome import CheckResult, Outcome
-from .report import RENDERED, ReportInput, write_report
+from .report.checks import run_checks
+from .report.page import RENDERED, ReportInput, write_report
 
 
 def version_record(options: ConvertOptions) -> dict[str, Any]:

@@ -11,16 +11,16 @@ import numpy as np
 
 from ig2mj.errors import Ig2mjError
 
-from . import inputs
-from .assembly import Assembly, assemble
-from .dataset import Dataset
-from .description import Instance, ObjectModel, SceneDescription, Shape
-from .hulls import decompose_link, is_cached
-from .inertia import link_inertials
-from .options import Progress, no_progress
-from .pieces import HullOptions, LinkHulls
-from .pool import map_tasks
-from .scaling import instance_scale, scale_model
+from .base import inputs
+from .base.description import Instance, ObjectModel, SceneDescription, Shape
+from .base.options import Progress, no_progress
+from .base.process_pool import map_tasks
+from .bodies.assembly import Assembly, assemble
+from .bodies.inertia import link_inertials
+from .hulls.link_hulls import decompose_link, is_cached
+from .hulls.pieces import HullOptions, LinkHulls
+from .reading.dataset import Dataset
+from .reading.scaling import instance_scale, scale_model
 
 
 @dataclasses.dataclass

@@ -13,8 +13,8 @@ import mujoco
 import numpy as np
 from PIL import Image, ImageDraw
 
-from .model import HouseholdObject, hull_mesh
-from .writer import box_mapping
+from .dataset.model_writer import box_mapping
+from .objects.model import HouseholdObject, hull_mesh
 
 TILE = 200  # pixels
 PALETTE = ((0.9, 0.4, 0.3), (0.3, 0.6, 0.9), (0.4, 0.8, 0.4), (0.9, 0.8, 0.3), (0.7, 0.5, 0.9), (0.4, 0.8, 0.8))

@@ -36,9 +36,8 @@ LAYERS = [
     "planning",
     "learn",
     "calibration",
-    "diagnosis_probes",
     "diagnosis",
-    "demos",
+    "showcase",
     "cli",
     "__main__",
 ]
@@ -133,7 +132,7 @@ def test_imports_run_downwards_only():
             if parts[0] == "ig2mj" and len(parts) > 1 and parts[1] in LAYERS:
                 if LAYERS.index(parts[1]) > LAYERS.index(room):
                     wrong.append(f"{file.relative_to(ROOT)}:{line}: {room} imports {name}")
-            elif parts[0] == "ig2mj" and room not in ("cli", "demos", "__main__"):
+            elif parts[0] == "ig2mj" and room not in ("cli", "showcase", "__main__"):
                 wrong.append(f"{file.relative_to(ROOT)}:{line}: imports {name} from the public surface")
     assert not wrong, "\n".join(wrong)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import ig2mj
-from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import EngineError, PoseError, UnknownNameError
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import ig2mj
-from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import AbilityError, InputError, StateError, UnknownNameError
 from ig2mj.predicates import AbilityWarning
 from ig2mj.states import StateOptions

@@ -5,9 +5,9 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 
-from ..catalogue import catalogue
-from ..things import Thing
+from ..objects.catalogue import catalogue
 from .kit import RoomKit
+from .placed import Thing
 from .room import HomeInProgress
 from .table_setting import lay_table
 

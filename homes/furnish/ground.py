@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..arrangement import FLAT
-from ..building import stair_boxes
-from ..floor_plans.plan import Plan, Rect
-from ..layout_maps import HIGH, LOW, reachable
-from ..things import Thing
+from ..plans.building import stair_boxes
+from ..plans.layout_maps import HIGH, LOW, reachable
+from ..plans.plan import Plan, Rect
+from .arrangement import FLAT
+from .placed import Thing
 
 CELL = 0.05  # m
 RADIUS = 0.34

@@ -5,11 +5,11 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterator
 
-from ..floor_plans.plan import Plan, Room
-from ..things import Thing
+from ..plans.plan import Plan, Room
 from . import kitchen, living, sleeping, working
 from .clutter import fill
 from .kit import RoomKit
+from .placed import Thing
 from .room import ROOMY, HomeInProgress
 from .start import lay_doormat, start_home
 

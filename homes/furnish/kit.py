@@ -10,10 +10,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..arrangement import AIR, FLAT
-from ..catalogue import find
-from ..things import Thing, yaw
+from ..objects.catalogue import find
+from .arrangement import AIR, FLAT
 from .loose import LooseKit
+from .placed import Thing, yaw
 from .room import SIDES, HomeInProgress, degrees_of
 
 __all__ = ["SIDES", "HomeInProgress", "RoomKit"]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import itertools
 from collections.abc import Iterator
 
-from ..things import Shape, Thing
 from .kit import RoomKit
+from .placed import Shape, Thing
 from .room import SIDES
 
 BEFORE = 0.55  # m, kept free before what has doors

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..things import Thing
 from .kit import RoomKit
+from .placed import Thing
 from .watching import seats_around, watch_television
 
 LARGE = 20.0  # m2 of living room from which there is a piano or a second place to sit

@@ -7,10 +7,10 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..arrangement import AIR, FLAT
-from ..catalogue import find
-from ..surfaces import Surface, insides, tops
-from ..things import Thing, lying, yaw
+from ..objects.catalogue import find
+from ..shapes.surfaces import Surface, insides, tops
+from .arrangement import AIR, FLAT
+from .placed import Thing, lying, yaw
 from .room import RoomBase
 
 MOST_POSES = 8  # stable orientations of a model at most (poses.MOST)

@@ -8,11 +8,11 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ..arrangement import Arrangement
-from ..catalogue import find
-from ..floor_plans.plan import Edge, Opening, Plan, Rect, Room
-from ..things import Shape, Thing, shape
+from ..objects.catalogue import find
+from ..plans.plan import Edge, Opening, Plan, Rect, Room
+from .arrangement import Arrangement
 from .ground import Ground
+from .placed import Shape, Thing, shape
 
 SIDES = {"south": (0, 1), "east": (-1, 0), "north": (0, -1), "west": (1, 0)}
 """Side of a room -> the direction into the room."""

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..things import Thing, yaw
 from .kit import RoomKit
 from .kitchen import with_doors
 from .living import middle_carpet, shoes
+from .placed import Thing, yaw
 from .room import degrees_of
 
 LID = 0.2

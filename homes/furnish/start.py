@@ -6,13 +6,13 @@ import random
 
 import numpy as np
 
-from ..arrangement import AIR, Arrangement
-from ..building import stair_boxes, wall_boxes
-from ..floor_plans.openings import opening_things
-from ..floor_plans.plan import Plan
-from ..floor_plans.porch import front_door, porch_rails
-from ..things import Thing, yaw
+from ..plans.building import stair_boxes, wall_boxes
+from ..plans.openings import opening_things
+from ..plans.plan import Plan
+from ..plans.porch import front_door, porch_rails
+from .arrangement import AIR, Arrangement
 from .ground import Ground
+from .placed import Thing, yaw
 from .room import HomeInProgress
 
 WAY = 0.75  # m, kept free on both sides of a door

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..things import Thing
 from .kit import RoomKit
+from .placed import Thing
 
 CENTREPIECES = ("bowl", "carafe", "pot_plant", "candle")
 COVER = (("plate", 0.18, 0.0), ("glass", 0.30, -0.17), ("tablefork", 0.18, 0.17), ("table_knife", 0.18, -0.16))

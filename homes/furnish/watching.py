@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..things import Thing
 from .kit import RoomKit
+from .placed import Thing
 from .room import SIDES
 
 OPPOSITE = {"south": "north", "north": "south", "east": "west", "west": "east"}

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..things import Thing
 from .kit import RoomKit
 from .kitchen import in_the_middle
 from .living import middle_carpet, shoes
+from .placed import Thing
 
 
 def home_office(kit: RoomKit) -> Iterator[Thing | None]:

@@ -19,21 +19,21 @@ import numpy as np
 from ig2mj.agents.pushing import Pusher, push, start_pushing
 from ig2mj.agents.reach import Reach
 from ig2mj.engine.base import Snapshot
-from ig2mj.engine.buffer_sizes import QUANTITIES, Measurement, Tail, profile_of
-from ig2mj.engine.candidate_pairs import CandidatePairs
 from ig2mj.engine.health import CAPACITY, SETTING
-from ig2mj.engine.mjx_contacts import warp_contacts
-from ig2mj.engine.native import NativeEngine
-from ig2mj.engine.profile import EngineProfile, default_profile
-from ig2mj.engine.settle import settle
-from ig2mj.engine.warp import WarpEngine
+from ig2mj.engine.mjx.contacts import warp_contacts
+from ig2mj.engine.native.engine import NativeEngine
+from ig2mj.engine.native.settle import settle
+from ig2mj.engine.warp.buffer_sizes import QUANTITIES, Measurement, Tail, profile_of
+from ig2mj.engine.warp.candidate_pairs import CandidatePairs
+from ig2mj.engine.warp.engine import WarpEngine
+from ig2mj.engine.warp.profile import EngineProfile, default_profile
 from ig2mj.errors import EngineError
 from ig2mj.sampling.perturbation import loose_objects, perturb
 from ig2mj.scene.scene import Scene
 from ig2mj.worlds.random_streams import episode_keys
 
 SAFETY = {"warp": 1.0, "native": 1.4}
-"""Factor on all sizes, by what was measured (see `ig2mj.engine.buffer_sizes` for what is reckoned with anyway)."""
+"""Factor on all sizes, by what was measured (see `ig2mj.engine.warp.buffer_sizes` for what is reckoned with anyway)."""
 
 WORLDS = {"warp": 1024, "native": 16}
 

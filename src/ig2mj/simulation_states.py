@@ -21,7 +21,7 @@ from ig2mj.predicates.compile import CompiledExpression, compile_expression
 from ig2mj.predicates.literals import object_index
 from ig2mj.predicates.logic import Atom, Expression
 from ig2mj.predicates.stepper import StateProgram, StateStepper, run_inline
-from ig2mj.sampling.setting import lacks, set_by_name
+from ig2mj.sampling.setters import lacks, set_by_name
 from ig2mj.scene.scene import Scene
 from ig2mj.states import registry
 from ig2mj.states.initial import states_of_manifest

@@ -13,8 +13,8 @@ import ig2mj
 from ig2mj.agents.floating_hand import add_floating_hand
 from ig2mj.agents.pushing import LEASH, push, start_pushing
 from ig2mj.agents.reach import find_reach
-from ig2mj.engine.native import NativeEngine
-from ig2mj.engine.settle import settle
+from ig2mj.engine.native.engine import NativeEngine
+from ig2mj.engine.native.settle import settle
 from ig2mj.sampling.perturbation import loose_objects
 from ig2mj.worlds.random_streams import episode_keys
 

@@ -10,7 +10,7 @@ from batch_case import Case
 from disturbance import Activity, geoms_of, join, summary
 from made_home import write_home
 
-from ig2mj.engine.profile import EngineProfile, save_profile
+from ig2mj.engine.warp.profile import EngineProfile, save_profile
 
 PROFILE = EngineProfile(awake_dofs=40, constraints=200, contacts=30, convex_contacts=20)
 

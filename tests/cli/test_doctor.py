@@ -9,8 +9,9 @@ import sys
 import pytest
 from packaging.requirements import Requirement
 
-from ig2mj import cli, diagnosis
-from ig2mj.diagnosis import Check
+from ig2mj import cli
+from ig2mj.diagnosis import checks as diagnosis
+from ig2mj.diagnosis.checks import Check
 from ig2mj.install_hint import requirements
 
 GPU = ("NVIDIA H200", 580)

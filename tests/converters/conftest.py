@@ -52,8 +52,8 @@ class Converted:
 @pytest.fixture(scope="session")
 def convert(dataset, tmp_path_factory: pytest.TempPathFactory):
     """Converts a scene of the tiny dataset: `convert(urdf=None, **options) -> Converted`."""
+    from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.convert_scene import convert_scene
-    from ig2mj_converters.options import ConvertOptions
     from tiny_house import SCENE
 
     def run(urdf=None, root: pathlib.Path = dataset, **options) -> Converted:

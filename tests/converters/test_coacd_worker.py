@@ -6,10 +6,10 @@ import time
 import numpy as np
 import pytest
 import trimesh
-from ig2mj_converters import workers
-from ig2mj_converters.cache_folder import ENVIRONMENT
-from ig2mj_converters.description import Mesh, Shape
-from ig2mj_converters.hulls import HullOptions, decompose_link
+from ig2mj_converters.base.cache_folder import ENVIRONMENT
+from ig2mj_converters.base.description import Mesh, Shape
+from ig2mj_converters.hulls import workers
+from ig2mj_converters.hulls.link_hulls import HullOptions, decompose_link
 
 
 @pytest.fixture(autouse=True)

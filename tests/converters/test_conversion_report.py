@@ -9,11 +9,11 @@ import re
 import mujoco
 import numpy as np
 import pytest
-from ig2mj_converters.checks import run_checks
-from ig2mj_converters.description import RoomMaps, Shape
-from ig2mj_converters.drawing import BACKGROUND, draw
-from ig2mj_converters.hulls import HullOptions, decompose_link
-from ig2mj_converters.report import ReportInput, write_report
+from ig2mj_converters.base.description import RoomMaps, Shape
+from ig2mj_converters.hulls.link_hulls import HullOptions, decompose_link
+from ig2mj_converters.report.checks import run_checks
+from ig2mj_converters.report.drawing import BACKGROUND, draw
+from ig2mj_converters.report.page import ReportInput, write_report
 from PIL import Image
 
 from ig2mj.scene.manifest import JointEntry, Manifest, ObjectEntry, RoomEntry, RoomsEntry

@@ -11,8 +11,9 @@ import shutil
 import mujoco
 import numpy as np
 import pytest
-from ig2mj_converters import inputs, model_task
-from ig2mj_converters.output import replaced_folder
+from ig2mj_converters import model_task
+from ig2mj_converters.base import inputs
+from ig2mj_converters.base.output import replaced_folder
 from tiny_dataset import write_dataset
 from tiny_geometry import box, write_obj
 from tiny_house import SCENE, instance_xml, scene_xml

@@ -14,8 +14,8 @@ def test_mjx_warp_takes_a_converted_scene(task_house):
 
 
 def test_a_converted_object_can_be_attached_to_another_model(dataset, tmp_path):
+    from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.convert_object import convert_object
-    from ig2mj_converters.options import ConvertOptions
 
     urdf = dataset / "objects" / "bottom_cabinet" / "cab0" / "cab0.urdf"
     convert_object(urdf, "bottom_cabinet", tmp_path / "out", options=ConvertOptions(report=False))
@@ -28,8 +28,8 @@ def test_a_converted_object_can_be_attached_to_another_model(dataset, tmp_path):
 
 
 def test_textured_visuals_keep_their_texture(tmp_path):
+    from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.convert_object import convert_object
-    from ig2mj_converters.options import ConvertOptions
 
     Image.fromarray(np.full((2000, 8, 3), (200, 30, 40), np.uint8)).save(tmp_path / "skin.jpg", quality=95)
     (tmp_path / "q.mtl").write_text("newmtl m\nKd 1 1 1\nmap_Kd skin.jpg\n")

@@ -78,7 +78,7 @@ def _instances() -> list[str]:
 
 def box_of(scene, body: str) -> np.ndarray:
     """Size of the world box of a body's own collision geoms."""
-    from ig2mj_converters.model_index import geom_box
+    from ig2mj_converters.mjcf.model_index import geom_box
 
     m, d = scene.model, scene.data
     boxes = [geom_box(m, g, d.geom_xmat[g].reshape(3, 3), d.geom_xpos[g]) for g in scene.geoms(body, 3)]
@@ -169,8 +169,8 @@ def test_no_speed_or_force_limits_and_no_springs_section_7(scene):
 
 
 def test_bullets_contact_tags_are_read_over_section_7(tmp_path, folder_of_a_ycb_like_urdf):
+    from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.conversion import convert_object
-    from ig2mj_converters.options import ConvertOptions
 
     convert_object(folder_of_a_ycb_like_urdf, "can", tmp_path / "out", options=ConvertOptions(report=False))
     m = mujoco.MjModel.from_xml_path(str(tmp_path / "out" / "object.xml"))

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ig2mj_converters import budget, convex
+from ig2mj_converters.hulls import budget, convex
 
 
 def box(size, at=(0, 0, 0)):

@@ -5,10 +5,10 @@ import pickle
 import numpy as np
 import pytest
 import trimesh
-from ig2mj_converters import convex
-from ig2mj_converters.description import Mesh, Shape
-from ig2mj_converters.hulls import HullOptions, decompose_link
-from ig2mj_converters.workers import WorkerError
+from ig2mj_converters.base.description import Mesh, Shape
+from ig2mj_converters.hulls import convex
+from ig2mj_converters.hulls.link_hulls import HullOptions, decompose_link
+from ig2mj_converters.hulls.workers import WorkerError
 
 NO_CACHE = HullOptions(cache=False)
 
@@ -20,7 +20,7 @@ def no_coacd(monkeypatch):
     def refuse(*_, **__):
         raise WorkerError("was not to be started")
 
-    monkeypatch.setattr("ig2mj_converters.workers.run_coacd", refuse)
+    monkeypatch.setattr("ig2mj_converters.hulls.workers.run_coacd", refuse)
 
 
 def shape(*meshes, grouped=False, **more):

@@ -76,8 +76,8 @@ def test_frictionloss_is_the_velocity_motor_of_section_0_fact_10(house):
     ("category", "force"), [("oven", 30.0), ("dishwasher", 30.0), ("toilet", 3.0), ("fridge", 10.0)]
 )
 def test_friction_of_ovens_dishwashers_and_toilets_section_0_fact_10(category, force):
-    from ig2mj_converters.description import Joint
-    from ig2mj_converters.joint_rules import friction
+    from ig2mj_converters.base.description import Joint
+    from ig2mj_converters.bodies.joint_rules import friction
 
     slide = Joint("j", "prismatic", "a", "b", np.eye(4), np.array([1.0, 0, 0]), 0.0, 0.3)
     hinge = Joint("j", "revolute", "a", "b", np.eye(4), np.array([1.0, 0, 0]), 0.0, 1.0)
@@ -86,8 +86,8 @@ def test_friction_of_ovens_dishwashers_and_toilets_section_0_fact_10(category, f
 
 
 def test_a_knob_is_not_held_by_a_furniture_hinges_torque():
-    from ig2mj_converters.description import Joint
-    from ig2mj_converters.joint_rules import friction
+    from ig2mj_converters.base.description import Joint
+    from ig2mj_converters.bodies.joint_rules import friction
 
     hinge = Joint("j", "revolute", "a", "b", np.eye(4), np.array([1.0, 0, 0]), 0.0, 1.0)
     assert friction(hinge, "stove", 0.02) == pytest.approx(2.0)

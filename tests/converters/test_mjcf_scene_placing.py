@@ -8,10 +8,10 @@ import pathlib
 import mujoco
 import numpy as np
 import pytest
-from ig2mj_converters.assembly import Assembly, BodyPlan
-from ig2mj_converters.description import Inertial, Instance, Metadata, ObjectModel
-from ig2mj_converters.mjcf_scene import root_poses
-from ig2mj_converters.placements import Placement
+from ig2mj_converters.base.description import Inertial, Instance, Metadata, ObjectModel
+from ig2mj_converters.bodies.assembly import Assembly, BodyPlan
+from ig2mj_converters.bodies.placements import Placement
+from ig2mj_converters.mjcf.scene import root_poses
 
 
 def test_the_joint_origin_is_the_pose_of_the_bounding_box_centre_section_2_2(house):

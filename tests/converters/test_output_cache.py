@@ -13,10 +13,10 @@ import sys
 
 import numpy as np
 import pytest
-from ig2mj_converters import inputs, output_cache
-from ig2mj_converters.cache_folder import prune
+from ig2mj_converters.base import inputs, output_cache
+from ig2mj_converters.base.cache_folder import prune
+from ig2mj_converters.base.options import ConvertOptions
 from ig2mj_converters.conversion import convert_object, convert_scene
-from ig2mj_converters.options import ConvertOptions
 from PIL import Image
 from tiny_geometry import box, write_obj
 from tiny_house import SCENE

@@ -6,7 +6,7 @@ import scipy.spatial.transform
 import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from ig2mj_converters import convex, fitting
+from ig2mj_converters.hulls import convex, fitting
 
 length = st.floats(0.005, 3.0)
 pose = st.builds(

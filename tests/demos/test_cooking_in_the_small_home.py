@@ -8,15 +8,15 @@ import json
 import numpy as np
 import pytest
 
-from ig2mj.demos.button_hand import HOLD, PRESS, REST, ButtonHand
-from ig2mj.demos.cooking import cook, missing
-from ig2mj.demos.cooking_plot import plot
-from ig2mj.demos.kitchen import Kitchen, enter_kitchen
-from ig2mj.demos.temperature_log import TemperatureLog
 from ig2mj.errors import EngineError, StateError
 from ig2mj.scene.scene import load_scene
+from ig2mj.showcase.button_hand import HOLD, PRESS, REST, ButtonHand
+from ig2mj.showcase.cooking import cook, missing
+from ig2mj.showcase.cooking_plot import plot
+from ig2mj.showcase.kitchen import Kitchen, enter_kitchen
+from ig2mj.showcase.temperature_log import TemperatureLog
 from ig2mj.simulation import Simulation
-from ig2mj.states import toggled
+from ig2mj.states.definitions import toggled
 
 
 @pytest.fixture(scope="module")
@@ -110,8 +110,8 @@ def test_the_plot_is_a_picture(cooked, tmp_path):
 
 
 def test_the_film_shows_stove_and_milk_and_has_the_frames_it_was_given(cooked, tmp_path):
-    from ig2mj.demos import cooking_film
-    from ig2mj.demos.cooking_pictures import KitchenCameras
+    from ig2mj.showcase import cooking_film
+    from ig2mj.showcase.cooking_pictures import KitchenCameras
     from ig2mj.viewer import offscreen
 
     if all(offscreen.probe(b) is not None for b in ("egl", "osmesa")):
@@ -136,8 +136,8 @@ def test_the_film_shows_stove_and_milk_and_has_the_frames_it_was_given(cooked, t
 
 
 def test_a_film_that_cannot_be_written_is_one_error(cooked, tmp_path):
-    from ig2mj.demos.cooking_film import CookingFilm
-    from ig2mj.demos.cooking_pictures import KitchenCameras
+    from ig2mj.showcase.cooking_film import CookingFilm
+    from ig2mj.showcase.cooking_pictures import KitchenCameras
 
     world, kitchen, _ = cooked
     film = CookingFilm(tmp_path / "no_such_folder" / "film.mp4", KitchenCameras(world, kitchen), kitchen)

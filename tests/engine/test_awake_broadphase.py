@@ -9,8 +9,8 @@ import warp as wp
 from mujoco.mjx.third_party import mujoco_warp
 from mujoco.mjx.third_party.mujoco_warp._src import collision_driver, types
 
-from ig2mj.engine.warp_kernels import upstream_kernels, use_awake_kernels
-from ig2mj.engine.warp_kernels.broadphase import serves
+from ig2mj.engine.warp.patches import upstream_kernels, use_awake_kernels
+from ig2mj.engine.warp.patches.broadphase import serves
 
 WORLDS = 8
 THINGS = 24

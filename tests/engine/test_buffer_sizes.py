@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from ig2mj.engine.buffer_sizes import RARE, SHARED, Measurement, Tail, profile_of
-from ig2mj.engine.candidate_pairs import CandidatePairs
-from ig2mj.engine.profile import default_profile
+from ig2mj.engine.warp.buffer_sizes import RARE, SHARED, Measurement, Tail, profile_of
+from ig2mj.engine.warp.candidate_pairs import CandidatePairs
+from ig2mj.engine.warp.profile import default_profile
 
 
 def test_quantiles_and_the_peak_of_what_was_counted():

@@ -8,8 +8,8 @@ import pytest
 from mujoco.mjx.third_party import mujoco_warp
 from mujoco.mjx.third_party.mujoco_warp._src import collision_driver
 
-from ig2mj.engine.warp_kernels import upstream_kernels, use_awake_kernels
-from ig2mj.engine.warp_kernels.contacts import FAR, mend_contacts
+from ig2mj.engine.warp.patches import upstream_kernels, use_awake_kernels
+from ig2mj.engine.warp.patches.contacts import FAR, mend_contacts
 
 FLOOR = 6.0
 HALF = np.array([0.05, 0.04, 0.03])

@@ -14,7 +14,7 @@ import pytest
 
 from ig2mj.engine.base import Snapshot
 from ig2mj.engine.health import Overflow
-from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.registry import make_engine
 from ig2mj.predicates.compile import compile_expression
 from ig2mj.states.initial import initial_states

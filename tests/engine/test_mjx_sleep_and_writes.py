@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from ig2mj.engine.base import Engine, Snapshot, Write
-from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import EngineError, UnknownNameError
 
 

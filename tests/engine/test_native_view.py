@@ -14,7 +14,7 @@ import ig2mj
 from ig2mj.agents.floating_hand import add_floating_hand, hand_ctrl
 from ig2mj.engine.base import Engine, Write
 from ig2mj.engine.layout import make_layout
-from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import EngineError
 from ig2mj.scene import manifest as mf
 

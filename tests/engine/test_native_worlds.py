@@ -13,7 +13,7 @@ import tiny_home as homes
 import ig2mj
 from ig2mj.agents.floating_hand import add_floating_hand, hand_ctrl
 from ig2mj.engine.base import Snapshot, Write
-from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.registry import make_engine
 from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError

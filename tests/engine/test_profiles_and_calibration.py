@@ -15,10 +15,10 @@ from ig2mj import cli
 from ig2mj.agents.floating_hand import add_floating_hand
 from ig2mj.agents.reach import find_reach
 from ig2mj.calibration import SAFETY, _wider, calibrate
-from ig2mj.engine.buffer_sizes import ALIGN
 from ig2mj.engine.health import Overflow
-from ig2mj.engine.profile import PROFILE_FILE, EngineProfile, default_profile, fit, load_profile, save_profile
-from ig2mj.engine.warp import WarpEngine
+from ig2mj.engine.warp.buffer_sizes import ALIGN
+from ig2mj.engine.warp.engine import WarpEngine
+from ig2mj.engine.warp.profile import PROFILE_FILE, EngineProfile, default_profile, fit, load_profile, save_profile
 from ig2mj.errors import EngineError, InputError
 from ig2mj.scene import manifest as mf
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import ig2mj
-from ig2mj.engine.native import NativeEngine
-from ig2mj.engine.sleep import restore_sleep
+from ig2mj.engine.native.engine import NativeEngine
+from ig2mj.engine.native.sleep import restore_sleep
 from ig2mj.scene import manifest as mf
 
 SHELF = '<body name="shelf"><geom name="shelf/collision_0" type="box" size="1 1 0.1" group="3"/></body>'

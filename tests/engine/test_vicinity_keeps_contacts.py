@@ -12,9 +12,9 @@ import pytest
 
 import ig2mj
 from ig2mj.agents.floating_hand import add_floating_hand, hand_ctrl
-from ig2mj.engine import vicinity
-from ig2mj.engine.native import NativeEngine
-from ig2mj.engine.vicinity import Masks, Vicinity, VicinityTable
+from ig2mj.engine.native import vicinity
+from ig2mj.engine.native.engine import NativeEngine
+from ig2mj.engine.native.vicinity import Masks, Vicinity, VicinityTable
 
 Act = Callable[[int, mujoco.MjData, np.random.Generator], None]
 GEOM = 'gap="0.003" friction="0.25 0.005 0.0001"'

@@ -9,8 +9,8 @@ import warp as wp
 from mujoco.mjx.third_party import mujoco_warp
 from mujoco.mjx.third_party.mujoco_warp._src import block_cholesky, forward, passive, solver
 
-from ig2mj.engine import warp_kernels
-from ig2mj.engine.warp_kernels import originals
+from ig2mj.engine.warp import patches as warp_kernels
+from ig2mj.engine.warp.patches import originals
 
 STEPS = 100
 AWAKE = 40  # buffer: over 32, where the blocked factorisation begins, and below the model's 51
@@ -95,7 +95,7 @@ def test_upstream_comes_back_and_goes_again():
         for function in (solver._cholesky_factorize_solve, passive.passive, forward._advance):
             assert "mujoco_warp" in function.__module__
     assert (solver._cholesky_factorize_solve, passive.passive, forward._advance) == own
-    assert all(function.__module__.startswith("ig2mj.engine.warp_kernels.") for function in own)
+    assert all(function.__module__.startswith("ig2mj.engine.warp.patches.") for function in own)
 
 
 def test_another_mujoco_warp_is_left_as_it_is(monkeypatch):

@@ -7,14 +7,14 @@ import functools
 
 import numpy as np
 import pytest
-from ig2mj_homes.building import PARAPET, floor_boxes, stair_boxes, wall_boxes
-from ig2mj_homes.dataset import ROOM_TYPES
-from ig2mj_homes.floor_plans.openings import opening_things
-from ig2mj_homes.floor_plans.plan import HEIGHT, Plan, grid_rooms, make_edges
-from ig2mj_homes.floor_plans.porch import front_door, porch_rails, porch_slab
-from ig2mj_homes.floor_plans.shipped import DRAWINGS, plan
+from ig2mj_homes.dataset.root import ROOM_TYPES
 from ig2mj_homes.furnish.ground import CELL, RADIUS, Ground
-from ig2mj_homes.layout_maps import reachable
+from ig2mj_homes.plans.building import PARAPET, floor_boxes, stair_boxes, wall_boxes
+from ig2mj_homes.plans.layout_maps import reachable
+from ig2mj_homes.plans.openings import opening_things
+from ig2mj_homes.plans.plan import HEIGHT, Plan, grid_rooms, make_edges
+from ig2mj_homes.plans.porch import front_door, porch_rails, porch_slab
+from ig2mj_homes.plans.shipped import DRAWINGS, plan
 
 cached_plan = functools.cache(plan)
 each_home = pytest.mark.parametrize("name", sorted(DRAWINGS))

@@ -6,15 +6,15 @@ import functools
 
 import numpy as np
 import pytest
-from ig2mj_homes.arrangement import AIR, Arrangement
-from ig2mj_homes.floor_plans.shipped import DRAWINGS, plan
+from ig2mj_homes.dataset.scene_writer import scene_urdf
+from ig2mj_homes.dataset.shipped_homes import furnished, home_names
+from ig2mj_homes.furnish.arrangement import AIR, Arrangement
 from ig2mj_homes.furnish.ground import CELL, Ground
 from ig2mj_homes.furnish.home import RULES
-from ig2mj_homes.layout_maps import Maps, reachable
-from ig2mj_homes.scene_writer import scene_urdf
-from ig2mj_homes.shipped_homes import furnished, home_names
-from ig2mj_homes.surfaces import insides, tops
-from ig2mj_homes.things import Thing, rpy_of, shape, yaw
+from ig2mj_homes.furnish.placed import Thing, rpy_of, shape, yaw
+from ig2mj_homes.plans.layout_maps import Maps, reachable
+from ig2mj_homes.plans.shipped import DRAWINGS, plan
+from ig2mj_homes.shapes.surfaces import insides, tops
 
 from ig2mj.errors import UnknownNameError
 

@@ -7,10 +7,10 @@ import pathlib
 
 import numpy as np
 import pytest
-from ig2mj_homes.catalogue import build_model, catalogue, find
-from ig2mj_homes.height_maps import height_maps
-from ig2mj_homes.model import HouseholdObject
-from ig2mj_homes.writer import write_model
+from ig2mj_homes.dataset.height_maps import height_maps
+from ig2mj_homes.dataset.model_writer import write_model
+from ig2mj_homes.objects.catalogue import build_model, catalogue, find
+from ig2mj_homes.objects.model import HouseholdObject
 from PIL import Image
 from scipy.spatial import Delaunay
 

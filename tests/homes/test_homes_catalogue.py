@@ -8,10 +8,10 @@ import re
 
 import numpy as np
 import pytest
-from ig2mj_homes.catalogue import build_model, catalogue
-from ig2mj_homes.material_library import CLASSES
-from ig2mj_homes.model import HouseholdObject, hull_mesh
-from ig2mj_homes.poses import stands
+from ig2mj_homes.dataset.material_library import CLASSES
+from ig2mj_homes.objects.catalogue import build_model, catalogue
+from ig2mj_homes.objects.model import HouseholdObject, hull_mesh
+from ig2mj_homes.objects.stable_poses import stands
 
 from ig2mj.errors import UnknownNameError
 from ig2mj.knowledge import abilities, bddl_folder, categories, categories_of, required_links
@@ -172,7 +172,7 @@ def test_a_seed_fixes_a_model_and_another_seed_changes_it():
 
 
 def test_unknown_category_names_near_ones():
-    from ig2mj_homes.catalogue import find
+    from ig2mj_homes.objects.catalogue import find
 
     with pytest.raises(UnknownNameError, match="apple"):
         find("appel")

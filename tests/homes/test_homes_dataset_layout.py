@@ -9,9 +9,9 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from ig2mj_converters.obj_files import read_obj
-from ig2mj_homes.catalogue import catalogue
-from ig2mj_homes.dataset import build_dataset
+from ig2mj_converters.reading.obj_files import read_obj
+from ig2mj_homes.dataset.root import build_dataset
+from ig2mj_homes.objects.catalogue import catalogue
 from PIL import Image
 
 from ig2mj.errors import UnknownNameError

@@ -7,11 +7,11 @@ import pathlib
 import mujoco
 import numpy as np
 import pytest
+from ig2mj_converters.base.options import ConvertOptions
 from ig2mj_converters.convert_object import convert_object
-from ig2mj_converters.options import ConvertOptions
-from ig2mj_homes.catalogue import build_model, catalogue, find
-from ig2mj_homes.dataset import build_dataset
-from ig2mj_homes.opening import open_joint
+from ig2mj_homes.dataset.root import build_dataset
+from ig2mj_homes.objects.catalogue import build_model, catalogue, find
+from ig2mj_homes.objects.opening_strength import open_joint
 
 from ig2mj.scene.manifest import Manifest, load_manifest
 

@@ -6,11 +6,11 @@ import functools
 
 import numpy as np
 import pytest
-from ig2mj_homes.floor_plans.plan import Room
-from ig2mj_homes.floor_plans.shipped import DRAWINGS
+from ig2mj_homes.dataset.shipped_homes import furnished
+from ig2mj_homes.furnish.placed import Thing
 from ig2mj_homes.furnish.watching import ASIDE, FARTHEST, NEAREST, aside, floor_between
-from ig2mj_homes.shipped_homes import furnished
-from ig2mj_homes.things import Thing
+from ig2mj_homes.plans.plan import Room
+from ig2mj_homes.plans.shipped import DRAWINGS
 
 home = functools.cache(furnished)
 each_home = pytest.mark.parametrize("name", sorted(DRAWINGS))

@@ -9,11 +9,11 @@ import time
 import mujoco
 import numpy as np
 import pytest
-from ig2mj_homes.floor_plans.shipped import DRAWINGS, plan
-from ig2mj_homes.layout_maps import reachable
-from ig2mj_homes.opening import open_joint
-from ig2mj_homes.ship import SHARED, total_bytes, used_assets
-from ig2mj_homes.shipped_homes import home_names
+from ig2mj_homes.dataset.ship import SHARED, total_bytes, used_assets
+from ig2mj_homes.dataset.shipped_homes import home_names
+from ig2mj_homes.objects.opening_strength import open_joint
+from ig2mj_homes.plans.layout_maps import reachable
+from ig2mj_homes.plans.shipped import DRAWINGS, plan
 
 from ig2mj.cli.homes import shipped_homes
 from ig2mj.scene.manifest import load_manifest

@@ -6,17 +6,17 @@ import random
 
 import numpy as np
 import pytest
-from ig2mj_homes.arrangement import Arrangement
-from ig2mj_homes.catalogue import build_model, catalogue, find
-from ig2mj_homes.clearances import blocked
-from ig2mj_homes.hinges import GRAVITY, friction, gravity_torque
-from ig2mj_homes.materials import plain
-from ig2mj_homes.model import HouseholdObject, ObjectBuilder
-from ig2mj_homes.opening import STRENGTH
-from ig2mj_homes.shipped_homes import build_homes, furnished
-from ig2mj_homes.solids import block
-from ig2mj_homes.sweeps import BULGE, self_clashes, sweep, turn
-from ig2mj_homes.things import Thing, shape
+from ig2mj_homes.dataset.shipped_homes import build_homes, furnished
+from ig2mj_homes.furnish.arrangement import Arrangement
+from ig2mj_homes.furnish.clearances import blocked
+from ig2mj_homes.furnish.placed import Thing, shape
+from ig2mj_homes.objects.catalogue import build_model, catalogue, find
+from ig2mj_homes.objects.hinges import GRAVITY, friction, gravity_torque
+from ig2mj_homes.objects.model import HouseholdObject, ObjectBuilder
+from ig2mj_homes.objects.opening_strength import STRENGTH
+from ig2mj_homes.shapes.bricks import block
+from ig2mj_homes.shapes.materials import plain
+from ig2mj_homes.shapes.sweeps import BULGE, self_clashes, sweep, turn
 
 WHITE = plain("white")
 HINGE_STRENGTH = min(STRENGTH.values())  # N m
@@ -93,7 +93,7 @@ def test_a_home_with_a_door_that_cannot_open_is_not_written(monkeypatch, tmp_pat
     fridge.position[0] += (walls[0] + 0.001 - low[0]) if left else (walls[2] - 0.001 - high[0])
     jams = blocked(home.plan, [fridge])
     assert jams == [(fridge.name, "walls")]
-    monkeypatch.setattr("ig2mj_homes.shipped_homes.furnished", lambda name, seed: home)
+    monkeypatch.setattr("ig2mj_homes.dataset.shipped_homes.furnished", lambda name, seed: home)
     with pytest.raises(AssertionError, match="fridge_0"):
         build_homes(tmp_path, ["small_home"])
     assert not (tmp_path / "scenes").exists()

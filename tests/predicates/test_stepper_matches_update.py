@@ -13,7 +13,8 @@ from hand_world import HandWorld, Thing, shell
 
 from ig2mj.predicates import compile_expression
 from ig2mj.predicates.stepper import StateProgram, StateStepper
-from ig2mj.states import dust, initial_states, update
+from ig2mj.states import initial_states, update
+from ig2mj.states.definitions import dust
 
 FOOD = {"cookable": {}, "burnable": {}, "freezable": {}, "sliceable": {}, "stainable": {}}
 SMALL = (((0, 0, 0), (0.05, 0.05, 0.05)),)

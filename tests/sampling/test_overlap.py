@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import ig2mj
-from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.sampling.overlap import Overlaps
 from ig2mj.sampling.perturbation import LIFT, loose_objects, perturb
 from ig2mj.sampling.settled import RESTING_OVERLAP, make_pool

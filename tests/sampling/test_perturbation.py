@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.sampling.perturbation import LIFT, SHIFT, loose_objects, perturb
 from ig2mj.worlds.random_streams import episode_keys
 

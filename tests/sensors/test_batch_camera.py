@@ -11,8 +11,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from ig2mj.engine.native import NativeEngine
-from ig2mj.engine.warp import WarpEngine
+from ig2mj.engine.native.engine import NativeEngine
+from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.sensors.batch_camera import BatchCamera
 from ig2mj.sensors.particle_slots import fill_slots

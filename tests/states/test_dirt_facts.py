@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from hand_world import HandWorld, Thing, step
 
-from ig2mj.states import dust, initial_states, particles, stain
+from ig2mj.states import initial_states, particles
+from ig2mj.states.definitions import dust, stain
 from ig2mj.states.particles import NUM_PARTICLES
 
 DIRT = {"dustyable": {}, "stainable": {}}

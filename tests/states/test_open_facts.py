@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hand_world import HandWorld, Thing
 
-from ig2mj.states import open as opened
+from ig2mj.states.definitions import open as opened
 
 HINGE = (0.0, 1.57)
 HOME = HandWorld(

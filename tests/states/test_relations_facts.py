@@ -9,7 +9,7 @@ import pytest
 from hand_world import HandWorld, Thing, answers, shell
 
 from ig2mj.states import RelationPlan
-from ig2mj.states.adjacency import HORIZONTAL_LENGTH, HORIZONTAL_LINES, VERTICAL_LENGTH
+from ig2mj.states.relations.adjacency import HORIZONTAL_LENGTH, HORIZONTAL_LINES, VERTICAL_LENGTH
 
 SMALL = (((0, 0, 0), (0.05, 0.05, 0.05)),)
 HOME = HandWorld(

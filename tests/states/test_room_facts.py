@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hand_world import HandWorld, Thing
 
-from ig2mj.states.rooms import in_room, room_at, rooms_of
+from ig2mj.states.relations.rooms import in_room, room_at, rooms_of
 
 HOME = HandWorld(
     Thing("cup"),

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from hand_world import IDENTITY, HandWorld, Thing, step, stepper
 
-from ig2mj.states import initial_states, sliced, stain
+from ig2mj.states import initial_states
+from ig2mj.states.definitions import sliced, stain
 from ig2mj.states.particles import NUM_PARTICLES, world_positions
 
 FOOD = {"cookable": {}, "burnable": {}, "freezable": {}, "soakable": {}, "stainable": {}, "sliceable": {}}

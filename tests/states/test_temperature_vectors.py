@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from hand_world import HandWorld, Thing, shell, step, stepper
 
-from ig2mj.states import initial_states, temperature
+from ig2mj.states import initial_states
+from ig2mj.states.definitions import temperature
 
 FOOD = {"cookable": {}, "burnable": {}, "freezable": {}}
 OVEN = {"temperature": 250.0, "heating_rate": 0.01, "requires_inside": True, "requires_closed": True,

@@ -8,7 +8,7 @@ import pytest
 from hand_world import HandWorld, Thing, step
 
 from ig2mj.states import initial_states
-from ig2mj.states.toggled import set_toggled_on
+from ig2mj.states.definitions.toggled import set_toggled_on
 
 LAMP = HandWorld(
     Thing("lamp", abilities={"toggleable": {}}, links={"toggle_button": (0, 0, 1)}),

@@ -10,8 +10,8 @@ import pytest
 from hand_world import HandWorld, Thing, step
 
 from ig2mj.states import StateModel, initial_states
-from ig2mj.states.water import DROP_RADIUS, NUM_DROPS
-from ig2mj.states.wetness import set_soaked, soaked
+from ig2mj.states.definitions.water import DROP_RADIUS, NUM_DROPS
+from ig2mj.states.definitions.wetness import set_soaked, soaked
 
 PLATE = (((0, 0, 0), (0.2, 0.2, 0.01)),)
 SINK = Thing(

@@ -13,10 +13,10 @@ import pytest
 
 from ig2mj.engine.base import Write
 from ig2mj.engine.health import Overflow
-from ig2mj.engine.native import NativeEngine
-from ig2mj.engine.profile import EngineProfile
-from ig2mj.engine.sleep import FULLY_AWAKE
-from ig2mj.engine.warp import WarpEngine
+from ig2mj.engine.native.engine import NativeEngine
+from ig2mj.engine.native.sleep import FULLY_AWAKE
+from ig2mj.engine.warp.engine import WarpEngine
+from ig2mj.engine.warp.profile import EngineProfile
 from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import compile_expression
 from ig2mj.simulation import Simulation

@@ -21,8 +21,8 @@ from ig2mj.agents.pushing import push, start_pushing
 from ig2mj.agents.reach import find_reach
 from ig2mj.calibration import calibrate
 from ig2mj.engine.health import CAPACITY
-from ig2mj.engine.sleep import FULLY_AWAKE
-from ig2mj.engine.warp import WarpEngine
+from ig2mj.engine.native.sleep import FULLY_AWAKE
+from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.sampling.settled import make_pool
 from ig2mj.simulation import Simulation
 from ig2mj.states.model import StateModel

@@ -14,7 +14,7 @@ from PIL import Image
 
 from ig2mj import cli
 from ig2mj.engine.base import Write
-from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import EngineError, InputError
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel

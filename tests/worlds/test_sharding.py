@@ -11,7 +11,7 @@ from pathlib import Path
 import engine_bench
 import pytest
 
-from ig2mj.engine.native import NativeEngine
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import EngineError
 from ig2mj.states.model import StateModel
 from ig2mj.worlds.batch import Worlds

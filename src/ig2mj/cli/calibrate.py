@@ -35,7 +35,7 @@ def run(
     """
     from ig2mj.calibration import calibrate
     from ig2mj.cli.printing import add_bar, print_json, progress_bar, stdout_console
-    from ig2mj.engine.profile import save_profile
+    from ig2mj.engine.warp.profile import save_profile
     from ig2mj.errors import Ig2mjError
 
     if not scenes:
@@ -87,7 +87,7 @@ def _table(title: str, profile, model):
     """What a world needed in a step: more than the first two numbers rarely; and what the buffers hold."""
     from rich.table import Table
 
-    from ig2mj.engine.profile import default_profile
+    from ig2mj.engine.warp.profile import default_profile
 
     measured, safe = profile.measured, default_profile(model)
     table = Table("per world", "1 %", "0.01 %", "peak", "mean", "size", "spare", "safe", title=title)

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import tyro
 
 if TYPE_CHECKING:
-    from ig2mj_converters.options import ConvertOptions
-    from ig2mj_converters.outcome import Outcome
+    from ig2mj_converters.base.options import ConvertOptions
+    from ig2mj_converters.base.outcome import Outcome
 
 Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help_behavior_hint="")]
 
@@ -133,7 +133,7 @@ SUBCOMMANDS = {"scene": convert_scene, "object": convert_object}
 
 def _options(common: Common, **of_scene: Any) -> ConvertOptions:
     """Conversion options from the command line, and the renderer for the report's pictures."""
-    from ig2mj_converters.options import ConvertOptions
+    from ig2mj_converters.base.options import ConvertOptions
 
     from ig2mj.errors import InputError
 

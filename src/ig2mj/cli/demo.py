@@ -30,7 +30,7 @@ def run(
       out: folder for everything the demo makes.
       jobs: processes.
     """
-    from ig2mj_homes import small_home
+    from ig2mj_homes.furnish import small_home
 
     from ig2mj.cli.printing import add_bar, progress_bar, stdout_console
     from ig2mj.errors import Ig2mjError
@@ -51,10 +51,10 @@ def run(
 
 def _convert(console: Console, step: Step, name: str, dataset: pathlib.Path, scene: pathlib.Path, jobs: int) -> int:
     """Builds the home's dataset, converts it with checks and a report; number of failed checks."""
+    from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.conversion import convert_scene
-    from ig2mj_converters.options import ConvertOptions
-    from ig2mj_homes import small_home
-    from ig2mj_homes.dataset import build_dataset
+    from ig2mj_homes.dataset.root import build_dataset
+    from ig2mj_homes.furnish import small_home
 
     from ig2mj.viewer.offscreen import FreeView, render
 
@@ -80,7 +80,7 @@ def _convert(console: Console, step: Step, name: str, dataset: pathlib.Path, sce
 def _look(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Path) -> None:
     """Runs the home for two seconds, tells what stands where, takes pictures."""
     from ig2mj.cli.printing import make_table
-    from ig2mj.demos import first_home
+    from ig2mj.showcase import first_home
 
     began = time.perf_counter()
     world, moved = first_home.load_and_run(scene)
@@ -99,11 +99,11 @@ def _look(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
 
 def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Path) -> int:
     """Cooks; leaves table, plot, pictures and film; number of things that were to happen and did not."""
-    from ig2mj.demos import cooking
-    from ig2mj.demos.cooking_film import CookingFilm
-    from ig2mj.demos.cooking_pictures import KitchenCameras, MomentSheet
-    from ig2mj.demos.cooking_plot import plot
-    from ig2mj.demos.kitchen import enter_kitchen
+    from ig2mj.showcase import cooking
+    from ig2mj.showcase.cooking_film import CookingFilm
+    from ig2mj.showcase.cooking_pictures import KitchenCameras, MomentSheet
+    from ig2mj.showcase.cooking_plot import plot
+    from ig2mj.showcase.kitchen import enter_kitchen
     from ig2mj.viewer.offscreen import INSTALL_HINT, default_backend
 
     report = step("cooking")

@@ -17,7 +17,7 @@ def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
     """
     from rich.console import Console
 
-    from ig2mj.diagnosis import diagnose, healthy
+    from ig2mj.diagnosis.checks import diagnose, healthy
 
     stderr = Console(stderr=True)
     with stderr.status("looking at this machine") as status:

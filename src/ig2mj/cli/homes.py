@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 if TYPE_CHECKING:
-    from ig2mj_homes.entry import Entry
+    from ig2mj_homes.objects.entry import Entry
 
 Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
 
@@ -32,8 +32,8 @@ def build(
       jobs: processes; default one per core.
       json: print what was built as JSON.
     """
-    from ig2mj_homes.dataset import build_dataset
-    from ig2mj_homes.shipped_homes import build_homes, categories_of, furnished
+    from ig2mj_homes.dataset.root import build_dataset
+    from ig2mj_homes.dataset.shipped_homes import build_homes, categories_of, furnished
 
     from ig2mj.cli.printing import add_bar, print_json, progress_bar
 
@@ -77,9 +77,9 @@ def convert(
       jobs: processes.
       no_cache: convert anew even what has not changed, and keep nothing for the next time.
     """
+    from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.conversion import convert_scene
-    from ig2mj_converters.options import ConvertOptions
-    from ig2mj_homes.ship import remove_unused, strip_report, total_bytes
+    from ig2mj_homes.dataset.ship import remove_unused, strip_report, total_bytes
 
     from ig2mj.cli.printing import add_bar, progress_bar
 
@@ -185,7 +185,7 @@ def sheet(
       opened: with doors, drawers and lids open.
       collision: draw the collision hulls instead of the visual meshes.
     """
-    from ig2mj_homes.catalogue import build_model
+    from ig2mj_homes.objects.catalogue import build_model
     from ig2mj_homes.sheet import contact_sheet
 
     from ig2mj.cli.files import check_picture
@@ -244,7 +244,7 @@ def shipped_homes() -> list[dict[str, Any]]:
 
 
 def _entries(only: tuple[str, ...]) -> list[Entry]:
-    from ig2mj_homes.catalogue import catalogue, find
+    from ig2mj_homes.objects.catalogue import catalogue, find
 
     return [find(name) for name in only] if only else list(catalogue().values())
 

@@ -10,9 +10,9 @@ from ig2mj.errors import UnknownNameError
 from ig2mj.scene.scene import Scene
 
 ENGINES = {
-    "native": "ig2mj.engine.native:NativeEngine",
-    "warp": "ig2mj.engine.warp:WarpEngine",
-    "jax": "ig2mj.engine.jax:JaxEngine",
+    "native": "ig2mj.engine.native.engine:NativeEngine",
+    "warp": "ig2mj.engine.warp.engine:WarpEngine",
+    "jax": "ig2mj.engine.mjx.jax_engine:JaxEngine",
 }
 """Name: module and class."""
 

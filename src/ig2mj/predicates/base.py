@@ -17,9 +17,9 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.states.contacts import finite
 from ig2mj.states.model import StateModel
-from ig2mj.states.relations import Query, Relations
+from ig2mj.states.relations.plan import Query, Relations
+from ig2mj.states.relations.touching import finite
 from ig2mj.states.world import ExtendedStates
 
 Arguments = Int[np.ndarray, "P K"]

@@ -31,7 +31,7 @@ from ig2mj.predicates.literals import Literals
 from ig2mj.predicates.logic import Atom, Expression
 from ig2mj.predicates.parse import parse
 from ig2mj.states.model import StateModel
-from ig2mj.states.relations import Query, RelationPlan, Relations
+from ig2mj.states.relations.plan import Query, RelationPlan, Relations
 from ig2mj.states.world import ExtendedStates, WorldState
 
 Groups = Mapping[str, Sequence[str]]

@@ -25,7 +25,7 @@ from ig2mj.predicates.base import ANY_ROOM, Context, Predicate
 from ig2mj.predicates.logic import Atom
 from ig2mj.predicates.registry import find
 from ig2mj.states.model import StateModel
-from ig2mj.states.relations import Query
+from ig2mj.states.relations.plan import Query
 from ig2mj.states.world import ExtendedStates
 
 Instance = tuple[str, tuple[int, ...]]

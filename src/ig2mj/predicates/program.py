@@ -24,7 +24,7 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.predicates.compile import CompiledExpression, Verdict
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
-from ig2mj.states.relations import Memo, RelationPlan
+from ig2mj.states.relations.plan import Memo, RelationPlan
 from ig2mj.states.update import events, heat, queries
 from ig2mj.states.world import ExtendedStates, Swap
 

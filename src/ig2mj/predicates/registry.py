@@ -4,25 +4,25 @@ from __future__ import annotations
 
 from ig2mj.errors import UnknownNameError
 from ig2mj.predicates.base import Predicate
-from ig2mj.predicates.burnt import BURNT
-from ig2mj.predicates.cooked import COOKED
-from ig2mj.predicates.dusty import DUSTY
-from ig2mj.predicates.frozen import FROZEN
-from ig2mj.predicates.in_contact_with import IN_CONTACT_WITH
-from ig2mj.predicates.in_fov_of_agent import IN_FOV_OF_AGENT
-from ig2mj.predicates.in_hand_of_agent import IN_HAND_OF_AGENT
-from ig2mj.predicates.in_reach_of_agent import IN_REACH_OF_AGENT
-from ig2mj.predicates.in_same_room_as_agent import IN_SAME_ROOM_AS_AGENT
-from ig2mj.predicates.inside import INSIDE
-from ig2mj.predicates.next_to import NEXT_TO
-from ig2mj.predicates.on_floor import ON_FLOOR
-from ig2mj.predicates.on_top import ON_TOP
-from ig2mj.predicates.open import OPEN
-from ig2mj.predicates.sliced import SLICED
-from ig2mj.predicates.soaked import SOAKED
-from ig2mj.predicates.stained import STAINED
-from ig2mj.predicates.toggled_on import TOGGLED_ON
-from ig2mj.predicates.under import UNDER
+from ig2mj.predicates.definitions.burnt import BURNT
+from ig2mj.predicates.definitions.cooked import COOKED
+from ig2mj.predicates.definitions.dusty import DUSTY
+from ig2mj.predicates.definitions.frozen import FROZEN
+from ig2mj.predicates.definitions.in_contact_with import IN_CONTACT_WITH
+from ig2mj.predicates.definitions.in_fov_of_agent import IN_FOV_OF_AGENT
+from ig2mj.predicates.definitions.in_hand_of_agent import IN_HAND_OF_AGENT
+from ig2mj.predicates.definitions.in_reach_of_agent import IN_REACH_OF_AGENT
+from ig2mj.predicates.definitions.in_same_room_as_agent import IN_SAME_ROOM_AS_AGENT
+from ig2mj.predicates.definitions.inside import INSIDE
+from ig2mj.predicates.definitions.next_to import NEXT_TO
+from ig2mj.predicates.definitions.on_floor import ON_FLOOR
+from ig2mj.predicates.definitions.on_top import ON_TOP
+from ig2mj.predicates.definitions.open import OPEN
+from ig2mj.predicates.definitions.sliced import SLICED
+from ig2mj.predicates.definitions.soaked import SOAKED
+from ig2mj.predicates.definitions.stained import STAINED
+from ig2mj.predicates.definitions.toggled_on import TOGGLED_ON
+from ig2mj.predicates.definitions.under import UNDER
 
 PREDICATES: dict[str, Predicate] = {
     p.name: p

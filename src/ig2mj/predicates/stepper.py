@@ -6,7 +6,7 @@ microseconds. So the work is cut up (`ig2mj.predicates.program`), with the same 
 
 - the whole step, where the states are others than those of the last step, where the last step changed more than
   temperatures, or where the view differs in anything that a step depends on. Relations come from a memo
-  (`ig2mj.states.relations`).
+  (`ig2mj.states.relations.plan`).
 - temperatures and what follows from them, where neither is so: then this step would change nothing else either.
 - nothing, where the last step did not change temperatures.
 
@@ -28,7 +28,7 @@ import numpy as np
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.predicates.compile import Verdict
 from ig2mj.predicates.program import BODY_FIELDS, Found, StateProgram, swap_of, verdict_of
-from ig2mj.states import toggled
+from ig2mj.states.definitions import toggled
 from ig2mj.states.world import ExtendedStates, Swap
 
 __all__ = ["StateProgram", "StateStepper", "Step", "run_inline"]

@@ -57,7 +57,7 @@ class Rooms:
 
 
 def load_rooms(path: str | os.PathLike) -> Rooms:
-    """Reads rooms.npz, or the folder that holds it (keys: see `ig2mj_converters.room_maps.write_rooms`).
+    """Reads rooms.npz, or the folder that holds it (keys: see `ig2mj_converters.reading.room_maps.write_rooms`).
 
     Raises:
       InputError: the file is missing, no npz archive, or its arrays do not fit together.

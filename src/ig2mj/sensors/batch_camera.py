@@ -23,7 +23,7 @@ from jaxtyping import Float, Int, UInt8
 from mujoco import mjx
 
 from ig2mj.engine.base import Engine
-from ig2mj.engine.mjx_engine import MjxEngine, MjxPhysics
+from ig2mj.engine.mjx.engine import MjxEngine, MjxPhysics
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix

@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import quat_to_matrix
 from ig2mj.sensors.render_model import NOWHERE
+from ig2mj.states.definitions.water import DROP_RADIUS, NUM_DROPS
 from ig2mj.states.model import StateModel
 from ig2mj.states.particles import (
     DUST_RADIUS,
@@ -22,7 +23,6 @@ from ig2mj.states.particles import (
     world_normals,
     world_positions,
 )
-from ig2mj.states.water import DROP_RADIUS, NUM_DROPS
 from ig2mj.states.world import ExtendedStates
 
 DUST_COLOUR = (0.55, 0.52, 0.47)

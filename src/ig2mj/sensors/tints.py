@@ -16,11 +16,11 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
 from ig2mj.predicates.base import Predicate
-from ig2mj.predicates.burnt import BURNT
-from ig2mj.predicates.cooked import COOKED
-from ig2mj.predicates.frozen import FROZEN
-from ig2mj.predicates.soaked import SOAKED
-from ig2mj.predicates.toggled_on import TOGGLED_ON
+from ig2mj.predicates.definitions.burnt import BURNT
+from ig2mj.predicates.definitions.cooked import COOKED
+from ig2mj.predicates.definitions.frozen import FROZEN
+from ig2mj.predicates.definitions.soaked import SOAKED
+from ig2mj.predicates.definitions.toggled_on import TOGGLED_ON
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 

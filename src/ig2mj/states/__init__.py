@@ -6,7 +6,7 @@ A state is one file; `update.update` calls them in their one order; `world.Exten
 from ig2mj.states.initial import initial_states, states_of_manifest
 from ig2mj.states.model import StateModel
 from ig2mj.states.options import StateOptions
-from ig2mj.states.relations import Memo, RelationPlan, Relations
+from ig2mj.states.relations.plan import Memo, RelationPlan, Relations
 from ig2mj.states.update import queries, update
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
 

@@ -12,7 +12,8 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.scene.manifest import Manifest
-from ig2mj.states import max_temperature, particles, temperature, water, wetness
+from ig2mj.states import particles
+from ig2mj.states.definitions import max_temperature, temperature, water, wetness
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 
@@ -55,8 +56,9 @@ def states_of_manifest(
 ) -> ExtendedStates:
     """The states that a converted scene starts with, the same in every world.
 
-    The manifest's keys are those of `ig2mj_converters.cached_states`: `FIELDS`; "dust" and "stain", lists of null or
-    {"body", "pos", "quat"} whose z axis is the normal; "water", {"steps_since_drop", "drops": [null or position]}.
+    The manifest's keys are those of `ig2mj_converters.reading.cached_states`: `FIELDS`; "dust" and "stain", lists of
+    null or {"body", "pos", "quat"} whose z axis is the normal; "water", {"steps_since_drop", "drops"}, with
+    entries that are null or a position.
     Particles count as placed where they are there; values of objects without the ability are left out.
 
     Args:

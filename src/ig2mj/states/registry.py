@@ -16,9 +16,11 @@ from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import UnknownNameError
-from ig2mj.states import adjacency, dust, heat_source, particles, rooms, stain
+from ig2mj.states import particles
+from ig2mj.states.definitions import dust, heat_source, stain
+from ig2mj.states.definitions.open import is_open
 from ig2mj.states.model import StateModel
-from ig2mj.states.open import is_open
+from ig2mj.states.relations import adjacency, rooms
 from ig2mj.states.world import ExtendedStates
 
 THERMAL = ("cookable", "burnable", "freezable")

@@ -15,7 +15,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.states import (
+from ig2mj.states.definitions import (
     cleaning,
     heat_source,
     max_temperature,
@@ -27,7 +27,7 @@ from ig2mj.states import (
     wetness,
 )
 from ig2mj.states.model import StateModel
-from ig2mj.states.relations import Query, RelationPlan, Relations
+from ig2mj.states.relations.plan import Query, RelationPlan, Relations
 from ig2mj.states.world import ExtendedStates, Swap
 
 

@@ -12,9 +12,9 @@ from flax import struct
 from jaxtyping import Bool, Float, Int, UInt
 
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.states.definitions.water import WaterDrops
 from ig2mj.states.particles import Particles
 from ig2mj.states.swap import Swap
-from ig2mj.states.water import WaterDrops
 
 
 @struct.dataclass

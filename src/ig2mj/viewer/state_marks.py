@@ -20,8 +20,8 @@ from ig2mj.sensors.particle_slots import DUST_COLOUR, STAIN_COLOUR, WATER_COLOUR
 from ig2mj.sensors.render_model import mean_colours
 from ig2mj.sensors.tints import UNTINTED, tinted, tints, tints_of_geoms
 from ig2mj.states import particles
+from ig2mj.states.definitions.water import DROP_RADIUS
 from ig2mj.states.model import StateModel
-from ig2mj.states.water import DROP_RADIUS
 from ig2mj.states.world import ExtendedStates
 
 WATER_ALPHA = 0.7

@@ -13,8 +13,8 @@ from jaxtyping import Float
 
 from ig2mj.engine.base import Snapshot
 from ig2mj.engine.health import Usage
-from ig2mj.engine.profile import EngineProfile
 from ig2mj.engine.view import Array
+from ig2mj.engine.warp.profile import EngineProfile
 from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import Verdict
 from ig2mj.scene.scene import Scene

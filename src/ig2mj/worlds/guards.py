@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.health import CAPACITY, SETTING, Health, Overflow
-from ig2mj.engine.profile import PROFILE_FILE
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.engine.warp.profile import PROFILE_FILE
 from ig2mj.errors import EngineError
 
 TOP_SPEED = 20.0

@@ -4,8 +4,8 @@ outside the dataset root."""
 from __future__ import annotations
 
 import pytest
-from ig2mj_converters.dataset import Dataset
-from ig2mj_converters.urdf import read_urdf
+from ig2mj_converters.reading.dataset import Dataset
+from ig2mj_converters.reading.urdf import read_urdf
 
 from ig2mj.errors import Ig2mjError, InputError
 

@@ -6,7 +6,7 @@ import json
 import struct
 
 import pytest
-from ig2mj_converters.dataset import Dataset
+from ig2mj_converters.reading.dataset import Dataset
 
 from ig2mj.errors import InputError
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ig2mj_converters.dataset import Dataset
-from ig2mj_converters.description import Inertial, Joint, Link, Mesh, Metadata, ObjectModel, Shape
-from ig2mj_converters.inertia import MIN_MASS, is_possible, link_inertials
-from ig2mj_converters.poses import pose_from
-from ig2mj_converters.scaling import scale_model
-from ig2mj_converters.solids import shape_solids
+from ig2mj_converters.base.description import Inertial, Joint, Link, Mesh, Metadata, ObjectModel, Shape
+from ig2mj_converters.base.transforms import pose_from
+from ig2mj_converters.bodies.inertia import MIN_MASS, is_possible, link_inertials
+from ig2mj_converters.hulls.solids import shape_solids
+from ig2mj_converters.reading.dataset import Dataset
+from ig2mj_converters.reading.scaling import scale_model
 
 CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
 SIDES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from ig2mj_converters.file_access import FileGuard
-from ig2mj_converters.mesh_files import read_collision, read_visual
-from ig2mj_converters.solids import hull_volume, joined, signed_volume
+from ig2mj_converters.base.file_access import FileGuard
+from ig2mj_converters.hulls.solids import hull_volume, joined, signed_volume
+from ig2mj_converters.reading.mesh_files import read_collision, read_visual
 from PIL import Image
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ig2mj_converters.dataset import Dataset
-from ig2mj_converters.description import Mimic
-from ig2mj_converters.kinematics import link_poses, model_bounds
-from ig2mj_converters.urdf import read_urdf
+from ig2mj_converters.base.description import Mimic
+from ig2mj_converters.bodies.kinematics import link_poses, model_bounds
+from ig2mj_converters.reading.dataset import Dataset
+from ig2mj_converters.reading.urdf import read_urdf
 
 from ig2mj.errors import InputError
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ig2mj_converters.dataset import Dataset, SceneOptions
-from ig2mj_converters.inertia import is_possible, link_inertials
-from ig2mj_converters.kinematics import model_bounds
-from ig2mj_converters.room_maps import room_at
-from ig2mj_converters.scaling import instance_scale, scale_model
-from ig2mj_converters.urdf import read_urdf
+from ig2mj_converters.bodies.inertia import is_possible, link_inertials
+from ig2mj_converters.bodies.kinematics import model_bounds
+from ig2mj_converters.reading.dataset import Dataset, SceneOptions
+from ig2mj_converters.reading.room_maps import room_at
+from ig2mj_converters.reading.scaling import instance_scale, scale_model
+from ig2mj_converters.reading.urdf import read_urdf
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ig2mj_converters.room_maps import read_room_maps, room_at, traversable, write_rooms
+from ig2mj_converters.reading.room_maps import read_room_maps, room_at, traversable, write_rooms
 
 from ig2mj.errors import InputError
 from ig2mj.scene.rooms import load_rooms

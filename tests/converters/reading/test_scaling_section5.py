@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from ig2mj_converters.description import Instance, Joint, Link, Mesh, Mimic, ObjectModel, Shape
-from ig2mj_converters.kinematics import link_poses, model_bounds
-from ig2mj_converters.metadata import read_metadata
-from ig2mj_converters.poses import apply, pose_from
-from ig2mj_converters.scaling import instance_scale, scale_model
-from ig2mj_converters.solids import joined
+from ig2mj_converters.base.description import Instance, Joint, Link, Mesh, Mimic, ObjectModel, Shape
+from ig2mj_converters.base.transforms import apply, pose_from
+from ig2mj_converters.bodies.kinematics import link_poses, model_bounds
+from ig2mj_converters.hulls.solids import joined
+from ig2mj_converters.reading.metadata import read_metadata
+from ig2mj_converters.reading.scaling import instance_scale, scale_model
 
 from ig2mj.errors import InputError
 

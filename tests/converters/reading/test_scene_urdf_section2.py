@@ -6,8 +6,8 @@ import json
 
 import numpy as np
 import pytest
-from ig2mj_converters.dataset import Dataset, SceneOptions
-from ig2mj_converters.scene_urdf import FIXED_FURNITURE, parse_object_scope, read_scene
+from ig2mj_converters.reading.dataset import Dataset, SceneOptions
+from ig2mj_converters.reading.scene_urdf import FIXED_FURNITURE, parse_object_scope, read_scene
 
 from ig2mj.errors import InputError, UnknownNameError
 

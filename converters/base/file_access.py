@@ -1,0 +1,158 @@
+"""Which files an URDF may make the converter read.
+
+A file name inside an URDF, MTL, DAE or glTF is a stranger's wish. `FileGuard` turns it into a path and refuses what
+lies outside the allowed folders, after following symbolic links.
+"""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import re
+import urllib.parse
+
+from ig2mj.errors import InputError
+
+from ..reading.xml_reader import read_xml
+from . import inputs
+
+PACKAGE_SEARCH_DEPTH = 8  # how many folders above an URDF are looked at for its ROS package
+_SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+)://")
+
+
+class OutsideError(InputError):
+    """A file name points outside the folders that may be read."""
+
+
+class FileGuard:
+    """Resolves the file names of one URDF.
+
+    Attributes:
+      file: the URDF, for messages.
+      folder: what relative names start from.
+      roots: resolved folders below which files may be read; None: anywhere.
+      dataset: dataset mode: names must be relative and without `package://`.
+    """
+
+    def __init__(
+        self,
+        file: str | os.PathLike,
+        root: str | os.PathLike | None = None,
+        folder: str | os.PathLike | None = None,
+        allow_outside: bool = False,
+    ):
+        self.file = pathlib.Path(file)
+        self.folder = pathlib.Path(folder) if folder is not None else self.file.parent
+        self.dataset = root is not None
+        if root is not None:
+            self.roots: list[pathlib.Path] | None = [pathlib.Path(root).resolve()]
+        elif allow_outside:
+            self.roots = None
+        else:
+            self.roots = [self.folder.resolve()]
+            if (package := package_root(self.file.parent)) is not None:
+                self.roots.append(package)
+
+    def resolve(self, filename: str, element: str, base: pathlib.Path | None = None) -> pathlib.Path:
+        """Path of a file that is named in the URDF, or in a file in the folder `base`.
+
+        The path need not exist. Raises OutsideError where it may not be read, InputError for names that are none.
+        """
+        name = filename.strip().replace("\\", "/")
+        if not name or any(ord(c) < 32 for c in name):
+            raise InputError(self.file, f"{filename!r} is no file name", element=element)
+        scheme = _SCHEME.match(name)
+        if scheme and self.dataset:
+            raise OutsideError(self.file, f"'{name}' is not below the dataset root", element=element)
+        if scheme and scheme[1] in ("package", "model"):
+            path = self._in_package(name[scheme.end() :], element)
+        elif scheme and scheme[1] == "file":
+            path = pathlib.Path(urllib.parse.unquote(name[scheme.end() :]))
+        elif scheme:
+            raise OutsideError(self.file, f"'{name}' is an address, not a local file", element=element)
+        else:
+            if self.dataset and (name.startswith("/") or re.match(r"[A-Za-z]:", name)):
+                raise OutsideError(
+                    self.file, f"'{name}' is absolute", element=element, mend="name it relative to the model's folder"
+                )
+            path = (base or self.folder) / name
+        try:
+            real = inputs.real_path(path)
+        except (OSError, RuntimeError) as e:
+            raise InputError(self.file, f"'{name}' cannot be resolved: {e}", element=element) from e
+        if self.roots is not None and not any(real.is_relative_to(root) for root in self.roots):
+            where = "the dataset root" if self.dataset else "the URDF's folder and its package"
+            raise OutsideError(
+                self.file, f"'{name}' lies outside {where}", element=element, mend="move the file inside"
+            )
+        return real
+
+    def _in_package(self, rest: str, element: str) -> pathlib.Path:
+        package, _, inside = rest.partition("/")
+        if package in ("", ".", ".."):
+            raise InputError(self.file, f"'package://{rest}' names no package", element=element)
+        root = find_package(self.file.parent, package)
+        if root is None:
+            raise InputError(
+                self.file,
+                f"no folder above it is the package '{package}'",
+                element=element,
+                mend=f"put the URDF into the package's folder, named '{package}' or with a package.xml",
+            )
+        beside = self.file.parent.resolve() / package
+        if self.roots is not None and root not in self.roots and not (beside.is_symlink() or beside == root):
+            self.roots.append(root)
+        return root / inside
+
+
+def package_root(folder: pathlib.Path) -> pathlib.Path | None:
+    """The ROS package an URDF's folder belongs to: the nearest folder with a package.xml, or, where the folder is
+    called urdf, robots or xacro, the folder above it. Resolved; None where there is none."""
+    folder = folder.resolve()
+    for candidate in _upwards(folder):
+        if inputs.is_file(candidate / "package.xml"):
+            return candidate
+    if folder.name in ("urdf", "urdfs", "robots", "xacro") and _is_private(folder.parent):
+        return folder.parent
+    return None
+
+
+def find_package(folder: pathlib.Path, package: str) -> pathlib.Path | None:
+    """The folder that `package://<package>/` means, seen from a folder inside it or beside it.
+
+    First a folder of that name beside the URDF, as Bullet has it. Then walking up: a folder with a package.xml of that
+    name, a folder of that name, or a neighbour of that name with a package.xml.
+    """
+    if inputs.is_folder(folder / package):
+        return (folder / package).resolve()
+    for candidate in _upwards(folder.resolve()):
+        manifest = candidate / "package.xml"
+        if inputs.is_file(manifest) and _package_name(manifest) == package:
+            return candidate
+        if candidate.name == package:
+            return candidate
+        neighbour = candidate / package
+        if inputs.is_file(neighbour / "package.xml"):
+            return neighbour.resolve()
+    return None
+
+
+def _upwards(folder: pathlib.Path) -> list[pathlib.Path]:
+    return [f for f in [folder, *folder.parents][:PACKAGE_SEARCH_DEPTH] if _is_private(f)]
+
+
+def _is_private(folder: pathlib.Path) -> bool:
+    """Not a folder that holds everything: the file system's root, its direct children, homes and what is above."""
+    try:
+        home = pathlib.Path.home().resolve()
+    except RuntimeError:
+        home = pathlib.Path("/")
+    return len(folder.parts) > 2 and not home.is_relative_to(folder)
+
+
+def _package_name(manifest: pathlib.Path) -> str | None:
+    try:
+        name = read_xml(manifest, "package", limit=2**20).find("name")
+    except InputError:
+        return None
+    return None if name is None else (name.text or "").strip()

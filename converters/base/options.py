@@ -1,0 +1,95 @@
+"""What a conversion may be told."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Collection
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:  # what these import takes seconds, which a conversion out of the cache need not spend
+    from ..hulls.pieces import HullOptions
+    from ..reading.scene_urdf import SceneOptions
+    from ..report.page import Renderer
+
+#: Called with what is worked on, how many units are done, and how many there are.
+Progress = Callable[[str, int, int], None]
+
+
+def no_progress(text: str, done: int, total: int) -> None:
+    """A progress callback that does nothing."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ConvertOptions:
+    """Options of both conversions. Those in the first group decide what comes out; the rest only how it is made.
+
+    Attributes:
+      seed: chooses models named "random", and seeds the decomposition.
+      fixed_furniture: fix the 12 categories that BEHAVIOR's `_fixed_furniture` scenes fix.
+      only_rooms, only_categories: what stays of a scene (building parts always do).
+      skip_missing: leave out models that are not in the dataset.
+      ceiling_collision: give ceilings collision geoms.
+      max_hulls, max_hull_vertices: budgets per link and per hull.
+      bullet_inertia: inertia of the bounding box, as Bullet computes it, instead of the hulls'.
+      colours: of visuals without a texture: the source's, or household ones by category. "auto": the source's, unless
+        every object of a scene is of one flat colour, which tells of the modelling program and not of the things.
+      assets: folder that gets `meshes/` and `textures/`, relative to the output's, so that many scenes can share them.
+      keep_hovering: start loose objects exactly where the source has them, even in mid-air.
+      jobs: processes. cache: use the caches of decompositions and of finished outputs.
+      report: write report.json and report.html.
+      renderer, view: what draws the report's pictures (see `report.write_report`).
+    """
+
+    seed: int = 0
+    fixed_furniture: bool = False
+    only_rooms: Collection[str] | None = None
+    only_categories: Collection[str] | None = None
+    skip_missing: bool = False
+    ceiling_collision: bool = False
+    max_hulls: int = 16
+    max_hull_vertices: int = 32
+    bullet_inertia: bool = False
+    colours: Literal["auto", "source", "category"] = "auto"
+
+    keep_hovering: bool = False
+    assets: str = "."
+
+    jobs: int = 1
+    cache: bool = True
+    report: bool = True
+    renderer: Renderer | None = None
+    view: Callable[..., Any] | None = None
+    progress: Progress = no_progress
+
+    def hull_options(self, *, building: bool = False) -> HullOptions:
+        """How collision geometry is decomposed. Wall segments are never merged: the gaps between them are doors."""
+        from ..hulls.pieces import HullOptions
+
+        return HullOptions(
+            max_hulls=None if building else self.max_hulls,
+            max_hull_vertices=self.max_hull_vertices,
+            seed=self.seed,
+            cache=self.cache,
+        )
+
+    def scene_options(self) -> SceneOptions:
+        """What of a scene is read."""
+        from ..reading.scene_urdf import SceneOptions
+
+        return SceneOptions(
+            seed=self.seed,
+            fixed_furniture=self.fixed_furniture,
+            only_rooms=self.only_rooms,
+            only_categories=self.only_categories,
+        )
+
+    def record(self) -> dict[str, Any]:
+        """What the manifest keeps of the options: those that decide what comes out."""
+        kept = ("seed", "fixed_furniture", "ceiling_collision", "max_hulls", "max_hull_vertices", "bullet_inertia")
+        kept += ("colours", "keep_hovering")
+        record: dict[str, Any] = {name: getattr(self, name) for name in kept}
+        for name in ("only_rooms", "only_categories"):
+            value = getattr(self, name)
+            if value is not None:
+                record[name] = sorted(value)
+        return record

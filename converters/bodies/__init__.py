@@ -1,0 +1,1 @@
+"""Bodies, joints, masses and placements of objects, before any MJCF."""

@@ -1,0 +1,183 @@
+"""Mass, centre of mass and inertia of an object's links (dataset_format.md section 6)."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+
+from ..base.description import Inertial, Link, ObjectModel
+from ..hulls.solids import Solid, combine, hull_volume, joined, shape_solids, signed_volume
+from .kinematics import shape_bounds
+
+DEFAULT_DENSITY = 67.0
+"""kg per m^3 of the bounding box, of a category without a spec (section 6)."""
+BULLET_MARGIN = 0.001
+"""m: what Bullet adds to each side of a mesh's box (section 6)."""
+MIN_MASS = 1e-3
+"""kg: what a moving body without mass is given; MuJoCo refuses none."""
+MIN_RADIUS = 0.01
+"""m: size of a body that has mass and no shape."""
+TINY = 1e-3
+"""A mesh's signed volume below this share of its hull's is taken for a double-sided or inside-out surface."""
+
+
+def link_inertials(model: ObjectModel, density: float | None, bullet: bool = False) -> dict[str, Inertial]:
+    """Inertials of all links of a model that `scaling.scale_model` returned.
+
+    With a density and a bounding box the URDF's masses are thrown away, as in iGibson: the mass of the whole is
+    density x scaled bounding box, split over the links by the volume of their collision meshes. The centre of mass is
+    the volume's where the mesh is watertight, else the surface's. Bodies left without mass get `MIN_MASS`.
+
+    Args:
+      model: the scaled model. Warnings are appended to `model.warnings`.
+      density: kg per m^3 of the bounding box, of the category; None keeps the URDF's own inertials and computes only
+        missing or impossible ones (building parts, plain URDFs).
+      bullet: inertia by Bullet's formula on the axis-aligned box instead of the true one of the convex hulls.
+
+    Returns:
+      link name -> Inertial (link frame), for every link. Fixed-joint children are separate: merging is the builder's.
+    """
+    if density is not None and model.metadata.bbox_size is not None:
+        masses = _split_mass(model, density * float(np.prod(model.metadata.bbox_size)))
+        result = {name: _computed(link, masses[name], bullet) for name, link in model.links.items()}
+    else:
+        result = {name: _kept(link, model, density or DEFAULT_DENSITY, bullet) for name, link in model.links.items()}
+    _give_least_mass(model, result)
+    return result
+
+
+def link_com(link: Link) -> np.ndarray | None:
+    """Centre of mass [3] by iGibson's rule, in the link frame, from the collision meshes (mesh scale applied).
+
+    `center_mass` where trimesh calls the merged mesh watertight, else the centroid of the surface. Only where a link
+    has no mesh do its primitives count. None for a link without collision shapes.
+    """
+    parts = []
+    for shape in link.collisions:
+        if not shape.meshes:
+            continue
+        body = joined(shape.meshes)
+        body.apply_transform(shape.pose @ np.diag([*shape.scale, 1.0]))
+        volume = abs(signed_volume(body))
+        solid = body.is_watertight and volume > MIN_RADIUS**3 * 1e-6
+        parts.append((volume if solid else body.area, body.center_mass if solid else _surface_centre(body)))
+    if len(parts) == 1:
+        return np.array(parts[0][1])
+    if parts:  # several meshes in one link: iGibson refuses them; here all count as one surface or one solid
+        weights = np.array([max(w, 1e-12) for w, _ in parts])
+        return np.einsum("i,ij->j", weights / weights.sum(), np.array([c for _, c in parts]))
+    whole = combine([s for shape in link.collisions if shape.kind != "mesh" for s in shape_solids(shape)])
+    return None if whole is None else whole.centre
+
+
+def _surface_centre(body: trimesh.Trimesh) -> np.ndarray:
+    """The surface's centre; the vertices' mean where there is no surface."""
+    return np.asarray(body.centroid if body.area > 0 else body.vertices.mean(axis=0))
+
+
+def _split_mass(model: ObjectModel, total: float) -> dict[str, float]:
+    """Mass per link, by the signed volume of its meshes, or by hulls where any of those is not positive."""
+    signed, hulls = {}, {}
+    for name, link in model.links.items():
+        meshes = [m for shape in link.collisions for m in shape.meshes]
+        signed[name] = signed_volume(joined(meshes)) if meshes else 0.0
+        hulls[name] = sum(hull_volume(m) for m in meshes)
+    with_mesh = [name for name, link in model.links.items() if any(s.meshes for s in link.collisions)]
+    volumes = signed
+    if any(signed[name] <= TINY * hulls[name] for name in with_mesh):
+        volumes = hulls
+        model.warnings.append("a collision mesh encloses no volume: masses are split by the volumes of convex hulls")
+    if sum(volumes.values()) <= 0:
+        volumes = {
+            name: sum(s.volume for shape in link.collisions for s in shape_solids(shape))
+            for name, link in model.links.items()
+        }
+    if model.category == "lamp":  # iGibson's own exception (section 6)
+        volumes = volumes | {model.base: 10 * volumes[model.base]}
+    whole = sum(volumes.values())
+    if whole <= 0:
+        return {name: total if name == model.base else 0.0 for name in model.links}
+    return {name: total * v / whole for name, v in volumes.items()}
+
+
+def _computed(link: Link, mass: float, bullet: bool) -> Inertial:
+    com = link.com if link.com is not None else link_com(link)
+    pose = np.eye(4)
+    if com is not None:
+        pose[:3, 3] = com
+    return Inertial(mass, _tensor(link, mass, pose, bullet), pose)
+
+
+def _kept(link: Link, model: ObjectModel, density: float, bullet: bool) -> Inertial:
+    """The URDF's inertial, or one computed where it is missing, or its tensor where that is impossible."""
+    given = link.inertial
+    if given is None:
+        boxes = [b for shape in link.collisions if (b := shape_bounds(shape)) is not None]
+        if not boxes:
+            return Inertial(0.0, np.zeros((3, 3)))
+        extent = np.max([b[1] for b in boxes], axis=0) - np.min([b[0] for b in boxes], axis=0)
+        mass = density * float(np.prod(np.maximum(extent, MIN_RADIUS)))
+        model.warnings.append(f"link '{link.name}' has no inertial: {mass:.3g} kg from its size")
+        return _computed(link, mass, bullet)
+    if given.mass == 0:
+        return Inertial(0.0, np.zeros((3, 3)), given.pose.copy())
+    if not bullet and is_possible(given.inertia):
+        return given
+    if not bullet and np.any(given.inertia):
+        model.warnings.append(f"link '{link.name}': no rigid body has its inertia; it is computed from its shape")
+    return Inertial(given.mass, _tensor(link, given.mass, given.pose, bullet), given.pose.copy())
+
+
+def is_possible(inertia: np.ndarray) -> bool:
+    """Positive definite, and no principal moment larger than the sum of the other two (to 0.1 %)."""
+    a, b, c = np.linalg.eigvalsh(inertia)
+    return bool(a > 1e-14 and a + b >= c * (1 - 1e-3))
+
+
+def _tensor(link: Link, mass: float, pose: np.ndarray, bullet: bool) -> np.ndarray:
+    """Inertia [3, 3] in the axes of `pose`."""
+    if mass == 0:
+        return np.zeros((3, 3))
+    if bullet:
+        return mass * _box_tensor(link, np.linalg.inv(pose))
+    solid = combine([s for shape in link.collisions for s in shape_solids(shape)])
+    solid = solid or combine([s for shape in link.visuals for s in shape_solids(shape)])
+    rotation = pose[:3, :3]
+    return rotation.T @ (solid or _ball()).inertia(mass) @ rotation
+
+
+def _box_tensor(link: Link, to_inertial: np.ndarray) -> np.ndarray:
+    """Bullet's inertia per mass: of the shapes' box in the inertial frame, m / 12 (ly^2 + lz^2, ...)."""
+    boxes = []
+    for shape in link.collisions:
+        box = shape_bounds(shape, to_inertial)
+        if box is not None:
+            margin = BULLET_MARGIN if shape.kind == "mesh" else 0.0
+            boxes.append(box + np.array([[-margin], [margin]]))
+    if not boxes:
+        return _ball().inertia(1.0)
+    low, high = np.min([b[0] for b in boxes], axis=0), np.max([b[1] for b in boxes], axis=0)
+    squares = (high - low) ** 2
+    return np.diag(squares.sum() - squares) / 12
+
+
+def _ball() -> Solid:
+    return Solid(4 / 3 * np.pi * MIN_RADIUS**3, np.zeros(3), np.eye(3) * MIN_RADIUS**2 / 5)
+
+
+def _give_least_mass(model: ObjectModel, inertials: dict[str, Inertial]) -> None:
+    """Gives `MIN_MASS` to the first link of every rigid body (links joined by fixed joints) that has no mass."""
+    fixed = {j.child: j.parent for j in model.joints.values() if j.type == "fixed"}
+    bodies: dict[str, list[str]] = {}
+    for name in model.links:
+        root = name
+        while root in fixed:
+            root = fixed[root]
+        bodies.setdefault(root, []).append(name)
+    for root, members in bodies.items():
+        if sum(inertials[name].mass for name in members) >= MIN_MASS * 1e-3:
+            continue
+        given = inertials[root]
+        inertials[root] = Inertial(MIN_MASS, _tensor(model.links[root], MIN_MASS, given.pose, False), given.pose)
+        what = "the base has no mass (Bullet would make it static)" if root == model.base else f"'{root}' has no mass"
+        model.warnings.append(f"{what}: it is given {MIN_MASS:g} kg")

@@ -1,0 +1,1 @@
+"""Convex collision pieces out of meshes."""

@@ -1,0 +1,1 @@
+"""MJCF and manifest out of bodies and hulls."""

@@ -1,0 +1,65 @@
+"""The folder `textures/` of an output: images of visual meshes as PNG, each once, and the materials that show them."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import pathlib
+
+import mujoco
+from PIL import Image
+
+from ..base import inputs
+from ..base.naming import file_slug
+
+#: Longer edges are scaled down to this many pixels: a home has hundreds of textures, and all of them lie in memory.
+MAX_EDGE = 1024
+
+
+class TextureStore:
+    """Writes images below `folder` and registers a texture and a material of each with `spec`."""
+
+    def __init__(self, spec: mujoco.MjSpec, folder: pathlib.Path):
+        self._spec, self._folder = spec, folder
+        self._by_file: dict[str, str | None] = {}
+        self._names: set[str] = set()
+        self.warnings: list[str] = []
+
+    @property
+    def files(self) -> list[str]:
+        """Names of the files written so far, sorted."""
+        return sorted(f"{name}.png" for name in self._names)
+
+    def material(self, image: str) -> str | None:
+        """Name of the material that shows an image file; None (and a warning) where it cannot be read."""
+        if image not in self._by_file:
+            self._by_file[image] = self._register(pathlib.Path(image))
+        return self._by_file[image]
+
+    def _register(self, image: pathlib.Path) -> str | None:
+        try:
+            data = _png(image)
+        except Exception as e:  # Pillow's decoders raise a dozen kinds of errors on broken files
+            self.warnings.append(f"{image.name}: texture left out: {e}")
+            return None
+        name = f"{file_slug(image.stem, 40)}-{hashlib.sha256(data).hexdigest()[:12]}"
+        if name not in self._names:
+            self._names.add(name)
+            self._folder.mkdir(parents=True, exist_ok=True)
+            (self._folder / f"{name}.png").write_bytes(data)
+            self._spec.add_texture(name=name, type=mujoco.mjtTexture.mjTEXTURE_2D, file=f"{name}.png")
+            material = self._spec.add_material(name=name)
+            material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = name
+            material.specular, material.shininess = 0.2, 0.3
+        return name
+
+
+def _png(image: pathlib.Path) -> bytes:
+    """An image file as PNG bytes, RGB, no longer edge than MAX_EDGE, no metadata."""
+    with Image.open(io.BytesIO(inputs.content(image))) as opened:
+        picture = opened.convert("RGB")
+    if max(picture.size) > MAX_EDGE:
+        picture.thumbnail((MAX_EDGE, MAX_EDGE), Image.Resampling.LANCZOS)
+    buffer = io.BytesIO()
+    picture.save(buffer, format="PNG", optimize=False)
+    return buffer.getvalue()

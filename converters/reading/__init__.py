@@ -1,0 +1,1 @@
+"""Readers: URDF, scene files, metadata, meshes and maps, turned into plain descriptions."""

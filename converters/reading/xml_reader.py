@@ -1,0 +1,199 @@
+"""XML that strangers wrote: tolerant of what is harmless, closed to what is not.
+
+Accepted, since real URDFs have it: a byte-order mark, blanks or text before `<?xml` or after the root, any version
+number, a wrong or missing encoding declaration, unbound namespace prefixes, a bare `&`, double hyphens in comments.
+Refused with an `InputError`: entity declarations (so nothing can expand, and no file or address is fetched),
+truncated or ill-nested files, files that are no XML, and files over the size limit.
+"""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import re
+from typing import Any
+
+import numpy as np
+from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  it has no stubs
+
+from ig2mj.errors import InputError
+
+from ..base import inputs
+
+MAX_XML_BYTES = 128 * 2**20  # the largest cached BEHAVIOR scenes are a few MiB
+MAX_NUMBER = 1e15  # beyond, products of a few numbers are no numbers any more
+Element = Any  # lxml.etree._Element, for which there are no type stubs
+
+# libxml2 goes quiet after its first syntax error, so only errors that leave it talking may be let pass.
+_HARMLESS = {
+    "NS_ERR_UNDEFINED_NAMESPACE",
+    "NS_ERR_ATTRIBUTE_REDEFINED",
+    "ERR_DOCUMENT_END",
+    "WAR_NS_URI",
+    "WAR_NS_URI_RELATIVE",
+}
+_DECLARATION = re.compile(r"\A\s*<\?xml\b[^>]*\?>")
+_ENCODING = re.compile(rb"<\?xml[^>]*\bencoding\s*=\s*[\"']([A-Za-z0-9._-]+)[\"']")
+_COMMENT = re.compile(r"<!--.*?-->", re.DOTALL)
+_BARE_AMPERSAND = re.compile(r"&(?!#\d+;|#x[0-9A-Fa-f]+;|(?:amp|lt|gt|quot|apos);)")
+_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?\Z")
+
+
+def read_bytes(file: str | os.PathLike, limit: int) -> bytes:
+    """A regular file's bytes. Raises InputError: missing, no regular file, unreadable, over the limit."""
+    path = pathlib.Path(file)
+    try:
+        if not inputs.is_file(path):
+            raise InputError(file, "is a folder or a device" if path.exists() else "does not exist")
+        if (size := path.stat().st_size) > limit:
+            raise InputError(file, f"has {size} bytes, more than the limit of {limit}")
+        return inputs.content(path)
+    except OSError as e:
+        raise InputError(file, f"cannot be read: {e.strerror or e}") from e
+    except ValueError as e:  # a null byte in the name
+        raise InputError(repr(str(file)), f"is no file name: {e}") from e
+
+
+def decode_xml(raw: bytes, file: object) -> str:
+    """Bytes -> text without byte-order mark, declaration and comments (line numbers are kept). Raises InputError."""
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        encoding = "utf-16"
+    elif match := _ENCODING.search(raw[:400]):
+        encoding = match[1].decode("ascii")
+    else:
+        encoding = "utf-8"
+    try:
+        text = raw.decode(encoding)
+    except LookupError:
+        text = raw.decode("utf-8", errors="replace")
+    except UnicodeDecodeError:
+        text = raw.decode("latin-1")
+    text = text.removeprefix("\ufeff")
+    start = text.find("<")
+    if start < 0:
+        raise InputError(file, "is no XML: it holds no '<'" if text.strip("\0 \r\n\t") else "is empty")
+    text = "\n" * text.count("\n", 0, start) + text[start:]
+    text = _DECLARATION.sub(_only_newlines, text, count=1)
+    text = _COMMENT.sub(_only_newlines, text)
+    if "<!ENTITY" in text:
+        raise InputError(file, "declares XML entities, which are refused", mend="replace the entities by their text")
+    return text
+
+
+def _only_newlines(match: re.Match[str]) -> str:
+    return "\n" * match[0].count("\n")
+
+
+def read_xml(
+    file: str | os.PathLike,
+    root_tag: str | tuple[str, ...],
+    warnings: list[str] | None = None,
+    limit: int = MAX_XML_BYTES,
+) -> Element:
+    """Parses a file into an lxml element.
+
+    Args:
+      root_tag: what the root element must be called.
+      warnings: gets a line for each oddity that was accepted with loss.
+
+    Raises:
+      InputError: see the module's text.
+    """
+    text = _BARE_AMPERSAND.sub("&amp;", decode_xml(read_bytes(file, limit), file)).replace("\0", "\ufffd")
+    parser = etree.XMLParser(
+        encoding="utf-8",
+        recover=True,
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        huge_tree=False,
+        remove_comments=True,
+        remove_pis=True,
+    )
+    try:
+        root = etree.fromstring(text.encode("utf-8", errors="replace"), parser)
+    except etree.XMLSyntaxError as e:
+        raise InputError(file, f"is no XML: {e.msg}", element=f"line {e.lineno}") from e
+    for entry in parser.error_log:
+        if entry.type_name not in _HARMLESS:
+            raise InputError(file, f"is broken or truncated XML: {entry.message}", element=f"line {entry.line}")
+        if entry.type_name == "ERR_DOCUMENT_END" and warnings is not None:
+            warnings.append(f"content after the root element (line {entry.line}) was ignored")
+    tags = (root_tag,) if isinstance(root_tag, str) else root_tag
+    if root is None:
+        raise InputError(file, "is no XML: it has no root element")
+    if local_name(root) not in tags:
+        raise InputError(file, f"the root element is <{local_name(root)}>, not <{tags[0]}>", element=where(root))
+    return root
+
+
+def parse_strictly(text: str, file: object) -> Element:
+    """The root element of well-formed XML that `decode_xml` returned. Raises InputError."""
+    parser = etree.XMLParser(encoding="utf-8", resolve_entities=False, no_network=True, load_dtd=False)
+    try:
+        return etree.fromstring(text.encode("utf-8", errors="replace"), parser)
+    except etree.XMLSyntaxError as e:
+        raise InputError(file, f"is broken or truncated XML: {e.msg}", element=f"line {e.lineno}") from e
+
+
+def local_name(element: Element) -> str:
+    """Tag without its namespace."""
+    return etree.QName(element).localname if "}" in element.tag else element.tag
+
+
+def where(element: Element) -> str:
+    """How an error message names an element: "link 'door' collision origin (line 12)"."""
+    names = []
+    node = element
+    while node is not None:
+        name = node.get("name")
+        names.append(f"{local_name(node)} '{name}'" if name is not None else local_name(node))
+        if name is not None or node.getparent() is None or node.getparent().getparent() is None:
+            break
+        node = node.getparent()
+    return f"{' '.join(reversed(names))} (line {element.sourceline})"
+
+
+def parse_number(word: str) -> float | None:
+    """A decimal number below `MAX_NUMBER`, or None (float() would take "nan", "1_000" and digits of other scripts)."""
+    if not _NUMBER.match(word):
+        return None
+    value = float(word)
+    return value if abs(value) <= MAX_NUMBER else None
+
+
+def numbers(
+    element: Element, attribute: str, count: int, file: object, default: tuple[float, ...] | None = None
+) -> np.ndarray:
+    """An attribute of `count` finite numbers separated by blanks, [count].
+
+    Args:
+      default: where the attribute is absent; None: absence is an error.
+
+    Raises:
+      InputError: absent, not `count` words, or a word that is no finite number.
+    """
+    text = element.get(attribute)
+    if text is None:
+        if default is None:
+            raise InputError(file, f"attribute '{attribute}' is missing", element=where(element))
+        return np.array(default, dtype=float)
+    words = [word.removesuffix(",") for word in text.split()]  # "0.1, 0, 0" is common, and harmless
+    if len(words) != count:
+        raise InputError(
+            file, f"{attribute}='{_short(text)}' has {len(words)} numbers instead of {count}", element=where(element)
+        )
+    values = [parse_number(w) for w in words]
+    for word, value in zip(words, values, strict=True):
+        if value is None:
+            raise InputError(file, f"{attribute}: '{_short(word)}' is no finite number", element=where(element))
+    return np.array(values, dtype=float)
+
+
+def number(element: Element, attribute: str, file: object, default: float | None = None) -> float:
+    """An attribute of one finite number; see `numbers`."""
+    return float(numbers(element, attribute, 1, file, None if default is None else (default,))[0])
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= 40 else text[:37] + "..."

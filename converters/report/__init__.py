@@ -1,0 +1,1 @@
+"""Checks of a converted scene, and the report that shows them."""

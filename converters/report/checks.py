@@ -1,0 +1,44 @@
+"""Is the converted scene sound? Measured on the compiled model, listed object by object.
+
+`check_still` looks at what can be seen without moving anything, `check_motion` at what takes steps.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Collection
+
+import mujoco
+
+from ig2mj.scene.manifest import Manifest
+
+from ..base.outcome import CheckResult
+from ..mjcf.model_index import index_model
+from . import check_motion, check_still
+
+
+def run_checks(
+    model: mujoco.MjModel,
+    manifest: Manifest,
+    overlaps_allowed: Collection[frozenset[str]] = (),
+) -> list[CheckResult]:
+    """All checks, in the order of `CheckResult.name`. The model is left as it was.
+
+    Args:
+      overlaps_allowed: pairs of object names from misc/bbox_overlap.json that may penetrate at t = 0.
+    """
+    index = index_model(model, manifest)
+    checks: list[Callable[[], CheckResult]] = [
+        lambda: check_still.check_compiles(model),
+        lambda: check_still.check_boxes(model, manifest, index),
+        lambda: check_still.check_mass(model, manifest, index),
+        lambda: check_still.check_penetration(model, index, overlaps_allowed),
+        lambda: check_motion.check_settle(model, manifest, index),
+    ]
+    results = []
+    for check in checks:
+        started = time.perf_counter()
+        result = check()
+        result.seconds = time.perf_counter() - started
+        results.append(result)
+    return results + check_motion.check_joints(model, manifest, index)

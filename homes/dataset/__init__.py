@@ -1,0 +1,1 @@
+"""The dataset's files in iGibson's layout, and the folder of converted homes."""

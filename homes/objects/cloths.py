@@ -1,0 +1,112 @@
+"""Towels, napkins, sheets, carpets, pillows: flat, folded or rolled cloth, rigid."""
+
+from __future__ import annotations
+
+from ..shapes import materials, textures
+from ..shapes.bricks import box, cylinder, join, sheet, soft_box
+from ..shapes.materials import Material
+from .entry import Entry
+from .model import ObjectBuilder
+
+
+def cloth(b: ObjectBuilder, kind: str | None = None) -> Material:
+    """Cloth with a weave, stripes or checks, by model."""
+    name = b.pick(materials.CLOTHS)
+    rgb = materials.tint(name, b.rng)
+    light = materials.colour("cream")
+    kind = kind or b.pick(("plain", "stripes", "checks"))
+    if kind == "stripes":
+        return materials.picture("stripes", textures.stripes(rgb, light, 4), 0.16, "fabric", 0.05)
+    if kind == "checks":
+        return materials.picture("checks", textures.checks(light, rgb, 4), 0.12, "fabric", 0.05)
+    return materials.fabric(name, b.rng)
+
+
+def spread(b: ObjectBuilder, *, kind: str | None = None, wipes: bool = False) -> None:
+    """A cloth lying flat with small waves; `wipes`: it is a cleaning tool, its underside cleans."""
+    x, y, z = b.size
+    thick = 0.4 * z
+    b.add(sheet(x, y, z - thick, thick, 10, b.rng.uniform(0, 6)), cloth(b, kind))
+    if wipes:
+        b.area("cleaning_tool_area", (x * 0.98, y * 0.98, 0.4 * z), (0, 0, 0.2 * z))
+
+
+def folded(b: ObjectBuilder, *, layers: int = 4, kind: str | None = None, wipes: bool = False) -> None:
+    """A cloth folded to a stack with round edges; felt as one box."""
+    x, y, z = b.size
+    look = cloth(b, kind)
+    t = z / layers
+    pile = [
+        soft_box(x - 0.003 * (k % 2), y - 0.004 * (k % 3), t, 0.49 * t).seen().at(0.001 * (k % 2), 0, k * t)
+        for k in range(layers)
+    ]
+    b.add(join(pile) + box(x, y, z).felt(), look)
+    if wipes:
+        b.area("cleaning_tool_area", (x * 0.98, y * 0.98, 0.2 * z), (0, 0, 0.1 * z))
+
+
+def kitchen_roll(b: ObjectBuilder) -> None:
+    """A roll of paper towel standing on end; it wipes with its mantle."""
+    x, _, z = b.size
+    r = x / 2
+    b.add(
+        cylinder(r, z, 20), materials.picture("tissue", textures.tiles((0.96, 0.96, 0.95), (0.90, 0.92, 0.95), 3), 0.1)
+    )
+    b.add(cylinder(0.36 * r, z + 0.0006, 12).seen().at(z=-0.0003), materials.plain("cardboard", "paper"))
+    b.add(cylinder(0.3 * r, z + 0.001, 12).seen().at(z=-0.0005), materials.plain("brown", "paper"))
+    b.area("cleaning_tool_area", (1.3 * r, 1.3 * r, z * 0.98), (0, 0, z / 2))
+
+
+def pillow(b: ObjectBuilder) -> None:
+    """A cushion, thick in the middle."""
+    x, y, z = b.size
+    solid = soft_box(x, y, z, 0.49 * z, 3)
+    mesh = solid.visuals[0]
+    u, v = 2 * mesh.vertices[:, 0] / x, 2 * mesh.vertices[:, 1] / y
+    mesh.vertices[:, 2] = z / 2 + (mesh.vertices[:, 2] - z / 2) * (1 - 0.6 * (u**4).clip(0, 1)) * (
+        1 - 0.6 * (v**4).clip(0, 1)
+    )
+    b.add(solid.seen(), cloth(b))
+    b.add(
+        box(0.94 * x, 0.94 * y, 0.55 * z).felt().at(z=0.225 * z) + box(0.7 * x, 0.7 * y, z).felt(),
+        materials.plain("white", "fabric"),
+    )
+
+
+def carpet(b: ObjectBuilder) -> None:
+    """A rug with a border."""
+    x, y, z = b.size
+    rgb = materials.tint(b.pick(("dark_red", "navy", "beige", "grey", "teal")), b.rng)
+    b.add(box(x, y, z), materials.picture("pile", textures.weave(rgb, b.rng), 0.1, "fabric", 0.02))
+    frame = materials.plain(materials.tint("cream", b.rng), "fabric", 0.02)
+    for s in (-1, 1):
+        b.add(box(0.05, y * 0.9, 0.001).seen().at(s * 0.42 * x, 0, z), frame)
+        b.add(box(x * 0.84 + 0.05, 0.05, 0.001).seen().at(0, s * 0.45 * y, z), frame)
+    b.add(box(0.35 * x, 0.35 * y, 0.0012).seen().turned("z", 45).at(z=z), frame)
+
+
+def mat(b: ObjectBuilder) -> None:
+    """A bath or door mat."""
+    x, y, z = b.size
+    look = materials.picture(
+        "knit",
+        textures.knit(materials.tint(b.pick(("grey", "teal", "brown", "rose")), b.rng), b.rng),
+        0.08,
+        "fabric",
+        0.02,
+    )
+    b.add(soft_box(x, y, z, 0.4 * z), look)
+
+
+CATEGORIES = [
+    Entry("dishtowel", spread, (0.450, 0.300, 0.014), 0.08, 5, vary=0.1, options={"wipes": True}),
+    Entry("hand_towel", folded, (0.200, 0.280, 0.040), 0.18, 5, options={"wipes": True}),
+    Entry("bath_towel", folded, (0.300, 0.360, 0.090), 0.55, 5, options={"wipes": True, "layers": 5}),
+    Entry("rag", spread, (0.320, 0.280, 0.018), 0.05, 5, vary=0.12, options={"wipes": True}),
+    Entry("dinner_napkin", folded, (0.190, 0.190, 0.008), 0.035, 3, options={"wipes": True, "layers": 3}),
+    Entry("paper_towel", kitchen_roll, (0.120, 0.120, 0.260), 0.25, 3, rest="standing", uniform=True),
+    Entry("sheet", folded, (0.320, 0.420, 0.070), 0.80, 4, options={"layers": 6}),
+    Entry("pillow", pillow, (0.420, 0.580, 0.150), 0.70, 5),
+    Entry("carpet", carpet, (2.000, 1.400, 0.012), 9.0, 5, fixed=True, rest="upright", vary=0.15),
+    Entry("mat", mat, (0.500, 0.750, 0.018), 1.2, 4, rest="upright"),
+]  # fmt: skip

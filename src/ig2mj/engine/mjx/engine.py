@@ -1,0 +1,360 @@
+"""What the two MJX engines share: physics as a pytree, control steps, writes, snapshots. Pure functions under JAX.
+
+A batch is MJX data whose arrays begin with the world axis. Kinematics are computed for every body in every step, so
+positions, sleep and a few more arrays are all of a world's state: replacing a world replaces just these.
+"""
+
+from __future__ import annotations
+
+import abc
+import copy
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from flax import struct
+from jaxtyping import Bool, Float, Int
+from mujoco import mjx
+
+from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snapshot, Write, check_arguments
+from ig2mj.engine.compile_cache import keep_jax_programs
+from ig2mj.engine.health import Health
+from ig2mj.engine.layout import ModelLayout, make_layout
+from ig2mj.engine.mjx.contacts import Contacts, link_forces, touching_units
+from ig2mj.engine.mjx.view import ViewPlan, make_view, plan_view
+from ig2mj.engine.mjx.writing import apply_write, reaches
+from ig2mj.engine.native.engine import NativeEngine
+from ig2mj.engine.native.sleep import FULLY_AWAKE, restore_sleep
+from ig2mj.engine.snapshot_check import check_snapshot
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.errors import EngineError
+from ig2mj.scene.scene import Scene
+
+STATE_FIELDS = ("qpos", "qvel", "act", "ctrl", "qacc_warmstart", "eq_active", "mocap_pos", "mocap_quat", "time")
+"""Fields of MJX data that are state, and that a `Snapshot` has by the same name."""
+
+
+@struct.dataclass
+class MjxPhysics:
+    """Physics of a batch.
+
+    Attributes:
+      data: MJX data; arrays begin with the world axis, but for Warp's contact list (design section 2, fact 10).
+      eq_data: parameters of the equality constraints of each world.
+      touching: of units, as of the last step. link_force: newtons, of the last control step.
+      overflow: or of MJX-Warp's overflow flags since the world was loaded (`ig2mj.engine.guards`).
+    """
+
+    data: Any
+    eq_data: Float[Array, "W E 12"]
+    touching: Bool[Array, "W U U"]
+    link_force: Float[Array, "W L O"]
+    overflow: Int[Array, "W"]
+
+
+class MjxEngine(abc.ABC):
+    """The `Engine` protocol on MJX; subclasses choose the implementation. See `ig2mj.engine.base`.
+
+    Contacts of the view are those of the last physics step, that is of positions 1/120 s before the poses, as in
+    Bullet and iGibson.
+    """
+
+    name: str
+    pure = True
+    unrolled = True
+    """Substeps are written out one after the other: no copies at a loop's border, but as often compiled."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        num_worlds: int = 1,
+        *,
+        substeps: int = SUBSTEPS,
+        timestep: float = PHYSICS_TIMESTEP,
+        touch_tolerance: float = TOUCH_TOLERANCE,
+        boxes: str = "tight",
+        initial: Snapshot | None = None,
+    ):
+        """Makes an engine.
+
+        Args:
+          scene: shared by all worlds.
+          num_worlds: W.
+          substeps, timestep: physics steps in a control step, and their length in seconds.
+          touch_tolerance: metres.
+          boxes: rule of the view's world boxes, "tight" or "igibson".
+          initial: where `reset` starts every world, without the world axis; None: the scene's initial state.
+
+        Raises:
+          EngineError: an argument is out of range, or MJX cannot run the scene.
+        """
+        check_arguments(boxes, num_worlds, substeps, timestep)
+        keep_jax_programs()
+        self.scene, self.tables, self.num_worlds = scene, scene.tables, num_worlds
+        self.substeps, self.timestep, self.boxes = substeps, timestep, boxes
+        self.touch_tolerance = touch_tolerance
+        self.host_model = self._host_model(scene.model)
+        self.layout: ModelLayout = make_layout(self.host_model, self.tables)
+        self.plan: ViewPlan = plan_view(self.host_model, self.tables, self.layout, boxes)
+        self._initial = initial if initial is not None else self._scene_start(touch_tolerance)
+        self._pyramidal = self.host_model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
+        self._has_blades = bool((self.tables.link_geom >= 0).any())
+        try:
+            self.model = self._put_model(self.host_model)
+            self._template = self._put_data(self.host_model, self._host_data())
+        except (NotImplementedError, ValueError) as e:
+            raise EngineError(f"MJX ({self.name}) cannot run scene '{scene.name}': {e}") from e
+        # One program each, not hundreds of little ones; and what several programs contain is traced once.
+        self._first = jax.jit(self._start_all)
+        self._row = jax.jit(lambda physics, world: jax.tree.map(lambda a: a[world], self.snapshot(physics)))
+        self._view = jax.jit(self._make_view)
+        self._mapped = jax.jit(self._map, static_argnums=0)
+
+    # What the implementations differ in.
+
+    @abc.abstractmethod
+    def _put_model(self, model: mujoco.MjModel) -> mjx.Model: ...
+
+    @abc.abstractmethod
+    def _put_data(self, model: mujoco.MjModel, data: mujoco.MjData) -> mjx.Data: ...
+
+    @abc.abstractmethod
+    def _contacts(self, data: mjx.Data) -> Contacts: ...
+
+    @abc.abstractmethod
+    def _efc_force(self, data: mjx.Data) -> Float[Array, "W N"]: ...
+
+    @abc.abstractmethod
+    def _tree_asleep(self, data: mjx.Data) -> Int[Array, "W T"]: ...
+
+    @abc.abstractmethod
+    def _with_sleep(self, data: mjx.Data, asleep: Int[Array, "W T"], awake: Bool[Array, "W T"]) -> mjx.Data: ...
+
+    @abc.abstractmethod
+    def _overflow(self, data: mjx.Data) -> Int[Array, "W"]: ...
+
+    # The protocol.
+
+    def reset(self) -> MjxPhysics:
+        """All worlds at the initial state."""
+        return self._first(self._template, self._initial)
+
+    def step(self, physics: MjxPhysics, ctrl: Float[Array, "W nu"] | None = None) -> tuple[MjxPhysics, PhysicsView]:
+        """One control step of every world; see `Engine.step`."""
+        data = physics.data
+        if ctrl is not None:
+            data = data.replace(ctrl=jnp.asarray(ctrl, jnp.float32))
+
+        def substep(carry: Any, _: Any) -> tuple[Any, None]:
+            data, force, overflow, _ = carry
+            awake = self._tree_asleep(data) < 0
+            data = self._mapped(mjx.step, self.model, data, physics.eq_data)
+            if self._has_blades:
+                force = jnp.maximum(force, self._link_forces(data))
+            return (data, force, overflow | self._overflow(data), awake), None
+
+        carry = (data, jnp.zeros_like(physics.link_force), physics.overflow, self._tree_asleep(data) < 0)
+        if self.unrolled:
+            for _ in range(self.substeps):
+                carry, _ = substep(carry, None)
+        else:
+            carry, _ = jax.lax.scan(substep, carry, length=self.substeps)
+        data, force, overflow, awake = carry
+        touching = self._touching(data, physics.touching, awake)
+        data = self._kinematics(data)
+        physics = dataclasses.replace(physics, data=data, touching=touching, link_force=force, overflow=overflow)
+        return physics, self.view(physics)
+
+    def view(self, physics: MjxPhysics) -> PhysicsView:
+        """The view of the present state."""
+        return self._view(physics)
+
+    def time(self, physics: MjxPhysics) -> Float[Array, "W"]:
+        """Simulated seconds since each world's reset."""
+        return physics.data.time
+
+    def write(self, physics: MjxPhysics, write: Write) -> MjxPhysics:
+        """Applies a change; see `Engine.write`. Costs a forward pass of all worlds where any world is written to."""
+        data = physics.data
+        asleep = self._tree_asleep(data)
+        qpos, qvel, tree_moved = apply_write(self.layout, self.host_model, data.qpos, data.qvel, write)
+        eq_active = data.eq_active if write.eq_active is None else jnp.asarray(write.eq_active, data.eq_active.dtype)
+        eq_data = physics.eq_data if write.eq_data is None else jnp.asarray(write.eq_data, jnp.float32)
+        tree_moved |= self._trees_joined(physics, eq_active, eq_data)
+        changed = tree_moved.any() | (eq_active != data.eq_active).any() | (eq_data != physics.eq_data).any()
+        data = data.replace(qpos=qpos, qvel=qvel, eq_active=eq_active)
+        data = self._with_sleep(
+            data, jnp.where(tree_moved & (asleep < 0), FULLY_AWAKE, asleep), (asleep < 0) | tree_moved
+        )
+        physics = dataclasses.replace(physics, data=data, eq_data=eq_data)
+        return jax.lax.cond(changed, self._refresh, lambda p: p, physics)
+
+    def snapshot(self, physics: MjxPhysics) -> Snapshot:
+        """All worlds as a snapshot with the world axis."""
+        data = physics.data
+        fields = {name: getattr(data, name) for name in STATE_FIELDS}
+        fields["eq_active"] = fields["eq_active"].astype(bool)
+        return Snapshot(
+            **fields, eq_data=physics.eq_data, tree_asleep=self._tree_asleep(data), touching=physics.touching
+        )
+
+    def export(self, physics: MjxPhysics, world: int) -> Snapshot:
+        """One world as a snapshot in numpy arrays of its own."""
+        if not 0 <= world < self.num_worlds:
+            raise EngineError(f"there is no world {world}: this engine has {self.num_worlds}")
+        return jax.tree.map(np.array, self._row(physics, world))
+
+    def load(self, physics: MjxPhysics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> MjxPhysics:
+        """Replaces worlds by snapshots; see `Engine.load`. Raises EngineError where it is of another scene."""
+        check_snapshot(snapshot, self.host_model, self.layout.num_units, self.num_worlds, self.scene.name)
+        chosen = jnp.ones(self.num_worlds, bool) if mask is None else jnp.asarray(mask, bool)
+        batched = snapshot.qpos.ndim == 2
+
+        def put(new: Any, old: Array) -> Array:
+            new = jnp.asarray(new).astype(old.dtype)
+            shape = (-1,) + (1,) * (old.ndim - 1)
+            return jnp.where(chosen.reshape(shape), new if batched else new[None], old)
+
+        data = physics.data
+        data = data.replace(**{name: put(getattr(snapshot, name), getattr(data, name)) for name in STATE_FIELDS})
+        asleep = put(snapshot.tree_asleep, self._tree_asleep(data))
+        data = self._with_sleep(data, asleep, asleep < 0)
+        return dataclasses.replace(
+            physics,
+            data=self._kinematics(data),
+            eq_data=put(snapshot.eq_data, physics.eq_data),
+            touching=put(snapshot.touching, physics.touching),
+            link_force=jnp.where(chosen[:, None, None], 0.0, physics.link_force),
+            overflow=jnp.where(chosen, 0, physics.overflow),
+        )
+
+    def health(self, physics: MjxPhysics) -> Health:
+        """What went wrong in each world; see `ig2mj.engine.health`."""
+        data = physics.data
+        free = np.concatenate([self.layout.object_dofadr[self.layout.object_dofadr >= 0], self.layout.extra_dofadr])
+        velocity = data.qvel[:, free[:, None] + np.arange(3)]
+        return Health(
+            overflow=physics.overflow,
+            finite=jnp.isfinite(data.qpos).all(1) & jnp.isfinite(data.qvel).all(1),
+            top_speed=jnp.sqrt(jnp.square(velocity).sum(-1).max(1, initial=0.0)),
+        )
+
+    def to_mujoco(self, physics: MjxPhysics, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """A copy of a world in MuJoCo's own structures; contacts and forces in it are of its present positions."""
+        row = self.export(physics, world)
+        model = copy.copy(self.host_model)
+        model.eq_data[:] = row.eq_data
+        data = mujoco.MjData(model)
+        for name in STATE_FIELDS:
+            if name == "time":
+                data.time = float(row.time)
+            else:
+                getattr(data, name)[:] = getattr(row, name)
+        mujoco.mj_forward(model, data)  # of all bodies: nothing sleeps in new data
+        restore_sleep(model, data, np.asarray(row.tree_asleep))
+        return model, data
+
+    # Stages.
+
+    def _scene_start(self, touch_tolerance: float) -> Snapshot:
+        """The scene's initial state, by C MuJoCo: all engines begin alike, and MJX need not compile a forward pass."""
+        native = NativeEngine(self.scene, timestep=self.timestep, touch_tolerance=touch_tolerance)
+        return native.export(native.reset(), 0)
+
+    def _start_all(self, template: mjx.Data, initial: Snapshot) -> MjxPhysics:
+        """Every world at `initial`, which has no world axis; the rest of the data is the template's."""
+        worlds, tables = self.num_worlds, self.tables
+        spread = jax.vmap(lambda ctrl: template.replace(ctrl=ctrl))
+        units = self.layout.num_units
+        physics = MjxPhysics(
+            data=spread(jnp.tile(template.ctrl, (worlds, 1))),
+            eq_data=jnp.tile(jnp.asarray(self.host_model.eq_data, jnp.float32), (worlds, 1, 1)),
+            touching=jnp.zeros((worlds, units, units), bool),
+            link_force=jnp.zeros((worlds, len(tables.link_object), tables.num_objects), jnp.float32),
+            overflow=jnp.zeros(worlds, jnp.int32),
+        )
+        return self.load(physics, initial)
+
+    def _trees_joined(
+        self, physics: MjxPhysics, eq_active: Bool[Array, "W E"], eq_data: Float[Array, "W E 12"]
+    ) -> Bool[Array, "W T"]:
+        """Trees at either end of an equality constraint that is being changed: what a hand lets go would hang in the
+        air if it fell asleep."""
+        model = self.host_model
+        changed = eq_active != physics.data.eq_active
+        changed |= (eq_data != physics.eq_data).any(-1) & eq_active.astype(bool)
+        of_tree = (self.layout.equality_tree[..., None] == np.arange(model.ntree)).any(1)
+        return reaches(changed, of_tree)
+
+    def _make_view(self, physics: MjxPhysics) -> PhysicsView:
+        data = physics.data
+        return make_view(
+            self.plan,
+            data.qpos,
+            data.xpos,
+            data.xquat,
+            self._tree_asleep(data) < 0,
+            physics.touching,
+            physics.link_force,
+            data.eq_active.astype(bool),
+        )
+
+    def _kinematics(self, data: mjx.Data) -> mjx.Data:
+        """Body poses of the present positions."""
+        return jax.vmap(lambda d: mjx.kinematics(self.model, d))(data)
+
+    def _refresh(self, physics: MjxPhysics) -> MjxPhysics:
+        """Everything derived, of the present positions; wakes what was marked. No forces are reported."""
+        data = self._mapped(mjx.forward, self.model, physics.data, physics.eq_data)
+        awake = self._tree_asleep(data) < 0
+        return dataclasses.replace(
+            physics,
+            data=data,
+            touching=self._touching(data, physics.touching, awake),
+            link_force=jnp.zeros_like(physics.link_force),
+        )
+
+    def _map(self, act: Any, model: mjx.Model, data: mjx.Data, eq_data: Float[Array, "W E 12"]) -> mjx.Data:
+        """A function of MJX on every world. The model comes as an argument, so that a program holds it only once."""
+        if self.host_model.neq == 0:
+            return jax.vmap(lambda d: act(model, d))(data)
+        return jax.vmap(lambda e, d: act(model.replace(eq_data=e), d))(eq_data, data)
+
+    def _touching(
+        self, data: mjx.Data, remembered: Bool[Array, "W U U"], tree_awake: Bool[Array, "W T"]
+    ) -> Bool[Array, "W U U"]:
+        """`tree_awake`: as the step that made the contacts began; what woke in it is awake now."""
+        tree = self.layout.unit_tree
+        fresh_tree = tree_awake | (self._tree_asleep(data) < 0)
+        fresh = (
+            fresh_tree[:, np.maximum(tree, 0)] & (tree >= 0)
+            if self.host_model.ntree
+            else jnp.zeros((remembered.shape[0], len(tree)), bool)
+        )
+        return touching_units(self._contacts(data), self.layout, self.touch_tolerance, remembered, fresh)
+
+    def _link_forces(self, data: mjx.Data) -> Float[Array, "W L O"]:
+        return link_forces(
+            self._contacts(data),
+            self.layout,
+            jnp.asarray(self.tables.geom_object),
+            self._efc_force(data),
+            self._pyramidal,
+            self.tables.num_objects,
+            len(self.tables.link_object),
+        )
+
+    def _host_model(self, model: mujoco.MjModel) -> mujoco.MjModel:
+        own = copy.copy(model)
+        own.opt.timestep = self.timestep
+        return own
+
+    def _host_data(self) -> mujoco.MjData:
+        data = mujoco.MjData(self.host_model)
+        if self.host_model.nkey:
+            mujoco.mj_resetDataKeyframe(self.host_model, data, 0)
+        mujoco.mj_forward(self.host_model, data)
+        return data

@@ -1,0 +1,182 @@
+"""`PhysicsView` from MJX arrays, shared by the two MJX engines. Pure JAX, all worlds at once.
+
+What nobody reads costs nothing: the view is made inside the jitted step, and XLA drops the parts that no state,
+predicate or reward uses.
+
+Axes as in `ig2mj.engine.base`; K boxed things of a `BoxTable`, S slots (the most boxed things, or units, of an object).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float
+
+from ig2mj.engine.layout import ModelLayout
+from ig2mj.engine.object_boxes import BoxTable, make_box_table
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.boxes import core_boxes, turned_boxes
+from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
+from ig2mj.scene.tables import SceneTables
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ViewPlan:
+    """Index arrays for `make_view`, on the host.
+
+    Attributes:
+      tables, layout, boxes: constants of the scene.
+      com_offset: [O, 3] centre of mass of the main body in its frame.
+      box_slots, unit_slots: [O, S] rows of the box table, and units, of each object; -1 none.
+      qpos_openable: [J]. camera_body, camera_pos, camera_quat: [A...] eyes in their bodies' frames.
+    """
+
+    tables: SceneTables
+    layout: ModelLayout
+    boxes: BoxTable
+    com_offset: np.ndarray
+    box_slots: np.ndarray
+    unit_slots: np.ndarray
+    camera_body: np.ndarray
+    camera_pos: np.ndarray
+    camera_quat: np.ndarray
+
+
+def plan_view(model: mujoco.MjModel, tables: SceneTables, layout: ModelLayout, box_rule: str) -> ViewPlan:
+    """Prepares the view of a scene; `box_rule` as in `ig2mj.engine.base.BOX_RULES`."""
+    boxes = make_box_table(box_rule, model, tables, layout)
+    camera = tables.agent_camera
+    known = camera >= 0
+    return ViewPlan(
+        tables=tables,
+        layout=layout,
+        boxes=boxes,
+        com_offset=np.asarray(model.body_ipos)[tables.object_root],
+        box_slots=slots(boxes.owner, tables.num_objects),
+        unit_slots=slots(layout.unit_object, tables.num_objects),
+        camera_body=np.where(known, model.cam_bodyid[camera] if model.ncam else 0, tables.agent_body),
+        camera_pos=np.where(known[:, None], model.cam_pos[camera] if model.ncam else 0.0, 0.0),
+        camera_quat=np.where(known[:, None], model.cam_quat[camera] if model.ncam else 0.0, [1.0, 0.0, 0.0, 0.0]),
+    )
+
+
+def make_view(
+    plan: ViewPlan,
+    qpos: Float[Array, "W nq"],
+    body_pos: Float[Array, "W B 3"],
+    body_quat: Float[Array, "W B 4"],
+    tree_awake: Bool[Array, "W T"],
+    touching: Bool[Array, "W U U"],
+    link_force: Float[Array, "W L O"],
+    eq_active: Bool[Array, "W E"],
+) -> PhysicsView:
+    """The view of poses, contacts and sleep. `touching` is of units, `link_force` in newtons."""
+    tables, layout = plan.tables, plan.layout
+    root = tables.object_root
+    object_pos, object_quat = body_pos[:, root], body_quat[:, root]
+    link_pos, link_quat = compose(
+        body_pos[:, tables.link_body],
+        body_quat[:, tables.link_body],
+        jnp.asarray(tables.link_pos, jnp.float32),
+        jnp.asarray(tables.link_quat, jnp.float32),
+    )
+    low, high = object_boxes(plan, body_pos, body_quat)
+    eye_pos, eye_quat = compose(
+        body_pos[:, plan.camera_body],
+        body_quat[:, plan.camera_body],
+        jnp.asarray(plan.camera_pos, jnp.float32),
+        jnp.asarray(plan.camera_quat, jnp.float32),
+    )
+    return PhysicsView(
+        object_pos=object_pos,
+        object_quat=object_quat,
+        object_com=object_pos + quat_rotate(object_quat, jnp.asarray(plan.com_offset, jnp.float32)),
+        aabb_low=low,
+        aabb_high=high,
+        body_pos=body_pos,
+        body_quat=body_quat,
+        link_pos=link_pos,
+        link_quat=link_quat,
+        joint_pos=qpos[:, tables.openable_qposadr],
+        touching=object_touching(plan, touching),
+        link_force=link_force,
+        awake=_any_of(tree_awake, layout.object_trees),
+        agent_pos=body_pos[:, tables.agent_body],
+        eye_pos=eye_pos,
+        eye_quat=eye_quat,
+        finger_pos=body_pos[:, tables.finger_body],
+        grasped=_grasped(plan, eq_active),
+    )
+
+
+def object_boxes(
+    plan: ViewPlan, body_pos: Float[Array, "W B 3"], body_quat: Float[Array, "W B 4"]
+) -> tuple[Float[Array, "W O 3"], Float[Array, "W O 3"]]:
+    """World boxes of all objects, low and high corners (m); as `ig2mj.engine.object_boxes.world_boxes` makes them."""
+    table = plan.boxes
+    rotation = quat_to_matrix(body_quat[:, table.body])  # W K 3 3
+    if table.rule == "tight":
+        points, radius, axis = (jnp.asarray(a, jnp.float32) for a in (table.points, table.radius, table.axis))
+        low, high = core_boxes(rotation, points, radius if table.any_round else None, axis)
+    else:
+        center, half, margin = (jnp.asarray(a, jnp.float32) for a in (table.center, table.half, table.margin))
+        low, high = turned_boxes(rotation, center, half, margin)
+    position = body_pos[:, table.body]
+    low, high = low + position, high + position
+    taken = (plan.box_slots >= 0)[..., None]
+    return (
+        jnp.where(taken, low[:, plan.box_slots], jnp.inf).min(2),
+        jnp.where(taken, high[:, plan.box_slots], -jnp.inf).max(2),
+    )
+
+
+def object_touching(plan: ViewPlan, touching: Bool[Array, "W U U"]) -> Bool[Array, "W O O"]:
+    """Touching of objects from touching of their units; an object does not touch itself."""
+    slot = plan.unit_slots
+    num_objects = len(slot)
+    if slot.shape[1] == 1 and np.array_equal(slot[:, 0], np.arange(num_objects)):
+        return touching
+    rows = _any_over_slots(touching, slot)  # W O U
+    both = _any_over_slots(rows.swapaxes(1, 2), slot)  # W O O, transposed, and symmetric as `touching` is
+    return both & ~np.eye(num_objects, dtype=bool)
+
+
+def slots(owner: np.ndarray, count: int) -> np.ndarray:
+    """Places [count, S] of each owner's entries in `owner` [n], ascending, padded with -1."""
+    rows = [np.flatnonzero(owner == o) for o in range(count)]
+    width = max((len(r) for r in rows), default=0)
+    table = np.full((count, max(width, 1)), -1)
+    for o, r in enumerate(rows):
+        table[o, : len(r)] = r
+    return table
+
+
+def _any_over_slots(values: Bool[Array, "W U X"], slot: np.ndarray) -> Bool[Array, "W O X"]:
+    """Whether any of an object's rows holds; slot by slot, so that no [W, O, S, X] array is made."""
+    result = values[:, slot[:, 0]] & (slot[:, 0] >= 0)[:, None]
+    for s in range(1, slot.shape[1]):
+        result |= values[:, slot[:, s]] & (slot[:, s] >= 0)[:, None]
+    return result
+
+
+def _any_of(values: Bool[Array, "W T"], owned: np.ndarray) -> Bool[Array, "W O"]:
+    """Whether any tree an object owns [O, T] holds."""
+    table = [np.flatnonzero(row) for row in owned]
+    width = max((len(r) for r in table), default=0)
+    result = jnp.zeros((values.shape[0], len(owned)), bool)
+    for s in range(width):
+        has = np.array([len(r) > s for r in table])
+        tree = np.array([r[s] if len(r) > s else 0 for r in table])
+        result |= values[:, tree] & has
+    return result
+
+
+def _grasped(plan: ViewPlan, eq_active: Bool[Array, "W E"]) -> Bool[Array, "W A O"]:
+    layout, tables = plan.layout, plan.tables
+    result = jnp.zeros((eq_active.shape[0], len(tables.agent_names), tables.num_objects), bool)
+    if not len(layout.grasp_equality):
+        return result
+    return result.at[:, layout.grasp_agent, layout.grasp_object].max(eq_active[:, layout.grasp_equality])

@@ -1,0 +1,292 @@
+"""The native engine: C MuJoCo with sleeping, one world or many on a thread pool. No physics of JAX in it.
+
+Each world has its own MjData and is stepped by one thread from start to end, so that results are the same, bit for
+bit, for any number of threads and of worlds. (`mujoco.batch.Batch` steps as fast, but gives neither contacts nor a way
+to put a saved sleep state back; both are needed here.)
+
+After a control step positions, contacts and boxes belong to one instant: `mj_step` leaves derived quantities one
+physics step behind, so a control step is `mj_step2`, three times `mj_step`, `mj_step1`. That costs no more than four
+`mj_step`.
+"""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import functools
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+
+import jax
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float
+
+from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snapshot, Write, check_arguments
+from ig2mj.engine.compile_cache import keep_jax_programs
+from ig2mj.engine.health import Health
+from ig2mj.engine.layout import ModelLayout, make_layout
+from ig2mj.engine.native.one_world import Statics, World
+from ig2mj.engine.native.vicinity import Masks, VicinityTable
+from ig2mj.engine.native.view_rows import FIELDS, Changed, PoseRows
+from ig2mj.engine.native.writing import apply_write
+from ig2mj.engine.object_boxes import make_box_table
+from ig2mj.engine.snapshot_check import check_snapshot
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.errors import EngineError
+from ig2mj.scene.scene import Scene
+from ig2mj.scene.tables import SceneTables
+
+
+class NativePhysics:
+    """The native engine's handle: all worlds, changed in place by `step`, `write` and `load`.
+
+    Attributes:
+      worlds: one `World` each. arrays: [W, ...] working arrays, by field of the view; never handed out.
+      view: the view last made; while nothing moves, the same object is handed out again.
+    """
+
+    def __init__(self, worlds: list[World], arrays: dict[str, np.ndarray]):
+        self.worlds, self.arrays = worlds, arrays
+        self.view: PhysicsView | None = None
+
+    def update(self, changed: int) -> PhysicsView:
+        """The view of the present state: copies of what changed, the old arrays for the rest."""
+        if self.view is None:
+            self.view = PhysicsView(**{name: array.copy() for name, array in self.arrays.items()})
+        elif changed:
+            old, self.view = self.view, PhysicsView.__new__(PhysicsView)
+            fields = self.view.__dict__  # the constructor of a frozen dataclass costs more than the copies
+            fields.update(old.__dict__)
+            for name in _fields_of(changed):
+                fields[name] = self.arrays[name].copy()
+        return self.view
+
+
+@functools.cache
+def _fields_of(changed: int) -> tuple[str, ...]:
+    return tuple(name for name, group in FIELDS.items() if group & changed)
+
+
+class NativeEngine:
+    """C MuJoCo behind the `Engine` protocol (see `ig2mj.engine.base`).
+
+    Views hold float32 numpy arrays that nobody changes afterwards. Where nothing changed since the last view, the same
+    object is given again, and an array that did not change is the same array, so that `is` tells what may be skipped.
+    """
+
+    name = "native"
+    pure = False
+
+    def __init__(
+        self,
+        scene: Scene,
+        num_worlds: int = 1,
+        *,
+        substeps: int = SUBSTEPS,
+        timestep: float = PHYSICS_TIMESTEP,
+        touch_tolerance: float = TOUCH_TOLERANCE,
+        boxes: str = "tight",
+        threads: int | None = None,
+    ):
+        """Makes an engine.
+
+        Args:
+          scene: shared by all worlds.
+          num_worlds: W.
+          substeps, timestep: physics steps in a control step, and their length in seconds.
+          touch_tolerance: metres; contacts farther apart than the geoms' `gap` are never seen.
+          boxes: rule of the view's world boxes, "tight" or "igibson".
+          threads: how many to step worlds on; None: one per processor, and no more than worlds.
+
+        Raises:
+          EngineError: an argument is out of range.
+        """
+        check_arguments(boxes, num_worlds, substeps, timestep)
+        keep_jax_programs()
+        if threads is not None and threads < 1:
+            raise EngineError(f"threads = {threads}: at least one is needed")
+        self.scene, self.tables, self.num_worlds = scene, scene.tables, num_worlds
+        self.substeps, self.timestep, self.boxes = substeps, timestep, boxes
+        self.threads = min(threads or os.cpu_count() or 1, num_worlds)
+        self._models = [_engine_model(scene.model, timestep) for _ in range(self.threads)]
+        model = self._models[0]
+        self.layout: ModelLayout = make_layout(model, self.tables)
+        _, unit_starts = np.unique(self.layout.unit_object, return_index=True)
+        self._statics = Statics(
+            tables=self.tables,
+            layout=self.layout,
+            poses=PoseRows(
+                self.tables,
+                self.layout,
+                make_box_table(boxes, model, self.tables, self.layout),
+                np.asarray(model.body_treeid, int),
+            ),
+            contact_unit=np.where(self.layout.collides, self.layout.geom_unit, -1),
+            unit_starts=unit_starts,
+            vicinity=VicinityTable.build(model, self.layout.equality_tree),
+            force_links=bool((self.tables.link_geom >= 0).any()),
+            pyramidal=model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL,
+            tolerance=touch_tolerance,
+            substeps=substeps,
+        )
+        self._masks = [Masks(self._statics.vicinity, model) for model in self._models]
+        self._shares = np.array_split(np.arange(num_worlds), self.threads)
+        self._pool = ThreadPoolExecutor(self.threads, "ig2mj-native") if self.threads > 1 else None
+
+    def reset(self) -> NativePhysics:
+        """New worlds at the scene's initial state: its first keyframe, else the zero pose; everything awake."""
+        arrays = _working_arrays(self.num_worlds, self.tables)
+        worlds = [
+            World(self._statics, self._models[share], self._masks[share], {n: a[w] for n, a in arrays.items()}, int(w))
+            for share, numbers in enumerate(self._shares)
+            for w in numbers
+        ]
+        physics = NativePhysics(worlds, arrays)
+
+        physics.update(self._run(physics, World.start))
+        return physics
+
+    def step(
+        self, physics: NativePhysics, ctrl: Float[Array, "W nu"] | None = None
+    ) -> tuple[NativePhysics, PhysicsView]:
+        """One control step of every world; see `Engine.step`. Raises EngineError where a state is not finite."""
+        if ctrl is None:
+            if self.num_worlds == 1 and physics.view is not None and physics.worlds[0].only_time_passes():
+                return physics, physics.view
+            changed = self._run(physics, lambda world: world.step(None))
+        else:
+            rows = np.asarray(ctrl, np.float64)
+            changed = self._run(physics, lambda world: world.step(rows[world.number]))
+        return physics, physics.update(changed)
+
+    def view(self, physics: NativePhysics) -> PhysicsView:
+        """The view of the present state; the same object as the last one when nothing changed."""
+        return physics.update(Changed.NOTHING)
+
+    def time(self, physics: NativePhysics) -> Float[np.ndarray, "W"]:
+        """Simulated seconds since each world's reset."""
+        return np.array([world.data.time for world in physics.worlds])
+
+    def write(self, physics: NativePhysics, write: Write) -> NativePhysics:
+        """Applies a change in place; see `Engine.write`."""
+        rows = {
+            name: np.asarray(value)
+            for name in ("object_mask", "object_pos", "object_quat", "qpos_mask", "qpos", "eq_active", "eq_data")
+            if (value := getattr(write, name)) is not None
+        }
+
+        def apply(world: World) -> int:
+            return apply_write(world, {name: value[world.number] for name, value in rows.items()})
+
+        physics.update(self._run(physics, apply))
+        return physics
+
+    def health(self, physics: NativePhysics) -> Health:
+        """What went wrong in each world; see `ig2mj.engine.health`. C MuJoCo's buffers grow: nothing overflows."""
+        layout = self.layout
+        free = np.concatenate([layout.object_dofadr[layout.object_dofadr >= 0], layout.extra_dofadr])
+        velocity = np.array([world.data.qvel[free[:, None] + np.arange(3)] for world in physics.worlds], np.float32)
+        positions = np.array([world.data.qpos for world in physics.worlds])
+        return Health(
+            overflow=np.zeros(self.num_worlds, np.int32),
+            finite=np.asarray(np.isfinite(positions).all(1) & np.isfinite(velocity).all((1, 2))),
+            top_speed=np.sqrt(np.square(velocity).sum(-1).max(1, initial=0.0)),
+        )
+
+    def snapshot(self, physics: NativePhysics) -> Snapshot:
+        """All worlds as a snapshot with the world axis."""
+        return jax.tree.map(lambda *rows: np.stack(rows), *(self.export(physics, w) for w in range(self.num_worlds)))
+
+    def export(self, physics: NativePhysics, world: int) -> Snapshot:
+        """One world as a snapshot in float64 numpy arrays of its own."""
+        return Snapshot(**physics.worlds[world].save())
+
+    def load(self, physics: NativePhysics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> NativePhysics:
+        """Replaces worlds in place; see `Engine.load`. Raises EngineError where the snapshot is of another scene."""
+        model = self._models[0]
+        arrays = {field.name: np.asarray(getattr(snapshot, field.name)) for field in dataclasses.fields(Snapshot)}
+        check_snapshot(snapshot, model, self.layout.num_units, self.num_worlds, self.scene.name)
+        batched = arrays["time"].ndim == 1
+        chosen = np.ones(self.num_worlds, bool) if mask is None else np.asarray(mask, bool)
+
+        def replace(world: World) -> int:
+            if not chosen[world.number]:
+                return Changed.NOTHING
+            return world.load({n: a[world.number] if batched else a for n, a in arrays.items()})
+
+        physics.update(self._run(physics, replace))
+        return physics
+
+    def to_mujoco(self, physics: NativePhysics, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
+        """The live model and data of a world. Do not step them."""
+        one = physics.worlds[world]
+        one.model.eq_data[:] = one.eq_data
+        return one.model, one.data
+
+    def _run(self, physics: NativePhysics, act: Callable[[World], int]) -> int:
+        """Does something to every world, each share of the worlds on its own thread and with its own model."""
+
+        failures: list[EngineError] = []
+
+        def run(share: np.ndarray) -> int:
+            changed = Changed.NOTHING
+            for number in share:
+                world = physics.worlds[number]
+                if len(world.eq_data):
+                    world.model.eq_data[:] = world.eq_data
+                try:
+                    changed |= act(world)
+                except EngineError as e:  # the other worlds go on; the caller hears of it when all are done
+                    failures.append(e)
+                    changed = Changed.ALL
+            return changed
+
+        if self._pool is None:
+            changed = run(self._shares[0])
+        else:
+            changed = Changed.NOTHING
+            for part in self._pool.map(run, self._shares):
+                changed |= part
+        if failures:
+            physics.update(changed)
+            raise min(failures, key=str)
+        return changed
+
+
+def _engine_model(model: mujoco.MjModel, timestep: float) -> mujoco.MjModel:
+    """A copy of the scene's model as the engine runs it: sleeping on, and no silent reset of a world gone wrong."""
+    own = copy.copy(model)
+    own.opt.timestep = timestep
+    own.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
+    own.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    return own
+
+
+def _working_arrays(num_worlds: int, tables: SceneTables) -> dict[str, np.ndarray]:
+    objects, bodies = tables.num_objects, len(tables.body_object)
+    links, joints = len(tables.link_object), len(tables.openable_object)
+    agents, fingers = len(tables.agent_body), len(tables.finger_body)
+    shapes: dict[str, tuple[int, ...]] = {
+        "object_pos": (objects, 3),
+        "object_quat": (objects, 4),
+        "object_com": (objects, 3),
+        "aabb_low": (objects, 3),
+        "aabb_high": (objects, 3),
+        "body_pos": (bodies, 3),
+        "body_quat": (bodies, 4),
+        "link_pos": (links, 3),
+        "link_quat": (links, 4),
+        "joint_pos": (joints,),
+        "touching": (objects, objects),
+        "link_force": (links, objects),
+        "awake": (objects,),
+        "agent_pos": (agents, 3),
+        "eye_pos": (agents, 3),
+        "eye_quat": (agents, 4),
+        "finger_pos": (fingers, 3),
+        "grasped": (agents, objects),
+    }
+    flags = {"touching", "awake", "grasped"}
+    return {n: np.zeros((num_worlds, *shape), bool if n in flags else np.float32) for n, shape in shapes.items()}

@@ -1,0 +1,280 @@
+"""One world of the native engine: its MjData and its row of the view, brought up to date only where something moved."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import mujoco
+import numpy as np
+
+from ig2mj.engine.layout import ModelLayout
+from ig2mj.engine.native.contacts import add_link_forces, touching_units
+from ig2mj.engine.native.sleep import restore_sleep, wake_trees
+from ig2mj.engine.native.vicinity import Masks, Vicinity, VicinityTable
+from ig2mj.engine.native.view_rows import Changed, PosePlan, PoseRows
+from ig2mj.errors import EngineError
+from ig2mj.scene.tables import SceneTables
+
+_STATE = ("qpos", "qvel", "act", "ctrl", "qacc_warmstart", "eq_active", "mocap_pos", "mocap_quat")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Statics:
+    """What all worlds of an engine share.
+
+    Attributes:
+      unit_starts: [O] first unit of each object. force_links: some annotated link is a geom.
+      See `ig2mj.engine.layout`, `ig2mj.engine.native.view_rows` and `ig2mj.engine.native.vicinity` for the rest.
+    """
+
+    tables: SceneTables
+    layout: ModelLayout
+    poses: PoseRows
+    contact_unit: np.ndarray
+    unit_starts: np.ndarray
+    vicinity: VicinityTable
+    force_links: bool
+    pyramidal: bool
+    tolerance: float
+    substeps: int
+
+
+class World:
+    """One world.
+
+    Attributes:
+      data: MuJoCo's state. rows: this world's row of each of the engine's working arrays, by field of the view.
+      units: [U, U] remembered touching of units.
+      eq_data: [E, 11] this world's equality parameters; its engine puts them into the model before it steps.
+    """
+
+    def __init__(self, statics: Statics, model: mujoco.MjModel, masks: Masks, rows: dict[str, np.ndarray], number: int):
+        self.statics, self.model, self.masks, self.rows, self.number = statics, model, masks, rows, number
+        self.data = mujoco.MjData(model)
+        self._near = Vicinity(statics.vicinity, model, self.data)
+        self.units = np.zeros((statics.layout.num_units, statics.layout.num_units), bool)
+        self.eq_data = np.array(model.eq_data)
+        self._plans: dict[bytes, PosePlan] = {}
+        self._fresh = np.zeros_like(self.units)  # [U, U] pairs with an awake unit
+        self._any_fresh = False
+        self._awake_key = self._eq_key = b""
+        self._awake = self._awake_before = np.zeros(model.ntree, bool)
+        self._none_awake = False
+        self._steady_plan = self._plan(self._awake)
+        self._has_force = False
+        self._numbers = self.data.qpos, self.data.qvel
+        self._timestep = float(model.opt.timestep)
+        self._has_grasps = len(statics.layout.grasp_equality) > 0
+        outside = (self.data.qvel, self.data.xfrc_applied, self.data.qfrc_applied)
+        self._from_outside = tuple((array, np.zeros_like(array).tobytes()) for array in outside)
+        self._never_left_alone = model.nmocap > 0
+
+    def step(self, ctrl: np.ndarray | None) -> int:
+        """One control step, and the refresh after it. The data stands after `mj_step1` before and after."""
+        model, data, statics = self.model, self.data, self.statics
+        if ctrl is not None:
+            data.ctrl[:] = ctrl
+        if self.only_time_passes():
+            return Changed.NOTHING
+        changed = self.clear_force()
+        self._near.begin()
+        self._let_near()
+        mujoco.mj_step2(model, data)
+        found = statics.force_links and self._collect_force()
+        for _ in range(statics.substeps - 1):
+            self._near.moved()
+            self._let_near()
+            mujoco.mj_step(model, data)
+            found |= statics.force_links and self._collect_force()
+        self._near.moved()
+        self._let_near()
+        mujoco.mj_step1(model, data)
+        self.masks.open()  # nobody else is to see a model with masks
+        if found:
+            self._has_force = True
+            changed |= Changed.FORCE
+        return changed | self.refresh()
+
+    def _let_near(self) -> None:
+        self.masks.put(self._near.contype, self._near.conaffinity)
+
+    def disturbed(self) -> None:
+        """To be called where the data was changed by another way than a step."""
+        self._near.forget()
+
+    def only_time_passes(self) -> bool:
+        """Lets time pass by one control step where that is all that happens; false where the world must be stepped.
+
+        So it is where all trees sleep and nothing reaches in from outside that could wake one (MuJoCo, too, looks at
+        the bytes of just these arrays). MuJoCo would still go through every geom.
+        """
+        data = self.data
+        if not self._none_awake or self._has_force or data.ntree_awake or self._never_left_alone:
+            return False
+        for array, zeros in self._from_outside:
+            if array.tobytes() != zeros:
+                return False
+        if self._has_grasps and self._active_grasps().tobytes() != self._eq_key:
+            return False
+        time, timestep = data.time, self._timestep
+        for _ in range(self.statics.substeps):
+            time += timestep
+        data.time = time
+        return True
+
+    def refresh(self, everything: bool = False) -> int:
+        """Brings the rows up to date with `data`, whose position stage is.
+
+        Args:
+          everything: also what sleeps, and touching from this instant's contacts alone.
+        """
+        if self._none_awake and not self.data.ntree_awake and not everything:
+            return self._refresh_grasped()
+        changed = self._note_awake()
+        if everything:
+            plan = self._plan(None)
+        else:
+            plan = self._plan(self._awake | self._awake_before) if changed else self._steady_plan
+            self._check_finite()
+        changed |= self.statics.poses.refresh(plan, self.data, self.rows) | self._refresh_grasped()
+        if self._any_fresh or changed & Changed.AWAKE or everything:
+            changed |= self._refresh_touching(everything)
+        return changed
+
+    def start(self) -> int:
+        """The scene's initial state: its first keyframe, else the zero pose."""
+        self.disturbed()
+        model, data = self.model, self.data
+        if model.nkey:
+            mujoco.mj_resetDataKeyframe(model, data, 0)
+        asleep = data.tree_asleep.copy()
+        if (asleep < 0).all():
+            mujoco.mj_step1(model, data)
+            return self.refresh(everything=True)
+        # Some trees start asleep (`sleep="init"`): let them show their contacts once.
+        fields = self.save()
+        wake_trees(model, data, np.arange(model.ntree))
+        mujoco.mj_step1(model, data)
+        self.refresh(everything=True)
+        return self.load({**fields, "tree_asleep": asleep, "touching": self.units})
+
+    def save(self) -> dict[str, np.ndarray]:
+        """Copies of the fields of a snapshot (see `ig2mj.engine.base.Snapshot`)."""
+        data = self.data
+        fields = {name: np.array(getattr(data, name)) for name in (*_STATE, "tree_asleep")}
+        fields["eq_active"] = fields["eq_active"].astype(bool)
+        return fields | {"eq_data": self.eq_data.copy(), "time": np.asarray(data.time), "touching": self.units.copy()}
+
+    def load(self, fields: dict[str, np.ndarray]) -> int:
+        """Takes the fields of a snapshot, and refreshes everything."""
+        self.disturbed()
+        model, data = self.model, self.data
+        mujoco.mj_resetData(model, data)
+        self.eq_data = np.array(fields["eq_data"], np.float64)
+        model.eq_data[:] = self.eq_data
+        self._set_state(fields)
+        wake_trees(model, data, np.arange(model.ntree))
+        mujoco.mj_step1(model, data)  # kinematics of everything, while everything is awake
+        self._set_state(fields)
+        restore_sleep(model, data, fields["tree_asleep"])
+        mujoco.mj_step1(model, data)
+        self.units = np.array(fields["touching"], bool)
+        return self.clear_force() | self.refresh(everything=True)
+
+    def _set_state(self, fields: dict[str, np.ndarray]) -> None:
+        for name in _STATE:
+            getattr(self.data, name)[:] = fields[name]
+        self.data.qacc[:] = fields["qacc_warmstart"]
+        self.data.time = float(fields["time"])
+
+    def clear_force(self) -> int:
+        """Forgets the contact forces of the last control step."""
+        if not self._has_force:
+            return Changed.NOTHING
+        self.rows["link_force"][:] = 0.0
+        self._has_force = False
+        return Changed.FORCE
+
+    def _collect_force(self) -> bool:
+        statics = self.statics
+        return add_link_forces(
+            self.data, statics.layout, statics.tables.geom_object, statics.pyramidal, self.rows["link_force"]
+        )
+
+    def _check_finite(self) -> None:
+        data, model, (qpos, qvel) = self.data, self.model, self._numbers
+        if qpos.dot(qpos) < mujoco.mjMAXVAL and qvel.dot(qvel) < mujoco.mjMAXVAL:
+            return  # false for NaN, too; what is larger is looked at closely
+        wrong = ~(np.abs(data.qvel) < mujoco.mjMAXVAL)
+        bodies = set(model.dof_bodyid[wrong])
+        coordinates = np.flatnonzero(~(np.abs(data.qpos) < mujoco.mjMAXVAL))
+        bodies |= set(model.jnt_bodyid[np.searchsorted(model.jnt_qposadr, coordinates, side="right") - 1])
+        if not bodies:
+            return
+        names = [f"'{model.body(int(b)).name}'" for b in sorted(bodies)]
+        listed = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
+        raise EngineError(
+            f"world {self.number}: position or velocity is not finite at t = {data.time:.3f} s of {listed} "
+            "(reset the world; a smaller timestep or weaker controls may mend it)"
+        )
+
+    def _plan(self, trees: np.ndarray | None) -> PosePlan:
+        """What moves with the given trees [T]; None: everything there is."""
+        key = b"all" if trees is None else trees.tobytes()
+        plan = self._plans.get(key)
+        if plan is None:
+            if len(self._plans) > 256:  # one per set of awake trees; sets repeat, but not for ever
+                self._plans.clear()
+            plan = self._plans[key] = self.statics.poses.plan(trees)
+        return plan
+
+    def _note_awake(self) -> int:
+        """Takes over which trees are awake, and everything that hangs on it alone."""
+        data, layout = self.data, self.statics.layout
+        key = data.tree_awake.tobytes()
+        if key == self._awake_key:
+            return Changed.NOTHING
+        self._awake_key = key
+        # What just fell asleep still moved during the control step that is over.
+        self._awake_before, self._awake = self._awake, data.tree_awake != 0
+        self._none_awake = not self._awake.any()
+        self._steady_plan = self._plan(self._awake)
+        unit_awake = np.concatenate([self._awake, [False]])[layout.unit_tree]
+        self._fresh = unit_awake[:, None] | unit_awake
+        self._any_fresh = bool(unit_awake.any())
+        asleep = ~self._awake[self.model.dof_treeid]
+        for array in (data.qacc, data.qacc_smooth, data.qacc_warmstart):
+            array[asleep] = 0.0  # MuJoCo leaves old values there; a loaded world must start a wake from the same ones
+        self.rows["awake"][:] = (layout.object_trees & self._awake).any(1)
+        return Changed.AWAKE
+
+    def _refresh_grasped(self) -> int:
+        if not self._has_grasps:
+            return Changed.NOTHING
+        layout, active = self.statics.layout, self._active_grasps()
+        key = active.tobytes()
+        if key == self._eq_key:
+            return Changed.NOTHING
+        self._eq_key = key
+        grasped = self.rows["grasped"]
+        grasped[:] = False
+        grasped[layout.grasp_agent[active], layout.grasp_object[active]] = True
+        return Changed.GRASPED
+
+    def _active_grasps(self) -> np.ndarray:
+        return self.data.eq_active[self.statics.layout.grasp_equality].astype(bool)
+
+    def _refresh_touching(self, everything: bool) -> int:
+        statics, data = self.statics, self.data
+        units = touching_units(data, statics.contact_unit, statics.tolerance, self.units, self._fresh)
+        if units is self.units and not everything:
+            return Changed.NOTHING
+        self.units = units
+        starts = statics.unit_starts
+        touching = self.rows["touching"]
+        if len(starts) == len(units):
+            touching[:] = units
+        else:
+            touching[:] = np.logical_or.reduceat(np.logical_or.reduceat(units, starts, 0), starts, 1)
+        np.fill_diagonal(touching, False)
+        return Changed.TOUCHING

@@ -1,0 +1,75 @@
+"""Writes to a world of the native engine: teleports, joint positions, equality constraints."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from ig2mj.engine.native.one_world import World
+from ig2mj.engine.native.sleep import wake_trees
+from ig2mj.engine.native.view_rows import Changed
+
+
+def apply_write(world: World, rows: dict[str, np.ndarray]) -> int:
+    """Applies one world's rows of a `Write` (its fields that are not None) and refreshes the world.
+
+    Without any rows the world is refreshed from what stands in its MjData.
+    """
+    layout, model, data = world.statics.layout, world.model, world.data
+    trees = np.zeros(model.ntree, bool)
+    if "object_mask" in rows:
+        moved = np.flatnonzero(rows["object_mask"] & (layout.object_qposadr >= 0))
+        if len(moved):
+            pos = rows["object_pos"][moved].astype(np.float64)
+            quat = rows["object_quat"][moved].astype(np.float64)
+            quat /= np.linalg.norm(quat, axis=1, keepdims=True)
+            _take_along(world, moved, pos, quat, trees)
+            _put(world, layout.object_qposadr[moved], layout.object_dofadr[moved], pos, quat, trees)
+    if "qpos_mask" in rows:
+        address = np.flatnonzero(rows["qpos_mask"])
+        if len(address):
+            data.qpos[address] = rows["qpos"][address]
+            first, count = layout.qpos_dof[address], layout.qpos_ndof[address]
+            for k in range(int(count.max())):
+                data.qvel[(first + k)[count > k]] = 0.0
+            trees[layout.qpos_tree[address]] = True
+    joined = np.zeros(model.neq, bool)
+    if "eq_active" in rows:
+        joined |= data.eq_active.astype(bool) != rows["eq_active"]
+        data.eq_active[:] = rows["eq_active"]
+    if "eq_data" in rows:
+        joined |= (world.eq_data != rows["eq_data"]).any(1) & data.eq_active.astype(bool)
+        world.eq_data = rows["eq_data"].astype(np.float64)
+        model.eq_data[:] = world.eq_data
+    if joined.any():  # what a hand lets go may be ready to sleep: it would hang in the air
+        free = layout.equality_tree[joined].ravel()
+        trees[free[free >= 0]] = True
+    if rows and not trees.any():
+        return Changed.NOTHING
+    world.disturbed()
+    wake_trees(model, data, np.flatnonzero(trees))
+    mujoco.mj_step1(model, data)
+    return world.clear_force() | world.refresh()
+
+
+def _put(
+    world: World, qposadr: np.ndarray, dofadr: np.ndarray, pos: np.ndarray, quat: np.ndarray, trees: np.ndarray
+) -> None:
+    """Puts free joints [n] at poses [n, 3], [n, 4], at rest, and marks their trees."""
+    world.data.qpos[qposadr[:, None] + np.arange(7)] = np.concatenate([pos, quat], 1)
+    world.data.qvel[dofadr[:, None] + np.arange(6)] = 0.0
+    trees[world.model.dof_treeid[dofadr]] = True
+
+
+def _take_along(world: World, moved: np.ndarray, pos: np.ndarray, quat: np.ndarray, trees: np.ndarray) -> None:
+    """Moves split-off bodies rigidly with the main bodies, which are about to move to pos, quat."""
+    layout, qpos = world.statics.layout, world.data.qpos
+    for k in np.flatnonzero(np.isin(layout.extra_object, moved)):
+        row = int(np.searchsorted(moved, layout.extra_object[k]))
+        base = qpos[layout.object_qposadr[moved[row]] :][:7]
+        own = qpos[layout.extra_qposadr[k] :][:7]
+        back, rel, new = (np.zeros(3), np.zeros(4)), (np.zeros(3), np.zeros(4)), (np.zeros(3), np.zeros(4))
+        mujoco.mju_negPose(*back, base[:3].copy(), base[3:].copy())
+        mujoco.mju_mulPose(*rel, *back, own[:3].copy(), own[3:].copy())
+        mujoco.mju_mulPose(*new, pos[row], quat[row], *rel)
+        _put(world, layout.extra_qposadr[k : k + 1], layout.extra_dofadr[k : k + 1], new[0][None], new[1][None], trees)

@@ -1,0 +1,1 @@
+"""The logical predicates of the paper's table A.1, one file each."""

@@ -1,0 +1,204 @@
+"""Setting states and predicates of one object by name, as the paper samples them (table A.5): those without placement.
+
+Changes of states are done here; what physics has to follow with (teleports of slicing, joints of doors) is handed back.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.errors import AbilityError, StateError, UnknownNameError
+from ig2mj.predicates.literals import object_index
+from ig2mj.predicates.registry import PREDICATES
+from ig2mj.predicates.registry import find as find_predicate
+from ig2mj.sampling.surface_particles import sample_places
+from ig2mj.states import registry
+from ig2mj.states.definitions import dust, max_temperature, sliced, stain, temperature, toggled, wetness
+from ig2mj.states.definitions.open import sample_open
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import ExtendedStates, Swap
+
+Value = bool | float | int
+
+
+class Change(NamedTuple):
+    """What setting a state comes to.
+
+    Attributes:
+      states: the new ones. swap: teleports, or None. joints: positions [W, J] of openable joints and which move, or
+      None.
+    """
+
+    states: ExtendedStates
+    swap: Swap | None = None
+    joints: tuple[np.ndarray, np.ndarray] | None = None
+
+
+class _Task(NamedTuple):
+    """What a setter is told: constants, the present, the objects (one and its halves), a random key."""
+
+    model: StateModel
+    states: ExtendedStates
+    view: PhysicsView
+    object_name: str
+    objects: tuple[int, ...]
+    mask: Bool[Array, "1 O"]
+    key: jax.Array
+
+
+def set_by_name(
+    model: StateModel,
+    states: ExtendedStates,
+    view: PhysicsView,
+    name: str,
+    object_name: str,
+    value: Value,
+    key: jax.Array,
+) -> Change:
+    """Sets a state to a value, or a predicate of one object to a truth, in every world of `states`.
+
+    Args:
+      name: a state that is a number or a switch (`ObjectState.field`), or a predicate: cooked, burnt, frozen, soaked,
+        dusty, stained, toggled_on, open, sliced.
+      object_name: its halves are set alike.
+      value: a finite number, or a truth.
+      key: of what is drawn at random.
+
+    Raises:
+      UnknownNameError: no such state, predicate or object. AbilityError: the object lacks the ability.
+      StateError: it cannot be set, or not to this value.
+    """
+    index = object_index(model, object_name)
+    objects = (index, *model.parameters.halves_of(index))
+    mask = np.isin(np.arange(model.tables.num_objects), objects)[None]
+    task = _Task(model, states, view, object_name, objects, mask, key)
+    if setter := _SETTERS.get(_predicate_name(name)):
+        predicate = PREDICATES[_predicate_name(name)]
+        if predicate.ability not in model.parameters.abilities[index]:
+            raise AbilityError(lacks(f"predicate '{predicate.name}'", object_name, model, (str(predicate.ability),)))
+        if value not in (True, False):
+            raise StateError(f"predicate '{predicate.name}' is set to true or false, not to {value!r}")
+        return setter(task, bool(value))
+    kind = _state(name)
+    if not kind.belongs_to(model, index):
+        raise AbilityError(lacks(f"state '{kind.name}'", object_name, model, kind.abilities or ()))
+    if kind.field is None:
+        raise StateError(f"state '{kind.name}' cannot be set (settable: {', '.join(settable())})")
+    if not np.isfinite(value):
+        raise StateError(f"state '{kind.name}' of '{object_name}' cannot be {value}")
+    field = jnp.asarray(getattr(states, kind.field))
+    return Change(dataclasses.replace(states, **{kind.field: jnp.where(mask, field.dtype.type(value), field)}))
+
+
+def settable() -> list[str]:
+    """Names that `set_by_name` takes."""
+    return [*(s.name for s in registry.STATES.values() if s.field is not None), *_SETTERS]
+
+
+def lacks(what: str, object_name: str, model: StateModel, abilities: tuple[str, ...]) -> str:
+    """The line of an AbilityError."""
+    category = model.tables.object_categories[object_index(model, object_name)]
+    return f"{what} of '{object_name}': its category '{category}' is not {' or '.join(abilities)}"
+
+
+def _predicate_name(name: str) -> str:
+    try:
+        return find_predicate(name).name
+    except UnknownNameError:
+        return ""
+
+
+def _state(name: str) -> registry.ObjectState:
+    try:
+        return registry.find(name)
+    except UnknownNameError:
+        if found := _predicate_name(name):
+            raise StateError(f"predicate '{found}' cannot be set by itself: place the object instead") from None
+        raise UnknownNameError("state or predicate", name, [*registry.STATES, *PREDICATES]) from None
+
+
+def _cooked(t: _Task, value: bool) -> Change:
+    new = max_temperature.set_cooked(t.model, t.states.max_temperature, t.mask, value)
+    return Change(dataclasses.replace(t.states, max_temperature=new))
+
+
+def _burnt(t: _Task, value: bool) -> Change:
+    new = max_temperature.set_burnt(t.model, t.states.max_temperature, t.mask, value)
+    return Change(dataclasses.replace(t.states, max_temperature=new))
+
+
+def _frozen(t: _Task, value: bool) -> Change:
+    new = temperature.set_frozen(t.model, t.states.temperature, t.mask, value, t.key)
+    return Change(dataclasses.replace(t.states, temperature=new))
+
+
+def _soaked(t: _Task, value: bool) -> Change:
+    return Change(dataclasses.replace(t.states, wetness=wetness.set_soaked(t.model, t.states.wetness, t.mask, value)))
+
+
+def _toggled_on(t: _Task, value: bool) -> Change:
+    new = toggled.set_toggled_on(t.model, t.states.toggled, t.mask, value)
+    return Change(dataclasses.replace(t.states, toggled=new))
+
+
+def _open(t: _Task, value: bool) -> Change:
+    if not np.any(t.model.tables.openable_object == t.objects[0]):
+        raise StateError(f"'{t.object_name}' has no relevant joints to open")
+    joints, moves = sample_open(t.model, jnp.asarray(t.view.joint_pos), t.mask, value, t.key)
+    return Change(t.states, joints=(np.asarray(joints), np.asarray(moves)))
+
+
+def _sliced(t: _Task, value: bool) -> Change:
+    if not value:
+        if bool(jnp.any(t.states.sliced[:, t.objects[0]])):
+            raise StateError(f"'{t.object_name}' is sliced, and that is for good")
+        return Change(t.states)
+    only = np.isin(np.arange(t.model.tables.num_objects), t.objects[:1])[None]
+    return Change(*sliced.set_sliced(t.model, t.states, only, t.view))
+
+
+def _dirty(field: str) -> Callable[[_Task, bool], Change]:
+    module = {"dust": dust, "stain": stain}[field]
+    put = {"dust": dust.set_dusty, "stain": stain.set_stained}[field]
+    clean = {"dust": dust.set_not_dusty, "stain": stain.set_not_stained}[field]
+
+    def setter(t: _Task, value: bool) -> Change:
+        rows, done = getattr(t.states, field), True
+        rng = np.random.default_rng(np.asarray(jax.random.key_data(t.key)))
+        for obj in t.objects:
+            row = module.row_of(t.model, obj)
+            if row is None:
+                continue
+            if value:
+                p = sample_places(t.model.tables, t.view, obj, rng)
+                rows, placed = put(t.model, rows, row, p.body, p.pos, p.normal, p.valid)
+                done &= bool(jnp.all(placed))
+            else:
+                rows = clean(rows, row)
+        if not done:
+            raise StateError(f"'{t.object_name}' has too little surface for particles")
+        return Change(dataclasses.replace(t.states, **{field: rows}))
+
+    return setter
+
+
+_SETTERS: dict[str, Callable[[_Task, bool], Change]] = {
+    "cooked": _cooked,
+    "burnt": _burnt,
+    "frozen": _frozen,
+    "soaked": _soaked,
+    "toggled_on": _toggled_on,
+    "open": _open,
+    "sliced": _sliced,
+    "dusty": _dirty("dust"),
+    "stained": _dirty("stain"),
+}
+"""Predicates that need no placement, and how each is set."""

@@ -1,0 +1,1 @@
+"""The extended states, one file each."""

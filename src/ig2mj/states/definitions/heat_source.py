@@ -1,0 +1,65 @@
+"""HeatSourceOrSink: which sources are on, and on which objects they act (spec/states.md 6.1 and 6.2).
+
+A source that asks for it is on only while its object is toggled on, or while it is closed. It acts either on the
+objects inside it (oven, microwave, fridge) or on those whose centre of mass is near its annotated link (stove, burner).
+Tables A.2 and A.3 give every source a switch and a link; the taxonomy's fridge has no switch and an oven acts on what
+is inside whatever its link, so both sets of rules read these per category (spec/states.md section 17, rows 11, 12).
+
+Axes: W worlds, O objects, S sources (`StateParameters.heat_*`).
+"""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Int
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.states.model import StateModel
+from ig2mj.states.relations.plan import Query, Relations
+
+
+def queries(model: StateModel) -> list[Query]:
+    """The pairs whose Inside the sources need."""
+    return [("inside", int(i), int(j)) for i, j in _inside_pairs(model)]
+
+
+def switched_on(model: StateModel, toggled: Bool[Array, "W O"], opened: Bool[Array, "W O"]) -> Bool[Array, "W S"]:
+    """Whether each source is on; one that acts by nearness and has no link never is."""
+    p = model.parameters
+    on = ~p.heat_requires_toggled_on | toggled[:, p.heat_object]
+    on &= ~p.heat_requires_closed | ~opened[:, p.heat_object]
+    return on & (p.heat_requires_inside | (p.heat_link >= 0))
+
+
+def acts_on(model: StateModel, on: Bool[Array, "W S"], view: PhysicsView, relations: Relations) -> Bool[Array, "W O S"]:
+    """Whether each source acts on each object; false for objects without a temperature."""
+    p, num_objects = model.parameters, model.tables.num_objects
+    worlds = on.shape[0]
+    if len(p.heat_object) == 0:
+        return jnp.zeros((worlds, num_objects, 0), bool)
+    if np.any(p.heat_link >= 0):
+        link = jnp.asarray(view.link_pos)[:, np.maximum(p.heat_link, 0)]
+        offset = jnp.asarray(view.object_com)[:, :, None] - link[:, None]
+        reached = jnp.sum(offset * offset, axis=-1) <= p.heat_distance**2
+    else:
+        reached = jnp.zeros((worlds, num_objects, len(p.heat_object)), bool)
+    pairs = _inside_pairs(model)
+    if len(pairs):
+        place = np.full((num_objects, len(p.heat_object)), len(pairs))
+        for column in np.flatnonzero(p.heat_requires_inside):
+            mine = np.flatnonzero(pairs[:, 1] == p.heat_object[column])
+            place[pairs[mine, 0], column] = mine
+        inside = relations.inside(pairs)
+        inside = jnp.concatenate([inside, jnp.zeros((worlds, 1), bool)], axis=-1)[:, place]
+    else:
+        inside = jnp.zeros(reached.shape, bool)
+    return on[:, None] & jnp.where(p.heat_requires_inside, inside, reached) & p.thermal[:, None]
+
+
+def _inside_pairs(model: StateModel) -> Int[np.ndarray, "P 2"]:
+    """(object with a temperature, source that acts on what is inside it)."""
+    p = model.parameters
+    containers = np.unique(p.heat_object[p.heat_requires_inside])
+    pairs = [(i, j) for i in np.flatnonzero(p.thermal) for j in containers if i != j]
+    return np.array(pairs, int).reshape(-1, 2)

@@ -1,0 +1,1 @@
+"""Relations that several predicates and states read: touching, adjacency, containment, nearness, rooms."""

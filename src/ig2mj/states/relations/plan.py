@@ -1,0 +1,196 @@
+"""Relations between named pairs of objects, each computed once per step for everyone who asks.
+
+Heat sources ask what is inside them; predicates ask for inside, above and below, beside, distance. `RelationPlan`
+gathers the pairs before tracing; `Relations` holds the answers. Rays are the dearest part of a step, so a `Memo` can
+carry the last answers along: a pair is computed anew unless every number it depends on (the object's centre of mass,
+the pose of every body of the target) is bitwise the same. iGibson's own memo looks at two positions only, and goes
+stale when something turns, opens or closes (spec/states.md 19.1). The memo pays where worlds are few and mostly asleep;
+without one, everything is computed every time.
+
+Axes: W worlds, P pairs of a kind, K numbers that an answer depends on.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.states.model import StateModel
+from ig2mj.states.relations.adjacency import AdjacencyPairs
+from ig2mj.states.relations.containment import ContainerPairs
+from ig2mj.states.relations.nearness import NearPairs, boxes_near
+
+Kind = Literal["inside", "vertical", "horizontal", "near"]
+Pair = tuple[int, int]
+Pairs = Iterable[Sequence[int]] | np.ndarray
+Query = tuple[Kind, int, int]
+"""What is asked: kind, object, target. Answers: `Relations.inside`, `.above` with `.below`, `.beside`, `.near`."""
+
+KINDS: tuple[Kind, ...] = ("inside", "vertical", "horizontal", "near")
+
+
+@struct.dataclass
+class Memo:
+    """The last answers and what they were computed from, per kind.
+
+    Attributes:
+      inputs: NaN at first, which equals nothing. values: one or two booleans per pair.
+    """
+
+    inputs: dict[str, Float[Array, "W P K"]]
+    values: dict[str, Bool[Array, "W P V"]]
+
+
+@dataclasses.dataclass(frozen=True)
+class Relations:
+    """Answers of one step; arrays over the pairs asked for, in their order."""
+
+    plan: RelationPlan
+    values: dict[str, Bool[Array, "W P V"]]
+
+    def inside(self, pairs: Pairs) -> Bool[Array, "W P"]:
+        """Two orthogonal axes through the object meet the target on both sides."""
+        return self._of("inside", pairs)[..., 0]
+
+    def above(self, pairs: Pairs) -> Bool[Array, "W P"]:
+        """The target is above the object (InSamePositiveVerticalAxisObjs of the object)."""
+        return self._of("vertical", pairs)[..., 0]
+
+    def below(self, pairs: Pairs) -> Bool[Array, "W P"]:
+        """The target is below the object (InSameNegativeVerticalAxisObjs of the object)."""
+        return self._of("vertical", pairs)[..., 1]
+
+    def beside(self, pairs: Pairs) -> Bool[Array, "W P"]:
+        """A horizontal ray of the object enters the target (InSameHorizontalPlaneObjs of the object)."""
+        return self._of("horizontal", pairs)[..., 0]
+
+    def near(self, pairs: Pairs) -> Bool[Array, "W P"]:
+        """The object and the target are near each other (nearness.py)."""
+        return self._of("near", pairs)[..., 0]
+
+    def _of(self, kind: Kind, pairs: Pairs) -> Bool[Array, "W P V"]:
+        where = [self.plan.index[kind][(int(a), int(b))] for a, b in pairs]
+        return self.values[kind][:, np.array(where, int)]
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RelationPlan:
+    """The pairs of each kind, without repetition."""
+
+    model: StateModel
+    pairs: dict[Kind, tuple[Pair, ...]]
+
+    @classmethod
+    def build(cls, model: StateModel, queries: Iterable[Query]) -> RelationPlan:
+        """Gathers what all askers need. A pair of an object with itself is left out: it never holds."""
+        asked: dict[Kind, dict[Pair, None]] = {kind: {} for kind in KINDS}
+        for kind, a, b in queries:
+            asked[kind][(int(a), int(b))] = None
+        return cls(model, {kind: tuple(pairs) for kind, pairs in asked.items()})
+
+    @functools.cached_property
+    def index(self) -> dict[Kind, dict[Pair, int]]:
+        """Position of each pair in its kind's axis."""
+        return {kind: {pair: i for i, pair in enumerate(pairs)} for kind, pairs in self.pairs.items()}
+
+    @functools.cached_property
+    def _work(self) -> dict[Kind, AdjacencyPairs | ContainerPairs | NearPairs]:
+        make = {"inside": ContainerPairs, "near": NearPairs}
+        return {
+            kind: make.get(kind, AdjacencyPairs).build(self.model, np.array(pairs, int))
+            for kind, pairs in self.pairs.items()
+            if pairs
+        }
+
+    def empty_memo(self, num_worlds: int) -> Memo:
+        """A memo that knows nothing yet."""
+        inputs, values = {}, {}
+        for kind, work in self._work.items():
+            shape = (num_worlds, len(work.pairs))
+            inputs[kind] = jnp.full((*shape, 3 + 7 * self._bodies[kind].shape[1]), jnp.nan, jnp.float32)
+            values[kind] = jnp.zeros((*shape, 2 if kind == "vertical" else 1), bool)
+        return Memo(inputs, values)
+
+    def evaluate(self, view: PhysicsView) -> Relations:
+        """All answers, computed now."""
+        values = {kind: self._compute(kind, view, self._gate(kind, view)) for kind in self._work}
+        return Relations(self, self._padded(values, view))
+
+    def evaluate_changed(self, view: PhysicsView, memo: Memo) -> tuple[Relations, Memo]:
+        """All answers, those of pairs where nothing moved from the memo, and the memo for the next step."""
+        inputs: dict[str, Array] = {}
+        values: dict[str, Array] = {}
+        for kind in self._work:
+            inputs[kind] = self._inputs(kind, view)
+            changed = jnp.any(inputs[kind] != memo.inputs[kind], axis=-1)
+            needed = changed & self._gate(kind, view)
+            computed = jax.lax.cond(
+                jnp.any(needed),
+                lambda kind=kind, needed=needed: self._compute(kind, view, needed),
+                lambda kind=kind: jnp.zeros(memo.values[kind].shape, bool),
+            )
+            values[kind] = jnp.where(changed[..., None], computed, memo.values[kind])
+        return Relations(self, self._padded(values, view)), Memo(inputs, values)
+
+    def _compute(self, kind: Kind, view: PhysicsView, needed: Bool[Array, "W P"]) -> Bool[Array, "W P V"]:
+        """Answers where they are needed, false elsewhere."""
+        work = self._work[kind]
+        if isinstance(work, ContainerPairs):
+            return work.inside(view, needed)[..., None]
+        if isinstance(work, NearPairs):
+            values = work.near(view)[..., None]
+        elif kind == "vertical":
+            values = jnp.stack(work.vertical(view), axis=-1)
+        else:
+            positive, negative = work.horizontal(view)
+            values = jnp.any(positive | negative, axis=-1)[..., None]
+        return needed[..., None] & values
+
+    def _gate(self, kind: Kind, view: PhysicsView) -> Bool[Array, "W P"]:
+        """Cheap necessary conditions from world boxes: false means that the answer is no."""
+        pairs = self._work[kind].pairs
+        apart = pairs[:, 0] != pairs[:, 1]
+        if kind == "near":
+            return boxes_near(view, pairs) & apart
+        com = jnp.asarray(view.object_com)[:, pairs[:, 0]]
+        low = jnp.asarray(view.aabb_low)[:, pairs[:, 1]] - BOX_SLACK
+        high = jnp.asarray(view.aabb_high)[:, pairs[:, 1]] + BOX_SLACK
+        within = (low <= com) & (com <= high)
+        axes = {"inside": [0, 1, 2], "vertical": [0, 1], "horizontal": [2]}[kind]
+        return jnp.all(within[..., np.array(axes)], axis=-1) & apart
+
+    def _inputs(self, kind: Kind, view: PhysicsView) -> Float[Array, "W P K"]:
+        pairs, bodies = self._work[kind].pairs, self._bodies[kind]
+        com = jnp.asarray(view.object_com)[:, pairs[:, 0]]
+        poses = jnp.concatenate([jnp.asarray(view.body_pos), jnp.asarray(view.body_quat)], axis=-1)[:, bodies]
+        return jnp.concatenate([com, poses.reshape(*com.shape[:2], -1)], axis=-1)
+
+    @functools.cached_property
+    def _bodies(self) -> dict[Kind, Int[np.ndarray, "P B"]]:
+        """Bodies whose poses each pair's answer depends on, padded by repetition."""
+        tables, found = self.model.tables, {}
+        for kind, work in self._work.items():
+            owners = [{a, b} if kind == "near" else {b} for a, b in work.pairs.tolist()]
+            rows = [np.unique(tables.piece_body[np.isin(tables.piece_object, list(o))]) for o in owners]
+            width = max(len(r) for r in rows)
+            found[kind] = np.array([np.resize(r, width) if len(r) else np.zeros(width, int) for r in rows], int)
+        return found
+
+    def _padded(self, values: Mapping[str, Array], view: PhysicsView) -> dict[str, Array]:
+        """Adds kinds that nobody asked for, so that asking for no pairs gives empty arrays."""
+        worlds = view.object_com.shape[0]
+        none: dict[str, Array] = {kind: jnp.zeros((worlds, 0, 2), bool) for kind in KINDS if kind not in values}
+        return {**none, **values}
+
+
+BOX_SLACK = 0.005
+"""Metres. Rounding of the world box, and the rays' own slack about hulls (`adjacency.INFLATE`)."""
