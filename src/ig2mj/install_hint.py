@@ -8,6 +8,8 @@ import json
 import pathlib
 from typing import TYPE_CHECKING
 
+from ig2mj.errors import MissingDependencyError
+
 if TYPE_CHECKING:
     from packaging.requirements import Requirement
 
@@ -17,14 +19,33 @@ CHECKOUT = pathlib.Path(__file__).resolve().parents[2]
 PACKAGE_OF_MODULE = {"PIL": "pillow", "collada": "pycollada", "imageio_ffmpeg": "imageio-ffmpeg", "warp": "warp-lang"}
 """Where the name that is imported is not the name that is installed."""
 
+_MODULE_OF_PACKAGE = {package: module for module, package in PACKAGE_OF_MODULE.items()}
+
 
 def pip_install(what: str) -> str:
     """E.g. `pip install "bddl==1.0.1"`; with uv where the environment has no pip of its own."""
     return f'{_installer()} install "{what}"'
 
 
+def require_extras(*extras: str) -> None:
+    """Checks that the packages of some extras of ig2mj can be imported, before a command does half of its work.
+
+    Raises:
+      MissingDependencyError: one cannot; the message has the one command that installs all of the extras.
+    """
+    missing = [
+        requirement.name
+        for requirement, extra in requirements()
+        if extra in extras and not _is_importable(_MODULE_OF_PACKAGE.get(_plain(requirement.name), requirement.name))
+    ]
+    if missing:
+        raise MissingDependencyError(
+            f"the Python package '{missing[0]}' is not installed ({pip_install_extra(','.join(extras))})"
+        )
+
+
 def pip_install_extra(extra: str) -> str:
-    """The command that installs what an extra of ig2mj asks for, from where ig2mj itself came from.
+    """The command that installs an extra of ig2mj (or several: "convert,demo") from where ig2mj itself came from.
 
     From a checkout that is `pip install -e ".[convert]"`, with the folder's path if it is not the working directory.
     """
@@ -63,6 +84,13 @@ def requirements() -> list[tuple[Requirement, str | None]]:
         else:
             found += [(requirement, extra) for extra in extras if marker.evaluate({"extra": extra})]
     return found
+
+
+def _is_importable(module: str) -> bool:
+    try:
+        return importlib.util.find_spec(module.replace("-", "_")) is not None
+    except ModuleNotFoundError:
+        return False
 
 
 def _installer() -> str:

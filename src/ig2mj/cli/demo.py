@@ -30,6 +30,9 @@ def run(
       out: folder for everything the demo makes.
       jobs: processes.
     """
+    from ig2mj.install_hint import require_extras
+
+    require_extras("convert", "demo")
     from ig2mj_homes.furnish import small_home
 
     from ig2mj.cli.printing import add_bar, progress_bar, stdout_console

@@ -10,8 +10,14 @@ from ig2mj.errors import InputError
 
 MODEL_FILES, MANIFEST_FILE = ("scene.xml", "object.xml"), "manifest.json"
 
-SHIPPED_HOMES = pathlib.Path(__file__).resolve().parents[3] / "scenes_mjcf"
-"""Homes that come with a checkout of the project; `load_scene` finds them by their bare names."""
+_HERE = pathlib.Path(__file__).resolve()
+
+SHIPPED_HOMES = next(
+    (folder for folder in (_HERE.parents[3] / "scenes_mjcf", _HERE.parents[2] / "ig2mj_scenes") if folder.is_dir()),
+    _HERE.parents[2] / "ig2mj_scenes",
+)
+"""Homes that come with the project: the folder of a checkout, or the one beside an installed package. `load_scene`
+finds them by their bare names."""
 
 _MEND = "give the folder that `ig2mj convert` wrote"
 
@@ -25,7 +31,7 @@ def scene_folder(path: str | os.PathLike) -> pathlib.Path:
     """The folder of a converted scene: the path itself, or where that file lies, or the shipped home of that name.
 
     Raises:
-      InputError: there is no such path; near names of homes are told.
+      InputError: there is no such path; the message names near matches among the shipped homes.
     """
     path = pathlib.Path(path)
     if path.is_dir():
