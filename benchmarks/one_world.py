@@ -11,7 +11,7 @@ import numpy as np
 from ig2mj.engine.base import Write
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.view import PhysicsView
-from ig2mj.predicates.compile import CompiledExpression, Verdict
+from ig2mj.predicates.compile import CompiledExpression, GoalStatus
 from ig2mj.predicates.stepper import StateProgram, StateStepper
 from ig2mj.scene.scene import Scene
 from ig2mj.states.initial import initial_states
@@ -22,7 +22,7 @@ class OneWorld:
     """A world of its own; `step` takes one control step of 1/30 s.
 
     Attributes:
-      engine, physics, view: of physics. states: extended ones. verdict: the goal's, of the last step.
+      engine, physics, view: of physics. states: extended ones. status: the goal's, of the last step.
     """
 
     def __init__(self, scene: Scene, model: StateModel, goal: CompiledExpression | None = None):
@@ -32,17 +32,17 @@ class OneWorld:
         self.view: PhysicsView = self.engine.view(self.physics)
         self._stepper = StateStepper(StateProgram(model, goal))
         self.states = initial_states(model, 1)
-        self.verdict: Verdict | None = None
+        self.status: GoalStatus | None = None
 
     def step(self, ctrl: np.ndarray | None = None) -> None:
         """Physics, view, states and goal; ctrl [nu]. Waits for the results, as a user of one world does."""
         self.engine_step(ctrl)
         before = self.states
-        self.states, swap, self.verdict = self._stepper.step(before, self.view)
+        self.states, swap, self.status = self._stepper.step(before, self.view)
         if swap is not None:
             self._teleport(swap)
         if self.states is not before:
-            jax.block_until_ready((self.states.temperature, self.verdict))
+            jax.block_until_ready((self.states.temperature, self.status))
 
     def engine_step(self, ctrl: np.ndarray | None = None) -> None:
         """Physics and view alone, of the same world."""

@@ -114,16 +114,16 @@ def one_world(scene: ig2mj.Scene, model: StateModel, seconds: float) -> list[Row
 
 
 class Stepped:
-    """States that go on from step to step; every step waits for its verdict."""
+    """States that go on from step to step; every step waits for its status."""
 
     def __init__(self, program: StateProgram, model: StateModel):
         self.stepper, self.states, self.count = StateStepper(program), initial_states(model, 1), 0
 
     def step(self, view: ig2mj.engine.view.PhysicsView) -> bool:
-        self.states, _, verdict = self.stepper.step(self.states, view)
+        self.states, _, status = self.stepper.step(self.states, view)
         self.count += 1
-        assert verdict is not None
-        return bool(np.asarray(verdict.holds)[0])
+        assert status is not None
+        return bool(np.asarray(status.holds)[0])
 
 
 def many_worlds(scene: ig2mj.Scene, model: StateModel, worlds: int, seconds: float) -> Row:
@@ -137,7 +137,7 @@ def many_worlds(scene: ig2mj.Scene, model: StateModel, worlds: int, seconds: flo
     def step(states, view):
         relations = plan.evaluate(view)
         states, swap = update(model, states, view, relations)
-        return states, goal.verdict(states, view, relations), swap
+        return states, goal.status(states, view, relations), swap
 
     states = initial_states(model, worlds)
     (row,) = best({f"{worlds} worlds in one function": lambda: jax.block_until_ready(step(states, view))}, seconds)

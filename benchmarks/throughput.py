@@ -117,8 +117,8 @@ def _program(case: Case, worlds: Worlds, watch: Watch, disturbed: bool, what: st
     def full(carry, _):
         batch, pusher, com, palm = carry
         pusher = control(batch, pusher, com, palm)
-        batch, verdict = worlds.step(batch, pusher.ctrl)
-        seen = verdict.fraction.mean()
+        batch, status = worlds.step(batch, pusher.ctrl)
+        seen = status.fraction.mean()
         view, physics = batch.world.view, batch.world.physics
         if camera is not None:
             images = camera(physics, view, batch.world.states)

@@ -185,7 +185,7 @@ def truths(bench, row: Snapshot) -> np.ndarray:
     goal = compile_expression(model, everything(bench.scene))
     _, view = bench.run(bench.fresh(row), 15)
     view = jax.tree.map(np.asarray, view)
-    return np.asarray(jax.jit(goal.verdict)(initial_states(model, bench.num_worlds), view).literals)
+    return np.asarray(jax.jit(goal.status)(initial_states(model, bench.num_worlds), view).literals)
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""`StateStepper` leaves work out and changes nothing: bitwise the states and verdicts of `update` in every step."""
+"""`StateStepper` leaves work out and changes nothing: bitwise the states and statuses of `update` in every step."""
 
 from __future__ import annotations
 
@@ -62,16 +62,16 @@ def _rules(text=GOAL, **options):
     @jax.jit
     def reference(states, view):
         states, swap = update(model, states, view)
-        return states, swap, goal.verdict(states, view)
+        return states, swap, goal.status(states, view)
 
     return model, StateProgram(model, goal), reference
 
 
-def _assert_same(ours, theirs, verdict, expected, where):
+def _assert_same(ours, theirs, status, expected, where):
     for a, b in zip(jax.tree.leaves(ours), jax.tree.leaves(theirs), strict=True):
         assert np.array_equal(np.asarray(a), np.asarray(b), equal_nan=True), where
     for field in dataclasses.fields(expected):
-        assert np.array_equal(getattr(verdict, field.name), getattr(expected, field.name)), (where, field.name)
+        assert np.array_equal(getattr(status, field.name), getattr(expected, field.name)), (where, field.name)
 
 
 @pytest.mark.parametrize("options", [{}, {"contact_heat_rate": 0.1, "drying_rate": 0.5}])
@@ -86,9 +86,9 @@ def test_every_step_is_bitwise_the_same(options):
             flip = theirs.toggled.at[0, HOME.index["tap"]].set(True)
             ours, theirs = ours.replace(toggled=flip), theirs.replace(toggled=flip)
         short += stepper._kept is not None and stepper._view is VIEWS[number]
-        ours, swap, verdict = stepper.step(ours, VIEWS[number])
+        ours, swap, status = stepper.step(ours, VIEWS[number])
         theirs, expected_swap, expected = reference(theirs, VIEWS[number])
-        _assert_same(ours, theirs, verdict, expected, f"step {k}")
+        _assert_same(ours, theirs, status, expected, f"step {k}")
         assert (swap is not None) == bool(expected_swap.mask.any())
         swaps += swap is not None
     assert swaps == 1
@@ -120,9 +120,9 @@ def test_whatever_changes_in_the_view_is_seen(seed):
             seen.add(name)
         elif rng.random() < 0.3:  # back to where nothing happens
             view = VIEWS[int(rng.integers(len(VIEWS)))]
-        ours, _, verdict = stepper.step(ours, view)
+        ours, _, status = stepper.step(ours, view)
         theirs, _, expected = reference(theirs, view)
-        _assert_same(ours, theirs, verdict, expected, (k, sorted(seen)))
+        _assert_same(ours, theirs, status, expected, (k, sorted(seen)))
     assert seen >= {"object_com", "body_pos", "touching", "link_pos", "finger_pos", "aabb_low"}
 
 
@@ -148,8 +148,8 @@ def test_a_goal_about_the_agent_follows_it():
     model, program, _ = _rules("(in_reach_of_agent fish)")
     stepper, states = StateStepper(program), _start(model)
     for x, near in ((0.0, False), (2.0, True), (2.5, True), (9.0, False)):
-        states, _, verdict = stepper.step(states, HOME.view(fingers=AWAY, agent_pos=(x, 0, 1)))
-        assert bool(verdict.holds[0]) == near
+        states, _, status = stepper.step(states, HOME.view(fingers=AWAY, agent_pos=(x, 0, 1)))
+        assert bool(status.holds[0]) == near
 
 
 def test_a_step_looks_only_at_what_it_depends_on():
@@ -181,12 +181,12 @@ def test_a_settled_world_is_left_alone_and_a_cooling_one_is_not():
     states = _start(model)
     for _ in range(3):
         states, _, _ = stepper.step(states, VIEWS[0])
-    again, _, verdict = stepper.step(states, VIEWS[0])
-    assert again is states and not verdict.holds[0]
+    again, _, status = stepper.step(states, VIEWS[0])
+    assert again is states and not status.holds[0]
     states = states.replace(temperature=states.temperature.at[0, 1].set(80.0))
     for _ in range(3):
-        cooler, _, verdict = stepper.step(states, VIEWS[0])
-        assert cooler.temperature[0, 1] < states.temperature[0, 1] and verdict.holds[0]
+        cooler, _, status = stepper.step(states, VIEWS[0])
+        assert cooler.temperature[0, 1] < states.temperature[0, 1] and status.holds[0]
         states = cooler
     # Near 23 C single precision comes to rest, and is noticed.
     states = states.replace(temperature=states.temperature.at[0, 1].set(23.00001))
@@ -201,11 +201,11 @@ def test_states_changed_from_outside_are_seen():
     stepper = StateStepper(StateProgram(model, goal))
     states = _start(model)
     for _ in range(3):
-        states, _, verdict = stepper.step(states, VIEWS[0])
-    assert not verdict.holds[0]
+        states, _, status = stepper.step(states, VIEWS[0])
+    assert not status.holds[0]
     states = states.replace(toggled=states.toggled.at[0, 0].set(True))
-    states, _, verdict = stepper.step(states, VIEWS[0])
-    assert verdict.holds[0]
+    states, _, status = stepper.step(states, VIEWS[0])
+    assert status.holds[0]
 
 
 def test_a_stepper_needs_no_goal():
@@ -213,6 +213,6 @@ def test_a_stepper_needs_no_goal():
     stepper = StateStepper(StateProgram(model))
     states = _start(model)
     for _ in range(3):
-        states, swap, verdict = stepper.step(states, VIEWS[1])
-    assert swap is None and verdict is None
+        states, swap, status = stepper.step(states, VIEWS[1])
+    assert swap is None and status is None
     assert stepper._kept is None  # a finger is at the button: the count goes on

@@ -142,9 +142,9 @@ def test_the_goal_is_evaluated_after_the_step(scene, model, bench_pool):
     place = np.asarray(batch.world.view.object_pos)[1, scene.object_index("box")]
     batch = teleport(worlds, batch, "knife", place + np.array([0, 0, 0.0705]), 1)
     for _ in range(20):
-        batch, verdict = worlds.step(batch)
-    assert np.asarray(verdict.holds).tolist() == [False, True]
-    assert np.asarray(verdict.fraction) == pytest.approx([0.5, 1.0])
+        batch, status = worlds.step(batch)
+    assert np.asarray(status.holds).tolist() == [False, True]
+    assert np.asarray(status.fraction) == pytest.approx([0.5, 1.0])
 
 
 # Guards.
@@ -206,10 +206,10 @@ def test_reset_inside_scan_with_autoreset(warp_worlds, scene):
     """Issue, item 1: a step and its resets are pure functions that `lax.scan` runs; world 1 falls again and again."""
 
     def body(batch, _):
-        batch, verdict = warp_worlds.step(batch)
+        batch, status = warp_worlds.step(batch)
         flagged = batch.flags != 0
         batch = warp_worlds.reset(batch, flagged | (batch.world.step >= 5))
-        return batch, (flagged, batch.world.step, verdict.holds)
+        return batch, (flagged, batch.world.step, status.holds)
 
     batch = teleport(warp_worlds, warp_worlds.start(seed=3), "box", [0, 0, -2.0], 1)
     batch, (flagged, steps, holds) = jax.jit(lambda b: jax.lax.scan(body, b, length=12))(batch)

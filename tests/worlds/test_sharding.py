@@ -39,10 +39,10 @@ for name, devices in (("one", jax.devices()[:1]), ("two", jax.devices()[:2])):
     for _ in range(2):
         shards, _ = worlds.step(shards)
     shards = worlds.reset(shards, np.array([False, True]))
-    shards, verdicts = worlds.step(shards)
+    shards, statuses = worlds.step(shards)
     fields = ("world.view.object_pos", "world.key", "number", "episode")
     out[name] = {f: np.asarray(worlds.gather(shards, operator.attrgetter(f))).tolist() for f in fields}
-    out[name]["holds"] = np.concatenate([np.asarray(v.holds) for v in verdicts]).tolist()
+    out[name]["holds"] = np.concatenate([np.asarray(v.holds) for v in statuses]).tolist()
     out[name]["on"] = len(worlds.gather(shards, operator.attrgetter("number")).sharding.device_set)
 print("RESULT" + json.dumps(out))
 """

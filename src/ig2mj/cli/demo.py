@@ -71,9 +71,9 @@ def _convert(console: Console, step: Step, name: str, dataset: pathlib.Path, sce
     options = ConvertOptions(jobs=jobs, renderer=render, view=FreeView, progress=step("converting"))
     outcome = convert_scene(dataset, name, scene, options=options)
     failed = [check for check in outcome.checks if not check.passed]
-    verdict = f"{len(outcome.checks) - len(failed)} of {len(outcome.checks)} checks passed"
+    summary = f"{len(outcome.checks) - len(failed)} of {len(outcome.checks)} checks passed"
     cached = " (nothing has changed: taken from the cache)" if outcome.cached else ""
-    console.print(f"[bold]converted[/]  {scene / 'scene.xml'}: {outcome.objects} objects, {verdict}{cached}")
+    console.print(f"[bold]converted[/]  {scene / 'scene.xml'}: {outcome.objects} objects, {summary}{cached}")
     for check in failed:
         console.print(f"           check {check.name}: {check.summary}")
     console.print(f"[bold]report[/]     {scene / 'report.html'}")

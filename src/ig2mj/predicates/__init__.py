@@ -5,7 +5,7 @@ function of all worlds.
 """
 
 from ig2mj.predicates.base import Context, Predicate
-from ig2mj.predicates.compile import CompiledExpression, Verdict, compile_expression
+from ig2mj.predicates.compile import CompiledExpression, GoalStatus, compile_expression
 from ig2mj.predicates.literals import AbilityWarning, ArityError, Literals, resolve
 from ig2mj.predicates.logic import (
     And,
@@ -39,11 +39,11 @@ __all__ = [
     "ForN",
     "ForNPairs",
     "ForPairs",
+    "GoalStatus",
     "Literals",
     "Not",
     "Or",
     "Predicate",
-    "Verdict",
     "atom",
     "compile_expression",
     "find",

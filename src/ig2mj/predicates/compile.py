@@ -5,7 +5,7 @@
     goal.fraction(world)   Float[W], 1 exactly where the goal holds
     print(goal.explain(world))
 
-`goal.verdict(states, view, relations)` is the pure function underneath, for use inside larger jitted ones;
+`goal.status(states, view, relations)` is the pure function underneath, for use inside larger jitted ones;
 `goal.queries` are the relations it needs.
 
 Axes: W worlds, L literals.
@@ -18,6 +18,7 @@ import functools
 from collections.abc import Mapping, Sequence
 
 import jax
+import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float
 
@@ -38,8 +39,8 @@ Groups = Mapping[str, Sequence[str]]
 
 
 @struct.dataclass
-class Verdict:
-    """What an expression says of every world.
+class GoalStatus:
+    """How far an expression is fulfilled in every world.
 
     Attributes:
       holds: it is true. fraction: of its literals that are as they should be (`evaluate.fraction`).
@@ -49,6 +50,11 @@ class Verdict:
     holds: Bool[Array, "W"]
     fraction: Float[Array, "W"]
     literals: Bool[Array, "W L"]
+
+    @classmethod
+    def empty(cls, num_worlds: int) -> GoalStatus:
+        """The status where there is no goal: no literals, and nothing that could ever be reached."""
+        return cls(np.zeros(num_worlds, bool), np.zeros(num_worlds, np.float32), np.zeros((num_worlds, 0), bool))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -71,7 +77,7 @@ class CompiledExpression:
 
     @functools.cached_property
     def queries(self) -> list[Query]:
-        """Relations that `verdict` needs."""
+        """Relations that `status` needs."""
         return self.literals.queries()
 
     @functools.cached_property
@@ -79,19 +85,19 @@ class CompiledExpression:
         """Those relations, planned for this expression alone."""
         return RelationPlan.build(self.model, self.queries)
 
-    def verdict(self, states: ExtendedStates, view: PhysicsView, relations: Relations | None = None) -> Verdict:
+    def status(self, states: ExtendedStates, view: PhysicsView, relations: Relations | None = None) -> GoalStatus:
         """Truth, fraction and literals in all worlds. Pure."""
-        return self.verdict_of(self.literals.facts(self.context(states, view, relations)), states)
+        return self.status_of(self.literals.facts(self.context(states, view, relations)), states)
 
     def context(self, states: ExtendedStates, view: PhysicsView, relations: Relations | None = None) -> Context:
         """What the literals read; relations are computed where they are not given."""
         return Context(self.model, states, view, self.plan.evaluate(view) if relations is None else relations)
 
-    def verdict_of(self, facts: Bool[Array, "W I"], states: ExtendedStates) -> Verdict:
-        """The verdict that follows from `Literals.facts`."""
+    def status_of(self, facts: Bool[Array, "W I"], states: ExtendedStates) -> GoalStatus:
+        """The status that follows from `Literals.facts`."""
         values = self.literals.combine(facts, states.sliced)
         truth = Truth(values, {a: i for i, a in enumerate(self.atoms)})
-        return Verdict(holds=holds(self.ground, truth), fraction=fraction(self.ground, truth), literals=values)
+        return GoalStatus(holds=holds(self.ground, truth), fraction=fraction(self.ground, truth), literals=values)
 
     def __call__(self, world: WorldState) -> Bool[Array, "W"]:
         """Whether the expression holds, in every world."""
@@ -113,7 +119,7 @@ class CompiledExpression:
 
     @functools.cached_property
     def _jitted(self):
-        return jax.jit(lambda states, view: self.verdict(states, view))
+        return jax.jit(lambda states, view: self.status(states, view))
 
 
 def compile_expression(

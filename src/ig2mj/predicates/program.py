@@ -21,7 +21,7 @@ from jax.extend.core import Jaxpr, Literal
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.predicates.compile import CompiledExpression, Verdict
+from ig2mj.predicates.compile import CompiledExpression, GoalStatus
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Memo, RelationPlan
@@ -43,14 +43,14 @@ class Found(NamedTuple):
 
     Attributes:
       leaves: of the states, at the places `StateProgram.gives`. swap: mask, pos, quat; None where nothing can be cut.
-      verdict: the goal's fields. acts: source on object [W, O, S]. facts: of the goal [W, I].
+      status: the goal's fields. acts: source on object [W, O, S]. facts: of the goal [W, I].
       flags: whether the step changed nothing but temperatures, whether it asks for teleports, and whether it changed no
       temperature. memo: of relations, flat.
     """
 
     leaves: list[Array]
     swap: tuple[Array, Array, Array] | None
-    verdict: tuple[Array, Array, Array] | None
+    status: tuple[Array, Array, Array] | None
     acts: Bool[Array, "W O S"]
     facts: Bool[Array, "W I"]
     flags: Bool[Array, "3"]
@@ -150,16 +150,16 @@ class StateProgram:
         after, swap, acts = events(self.model, states, view, relations)
         same = [jnp.all(a == b) for a, b in zip(leaves, jax.tree.leaves(after), strict=True) if a is not b]
         new = heat(self.model, after, acts, view.touching)
-        facts, verdict = jnp.zeros((view.object_com.shape[0], 0), bool), None
+        facts, status = jnp.zeros((view.object_com.shape[0], 0), bool), None
         if self.goal is not None:
             facts = self.goal.literals.facts(self.goal.context(new, view, relations))
-            verdict = _verdict_fields(self.goal.verdict_of(facts, new))
+            status = _status_fields(self.goal.status_of(facts, new))
         cold = jnp.all(new.temperature == after.temperature) & jnp.all(new.max_temperature == after.max_temperature)
         flags = jnp.stack([jnp.all(jnp.array(same)), jnp.any(swap.mask), cold])
         made = jax.tree.leaves(new)
         self.gives = [i for i, (a, b) in enumerate(zip(leaves, made, strict=True)) if a is not b]
         cuts = (swap.mask, swap.pos, swap.quat) if swap.mask.shape[1] else None
-        return [made[i] for i in self.gives], cuts, verdict, acts, facts, flags, jax.tree.leaves(after_memo)
+        return [made[i] for i in self.gives], cuts, status, acts, facts, flags, jax.tree.leaves(after_memo)
 
     def _heat_step(
         self,
@@ -174,10 +174,10 @@ class StateProgram:
         )
         nothing = jnp.zeros((sliced.shape[0], sliced.shape[1], sliced.shape[1]), bool)
         new = heat(self.model, states, acts, nothing)
-        verdict = None
+        status = None
         if self.goal is not None:
-            verdict = _verdict_fields(self.goal.verdict_of(self.goal.literals.update_heat(facts, new), new))
-        return new.temperature, new.max_temperature, verdict
+            status = _status_fields(self.goal.status_of(self.goal.literals.update_heat(facts, new), new))
+        return new.temperature, new.max_temperature, status
 
 
 def inputs_that_matter(jaxpr: Jaxpr) -> list[bool]:
@@ -189,9 +189,9 @@ def inputs_that_matter(jaxpr: Jaxpr) -> list[bool]:
     return [v in needed for v in jaxpr.invars]
 
 
-def verdict_of(fields: tuple[Array, Array, Array] | None) -> Verdict | None:
-    """A verdict from what the compiled functions give."""
-    return None if fields is None else Verdict(*fields)
+def status_of(fields: tuple[Array, Array, Array] | None) -> GoalStatus | None:
+    """A status from what the compiled functions give."""
+    return None if fields is None else GoalStatus(*fields)
 
 
 def swap_of(fields: tuple[Array, Array, Array] | None) -> Swap | None:
@@ -205,8 +205,8 @@ def _copied(node: T) -> T:
     return new
 
 
-def _verdict_fields(verdict: Verdict) -> tuple[Array, Array, Array]:
-    return verdict.holds, verdict.fraction, verdict.literals
+def _status_fields(status: GoalStatus) -> tuple[Array, Array, Array]:
+    return status.holds, status.fraction, status.literals
 
 
 def _object_bodies(model: StateModel) -> slice | np.ndarray:

@@ -26,8 +26,8 @@ import jax
 import numpy as np
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.predicates.compile import Verdict
-from ig2mj.predicates.program import BODY_FIELDS, Found, StateProgram, swap_of, verdict_of
+from ig2mj.predicates.compile import GoalStatus
+from ig2mj.predicates.program import BODY_FIELDS, Found, StateProgram, status_of, swap_of
 from ig2mj.states.definitions import toggled
 from ig2mj.states.world import ExtendedStates, Swap
 
@@ -49,11 +49,11 @@ LOOK_EVERY = 30
 
 
 class Step(NamedTuple):
-    """What a step gives: states, the teleports that slicing asks for (None: none), and the goal's verdict."""
+    """What a step gives: states, the teleports that slicing asks for (None: none), and the goal's status."""
 
     states: ExtendedStates
     swap: Swap | None
-    verdict: Verdict | None
+    status: GoalStatus | None
 
 
 class StateStepper:
@@ -109,7 +109,7 @@ class StateStepper:
 
     def _heat(self, last: Step, kept: Found) -> Step:
         states = last.states
-        warm, hottest, verdict = self.program.heat(
+        warm, hottest, status = self.program.heat(
             states.temperature, states.max_temperature, states.sliced, kept.acts, kept.facts
         )
         if self._heat_steps % LOOK_EVERY == 0:
@@ -118,7 +118,7 @@ class StateStepper:
         self._heat_steps += 1
         states = self.program.with_leaves(states, self.program.heats, [warm, hottest])
         self._put(self.program.heats, [warm, hottest])
-        self._step = Step(states, None, verdict_of(verdict))
+        self._step = Step(states, None, status_of(status))
         return self._step
 
     def _everything(self, states: ExtendedStates, leaves: list[Array], view: PhysicsView) -> Step:
@@ -129,7 +129,7 @@ class StateStepper:
         new = program.with_leaves(states, program.gives, found.leaves)
         quiet, swapped, self._settled = np.asarray(found.flags).tolist()
         self._memo, self._view, self._heat_steps = found.memo, view, 0
-        self._step = Step(new, None, verdict_of(found.verdict))
+        self._step = Step(new, None, status_of(found.status))
         self._kept = None
         if quiet and not program.model.options.contact_heat_rate:
             self._kept = found

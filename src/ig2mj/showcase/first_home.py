@@ -59,7 +59,7 @@ def what_stands_where(world: Simulation) -> list[Place]:
     atoms = [atom(relation, a, b) for a, b in pairs for relation in ("inside", "on_top")]
     model = StateModel.of_manifest(tables, scene.manifest)
     asked = compile_expression(model, Or(tuple(atoms)))
-    truth = np.asarray(asked.verdict(initial_states(model, 1), view).literals)[0]
+    truth = np.asarray(asked.status(initial_states(model, 1), view).literals)[0]
     volume = {entry.name: float(np.prod(entry.bounding_box)) for entry in scene.manifest.objects}
     found: dict[str, tuple[float, str, str]] = {}
     for stated, holds in zip(asked.atoms, truth.tolist(), strict=True):

@@ -4,7 +4,7 @@
     worlds = Worlds(engine, StateModel.of_manifest(scene.tables, scene.manifest), pool, goal)
     batch = worlds.start(seed=0)
     step = jax.jit(worlds.step, donate_argnums=0)
-    batch, verdict = step(batch, ctrl)
+    batch, status = step(batch, ctrl)
     batch = jax.jit(worlds.reset)(batch, batch.flags != 0)
 
 A step is physics, view, states, guards and the goal, in that order; `jax.lax.scan` can run it, and nothing leaves the
@@ -26,7 +26,7 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.engine.base import Engine, Physics, Write
 from ig2mj.engine.health import Health
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.predicates.compile import CompiledExpression, Verdict
+from ig2mj.predicates.compile import CompiledExpression, GoalStatus
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import RelationPlan
@@ -121,11 +121,11 @@ class Worlds:
         )
         return self.reset(batch, jnp.ones(count, bool))
 
-    def step(self, batch: Batch, ctrl: Float[Array, "W nu"] | None = None) -> tuple[Batch, Verdict | None]:
+    def step(self, batch: Batch, ctrl: Float[Array, "W nu"] | None = None) -> tuple[Batch, GoalStatus | None]:
         """One control step of every world, and what the goal says afterwards (None without a goal)."""
         world = batch.world
         physics, view = self.engine.step(world.physics, ctrl)
-        states, teleports, verdict, flags = self._react(world.states, view, self.engine.health(physics))
+        states, teleports, status, flags = self._react(world.states, view, self.engine.health(physics))
         if teleports is not None:
             physics = self.engine.write(physics, teleports)
         new = guards.count(flags & ~batch.flags)
@@ -137,9 +137,7 @@ class Worlds:
             step=world.step + 1,
             time=world.time + jnp.float32(self.engine.substeps * self.engine.timestep),
         )
-        return dataclasses.replace(
-            batch, world=world, flags=batch.flags | flags, troubles=batch.troubles + new
-        ), verdict
+        return dataclasses.replace(batch, world=world, flags=batch.flags | flags, troubles=batch.troubles + new), status
 
     def reset(self, batch: Batch, mask: Bool[Array, "W"]) -> Batch:
         """Starts a new episode in the masked worlds, from a random row of the pool."""
@@ -173,13 +171,13 @@ class Worlds:
 
     def _rules(
         self, states: ExtendedStates, view: PhysicsView, health: Health
-    ) -> tuple[ExtendedStates, Write | None, Verdict | None, Int[Array, "W"]]:
+    ) -> tuple[ExtendedStates, Write | None, GoalStatus | None, Int[Array, "W"]]:
         """All of a step that is not physics. Pure."""
         relations = self.plan.evaluate(view)
         states, swap = update(self.model, states, view, relations)
         teleports = self._teleports(swap, view) if len(self.model.swap_objects) else None
-        verdict = None if self.goal is None else self.goal.verdict(states, view, relations)
-        return states, teleports, verdict, guards.check(health, view, self.floor)
+        status = None if self.goal is None else self.goal.status(states, view, relations)
+        return states, teleports, status, guards.check(health, view, self.floor)
 
     def _teleports(self, swap: Swap, view: PhysicsView) -> Write:
         """The engine's write for what slicing asks."""

@@ -16,7 +16,7 @@ from ig2mj.engine.health import Usage
 from ig2mj.engine.view import Array
 from ig2mj.engine.warp.profile import EngineProfile
 from ig2mj.errors import EngineError
-from ig2mj.predicates.compile import Verdict
+from ig2mj.predicates.compile import GoalStatus
 from ig2mj.scene.scene import Scene
 from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Batch, Worlds
@@ -41,19 +41,19 @@ class DebugWorlds:
         self._recording = start_recording(self.worlds.engine, batch, self.length)
         return batch
 
-    def step(self, batch: Batch, ctrl: Float[Array, "W nu"] | None = None) -> tuple[Batch, Verdict | None]:
+    def step(self, batch: Batch, ctrl: Float[Array, "W nu"] | None = None) -> tuple[Batch, GoalStatus | None]:
         """One control step.
 
         Raises:
           EngineError: a world is flagged; names world, flag, values, the setting to raise, and the dump.
         """
         assert self._recording is not None, "start first"
-        batch, verdict = self._step(batch, ctrl)
+        batch, status = self._step(batch, ctrl)
         self._recording = record(self.worlds.engine, self._recording, batch)
         flagged = np.flatnonzero(np.asarray(batch.flags))
         if len(flagged):
             raise EngineError(self._report(batch, int(flagged[0])))
-        return batch, verdict
+        return batch, status
 
     def reset(self, batch: Batch, mask: Array) -> Batch:
         """See `Worlds.reset`."""

@@ -24,7 +24,7 @@ from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array
 from ig2mj.errors import EngineError
-from ig2mj.predicates.compile import Verdict
+from ig2mj.predicates.compile import GoalStatus
 from ig2mj.worlds.batch import Batch, Worlds
 
 AXIS = "worlds"
@@ -75,8 +75,8 @@ class ShardedWorlds:
         """All worlds at the start of episode 0."""
         return Shards(tuple(self._each(lambda k: self._start(jnp.int32(seed), jnp.int32(self._first + k * self.part)))))
 
-    def step(self, shards: Shards, ctrl: Float[Array, "W nu"] | None = None) -> tuple[Shards, list[Verdict | None]]:
-        """One control step of every world, and each device's verdicts.
+    def step(self, shards: Shards, ctrl: Float[Array, "W nu"] | None = None) -> tuple[Shards, list[GoalStatus | None]]:
+        """One control step of every world, and each device's statuses.
 
         Args:
           ctrl: of all worlds of this process, or None to keep the controls.
@@ -84,7 +84,7 @@ class ShardedWorlds:
         split = self.place(ctrl) if ctrl is not None else None
         local = None if split is None else [s.data for s in sorted(split.addressable_shards, key=self._order)]
         done = self._each(lambda k: self._step(shards.parts[k], None if local is None else local[k]))
-        return Shards(tuple(batch for batch, _ in done)), [verdict for _, verdict in done]
+        return Shards(tuple(batch for batch, _ in done)), [status for _, status in done]
 
     def rollout(
         self, shards: Shards, carries: Sequence[Any], control: Control, length: int
