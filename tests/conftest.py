@@ -44,7 +44,7 @@ def pytest_configure(config: pytest.Config) -> None:
     """Keep compiled JAX programs between runs, where pytest keeps a cache at all."""
     import jax
 
-    if config.cache is not None:
+    if getattr(config, "cache", None) is not None:  # without its plugin there is no such attribute
         jax.config.update("jax_compilation_cache_dir", str(config.cache.mkdir("jax")))
         jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
 
