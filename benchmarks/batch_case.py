@@ -12,8 +12,8 @@ import numpy as np
 
 import ig2mj
 from ig2mj.agents.floating_hand import add_floating_hand
-from ig2mj.agents.reach import find_reach
-from ig2mj.calibration import calibrate
+from ig2mj.calibration.measuring import calibrate
+from ig2mj.calibration.reach import find_reach
 from ig2mj.engine.warp.profile import PROFILE_FILE, EngineProfile, load_profile
 from ig2mj.predicates.compile import compile_expression
 from ig2mj.sampling.perturbation import loose_objects

@@ -8,7 +8,6 @@ Writes DIR/<home>/engine_profile.json and prints it with the seconds it took.
 from __future__ import annotations
 
 import argparse
-import functools
 import json
 import pathlib
 import time
@@ -16,9 +15,9 @@ import time
 import msgspec
 
 import ig2mj
-from ig2mj.agents.floating_hand import add_floating_hand
-from ig2mj.agents.reach import find_reach
-from ig2mj.calibration import calibrate
+from ig2mj.agents.floating_hand import FloatingHand
+from ig2mj.calibration.measuring import calibrate
+from ig2mj.calibration.reach import find_reach
 from ig2mj.engine.warp.profile import save_profile
 
 
@@ -31,7 +30,7 @@ def main() -> None:
     args = parser.parse_args()
     start = time.time()
     reach = find_reach(ig2mj.load_scene(args.home))
-    scene = ig2mj.load_scene(args.home, [functools.partial(add_floating_hand, pos=reach.start)])
+    scene = ig2mj.load_scene(args.home, [FloatingHand(pos=reach.start)])
     found = time.time() - start
     profile = calibrate(scene, reach, num_worlds=args.worlds, rounds=args.rounds)
     folder = args.out / scene.folder.name

@@ -2,14 +2,13 @@
 
     python benchmarks/hand_activity.py [HOME ...] [--made 20 60 120] [--seconds 10] [--worlds 4] [--out DIR]
 
-Without homes: all shipped ones and those of `made_home.py`. The hand starts where `ig2mj.agents.reach` puts it, and
-does what it does in `throughput.py` and in `ig2mj calibrate`.
+Without homes: all shipped ones and those of `made_home.py`. The hand starts where `ig2mj.calibration.reach` puts
+it, and does what it does in `throughput.py` and in `ig2mj calibrate`.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import functools
 import pathlib
 import tempfile
 import time
@@ -25,9 +24,9 @@ from made_home import write_home
 from rich.console import Console
 
 import ig2mj
-from ig2mj.agents.floating_hand import add_floating_hand
-from ig2mj.agents.pushing import push, start_pushing
-from ig2mj.agents.reach import find_reach
+from ig2mj.agents.floating_hand import FloatingHand
+from ig2mj.calibration.pushing import push, start_pushing
+from ig2mj.calibration.reach import find_reach
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.native.settle import settle
 from ig2mj.sampling.perturbation import loose_objects
@@ -58,7 +57,7 @@ def measure(home: str, args: Args) -> dict[str, Any]:
     settled, start = settle(bare), time.process_time()
     reach = find_reach(bare, settled)
     reach_seconds = time.process_time() - start
-    scene = ig2mj.load_scene(home, [functools.partial(add_floating_hand, pos=reach.start)])
+    scene = ig2mj.load_scene(home, [FloatingHand(pos=reach.start)])
     hand, thing = geoms_of(scene)
     engine = NativeEngine(scene, args.worlds)
     physics = engine.load(engine.reset(), settle(scene))

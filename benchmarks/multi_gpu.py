@@ -17,7 +17,7 @@ import jax
 import numpy as np
 from batch_case import Case
 
-from ig2mj.agents.pushing import push, start_pushing
+from ig2mj.calibration.pushing import push, start_pushing
 from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.worlds.batch import Worlds
 from ig2mj.worlds.sharding import ShardedWorlds

@@ -10,7 +10,6 @@ every three seconds; a batch of worlds on threads. "physics" is MuJoCo alone, ta
 from __future__ import annotations
 
 import dataclasses
-import functools
 import pathlib
 import platform
 import tempfile
@@ -26,7 +25,7 @@ from rich.console import Console
 from rich.table import Table
 
 import ig2mj
-from ig2mj.agents.floating_hand import add_floating_hand, hand_ctrl
+from ig2mj.agents.floating_hand import FloatingHand, hand_ctrl
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import EngineError
 
@@ -157,8 +156,8 @@ def main(args: Args) -> None:
     with tempfile.TemporaryDirectory() as temporary:
         folder = args.scene or write_home(pathlib.Path(temporary) / "home", args.objects)
         plain = ig2mj.load_scene(folder)
-        high = ig2mj.load_scene(folder, agents=[functools.partial(add_floating_hand, pos=(0, 0, 5))])
-        low = ig2mj.load_scene(folder, agents=[functools.partial(add_floating_hand, pos=(0, 0, 1.1))])
+        high = ig2mj.load_scene(folder, agents=[FloatingHand(pos=(0, 0, 5))])
+        low = ig2mj.load_scene(folder, agents=[FloatingHand(pos=(0, 0, 1.1))])
     rows = []
     for case, scene, ctrl in (
         ("asleep", plain, None),

@@ -18,7 +18,6 @@ else:
     CORE = -1
 
 import dataclasses
-import functools
 import pathlib
 from typing import Any
 
@@ -35,9 +34,9 @@ from rich.console import Console
 from timing import Block, interleave, timed
 
 import ig2mj
-from ig2mj.agents.floating_hand import add_floating_hand
-from ig2mj.agents.pushing import push, start_pushing
-from ig2mj.agents.reach import Reach, find_reach
+from ig2mj.agents.floating_hand import FloatingHand
+from ig2mj.calibration.pushing import push, start_pushing
+from ig2mj.calibration.reach import Reach, find_reach
 from ig2mj.predicates.compile import compile_expression
 from ig2mj.scene.scene import Scene
 from ig2mj.states.model import StateModel
@@ -116,7 +115,7 @@ def measure(home: Home, case: str, args: Args) -> dict[str, Any]:
     scene, reach = home.load(home.robot_place() if case == "idle robot" else None), None
     if case == "disturbed":
         reach = find_reach(scene)
-        scene = ig2mj.load_scene(home.folder, [functools.partial(add_floating_hand, pos=reach.start)])
+        scene = ig2mj.load_scene(home.folder, [FloatingHand(pos=reach.start)])
     model = StateModel.of_manifest(scene.tables, scene.manifest)
     goal = compile_expression(model, ten_literals(model))
     worlds = {"engine": OneWorld(scene, model), "states": OneWorld(scene, model), "goal": OneWorld(scene, model, goal)}

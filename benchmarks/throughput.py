@@ -30,7 +30,7 @@ import warp as wp
 from batch_case import HAND_DOFS, Case
 from disturbance import LEAST, Watch, join, summary
 
-from ig2mj.agents.pushing import push, start_pushing
+from ig2mj.calibration.pushing import push, start_pushing
 from ig2mj.engine.health import CAPACITY, Overflow
 from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.sensors.batch_camera import BatchCamera

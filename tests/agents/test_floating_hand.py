@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import functools
-
 import mujoco
 import numpy as np
 import pytest
 
 import ig2mj
-from ig2mj.agents.floating_hand import HAND_FORCE, add_floating_hand, hand_ctrl
+from ig2mj.agents.base import Controller, Robot
+from ig2mj.agents.floating_hand import HAND_FORCE, FloatingHand, add_floating_hand, hand_ctrl
 
 EMPTY = "<mujoco><option timestep='0.00833333' gravity='0 0 -9.8'><flag sleep='enable'/></option></mujoco>"
 
@@ -71,7 +70,7 @@ def test_fingers_close_toward_the_palms_face_and_the_hand_never_hits_itself():
 
 
 def test_a_hand_pushes_a_box_along_a_table(tiny_home_folder):
-    hand = functools.partial(add_floating_hand, pos=(0.1, 0.25, 0.65))
+    hand = FloatingHand(pos=(0.1, 0.25, 0.65))
     simulation = ig2mj.Simulation(ig2mj.load_scene(tiny_home_folder, agents=[hand]))
     simulation.step(count=30)
     before = simulation.object_pose("box")[0]
@@ -83,9 +82,26 @@ def test_a_hand_pushes_a_box_along_a_table(tiny_home_folder):
 
 
 def test_two_hands_have_names_of_their_own(tiny_home_folder):
-    agents = [functools.partial(add_floating_hand, name=n, pos=(x, 0, 1)) for n, x in (("left", -1), ("right", -0.5))]
+    agents = [FloatingHand(name=n, pos=(x, 0, 1)) for n, x in (("left", -1), ("right", -0.5))]
     scene = ig2mj.load_scene(tiny_home_folder, agents=agents)
     assert scene.tables.agent_names == ("left", "right")
     assert scene.model.nu == 32
     view = ig2mj.Simulation(scene).view
     assert view.agent_pos[0, :, 0] == pytest.approx([-1, -0.5])
+
+
+def test_the_hand_is_a_robot_whose_actions_are_its_controls(tiny_home_folder):
+    hand = FloatingHand(pos=(0, 0, 1.5))
+    assert isinstance(hand, Robot)
+    scene = ig2mj.load_scene(tiny_home_folder, agents=[hand])
+    controller = hand.controller(scene.tables, 0)
+    assert isinstance(controller, Controller)
+    assert controller.action_size == len(controller.action_names) == scene.model.nu
+    assert scene.model.actuator(7).name == f"hand_{controller.action_names[7]}"
+    simulation = ig2mj.Simulation(scene)
+    state = controller.initial(2)
+    action = np.stack([hand_ctrl((0.1, 0.2, 0.3), closed=1), hand_ctrl(turn=(9, 0, 0))])
+    ctrl, state = controller.control(action, simulation.view, state)
+    assert ctrl[0] == pytest.approx(action[0])
+    assert ctrl[1, 3] == pytest.approx(np.pi), "clipped"
+    assert controller.grip(state)[:, 0] == pytest.approx([1, 0])

@@ -11,7 +11,7 @@ import pytest
 import tiny_home as homes
 
 import ig2mj
-from ig2mj.agents.floating_hand import add_floating_hand, hand_ctrl
+from ig2mj.agents.floating_hand import FloatingHand, add_floating_hand, hand_ctrl
 from ig2mj.engine.base import Engine, Write
 from ig2mj.engine.layout import make_layout
 from ig2mj.engine.native.engine import NativeEngine
@@ -282,7 +282,7 @@ def test_a_switched_weld_is_a_grasp_and_what_is_let_go_falls(tiny_home_folder):
 
 
 def test_agent_eye_and_fingers_follow_the_hand(tiny_home_folder):
-    hand = functools.partial(add_floating_hand, pos=(-1, 0, 1))
+    hand = FloatingHand(pos=(-1, 0, 1))
     simulation = ig2mj.Simulation(ig2mj.load_scene(tiny_home_folder, agents=[hand]))
     start = simulation.view
     assert start.agent_pos[0, 0] == pytest.approx([-1, 0, 1])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 
 import mujoco
 import numpy as np
@@ -11,7 +10,7 @@ import pytest
 import tiny_home as homes
 
 import ig2mj
-from ig2mj.agents.floating_hand import add_floating_hand, hand_ctrl
+from ig2mj.agents.floating_hand import FloatingHand, add_floating_hand, hand_ctrl
 from ig2mj.engine.base import Snapshot, Write
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.registry import make_engine
@@ -22,7 +21,7 @@ from ig2mj.errors import EngineError, UnknownNameError
 @pytest.fixture(scope="module")
 def hand_home(tiny_home_folder) -> ig2mj.Scene:
     """The tiny home with a hand beside the box on the table."""
-    return ig2mj.load_scene(tiny_home_folder, agents=[functools.partial(add_floating_hand, pos=(0.1, 0.2, 0.65))])
+    return ig2mj.load_scene(tiny_home_folder, agents=[FloatingHand(pos=(0.1, 0.2, 0.65))])
 
 
 def push(world: int, step: int) -> np.ndarray:

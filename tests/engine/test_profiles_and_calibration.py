@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import json
 import shutil
 
@@ -12,9 +11,9 @@ import pytest
 
 import ig2mj
 from ig2mj import cli
-from ig2mj.agents.floating_hand import add_floating_hand
-from ig2mj.agents.reach import find_reach
-from ig2mj.calibration import SAFETY, _wider, calibrate
+from ig2mj.agents.floating_hand import FloatingHand
+from ig2mj.calibration.measuring import SAFETY, _wider, calibrate
+from ig2mj.calibration.reach import find_reach
 from ig2mj.engine.health import Overflow
 from ig2mj.engine.warp.buffer_sizes import ALIGN
 from ig2mj.engine.warp.engine import WarpEngine
@@ -108,7 +107,7 @@ def test_a_disturbed_home_is_measured_natively(tiny_home):
 def test_a_hand_that_pushes_asks_for_more(tiny_home_folder):
     bare = ig2mj.load_scene(tiny_home_folder)
     reach = find_reach(bare)
-    scene = ig2mj.load_scene(tiny_home_folder, [functools.partial(add_floating_hand, pos=reach.start)])
+    scene = ig2mj.load_scene(tiny_home_folder, [FloatingHand(pos=reach.start)])
     without = calibrate(bare, engine="native", num_worlds=1, rounds=1)
     with_hand = calibrate(scene, reach, engine="native", num_worlds=1, rounds=1)
     assert with_hand.measured["peak_awake_dofs"] >= without.measured["peak_awake_dofs"] + 16

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Callable
 
 import mujoco
@@ -11,7 +10,7 @@ import numpy as np
 import pytest
 
 import ig2mj
-from ig2mj.agents.floating_hand import add_floating_hand, hand_ctrl
+from ig2mj.agents.floating_hand import FloatingHand, hand_ctrl
 from ig2mj.engine.native import vicinity
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.native.vicinity import Masks, Vicinity, VicinityTable
@@ -238,7 +237,7 @@ def test_planes_and_the_world_stay_in():
 
 
 def test_the_engine_with_a_hand_is_bitwise_the_same_and_shows_no_mask(tiny_home_folder, monkeypatch):
-    scene = ig2mj.load_scene(tiny_home_folder, agents=[functools.partial(add_floating_hand, pos=(0.1, 0.2, 0.65))])
+    scene = ig2mj.load_scene(tiny_home_folder, agents=[FloatingHand(pos=(0.1, 0.2, 0.65))])
     ours = NativeEngine(scene)
     build = VicinityTable.build
     monkeypatch.setattr(VicinityTable, "build", lambda *args: dataclasses.replace(build(*args), usable=False))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import pathlib
 import subprocess
 import sys
@@ -168,9 +167,9 @@ def test_a_manifest_of_another_version_is_refused(tmp_path):
 
 
 def test_agents_are_compiled_in_and_listed(tiny_home_folder, tiny_home):
-    from ig2mj.agents.floating_hand import add_floating_hand
+    from ig2mj.agents.floating_hand import FloatingHand
 
-    scene = ig2mj.load_scene(tiny_home_folder, agents=[functools.partial(add_floating_hand, pos=(0, 0, 1.5))])
+    scene = ig2mj.load_scene(tiny_home_folder, agents=[FloatingHand(pos=(0, 0, 1.5))])
     tables = scene.tables
     assert tables.agent_names == ("hand",)
     assert (tables.body_object[tables.agent_body] == -1).all()

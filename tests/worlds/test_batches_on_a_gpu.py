@@ -6,7 +6,6 @@ Programs are kept by JAX and Warp; with warm caches the file takes a few minutes
 from __future__ import annotations
 
 import dataclasses
-import functools
 
 import bench_scene
 import engine_bench
@@ -16,10 +15,10 @@ import numpy as np
 import pytest
 
 import ig2mj
-from ig2mj.agents.floating_hand import add_floating_hand
-from ig2mj.agents.pushing import push, start_pushing
-from ig2mj.agents.reach import find_reach
-from ig2mj.calibration import calibrate
+from ig2mj.agents.floating_hand import FloatingHand
+from ig2mj.calibration.measuring import calibrate
+from ig2mj.calibration.pushing import push, start_pushing
+from ig2mj.calibration.reach import find_reach
 from ig2mj.engine.health import CAPACITY
 from ig2mj.engine.native.sleep import FULLY_AWAKE
 from ig2mj.engine.warp.engine import WarpEngine
@@ -101,7 +100,7 @@ def reach():
 
 @pytest.fixture(scope="module")
 def scene(reach):
-    return ig2mj.load_scene(HOME, [functools.partial(add_floating_hand, pos=tuple(reach.start))])
+    return ig2mj.load_scene(HOME, [FloatingHand(pos=tuple(reach.start))])
 
 
 @pytest.fixture(scope="module")

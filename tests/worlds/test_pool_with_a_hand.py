@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from pathlib import Path
 
 import mujoco
@@ -11,8 +10,8 @@ import pytest
 
 import ig2mj
 from ig2mj import cli
-from ig2mj.agents.floating_hand import add_floating_hand
-from ig2mj.agents.reach import find_reach
+from ig2mj.agents.floating_hand import FloatingHand
+from ig2mj.calibration.reach import find_reach
 from ig2mj.sampling.settled import make_pool
 from ig2mj.scene import manifest as mf
 from ig2mj.states.model import StateModel
@@ -57,12 +56,12 @@ def test_the_hand_of_a_pool_is_in_a_free_place_that_the_file_and_the_command_tel
     assert f"with a hand at ({start[0]:.3f}, {start[1]:.3f}, {start[2]:.3f})" in capsys.readouterr().out
     assert start == find_reach(ig2mj.load_scene(home)).start.tolist(), "as `ig2mj calibrate` has it"
 
-    scene = ig2mj.load_scene(home, [functools.partial(add_floating_hand, pos=start)])
+    scene = ig2mj.load_scene(home, [FloatingHand(pos=start)])
     like = make_pool(scene, StateModel.of_manifest(scene.tables, scene.manifest), 1, share=0.0, threads=1)
     pool = load_pool(file, like, "room")
     assert pool.size == 2
     assert not any(hits_the_cupboard(scene, qpos) for qpos in np.asarray(pool.physics.qpos))
-    inside = ig2mj.load_scene(home, [functools.partial(add_floating_hand, pos=(0, 0, 1))])
+    inside = ig2mj.load_scene(home, [FloatingHand(pos=(0, 0, 1))])
     assert hits_the_cupboard(inside, np.asarray(like.physics.qpos)[0]), "where it was put before"
 
 

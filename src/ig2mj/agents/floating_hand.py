@@ -7,14 +7,18 @@ then z) carry it. Position servos limited to the paper's 300 N drive them, each 
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
+import jax.numpy as jnp
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
+from ig2mj.agents.base import Vector
+from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.scene.manifest import AgentEntry
-
-Vector = Sequence[float | int] | np.ndarray
+from ig2mj.scene.tables import SceneTables
 
 HAND_FORCE = 300.0
 """Newtons (newton metres for turning) of each axis (paper, appendix A.3; design section 5)."""
@@ -45,6 +49,54 @@ STIFFNESS_RATE = 0.08 * 120**2
 """1/s^2. A servo's stiffness is this times the inertia it moves: Bullet closes 0.08 of the error in a physics step."""
 
 _FINGERS = {"index": 0.03, "middle": 0.01, "ring": -0.01, "pinky": -0.03}  # place on the palm's edge, x in metres
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FloatingHand:
+    """The robot. `pos` and `quat` (world frame, m, w-x-y-z): its palm at joint positions 0."""
+
+    name: str = "hand"
+    pos: Vector = (0, 0, 1)
+    quat: Vector = (1, 0, 0, 0)
+
+    def attach(self, spec: mujoco.MjSpec, pos: Vector | None = None, quat: Vector | None = None) -> AgentEntry:
+        return add_floating_hand(spec, self.name, self.pos if pos is None else pos, self.quat if quat is None else quat)
+
+    def controller(self, tables: SceneTables, agent: int) -> HandController:
+        return HandController()
+
+
+class HandController:
+    """An action is the controls themselves: where palm and fingers are to go, see `hand_ctrl`. It feels nothing."""
+
+    action_names = (
+        *("x", "y", "z", "roll", "pitch", "yaw"),
+        *(f"{f}_{s}" for f in ("thumb", "index", "middle", "ring", "pinky") for s in ("proximal", "distal")),
+    )
+    action_high = np.array([100.0] * 3 + [np.pi] * 3 + [THUMB_CLOSED] * 2 + [FINGER_CLOSED] * 8)
+    action_low = np.array([-100.0] * 3 + [-np.pi] * 3 + [0.0] * 10)
+    proprioception_names = ()
+
+    @property
+    def action_size(self) -> int:
+        return len(self.action_names)
+
+    def initial(self, num_worlds: int) -> Float[Array, "W 16"]:
+        """The last controls."""
+        return jnp.zeros((num_worlds, self.action_size), jnp.float32)
+
+    def control(
+        self, action: Float[Array, "W 16"], view: PhysicsView, state: Float[Array, "W 16"]
+    ) -> tuple[Float[Array, "W 16"], Float[Array, "W 16"]]:
+        ctrl = jnp.clip(jnp.asarray(action, jnp.float32), self.action_low, self.action_high)
+        return ctrl, ctrl
+
+    def grip(self, state: Float[Array, "W 16"]) -> Float[Array, "W 1"]:
+        """Mean over the fingers."""
+        return jnp.mean(state[:, 6:] / self.action_high[6:], axis=1, keepdims=True)
+
+    def proprioception(self, view: PhysicsView, state: Float[Array, "W 16"]) -> Float[Array, "W 0"]:
+        return jnp.zeros((state.shape[0], 0), jnp.float32)
 
 
 def add_floating_hand(

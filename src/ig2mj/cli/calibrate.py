@@ -33,7 +33,7 @@ def run(
       out: folder; profiles go to OUT/<scene's name>/ instead of beside the manifests.
       json: print the profiles as JSON, by scene.
     """
-    from ig2mj.calibration import calibrate
+    from ig2mj.calibration.measuring import calibrate
     from ig2mj.cli.printing import add_bar, print_json, progress_bar, stdout_console
     from ig2mj.engine.warp.profile import save_profile
     from ig2mj.errors import Ig2mjError

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import functools
 import os
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ig2mj.agents.reach import Reach
+    from ig2mj.calibration.reach import Reach
     from ig2mj.scene.scene import Scene
 
 
@@ -20,9 +19,9 @@ def with_hand(scene: Scene, folder: str | os.PathLike) -> tuple[Scene, Reach]:
     Raises:
       EngineError: a hand can get at none of its loose objects.
     """
-    from ig2mj.agents.floating_hand import add_floating_hand
-    from ig2mj.agents.reach import find_reach
+    from ig2mj.agents.floating_hand import FloatingHand
+    from ig2mj.calibration.reach import find_reach
     from ig2mj.scene.scene import load_scene
 
     reach = find_reach(scene)
-    return load_scene(folder, [functools.partial(add_floating_hand, pos=reach.start)]), reach
+    return load_scene(folder, [FloatingHand(pos=reach.start)]), reach

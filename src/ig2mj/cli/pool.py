@@ -27,7 +27,7 @@ def run(
       share: probability that a loose object is moved, per row.
       threads: 0: one per processor.
       hand: make it for the scene with a floating hand, in the free place from which it reaches most loose objects
-        (`ig2mj.agents.reach.find_reach`), as `ig2mj calibrate` has it.
+        (`ig2mj.calibration.reach.find_reach`), as `ig2mj calibrate` has it.
     """
     from ig2mj.cli.files import check_folder_of
     from ig2mj.cli.hand import with_hand

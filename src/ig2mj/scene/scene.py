@@ -7,6 +7,7 @@ import dataclasses
 import os
 import pathlib
 from collections.abc import Callable, Sequence
+from typing import Protocol, runtime_checkable
 
 import mujoco
 
@@ -17,8 +18,18 @@ from ig2mj.scene.paths import MANIFEST_FILE, model_file
 from ig2mj.scene.rooms import Rooms, load_rooms
 from ig2mj.scene.tables import SceneTables
 
-AddAgent = Callable[[mujoco.MjSpec], AgentEntry]
-"""Adds an agent's bodies to a scene that is not compiled yet, and says what it added (see `ig2mj.agents`)."""
+
+@runtime_checkable
+class Attachable(Protocol):
+    """A robot, as far as a scene knows it (see `ig2mj.agents.base`)."""
+
+    def attach(self, spec: mujoco.MjSpec) -> AgentEntry:
+        """Adds its bodies to a scene that is not compiled yet, at its start, and says what it added."""
+        ...
+
+
+Agent = Attachable | Callable[[mujoco.MjSpec], AgentEntry]
+"""A robot, or just a function that adds bodies (nothing can control those but `ctrl`)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -31,7 +42,7 @@ class Scene:
       model: the compiled model. Engines that must change a model change a copy.
       tables: its constants as arrays.
       rooms: room maps, or None.
-      agents: what was added when it was loaded.
+      agents: what was attached when it was loaded, in the order of the A axis.
     """
 
     folder: pathlib.Path
@@ -39,7 +50,7 @@ class Scene:
     model: mujoco.MjModel
     tables: SceneTables
     rooms: Rooms | None = None
-    agents: tuple[AddAgent, ...] = ()
+    agents: tuple[Agent, ...] = ()
 
     @property
     def name(self) -> str:
@@ -63,8 +74,8 @@ class Scene:
     def spec(self) -> mujoco.MjSpec:
         """The scene with its agents, read again, to be changed and compiled; ids are those of `model`."""
         spec = read_spec(model_file(self.folder))
-        for add in self.agents:
-            add(spec)
+        for agent in self.agents:
+            _attach(agent, spec)
         return spec
 
     def start_data(self) -> mujoco.MjData:
@@ -79,12 +90,12 @@ class Scene:
         return f"Scene('{self.name}', {len(self.object_names)} objects, {self.folder})"
 
 
-def load_scene(path: str | os.PathLike, agents: Sequence[AddAgent] = ()) -> Scene:
+def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = ()) -> Scene:
     """Loads a converted scene.
 
     Args:
       path: its folder, its scene.xml or its manifest.json, or the bare name of a home that ships with the project.
-      agents: agents to compile into it, e.g. `functools.partial(add_floating_hand, pos=(0, 0, 1))`.
+      agents: robots to compile into it, e.g. `FloatingHand(pos=(0, 0, 1))`.
 
     Raises:
       InputError: a file is missing or is no valid MJCF.
@@ -96,13 +107,17 @@ def load_scene(path: str | os.PathLike, agents: Sequence[AddAgent] = ()) -> Scen
     if agents:
         spec = read_spec(file)
         manifest = copy.copy(manifest)
-        manifest.agents = [*manifest.agents, *(add(spec) for add in agents)]
+        manifest.agents = [*manifest.agents, *(_attach(agent, spec) for agent in agents)]
         model = _compile(spec, file)
     else:
         model = _compile(None, file)
     rooms = load_rooms(folder / manifest.rooms.file) if manifest.rooms.file else None
     tables = build_tables(model, manifest, rooms, folder / MANIFEST_FILE)
     return Scene(folder, manifest, model, tables, rooms, tuple(agents))
+
+
+def _attach(agent: Agent, spec: mujoco.MjSpec) -> AgentEntry:
+    return agent.attach(spec) if isinstance(agent, Attachable) else agent(spec)
 
 
 def read_spec(file: pathlib.Path) -> mujoco.MjSpec:

@@ -6,13 +6,12 @@ Things are found by category, so that any home with one of each will do.
 from __future__ import annotations
 
 import dataclasses
-import functools
 import os
 
 import mujoco
 import numpy as np
 
-from ig2mj.agents.floating_hand import add_floating_hand
+from ig2mj.agents.floating_hand import FloatingHand
 from ig2mj.errors import StateError
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.showcase.button_hand import FINGER_AXIS_OFFSET, REST
@@ -73,7 +72,7 @@ def enter_kitchen(folder: str | os.PathLike) -> tuple[Simulation, Kitchen]:
     turn, quat = _palm_down(kitchen.approach), np.zeros(4)
     mujoco.mju_mat2Quat(quat, turn.ravel())
     start = kitchen.button - REST * kitchen.approach - turn @ np.array(FINGER_AXIS_OFFSET)
-    scene = load_scene(folder, agents=[functools.partial(add_floating_hand, name=HAND, pos=start, quat=quat)])
+    scene = load_scene(folder, agents=[FloatingHand(HAND, start, quat)])
     return Simulation(scene), kitchen
 
 

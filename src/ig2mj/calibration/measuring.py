@@ -16,8 +16,8 @@ import msgspec
 import mujoco
 import numpy as np
 
-from ig2mj.agents.pushing import Pusher, push, start_pushing
-from ig2mj.agents.reach import Reach
+from ig2mj.calibration.pushing import Pusher, push, start_pushing
+from ig2mj.calibration.reach import Reach
 from ig2mj.engine.base import Snapshot
 from ig2mj.engine.health import CAPACITY, SETTING
 from ig2mj.engine.mjx.contacts import warp_contacts

@@ -1,10 +1,10 @@
 """A floating hand that goes about pushing loose objects: the disturbance of benchmarks and of `ig2mj calibrate`.
 
-Each world's hand goes from object to object on ways known to be free (`ig2mj.agents.reach`) and pushes each from its
-present place along the way it came. Pure JAX, a few table look-ups per world.
+Each world's hand goes from object to object on ways known to be free (`ig2mj.calibration.reach`) and pushes each
+from its present place along the way it came. Pure JAX, a few table look-ups per world.
 
     reach = find_reach(ig2mj.load_scene(home))
-    scene = ig2mj.load_scene(home, [functools.partial(add_floating_hand, pos=reach.start)])
+    scene = ig2mj.load_scene(home, [FloatingHand(pos=reach.start)])
     pusher = start_pushing(reach, num_worlds, scene.model.nu)
     pusher = push(reach, pusher, view.object_com, view.agent_pos[:, 0], key, step, seconds)     # then pusher.ctrl
 
@@ -18,7 +18,7 @@ import jax.numpy as jnp
 from flax import struct
 from jaxtyping import Bool, Float, Int, UInt
 
-from ig2mj.agents.reach import Reach
+from ig2mj.calibration.reach import Reach
 from ig2mj.engine.view import Array
 from ig2mj.worlds.random_streams import step_keys
 

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import ig2mj
-from ig2mj.agents.floating_hand import add_floating_hand
-from ig2mj.agents.pushing import LEASH, push, start_pushing
-from ig2mj.agents.reach import find_reach
+from ig2mj.agents.floating_hand import FloatingHand
+from ig2mj.calibration.pushing import LEASH, push, start_pushing
+from ig2mj.calibration.reach import find_reach
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.native.settle import settle
 from ig2mj.sampling.perturbation import loose_objects
@@ -25,7 +25,7 @@ def pushed(home, worlds: int, steps: int):
     """Objects moved by over 2 cm per world, and views and pushers of all steps."""
     bare = ig2mj.load_scene(home)
     reach = find_reach(bare)
-    scene = ig2mj.load_scene(home, [functools.partial(add_floating_hand, pos=reach.start)])
+    scene = ig2mj.load_scene(home, [FloatingHand(pos=reach.start)])
     engine = NativeEngine(scene, worlds)
     physics = engine.load(engine.reset(), settle(scene))
     view = engine.view(physics)

@@ -75,7 +75,7 @@ FAR = 1.0
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Reach:
-    """Where the hand starts and what it can push; constants of `ig2mj.agents.pushing`.
+    """Where the hand starts and what it can push; constants of `ig2mj.calibration.pushing`.
 
     Attributes:
       start: world position of the hand at zero controls, m: the node `start_node`.

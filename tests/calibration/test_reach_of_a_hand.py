@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 from pathlib import Path
 
 import mujoco
@@ -10,8 +9,8 @@ import numpy as np
 import pytest
 
 import ig2mj
-from ig2mj.agents.floating_hand import add_floating_hand
-from ig2mj.agents.reach import RANGE, find_reach, hand_box
+from ig2mj.agents.floating_hand import FloatingHand, add_floating_hand
+from ig2mj.calibration.reach import RANGE, find_reach, hand_box
 from ig2mj.errors import EngineError
 from ig2mj.scene import manifest as mf
 
@@ -66,7 +65,7 @@ def test_things_in_a_closed_crate_and_behind_a_wall_are_out_of_reach(room):
 
 def test_the_hand_starts_where_it_touches_nothing(room):
     reach = find_reach(room)
-    scene = ig2mj.load_scene(room.folder, [functools.partial(add_floating_hand, pos=reach.start)])
+    scene = ig2mj.load_scene(room.folder, [FloatingHand(pos=reach.start)])
     data = mujoco.MjData(scene.model)
     mujoco.mj_forward(scene.model, data)
     agent = scene.model.body_rootid[scene.model.geom_bodyid[data.contact.geom]] == scene.tables.agent_body[0]

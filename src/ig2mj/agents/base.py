@@ -1,0 +1,102 @@
+"""The protocols of robots and their controllers.
+
+A robot adds its bodies to a scene before it is compiled; its controller turns actions into MuJoCo controls.
+
+    scene = load_scene("birch", agents=[FloatingHand(pos=(0, 0, 1))])
+    controller = FloatingHand().controller(scene.tables, agent=0)
+    state = controller.initial(num_worlds)
+    ctrl, state = controller.control(action, view, state)      # pure and batched: may be jitted and scanned
+
+Axes: W worlds, n numbers of an action, m numbers of proprioception, U actuators of the agent, H hands of the agent.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol, runtime_checkable
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.scene.manifest import AgentEntry
+from ig2mj.scene.tables import SceneTables
+
+Vector = Sequence[float | int] | np.ndarray
+
+ControllerState = Any
+"""What a controller remembers from step to step: a pytree of arrays that begin with the world axis."""
+
+
+@runtime_checkable
+class Controller(Protocol):
+    """Actions and proprioception of one agent of a scene. All methods are pure, batched and traceable by JAX.
+
+    Attributes:
+      action_names: [n] what each number of an action means.
+      action_low, action_high: [n] limits; actions beyond them are clipped.
+      proprioception_names: [m] what each number of `proprioception` means.
+    """
+
+    action_names: tuple[str, ...]
+    action_low: Float[np.ndarray, "n"]
+    action_high: Float[np.ndarray, "n"]
+    proprioception_names: tuple[str, ...]
+
+    @property
+    def action_size(self) -> int:
+        """n."""
+        ...
+
+    def initial(self, num_worlds: int) -> ControllerState:
+        """The state of controllers whose agents stand at their start."""
+        ...
+
+    def control(
+        self, action: Float[Array, "W n"], view: PhysicsView, state: ControllerState
+    ) -> tuple[Float[Array, "W U"], ControllerState]:
+        """Controls of the agent's actuators, in the order of the model. Called once per action, which they hold for.
+
+        Args:
+          action: clipped to the limits.
+          view: of the present physics.
+          state: as returned by the last call.
+        """
+        ...
+
+    def grip(self, state: ControllerState) -> Float[Array, "W H"]:
+        """How far each hand is asked to close: 0 open, 1 closed. From one half on it grasps (spec A.1)."""
+        ...
+
+    def proprioception(self, view: PhysicsView, state: ControllerState) -> Float[Array, "W m"]:
+        """What the agent feels of itself."""
+        ...
+
+
+@runtime_checkable
+class Robot(Protocol):
+    """Something that acts: adds its bodies to a scene and makes the controller for them.
+
+    Attributes:
+      name: of the agent; prefix of its bodies, joints and actuators. Unique in a scene.
+    """
+
+    @property
+    def name(self) -> str: ...
+
+    def attach(self, spec: mujoco.MjSpec, pos: Vector | None = None, quat: Vector | None = None) -> AgentEntry:
+        """Adds the robot's bodies to a scene that is not compiled yet.
+
+        Args:
+          spec: of the scene; changed in place.
+          pos, quat: where it starts, world frame, m and w-x-y-z; None: the robot's own start.
+
+        Returns:
+          What was added, for the manifest.
+        """
+        ...
+
+    def controller(self, tables: SceneTables, agent: int) -> Controller:
+        """The controller of this robot, compiled into the scene of these tables as agent number `agent`."""
+        ...
