@@ -75,7 +75,7 @@ def test_boxes_follow_through_a_fall_into_sleep(tiny_home):
         assert simulation.view.aabb_high[0, number] == pytest.approx(high, abs=2e-6)
 
 
-def test_igibsons_box_is_the_rotated_local_box_plus_bullets_margin(tiny_home):
+def test_igibsons_box_is_the_local_box_with_bullets_margin_rotated(tiny_home):
     """4.2: a hull ball of radius r gives +-r unrotated and more when turned; section 24: 3 mm for one hull."""
     simulation = ig2mj.Simulation(tiny_home, boxes="igibson")
     number = tiny_home.object_index("ball")
@@ -85,7 +85,7 @@ def test_igibsons_box_is_the_rotated_local_box_plus_bullets_margin(tiny_home):
     simulation.set_object_pose("ball", [0, 0, 2], TURN)
     matrix = np.zeros(9)
     mujoco.mju_quat2Mat(matrix, TURN / np.linalg.norm(TURN))
-    reach = np.abs(matrix.reshape(3, 3)).sum(1) * 0.1 + BULLET_MARGIN_SINGLE
+    reach = np.abs(matrix.reshape(3, 3)).sum(1) * (0.1 + BULLET_MARGIN_SINGLE)
     view = simulation.view
     assert view.aabb_high[0, number] - [0, 0, 2] == pytest.approx(reach, abs=1e-6)
     assert view.aabb_low[0, number] - [0, 0, 2] == pytest.approx(-reach, abs=1e-6)

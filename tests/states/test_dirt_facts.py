@@ -11,7 +11,7 @@ import pytest
 from hand_world import HandWorld, Thing, step
 
 from ig2mj.states import initial_states, particles
-from ig2mj.states.definitions import dust, stain
+from ig2mj.states.definitions import cleaning, dust, stain
 from ig2mj.states.particles import NUM_PARTICLES
 
 DIRT = {"dustyable": {}, "stainable": {}}
@@ -96,9 +96,14 @@ def test_table_a4_levels_are_fractions_of_the_placed_particles():
     assert particles.level(particles.no_particles(1, 1))[0, 0] == 0.0
 
 
+def _swept(pos, newtons: float = 1.0, **changes):
+    """A view in which the broom touches the table, through its head unless `newtons` is 0."""
+    return ROOM.view(pos, touching=[("broom", "table")], force={("broom", "table"): newtons}, **changes)
+
+
 def test_table_a4_any_cleaning_tool_takes_dust_in_its_region():
     # The broom's head covers x in [0.3, 0.7]: the points at 0.35, 0.45, 0.55, 0.65.
-    states = step(ROOM.model(), _dirty(), ROOM.view({"broom": (0.5, 0, 0.0)}, touching=[("broom", "table")]))
+    states = step(ROOM.model(), _dirty(), _swept({"broom": (0.5, 0, 0.0)}))
     assert _counts(states) == (16, 20)
     gone = np.flatnonzero(~np.asarray(states.dust.alive[0, 0]))
     assert np.allclose(PLACES[gone, 0], [0.35, 0.45, 0.55, 0.65])
@@ -107,6 +112,31 @@ def test_table_a4_any_cleaning_tool_takes_dust_in_its_region():
 def test_section_8_3_without_an_annotated_area_the_whole_tool_cleans():
     states = step(ROOM.model(), _dirty(), ROOM.view({"rag": (0.0, 0, 0.02)}, touching=[("rag", "table")]))
     assert _counts(states) == (18, 20)
+
+
+def test_section_8_3_only_contacts_through_the_annotated_area_clean():
+    handle = _swept({"broom": (0.5, 0, 0.0)}, newtons=0.0)
+    assert _counts(step(ROOM.model(), _dirty(), handle)) == (20, 20)
+    asleep = handle.replace(awake=handle.awake & False)  # contacts of what sleeps are remembered, without their links
+    assert _counts(step(ROOM.model(), _dirty(), asleep)) == (16, 20)
+
+
+@pytest.mark.parametrize(("height", "left"), [(0.0229, 18), (0.0231, 20)])
+def test_section_8_3_the_whole_tools_region_has_bullets_margin(height, left):
+    """3 mm for one hull (section 24). Without it a rag that rests 2 mm off its plate would reach nothing on it."""
+    states = step(ROOM.model(), _dirty(), ROOM.view({"rag": (0.0, 0, height)}, touching=[("rag", "table")]))
+    assert _counts(states)[0] == left
+
+
+@pytest.mark.parametrize("tool", ["rag", "broom"])
+def test_section_4_2_a_regions_margin_turns_with_the_tool(tool):
+    turn = (np.cos(0.4), np.sin(0.4), 0.0, 0.0)  # 0.8 rad about x
+    low, high = cleaning.regions(ROOM.model(), ROOM.view({tool: (0, 0, 0)}, quat={tool: turn}))
+    number = {"broom": 0, "rag": 1}[tool]
+    half = np.array({"rag": (0.1, 0.1, 0.01), "broom": (0.2, 0.1, 0.02)}[tool]) + 0.003
+    c, s = np.cos(0.8), np.sin(0.8)
+    reach = [half[0], c * half[1] + s * half[2], s * half[1] + c * half[2]]
+    np.testing.assert_allclose([-np.asarray(low[0, number]), high[0, number]], [reach, reach], atol=1e-6)
 
 
 def test_section_8_3_the_tool_must_touch_what_it_cleans():
@@ -119,7 +149,7 @@ def test_table_a4_stains_go_only_with_a_soaked_tool():
     wet = _dirty()
     wet = wet.replace(wetness=wet.wetness.at[0, 2].set(1.0))
     assert _counts(step(ROOM.model(), wet, view)) == (18, 18)
-    broom = ROOM.view({"broom": (0.5, 0, 0.0)}, touching=[("broom", "table")])
+    broom = _swept({"broom": (0.5, 0, 0.0)})
     assert _counts(step(ROOM.model(), wet, broom))[1] == 20  # a broom cannot be soaked
 
 

@@ -77,7 +77,9 @@ def test_table_a3_cleaning_tool_link(area, left):
     states = initial_states(home.model(), 1)
     rows = states.dust
     rows = rows.replace(alive=rows.alive | True, placed=rows.placed | True, body=rows.body + 1, pos=rows.pos + 0.05)
-    states = step(home.model(), states.replace(dust=rows), home.view(touching=[("mop", "table")]))
+    states = step(
+        home.model(), states.replace(dust=rows), home.view(touching=[("mop", "table")], force={("mop", "table"): 1.0})
+    )
     assert int(states.dust.alive.sum()) == left
 
 

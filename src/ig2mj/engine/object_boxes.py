@@ -1,8 +1,8 @@
 """World boxes of objects from body poses, by the tight rule or by iGibson's (see `ig2mj.engine.base.BOX_RULES`).
 
-Which things' boxes make up which object's; the rules themselves are in `ig2mj.geometry.boxes`.
+Which boxes make up which object's; the rules themselves are in `ig2mj.geometry.boxes`.
 
-Axes: K boxed things (convex pieces by the tight rule, bodies by iGibson's), sorted by object; V corners of the largest.
+Axes: K boxed items (convex pieces by the tight rule, bodies by iGibson's), sorted by object; V corners of the largest.
 """
 
 from __future__ import annotations
@@ -11,9 +11,11 @@ import dataclasses
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
 from ig2mj.engine.layout import ModelLayout
-from ig2mj.geometry.boxes import core_boxes, link_boxes, piece_cores, turned_boxes
+from ig2mj.geometry.boxes import Boxes, core_boxes, link_boxes, piece_cores, turned_boxes
+from ig2mj.geometry.poses import AnyArray
 from ig2mj.scene.tables import SceneTables
 
 
@@ -24,9 +26,9 @@ class BoxTable:
     Attributes:
       owner, body: [K] object and body. Objects without collision geometry have one point: their base's origin.
       points: [K, 3, V] corners in the body's frame; ends of the core of round primitives.
-      radius: [K, 1]; axis: [K, 3] in the body's frame, the flat direction of a cylinder, zero for all others. A thing
+      radius: [K, 1]; axis: [K, 3] in the body's frame, the flat direction of a cylinder, zero for all others. An item
         reaches `radius * sqrt(1 - axis_i^2)` beyond its points along world axis i.
-      center, half: [K, 3] box in the body's frame; margin: [K, 1] m. any_round: some radius is not zero.
+      center, half: [K, 3] box in the body's frame, m, Bullet's margin included. any_round: some radius is not zero.
     """
 
     rule: str
@@ -37,8 +39,16 @@ class BoxTable:
     axis: np.ndarray
     center: np.ndarray
     half: np.ndarray
-    margin: np.ndarray
     any_round: bool
+
+    def boxes(self, rotation: Float[AnyArray, "*b K 3 3"]) -> Boxes:
+        """Boxes (low, high) of all items about their bodies' origins; `rotation` turns the bodies into the world.
+
+        Works on NumPy arrays and on JAX's alike and returns what it is given.
+        """
+        if self.rule == "tight":
+            return core_boxes(rotation, self.points, self.radius if self.any_round else None, self.axis)
+        return turned_boxes(rotation, self.center, self.half)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -57,11 +67,11 @@ def make_box_table(rule: str, model: mujoco.MjModel, tables: SceneTables, layout
     owner, body = tables.piece_object, tables.piece_body
     if rule == "igibson":
         kept = ~np.isin(body, _split_off(model, tables, layout))
-        body, center, half, margin = link_boxes(body[kept], points[kept], radius[kept], axis[kept])
+        body, center, half = link_boxes(body[kept], points[kept], radius[kept], axis[kept])
         owner, count = tables.body_object[body], len(body)
         points, radius, axis = np.zeros((count, 3, 1)), np.zeros((count, 1)), np.zeros((count, 3))
     else:
-        center, half, margin = np.zeros((len(owner), 3)), np.zeros((len(owner), 3)), np.zeros((len(owner), 1))
+        center, half = np.zeros((len(owner), 3)), np.zeros((len(owner), 3))
     bare = np.setdiff1d(np.arange(tables.num_objects), owner)
     extra = len(bare)
     owner, body = np.concatenate([owner, bare]), np.concatenate([body, tables.object_root[bare]])
@@ -79,7 +89,6 @@ def make_box_table(rule: str, model: mujoco.MjModel, tables: SceneTables, layout
         axis=padded(axis, 3),
         center=padded(center, 3),
         half=padded(half, 3),
-        margin=padded(margin, 1),
         any_round=bool(np.any(radius > 0)),
     )
 
@@ -93,22 +102,17 @@ def plan_boxes(table: BoxTable, chosen: np.ndarray) -> BoxPlan:
     return BoxPlan(np.flatnonzero(np.diff(picked.owner, prepend=-1)), picked)
 
 
-def world_boxes(rule: str, plan: BoxPlan, xpos: np.ndarray, xmat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def world_boxes(plan: BoxPlan, xpos: np.ndarray, xmat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Boxes of the plan's objects.
 
     Args:
-      rule: of the table that the plan was made from.
       xpos, xmat: [B, 3] and [B, 9] poses of all bodies, as in MjData.
 
     Returns:
       low, high: [n, 3] float64, world frame.
     """
     rows = plan.rows
-    rotation = xmat[rows.body].reshape(-1, 3, 3)
-    if rule == "tight":
-        low, high = core_boxes(rotation, rows.points, rows.radius if rows.any_round else None, rows.axis)
-    else:
-        low, high = turned_boxes(rotation, rows.center, rows.half, rows.margin)
+    low, high = rows.boxes(xmat[rows.body].reshape(-1, 3, 3))
     position = xpos[rows.body]
     low, high = np.add(low, position), np.add(high, position)
     if len(plan.starts) == len(rows.body):

@@ -1,8 +1,8 @@
 """Axis-aligned boxes: the two rules that give an object's box, and what can be asked of boxes. Metres, world axes.
 
 Tight: the smallest box around the object's pieces (`core_boxes`). iGibson's: per link the box of the link's whole shape
-in the link's frame (`link_boxes`, made once), turned into the world, which makes it looser, plus Bullet's margin
-(`turned_boxes`; spec/states.md 4.2 and section 24).
+in the link's frame, widened by Bullet's margin (`link_boxes`, made once), and then turned into the world, which makes
+it looser (`turned_boxes`; spec/states.md 4.2 and section 24).
 
 `core_boxes` and `turned_boxes` work on NumPy arrays and on JAX's alike and return what they are given.
 
@@ -77,11 +77,13 @@ def turned_boxes(
     rotation: Float[AnyArray, "*b K 3 3"],
     center: Float[AnyArray, "K 3"],
     half: Float[AnyArray, "K 3"],
-    margin: Float[AnyArray, "K 1"],
 ) -> Boxes:
-    """iGibson's rule: boxes (low, high) around turned local boxes, about their frames' origins, plus the margin."""
+    """iGibson's rule: boxes (low, high) around turned local boxes, about their frames' origins.
+
+    Bullet turns half extents and margin together, |R| (half + margin) (spec/states.md 4.2): `half` includes the margin.
+    """
     middle = (rotation @ center[..., None])[..., 0]
-    reach = (abs(rotation) @ half[..., None])[..., 0] + margin
+    reach = (abs(rotation) @ half[..., None])[..., 0]
     return middle - reach, middle + reach
 
 
@@ -90,8 +92,8 @@ def link_boxes(
     points: Float[np.ndarray, "K 3 V"],
     radius: Float[np.ndarray, "K 1"],
     axis: Float[np.ndarray, "K 3"],
-) -> tuple[Int[np.ndarray, "N"], Float[np.ndarray, "N 3"], Float[np.ndarray, "N 3"], Float[np.ndarray, "N 1"]]:
-    """iGibson's local boxes, one for each body that has pieces: (body, centre, half size, Bullet's margin).
+) -> tuple[Int[np.ndarray, "N"], Float[np.ndarray, "N 3"], Float[np.ndarray, "N 3"]]:
+    """iGibson's local boxes, one for each body that has pieces: (body, centre, half size with Bullet's margin).
 
     Arguments as `piece_cores` gives them for pieces posed in their bodies. Host side, once per scene.
     """
@@ -101,7 +103,7 @@ def link_boxes(
     np.minimum.at(box_low, group, low)
     np.maximum.at(box_high, group, high)
     margin = np.where(count > 1, BULLET_MARGIN_COMPOUND, BULLET_MARGIN_SINGLE)[:, None]
-    return bodies, (box_low + box_high) / 2, (box_high - box_low) / 2, margin
+    return bodies, (box_low + box_high) / 2, (box_high - box_low) / 2 + margin
 
 
 def point_in_box(

@@ -97,10 +97,10 @@ def heat(
     Args:
       acts: from `events`. touching: read only where heat passes by contact.
     """
-    warm = temperature.update(model, states.temperature, acts, sliced.in_use(model, states.sliced), touching)
-    return dataclasses.replace(
-        states, temperature=warm, max_temperature=max_temperature.update(model, states.max_temperature, warm)
-    )
+    in_use = sliced.in_use(model, states.sliced)
+    warm = temperature.update(model, states.temperature, acts, in_use, touching)
+    hottest = max_temperature.update(model, states.max_temperature, warm, in_use)
+    return dataclasses.replace(states, temperature=warm, max_temperature=hottest)
 
 
 def _as_wholes(model: StateModel, cut_now: Bool[Array, "W O"], acts: Bool[Array, "W O S"]) -> Bool[Array, "W O S"]:

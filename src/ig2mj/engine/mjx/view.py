@@ -3,7 +3,7 @@
 What nobody reads costs nothing: the view is made inside the jitted step, and XLA drops the parts that no state,
 predicate or reward uses.
 
-Axes as in `ig2mj.engine.base`; K boxed things of a `BoxTable`, S slots (the most boxed things, or units, of an object).
+Axes as in `ig2mj.engine.base`; K boxed items of a `BoxTable`, S slots (the most boxed items, or units, of an object).
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ from jaxtyping import Bool, Float
 from ig2mj.engine.layout import ModelLayout
 from ig2mj.engine.object_boxes import BoxTable, make_box_table
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.boxes import core_boxes, turned_boxes
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
 from ig2mj.scene.tables import SceneTables
 
@@ -118,12 +117,7 @@ def object_boxes(
     """World boxes of all objects, low and high corners (m); as `ig2mj.engine.object_boxes.world_boxes` makes them."""
     table = plan.boxes
     rotation = quat_to_matrix(body_quat[:, table.body])  # W K 3 3
-    if table.rule == "tight":
-        points, radius, axis = (jnp.asarray(a, jnp.float32) for a in (table.points, table.radius, table.axis))
-        low, high = core_boxes(rotation, points, radius if table.any_round else None, axis)
-    else:
-        center, half, margin = (jnp.asarray(a, jnp.float32) for a in (table.center, table.half, table.margin))
-        low, high = turned_boxes(rotation, center, half, margin)
+    low, high = table.boxes(rotation)
     position = body_pos[:, table.body]
     low, high = low + position, high + position
     taken = (plan.box_slots >= 0)[..., None]

@@ -113,9 +113,7 @@ class PoseRows:
             rows["object_pos"][plan.objects] = xpos[plan.roots]
             rows["object_quat"][plan.objects] = xquat[plan.roots]
             rows["object_com"][plan.objects] = data.xipos[plan.roots]
-            rows["aabb_low"][plan.objects], rows["aabb_high"][plan.objects] = world_boxes(
-                self.boxes.rule, plan.boxes, xpos, xmat
-            )
+            rows["aabb_low"][plan.objects], rows["aabb_high"][plan.objects] = world_boxes(plan.boxes, xpos, xmat)
             changed |= Changed.OBJECTS
         if plan.joints:
             rows["joint_pos"][:] = data.qpos[tables.openable_qposadr]

@@ -1,9 +1,11 @@
 """Cleaning tools: what they touch they wipe off (spec/states.md 8.3).
 
 A tool removes, at once, every particle of an object it touches whose centre is in the world box of its annotated
-cleaning area, or of the whole tool where the model has none. Stains go only when the tool is soaked. No movement or
-force is asked for. A tool with a switch cleans only while it is on (iGibson's vacuum cleaner works when it is off,
-spec/states.md 19.17).
+cleaning area, or of the whole tool where the model has none. The boxes are Bullet's: local boxes with their margin,
+turned together (`ig2mj.geometry.boxes.turned_boxes`). Where the area has geometry, only contacts through it count, so
+that the handle of a broom cleans nothing. Stains go only when the tool is soaked. No movement or minimum force is
+required. A tool with a switch cleans only while it is on (iGibson's vacuum cleaner works when it is off, spec/states.md
+19.17).
 
 Axes: W worlds, T tools, R rows of particles, N particles.
 """
@@ -11,6 +13,7 @@ Axes: W worlds, T tools, R rows of particles, N particles.
 from __future__ import annotations
 
 import dataclasses
+from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -18,12 +21,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.boxes import BULLET_MARGIN_SINGLE, link_boxes, piece_cores, turned_boxes
 from ig2mj.geometry.poses import quat_to_matrix
 from ig2mj.states.model import StateModel
 from ig2mj.states.particles import Particles, world_positions
-
-BOX_MARGIN = 0.003
-"""Metres that Bullet adds to a link's box (spec/states.md section 24)."""
 
 
 def working(model: StateModel, toggled: Bool[Array, "W O"]) -> Bool[Array, "W T"]:
@@ -51,7 +52,7 @@ def update(
     tools = model.parameters.tool_object
     if len(tools) == 0 or len(rows) == 0:
         return particles
-    touching = jnp.asarray(view.touching)[:, tools][:, :, rows] & can_clean[..., None]  # [W, T, R]
+    touching = _touching(model, view)[:, :, rows] & can_clean[..., None]  # [W, T, R]
     touching &= jnp.any(particles.alive, axis=-1)[:, None]
     alive = jax.lax.cond(
         jnp.any(touching),
@@ -73,16 +74,63 @@ def _wiped(
     return wiped
 
 
-def regions(model: StateModel, view: PhysicsView) -> tuple[Float[Array, "W T 3"], Float[Array, "W T 3"]]:
-    """World box in which each tool cleans."""
-    p, tables = model.parameters, model.tables
-    low, high = jnp.asarray(view.aabb_low)[:, p.tool_object], jnp.asarray(view.aabb_high)[:, p.tool_object]
-    if len(tables.link_kind) == 0 or len(p.tool_link) == 0:
-        return low, high
+def _touching(model: StateModel, view: PhysicsView) -> Bool[Array, "W T O"]:
+    """What each tool touches with the part that cleans.
+
+    The view tells which contacts a link has by their force. A tool that sleeps has none, but what it touched before it
+    fell asleep is remembered for the whole tool, and counts: water can still soak it and let it take a stain.
+    """
+    p, links = model.parameters, model.tables.link_geom
+    touching = jnp.asarray(view.touching)[:, p.tool_object]
+    if len(links) == 0:
+        return touching
     link = np.maximum(p.tool_link, 0)
-    half = tables.link_half[link]
-    axes = jnp.abs(quat_to_matrix(jnp.asarray(view.link_quat)[:, link]))
-    reach = jnp.sum(axes * half[:, None, :], axis=-1) + BOX_MARGIN
-    centre = jnp.asarray(view.link_pos)[:, link]
-    has_area = ((p.tool_link >= 0) & np.any(half > 0, axis=-1))[:, None]
-    return jnp.where(has_area, centre - reach, low), jnp.where(has_area, centre + reach, high)
+    by_area = (p.tool_link >= 0) & (links[link] >= 0)
+    if not by_area.any():
+        return touching
+    pressing = (jnp.asarray(view.link_force)[:, link] > 0) | ~jnp.asarray(view.awake)[:, p.tool_object, None]
+    return touching & (pressing | ~by_area[:, None])
+
+
+def regions(model: StateModel, view: PhysicsView) -> tuple[Float[Array, "W T 3"], Float[Array, "W T 3"]]:
+    """World box, low and high corners (m), in which each tool cleans."""
+    p, areas = model.parameters, _boxes_of_tools(model)
+    frames = [jnp.asarray(view.body_pos)[:, areas.body], jnp.asarray(view.link_pos)[:, areas.link]]
+    turns = [jnp.asarray(view.body_quat)[:, areas.body], jnp.asarray(view.link_quat)[:, areas.link]]
+    low, high = turned_boxes(quat_to_matrix(jnp.concatenate(turns, axis=1)), areas.center, areas.half)
+    at = jnp.concatenate(frames, axis=1)
+    low, high = low + at, high + at
+    worlds, tools = low.shape[0], len(p.tool_object)
+    return (
+        jnp.full((worlds, tools, 3), jnp.inf).at[:, areas.tool].min(low),
+        jnp.full((worlds, tools, 3), -jnp.inf).at[:, areas.tool].max(high),
+    )
+
+
+class _Areas(NamedTuple):
+    """Local boxes, first those in bodies' frames, then those in links'; `tool` is an index among the tools."""
+
+    tool: Int[np.ndarray, "N"]
+    body: Int[np.ndarray, "Nb"]
+    link: Int[np.ndarray, "Nl"]
+    center: Float[np.ndarray, "N 3"]
+    half: Float[np.ndarray, "N 3"]
+
+
+def _boxes_of_tools(model: StateModel) -> _Areas:
+    """The box of a tool's cleaning area, or those of all its bodies. Host side, at tracing."""
+    p, tables = model.parameters, model.tables
+    area_half = tables.link_half[p.tool_link] if len(tables.link_half) else np.zeros((len(p.tool_link), 3))
+    has_area = (p.tool_link >= 0) & np.any(area_half > 0, axis=-1)
+    number = {int(o): t for t, o in enumerate(p.tool_object) if not has_area[t]}
+    mine = np.isin(tables.piece_object, list(number))
+    columns = (tables.piece_kind, tables.piece_size, tables.piece_vertices, tables.piece_pos, tables.piece_quat)
+    body, center, half = link_boxes(tables.piece_body[mine], *piece_cores(*(c[mine] for c in columns)))
+    with_area = np.flatnonzero(has_area)
+    return _Areas(
+        tool=np.array([*(number[int(o)] for o in tables.body_object[body]), *with_area], int),
+        body=body.astype(int),
+        link=p.tool_link[with_area],
+        center=np.concatenate([center, np.zeros((len(with_area), 3))]).astype(np.float32),
+        half=np.concatenate([half, area_half[with_area] + BULLET_MARGIN_SINGLE]).astype(np.float32),
+    )

@@ -15,10 +15,14 @@ def initial(num_worlds: int, num_objects: int) -> Float[Array, "W O"]:
 
 
 def update(
-    model: StateModel, max_temperature: Float[Array, "W O"], temperature: Float[Array, "W O"]
+    model: StateModel,
+    max_temperature: Float[Array, "W O"],
+    temperature: Float[Array, "W O"],
+    in_use: Bool[Array, "W O"],
 ) -> Float[Array, "W O"]:
-    """Takes this step's temperature into account."""
-    return jnp.where(model.parameters.thermal, jnp.maximum(max_temperature, temperature), max_temperature)
+    """Takes this step's temperature into account; parked objects (`in_use` false) keep theirs, halves -inf."""
+    counts = in_use & model.parameters.thermal
+    return jnp.where(counts, jnp.maximum(max_temperature, temperature), max_temperature)
 
 
 def set_cooked(
