@@ -8,7 +8,7 @@ JOBS ?= 2
 PYTEST_ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-slow test-gpu check homes-check format bench clean distclean
+.PHONY: help setup demo test test-slow test-gpu check docs homes-check format bench clean distclean
 
 help:
 	@echo "make demo       convert the small home, run it, cook a fish in it; leaves pictures, a plot, a film, a report"
@@ -16,6 +16,7 @@ help:
 	@echo "make test-slow  the tests that take long"
 	@echo "make test-gpu   the tests that need a CUDA device"
 	@echo "make check      ruff and pyright"
+	@echo "make docs       the documentation site, in out/site/"
 	@echo "make homes-check  build and convert all homes anew and compare them byte for byte with scenes_mjcf/"
 	@echo "make format     let ruff put the code in order"
 	@echo "make bench      the benchmarks of the native engine; results in benchmarks/results/"
@@ -62,6 +63,10 @@ check: setup
 	@$(BIN)/ruff check
 	@$(BIN)/ruff format --check
 	@PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright
+
+docs: setup
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --quiet
+	@echo "wrote out/site/index.html"
 
 # With a cache of its own, so that nothing is taken from an earlier run. Engine profiles lie beside the scenes but are
 # measured, not converted.
