@@ -69,7 +69,7 @@ def measure(home: str, args: Args) -> dict[str, Any]:
     pusher = start_pushing(reach, args.worlds, scene.model.nu)
     touched, awake = [], []
     for step in range(round(args.seconds / seconds)):
-        pusher = act(pusher, view.object_com, view.agent_pos[:, 0], np.full(args.worlds, step, np.int32))
+        pusher = act(pusher, view.object_com, view.agent.base_pos[:, 0], np.full(args.worlds, step, np.int32))
         physics, view = engine.step(physics, np.asarray(pusher.ctrl))
         for w in range(args.worlds):
             data = engine.to_mujoco(physics, w)[1]

@@ -41,7 +41,7 @@ def pusher(case: Case):
     def control(batch, pusher):
         world = batch.world
         view = world.view
-        pusher = push(case.reach, pusher, view.object_com, view.agent_pos[:, 0], world.key, world.step, 1 / 30)
+        pusher = push(case.reach, pusher, view.object_com, view.agent.base_pos[:, 0], world.key, world.step, 1 / 30)
         return pusher.ctrl, pusher
 
     return control

@@ -101,7 +101,7 @@ def record(
     pusher, rows, awake = start_pushing(reach, 1, scene.model.nu), [], []
     for step in range(steps):
         view = world.view
-        pusher = act(pusher, view.object_com, view.agent_pos[:, 0], np.array([step], np.int32))
+        pusher = act(pusher, view.object_com, view.agent.base_pos[:, 0], np.array([step], np.int32))
         rows.append(np.asarray(pusher.ctrl[0], np.float64))
         world.engine_step(rows[-1])
         awake.append(int(np.asarray(world.view.awake).sum()))

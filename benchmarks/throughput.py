@@ -123,7 +123,7 @@ def _program(case: Case, worlds: Worlds, watch: Watch, disturbed: bool, what: st
         if camera is not None:
             images = camera(physics, view, batch.world.states)
             seen += images.rgb.astype(jnp.float32).mean() + images.depth.mean()
-        return (batch, pusher, view.object_com, view.agent_pos[:, 0]), (seen, watch.step(physics))
+        return (batch, pusher, view.object_com, view.agent.base_pos[:, 0]), (seen, watch.step(physics))
 
     def physics(carry, _):
         """Of the view only what the hand needs, unless the whole of it is asked for."""
@@ -134,7 +134,10 @@ def _program(case: Case, worlds: Worlds, watch: Watch, disturbed: bool, what: st
         if what == "view":
             world = world.replace(view=view)
         seen = view.object_com[:, 0, 2].mean()
-        return (batch.replace(world=world), pusher, view.object_com, view.agent_pos[:, 0]), (seen, watch.step(state))
+        return (batch.replace(world=world), pusher, view.object_com, view.agent.base_pos[:, 0]), (
+            seen,
+            watch.step(state),
+        )
 
     body = physics if what in ("physics", "view") else full
     call = jax.jit(lambda carry: jax.lax.scan(body, carry, None, STEPS), donate_argnums=0)
@@ -142,7 +145,7 @@ def _program(case: Case, worlds: Worlds, watch: Watch, disturbed: bool, what: st
     pusher = start_pushing(case.reach, engine.num_worlds, case.scene.model.nu)
     # Copies: what is donated must not be in the batch as well.
     view = batch.world.view
-    return call, (batch, pusher, view.object_com + 0.0, view.agent_pos[:, 0] + 0.0)
+    return call, (batch, pusher, view.object_com + 0.0, view.agent.base_pos[:, 0] + 0.0)
 
 
 @contextlib.contextmanager

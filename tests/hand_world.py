@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ig2mj.engine.view import PhysicsView
+from ig2mj.engine.view import SCHEMA, PhysicsView, axis_sizes, blank_view, faults, replace_fields
 from ig2mj.scene.tables import LinkKind, PieceKind, SceneTables
 from ig2mj.states import (
     ExtendedStates,
@@ -114,7 +114,8 @@ class HandWorld:
         fingers: Sequence[Sequence[float]] = (),
         agent_pos: Sequence[float] = (0.0, 0.0, 0.0),
         eye: tuple[Sequence[float], Sequence[float]] = ((0, 0, 1), IDENTITY),
-        grasped: Sequence[str] = (),
+        held: Sequence[str] = (),
+        agent_touches: Sequence[str] = (),
         worlds: int = 1,
     ) -> PhysicsView:
         """A view in which named objects are elsewhere than their `Thing` says; `force` is on ("knife", "apple")."""
@@ -129,7 +130,7 @@ class HandWorld:
         for (a, b), newtons in (force or {}).items():
             pressed[owner == self.index[a], self.index[b]] = newtons
         joint_pos = [q for t in self.things for q in (joints or {}).get(t.name, [j[0] for j in t.joints])]
-        held = np.array([[t.name in grasped for t in self.things]], bool)
+        of_hand = np.array([[t.name in held for t in self.things]], bool)
         agents = slice(None) if self.agent else slice(0, 0)
         fields = dict(
             object_pos=at,
@@ -145,18 +146,26 @@ class HandWorld:
             touching=touch,
             link_force=pressed,
             awake=np.ones(len(self.things), bool),
-            agent_pos=np.array([agent_pos])[agents],
+            held=of_hand[agents],
+        )
+        of_agent = dict(
+            base_pos=np.array([agent_pos])[agents],
+            base_quat=np.array([IDENTITY])[agents],
             eye_pos=np.array([eye[0]])[agents],
             eye_quat=np.array([eye[1]])[agents],
+            hand_pos=np.array([agent_pos])[agents],
+            hand_quat=np.array([IDENTITY])[agents],
             finger_pos=np.array(fingers, float).reshape(-1, 3),
-            grasped=held[agents],
+            finger_quat=np.tile(IDENTITY, (len(fingers), 1)),
+            touching=np.array([[t.name in agent_touches for t in self.things]], bool)[agents],
         )
-        return PhysicsView(
-            **{
-                name: jnp.asarray(np.repeat(f[None], worlds, axis=0), f.dtype if f.dtype == bool else jnp.float32)
-                for name, f in fields.items()
-            }
+        given = fields | {f"agent.{name}": array for name, array in of_agent.items()}
+        sizes = axis_sizes(self.tables, worlds) | {"F": len(fingers)}
+        view = replace_fields(
+            blank_view(sizes), {n: np.repeat(f[None], worlds, axis=0).astype(SCHEMA[n].dtype) for n, f in given.items()}
         )
+        assert not faults(view, sizes)
+        return jax.tree.map(jnp.asarray, view)
 
     def _boxes(self, pos: np.ndarray, quat: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         low, high = np.zeros((len(pos), 3)), np.zeros((len(pos), 3))
@@ -228,8 +237,27 @@ class HandWorld:
             agent_body=np.zeros(agents, int),
             agent_camera=np.zeros(agents, int),
             agent_fovy=np.full(agents, fovy, np.float32),
+            body_agent=np.full(number + 1, -1),
+            body_hand=np.full(number + 1, -1),
+            agent_joint_names=(),
+            agent_joint_agent=np.zeros(0, int),
+            agent_joint_qposadr=np.zeros(0, int),
+            agent_joint_dofadr=np.zeros(0, int),
+            agent_joint_lower=np.zeros(0),
+            agent_joint_upper=np.zeros(0),
+            actuator_agent=np.zeros(0, int),
+            hand_body=np.zeros(agents, int),
+            hand_agent=np.zeros(agents, int),
             finger_body=np.zeros(self.fingers, int),
             finger_agent=np.zeros(self.fingers, int),
+            finger_hand=np.zeros(self.fingers, int),
+            graspable_body=np.flatnonzero([not t.fixed for t in things]) + 1,
+            graspable_object=np.flatnonzero([not t.fixed for t in things]),
+            graspable_joint=np.full(sum(not t.fixed for t in things), -1),
+            orientation_object=np.zeros(0, int),
+            orientation_quat=np.zeros((0, 4)),
+            orientation_prob=np.zeros(0),
+            orientation_size=np.zeros((0, 3)),
         )
 
 

@@ -87,7 +87,7 @@ def test_two_hands_have_names_of_their_own(tiny_home_folder):
     assert scene.tables.agent_names == ("left", "right")
     assert scene.model.nu == 32
     view = ig2mj.Simulation(scene).view
-    assert view.agent_pos[0, :, 0] == pytest.approx([-1, -0.5])
+    assert view.agent.base_pos[0, :, 0] == pytest.approx([-1, -0.5])
 
 
 def test_the_hand_is_a_robot_whose_actions_are_its_controls(tiny_home_folder):

@@ -35,7 +35,7 @@ def pushed(home, worlds: int, steps: int):
     pusher, course = start_pushing(reach, worlds, scene.model.nu), []
     for step in range(steps):
         number = np.full(worlds, step, np.int32)
-        pusher = act(pusher, view.object_com, view.agent_pos[:, 0], key, number, seconds=SECONDS)
+        pusher = act(pusher, view.object_com, view.agent.base_pos[:, 0], key, number, seconds=SECONDS)
         before = view
         physics, view = engine.step(physics, np.asarray(pusher.ctrl))
         course.append((before, pusher))
@@ -56,7 +56,7 @@ def test_things_are_moved_within_five_seconds(three_worlds):
 def test_controls_are_never_far_ahead_of_the_hand(three_worlds):
     _, course, reach = three_worlds
     for view, pusher in course:
-        ahead = np.asarray(pusher.ctrl)[:, :3] + reach.start - np.asarray(view.agent_pos)[:, 0]
+        ahead = np.asarray(pusher.ctrl)[:, :3] + reach.start - np.asarray(view.agent.base_pos)[:, 0]
         assert np.abs(ahead).max() <= LEASH + 1e-5
 
 
@@ -78,7 +78,7 @@ def test_what_lies_too_far_away_is_not_followed(three_worlds):
     _, course, reach = three_worlds
     view, pusher = course[60]
     away = np.asarray(view.object_com) + np.array([2.0, 0.0, 0.0], np.float32)
-    palm = np.asarray(view.agent_pos)[:, 0]
+    palm = np.asarray(view.agent.base_pos)[:, 0]
     key = episode_keys(0, np.arange(3), np.zeros(3, np.int32))
     low, high = reach.nodes.min(0) - 0.5, reach.nodes.max(0) + 0.5
     act = jax.jit(functools.partial(push, reach), static_argnames="seconds")
@@ -94,7 +94,7 @@ def test_a_world_without_numbers_keeps_its_controls(three_worlds):
     view, pusher = course[30]
     lost = np.array(view.object_com)
     lost[1] = np.nan
-    palm = np.array(view.agent_pos)[:, 0]
+    palm = np.array(view.agent.base_pos)[:, 0]
     palm[1] = np.nan
     key = episode_keys(0, np.arange(3), np.zeros(3, np.int32))
     after = push(reach, pusher, lost, palm, key, np.full(3, 30, np.int32), SECONDS)

@@ -208,7 +208,7 @@ def test_a_weld_wakes_what_it_holds_and_lifts_it(full, asleep):
     assert not full.awake(view, "knife").any()
     _, view = full.run(physics, 30)
     assert full.z(view, "box")[0] > 0.6 and full.z(view, "box")[1] < 0.46
-    assert np.asarray(view.grasped)[:, 0, full.index("box")].tolist() == [True, False]
+    assert np.asarray(view.held)[:, 0, full.index("box")].tolist() == [True, False]
 
 
 def test_what_is_let_go_falls(full, asleep):

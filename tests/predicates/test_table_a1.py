@@ -205,7 +205,7 @@ def test_in_fov_of_agent_needs_a_free_line_of_sight():
 
 
 def test_in_hand_of_agent_is_about_the_object_held():
-    view = HOME.view(grasped=["rag"])
+    view = HOME.view(held=["rag"])
     assert _holds("(in_hand_of_agent rag)", view)
     assert not _holds("(in_hand_of_agent fish)", view)  # bug 19.4: in iGibson's physical mode everything is
 
@@ -237,7 +237,7 @@ def test_nan_poses_never_make_a_predicate_true(name):
         {"fish": nowhere, "fridge": (3, 0, 1)},
         joints={"fridge": [np.nan]},
         touching=[("fish", "fridge"), ("fish", "floor")],
-        grasped=["fish"],
+        held=["fish"],
         agent_pos=(3, 0, 1),
     )
     first = "fridge" if name == "open" else "fish"

@@ -140,11 +140,11 @@ def rollout(worlds: Worlds, reach, batch, length: int):
         batch, _ = worlds.step(batch, pusher.ctrl)
         view = batch.world.view
         ever |= batch.world.physics.overflow
-        return (batch, pusher, view.object_com, view.agent_pos[:, 0], ever), None
+        return (batch, pusher, view.object_com, view.agent.base_pos[:, 0], ever), None
 
     view = batch.world.view
     pusher = start_pushing(reach, engine.num_worlds, engine.host_model.nu)
-    carry = (batch, pusher, view.object_com, view.agent_pos[:, 0], jnp.zeros(engine.num_worlds, jnp.int32))
+    carry = (batch, pusher, view.object_com, view.agent.base_pos[:, 0], jnp.zeros(engine.num_worlds, jnp.int32))
     carry = jax.jit(lambda c: jax.lax.scan(body, c, None, length)[0])(carry)
     return carry[0], np.asarray(carry[4])
 

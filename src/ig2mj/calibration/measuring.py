@@ -140,7 +140,7 @@ class _Disturbance:
     def controls(self, view, pusher: Pusher | None, key: jax.Array, step: jax.Array) -> Pusher | None:
         if self.reach is None or pusher is None:
             return None
-        return push(self.reach, pusher, view.object_com, view.agent_pos[:, 0], key, step, self.seconds)
+        return push(self.reach, pusher, view.object_com, view.agent.base_pos[:, 0], key, step, self.seconds)
 
 
 def _measure_native(

@@ -6,7 +6,7 @@ from its present place along the way it came. Pure JAX, a few table look-ups per
     reach = find_reach(ig2mj.load_scene(home))
     scene = ig2mj.load_scene(home, [FloatingHand(pos=reach.start)])
     pusher = start_pushing(reach, num_worlds, scene.model.nu)
-    pusher = push(reach, pusher, view.object_com, view.agent_pos[:, 0], key, step, seconds)     # then pusher.ctrl
+    pusher = push(reach, pusher, view.object_com, view.agent.base_pos[:, 0], key, step, seconds)     # then pusher.ctrl
 
 Axes: W worlds, N reachable objects.
 """

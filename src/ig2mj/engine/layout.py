@@ -26,15 +26,18 @@ class ModelLayout:
       object_qposadr, object_dofadr: addresses of the free joint of the object's main body, -1 for fixed objects.
       object_trees: [O, T] the object owns bodies of the tree.
       extra_object, extra_qposadr, extra_dofadr: free joints of bodies split off an object.
-      unit_object, unit_tree: owner and tree of each unit; tree -1: the object's static part.
-      body_unit, geom_unit: unit of each body and geom; -1: no object's (the world, agents).
-      collides: [G] the geom takes part in contacts and belongs to an object.
+      unit_object, unit_agent, unit_tree: owner of each unit, an object or an agent (the other one is -1), and its
+        tree; tree -1: the owner's static part.
+      body_unit, geom_unit: unit of each body and geom; -1: nobody's (the world).
+      collides: [G] the geom takes part in contacts and belongs to an object or an agent.
       link_of_geom: [G] annotated link whose geom it is, -1 none.
+      finger_of_geom, graspable_of_geom: [G] finger link, and graspable body, whose geom it is, -1 none. What is welded
+        to a graspable body is part of it.
       link_tree: [L] tree of the link's body, -1: static.
       qpos_tree, qpos_dof: [nq] tree and first degree of freedom of the joint that owns the coordinate.
       qpos_ndof: [nq] number of degrees of freedom of that joint.
       equality_tree: [E, 2] trees that an equality constraint joins, -1: the world or nothing.
-      grasp_equality, grasp_agent, grasp_object: equality constraints between an agent's body and an object's.
+      grasp_equality, grasp_hand, grasp_object: equality constraints between a hand's body and an object's.
     """
 
     object_qposadr: Int[np.ndarray, "O"]
@@ -44,23 +47,31 @@ class ModelLayout:
     extra_qposadr: Int[np.ndarray, "X"]
     extra_dofadr: Int[np.ndarray, "X"]
     unit_object: Int[np.ndarray, "U"]
+    unit_agent: Int[np.ndarray, "U"]
     unit_tree: Int[np.ndarray, "U"]
     body_unit: Int[np.ndarray, "B"]
     geom_unit: Int[np.ndarray, "G"]
     collides: Bool[np.ndarray, "G"]
     link_of_geom: Int[np.ndarray, "G"]
+    finger_of_geom: Int[np.ndarray, "G"]
+    graspable_of_geom: Int[np.ndarray, "G"]
     link_tree: Int[np.ndarray, "L"]
     qpos_tree: Int[np.ndarray, "nq"]
     qpos_dof: Int[np.ndarray, "nq"]
     qpos_ndof: Int[np.ndarray, "nq"]
     equality_tree: Int[np.ndarray, "E 2"]
-    grasp_equality: Int[np.ndarray, "Y"]
-    grasp_agent: Int[np.ndarray, "Y"]
-    grasp_object: Int[np.ndarray, "Y"]
+    grasp_equality: Int[np.ndarray, "grasps"]
+    grasp_hand: Int[np.ndarray, "grasps"]
+    grasp_object: Int[np.ndarray, "grasps"]
 
     @property
     def num_units(self) -> int:
         return len(self.unit_object)
+
+    @property
+    def num_object_units(self) -> int:
+        """V: units of objects are the first ones."""
+        return int((self.unit_object >= 0).sum())
 
 
 def make_layout(model: mujoco.MjModel, tables: SceneTables) -> ModelLayout:
@@ -73,8 +84,10 @@ def make_layout(model: mujoco.MjModel, tables: SceneTables) -> ModelLayout:
     moving = owned & (body_tree >= 0)
     object_trees[body_object[moving], body_tree[moving]] = True
 
-    pairs = np.stack([body_object, body_tree], 1)
-    units = np.unique(pairs[owned], axis=0) if owned.any() else np.zeros((0, 2), int)
+    # Objects are owners 0 to O - 1, agents those from O on.
+    owner = np.where(owned, body_object, np.where(tables.body_agent >= 0, num_objects + tables.body_agent, -1))
+    pairs = np.stack([owner, body_tree], 1)
+    units = np.unique(pairs[owner >= 0], axis=0) if (owner >= 0).any() else np.zeros((0, 2), int)
     number = {tuple(pair): k for k, pair in enumerate(units.tolist())}
     body_unit = np.array([number.get(tuple(pair), -1) for pair in pairs.tolist()], int)
 
@@ -93,13 +106,16 @@ def make_layout(model: mujoco.MjModel, tables: SceneTables) -> ModelLayout:
     with_geom = np.flatnonzero(tables.link_geom >= 0)
     link_of_geom[tables.link_geom[with_geom]] = with_geom
 
+    finger_of_body = _with_welded(model, tables.finger_body)
+    graspable_of_body = _with_welded(model, tables.graspable_body)
+
     width = np.where(model.jnt_type == mujoco.mjtJoint.mjJNT_FREE, 7, 1)
     width[model.jnt_type == mujoco.mjtJoint.mjJNT_BALL] = 4
     joint_ndof = np.select([width == 7, width == 4], [6, 3], 1)
-    owner = np.repeat(np.arange(model.njnt), width)
+    joint = np.repeat(np.arange(model.njnt), width)
 
     equality_body = _equality_bodies(model)
-    equality, agent, grasped = _grasps(model, tables, equality_body)
+    equality, hand, grasped = _grasps(tables, equality_body)
     return ModelLayout(
         object_qposadr=object_qposadr,
         object_dofadr=object_dofadr,
@@ -107,21 +123,34 @@ def make_layout(model: mujoco.MjModel, tables: SceneTables) -> ModelLayout:
         extra_object=body_object[model.jnt_bodyid[extra]],
         extra_qposadr=np.asarray(model.jnt_qposadr)[extra],
         extra_dofadr=np.asarray(model.jnt_dofadr)[extra],
-        unit_object=units[:, 0],
+        unit_object=np.where(units[:, 0] < num_objects, units[:, 0], -1),
+        unit_agent=np.where(units[:, 0] < num_objects, -1, units[:, 0] - num_objects),
         unit_tree=units[:, 1],
         body_unit=body_unit,
         geom_unit=body_unit[geom_body],
         collides=collides,
         link_of_geom=link_of_geom,
+        finger_of_geom=finger_of_body[geom_body],
+        graspable_of_geom=graspable_of_body[geom_body],
         link_tree=body_tree[tables.link_body],
-        qpos_tree=body_tree[model.jnt_bodyid[owner]],
-        qpos_dof=np.asarray(model.jnt_dofadr)[owner],
-        qpos_ndof=joint_ndof[owner],
+        qpos_tree=body_tree[model.jnt_bodyid[joint]],
+        qpos_dof=np.asarray(model.jnt_dofadr)[joint],
+        qpos_ndof=joint_ndof[joint],
         equality_tree=np.where(equality_body >= 0, body_tree[equality_body], -1),
         grasp_equality=equality,
-        grasp_agent=agent,
+        grasp_hand=hand,
         grasp_object=grasped,
     )
+
+
+def _with_welded(model: mujoco.MjModel, bodies: np.ndarray) -> np.ndarray:
+    """Place in `bodies` of each body [B] that is one of them or hangs on one by no joint; -1 for all others."""
+    place = np.full(model.nbody, -1)
+    place[bodies] = np.arange(len(bodies))
+    for body in range(1, model.nbody):  # parents come first
+        if place[body] < 0 and model.body_jntnum[body] == 0:
+            place[body] = place[model.body_parentid[body]]
+    return place
 
 
 def _equality_bodies(model: mujoco.MjModel) -> np.ndarray:
@@ -138,20 +167,15 @@ def _equality_bodies(model: mujoco.MjModel) -> np.ndarray:
     return out
 
 
-def _grasps(
-    model: mujoco.MjModel, tables: SceneTables, equality_body: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Welds and connects that join an agent to an object: equality ids, agents, objects."""
-    agent_of_root = {int(model.body_rootid[b]): a for a, b in enumerate(tables.agent_body)}
-    for body, agent in zip(tables.finger_body, tables.finger_agent, strict=True):
-        agent_of_root[int(model.body_rootid[body])] = int(agent)
+def _grasps(tables: SceneTables, equality_body: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Welds and connects that join a hand to an object: equality ids, hands, objects."""
     rows = []
     for e, bodies in enumerate(equality_body):
         for one, other in (bodies, bodies[::-1]):
             if one < 0 or other < 0:
                 continue
-            agent, held = agent_of_root.get(int(model.body_rootid[one])), int(tables.body_object[other])
-            if agent is not None and held >= 0:
-                rows.append((e, agent, held))
+            hand, held = int(tables.body_hand[one]), int(tables.body_object[other])
+            if hand >= 0 and held >= 0:
+                rows.append((e, hand, held))
     table = np.array(rows, int).reshape(-1, 3)
     return table[:, 0], table[:, 1], table[:, 2]

@@ -1,60 +1,180 @@
 """`PhysicsView`: what states, predicates, sensors and tasks know of physics. Every engine can produce it.
 
-It is the narrow waist between engines and everything above them. All arrays begin with the world axis.
+It is the narrow waist between engines and everything above them. All arrays begin with the world axis. The annotations
+of the two classes are the one schema of the view (`SCHEMA`), from which engines, programs and tests know its fields.
 
 Axes: W worlds, O objects (order of the manifest), B bodies of the MuJoCo model (0 is the world), L annotated links
-(order of `SceneTables.link_*`), J openable joints (order of `SceneTables.openable_*`), A agents (0 or 1),
-F finger links of all agents.
+(order of `SceneTables.link_*`), J openable joints (order of `SceneTables.openable_*`), A agents, Q scalar joints of all
+agents, H hands, F finger links, Y graspable bodies (orders of `SceneTables.agent_joint_*`, `hand_*`, `finger_*`,
+`graspable_*`).
 """
 
 from __future__ import annotations
+
+import dataclasses
+import typing
+from collections.abc import Mapping
+from typing import Any
 
 import jax
 import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float
 
+from ig2mj.scene.tables import SceneTables
+
 Array = jax.Array | np.ndarray
 """The native engine gives numpy arrays, the MJX engines JAX's; jitted functions take both."""
 
 
+def _field(doc: str) -> Any:
+    return dataclasses.field(metadata={"doc": doc})
+
+
+@struct.dataclass
+class AgentView:
+    """All agents, their hands and fingers at the end of a control step; world frame, SI units, w-x-y-z quaternions."""
+
+    base_pos: Float[Array, "W A 3"] = _field("origin of the base body")
+    base_quat: Float[Array, "W A 4"] = _field("orientation of the base body")
+    base_linvel: Float[Array, "W A 3"] = _field("velocity of the base body's origin, m/s")
+    base_angvel: Float[Array, "W A 3"] = _field("angular velocity of the base body, rad/s")
+    eye_pos: Float[Array, "W A 3"] = _field("camera; the base body's origin for an agent without a camera")
+    eye_quat: Float[Array, "W A 4"] = _field("orientation of the camera (MuJoCo's axes: -z forward, y up)")
+    joint_pos: Float[Array, "W Q"] = _field("positions of scalar joints, rad or m")
+    joint_vel: Float[Array, "W Q"] = _field("velocities of scalar joints, rad/s or m/s")
+    hand_pos: Float[Array, "W H 3"] = _field("origin of the palm or end effector")
+    hand_quat: Float[Array, "W H 4"] = _field("orientation of the palm or end effector")
+    hand_linvel: Float[Array, "W H 3"] = _field("velocity of the palm's origin, m/s")
+    hand_angvel: Float[Array, "W H 3"] = _field("angular velocity of the palm, rad/s")
+    finger_pos: Float[Array, "W F 3"] = _field("origin of each finger link")
+    finger_quat: Float[Array, "W F 4"] = _field("orientation of each finger link")
+    finger_force: Float[Array, "W F Y"] = _field(
+        "N; normal forces of all contacts of the finger link with the graspable body added up, the largest such sum of "
+        "any physics step of this control step"
+    )
+    touching: Bool[Array, "W A O"] = _field("any part of the agent touches the object; as `touching` of objects")
+
+
 @struct.dataclass
 class PhysicsView:
-    """A snapshot of physics at the end of a control step, world frame, metres, w-x-y-z quaternions, float32.
+    """A snapshot of physics at the end of a control step: world frame, SI units, w-x-y-z quaternions, float32.
 
-    Attributes:
-      object_pos, object_quat: frame of each object's main body.
-      object_com: centre of mass of each object's main body. iGibson's "position" of an object (spec/states.md 4.1).
-      aabb_low, aabb_high: world box over all bodies of the object; the tight one or iGibson's rotated-local-box rule,
-        as the engine was told.
-      body_pos, body_quat: every body's frame; collision pieces are posed with it.
-      link_pos, link_quat: annotated links: the site's, or the geom's, frame.
-      joint_pos: openable joints.
-      touching: surfaces no further apart than the engine's tolerance (3 mm), symmetric, diagonal false. Remembered
-        for pairs that sleep (design section 2, fact 7).
-      link_force: the largest normal force, newtons, of any contact and any physics step of this control step, of each
-        annotated link's geom against each object; 0 for links that are sites.
-      awake: the object has a body that moves or may move now; fixed objects with no joints are never awake.
-      agent_pos: the agent's base body. eye_pos, eye_quat: its camera (MuJoCo camera axes: -z forward, y up).
-      finger_pos: frames of finger links.
-      grasped: the agent holds the object (assistive grasping is active on it).
+    Contacts, and with them `touching` and forces, are those of the engine's last collision stage (see the engines).
     """
 
-    object_pos: Float[Array, "W O 3"]
-    object_quat: Float[Array, "W O 4"]
-    object_com: Float[Array, "W O 3"]
-    aabb_low: Float[Array, "W O 3"]
-    aabb_high: Float[Array, "W O 3"]
-    body_pos: Float[Array, "W B 3"]
-    body_quat: Float[Array, "W B 4"]
-    link_pos: Float[Array, "W L 3"]
-    link_quat: Float[Array, "W L 4"]
-    joint_pos: Float[Array, "W J"]
-    touching: Bool[Array, "W O O"]
-    link_force: Float[Array, "W L O"]
-    awake: Bool[Array, "W O"]
-    agent_pos: Float[Array, "W A 3"]
-    eye_pos: Float[Array, "W A 3"]
-    eye_quat: Float[Array, "W A 4"]
-    finger_pos: Float[Array, "W F 3"]
-    grasped: Bool[Array, "W A O"]
+    object_pos: Float[Array, "W O 3"] = _field("origin of the object's main body")
+    object_quat: Float[Array, "W O 4"] = _field("orientation of the main body")
+    object_linvel: Float[Array, "W O 3"] = _field("velocity of the main body's origin, m/s; 0 for fixed objects")
+    object_angvel: Float[Array, "W O 3"] = _field("angular velocity of the main body, rad/s; 0 for fixed objects")
+    object_com: Float[Array, "W O 3"] = _field(
+        "centre of mass of the main body; iGibson's position of an object (spec/states.md 4.1)"
+    )
+    aabb_low: Float[Array, "W O 3"] = _field(
+        "lowest corner of the world box over all bodies of the object, by the engine's box rule"
+    )
+    aabb_high: Float[Array, "W O 3"] = _field("highest corner of that box")
+    body_pos: Float[Array, "W B 3"] = _field("every body's origin; collision pieces are posed with it")
+    body_quat: Float[Array, "W B 4"] = _field("every body's orientation")
+    link_pos: Float[Array, "W L 3"] = _field("annotated links: origin of the site, or of the geom")
+    link_quat: Float[Array, "W L 4"] = _field("annotated links: orientation of the site, or of the geom")
+    joint_pos: Float[Array, "W J"] = _field("positions of openable joints, rad or m")
+    touching: Bool[Array, "W O O"] = _field(
+        "surfaces no further apart than the engine's tolerance (3 mm); symmetric, the diagonal is false. Remembered "
+        "for pairs that sleep (design section 2, fact 7)"
+    )
+    link_force: Float[Array, "W L O"] = _field(
+        "N; largest normal force of any contact and any physics step of this control step of the annotated link's geom "
+        "with the object; 0 for links that are sites"
+    )
+    awake: Bool[Array, "W O"] = _field("some body of the object moves or may move now; never where it has no joints")
+    held: Bool[Array, "W H O"] = _field("a grasp equality of the hand is active on the object")
+    agent: AgentView = _field("agents, hands and fingers")
+
+
+@dataclasses.dataclass(frozen=True)
+class ViewField:
+    """One array of the view.
+
+    Attributes:
+      name: its path, such as "object_pos" or "agent.hand_pos". axes: letters of axes with a size of the scene, numbers.
+      dtype: float32 or bool. doc: what it is.
+    """
+
+    name: str
+    axes: tuple[str | int, ...]
+    dtype: np.dtype
+    doc: str
+
+    def shape(self, sizes: Mapping[str, int]) -> tuple[int, ...]:
+        """Its shape where the axes have these sizes (see `axis_sizes`)."""
+        return tuple(axis if isinstance(axis, int) else sizes[axis] for axis in self.axes)
+
+
+def _schema(view: type, prefix: str = "") -> dict[str, ViewField]:
+    found: dict[str, ViewField] = {}
+    hints = typing.get_type_hints(view)
+    for field in dataclasses.fields(view):
+        name, hint = prefix + field.name, hints[field.name]
+        if dataclasses.is_dataclass(hint):
+            found |= _schema(typing.cast(type, hint), f"{name}.")
+            continue
+        annotation = typing.get_args(hint)[0]  # of numpy's array and of JAX's: the same for both
+        axes = tuple(int(axis) if axis.isdigit() else axis for axis in annotation.dim_str.split())
+        dtype = np.dtype(bool if "bool" in annotation.dtypes else np.float32)
+        found[name] = ViewField(name, axes, dtype, field.metadata["doc"])
+    return found
+
+
+SCHEMA: dict[str, ViewField] = _schema(PhysicsView)
+"""All arrays of the view by path, in the order of its leaves as a pytree."""
+
+
+def axis_sizes(tables: SceneTables, num_worlds: int) -> dict[str, int]:
+    """How long each axis of the view is in a scene."""
+    return {
+        "W": num_worlds,
+        "O": tables.num_objects,
+        "B": len(tables.body_object),
+        "L": len(tables.link_object),
+        "J": len(tables.openable_object),
+        "A": len(tables.agent_body),
+        "Q": len(tables.agent_joint_qposadr),
+        "H": len(tables.hand_body),
+        "F": len(tables.finger_body),
+        "Y": len(tables.graspable_body),
+    }
+
+
+def read_field(view: PhysicsView, name: str) -> Array:
+    """The array at a path of `SCHEMA`."""
+    return getattr(view.agent, name[6:]) if name.startswith("agent.") else getattr(view, name)
+
+
+def assemble(fields: Mapping[str, Any]) -> PhysicsView:
+    """A view from all of its arrays by path."""
+    agent = AgentView(**{name[6:]: array for name, array in fields.items() if name.startswith("agent.")})
+    return PhysicsView(**{n: a for n, a in fields.items() if not n.startswith("agent.")}, agent=agent)
+
+
+def replace_fields(view: PhysicsView, fields: Mapping[str, Any]) -> PhysicsView:
+    """The view with other arrays at some paths."""
+    return assemble({name: fields[name] if name in fields else read_field(view, name) for name in SCHEMA})
+
+
+def blank_view(sizes: Mapping[str, int]) -> PhysicsView:
+    """A view of zeros and falses (numpy)."""
+    return assemble({name: np.zeros(field.shape(sizes), field.dtype) for name, field in SCHEMA.items()})
+
+
+def faults(view: PhysicsView, sizes: Mapping[str, int]) -> list[str]:
+    """What is wrong with the shapes and dtypes of a view; nothing, for a sound one."""
+    found = []
+    for name, field in SCHEMA.items():
+        array = read_field(view, name)
+        if tuple(array.shape) != field.shape(sizes) or np.dtype(array.dtype) != field.dtype:
+            axes = " ".join(map(str, field.axes))
+            found.append(
+                f"{name} is {array.dtype}{list(array.shape)}, not {field.dtype}{list(field.shape(sizes))} [{axes}]"
+            )
+    return found

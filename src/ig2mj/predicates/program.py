@@ -20,7 +20,7 @@ import numpy as np
 from jax.extend.core import Jaxpr, Literal
 from jaxtyping import Bool, Float
 
-from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.engine.view import SCHEMA, Array, PhysicsView, assemble, read_field
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
@@ -30,7 +30,7 @@ from ig2mj.states.world import ExtendedStates, Swap
 
 T = TypeVar("T")
 
-FIELDS = tuple(field.name for field in dataclasses.fields(PhysicsView))
+FIELDS = tuple(SCHEMA)
 
 FIRST_MOVED = ("object_com", "touching", "joint_pos", "link_force")
 """Fields of the view that are looked at first: small, and among them is what changes when anything does."""
@@ -101,7 +101,7 @@ class StateProgram:
             self._trace(leaves, view, memo)
             assert self._whole is not None
         taken = [leaves[i] for i in self._takes]
-        return Found(*self._whole(taken, [getattr(view, name) for name in self.view_reads], memo))
+        return Found(*self._whole(taken, [read_field(view, name) for name in self.view_reads], memo))
 
     def with_leaves(self, states: ExtendedStates, places: list[int], leaves: list[Array]) -> ExtendedStates:
         """A copy of the states in which the leaves at some places are others.
@@ -123,7 +123,7 @@ class StateProgram:
         return new
 
     def _trace(self, leaves: list[Array], view: PhysicsView, memo: list[Array]) -> None:
-        fields = [getattr(view, name) for name in FIELDS]
+        fields = [read_field(view, name) for name in FIELDS]
         matters = inputs_that_matter(jax.make_jaxpr(self._whole_step)(leaves, fields, memo).jaxpr)
         read = [name for name, used in zip(FIELDS, matters[len(leaves) :], strict=False) if used]
         takes = [i for i in range(len(leaves)) if matters[i]]
@@ -144,7 +144,7 @@ class StateProgram:
     def _whole_step(self, leaves: list[Array], fields: list[Array], memo: list[Array]) -> tuple:
         """`Found` as a plain tuple; notes which leaves of the states it makes."""
         states: ExtendedStates = jax.tree.unflatten(self.structure, leaves)
-        view = PhysicsView(**dict(zip(FIELDS, fields, strict=True)))
+        view = assemble(dict(zip(FIELDS, fields, strict=True)))
         before: Memo = jax.tree.unflatten(self._memo_structure, memo)
         relations, after_memo = self.plan.evaluate_changed(view, before)
         after, swap, acts = events(self.model, states, view, relations)

@@ -25,7 +25,7 @@ from typing import NamedTuple
 import jax
 import numpy as np
 
-from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.engine.view import Array, PhysicsView, read_field
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.predicates.program import BODY_FIELDS, Found, StateProgram, status_of, swap_of
 from ig2mj.states.definitions import toggled
@@ -86,11 +86,11 @@ class StateStepper:
         """Whether the view has all that a step depends on as it was at the last whole step."""
         rows = self.program.rows
         for k, name in enumerate(self.program.view_reads):
-            now = getattr(view, name)
+            now = read_field(view, name)
             seen = self._seen[k]
             if now is seen:
                 continue
-            if name == "finger_pos" and self._fingers_away and self._away(view):
+            if name == "agent.finger_pos" and self._fingers_away and self._away(view):
                 continue
             if not isinstance(now, np.ndarray) or not isinstance(seen, np.ndarray):
                 return False  # on a device: to fetch it would take as long as the step
@@ -105,7 +105,7 @@ class StateStepper:
         return True
 
     def _away(self, view: PhysicsView) -> bool:
-        return isinstance(view.finger_pos, np.ndarray) and toggled.all_out_of_reach(self.program.model, view)
+        return isinstance(view.agent.finger_pos, np.ndarray) and toggled.all_out_of_reach(self.program.model, view)
 
     def _heat(self, last: Step, kept: Found) -> Step:
         states = last.states
@@ -133,9 +133,9 @@ class StateStepper:
         self._kept = None
         if quiet and not program.model.options.contact_heat_rate:
             self._kept = found
-            self._seen = [getattr(view, name) for name in program.view_reads]
+            self._seen = [read_field(view, name) for name in program.view_reads]
             self._bytes = [None] * len(self._seen)
-            self._fingers_away = "finger_pos" in program.view_reads and self._away(view)
+            self._fingers_away = "agent.finger_pos" in program.view_reads and self._away(view)
         return self._step._replace(swap=swap_of(found.swap)) if swapped else self._step
 
     def _put(self, places: list[int], leaves: list[Array]) -> None:

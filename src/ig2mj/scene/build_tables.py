@@ -8,7 +8,8 @@ import mujoco
 import numpy as np
 
 from ig2mj.errors import ManifestError
-from ig2mj.scene.manifest import AgentEntry, Manifest, ObjectEntry
+from ig2mj.scene.agent_tables import agent_columns
+from ig2mj.scene.manifest import Manifest, ObjectEntry
 from ig2mj.scene.pieces import make_pieces
 from ig2mj.scene.rooms import Rooms
 from ig2mj.scene.tables import LinkKind, SceneTables
@@ -73,7 +74,9 @@ def build_tables(
         **_link_columns(model, objects, body_object, find, file),
         **_piece_columns(model, geom_object, file),
         **_room_columns(manifest, rooms, file),
-        **_agent_columns(model, manifest.agents, find),
+        **_orientation_columns(objects),
+        **agent_columns(model, manifest.agents, find),
+        **_graspable_columns(model, objects, find),
     )
 
 
@@ -223,18 +226,26 @@ def _room_columns(manifest: Manifest, rooms: Rooms | None, file: object) -> dict
     }
 
 
-def _agent_columns(model: mujoco.MjModel, agents: list[AgentEntry], find: _Names) -> dict[str, Any]:
-    elements = [f"agent '{a.name}'" for a in agents]
-    camera = [-1 if a.camera is None else find("camera", a.camera, e) for a, e in zip(agents, elements, strict=True)]
-    fingers = [
-        (find("body", f, e), n) for n, (a, e) in enumerate(zip(agents, elements, strict=True)) for f in a.fingers
+def _graspable_columns(model: mujoco.MjModel, objects: list[ObjectEntry], find: _Names) -> dict[str, Any]:
+    """What hands can take hold of. iGibson's rule: spec/robots_tasks_sensors.md, assistive grasping."""
+    rows = [
+        (find("body", entry.bodies[0], f"object '{entry.name}'"), number, -1)
+        for number, entry in enumerate(objects)
+        if entry.assisted_grasp and not entry.fixed
     ]
-    finger_table = np.array(fingers, int).reshape(-1, 2)
+    openable = [(number, entry, o.joint) for number, entry in enumerate(objects) for o in entry.openable]
+    for column, (number, entry, joint) in enumerate(openable):
+        if entry.fixed:
+            rows.append((int(model.jnt_bodyid[find("joint", joint, f"object '{entry.name}'")]), number, column))
+    table = np.array(rows, int).reshape(-1, 3)
+    return {"graspable_body": table[:, 0], "graspable_object": table[:, 1], "graspable_joint": table[:, 2]}
+
+
+def _orientation_columns(objects: list[ObjectEntry]) -> dict[str, Any]:
+    rows = [(number, o) for number, entry in enumerate(objects) for o in entry.orientations]
     return {
-        "agent_names": tuple(a.name for a in agents),
-        "agent_body": np.array([find("body", a.body, e) for a, e in zip(agents, elements, strict=True)], int),
-        "agent_camera": np.array(camera, int),
-        "agent_fovy": np.array([0.0 if c < 0 else np.deg2rad(model.cam_fovy[c]) for c in camera]),
-        "finger_body": finger_table[:, 0],
-        "finger_agent": finger_table[:, 1],
+        "orientation_object": np.array([number for number, _ in rows], int),
+        "orientation_quat": np.array([o.quat for _, o in rows], np.float64).reshape(-1, 4),
+        "orientation_prob": np.array([o.prob for _, o in rows], np.float64),
+        "orientation_size": np.array([o.size for _, o in rows], np.float64).reshape(-1, 3),
     }

@@ -1,7 +1,8 @@
 """`SceneTables`: the scene's constants as numpy arrays, ready to be closed over by jitted functions.
 
 Axes: O objects, B bodies, G geoms, J openable joints, L annotated links, K convex collision pieces (one per collision
-geom), V vertices and N half-spaces of the largest piece (padded), A agents, F finger links.
+geom), V vertices and N half-spaces of the largest piece (padded), A agents, H hands, F finger links, Q scalar joints of
+agents, Y graspable bodies, I stable orientations, nu actuators.
 """
 
 from __future__ import annotations
@@ -55,7 +56,18 @@ class SceneTables:
       room_names: room instances; room_types: type of each. room_map: index + 1 of the room instance per pixel, 0 none;
         row is y, column is x (spec/dataset_format.md 2.5). room_resolution: metres a pixel.
       object_rooms: annotated rooms of fixed objects, [O, R].
-      agent_*: base body, camera id (-1 none), vertical field of view (radians). finger_body, finger_agent.
+      orientation_*: stable orientations, sorted by object: object, quaternion of its base, probability, size (m) of
+        the axis-aligned box that the object fills when it stands so.
+      agent_*: base body, camera id (-1 none), vertical field of view (radians).
+      body_agent, body_hand: agent and hand that each body is part of, -1 none. A hand is its palm, everything that
+        hangs on the palm, and its fingers.
+      agent_joint_*: hinges and slides of the agents' bodies, by agent and then in the model's order: name, agent,
+        addresses in qpos and qvel, range (rad or m; infinite where the joint has no limit).
+      actuator_agent: agent that each actuator moves, -1 none.
+      hand_*: palm or end effector body, agent. finger_*: finger link, its agent, its hand (-1: none is known).
+      graspable_*: bodies that a hand can take hold of: the main body of every movable object that allows assisted
+        grasps, then the moving link of every openable joint of fixed objects: body, object, and J of that joint (-1 for
+        a movable object).
     """
 
     object_names: tuple[str, ...]
@@ -94,14 +106,33 @@ class SceneTables:
     piece_vertices: Float[np.ndarray, "K V 3"]
     room_names: tuple[str, ...]
     room_types: tuple[str, ...]
-    room_map: Int[np.ndarray, "Y X"]
+    room_map: Int[np.ndarray, "rows columns"]
     room_resolution: float
     agent_names: tuple[str, ...]
     agent_body: Int[np.ndarray, "A"]
     agent_camera: Int[np.ndarray, "A"]
     agent_fovy: Float[np.ndarray, "A"]
+    body_agent: Int[np.ndarray, "B"]
+    body_hand: Int[np.ndarray, "B"]
+    agent_joint_names: tuple[str, ...]
+    agent_joint_agent: Int[np.ndarray, "Q"]
+    agent_joint_qposadr: Int[np.ndarray, "Q"]
+    agent_joint_dofadr: Int[np.ndarray, "Q"]
+    agent_joint_lower: Float[np.ndarray, "Q"]
+    agent_joint_upper: Float[np.ndarray, "Q"]
+    actuator_agent: Int[np.ndarray, "nu"]
+    hand_body: Int[np.ndarray, "H"]
+    hand_agent: Int[np.ndarray, "H"]
     finger_body: Int[np.ndarray, "F"]
     finger_agent: Int[np.ndarray, "F"]
+    finger_hand: Int[np.ndarray, "F"]
+    graspable_body: Int[np.ndarray, "Y"]
+    graspable_object: Int[np.ndarray, "Y"]
+    graspable_joint: Int[np.ndarray, "Y"]
+    orientation_object: Int[np.ndarray, "I"]
+    orientation_quat: Float[np.ndarray, "I 4"]
+    orientation_prob: Float[np.ndarray, "I"]
+    orientation_size: Float[np.ndarray, "I 3"]
 
     @property
     def num_objects(self) -> int:

@@ -3,7 +3,7 @@
 MJX-Warp keeps one flat contact list for all worlds (design section 2, fact 10), MJX-JAX one list per world; both are
 brought to one form, and reduced with one scatter.
 
-Axes: C contacts, U units, W worlds, L links, O objects.
+Axes: C contacts, U units, W worlds, L links, O objects, F finger links, Y graspable bodies.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from mujoco import mjx
 
 from ig2mj.engine.layout import ModelLayout
 from ig2mj.engine.view import Array
+from ig2mj.scene.tables import SceneTables
 
 
 @struct.dataclass
@@ -91,26 +92,39 @@ def touching_units(
     return jnp.where(fresh, now | now.swapaxes(1, 2), remembered)
 
 
-def link_forces(
-    contacts: Contacts,
-    layout: ModelLayout,
-    geom_object: Int[Array, "G"],
-    efc_force: Float[Array, "W N"],
-    pyramidal: bool,
-    num_objects: int,
-    num_links: int,
-) -> Float[Array, "W L O"]:
-    """Largest normal force (N) of a single contact between each annotated link's geom and each object."""
-    geom = jnp.maximum(contacts.geom, 0)
+def normal_forces(contacts: Contacts, efc_force: Float[Array, "W N"], pyramidal: bool) -> Float[Array, "C"]:
+    """Normal force (N) of every contact; what stands in rows without a contact means nothing."""
     address = contacts.efc_address
     rows = efc_force[jnp.clip(contacts.world, 0, efc_force.shape[0] - 1)[:, None], jnp.maximum(address, 0)]
     rows = jnp.where((address >= 0) & (address < efc_force.shape[1]), rows, 0.0)
-    normal = rows.sum(-1) if pyramidal else rows[:, 0]
+    return rows.sum(-1) if pyramidal else rows[:, 0]
+
+
+def link_forces(
+    contacts: Contacts, layout: ModelLayout, tables: SceneTables, normal: Float[Array, "C"], num_worlds: int
+) -> Float[Array, "W L O"]:
+    """Largest normal force (N) of a single contact between each annotated link's geom and each object."""
+    geom = jnp.maximum(contacts.geom, 0)
     link = jnp.asarray(layout.link_of_geom)[geom]
-    thing = jnp.asarray(geom_object)[geom]
-    force = jnp.zeros((efc_force.shape[0], num_links, num_objects), jnp.float32)
+    thing = jnp.asarray(tables.geom_object)[geom]
+    force = jnp.zeros((num_worlds, len(tables.link_object), tables.num_objects), jnp.float32)
     for side in (0, 1):
         usable = contacts.valid & (link[:, side] >= 0) & (thing[:, 1 - side] >= 0)
-        world = jnp.where(usable, contacts.world, force.shape[0])
+        world = jnp.where(usable, contacts.world, num_worlds)
         force = force.at[world, link[:, side], thing[:, 1 - side]].max(normal, mode="drop")
     return force
+
+
+def finger_forces(
+    contacts: Contacts, layout: ModelLayout, tables: SceneTables, normal: Float[Array, "C"], num_worlds: int
+) -> Float[Array, "W F Y"]:
+    """Sum of the normal forces (N) of the contacts of each finger with each graspable body."""
+    geom = jnp.maximum(contacts.geom, 0)
+    finger = jnp.asarray(layout.finger_of_geom)[geom]
+    body = jnp.asarray(layout.graspable_of_geom)[geom]
+    first = (finger[:, 0] >= 0) & (body[:, 1] >= 0)  # a finger is no graspable body: never both ways
+    one, other = jnp.where(first, finger[:, 0], finger[:, 1]), jnp.where(first, body[:, 1], body[:, 0])
+    usable = contacts.valid & (one >= 0) & (other >= 0)
+    world = jnp.where(usable, contacts.world, num_worlds)  # out of range: dropped
+    force = jnp.zeros((num_worlds, len(tables.finger_body), len(tables.graspable_body)), jnp.float32)
+    return force.at[world, one, other].add(normal, mode="drop")

@@ -23,8 +23,8 @@ from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snaps
 from ig2mj.engine.compile_cache import keep_jax_programs
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
-from ig2mj.engine.mjx.contacts import Contacts, link_forces, touching_units
-from ig2mj.engine.mjx.view import ViewPlan, make_view, plan_view
+from ig2mj.engine.mjx.contacts import Contacts, finger_forces, link_forces, normal_forces, touching_units
+from ig2mj.engine.mjx.view import Moved, ViewPlan, make_view, plan_view
 from ig2mj.engine.mjx.writing import apply_write, reaches
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.native.sleep import FULLY_AWAKE, restore_sleep
@@ -44,7 +44,7 @@ class MjxPhysics:
     Attributes:
       data: MJX data; arrays begin with the world axis, but for Warp's contact list (design section 2, fact 10).
       eq_data: parameters of the equality constraints of each world.
-      touching: of units, as of the last step. link_force: newtons, of the last control step.
+      touching: of units, as of the last step. link_force, finger_force: newtons, of the last control step.
       overflow: or of MJX-Warp's overflow flags since the world was loaded (`ig2mj.engine.guards`).
     """
 
@@ -52,6 +52,7 @@ class MjxPhysics:
     eq_data: Float[Array, "W E 12"]
     touching: Bool[Array, "W U U"]
     link_force: Float[Array, "W L O"]
+    finger_force: Float[Array, "W F Y"]
     overflow: Int[Array, "W"]
 
 
@@ -102,6 +103,7 @@ class MjxEngine(abc.ABC):
         self._initial = initial if initial is not None else self._scene_start(touch_tolerance)
         self._pyramidal = self.host_model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
         self._has_blades = bool((self.tables.link_geom >= 0).any())
+        self._can_grasp = bool(len(self.tables.finger_body) and len(self.tables.graspable_body))
         try:
             self.model = self._put_model(self.host_model)
             self._template = self._put_data(self.host_model, self._host_data())
@@ -149,23 +151,30 @@ class MjxEngine(abc.ABC):
             data = data.replace(ctrl=jnp.asarray(ctrl, jnp.float32))
 
         def substep(carry: Any, _: Any) -> tuple[Any, None]:
-            data, force, overflow, _ = carry
+            data, forces, overflow, _ = carry
             awake = self._tree_asleep(data) < 0
             data = self._mapped(mjx.step, self.model, data, physics.eq_data)
-            if self._has_blades:
-                force = jnp.maximum(force, self._link_forces(data))
-            return (data, force, overflow | self._overflow(data), awake), None
+            forces = jax.tree.map(jnp.maximum, forces, self._forces(data))
+            return (data, forces, overflow | self._overflow(data), awake), None
 
-        carry = (data, jnp.zeros_like(physics.link_force), physics.overflow, self._tree_asleep(data) < 0)
+        none = jax.tree.map(jnp.zeros_like, (physics.link_force, physics.finger_force))
+        carry = (data, none, physics.overflow, self._tree_asleep(data) < 0)
         if self.unrolled:
             for _ in range(self.substeps):
                 carry, _ = substep(carry, None)
         else:
             carry, _ = jax.lax.scan(substep, carry, length=self.substeps)
-        data, force, overflow, awake = carry
+        data, (link_force, finger_force), overflow, awake = carry
         touching = self._touching(data, physics.touching, awake)
         data = self._kinematics(data)
-        physics = dataclasses.replace(physics, data=data, touching=touching, link_force=force, overflow=overflow)
+        physics = dataclasses.replace(
+            physics,
+            data=data,
+            touching=touching,
+            link_force=link_force,
+            finger_force=finger_force,
+            overflow=overflow,
+        )
         return physics, self.view(physics)
 
     def view(self, physics: MjxPhysics) -> PhysicsView:
@@ -228,6 +237,7 @@ class MjxEngine(abc.ABC):
             eq_data=put(snapshot.eq_data, physics.eq_data),
             touching=put(snapshot.touching, physics.touching),
             link_force=jnp.where(chosen[:, None, None], 0.0, physics.link_force),
+            finger_force=jnp.where(chosen[:, None, None], 0.0, physics.finger_force),
             overflow=jnp.where(chosen, 0, physics.overflow),
         )
 
@@ -274,6 +284,7 @@ class MjxEngine(abc.ABC):
             eq_data=jnp.tile(jnp.asarray(self.host_model.eq_data, jnp.float32), (worlds, 1, 1)),
             touching=jnp.zeros((worlds, units, units), bool),
             link_force=jnp.zeros((worlds, len(tables.link_object), tables.num_objects), jnp.float32),
+            finger_force=jnp.zeros((worlds, len(tables.finger_body), len(tables.graspable_body)), jnp.float32),
             overflow=jnp.zeros(worlds, jnp.int32),
         )
         return self.load(physics, initial)
@@ -293,12 +304,11 @@ class MjxEngine(abc.ABC):
         data = physics.data
         return make_view(
             self.plan,
-            data.qpos,
-            data.xpos,
-            data.xquat,
+            Moved(data.qpos, data.qvel, data.xpos, data.xquat, data.xanchor, data.xaxis),
             self._tree_asleep(data) < 0,
             physics.touching,
             physics.link_force,
+            physics.finger_force,
             data.eq_active.astype(bool),
         )
 
@@ -315,6 +325,7 @@ class MjxEngine(abc.ABC):
             data=data,
             touching=self._touching(data, physics.touching, awake),
             link_force=jnp.zeros_like(physics.link_force),
+            finger_force=jnp.zeros_like(physics.finger_force),
         )
 
     def _map(self, act: Any, model: mjx.Model, data: mjx.Data, eq_data: Float[Array, "W E 12"]) -> mjx.Data:
@@ -336,16 +347,20 @@ class MjxEngine(abc.ABC):
         )
         return touching_units(self._contacts(data), self.layout, self.touch_tolerance, remembered, fresh)
 
-    def _link_forces(self, data: mjx.Data) -> Float[Array, "W L O"]:
-        return link_forces(
-            self._contacts(data),
-            self.layout,
-            jnp.asarray(self.tables.geom_object),
-            self._efc_force(data),
-            self._pyramidal,
-            self.tables.num_objects,
-            len(self.tables.link_object),
-        )
+    def _forces(self, data: mjx.Data) -> tuple[Float[Array, "W L O"], Float[Array, "W F Y"]]:
+        """Forces of the physics step just taken, of annotated links and of fingers."""
+        tables, worlds = self.tables, self.num_worlds
+        link = jnp.zeros((worlds, len(tables.link_object), tables.num_objects), jnp.float32)
+        finger = jnp.zeros((worlds, len(tables.finger_body), len(tables.graspable_body)), jnp.float32)
+        if not self._has_blades and not self._can_grasp:
+            return link, finger
+        contacts = self._contacts(data)
+        normal = normal_forces(contacts, self._efc_force(data), self._pyramidal)
+        if self._has_blades:
+            link = link_forces(contacts, self.layout, tables, normal, worlds)
+        if self._can_grasp:
+            finger = finger_forces(contacts, self.layout, tables, normal, worlds)
+        return link, finger
 
     def _host_model(self, model: mujoco.MjModel) -> mujoco.MjModel:
         own = copy.copy(model)

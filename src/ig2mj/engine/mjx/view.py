@@ -3,7 +3,8 @@
 What nobody reads costs nothing: the view is made inside the jitted step, and XLA drops the parts that no state,
 predicate or reward uses.
 
-Axes as in `ig2mj.engine.base`; K boxed items of a `BoxTable`, S slots (the most boxed items, or units, of an object).
+Axes as in `ig2mj.engine.base` and `ig2mj.engine.view`; K boxed items of a `BoxTable`, V units of objects, S slots (the
+most boxed items, or units, of an owner).
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.layout import ModelLayout
+from ig2mj.engine.mjx.velocities import JointsAbove, Moved, body_velocities, joints_above
 from ig2mj.engine.object_boxes import BoxTable, make_box_table
-from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.engine.view import AgentView, Array, PhysicsView
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
 from ig2mj.scene.tables import SceneTables
 
@@ -29,7 +31,8 @@ class ViewPlan:
     Attributes:
       tables, layout, boxes: constants of the scene.
       com_offset: [O, 3] centre of mass of the main body in its frame.
-      box_slots, unit_slots: [O, S] rows of the box table, and units, of each object; -1 none.
+      box_slots, unit_slots: [O, S] rows of the box table, and units, of each object; -1 none. agent_slots: [A, S].
+      free: objects that are free. base_joints, hand_joints: what moves bases and hands.
       qpos_openable: [J]. camera_body, camera_pos, camera_quat: [A...] eyes in their bodies' frames.
     """
 
@@ -39,6 +42,10 @@ class ViewPlan:
     com_offset: np.ndarray
     box_slots: np.ndarray
     unit_slots: np.ndarray
+    agent_slots: np.ndarray
+    free: np.ndarray
+    base_joints: JointsAbove
+    hand_joints: JointsAbove
     camera_body: np.ndarray
     camera_pos: np.ndarray
     camera_quat: np.ndarray
@@ -56,6 +63,10 @@ def plan_view(model: mujoco.MjModel, tables: SceneTables, layout: ModelLayout, b
         com_offset=np.asarray(model.body_ipos)[tables.object_root],
         box_slots=slots(boxes.owner, tables.num_objects),
         unit_slots=slots(layout.unit_object, tables.num_objects),
+        agent_slots=slots(layout.unit_agent, len(tables.agent_names)),
+        free=np.flatnonzero(layout.object_dofadr >= 0),
+        base_joints=joints_above(model, tables.agent_body),
+        hand_joints=joints_above(model, tables.hand_body),
         camera_body=np.where(known, model.cam_bodyid[camera] if model.ncam else 0, tables.agent_body),
         camera_pos=np.where(known[:, None], model.cam_pos[camera] if model.ncam else 0.0, 0.0),
         camera_quat=np.where(known[:, None], model.cam_quat[camera] if model.ncam else 0.0, [1.0, 0.0, 0.0, 0.0]),
@@ -64,18 +75,19 @@ def plan_view(model: mujoco.MjModel, tables: SceneTables, layout: ModelLayout, b
 
 def make_view(
     plan: ViewPlan,
-    qpos: Float[Array, "W nq"],
-    body_pos: Float[Array, "W B 3"],
-    body_quat: Float[Array, "W B 4"],
+    moved: Moved,
     tree_awake: Bool[Array, "W T"],
     touching: Bool[Array, "W U U"],
     link_force: Float[Array, "W L O"],
+    finger_force: Float[Array, "W F Y"],
     eq_active: Bool[Array, "W E"],
 ) -> PhysicsView:
-    """The view of poses, contacts and sleep. `touching` is of units, `link_force` in newtons."""
+    """The view of poses, velocities, contacts and sleep. `touching` is of units; forces in newtons."""
     tables, layout = plan.tables, plan.layout
-    root = tables.object_root
+    body_pos, body_quat = moved.xpos, moved.xquat
+    root, count = tables.object_root, layout.num_object_units
     object_pos, object_quat = body_pos[:, root], body_quat[:, root]
+    linvel, angvel = _object_velocities(plan, moved.qvel, object_quat)
     link_pos, link_quat = compose(
         body_pos[:, tables.link_body],
         body_quat[:, tables.link_body],
@@ -83,15 +95,11 @@ def make_view(
         jnp.asarray(tables.link_quat, jnp.float32),
     )
     low, high = object_boxes(plan, body_pos, body_quat)
-    eye_pos, eye_quat = compose(
-        body_pos[:, plan.camera_body],
-        body_quat[:, plan.camera_body],
-        jnp.asarray(plan.camera_pos, jnp.float32),
-        jnp.asarray(plan.camera_quat, jnp.float32),
-    )
     return PhysicsView(
         object_pos=object_pos,
         object_quat=object_quat,
+        object_linvel=linvel,
+        object_angvel=angvel,
         object_com=object_pos + quat_rotate(object_quat, jnp.asarray(plan.com_offset, jnp.float32)),
         aabb_low=low,
         aabb_high=high,
@@ -99,16 +107,59 @@ def make_view(
         body_quat=body_quat,
         link_pos=link_pos,
         link_quat=link_quat,
-        joint_pos=qpos[:, tables.openable_qposadr],
-        touching=object_touching(plan, touching),
+        joint_pos=moved.qpos[:, tables.openable_qposadr],
+        touching=object_touching(plan, touching[:, :count, :count]),
         link_force=link_force,
         awake=_any_of(tree_awake, layout.object_trees),
-        agent_pos=body_pos[:, tables.agent_body],
+        held=_held(plan, eq_active),
+        agent=_agents(plan, moved, touching, finger_force),
+    )
+
+
+def _agents(
+    plan: ViewPlan, moved: Moved, touching: Bool[Array, "W U U"], finger_force: Float[Array, "W F Y"]
+) -> AgentView:
+    tables, body_pos, body_quat = plan.tables, moved.xpos, moved.xquat
+    eye_pos, eye_quat = compose(
+        body_pos[:, plan.camera_body],
+        body_quat[:, plan.camera_body],
+        jnp.asarray(plan.camera_pos, jnp.float32),
+        jnp.asarray(plan.camera_quat, jnp.float32),
+    )
+    base_linvel, base_angvel = body_velocities(plan.base_joints, moved)
+    hand_linvel, hand_angvel = body_velocities(plan.hand_joints, moved)
+    touched = _any_over_slots(touching[:, :, : plan.layout.num_object_units], plan.agent_slots)  # W A V
+    return AgentView(
+        base_pos=body_pos[:, tables.agent_body],
+        base_quat=body_quat[:, tables.agent_body],
+        base_linvel=base_linvel,
+        base_angvel=base_angvel,
         eye_pos=eye_pos,
         eye_quat=eye_quat,
+        joint_pos=moved.qpos[:, tables.agent_joint_qposadr],
+        joint_vel=moved.qvel[:, tables.agent_joint_dofadr],
+        hand_pos=body_pos[:, tables.hand_body],
+        hand_quat=body_quat[:, tables.hand_body],
+        hand_linvel=hand_linvel,
+        hand_angvel=hand_angvel,
         finger_pos=body_pos[:, tables.finger_body],
-        grasped=_grasped(plan, eq_active),
+        finger_quat=body_quat[:, tables.finger_body],
+        finger_force=finger_force,
+        touching=_any_over_slots(touched.swapaxes(1, 2), plan.unit_slots).swapaxes(1, 2),
     )
+
+
+def _object_velocities(
+    plan: ViewPlan, qvel: Float[Array, "W nv"], object_quat: Float[Array, "W O 4"]
+) -> tuple[Float[Array, "W O 3"], Float[Array, "W O 3"]]:
+    """Linear and angular velocities of main bodies; a free joint's are linear in the world's axes, angular in its
+    body's."""
+    zero = jnp.zeros((*object_quat.shape[:2], 3), jnp.float32)
+    if not len(plan.free):
+        return zero, zero
+    velocity = qvel[:, plan.layout.object_dofadr[plan.free, None] + np.arange(6)]
+    angular = quat_rotate(object_quat[:, plan.free], velocity[..., 3:])
+    return zero.at[:, plan.free].set(velocity[..., :3]), zero.at[:, plan.free].set(angular)
 
 
 def object_boxes(
@@ -168,9 +219,9 @@ def _any_of(values: Bool[Array, "W T"], owned: np.ndarray) -> Bool[Array, "W O"]
     return result
 
 
-def _grasped(plan: ViewPlan, eq_active: Bool[Array, "W E"]) -> Bool[Array, "W A O"]:
+def _held(plan: ViewPlan, eq_active: Bool[Array, "W E"]) -> Bool[Array, "W H O"]:
     layout, tables = plan.layout, plan.tables
-    result = jnp.zeros((eq_active.shape[0], len(tables.agent_names), tables.num_objects), bool)
+    result = jnp.zeros((eq_active.shape[0], len(tables.hand_body), tables.num_objects), bool)
     if not len(layout.grasp_equality):
         return result
-    return result.at[:, layout.grasp_agent, layout.grasp_object].max(eq_active[:, layout.grasp_equality])
+    return result.at[:, layout.grasp_hand, layout.grasp_object].max(eq_active[:, layout.grasp_equality])

@@ -17,6 +17,7 @@ import functools
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
 
 import jax
 import mujoco
@@ -27,13 +28,14 @@ from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snaps
 from ig2mj.engine.compile_cache import keep_jax_programs
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
+from ig2mj.engine.native.agent_rows import AgentPlan, pose_arrays
 from ig2mj.engine.native.one_world import Statics, World
 from ig2mj.engine.native.vicinity import Masks, VicinityTable
 from ig2mj.engine.native.view_rows import FIELDS, Changed, PoseRows
 from ig2mj.engine.native.writing import apply_write
 from ig2mj.engine.object_boxes import make_box_table
 from ig2mj.engine.snapshot_check import check_snapshot
-from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.engine.view import SCHEMA, AgentView, Array, PhysicsView, assemble, axis_sizes
 from ig2mj.errors import EngineError
 from ig2mj.scene.scene import Scene
 from ig2mj.scene.tables import SceneTables
@@ -54,19 +56,36 @@ class NativePhysics:
     def update(self, changed: int) -> PhysicsView:
         """The view of the present state: copies of what changed, the old arrays for the rest."""
         if self.view is None:
-            self.view = PhysicsView(**{name: array.copy() for name, array in self.arrays.items()})
+            self.view = assemble({name: self.arrays[name].copy() for name in SCHEMA})
         elif changed:
-            old, self.view = self.view, PhysicsView.__new__(PhysicsView)
-            fields = self.view.__dict__  # the constructor of a frozen dataclass costs more than the copies
-            fields.update(old.__dict__)
-            for name in _fields_of(changed):
+            self.view = _copied(self.view)
+            fields = self.view.__dict__
+            plain, of_agent = _fields_of(changed)
+            for name in plain:
                 fields[name] = self.arrays[name].copy()
+            if of_agent:
+                agent = fields["agent"] = _copied(self.view.agent)
+                for path, name in of_agent:
+                    agent.__dict__[name] = self.arrays[path].copy()
         return self.view
 
 
+View = TypeVar("View", PhysicsView, AgentView)
+
+
+def _copied(view: View) -> View:
+    """A view of the same arrays; the constructor of a frozen dataclass costs more than to copy what changed."""
+    new = object.__new__(type(view))
+    new.__dict__.update(view.__dict__)
+    return new
+
+
 @functools.cache
-def _fields_of(changed: int) -> tuple[str, ...]:
-    return tuple(name for name, group in FIELDS.items() if group & changed)
+def _fields_of(changed: int) -> tuple[tuple[str, ...], tuple[tuple[str, str], ...]]:
+    """Names of the view's own fields in some groups; paths and names of its agents'."""
+    names = [name for name, group in FIELDS.items() if group & changed]
+    of_agent = tuple((name, name.removeprefix("agent.")) for name in names if name.startswith("agent."))
+    return tuple(name for name in names if not name.startswith("agent.")), of_agent
 
 
 class NativeEngine:
@@ -113,7 +132,10 @@ class NativeEngine:
         self._models = [_engine_model(scene.model, timestep) for _ in range(self.threads)]
         model = self._models[0]
         self.layout: ModelLayout = make_layout(model, self.tables)
-        _, unit_starts = np.unique(self.layout.unit_object, return_index=True)
+        count = self.layout.num_object_units
+        _, unit_starts = np.unique(self.layout.unit_object[:count], return_index=True)
+        _, agent_starts = np.unique(self.layout.unit_agent[count:], return_index=True)
+        presses = (self.layout.link_of_geom >= 0) | (self.layout.finger_of_geom >= 0)
         self._statics = Statics(
             tables=self.tables,
             layout=self.layout,
@@ -121,12 +143,15 @@ class NativeEngine:
                 self.tables,
                 self.layout,
                 make_box_table(boxes, model, self.tables, self.layout),
+                AgentPlan.build(model, self.tables),
                 np.asarray(model.body_treeid, int),
             ),
             contact_unit=np.where(self.layout.collides, self.layout.geom_unit, -1),
             unit_starts=unit_starts,
+            agent_starts=agent_starts,
             vicinity=VicinityTable.build(model, self.layout.equality_tree),
-            force_links=bool((self.tables.link_geom >= 0).any()),
+            presses=presses,
+            any_presses=bool(presses.any()),
             pyramidal=model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL,
             tolerance=touch_tolerance,
             substeps=substeps,
@@ -265,28 +290,7 @@ def _engine_model(model: mujoco.MjModel, timestep: float) -> mujoco.MjModel:
 
 
 def _working_arrays(num_worlds: int, tables: SceneTables) -> dict[str, np.ndarray]:
-    objects, bodies = tables.num_objects, len(tables.body_object)
-    links, joints = len(tables.link_object), len(tables.openable_object)
-    agents, fingers = len(tables.agent_body), len(tables.finger_body)
-    shapes: dict[str, tuple[int, ...]] = {
-        "object_pos": (objects, 3),
-        "object_quat": (objects, 4),
-        "object_com": (objects, 3),
-        "aabb_low": (objects, 3),
-        "aabb_high": (objects, 3),
-        "body_pos": (bodies, 3),
-        "body_quat": (bodies, 4),
-        "link_pos": (links, 3),
-        "link_quat": (links, 4),
-        "joint_pos": (joints,),
-        "touching": (objects, objects),
-        "link_force": (links, objects),
-        "awake": (objects,),
-        "agent_pos": (agents, 3),
-        "eye_pos": (agents, 3),
-        "eye_quat": (agents, 4),
-        "finger_pos": (fingers, 3),
-        "grasped": (agents, objects),
-    }
-    flags = {"touching", "awake", "grasped"}
-    return {n: np.zeros((num_worlds, *shape), bool if n in flags else np.float32) for n, shape in shapes.items()}
+    sizes = axis_sizes(tables, num_worlds)
+    packed = pose_arrays(num_worlds, tables)
+    made = {name: np.zeros(field.shape(sizes), field.dtype) for name, field in SCHEMA.items() if name not in packed}
+    return made | packed

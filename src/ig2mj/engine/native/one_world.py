@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from ig2mj.engine.layout import ModelLayout
-from ig2mj.engine.native.contacts import add_link_forces, touching_units
+from ig2mj.engine.native.contacts import add_forces, touching_units
 from ig2mj.engine.native.sleep import restore_sleep, wake_trees
 from ig2mj.engine.native.vicinity import Masks, Vicinity, VicinityTable
 from ig2mj.engine.native.view_rows import Changed, PosePlan, PoseRows
@@ -23,7 +23,8 @@ class Statics:
     """What all worlds of an engine share.
 
     Attributes:
-      unit_starts: [O] first unit of each object. force_links: some annotated link is a geom.
+      unit_starts: [O] first unit of each object. agent_starts: [A] first unit of each agent, counted from V.
+      presses: [G] the geom is an annotated link's or a finger's; any_presses: there is such a geom.
       See `ig2mj.engine.layout`, `ig2mj.engine.native.view_rows` and `ig2mj.engine.native.vicinity` for the rest.
     """
 
@@ -32,8 +33,10 @@ class Statics:
     poses: PoseRows
     contact_unit: np.ndarray
     unit_starts: np.ndarray
+    agent_starts: np.ndarray
     vicinity: VicinityTable
-    force_links: bool
+    presses: np.ndarray
+    any_presses: bool
     pyramidal: bool
     tolerance: float
     substeps: int
@@ -80,12 +83,12 @@ class World:
         self._near.begin()
         self._let_near()
         mujoco.mj_step2(model, data)
-        found = statics.force_links and self._collect_force()
+        found = statics.any_presses and self._collect_force()
         for _ in range(statics.substeps - 1):
             self._near.moved()
             self._let_near()
             mujoco.mj_step(model, data)
-            found |= statics.force_links and self._collect_force()
+            found |= statics.any_presses and self._collect_force()
         self._near.moved()
         self._let_near()
         mujoco.mj_step1(model, data)
@@ -129,14 +132,14 @@ class World:
           everything: also what sleeps, and touching from this instant's contacts alone.
         """
         if self._none_awake and not self.data.ntree_awake and not everything:
-            return self._refresh_grasped()
+            return self._refresh_held()
         changed = self._note_awake()
         if everything:
             plan = self._plan(None)
         else:
             plan = self._plan(self._awake | self._awake_before) if changed else self._steady_plan
             self._check_finite()
-        changed |= self.statics.poses.refresh(plan, self.data, self.rows) | self._refresh_grasped()
+        changed |= self.statics.poses.refresh(plan, self.data, self.rows) | self._refresh_held()
         if self._any_fresh or changed & Changed.AWAKE or everything:
             changed |= self._refresh_touching(everything)
         return changed
@@ -192,13 +195,20 @@ class World:
         if not self._has_force:
             return Changed.NOTHING
         self.rows["link_force"][:] = 0.0
+        self.rows["agent.finger_force"][:] = 0.0
         self._has_force = False
         return Changed.FORCE
 
     def _collect_force(self) -> bool:
         statics = self.statics
-        return add_link_forces(
-            self.data, statics.layout, statics.tables.geom_object, statics.pyramidal, self.rows["link_force"]
+        return add_forces(
+            self.data,
+            statics.layout,
+            statics.tables.geom_object,
+            statics.presses,
+            statics.pyramidal,
+            self.rows["link_force"],
+            self.rows["agent.finger_force"],
         )
 
     def _check_finite(self) -> None:
@@ -248,7 +258,7 @@ class World:
         self.rows["awake"][:] = (layout.object_trees & self._awake).any(1)
         return Changed.AWAKE
 
-    def _refresh_grasped(self) -> int:
+    def _refresh_held(self) -> int:
         if not self._has_grasps:
             return Changed.NOTHING
         layout, active = self.statics.layout, self._active_grasps()
@@ -256,10 +266,10 @@ class World:
         if key == self._eq_key:
             return Changed.NOTHING
         self._eq_key = key
-        grasped = self.rows["grasped"]
-        grasped[:] = False
-        grasped[layout.grasp_agent[active], layout.grasp_object[active]] = True
-        return Changed.GRASPED
+        held = self.rows["held"]
+        held[:] = False
+        held[layout.grasp_hand[active], layout.grasp_object[active]] = True
+        return Changed.HELD
 
     def _active_grasps(self) -> np.ndarray:
         return self.data.eq_active[self.statics.layout.grasp_equality].astype(bool)
@@ -269,12 +279,23 @@ class World:
         units = touching_units(data, statics.contact_unit, statics.tolerance, self.units, self._fresh)
         if units is self.units and not everything:
             return Changed.NOTHING
-        self.units = units
-        starts = statics.unit_starts
-        touching = self.rows["touching"]
-        if len(starts) == len(units):
-            touching[:] = units
-        else:
-            touching[:] = np.logical_or.reduceat(np.logical_or.reduceat(units, starts, 0), starts, 1)
-        np.fill_diagonal(touching, False)
-        return Changed.TOUCHING
+        before, self.units = self.units, units
+        count = statics.layout.num_object_units
+        changed = Changed.NOTHING
+        if everything or not np.array_equal(before[:count, :count], units[:count, :count]):
+            touching = self.rows["touching"]
+            touching[:] = _of_owners(_of_owners(units[:count, :count], statics.unit_starts, 0), statics.unit_starts, 1)
+            np.fill_diagonal(touching, False)
+            changed |= Changed.TOUCHING
+        if len(statics.agent_starts) and (everything or not np.array_equal(before[count:], units[count:])):
+            touched = _of_owners(units[count:, :count], statics.agent_starts, 0)
+            self.rows["agent.touching"][:] = _of_owners(touched, statics.unit_starts, 1)
+            changed |= Changed.AGENT_TOUCHING
+        return changed
+
+
+def _of_owners(touching: np.ndarray, starts: np.ndarray, axis: int) -> np.ndarray:
+    """Whether any unit of each owner touches; `starts`: its first unit along the axis."""
+    if len(starts) == touching.shape[axis]:
+        return touching
+    return np.logical_or.reduceat(touching, starts, axis)

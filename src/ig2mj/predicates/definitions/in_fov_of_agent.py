@@ -56,8 +56,8 @@ def _seen(context: Context, objects: np.ndarray, agent: int) -> Bool[Array, "W P
     tables, view = context.model.tables, context.view
     points = _points(tables, view, objects)  # [W, P, N, 3]
     camera = Camera(
-        pos=view.eye_pos[:, agent],
-        quat=view.eye_quat[:, agent],
+        pos=view.agent.eye_pos[:, agent],
+        quat=view.agent.eye_quat[:, agent],
         fovy=float(tables.agent_fovy[agent]),
         aspect=context.model.options.image_aspect,
         near=NEAR,
@@ -133,7 +133,7 @@ def surface_points(tables: SceneTables, obj: int) -> tuple[np.ndarray, np.ndarra
 IN_FOV_OF_AGENT = Predicate(
     name="in_fov_of_agent",
     arguments=("object",),
-    reads=("view.eye_pos", "view.eye_quat", "view.body_pos", "view.body_quat"),
+    reads=("view.agent.eye_pos", "view.agent.eye_quat", "view.body_pos", "view.body_quat"),
     evaluate=_evaluate,
     aliases=("in_fov_of_robot", "infovofagent", "infovofrobot"),
 )

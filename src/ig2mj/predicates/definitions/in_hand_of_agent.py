@@ -15,13 +15,13 @@ from ig2mj.predicates.base import Arguments, Context, Predicate
 
 def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
     objects = arguments[:, 0]
-    return jnp.any(jnp.asarray(context.view.grasped), axis=1)[:, objects] & context.known(objects)
+    return jnp.any(jnp.asarray(context.view.held), axis=1)[:, objects] & context.known(objects)
 
 
 IN_HAND_OF_AGENT = Predicate(
     name="in_hand_of_agent",
     arguments=("object",),
-    reads=("view.grasped", "view.object_com"),
+    reads=("view.held", "view.object_com"),
     evaluate=_evaluate,
     aliases=("in_hand_of_robot", "inhandofagent", "inhandofrobot"),
 )

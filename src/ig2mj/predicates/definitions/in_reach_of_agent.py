@@ -14,21 +14,21 @@ REACH = 2.0
 
 def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
     com = jnp.asarray(context.view.object_com)[:, None, arguments[:, 0]]
-    offset = com - jnp.asarray(context.view.agent_pos)[:, :, None]
+    offset = com - jnp.asarray(context.view.agent.base_pos)[:, :, None]
     return jnp.any(jnp.sum(offset * offset, axis=-1) < REACH**2, axis=1)
 
 
 def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
-    if context.view.agent_pos.shape[1] == 0:
+    if context.view.agent.base_pos.shape[1] == 0:
         return "there is no agent"
-    offset = context.view.agent_pos[world] - context.view.object_com[world, arguments[0]]
+    offset = context.view.agent.base_pos[world] - context.view.object_com[world, arguments[0]]
     return f"{float(jnp.min(jnp.linalg.norm(offset, axis=-1))):.2f} m away, reach is {REACH} m"
 
 
 IN_REACH_OF_AGENT = Predicate(
     name="in_reach_of_agent",
     arguments=("object",),
-    reads=("view.object_com", "view.agent_pos"),
+    reads=("view.object_com", "view.agent.base_pos"),
     evaluate=_evaluate,
     aliases=("in_reach_of_robot", "inreachofagent", "inreachofrobot"),
     why=_why,

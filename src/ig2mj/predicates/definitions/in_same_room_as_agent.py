@@ -13,17 +13,17 @@ from ig2mj.states.relations.rooms import in_room, room_at, rooms_of
 def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
     tables, view, objects = context.model.tables, context.view, arguments[:, 0]
     found = context.none(arguments)
-    for agent in range(view.agent_pos.shape[1]):
-        room = room_at(tables, jnp.asarray(view.agent_pos)[:, agent, :2])
+    for agent in range(view.agent.base_pos.shape[1]):
+        room = room_at(tables, jnp.asarray(view.agent.base_pos)[:, agent, :2])
         found |= in_room(tables, view, objects, jnp.broadcast_to(room[:, None], found.shape))
     return found & context.known(objects)
 
 
 def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
     tables, view = context.model.tables, context.view
-    if view.agent_pos.shape[1] == 0:
+    if view.agent.base_pos.shape[1] == 0:
         return "there is no agent"
-    room = int(room_at(tables, jnp.asarray(view.agent_pos)[world, 0, :2]))
+    room = int(room_at(tables, jnp.asarray(view.agent.base_pos)[world, 0, :2]))
     where = ", ".join(rooms_of(tables, view, arguments[0], world)) or "no room"
     return f"it is in {where}, the agent in {tables.room_names[room] if room >= 0 else 'no room'}"
 
@@ -31,7 +31,7 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
 IN_SAME_ROOM_AS_AGENT = Predicate(
     name="in_same_room_as_agent",
     arguments=("object",),
-    reads=("view.object_com", "view.agent_pos", "tables.room_map", "tables.object_rooms"),
+    reads=("view.object_com", "view.agent.base_pos", "tables.room_map", "tables.object_rooms"),
     evaluate=_evaluate,
     aliases=("in_same_room_as_robot", "insameroomasagent", "insameroomasrobot"),
     why=_why,

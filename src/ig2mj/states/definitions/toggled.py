@@ -31,9 +31,9 @@ def update(
 ) -> tuple[Bool[Array, "W O"], Int[Array, "W O"]]:
     """One step: the switches and the counts."""
     tables, buttons = model.tables, model.buttons
-    if len(buttons) == 0 or view.finger_pos.shape[1] == 0:
+    if len(buttons) == 0 or view.agent.finger_pos.shape[1] == 0:
         return toggled, press_count
-    offset = jnp.asarray(view.finger_pos)[:, None] - jnp.asarray(view.link_pos)[:, buttons, None]
+    offset = jnp.asarray(view.agent.finger_pos)[:, None] - jnp.asarray(view.link_pos)[:, buttons, None]
     near = jnp.any(jnp.sum(offset * offset, axis=-1) < REACH**2, axis=-1)  # [W, B]
     of_object = np.full(tables.num_objects, len(buttons))
     of_object[tables.link_object[buttons]] = np.arange(len(buttons))
@@ -48,7 +48,7 @@ def all_out_of_reach(model: StateModel, view: PhysicsView) -> bool:
 
     Fingers change nothing then; false where anything is not finite.
     """
-    fingers = np.asarray(view.finger_pos)[:, :, None]
+    fingers = np.asarray(view.agent.finger_pos)[:, :, None]
     offset = np.abs(fingers - np.asarray(view.link_pos)[:, None, model.buttons]).max(axis=-1)
     return bool((offset > REACH + SURELY).all())
 
