@@ -6,24 +6,26 @@ import os
 import pathlib
 import time
 
+import mujoco
 import numpy as np
 
 from ig2mj.errors import InputError
 from ig2mj.scene.manifest import FORMAT_VERSION, Manifest
 
 from .base import inputs
-from .base.description import ObjectModel
+from .base.description import Instance, ObjectModel
 from .base.options import ConvertOptions
 from .base.output import replaced_folder
-from .bodies.assembly import extent
+from .bodies.assembly import Assembly, extent
+from .bodies.placements import Placement, make_halves
 from .finish import Outcome, finish, version_record
 from .mjcf.appearance import add_ground, add_setting
 from .mjcf.file import write_model
 from .mjcf.manifest_entries import object_entry
 from .mjcf.model_builder import ModelBuilder
 from .mjcf.object import add_object
-from .mjcf.parking import resting_pose
-from .mjcf.scene import add_start_key
+from .mjcf.parking import CLEARANCE, resting_pose
+from .mjcf.scene import SceneBuild, add_start_key, rest_start
 from .model_task import BuiltModel, build_model
 from .reading.dataset import Dataset
 from .reading.joint_limits import clamp
@@ -42,7 +44,7 @@ def convert_object(
 ) -> Outcome:
     """Converts one object: `object.xml`, `manifest.json`, `meshes/`, and the report.
 
-    The object stands on a ground plane, free to move. Masses are the URDF's own; missing ones come from the
+    The object stands on a ground plane, free to move; the halves of a sliceable one lie beside it. Masses are the URDF's own; missing ones come from the
     category's density where the URDF lies in a dataset, else from a general one.
 
     Args:
@@ -57,19 +59,20 @@ def convert_object(
     start = time.perf_counter()
     options.progress(f"reading {file.name}", 0, 2)
     source, dataset = _read(file, category, model or file.stem)
-    built = _build(source, dataset, bounding_box, options)
+    built = {source.model: _build(source, dataset, bounding_box, options)}
+    built |= _halves(dataset, built[source.model], options)
     read_seconds = time.perf_counter() - start
     options.progress(f"writing {source.model}", 1, 2)
     with replaced_folder(out) as folder:
         start = time.perf_counter()
-        builder, manifest = _write(source, built, folder, options)
-        compiled = write_model(builder.spec, folder / "object.xml")
+        ag = dataset is None or source.category not in dataset.specs or dataset.enable_ag(source.category)
+        builder, manifest, compiled = _write(source, built, folder, options, assisted_grasp=ag)
         timings = {"models": read_seconds, "writing": time.perf_counter() - start}
         outcome = finish(
             folder,
             compiled,
             manifest,
-            {source.model: built},
+            built,
             builder,
             options,
             kind="object",
@@ -139,32 +142,89 @@ def _build(
     return built(wanted / size)
 
 
+def _halves(dataset: Dataset | None, whole: BuiltModel, options: ConvertOptions) -> dict[str, BuiltModel]:
+    """`<model>_part_<i>` -> half of a sliceable object, at the whole's scale; {} where the dataset lacks one of them."""
+    parts = whole.assembly.model.metadata.object_parts
+    if dataset is None or not all(dataset.has_model(p.category, p.model) for p in parts):
+        return {}
+    made = {}
+    for number, part in enumerate(parts):
+        source = dataset.model(part.category, part.model)
+        density = dataset.density(source.category) if source.metadata.bbox_size is not None else None
+        made[f"{whole.assembly.model.model}_part_{number}"] = build_model(
+            source,
+            whole.assembly.scale,
+            density,
+            options.hull_options(),
+            options.bullet_inertia,
+            igibson_visuals=False,
+            jobs=options.jobs,
+            progress=options.progress,
+        )
+    return made
+
+
+def _beside(low: np.ndarray, high: np.ndarray, halves: dict[str, Assembly]) -> dict[str, np.ndarray]:
+    """Poses (4x4) at rest on the ground in a row along +y, beside the object whose box is `low` to `high`."""
+    places, edge = {}, high[1]
+    for name, assembly in halves.items():
+        pose = resting_pose(assembly)
+        half_low, half_high = extent(assembly, pose)
+        edge += CLEARANCE
+        pose[:2, 3] += [(low[0] + high[0]) / 2, edge - half_low[1]]
+        edge += half_high[1] - half_low[1]
+        places[name] = pose
+    return places
+
+
 def _write(
-    source: ObjectModel, built: BuiltModel, folder: pathlib.Path, options: ConvertOptions
-) -> tuple[ModelBuilder, Manifest]:
-    builder = ModelBuilder(source.model, folder, category_colours=options.colours == "category")
-    assembly, name = built.assembly, source.model
-    base = resting_pose(assembly)
-    elements = add_object(
-        builder,
-        assembly,
-        name,
-        [base @ assembly.bodies[index].pose for index in assembly.roots],
-        fixed=False,
-    )
-    low, high = extent(assembly, base)
+    source: ObjectModel,
+    built: dict[str, BuiltModel],
+    folder: pathlib.Path,
+    options: ConvertOptions,
+    *,
+    assisted_grasp: bool,
+) -> tuple[ModelBuilder, Manifest, mujoco.MjModel]:
+    """Writes `object.xml`: the object on a ground plane, its halves beside it, all at rest."""
+    colours = options.colours == "category"
+    builder = ModelBuilder(source.model, folder, category_colours=colours, assets=options.assets)
+    name, assemblies = source.model, {name: model.assembly for name, model in built.items()}
+    base = resting_pose(assemblies[name])
+    low, high = extent(assemblies[name], base)
+    whole = Placement(Instance(name=name, category=source.category, model=source.model, pose=base, fixed=False))
+    metadata = assemblies[name].model.metadata
+    halves, _ = make_halves(whole, metadata.object_parts[: len(built) - 1], assemblies[name].scale, set())
+    places = {name: base} | _beside(low, high, {half.name: assemblies[half.name] for half in halves})
+    build = SceneBuild(builder, [], {}, {})
+    for placement in [whole, *halves]:
+        assembly = assemblies[placement.name]
+        roots = [places[placement.name] @ assembly.bodies[index].pose for index in assembly.roots]
+        elements = add_object(builder, assembly, placement.name, roots, fixed=False)
+        build.elements[placement.name] = elements
+        build.start_joints |= {elements.joints[j.name]: clamp(j, 0.0) for j in assembly.joints()}
+        build.entries.append(
+            object_entry(
+                placement.name,
+                assembly,
+                elements,
+                fixed=False,
+                parts=placement.parts,
+                part_of=placement.part_of,
+                parked=placement.parked,
+                assisted_grasp=assisted_grasp,
+            )
+        )
     add_setting(builder.spec, low, high, None, distance=2.0)
     add_ground(builder.spec, builder.collision_class)
-    add_start_key(builder.spec, {elements.joints[j.name]: clamp(j, 0.0) for j in assembly.joints()})
+    add_start_key(builder.spec, build.start_joints)
+    compiled = write_model(builder.spec, folder / "object.xml")
+    if rest_start(build, compiled):
+        compiled = write_model(builder.spec, folder / "object.xml")
+    models = {f"{b.assembly.model.category}/{b.assembly.model.model}": b.file_hash for b in built.values()}
     manifest = Manifest(
         format_version=FORMAT_VERSION,
         name=name,
-        objects=[object_entry(name, assembly, elements, fixed=False)],
-        source={
-            **version_record(options),
-            "kind": "object",
-            "file": source.file.name,
-            "models": {f"{source.category}/{name}": built.file_hash},
-        },
+        objects=build.entries,
+        source={**version_record(options), "kind": "object", "file": source.file.name, "models": models},
     )
-    return builder, manifest
+    return builder, manifest, compiled

@@ -66,14 +66,15 @@ def convert(
     jobs: int = 2,
     no_cache: Flag = False,
 ) -> int:
-    """Convert the homes of a dataset into one folder with shared meshes, as scenes_mjcf/ has them.
+    """Convert the homes of a dataset, and the object library, into one folder with shared meshes, as scenes_mjcf/ has them.
 
-    Each home's checks are kept as OUT/HOME/checks.json. Exit status 1 when a check failed.
+    Each home's checks are kept as OUT/HOME/checks.json, the library is OUT/objects/CATEGORY/MODEL. Exit status 1 when a
+    check failed.
 
     Args:
       dataset: root that `ig2mj homes build` wrote.
-      out: folder for the homes; meshes that no home uses any more are removed from it.
-      home: just these homes.
+      out: folder for the homes; meshes that nothing in it uses any more are removed from it.
+      home: just these homes, and no objects.
       jobs: processes.
       no_cache: convert anew even what has not changed, and keep nothing for the next time.
     """
@@ -95,12 +96,36 @@ def convert(
             cached += convert_scene(dataset, name, out / name, options=options).cached
             failed += strip_report(out / name)
             bar.remove_task(bar.task_ids[-1])
+        added = 0 if home else _convert_objects(dataset, out, not no_cache, add_bar(bar, "objects"), failed)
     remove_unused(out)
     kept = f" ({cached} have not changed: taken from the cache)" if cached else ""
-    print(f"{out}: {len(names)} homes, {total_bytes(out) / 1e6:.1f} MB, {len(failed)} checks failed{kept}")
+    megabytes = total_bytes(out) / 1e6
+    print(f"{out}: {len(names)} homes, {added} objects, {megabytes:.1f} MB, {len(failed)} checks failed{kept}")
     for line in failed:
         print(f"  {line}")
     return 1 if failed else 0
+
+
+def _convert_objects(
+    dataset: pathlib.Path,
+    out: pathlib.Path,
+    cache: bool,
+    progress: Callable[[str, int, int | None], None],
+    failed: list[str],
+) -> int:
+    """Converts the object library; adds lines of failed checks to `failed`. How many models."""
+    from ig2mj_converters.base.options import ConvertOptions
+    from ig2mj_converters.conversion import convert_object
+    from ig2mj_homes.dataset.object_library import ASSETS, FOLDER, library_models
+    from ig2mj_homes.dataset.ship import strip_report
+
+    models = library_models(dataset)
+    for number, (category, model, urdf) in enumerate(models):
+        progress(category, number, len(models))
+        folder = out / FOLDER / category / model
+        convert_object(urdf, category, folder, model=model, options=ConvertOptions(assets=ASSETS, cache=cache))
+        failed += strip_report(folder, keep_checks=False)
+    return len(models)
 
 
 def _scenes_of(dataset: pathlib.Path, wanted: tuple[str, ...]) -> list[str]:

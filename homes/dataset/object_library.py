@@ -1,0 +1,27 @@
+"""The object library: converted models that can be added to any home when it is loaded (`load_scene(objects=...)`).
+
+One model, the first, of every category that is not fixed to a house: more of a category are copies of it. All that an
+activity may place somewhere is there; beds, sinks and cabinets belong to homes.
+"""
+
+from __future__ import annotations
+
+import pathlib
+
+from ..objects.catalogue import catalogue
+
+FOLDER = "objects"
+"""Below the folder of the homes: `objects/<category>/<model>/object.xml`."""
+ASSETS = "../../.."
+"""From a model's folder to the meshes and textures that all homes and models share."""
+
+
+def library_models(dataset: pathlib.Path) -> list[tuple[str, str, pathlib.Path]]:
+    """(category, model, URDF) of each model of the library that the dataset holds, sorted by category."""
+    found = []
+    for category, entry in catalogue().items():
+        if entry.fixed:
+            continue
+        folders = sorted(f for f in (dataset / "objects" / category).glob(f"*{category}_00") if f.is_dir())
+        found += [(category, folder.name, folder / f"{folder.name}.urdf") for folder in folders]
+    return found
