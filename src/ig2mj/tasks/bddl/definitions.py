@@ -1,0 +1,58 @@
+"""The activities that are known, and reading one: BEHAVIOR-100's, BEHAVIOR-1K's once fetched, or a file of one's own."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+
+from ig2mj.errors import InputError, UnknownNameError
+from ig2mj.knowledge import bddl_folder
+from ig2mj.tasks.bddl import behavior1k
+from ig2mj.tasks.bddl.problem import Problem, parse_problem
+from ig2mj.tasks.bddl.vocabulary import Activity, lower
+
+FILE = "problem0.bddl"
+
+
+def activity_names(behavior_1k: bool = False) -> list[str]:
+    """Names of all activities of BEHAVIOR-100, or of BEHAVIOR-1K, sorted.
+
+    Raises:
+      MissingDependencyError: the definitions are not there; the message names the command that fetches them.
+    """
+    return sorted(file.parent.name for file in _folder(behavior_1k).glob(f"*/{FILE}"))
+
+
+def read_problem(name: str | os.PathLike, behavior_1k: bool = False) -> Problem:
+    """The definition of an activity.
+
+    Args:
+      name: of an activity, or the path of a definition (it ends in .bddl).
+      behavior_1k: of BEHAVIOR-1K instead of BEHAVIOR-100: some names occur in both.
+
+    Raises:
+      UnknownNameError: no such activity. BddlError: the file is no definition, naming line and word. InputError: it
+        cannot be read.
+    """
+    if os.fspath(name).endswith(".bddl"):
+        file, tolerant = pathlib.Path(name), False
+    else:
+        file, tolerant = _folder(behavior_1k) / name / FILE, True
+        if not file.is_file():
+            raise UnknownNameError("activity", os.fspath(name), activity_names(behavior_1k))
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as e:
+        raise InputError(file, f"cannot be read: {e}", mend="name a BDDL definition") from e
+    return parse_problem(text, str(file), tolerant=tolerant)
+
+
+def load_activity(name: str | os.PathLike, behavior_1k: bool = False) -> Activity:
+    """An activity in ig2mj's predicates. Raises as `read_problem`, and VocabularyError where it needs others."""
+    problem = read_problem(name, behavior_1k)
+    file = pathlib.Path(problem.file)
+    return lower(problem, file.parent.name if file.name == FILE else file.stem)
+
+
+def _folder(behavior_1k: bool) -> pathlib.Path:
+    return behavior1k.definitions() if behavior_1k else bddl_folder() / "activity_definitions"

@@ -1,0 +1,56 @@
+"""Which categories of objects may stand for a synset of an activity.
+
+BEHAVIOR-100 speaks of synsets of ig2mj's own taxonomy (`ig2mj.knowledge`). BEHAVIOR-1K has a finer one of its own; for
+what ours does not know something near stands in, and says so: a synset with a category of the same name, the thing in
+`bottle__of__soda` (soda, else a bottle), the synset right above.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+from ig2mj.knowledge import categories, categories_of, synset, taxonomy
+from ig2mj.tasks.bddl import behavior1k
+
+FLOOR = "floor.n.01"
+AGENT = "agent.n.01"
+MOST_CATEGORIES = 8
+"""A synset above with more categories than these is too general to stand in (furniture, container, grocery)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Kinds:
+    """Categories for a synset, those that name it best first; `instead`: what stands in where ours does not know it."""
+
+    categories: tuple[str, ...]
+    instead: str | None = None
+
+
+@functools.cache
+def kinds(name: str, behavior_1k: bool = False) -> Kinds:
+    """The categories whose objects may be bound to a synset; none where nothing fits.
+
+    Args:
+      behavior_1k: the synset may be of BEHAVIOR-1K's taxonomy, which must have been fetched then.
+    """
+    if name in taxonomy():
+        # As iGibson: the leaves below; inner nodes with categories of their own only where there is nothing else.
+        return Kinds(_ordered(name, categories_of(name) or categories_of(name, include_inner=True)))
+    if not behavior_1k or name not in behavior1k.hierarchy():
+        return Kinds(())
+    above, own = behavior1k.hierarchy()[name]
+    known = set(categories())
+    stem = name.split(".")[0]
+    for word in (*own, stem, *reversed(stem.split("__of__"))):
+        if word in known:
+            return Kinds((word,), word)
+    for synset_above in above:
+        if synset_above in taxonomy() and 0 < len(found := categories_of(synset_above)) <= MOST_CATEGORIES:
+            return Kinds(_ordered(synset_above, found), synset_above)
+    return Kinds(())
+
+
+def _ordered(name: str, found: tuple[str, ...]) -> tuple[str, ...]:
+    """The synset's own categories first, halves last: nobody who asks for an apple means half of one."""
+    return tuple(sorted(found, key=lambda c: (c.startswith("half_"), synset(c) != name, c)))

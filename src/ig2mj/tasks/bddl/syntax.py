@@ -1,0 +1,87 @@
+"""BDDL's brackets: text to a tree whose every word knows its line, so that errors can name line and word."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from typing import TypeAlias
+
+from ig2mj.errors import InputError
+
+_TOKEN = re.compile(r"[()]|[^\s();]+|;[^\n]*|\n")
+
+MAX_DEPTH = 100
+"""Nesting that no activity reaches; deeper text is refused instead of overflowing the stack."""
+
+
+class BddlError(InputError):
+    """Text that is no BDDL, or names what it does not declare; says the line and the word."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Word:
+    """One word, in lower case as BDDL compares them, and its line, from 1."""
+
+    text: str
+    line: int
+
+
+@dataclasses.dataclass(frozen=True)
+class Group:
+    """What stands between two brackets; `line`: of the opening one."""
+
+    parts: tuple[Tree, ...]
+    line: int
+
+
+Tree: TypeAlias = Word | Group
+
+
+def error(file: str, at: Tree, problem: str, mend: str = "") -> BddlError:
+    """The error that names a place: its line, and its word (of a group: the first)."""
+    first = at
+    while isinstance(first, Group) and first.parts:
+        first = first.parts[0]
+    word = first.text if isinstance(first, Word) else "()"
+    shown = word if at is first else f"({word}"
+    return BddlError(file, problem, element=f"line {at.line}: '{shown}'", mend=mend)
+
+
+def read_tree(text: str, file: str) -> Group:
+    """The one group that the text is. Comments run from a semicolon to the end of the line.
+
+    Raises:
+      BddlError: brackets that do not match, something beside the group, or no group at all.
+    """
+    line = 1
+    found: list[Tree] = []
+    open_groups: list[tuple[Word, list[Tree]]] = []
+    for token in _TOKEN.findall(text):
+        if token == "\n":
+            line += 1
+            continue
+        if token.startswith(";"):
+            continue
+        word = Word(token.lower(), line)
+        parts = open_groups[-1][1] if open_groups else found
+        if found and not open_groups:
+            raise error(file, word, "stands after the end", "remove it, or the bracket that closes too early")
+        if token == "(":
+            if len(open_groups) == MAX_DEPTH:
+                raise error(file, word, f"is nested deeper than {MAX_DEPTH}")
+            open_groups.append((word, []))
+        elif token == ")":
+            if not open_groups:
+                raise error(file, word, "closes a bracket that was not opened")
+            opening, inner = open_groups.pop()
+            (open_groups[-1][1] if open_groups else found).append(Group(tuple(inner), opening.line))
+        elif not open_groups:
+            raise error(file, word, "stands outside of brackets", "a definition begins with (define")
+        else:
+            parts.append(word)
+    if open_groups:
+        raise error(file, open_groups[-1][0], "is never closed", "add a ')'")
+    if not found:
+        raise BddlError(file, "is empty", mend="a definition begins with (define")
+    assert isinstance(found[0], Group)
+    return found[0]

@@ -1,0 +1,207 @@
+"""Lowering: a definition in either vocabulary of BDDL to the predicates of `ig2mj.predicates`.
+
+bddl 1.0.1 (BEHAVIOR-100) has iGibson's predicates under other names: `nextto` is `next_to`. bddl 3.6 (BEHAVIOR-1K) says
+some things in another way:
+
+    ontop X floor.n.01_1                     on_floor X floor.n.01_1
+    covered X stain.n.01_1, ... dust.n.01_1  stained X, dusty X
+    saturated X water.n.06_1                 soaked X
+    real half__apple.n.01_1                  sliced apple.n.01_1, likewise (not (real apple.n.01_1))
+    future half__apple.n.01_1                not sliced apple.n.01_1
+
+Halves that an activity waits for are the parts of their whole. What else 3.6 knows (filled, attached, folded, ...) has no
+state here.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+
+from ig2mj.errors import Ig2mjError
+from ig2mj.predicates import find, logic
+from ig2mj.predicates.logic import Atom, Expression, Not
+from ig2mj.tasks.bddl.problem import Problem
+from ig2mj.tasks.bddl.synsets import FLOOR
+
+BEHAVIOR_1K = "omnigibson"
+DIRT = {"stain.n.01": "stained", "dust.n.01": "dusty"}
+WATER = "water.n.06"
+HALF = "half__"
+
+
+class VocabularyError(Ig2mjError):
+    """An activity uses predicates that no state expresses; they are in `predicates`."""
+
+    def __init__(self, name: str, predicates: tuple[str, ...]):
+        self.name, self.predicates = name, predicates
+        super().__init__(f"activity '{name}' uses {', '.join(predicates)}, which ig2mj has no state for")
+
+
+@dataclasses.dataclass(frozen=True)
+class Activity:
+    """What an activity asks for, in predicates of `ig2mj.predicates`, over the definition's own names of objects.
+
+    Attributes:
+      name: of the activity. behavior_1k: its synsets are of BEHAVIOR-1K's taxonomy.
+      objects: synset -> objects that must be found or added; halves and substances are not among them.
+      halves: half -> (whole, number), for halves that come to be when the whole is cut.
+      rooms: object -> the kind of room it has to be in.
+      init: conditions of the start. goal: all must hold. Groups of quantifiers are synsets of `objects`.
+      remarks: oddities of the definition.
+    """
+
+    name: str
+    behavior_1k: bool
+    objects: Mapping[str, tuple[str, ...]]
+    halves: Mapping[str, tuple[str, int]]
+    rooms: Mapping[str, str]
+    init: tuple[Expression, ...]
+    goal: tuple[Expression, ...]
+    remarks: tuple[str, ...] = ()
+
+    def synset_of(self) -> dict[str, str]:
+        """Object -> its synset."""
+        return {name: synset for synset, names in self.objects.items() for name in names}
+
+
+def lower(problem: Problem, name: str) -> Activity:
+    """The activity that a definition describes.
+
+    Args:
+      name: of the activity; the definition's own carries a number.
+
+    Raises:
+      VocabularyError: it uses predicates that no state expresses.
+    """
+    lowering = _Lowering(problem)
+    init, goal = lowering.all(problem.init), lowering.all(problem.goal)
+    if lowering.unknown:
+        raise VocabularyError(name, tuple(sorted(lowering.unknown)))
+    kept = {s: names for s, names in problem.objects.items() if s not in lowering.substances}
+    kept = {s: tuple(n for n in names if n not in lowering.halves) for s, names in kept.items()}
+    return Activity(
+        name=name,
+        behavior_1k=problem.domain == BEHAVIOR_1K,
+        objects={s: names for s, names in kept.items() if names},
+        halves=lowering.halves,
+        rooms=problem.rooms,
+        init=tuple(dict.fromkeys(init)),
+        goal=goal,
+        remarks=problem.remarks,
+    )
+
+
+class _Lowering:
+    def __init__(self, problem: Problem):
+        self.problem, self.old = problem, problem.domain != BEHAVIOR_1K
+        self.synset = problem.synset_of()
+        self.unknown: set[str] = set()
+        every = logic.atoms(logic.ground(logic.And((*problem.init, *problem.goal)), self.members))
+        self.substances = {
+            self.synset[a.arguments[1]] for a in every if not self.old and a.predicate in ("covered", "saturated")
+        }
+        future = {a.arguments[0] for a in every if a.predicate == "future"}
+        self.halves = {} if self.old else self.find_halves(future)
+
+    def members(self, group: str) -> tuple[str, ...]:
+        return self.problem.objects[group]
+
+    def find_halves(self, future: set[str]) -> dict[str, tuple[str, int]]:
+        """Future halves -> (whole, number): in the order of the definition, shared out among the wholes of that name."""
+        found = {}
+        for synset, names in self.problem.objects.items():
+            stem = synset.split(".")[0]
+            waiting = [n for n in names if n in future]
+            if not stem.startswith(HALF) or not waiting:
+                continue
+            same = [n for s, n in self.problem.objects.items() if s.split(".")[0] == stem.removeprefix(HALF)]
+            wholes = [name for group in same for name in group if name not in future]
+            for i, half in enumerate(waiting if wholes else ()):
+                whole = i * len(wholes) // len(waiting)
+                first = -(-whole * len(waiting) // len(wholes))
+                found[half] = (wholes[whole], i - first)
+        return found
+
+    def all(self, parts: tuple[Expression, ...]) -> tuple[Expression, ...]:
+        lowered = []
+        for part in parts:
+            groups = _groups(part)
+            special = {s for s in groups if s in self.substances or any(h in self.halves for h in self.members(s))}
+            source = logic.ground(part, self.members) if special or FLOOR in groups else part
+            lowered.append(rewrite(source, lambda a, bound: self.atom(a, bound)))
+        return tuple(lowered)
+
+    def atom(self, a: Atom, bound: Mapping[str, str]) -> Expression:
+        synsets = [bound.get(x) or self.synset.get(x, "") for x in a.arguments]
+        if self.old:
+            return Atom(find(a.predicate).name, a.arguments)
+        match a.predicate:
+            case "ontop" if synsets[1] == FLOOR:
+                return Atom("on_floor", a.arguments)
+            case "covered" if synsets[1] in DIRT:
+                return Atom(DIRT[synsets[1]], a.arguments[:1])
+            case "saturated" if synsets[1] == WATER:
+                return Atom("soaked", a.arguments[:1])
+            case "real" | "future" if a.arguments[0] in self.halves:
+                sliced = Atom("sliced", (self.halves[a.arguments[0]][0],))
+                return sliced if a.predicate == "real" else Not(sliced)
+            case "real" if self.is_cut(a.arguments[0], synsets[0]):
+                return Not(Atom("sliced", a.arguments))
+        name = a.predicate
+        if name not in ("ontop", "inside", "nextto", "under", "touching", "cooked", "frozen", "open", "toggled_on"):
+            substance = f" {synsets[1].split('.')[0]}" if name in ("covered", "saturated") else ""
+            self.unknown.add(name + substance)
+            return a
+        return Atom(find(name).name, a.arguments)
+
+    def is_cut(self, name: str, synset: str) -> bool:
+        """Whether an object, or every object of a variable's synset, is a whole that halves wait for."""
+        wholes = {whole for whole, _ in self.halves.values()}
+        return name in wholes if name in self.synset else set(self.members(synset)) <= wholes
+
+
+def rewrite(
+    e: Expression, atom: Callable[[Atom, Mapping[str, str]], Expression], bound: Mapping[str, str] | None = None
+) -> Expression:
+    """The expression with every atom replaced; `atom` is given it and the variables bound around it with their groups."""
+    known = dict(bound or {})
+
+    def again(part: Expression, more: Mapping[str, str] | None = None) -> Expression:
+        return rewrite(part, atom, {**known, **(more or {})})
+
+    match e:
+        case Atom():
+            return atom(e, known)
+        case Not(part):
+            inner = again(part)
+            return inner.part if isinstance(inner, Not) else Not(inner)
+        case logic.And(parts):
+            return logic.And(tuple(map(again, parts)))
+        case logic.Or(parts):
+            return logic.Or(tuple(map(again, parts)))
+        case logic.ForAll(variable, group, body) | logic.Exists(variable, group, body):
+            return type(e)(variable, group, again(body, {variable: group}))
+        case logic.ForN(count, variable, group, body):
+            return logic.ForN(count, variable, group, again(body, {variable: group}))
+        case logic.ForPairs(first, second, body):
+            return logic.ForPairs(first, second, again(body, dict([first, second])))
+        case logic.ForNPairs(count, first, second, body):
+            return logic.ForNPairs(count, first, second, again(body, dict([first, second])))
+        case logic.Exactly(count, parts):
+            return logic.Exactly(count, tuple(map(again, parts)))
+        case logic.Pairing(count, rows):
+            return logic.Pairing(count, tuple(tuple(None if p is None else again(p) for p in row) for row in rows))
+    raise TypeError(f"{e!r} is no expression")
+
+
+def _groups(e: Expression) -> set[str]:
+    """Groups of all quantifiers of an expression."""
+    found: set[str] = set()
+
+    def note(a: Atom, bound: Mapping[str, str]) -> Atom:
+        found.update(bound.values())
+        return a
+
+    rewrite(e, note)
+    return found
