@@ -44,8 +44,8 @@ def convert_object(
 ) -> Outcome:
     """Converts one object: `object.xml`, `manifest.json`, `meshes/`, and the report.
 
-    The object stands on a ground plane, free to move; the halves of a sliceable one lie beside it. Masses are the URDF's own; missing ones come from the
-    category's density where the URDF lies in a dataset, else from a general one.
+    The object stands on a ground plane, free to move; the halves of a sliceable one lie beside it. Masses are the
+    URDF's own; missing ones come from the category's density where the URDF lies in a dataset, else from a general one.
 
     Args:
       category: what it is, in iGibson's names: decides its abilities. model: its name, default the URDF's.
@@ -143,7 +143,7 @@ def _build(
 
 
 def _halves(dataset: Dataset | None, whole: BuiltModel, options: ConvertOptions) -> dict[str, BuiltModel]:
-    """`<model>_part_<i>` -> half of a sliceable object, at the whole's scale; {} where the dataset lacks one of them."""
+    """`<model>_part_<i>` -> half of a sliceable object, at the whole's scale; {} where the dataset lacks one."""
     parts = whole.assembly.model.metadata.object_parts
     if dataset is None or not all(dataset.has_model(p.category, p.model) for p in parts):
         return {}

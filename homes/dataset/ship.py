@@ -17,7 +17,7 @@ NOT_SHIPPED = ("report.html", "report.json")
 
 
 def strip_report(home: pathlib.Path, *, keep_checks: bool = True) -> list[str]:
-    """Removes the report of a converted home or object, and keeps `checks.json` of it; the failed checks, one line each."""
+    """Removes the report of a converted home or object, keeping `checks.json` of it; the failed checks, a line each."""
     report = home / "report.json"
     checks = json.loads(report.read_text(encoding="utf-8"))["checks"]
     kept = [{key: check[key] for key in ("name", "passed", "summary", "failures")} for check in checks]

@@ -66,7 +66,7 @@ def convert(
     jobs: int = 2,
     no_cache: Flag = False,
 ) -> int:
-    """Convert the homes of a dataset, and the object library, into one folder with shared meshes, as scenes_mjcf/ has them.
+    """Convert a dataset's homes and the object library into one folder with shared meshes, as scenes_mjcf/ has them.
 
     Each home's checks are kept as OUT/HOME/checks.json, the library is OUT/objects/CATEGORY/MODEL. Exit status 1 when a
     check failed.

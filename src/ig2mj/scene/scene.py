@@ -12,6 +12,7 @@ from typing import Protocol, runtime_checkable
 import mujoco
 
 from ig2mj.errors import InputError, UnknownNameError
+from ig2mj.scene.additions import Addition, add_objects
 from ig2mj.scene.build_tables import build_tables
 from ig2mj.scene.manifest import AgentEntry, Manifest, ObjectEntry, load_manifest
 from ig2mj.scene.paths import MANIFEST_FILE, model_file
@@ -43,6 +44,7 @@ class Scene:
       tables: its constants as arrays.
       rooms: room maps, or None.
       agents: what was attached when it was loaded, in the order of the A axis.
+      additions: objects of the library that were added when it was loaded; they come last on the O axis.
     """
 
     folder: pathlib.Path
@@ -51,6 +53,7 @@ class Scene:
     tables: SceneTables
     rooms: Rooms | None = None
     agents: tuple[Agent, ...] = ()
+    additions: tuple[Addition, ...] = ()
 
     @property
     def name(self) -> str:
@@ -72,8 +75,13 @@ class Scene:
         return self.manifest.objects[self.object_index(name)]
 
     def spec(self) -> mujoco.MjSpec:
-        """The scene with its agents, read again, to be changed and compiled; ids are those of `model`."""
-        spec = read_spec(model_file(self.folder))
+        """The scene with additions and agents, read again, to be changed and compiled; ids are those of `model`."""
+        file = model_file(self.folder)
+        if self.additions:
+            own = load_manifest(self.folder / MANIFEST_FILE)
+            spec = _spec_from_text(add_objects(file, own, [f"{a.category}/{a.model}" for a in self.additions])[0], file)
+        else:
+            spec = read_spec(file)
         for agent in self.agents:
             _attach(agent, spec)
         return spec
@@ -90,30 +98,35 @@ class Scene:
         return f"Scene('{self.name}', {len(self.object_names)} objects, {self.folder})"
 
 
-def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = ()) -> Scene:
+def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: Sequence[str] = ()) -> Scene:
     """Loads a converted scene.
 
     Args:
       path: its folder, its scene.xml or its manifest.json, or the bare name of a home that ships with the project.
       agents: robots to compile into it, e.g. `FloatingHand(pos=(0, 0, 1))`.
+      objects: what to add from the object library, e.g. ["steak", "plate/plate_00"]. Additions are named
+        `<category>_<n>`, going on from the home's own, and stand outside the house until they are put somewhere.
 
     Raises:
-      InputError: a file is missing or is no valid MJCF.
+      InputError: a file is missing or is no valid MJCF. UnknownNameError: the library has no such object.
       ManifestError: the manifest is broken, or does not belong to the scene.xml.
     """
     file = model_file(path)
     folder = file.parent
     manifest = load_manifest(folder / MANIFEST_FILE)
+    additions: list[Addition] = []
+    spec = None
+    if objects:
+        text, manifest, additions = add_objects(file, manifest, objects)
+        spec = _spec_from_text(text, file)
     if agents:
-        spec = read_spec(file)
+        spec = spec or read_spec(file)
         manifest = copy.copy(manifest)
         manifest.agents = [*manifest.agents, *(_attach(agent, spec) for agent in agents)]
-        model = _compile(spec, file)
-    else:
-        model = _compile(None, file)
+    model = _compile(spec, file)
     rooms = load_rooms(folder / manifest.rooms.file) if manifest.rooms.file else None
     tables = build_tables(model, manifest, rooms, folder / MANIFEST_FILE)
-    return Scene(folder, manifest, model, tables, rooms, tuple(agents))
+    return Scene(folder, manifest, model, tables, rooms, tuple(agents), tuple(additions))
 
 
 def _attach(agent: Agent, spec: mujoco.MjSpec) -> AgentEntry:
@@ -125,6 +138,13 @@ def read_spec(file: pathlib.Path) -> mujoco.MjSpec:
     try:
         return mujoco.MjSpec.from_file(str(file))
     except (ValueError, OSError) as e:
+        raise _not_mjcf(file, e) from e
+
+
+def _spec_from_text(text: str, file: pathlib.Path) -> mujoco.MjSpec:
+    try:
+        return mujoco.MjSpec.from_string(text)
+    except ValueError as e:
         raise _not_mjcf(file, e) from e
 
 

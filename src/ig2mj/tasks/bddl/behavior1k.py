@@ -123,7 +123,7 @@ def _pip() -> list[str]:
 
 @functools.cache
 def hierarchy() -> dict[str, tuple[tuple[str, ...], tuple[str, ...]]]:
-    """Synset -> the synsets right above it, and its own categories, of BEHAVIOR-1K's taxonomy. Raises as `definitions`."""
+    """Synset of BEHAVIOR-1K -> the synsets right above it, and its own categories. Raises as `definitions`."""
     definitions()
     parents: dict[str, dict[str, None]] = {}
     categories: dict[str, tuple[str, ...]] = {}

@@ -1,4 +1,4 @@
-"""The activities that are known, and reading one: BEHAVIOR-100's, BEHAVIOR-1K's once fetched, or a file of one's own."""
+"""The activities that are known, and reading one: of BEHAVIOR-100, of BEHAVIOR-1K once fetched, or from any file."""
 
 from __future__ import annotations
 

@@ -107,7 +107,7 @@ class _Reader:
                 raise self.error(tree, f"has no section ({name} ...)")
         self.domain = self.only_word(sections[":domain"])
         if self.domain not in PREDICATES:
-            raise self.error(sections[":domain"].parts[1], f"is no domain that is known ({', '.join(PREDICATES)})")
+            raise self.error(sections[":domain"], f"is no domain that is known ({', '.join(PREDICATES)})")
         self.predicates = PREDICATES[self.domain]
         self.read_objects(sections[":objects"])
         init, rooms = [], {}
@@ -158,39 +158,40 @@ class _Reader:
             )
         word, parts = head.text, tree.parts[1:]
 
-        def wants(count: int, form: str) -> None:
-            if len(parts) != count:
-                raise self.error(tree, f"expects {form}, has {len(parts)} parts")
-
         match word:
             case "and" | "or":
                 made = tuple(self.condition(p, bound) for p in parts)
                 return logic.And(made) if word == "and" else logic.Or(made)
             case "not":
-                wants(1, "(not X)")
+                self.wants(tree, 1, "(not X)")
                 return Not(self.condition(parts[0], bound))
             case "imply":
-                wants(2, "(imply X Y)")
+                self.wants(tree, 2, "(imply X Y)")
                 return logic.implies(self.condition(parts[0], bound), self.condition(parts[1], bound))
             case "forall" | "exists":
-                wants(2, f"({word} (?x - SYNSET) X)")
+                self.wants(tree, 2, f"({word} (?x - SYNSET) X)")
                 variable, group = self.binding(parts[0])
                 kind = logic.ForAll if word == "forall" else logic.Exists
                 return kind(variable, group, self.condition(parts[1], {**bound, variable: group}))
             case "forn":
-                wants(3, "(forn (N) (?x - SYNSET) X)")
+                self.wants(tree, 3, "(forn (N) (?x - SYNSET) X)")
                 count, (variable, group) = self.count(parts[0]), self.binding(parts[1])
                 return logic.ForN(count, variable, group, self.condition(parts[2], {**bound, variable: group}))
             case "forpairs":
-                wants(3, "(forpairs (?x - SYNSET) (?y - SYNSET) X)")
+                self.wants(tree, 3, "(forpairs (?x - SYNSET) (?y - SYNSET) X)")
                 first, second = self.binding(parts[0]), self.binding(parts[1])
                 return logic.ForPairs(first, second, self.condition(parts[2], {**bound, **dict([first, second])}))
             case "fornpairs":
-                wants(4, "(fornpairs (N) (?x - SYNSET) (?y - SYNSET) X)")
+                self.wants(tree, 4, "(fornpairs (N) (?x - SYNSET) (?y - SYNSET) X)")
                 count, first, second = self.count(parts[0]), self.binding(parts[1]), self.binding(parts[2])
                 body = self.condition(parts[3], {**bound, **dict([first, second])})
                 return logic.ForNPairs(count, first, second, body)
         return self.atom(tree, head, parts, bound, top)
+
+    def wants(self, tree: Group, count: int, form: str) -> None:
+        """Checks how many parts follow the first word."""
+        if len(tree.parts) - 1 != count:
+            raise self.error(tree, f"expects {form}, has {len(tree.parts) - 1} parts")
 
     def atom(self, tree: Group, head: Word, parts: tuple[Tree, ...], bound: Collection[str], top: bool) -> Atom:
         if head.text not in self.predicates:

@@ -9,13 +9,14 @@ some things in another way:
     real half__apple.n.01_1                  sliced apple.n.01_1, likewise (not (real apple.n.01_1))
     future half__apple.n.01_1                not sliced apple.n.01_1
 
-Halves that an activity waits for are the parts of their whole. What else 3.6 knows (filled, attached, folded, ...) has no
-state here.
+Halves that an activity waits for are the parts of their whole. What else 3.6 knows (filled, attached, folded, ...) has
+no state here.
 """
 
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping
 
 from ig2mj.errors import Ig2mjError
@@ -108,7 +109,7 @@ class _Lowering:
         return self.problem.objects[group]
 
     def find_halves(self, future: set[str]) -> dict[str, tuple[str, int]]:
-        """Future halves -> (whole, number): in the order of the definition, shared out among the wholes of that name."""
+        """Future halves -> (whole, number), in the order of the definition, shared out among wholes of that name."""
         found = {}
         for synset, names in self.problem.objects.items():
             stem = synset.split(".")[0]
@@ -126,10 +127,10 @@ class _Lowering:
     def all(self, parts: tuple[Expression, ...]) -> tuple[Expression, ...]:
         lowered = []
         for part in parts:
-            groups = _groups(part)
+            groups = groups_of(part)
             special = {s for s in groups if s in self.substances or any(h in self.halves for h in self.members(s))}
             source = logic.ground(part, self.members) if special or FLOOR in groups else part
-            lowered.append(rewrite(source, lambda a, bound: self.atom(a, bound)))
+            lowered.append(rewrite(source, self.atom))
         return tuple(lowered)
 
     def atom(self, a: Atom, bound: Mapping[str, str]) -> Expression:
@@ -161,47 +162,47 @@ class _Lowering:
         return name in wholes if name in self.synset else set(self.members(synset)) <= wholes
 
 
-def rewrite(
-    e: Expression, atom: Callable[[Atom, Mapping[str, str]], Expression], bound: Mapping[str, str] | None = None
-) -> Expression:
-    """The expression with every atom replaced; `atom` is given it and the variables bound around it with their groups."""
-    known = dict(bound or {})
+AtomRule = Callable[[Atom, Mapping[str, str]], Expression]
+"""What an atom becomes, given the variables bound around it with their groups."""
 
-    def again(part: Expression, more: Mapping[str, str] | None = None) -> Expression:
-        return rewrite(part, atom, {**known, **(more or {})})
 
+def rewrite(e: Expression, rule: AtomRule, bound: Mapping[str, str] | None = None) -> Expression:
+    """The expression with every atom replaced; double negations vanish."""
+    bound = bound or {}
     match e:
         case Atom():
-            return atom(e, known)
+            return rule(e, bound)
         case Not(part):
-            inner = again(part)
+            inner = rewrite(part, rule, bound)
             return inner.part if isinstance(inner, Not) else Not(inner)
         case logic.And(parts):
-            return logic.And(tuple(map(again, parts)))
+            return logic.And(tuple(rewrite(p, rule, bound) for p in parts))
         case logic.Or(parts):
-            return logic.Or(tuple(map(again, parts)))
+            return logic.Or(tuple(rewrite(p, rule, bound) for p in parts))
         case logic.ForAll(variable, group, body) | logic.Exists(variable, group, body):
-            return type(e)(variable, group, again(body, {variable: group}))
+            return type(e)(variable, group, rewrite(body, rule, {**bound, variable: group}))
         case logic.ForN(count, variable, group, body):
-            return logic.ForN(count, variable, group, again(body, {variable: group}))
+            return logic.ForN(count, variable, group, rewrite(body, rule, {**bound, variable: group}))
         case logic.ForPairs(first, second, body):
-            return logic.ForPairs(first, second, again(body, dict([first, second])))
+            return logic.ForPairs(first, second, rewrite(body, rule, {**bound, **dict([first, second])}))
         case logic.ForNPairs(count, first, second, body):
-            return logic.ForNPairs(count, first, second, again(body, dict([first, second])))
+            return logic.ForNPairs(count, first, second, rewrite(body, rule, {**bound, **dict([first, second])}))
         case logic.Exactly(count, parts):
-            return logic.Exactly(count, tuple(map(again, parts)))
+            return logic.Exactly(count, tuple(rewrite(p, rule, bound) for p in parts))
         case logic.Pairing(count, rows):
-            return logic.Pairing(count, tuple(tuple(None if p is None else again(p) for p in row) for row in rows))
+            return logic.Pairing(
+                count, tuple(tuple(None if p is None else rewrite(p, rule, bound) for p in row) for row in rows)
+            )
     raise TypeError(f"{e!r} is no expression")
 
 
-def _groups(e: Expression) -> set[str]:
-    """Groups of all quantifiers of an expression."""
+def groups_of(e: Expression) -> set[str]:
+    """Groups of all quantifiers of an expression that have an atom in them."""
     found: set[str] = set()
-
-    def note(a: Atom, bound: Mapping[str, str]) -> Atom:
-        found.update(bound.values())
-        return a
-
-    rewrite(e, note)
+    rewrite(e, functools.partial(_note_groups, found))
     return found
+
+
+def _note_groups(found: set[str], a: Atom, bound: Mapping[str, str]) -> Atom:
+    found.update(bound.values())
+    return a
