@@ -28,7 +28,8 @@ from stateful_home import GOAL, write_stateful_home
 import ig2mj
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.predicates import compile_expression
-from ig2mj.predicates.stepper import StateProgram, StateStepper, run_inline
+from ig2mj.predicates.stepper import StateProgram, StateStepper
+from ig2mj.process import run_programs_inline
 from ig2mj.states import RelationPlan, StateModel, initial_states, queries, update
 
 SETTLE_STEPS = 200
@@ -145,7 +146,7 @@ def many_worlds(scene: ig2mj.Scene, model: StateModel, worlds: int, seconds: flo
 
 
 def main(args: Args) -> None:
-    run_inline()
+    run_programs_inline()
     with tempfile.TemporaryDirectory() as folder:
         scene = ig2mj.load_scene(write_stateful_home(pathlib.Path(folder) / "home", args.objects))
     model = StateModel.of_manifest(scene.tables, scene.manifest)

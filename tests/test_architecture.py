@@ -18,6 +18,7 @@ SRC = ROOT / "src" / "ig2mj"
 LAYERS = [
     "errors",
     "install_hint",
+    "process",
     "knowledge",
     "scene",
     "geometry",

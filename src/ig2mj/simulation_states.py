@@ -20,7 +20,8 @@ from ig2mj.errors import AbilityError, InputError, StateError
 from ig2mj.predicates.compile import CompiledExpression, compile_expression
 from ig2mj.predicates.literals import object_index
 from ig2mj.predicates.logic import Atom, Expression
-from ig2mj.predicates.stepper import StateProgram, StateStepper, run_inline
+from ig2mj.predicates.stepper import StateProgram, StateStepper
+from ig2mj.process import run_programs_inline
 from ig2mj.sampling.setters import lacks, set_by_name
 from ig2mj.scene.scene import Scene
 from ig2mj.states import registry
@@ -75,7 +76,7 @@ class SimulationStates:
     state_options: StateOptions | None
 
     def _start_states(self, options: StateOptions | None, seed: int) -> None:
-        run_inline()
+        run_programs_inline()
         self.state_options, self._seed = options, seed
         self._scene_states: SceneStates | None = None
         self._stepper: StateStepper | None = None

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 import warp as wp
 from mujoco.mjx.third_party import mujoco_warp
-from mujoco.mjx.third_party.mujoco_warp._src import block_cholesky, forward, passive, solver
 
-from ig2mj.engine.warp import patches as warp_kernels
-from ig2mj.engine.warp.patches import originals
+from ig2mj.engine.warp.patches import awake_kernels, pins
+
+pytestmark = pytest.mark.skipif(bool(pins.mismatches()), reason=f"our kernels do not fit: {pins.mismatches()}")
 
 STEPS = 100
 AWAKE = 40  # buffer: over 32, where the blocked factorisation begins, and below the model's 51
@@ -56,10 +56,9 @@ def test_an_arm_among_sleeping_boxes_moves_as_upstream():
     start = mujoco.MjData(model)
     mujoco.mj_step(model, start, nstep=240)
     assert start.nv_awake == 3
-    assert warp_kernels.use_awake_kernels()
-    own, awake = _roll(model, start)
-    with warp_kernels.upstream_kernels():
-        upstream, _ = _roll(model, start)
+    with awake_kernels():
+        own, awake = _roll(model, start)
+    upstream, _ = _roll(model, start)
     assert awake[0].tolist() == [3, 3]
     assert awake[:, 0].max() == 3 and awake[:, 1].max() >= 15, "one arm stops short, the other pushes boxes"
     before, boxes_x = 35, slice(0, 8 * 7, 7)
@@ -76,32 +75,13 @@ def test_a_world_without_constraints_reads_nothing_that_was_never_written():
     model = mujoco.MjModel.from_xml_string(SCENE.replace('frictionloss="0.001"', ""))
     start = mujoco.MjData(model)
     mujoco.mj_step(model, start, nstep=240)
-    assert warp_kernels.use_awake_kernels()
     put = mujoco_warp.put_model(model)
     for _ in range(4):
         data = mujoco_warp.put_data(model, start, nworld=2, naconmax=128, naccdmax=128, njmax=200, nvmax=AWAKE)
         for shape in ((2, 48), (2, AWAKE), (2, model.nv), (2, 200), (2, model.nq), (2, 48, 48)):
             junk = [wp.full(shape=shape, value=float("nan"), dtype=float) for _ in range(6)]
             del junk
-        mujoco_warp.step(put, data)
+        with awake_kernels():
+            mujoco_warp.step(put, data)
         assert data.nefc.numpy().tolist() == [0, 0]
         assert np.isfinite(data.qvel.numpy()).all() and np.isfinite(data.qfrc_constraint.numpy()).all()
-
-
-def test_upstream_comes_back_and_goes_again():
-    assert warp_kernels.use_awake_kernels()
-    own = (solver._cholesky_factorize_solve, passive.passive, forward._advance)
-    with warp_kernels.upstream_kernels():
-        for function in (solver._cholesky_factorize_solve, passive.passive, forward._advance):
-            assert "mujoco_warp" in function.__module__
-    assert (solver._cholesky_factorize_solve, passive.passive, forward._advance) == own
-    assert all(function.__module__.startswith("ig2mj.engine.warp.patches.") for function in own)
-
-
-def test_another_mujoco_warp_is_left_as_it_is(monkeypatch):
-    monkeypatch.setattr(originals, "_originals", {})
-    monkeypatch.delattr(block_cholesky, "create_blocked_cholesky_solve_newton_func")
-    before = solver.smooth_solve_compact
-    with pytest.warns(UserWarning, match="create_blocked_cholesky_solve_newton_func"):
-        assert not warp_kernels.use_awake_kernels()
-    assert solver.smooth_solve_compact is before

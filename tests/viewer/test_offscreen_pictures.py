@@ -110,7 +110,7 @@ def test_a_backend_that_kills_its_process_is_only_reported(monkeypatch):
 
 
 def test_where_nothing_draws_the_error_says_what_to_install(monkeypatch):
-    monkeypatch.setattr(offscreen, "_loaded_gl", None)
+    monkeypatch.setattr(offscreen, "used_gl", lambda: None)
     monkeypatch.setattr(offscreen, "probe", lambda name: "broken")
     with pytest.raises(MissingDependencyError, match=r"apt-get install .*libegl1"):
         offscreen.default_backend()

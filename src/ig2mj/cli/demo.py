@@ -102,12 +102,13 @@ def _look(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
 
 def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Path) -> int:
     """Cooks; leaves table, plot, pictures and film; number of things that were to happen and did not."""
+    from ig2mj.process.settings import GL_INSTALL_HINT
     from ig2mj.showcase import cooking
     from ig2mj.showcase.cooking_film import CookingFilm
     from ig2mj.showcase.cooking_pictures import KitchenCameras, MomentSheet
     from ig2mj.showcase.cooking_plot import plot
     from ig2mj.showcase.kitchen import enter_kitchen
-    from ig2mj.viewer.offscreen import INSTALL_HINT, default_backend
+    from ig2mj.viewer.offscreen import default_backend
 
     report = step("cooking")
     report("compiling the states", 0, None)
@@ -143,7 +144,7 @@ def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
                        ("pictures", "moments.png"), *([("film", "cooking.mp4")] if filming else [])):  # fmt: skip
         console.print(f"[bold]{word:<10}[/] {folder / name}")
     if not filming:
-        console.print(f"[bold]film[/]       none: it needs OpenGL ({INSTALL_HINT})")
+        console.print(f"[bold]film[/]       none: it needs OpenGL ({GL_INSTALL_HINT})")
     absent = cooking.missing(log, kitchen)
     for what in absent:
         console.print(f"           did not happen: {what}")

@@ -18,10 +18,11 @@ import sys
 from collections.abc import Callable, Iterable
 from typing import Any
 
-import platformdirs
 from packaging.requirements import Requirement
 
 from ig2mj.install_hint import pip_install, pip_install_extra, requirements
+from ig2mj.process import cache_folder
+from ig2mj.process.settings import GL_INSTALL_HINT
 
 #: Longest that one probe may take. Importing JAX with CUDA on a cold disk takes about half a minute.
 PROBE_TIMEOUT_S = 120.0
@@ -168,18 +169,16 @@ def accelerator_checks(jax: dict[str, Any], warp: dict[str, Any], nvidia: tuple[
 
 def picture_checks(backends: dict[str, str | None]) -> list[Check]:
     """Rendering backends that really drew a picture. None is required alone: one that works is enough."""
-    from ig2mj.viewer.offscreen import INSTALL_HINT
-
     any_works = None in backends.values()
     checks = []
     for name, error in backends.items():
         mend = ""
         if error is not None:
-            mend = INSTALL_HINT if name != "warp" else _reinstall("warp-lang==1.18.0")
+            mend = GL_INSTALL_HINT if name != "warp" else _reinstall("warp-lang==1.18.0")
         what = "draws (slow, needs no OpenGL)" if name == "warp" else "draws"
         checks.append(Check("pictures", name, error is None, error or what, mend=mend))
     if not any_works:
-        checks.append(Check("pictures", "any", False, "no backend draws", mend=INSTALL_HINT))
+        checks.append(Check("pictures", "any", False, "no backend draws", mend=GL_INSTALL_HINT))
     return checks
 
 
@@ -204,7 +203,7 @@ def tool_checks() -> list[Check]:
 
 def cache_checks(warp: dict[str, Any]) -> list[Check]:
     """Cache folders: where, how large, writable."""
-    own = os.environ.get("IG2MJ_CACHE_DIR") or platformdirs.user_cache_dir("ig2mj")
+    own = str(cache_folder())
     folders = {"ig2mj (conversions)": (own, "IG2MJ_CACHE_DIR")}
     if "cache" in warp:
         folders["Warp (compiled kernels)"] = (warp["cache"], "WARP_CACHE_PATH")

@@ -19,7 +19,6 @@ Axes: W worlds.
 
 from __future__ import annotations
 
-import os
 from typing import NamedTuple
 
 import jax
@@ -31,17 +30,7 @@ from ig2mj.predicates.program import BODY_FIELDS, Found, StateProgram, status_of
 from ig2mj.states.definitions import toggled
 from ig2mj.states.world import ExtendedStates, Swap
 
-__all__ = ["StateProgram", "StateStepper", "Step", "run_inline"]
-
-
-def run_inline() -> None:
-    """Makes JAX run small CPU programs in the calling thread, for the rest of the process.
-
-    By default it hands them to another thread, which costs more than a step of the states takes. Has an effect only
-    before JAX is first used; does nothing where the user has decided (JAX_CPU_ENABLE_ASYNC_DISPATCH).
-    """
-    if "JAX_CPU_ENABLE_ASYNC_DISPATCH" not in os.environ:
-        jax.config.update("jax_cpu_enable_async_dispatch", False)
+__all__ = ["StateProgram", "StateStepper", "Step"]
 
 
 LOOK_EVERY = 30

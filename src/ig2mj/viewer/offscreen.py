@@ -14,7 +14,6 @@ import atexit
 import collections
 import dataclasses
 import functools
-import importlib
 import os
 import subprocess
 import sys
@@ -23,7 +22,8 @@ from collections.abc import Callable, Sequence
 import mujoco
 import numpy as np
 
-from ig2mj.errors import EngineError, MissingDependencyError, UnknownNameError
+from ig2mj.errors import MissingDependencyError, UnknownNameError
+from ig2mj.process.settings import GL_INSTALL_HINT, use_gl, used_gl
 
 BACKENDS = ("egl", "osmesa", "warp")
 """In the order in which they are tried."""
@@ -31,7 +31,6 @@ BACKENDS = ("egl", "osmesa", "warp")
 VISIBLE_GROUPS = (0, 1, 2)
 """Geom groups drawn unless asked otherwise, as in MuJoCo's viewer: visual geoms yes, collision geoms (3) no."""
 
-INSTALL_HINT = "apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6"
 
 _PROBE = "import sys; from ig2mj.viewer import offscreen; offscreen._probe_main(sys.argv[1])"
 _PROBE_XML = """<mujoco><visual><headlight ambient="1 1 1"/></visual><worldbody>
@@ -106,14 +105,14 @@ def default_backend() -> str:
     """The backend that `render` uses: the one that MUJOCO_GL names where it works, else the first that does."""
     order = list(BACKENDS)
     wished = os.environ.get("MUJOCO_GL", "").strip().lower()
-    if _loaded_gl is not None:
-        return _loaded_gl
+    if (used := used_gl()) is not None:
+        return used
     if wished in order:
         order.sort(key=lambda b: b != wished)
     for name in order:
         if probe(name) is None:
             return name
-    raise MissingDependencyError(f"no way to draw pictures works here; for OpenGL without a display: {INSTALL_HINT}")
+    raise MissingDependencyError(f"no way to draw pictures works here; for OpenGL without a display: {GL_INSTALL_HINT}")
 
 
 def use_opengl() -> str:
@@ -122,10 +121,10 @@ def use_opengl() -> str:
     Raises:
       MissingDependencyError: none works here.
     """
-    name = next((b for b in ("egl", "osmesa") if b == _loaded_gl or (_loaded_gl is None and probe(b) is None)), None)
+    name = next((b for b in ("egl", "osmesa") if b == used_gl() or (used_gl() is None and probe(b) is None)), None)
     if name is None:
-        raise MissingDependencyError(f"no OpenGL without a display works here; try: {INSTALL_HINT}")
-    _use_gl(name)
+        raise MissingDependencyError(f"no OpenGL without a display works here; try: {GL_INSTALL_HINT}")
+    use_gl(name)
     return name
 
 
@@ -192,30 +191,12 @@ def _resolve_camera(model: mujoco.MjModel, camera: int | str | FreeView | None) 
 
 # ---------------------------------------------------------------------------------------------------- OpenGL
 
-_loaded_gl: str | None = None
 _renderers: collections.OrderedDict[tuple[int, int, int], mujoco.Renderer] = collections.OrderedDict()
 _MAX_RENDERERS = 3  # each holds its model's meshes and textures on the GL side
 
 
-def _use_gl(backend: str) -> None:
-    """Makes `mujoco.Renderer` use this backend, whatever MUJOCO_GL was when MuJoCo was imported."""
-    global _loaded_gl
-    if _loaded_gl == backend:
-        return
-    if _loaded_gl is not None:
-        raise EngineError(f"this process already draws with {_loaded_gl}; {backend} needs a process of its own")
-    from mujoco.rendering.classic import gl_context
-
-    try:
-        module = importlib.import_module(f"mujoco.{backend}")
-    except (ImportError, AttributeError, OSError) as e:
-        raise MissingDependencyError(f"{backend} does not load: {e}; try: {INSTALL_HINT}") from e
-    gl_context.GLContext = module.GLContext
-    _loaded_gl = backend
-
-
 def _render_gl(model, data, view, width, height, groups, segmentation, backend, decorate) -> np.ndarray:
-    _use_gl(backend)
+    use_gl(backend)
     renderer = _renderer_for(model, width, height)
     option = mujoco.MjvOption()
     option.geomgroup[:] = [g in groups for g in range(len(option.geomgroup))]

@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int
 
+from ig2mj.process import quiet_warp
 from ig2mj.sensors.render_model import BACKGROUND, mean_colours
 
 if TYPE_CHECKING:
@@ -30,13 +31,8 @@ def render(
     segmentation: bool = False,
 ) -> np.ndarray:
     """As `offscreen.render`, with the camera already resolved to a number or a FreeView."""
-    import warp as wp
-
-    level, wp.config.log_level = wp.config.log_level, max(wp.config.log_level, wp.LOG_WARNING)
-    try:
+    with quiet_warp():
         return _cast(model, data, camera, width, height, groups, segmentation)
-    finally:
-        wp.config.log_level = level
 
 
 def _cast(model, data, camera, width: int, height: int, groups: Sequence[int], segmentation: bool) -> np.ndarray:

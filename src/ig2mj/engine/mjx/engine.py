@@ -20,7 +20,6 @@ from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 
 from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snapshot, Write, check_arguments
-from ig2mj.engine.compile_cache import keep_jax_programs
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.mjx.contacts import Contacts, finger_forces, link_forces, normal_forces, touching_units
@@ -31,6 +30,7 @@ from ig2mj.engine.native.sleep import FULLY_AWAKE, restore_sleep
 from ig2mj.engine.snapshot_check import check_snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
+from ig2mj.process import prepare_jax
 from ig2mj.scene.scene import Scene
 
 STATE_FIELDS = ("qpos", "qvel", "act", "ctrl", "qacc_warmstart", "eq_active", "mocap_pos", "mocap_quat", "time")
@@ -93,7 +93,7 @@ class MjxEngine(abc.ABC):
           EngineError: an argument is out of range, or MJX cannot run the scene.
         """
         check_arguments(boxes, num_worlds, substeps, timestep)
-        keep_jax_programs()
+        prepare_jax()
         self.scene, self.tables, self.num_worlds = scene, scene.tables, num_worlds
         self.substeps, self.timestep, self.boxes = substeps, timestep, boxes
         self.touch_tolerance = touch_tolerance

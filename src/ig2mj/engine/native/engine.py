@@ -25,7 +25,6 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snapshot, Write, check_arguments
-from ig2mj.engine.compile_cache import keep_jax_programs
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.native.agent_rows import AgentPlan, pose_arrays
@@ -37,6 +36,7 @@ from ig2mj.engine.object_boxes import make_box_table
 from ig2mj.engine.snapshot_check import check_snapshot
 from ig2mj.engine.view import SCHEMA, AgentView, Array, PhysicsView, assemble, axis_sizes
 from ig2mj.errors import EngineError
+from ig2mj.process import prepare_jax
 from ig2mj.scene.scene import Scene
 from ig2mj.scene.tables import SceneTables
 
@@ -123,7 +123,7 @@ class NativeEngine:
           EngineError: an argument is out of range.
         """
         check_arguments(boxes, num_worlds, substeps, timestep)
-        keep_jax_programs()
+        prepare_jax()
         if threads is not None and threads < 1:
             raise EngineError(f"threads = {threads}: at least one is needed")
         self.scene, self.tables, self.num_worlds = scene, scene.tables, num_worlds

@@ -15,20 +15,24 @@ from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 
 from ig2mj.engine.base import Snapshot
-from ig2mj.engine.compile_cache import report_warp_compilation
 from ig2mj.engine.health import Usage
 from ig2mj.engine.mjx.contacts import Contacts, warp_contacts
 from ig2mj.engine.mjx.engine import MjxEngine, MjxPhysics
 from ig2mj.engine.native.settle import settle
 from ig2mj.engine.view import Array
-from ig2mj.engine.warp.patches import use_awake_kernels
+from ig2mj.engine.warp import patches
 from ig2mj.engine.warp.profile import EngineProfile, fit, load_profile
-from ig2mj.engine.warp.streams import keep_external_streams
+from ig2mj.process import prepare_warp
 from ig2mj.scene.scene import Scene
 
 
 class WarpEngine(MjxEngine):
-    """MJX-Warp behind the `Engine` protocol."""
+    """MJX-Warp behind the `Engine` protocol.
+
+    Attributes:
+      profile: sizes of its buffers.
+      own_kernels: its programs run our functions in place of some of MuJoCo Warp's (`ig2mj.engine.warp.patches`).
+    """
 
     name = "warp"
 
@@ -54,9 +58,8 @@ class WarpEngine(MjxEngine):
             little: of 16,384 disturbed worlds nearly all converge at once, and 5 against 100 saved 9 % of a step.
           print_overflow: let Warp print a line per overflowing world and step. The flags are kept in any case.
         """
-        keep_external_streams()
-        use_awake_kernels()
-        report_warp_compilation()
+        prepare_warp()
+        self.own_kernels = patches.for_new_engines()
         sizes = fit(profile, scene.model) if profile else load_profile(scene.folder, scene.model)
         self.profile = sizes.for_worlds(max(num_worlds, 1))  # a wrong number is told by `MjxEngine`
         self._print_overflow = print_overflow
@@ -77,6 +80,10 @@ class WarpEngine(MjxEngine):
         own.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
         own.opt.iterations, own.opt.ls_iterations = self._iterations, self._ls_iterations
         return own
+
+    def _map(self, act: Any, model: mjx.Model, data: mjx.Data, eq_data: Float[Array, "W E 12"]) -> mjx.Data:
+        with patches.traced_with(self.own_kernels):
+            return super()._map(act, model, data, eq_data)
 
     def _put_model(self, model: mujoco.MjModel) -> mjx.Model:
         put = mjx.put_model(model, impl="warp")

@@ -1,7 +1,7 @@
-"""Warp kernels that cost what is awake, not what could be: changes to MuJoCo Warp 3.17 for households.
+"""Warp kernels that cost what is awake, not what could be: changes to MuJoCo Warp 3.17.0 for households.
 
-Nearly everything in a home sleeps, but five parts of MuJoCo Warp's step cost as if nothing did. `use_awake_kernels`
-puts these in their place; results are the same up to rounding:
+Nearly everything in a home sleeps, but five parts of MuJoCo Warp's step cost as if nothing did. Engines of ours run
+these in their place; results are the same up to rounding:
 
 - The factorisations of the compacted solver run over the buffer (`nvmax`, sized for the worst moment of the busiest
   world) though the rest of it is identity. Here they stop after the degrees of freedom awake in each world.
@@ -20,42 +20,80 @@ Three more, for safety:
 - Contacts are checked against their geoms (`contacts`).
 - Too many pairs in the first of a step's two passes of collision detection are flagged (`collision`).
 
-What each was of a step on an H200 stands in docs/notes.md. The functions
-replaced are private to MuJoCo Warp, which is pinned; a version without them is left as it is, with a warning.
+What each was of a step on an H200 is in docs/notes.md.
+
+Who gets them: programs of our own engines (`traced_with`), and direct calls inside `awake_kernels()`. Everybody else in
+the process, in whatever thread, gets MuJoCo Warp's own functions. An engine made inside `upstream_kernels()` gets
+those, too. The functions replaced are private, so version and sources are pinned (`pins`); with others every engine
+runs upstream's functions, and one warning says so.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
+import threading
+import warnings
+from collections.abc import Iterator
 
-from mujoco.mjx.third_party.mujoco_warp._src import collision_driver, forward, passive, solver
+from ig2mj.engine.warp.patches import pins
+from ig2mj.engine.warp.patches.programs import traced_with
+from ig2mj.engine.warp.patches.replacements import KERNELS
 
-from ig2mj.engine.warp.patches import broadphase, collision, compact_solver, gravity, velocity
-from ig2mj.engine.warp.patches.originals import replace, upstream_kernels
+__all__ = ["awake_kernels", "fit", "for_new_engines", "traced_with", "upstream_kernels"]
 
-__all__ = ["upstream_kernels", "use_awake_kernels"]
-
-_NEEDED = {
-    **compact_solver.NEEDED,
-    passive: ("passive",),
-    collision_driver: ("collision", *broadphase.NEEDED),
-    forward: ("_advance", "fwd_velocity"),
-}
-
-_OWN = {
-    (solver, "_cholesky_factorize_solve"): compact_solver.cholesky_factorize_solve,
-    (solver, "_update_gradient_init_h_sparse"): compact_solver.init_hessian,
-    (solver, "smooth_solve_compact"): compact_solver.smooth_solve_compact,
-    (solver, "_solve_init_dof"): compact_solver.solve_init_dof,
-    (passive, "passive"): gravity.passive_forces,
-    (collision_driver, "collision"): collision.collision,
-    (collision_driver, "nxn_broadphase"): functools.partial(collision.choose_broadphase, "nxn_broadphase"),
-    (collision_driver, "sap_broadphase"): functools.partial(collision.choose_broadphase, "sap_broadphase"),
-    (forward, "_advance"): velocity.advance,
-    (forward, "fwd_velocity"): velocity.fwd_velocity,
-}
+_here = threading.local()
+_lock = threading.Lock()
+_warned = False
 
 
-def use_awake_kernels() -> bool:
-    """Puts the kernels in place, once per process. Returns whether they are; a warning says why not."""
-    return replace(_NEEDED, _OWN)
+def fit() -> bool:
+    """Whether our functions fit the MuJoCo Warp that is installed. The first time they do not, a warning says why."""
+    global _warned
+    wrong = pins.mismatches()
+    with _lock:
+        warn, _warned = bool(wrong) and not _warned, _warned or bool(wrong)
+    if not wrong:
+        _fill()
+    if warn:
+        more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
+        warnings.warn(f"MuJoCo Warp's own, slower kernels run: {wrong[0]}{more}", stacklevel=3)
+    return not wrong
+
+
+@functools.cache
+def _fill() -> None:
+    from ig2mj.engine.warp.patches.table import OWN  # not before: its modules need names that may not exist
+
+    KERNELS.add(OWN)
+
+
+def for_new_engines() -> bool:
+    """Whether an engine made now in this thread runs our functions."""
+    return not getattr(_here, "upstream", False) and fit()
+
+
+@contextlib.contextmanager
+def awake_kernels() -> Iterator[None]:
+    """Inside the block this thread's direct calls of MuJoCo Warp run our functions, where they fit.
+
+    Engines need no such block.
+    """
+    with KERNELS.entered(fit()):
+        yield
+
+
+@contextlib.contextmanager
+def upstream_kernels() -> Iterator[None]:
+    """Inside the block this thread makes engines that run MuJoCo Warp as it comes, for comparison.
+
+    They go on doing so after the block, and engines made before go on with our functions inside it. Direct calls of
+    MuJoCo Warp from this thread run its own functions.
+    """
+    before = getattr(_here, "upstream", False)
+    _here.upstream = True
+    try:
+        with KERNELS.entered(False):
+            yield
+    finally:
+        _here.upstream = before

@@ -23,9 +23,6 @@ LANES = 16
 
 AWAKE = int(types.SleepState.AWAKE)
 
-NEEDED = ("_broadphase_filter", "_mesh_missing", "_add_geom_pair", "nxn_broadphase", "sap_broadphase")
-"""What is used of `collision_driver`."""
-
 
 @functools.cache
 @no_type_check

@@ -10,7 +10,7 @@ from mujoco.mjx.third_party.mujoco_warp._src import collision_driver
 
 from ig2mj.engine.warp.patches.broadphase import awake_broadphase, serves
 from ig2mj.engine.warp.patches.contacts import mend_contacts
-from ig2mj.engine.warp.patches.originals import original
+from ig2mj.engine.warp.patches.replacements import original
 
 
 def choose_broadphase(name: str, m: Any, d: Any, ctx: Any, awake_prev: Any = None) -> None:

@@ -15,31 +15,10 @@ from typing import Any, no_type_check
 import warp as wp
 from mujoco.mjx.third_party.mujoco_warp._src import block_cholesky, solver
 
-from ig2mj.engine.warp.patches.originals import original
+from ig2mj.engine.warp.patches.replacements import original
 
 TILE = 16
 """Rows of a block of the blocked factorisations (`types.TILE_SIZE_JTDAJ_DENSE`)."""
-
-NEEDED = {
-    solver: (
-        "_cholesky_factorize_solve",
-        "_update_gradient_init_h_sparse",
-        "_upper_triangle_index",
-        "_sparse_compact",
-        "_BLOCK_CHOLESKY_DIM",
-        "smooth_solve_compact",
-        "_gather_M_sparse",
-        "_gather_rhs_compact",
-        "_scatter_solution",
-        "_solve_init_dof",
-    ),
-    block_cholesky: (
-        "create_blocked_cholesky_factorize_solve_func",
-        "create_blocked_cholesky_augmented_factorize_solve_newton_func",
-        "create_blocked_cholesky_solve_newton_func",
-    ),
-}
-"""What is used of MuJoCo Warp."""
 
 
 @wp.func

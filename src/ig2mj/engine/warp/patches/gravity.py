@@ -11,7 +11,7 @@ from typing import Any, no_type_check
 import warp as wp
 from mujoco.mjx.third_party.mujoco_warp._src import passive, support, types
 
-from ig2mj.engine.warp.patches.originals import original
+from ig2mj.engine.warp.patches.replacements import original
 
 
 @wp.kernel

@@ -7,7 +7,7 @@ from typing import Any
 
 from mujoco.mjx.third_party.mujoco_warp._src import forward
 
-from ig2mj.engine.warp.patches.originals import original
+from ig2mj.engine.warp.patches.replacements import original
 
 _inside = threading.local()
 

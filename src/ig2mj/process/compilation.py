@@ -1,4 +1,4 @@
-"""First use: what is compiled once per machine is kept, and the wait is not silent.
+"""First use: what is compiled once per machine is kept, and long waits are reported.
 
 Two compilers work before the first step. Warp compiles about 80 modules of physics kernels (minutes), and keeps them in
 its own folder under the user's cache. XLA compiles the step; its programs are kept below ig2mj's cache folder, unless
@@ -15,18 +15,16 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-import jax
-import jax.monitoring
 import platformdirs
 
-from ig2mj.engine.waiting import WAITING, Work
+from ig2mj.process.waiting import WAITING, Work
 
-ENVIRONMENT = "IG2MJ_CACHE_DIR"
+CACHE_VARIABLE = "IG2MJ_CACHE_DIR"
 
 MODULES = 80
-"""About as many Warp modules does a home's step need."""
+"""About the number of Warp modules that a home's step needs."""
 
-WORTH_KEEPING = 0.1
+MIN_COMPILE_SECONDS = 0.1
 """Seconds. Programs that XLA compiles faster than this are not kept."""
 
 XLA_EVENT = "/jax/core/compile/backend_compile_duration"
@@ -37,36 +35,14 @@ _REPORTING = "_ig2mj_reports_compilation"
 
 def cache_folder() -> pathlib.Path:
     """ig2mj's cache folder: IG2MJ_CACHE_DIR, or the user's cache folder of this platform."""
-    return pathlib.Path(os.environ.get(ENVIRONMENT) or platformdirs.user_cache_dir("ig2mj")).expanduser()
-
-
-def keep_jax_programs() -> pathlib.Path | None:
-    """Lets JAX keep compiled programs from one process to the next, and tells of long compilations.
-
-    What the user told JAX (its option `jax_compilation_cache_dir`, or the variable of that name in capitals) stands.
-
-    Returns:
-      The folder; None: there is none to write to.
-    """
-    report_xla_compilation()
-    chosen = getattr(jax.config, "jax_compilation_cache_dir", None)
-    if chosen:
-        return pathlib.Path(chosen)
-    folder = cache_folder() / "jax"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        return None
-    if not os.access(folder, os.W_OK):
-        return None
-    jax.config.update("jax_compilation_cache_dir", str(folder))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", WORTH_KEEPING)
-    return folder
+    return pathlib.Path(os.environ.get(CACHE_VARIABLE) or platformdirs.user_cache_dir("ig2mj")).expanduser()
 
 
 @functools.cache
 def report_xla_compilation() -> None:
-    """From now on this process tells on stderr that XLA compiles a program, where that takes long."""
+    """From now on this process reports on stderr that XLA compiles a program, where that takes long."""
+    import jax.monitoring
+
     begun: dict[tuple[int, str], Work] = {}
 
     def begin(event: str, value: float | int, **about: str | int) -> None:
@@ -84,21 +60,17 @@ def report_xla_compilation() -> None:
 
 
 def xla_text(program: str) -> str:
-    """What is told of a program of XLA."""
+    """The line about a program of XLA."""
     return f"compiling {program or 'a program'}, once per machine, scene and number of worlds"
 
 
 def report_warp_compilation() -> None:
-    """From now on this process tells on stderr that Warp compiles kernels, instead of Warp's own lines on stdout.
+    """From now on this process reports on stderr that Warp compiles kernels, instead of Warp's own lines on stdout.
 
     Once per process; without effect where Warp's inner workings are not those of 1.18.
     """
     import warp as wp
 
-    if wp.config.log_level == wp.LOG_INFO:  # nobody asked for more or for less
-        wp.config.log_level = wp.LOG_WARNING
-    if os.environ.get(ENVIRONMENT) and "WARP_CACHE_PATH" not in os.environ and not wp.config.kernel_cache_dir:
-        wp.config.kernel_cache_dir = str(cache_folder() / "warp")
     module = getattr(getattr(getattr(wp, "_src", None), "context", None), "Module", None)
     compile_module: Callable[..., bool] | None = getattr(module, "_compile", None)
     if module is None or compile_module is None or getattr(module, _REPORTING, False):
@@ -117,5 +89,5 @@ def report_warp_compilation() -> None:
 
 
 def kernels_text(number: int) -> str:
-    """What is told of the module of that number, from 1."""
+    """The line about the module of that number, from 1."""
     return f"compiling physics kernels {number}/{max(MODULES, number)}, once per machine"

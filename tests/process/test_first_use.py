@@ -11,9 +11,9 @@ import time
 import jax
 import pytest
 
-from ig2mj.engine import waiting
-from ig2mj.engine.compile_cache import cache_folder, keep_jax_programs, kernels_text, xla_text
-from ig2mj.engine.waiting import Waiting
+from ig2mj.process import cache_folder, prepare_jax, waiting
+from ig2mj.process.compilation import kernels_text, xla_text
+from ig2mj.process.waiting import Waiting
 
 
 class Terminal(io.StringIO):
@@ -110,7 +110,7 @@ def test_more_modules_than_usual_are_told_as_they_are():
 
 def test_what_xla_compiles_is_told(monkeypatch):
     """By JAX's own monitoring; the compiled function is a new one, so it is in no cache."""
-    keep_jax_programs()
+    prepare_jax()
     begun = []
 
     class Told(Waiting):
@@ -119,7 +119,7 @@ def test_what_xla_compiles_is_told(monkeypatch):
             return super().begin(text, in_row)
 
     told = Told()
-    monkeypatch.setattr("ig2mj.engine.compile_cache.WAITING", told)
+    monkeypatch.setattr("ig2mj.process.compilation.WAITING", told)
 
     def some_step(x):
         return x + 1
@@ -140,14 +140,13 @@ def test_a_folder_that_the_user_gave_jax_stands():
     given = jax.config.jax_compilation_cache_dir  # type: ignore[attr-defined]
     if given is None:
         pytest.skip("pytest runs without its cache, so JAX was given no folder")
-    assert keep_jax_programs() == pathlib.Path(given)
+    assert prepare_jax() == pathlib.Path(given)
     assert jax.config.jax_compilation_cache_dir == given  # type: ignore[attr-defined]
 
 
 def test_jax_is_given_a_folder_below_ig2mjs(tmp_path):
     code = (
-        "import jax; from ig2mj.engine.compile_cache import keep_jax_programs as k;"
-        "print(k()); print(jax.config.jax_compilation_cache_dir)"
+        "import jax; from ig2mj.process import prepare_jax as k;print(k()); print(jax.config.jax_compilation_cache_dir)"
     )
     for folder, lines in ((tmp_path, [str(tmp_path / "jax")] * 2), (pathlib.Path("/dev/null/x"), ["None", "None"])):
         environment = {"IG2MJ_CACHE_DIR": str(folder), "PATH": "", "JAX_PLATFORMS": "cpu"}

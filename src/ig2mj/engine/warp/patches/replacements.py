@@ -1,0 +1,16 @@
+"""MuJoCo Warp's functions, replaced for whoever is inside a block of `KERNELS`."""
+
+from __future__ import annotations
+
+from types import ModuleType
+from typing import Any
+
+from ig2mj.engine.warp.patches.scope import ScopedReplacement
+
+KERNELS = ScopedReplacement()
+"""Our functions in place of MuJoCo Warp's; filled when they are found to fit (`ig2mj.engine.warp.patches.fit`)."""
+
+
+def original(module: ModuleType, name: str) -> Any:
+    """MuJoCo Warp's own function of a replaced name."""
+    return KERNELS.original(module, name)

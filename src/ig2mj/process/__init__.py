@@ -1,0 +1,42 @@
+"""Everything that ig2mj changes in its process as a whole, so that other code there knows what it meets.
+
+Importing ig2mj changes nothing. The functions below are called where the first engine, simulation or picture is made,
+or earlier by whoever wants to; a second call does nothing. What the user has decided stands.
+
+`prepare_jax` (every engine):
+  - JAX's option `jax_compilation_cache_dir`: compiled programs are kept in ig2mj's cache folder, unless it has a value;
+    then also `jax_persistent_cache_min_compile_time_secs`, 0.1 s.
+  - JAX's monitoring gets two listeners: long compilations are reported on stderr.
+
+`run_programs_inline` (a simulation of one world):
+  - JAX's option `jax_cpu_enable_async_dispatch` is off: small CPU programs run in the calling thread. Not where the
+    variable JAX_CPU_ENABLE_ASYNC_DISPATCH is set.
+
+`prepare_warp` (Warp engines):
+  - `warp.config.log_level`: WARNING where it was INFO, and long compilations are reported on stderr instead.
+  - `warp.config.kernel_cache_dir`: below IG2MJ_CACHE_DIR, where that is set and Warp's own folder was not chosen.
+  - Two repairs of Warp 1.18, of its streams and of its graph captures (`ig2mj.process.warp_repairs`).
+
+`use_gl` (the first picture):
+  - The class of OpenGL contexts that `mujoco.Renderer` makes. Environment variables are not changed.
+
+Environment variables that are read: IG2MJ_CACHE_DIR (moves ig2mj's cache folder, and with it JAX's and Warp's),
+MUJOCO_GL (the backend tried first), and those named above. MuJoCo Warp's functions are not replaced process-wide: what
+`ig2mj.engine.warp.patches` has in their place runs inside our own engines' programs only.
+"""
+
+from __future__ import annotations
+
+from ig2mj.process.compilation import CACHE_VARIABLE, cache_folder
+from ig2mj.process.settings import prepare_jax, prepare_warp, quiet_warp, run_programs_inline, use_gl, used_gl
+
+__all__ = [
+    "CACHE_VARIABLE",
+    "cache_folder",
+    "prepare_jax",
+    "prepare_warp",
+    "quiet_warp",
+    "run_programs_inline",
+    "use_gl",
+    "used_gl",
+]

@@ -1,0 +1,119 @@
+"""The functions that make the settings listed in `ig2mj.process`."""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import importlib
+import os
+import pathlib
+from collections.abc import Iterator
+
+from ig2mj.errors import EngineError, MissingDependencyError
+from ig2mj.process.compilation import (
+    CACHE_VARIABLE,
+    MIN_COMPILE_SECONDS,
+    cache_folder,
+    report_warp_compilation,
+    report_xla_compilation,
+)
+
+GL_INSTALL_HINT = "apt-get install libegl1 libegl-mesa0 libgl1-mesa-dri libosmesa6"
+
+_gl: str | None = None
+
+
+def prepare_jax() -> pathlib.Path | None:
+    """Lets JAX keep compiled programs from one process to the next, and reports long compilations on stderr.
+
+    A folder that the user gave JAX (its option `jax_compilation_cache_dir`, or the variable of that name in capitals)
+    stands.
+
+    Returns:
+      The folder, or None where there is none that can be written to.
+    """
+    import jax
+
+    report_xla_compilation()
+    chosen = getattr(jax.config, "jax_compilation_cache_dir", None)
+    if chosen:
+        return pathlib.Path(chosen)
+    folder = cache_folder() / "jax"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    if not os.access(folder, os.W_OK):
+        return None
+    jax.config.update("jax_compilation_cache_dir", str(folder))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", MIN_COMPILE_SECONDS)
+    return folder
+
+
+def run_programs_inline() -> None:
+    """Makes JAX run small CPU programs in the calling thread.
+
+    By default it hands them to another thread, which costs more than a step of the states of one world. Has an effect
+    only before JAX is first used; does nothing where the user has decided (JAX_CPU_ENABLE_ASYNC_DISPATCH).
+    """
+    import jax
+
+    if "JAX_CPU_ENABLE_ASYNC_DISPATCH" not in os.environ:
+        jax.config.update("jax_cpu_enable_async_dispatch", False)
+
+
+@functools.cache
+def prepare_warp() -> None:
+    """Warp reports compilation as the rest of ig2mj does, keeps kernels where IG2MJ_CACHE_DIR says, and is repaired."""
+    import warp as wp
+
+    from ig2mj.process.warp_repairs import collect_nothing_during_captures, keep_external_streams
+
+    if wp.config.log_level == wp.LOG_INFO:  # the default: nobody asked for more or for less
+        wp.config.log_level = wp.LOG_WARNING
+    if os.environ.get(CACHE_VARIABLE) and "WARP_CACHE_PATH" not in os.environ and not wp.config.kernel_cache_dir:
+        wp.config.kernel_cache_dir = str(cache_folder() / "warp")
+    report_warp_compilation()
+    keep_external_streams()
+    collect_nothing_during_captures()
+
+
+@contextlib.contextmanager
+def quiet_warp() -> Iterator[None]:
+    """Warp tells of nothing less than warnings inside the block."""
+    import warp as wp
+
+    level, wp.config.log_level = wp.config.log_level, max(wp.config.log_level, wp.LOG_WARNING)
+    try:
+        yield
+    finally:
+        wp.config.log_level = level
+
+
+def use_gl(backend: str) -> None:
+    """Makes `mujoco.Renderer` draw with this backend, whatever MUJOCO_GL was when MuJoCo was imported.
+
+    Args:
+      backend: "egl", "osmesa" or "glfw".
+
+    Raises:
+      EngineError: this process already draws with another one. MissingDependencyError: it does not load.
+    """
+    global _gl
+    if _gl == backend:
+        return
+    if _gl is not None:
+        raise EngineError(f"this process already draws with {_gl}; {backend} needs a process of its own")
+    from mujoco.rendering.classic import gl_context
+
+    try:
+        module = importlib.import_module(f"mujoco.{backend}")
+    except (ImportError, AttributeError, OSError) as e:
+        raise MissingDependencyError(f"{backend} does not load: {e}; try: {GL_INSTALL_HINT}") from e
+    gl_context.GLContext = module.GLContext
+    _gl = backend
+
+
+def used_gl() -> str | None:
+    """The backend that this process draws with; None before the first picture."""
+    return _gl

@@ -1,0 +1,90 @@
+"""Two repairs of Warp 1.18 as JAX uses it. Each concerns the whole process, and takes nothing from other users of Warp.
+
+CUDA streams that belong to JAX stay known to Warp. Warp wraps JAX's stream in an object for each call and forgets the
+stream when the object goes away. Two calls that overlap on one stream, as they do when JAX dispatches ahead, then fail
+with "unknown stream": the first to end takes the stream from the other. Nothing is lost by never forgetting: JAX has a
+handful of streams, and they live as long as it.
+
+Python's garbage collector rests while Warp captures a CUDA graph. A capture runs Python code for up to seconds, so that
+the collector runs in it, in the capturing thread. Compiled programs of JAX in reference cycles (an engine that was
+dropped is one) are destroyed then, and XLA unloads their CUDA modules, which CUDA forbids while the thread captures:
+"CUDA_ERROR_STREAM_CAPTURE_UNSUPPORTED: Failed to unload module", and the next launch fails with error 901, since the
+capture is lost. (Warp puts off unloading its own modules; it cannot know of XLA's.)
+"""
+
+from __future__ import annotations
+
+import gc
+import threading
+from typing import Any
+
+import warp as wp
+
+_REPAIRED = "_ig2mj_repaired"
+
+
+class CollectorRest:
+    """Keeps Python's cyclic garbage collector off while at least one block is entered, in any thread."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._entered = 0
+        self._was_on = False
+
+    def begin(self) -> None:
+        """Enters a block: the collector goes off."""
+        with self._lock:
+            if self._entered == 0:
+                self._was_on = gc.isenabled()
+                gc.disable()
+            self._entered += 1
+
+    def end(self) -> None:
+        """Leaves a block; after the last one the collector is on again, if it was."""
+        with self._lock:
+            self._entered -= 1
+            if self._entered == 0 and self._was_on:
+                gc.enable()
+
+
+REST = CollectorRest()
+"""The one of this process: there is only one collector."""
+
+
+def keep_external_streams() -> None:
+    """Applies the first repair, once per process."""
+    if getattr(wp.Stream, _REPAIRED, False):
+        return
+    forget = wp.Stream.__del__
+
+    def forget_own(self: Any) -> None:
+        if self.owner:
+            forget(self)
+
+    wp.Stream.__del__ = forget_own
+    setattr(wp.Stream, _REPAIRED, True)
+
+
+def collect_nothing_during_captures() -> None:
+    """Applies the second repair, once per process."""
+    if getattr(wp.ScopedCapture, _REPAIRED, False):
+        return
+    enter, leave = wp.ScopedCapture.__enter__, wp.ScopedCapture.__exit__
+
+    def enter_without_collector(self: Any) -> Any:
+        REST.begin()
+        try:
+            return enter(self)
+        except BaseException:
+            REST.end()
+            raise
+
+    def leave_and_collect(self: Any, *error: Any) -> Any:
+        try:
+            return leave(self, *error)
+        finally:
+            REST.end()
+
+    wp.ScopedCapture.__enter__ = enter_without_collector
+    wp.ScopedCapture.__exit__ = leave_and_collect
+    setattr(wp.ScopedCapture, _REPAIRED, True)
