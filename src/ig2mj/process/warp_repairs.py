@@ -79,9 +79,9 @@ def collect_nothing_during_captures() -> None:
             REST.end()
             raise
 
-    def leave_and_collect(self: Any, *error: Any) -> Any:
+    def leave_and_collect(self: Any, exc_type: Any, exc_value: Any, traceback: Any) -> None:
         try:
-            return leave(self, *error)
+            leave(self, exc_type, exc_value, traceback)
         finally:
             REST.end()
 

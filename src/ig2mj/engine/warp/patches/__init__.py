@@ -55,10 +55,11 @@ def fit() -> bool:
         warn, _warned = bool(wrong) and not _warned, _warned or bool(wrong)
     if not wrong:
         _fill()
+        return True
     if warn:
         more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
         warnings.warn(f"MuJoCo Warp's own, slower kernels run: {wrong[0]}{more}", stacklevel=3)
-    return not wrong
+    return False
 
 
 @functools.cache
