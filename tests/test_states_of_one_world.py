@@ -23,7 +23,7 @@ def world(tiny_home) -> ig2mj.Simulation:
 def test_every_object_state_can_be_asked(world):
     assert world.state("temperature", "apple") == 23.0
     assert world.state("max_temperature", "apple") == 23.0
-    assert world.state("toggled", "stove") is False
+    assert world.state("toggled_on", "stove") is False
     assert world.state("wetness", "sponge") == 0.0
     assert world.state("dust", "table") == 0.0
     assert world.state("open", "cabinet") is False

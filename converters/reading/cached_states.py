@@ -4,7 +4,7 @@ The manifest's `ObjectEntry.state` then holds, each only where the source had it
 
     temperature, max_temperature   degrees C; no max_temperature where the source says -Infinity (never heated yet)
     wetness                        droplets: the soaking threshold for a soaked object, else 0
-    toggled, toggled_steps         the switch, and for how many steps a finger has been at it
+    toggled_on, press_count        the switch, and for how many steps a finger has been at it
     sliced                         bool
     dust, stain                    particles: null (cleaned), or {"body", "pos", "quat"} in that body's frame
     stain_sizes                    [x, y, z] of each stain particle, m
@@ -73,8 +73,8 @@ def _soaked(value: Any, threshold: float, _: LinkFrame) -> dict[str, Any]:
 
 def _toggled(value: Any, *_: Any) -> dict[str, Any]:
     if isinstance(value, Mapping):
-        return {"toggled": bool(value["value"]), "toggled_steps": int(value.get("hand_in_marker_steps", 0))}
-    return {"toggled": bool(value)}
+        return {"toggled_on": bool(value["value"]), "press_count": int(value.get("hand_in_marker_steps", 0))}
+    return {"toggled_on": bool(value)}
 
 
 def _sliced(value: Any, *_: Any) -> dict[str, Any]:

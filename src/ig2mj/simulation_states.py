@@ -168,7 +168,7 @@ class SimulationStates:
         """Sets a state, or makes a predicate of one object true or false as the paper samples it (table A.5).
 
         Args:
-          name: temperature, max_temperature, wetness or toggled, with a number or a switch; or cooked, burnt, frozen,
+          name: temperature, max_temperature or wetness, with a number; or cooked, burnt, frozen,
             soaked, dusty, stained, toggled_on, open, or sliced (only True).
           object_name: its halves, where it has some, are set alike.
 

@@ -18,7 +18,7 @@ def test_states_of_all_objects_are_listed(tiny_home_folder, capsys):
     out = _json(capsys, "states", str(tiny_home_folder))
     assert out["time"] == 0.0
     assert out["objects"]["apple"] == {"temperature": 23.0, "max_temperature": None, "sliced": False}
-    assert out["objects"]["stove"] == {"toggled": False, "heat_source": False}
+    assert out["objects"]["stove"] == {"toggled_on": False, "heat_source": False}
     assert "box" not in out["objects"]
 
 

@@ -211,7 +211,7 @@ def test_saved_states_have_our_names_section_9(task_house):
         "temperature": 30.5,
     }
     sink = entries["sink_9"].state
-    assert sink["toggled"] is True and sink["toggled_steps"] == 2
+    assert sink["toggled_on"] is True and sink["press_count"] == 2
     assert sink["water"] == {"steps_since_drop": None, "drops": [None, [-0.8, -1.1, 0.9]]}
 
 

@@ -16,7 +16,7 @@ from ig2mj.showcase.cooking_plot import plot
 from ig2mj.showcase.kitchen import Kitchen, enter_kitchen
 from ig2mj.showcase.temperature_log import TemperatureLog
 from ig2mj.simulation import Simulation
-from ig2mj.states.definitions import toggled
+from ig2mj.states.definitions import toggled_on
 
 
 @pytest.fixture(scope="module")
@@ -155,7 +155,7 @@ def test_the_hand_stays_long_enough_within_reach_and_comes_back():
         way.append(float(hand.ctrl()[1]))
         assert len(way) < 200
     assert max(way) == pytest.approx(REST - PRESS)
-    assert sum(y == max(way) for y in way) >= HOLD > toggled.HOLD
+    assert sum(y == max(way) for y in way) >= HOLD > toggled_on.HOLD
     assert way[-1] == 0.0
     assert max(np.abs(np.diff(way))) <= 0.35 / 30 + 1e-9
 

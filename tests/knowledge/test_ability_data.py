@@ -208,11 +208,11 @@ def test_a_caller_may_change_what_it_gets():
         ("soakable", {"wetness"}),
         ("dustyable", {"dust"}),
         ("stainable", {"stain"}),
-        ("toggleable", {"toggled"}),
+        ("toggleable", {"toggled_on"}),
         ("sliceable", {"sliced"}),
-        ("heatSource", {"toggled"}),
-        ("coldSource", {"toggled"}),
-        ("waterSource", {"toggled"}),
+        ("heatSource", {"toggled_on"}),
+        ("coldSource", {"toggled_on"}),
+        ("waterSource", {"toggled_on"}),
     ],
 )
 def test_table_a2_required_states(ability, states):

@@ -40,7 +40,7 @@ HOME = HandWorld(
 def _world(on: tuple[str, ...] = (), touching=(), worlds: int = 1) -> WorldState:
     states = initial_states(HOME.model(), worlds)
     toggled = np.isin(np.array(HOME.tables.object_names), on)
-    states = states.replace(toggled=states.toggled | toggled)
+    states = states.replace(toggled_on=states.toggled_on | toggled)
     zeros = np.zeros(worlds, np.float32)
     view = HOME.view(touching=touching, worlds=worlds)
     return WorldState(None, view, states, np.zeros((worlds, 2), np.uint32), zeros.astype(np.int32), zeros)
@@ -296,7 +296,7 @@ def test_explain_of_every_connective(text, words):
 
 def test_explain_is_about_the_world_asked_for():
     world = _world(worlds=2)
-    states = world.states.replace(toggled=world.states.toggled.at[1, 0].set(True))
+    states = world.states.replace(toggled_on=world.states.toggled_on.at[1, 0].set(True))
     goal = compile_expression(HOME.model(), "(toggled_on lamp_0)")
     assert goal.explain(world.replace(states=states), 1).endswith("holds.")
     assert "does not hold" in goal.explain(world.replace(states=states), 0)

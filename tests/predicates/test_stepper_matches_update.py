@@ -84,8 +84,8 @@ def test_every_step_is_bitwise_the_same(options):
     swaps, short = 0, 0
     for k, number in enumerate(STORY):
         if k == 20:  # a hand on the switch of the tap, from outside
-            flip = theirs.toggled.at[0, HOME.index["tap"]].set(True)
-            ours, theirs = ours.replace(toggled=flip), theirs.replace(toggled=flip)
+            flip = theirs.toggled_on.at[0, HOME.index["tap"]].set(True)
+            ours, theirs = ours.replace(toggled_on=flip), theirs.replace(toggled_on=flip)
         short += stepper._kept is not None and stepper._view is VIEWS[number]
         ours, swap, status = stepper.step(ours, VIEWS[number])
         theirs, expected_swap, expected = reference(theirs, VIEWS[number])
@@ -205,7 +205,7 @@ def test_states_changed_from_outside_are_seen():
     for _ in range(3):
         states, _, status = stepper.step(states, VIEWS[0])
     assert not status.holds[0]
-    states = states.replace(toggled=states.toggled.at[0, 0].set(True))
+    states = states.replace(toggled_on=states.toggled_on.at[0, 0].set(True))
     states, _, status = stepper.step(states, VIEWS[0])
     assert status.holds[0]
 

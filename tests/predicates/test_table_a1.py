@@ -175,7 +175,7 @@ def test_dusty_and_stained(kind, alive, dirty):
 
 def test_toggled_on():
     assert not _holds("(toggled_on fridge)")
-    assert _holds("(toggled_on fridge)", states=_states(toggled={"fridge": True}))
+    assert _holds("(toggled_on fridge)", states=_states(toggled_on={"fridge": True}))
 
 
 def test_sliced():

@@ -87,7 +87,7 @@ def test_a_switched_on_thing_is_brighter(tiny_home):
     model = StateModel.of_manifest(tiny_home.tables, tiny_home.manifest)
     stove = tiny_home.object_index("stove")
     states = initial_states(model, 1)
-    states = dataclasses.replace(states, toggled=states.toggled.at[0, stove].set(True))
+    states = dataclasses.replace(states, toggled_on=states.toggled_on.at[0, stove].set(True))
     of_geoms = tints_of_geoms(tints(model, states), np.array([stove, -1]))
     colour = np.asarray(tinted(np.array([[0.4, 0.8, 0.2]] * 2, np.float32), of_geoms))[0]
     assert colour[0] == pytest.approx([0.6, 1.0, 0.3])

@@ -156,7 +156,7 @@ def test_table_a4_stains_go_only_with_a_soaked_tool():
 def test_section_19_17_a_vacuum_cleaner_cleans_only_while_it_is_on():
     view = ROOM.view({"vacuum": (0.0, 0, 0.1)}, touching=[("vacuum", "table")])
     off = _dirty()
-    on = off.replace(toggled=off.toggled.at[0, 3].set(True))
+    on = off.replace(toggled_on=off.toggled_on.at[0, 3].set(True))
     assert _counts(step(ROOM.model(), off, view))[0] == 20
     assert _counts(step(ROOM.model(), on, view))[0] == 18
 

@@ -112,7 +112,7 @@ def test_table_a3_toggling_link(with_link):
     states = initial_states(home.model(), 1)
     for _ in range(5):
         states = step(home.model(), states, home.view(fingers=[(0, 0, 0.05)]))
-    assert bool(states.toggled[0, 0]) == with_link
+    assert bool(states.toggled_on[0, 0]) == with_link
 
 
 @pytest.mark.parametrize("with_link", [True, False])

@@ -23,7 +23,7 @@ from ig2mj.states.registry import STATES
         ("Can be Soaked", "soakable", {"wetness"}),
         ("Can be Dusty", "dustyable", {"dust"}),
         ("Can be Stained", "stainable", {"stain"}),
-        ("Can be ToggledOn", "toggleable", {"toggled"}),
+        ("Can be ToggledOn", "toggleable", {"toggled_on"}),
         ("Can be Sliced", "sliceable", {"sliced"}),
     ],
 )
@@ -47,12 +47,12 @@ def test_table_a2_a_heat_source_and_a_droplet_source_obey_the_toggled_state(abil
     )
     for on in (False, True):
         states = initial_states(home.model(), 1)
-        states = states.replace(toggled=states.toggled.at[0, 0].set(on))
+        states = states.replace(toggled_on=states.toggled_on.at[0, 0].set(on))
         for _ in range(3):
             states = step(home.model(), states, home.view())
         works = states.temperature[0, 1] > 23.1 if ability == "heatSource" else states.water.active.any()
         assert bool(works) == on
-    assert "toggled" in required_states(ability)
+    assert "toggled_on" in required_states(ability)
 
 
 ROWS = HandWorld(
@@ -101,7 +101,7 @@ def test_table_a4_in_same_positive_and_negative_vertical_axis_objs_and_horizonta
         ("Temperature", "temperature", "temperature", 41.5),
         ("MaxTemperature", "max_temperature", "max_temperature", 99.5),
         ("WetnessLevel", "wetness_level", "wetness", 3.0),
-        ("ToggledState", "toggled_state", "toggled", True),
+        ("ToggledState", "toggled_state", "toggled_on", True),
         ("SlicedState", "sliced_state", "sliced", True),
     ],
 )
@@ -135,7 +135,11 @@ def test_initial_states_of_a_manifest(tiny_home):
     saved = {
         apple: {"temperature": -5.0, "max_temperature": 71.0, "sliced": False},
         table: {"dust": [None, {"body": "table", "pos": [0.1, 0.2, 0.5], "quat": side}]},
-        sink: {"toggled": True, "toggled_steps": 2, "water": {"steps_since_drop": 1, "drops": [None, [1.0, 2.0, 3.0]]}},
+        sink: {
+            "toggled_on": True,
+            "press_count": 2,
+            "water": {"steps_since_drop": 1, "drops": [None, [1.0, 2.0, 3.0]]},
+        },
     }
     for index, state in saved.items():
         manifest.objects[index].state = state
@@ -143,7 +147,7 @@ def test_initial_states_of_a_manifest(tiny_home):
     assert states.temperature[:, apple].tolist() == [-5.0, -5.0]
     assert states.max_temperature[1, apple] == 71.0
     assert states.max_temperature[1, apple + 1] == -np.inf
-    assert bool(states.toggled[0, sink]) and int(states.press_count[0, sink]) == 2
+    assert bool(states.toggled_on[0, sink]) and int(states.press_count[0, sink]) == 2
     row = np.flatnonzero(model.parameters.dust_rows == table)[0]
     assert np.asarray(states.dust.alive[1, row]).tolist() == [False, True] + [False] * 18
     assert int(states.dust.body[0, row, 1]) == bodies["table"]

@@ -95,7 +95,7 @@ def _after(home: HandWorld, view, *, on: tuple[str, ...] = (), **options) -> np.
     model = home.model(**options)
     states = initial_states(model, 1)
     toggled = np.isin(np.arange(len(home.things)), [home.index[n] for n in on])[None]
-    states = states.replace(toggled=jnp.asarray(toggled))
+    states = states.replace(toggled_on=jnp.asarray(toggled))
     return np.asarray(step(model, states, view).temperature)[0]
 
 
@@ -191,7 +191,7 @@ def test_temperature_is_differentiable():
     home = _kitchen()
     model, view, fish = home.model(), home.view({"fish": (0, 0.1, 0.55)}), home.index["fish"]
     states = initial_states(model, 1)
-    states = states.replace(toggled=states.toggled.at[0, home.index["stove"]].set(True))
+    states = states.replace(toggled_on=states.toggled_on.at[0, home.index["stove"]].set(True))
 
     def after(start: jax.Array) -> jax.Array:
         s = states.replace(temperature=states.temperature.at[0, fish].set(start))

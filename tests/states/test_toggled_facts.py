@@ -8,7 +8,7 @@ import pytest
 from hand_world import HandWorld, Thing, step
 
 from ig2mj.states import initial_states
-from ig2mj.states.definitions.toggled import set_toggled_on
+from ig2mj.states.definitions.toggled_on import set_toggled_on
 
 LAMP = HandWorld(
     Thing("lamp", abilities={"toggleable": {}}, links={"toggle_button": (0, 0, 1)}),
@@ -23,11 +23,11 @@ def _press(pattern: str, start: bool = False) -> list[bool]:
     """The lamp's switch after each update; 1 is a finger at the button, 0 is none."""
     model = LAMP.model()
     states = initial_states(model, 1)
-    states = states.replace(toggled=states.toggled.at[0, 0].set(start))
+    states = states.replace(toggled_on=states.toggled_on.at[0, 0].set(start))
     found = []
     for mark in pattern:
         states = step(model, states, LAMP.view(fingers=NEAR if mark == "1" else AWAY))
-        found.append(bool(states.toggled[0, 0]))
+        found.append(bool(states.toggled_on[0, 0]))
     return found
 
 
@@ -49,7 +49,7 @@ def test_the_reach_is_strictly_ten_centimetres_from_the_finger_frame():
     at_the_edge = LAMP.view(fingers=[(0, 0, 5), (0, 0.1001, 1)])
     for _ in range(6):
         states = step(model, states, at_the_edge)
-    assert not states.toggled.any()
+    assert not states.toggled_on.any()
 
 
 def test_only_toggleable_objects_with_a_button_have_a_switch():
@@ -57,7 +57,7 @@ def test_only_toggleable_objects_with_a_button_have_a_switch():
     states = initial_states(model, 1)
     for _ in range(5):
         states = step(model, states, LAMP.view(fingers=[(0, 0, 1), (3, 0, 0)]))
-    assert states.toggled[0].tolist() == [True, False, False]
+    assert states.toggled_on[0].tolist() == [True, False, False]
 
 
 def test_a_nan_finger_presses_nothing():
@@ -65,7 +65,7 @@ def test_a_nan_finger_presses_nothing():
     states = initial_states(model, 1)
     for _ in range(6):
         states = step(model, states, LAMP.view(fingers=[(np.nan, 0, 1), (0, 0, 5)]))
-    assert not states.toggled.any()
+    assert not states.toggled_on.any()
 
 
 @pytest.mark.parametrize("value", [True, False])
@@ -73,7 +73,7 @@ def test_table_a5_toggled_on_is_set_to_the_wanted_value(value):
     model = LAMP.model()
     everything = jnp.ones((2, 3), bool)
     states = initial_states(model, 2)
-    toggled = set_toggled_on(model, ~states.toggled if not value else states.toggled, everything, value)
+    toggled = set_toggled_on(model, ~states.toggled_on if not value else states.toggled_on, everything, value)
     assert (np.asarray(toggled[:, [0, 2]]) == value).all()
 
 
@@ -83,4 +83,4 @@ def test_a_held_button_counts_without_end():
     for _ in range(12):
         states = step(model, states, LAMP.view(fingers=NEAR))
     assert states.press_count[0, 0] == 6
-    assert states.toggled[0, 0]
+    assert states.toggled_on[0, 0]

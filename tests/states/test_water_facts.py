@@ -32,7 +32,7 @@ def _run(home: HandWorld, views: list, on_from: int = 1, **options) -> tuple[Sta
     states, history = initial_states(model, 1), []
     for k, view in enumerate(views, start=1):
         if k == on_from:
-            states = states.replace(toggled=states.toggled.at[0, 0].set(True))
+            states = states.replace(toggled_on=states.toggled_on.at[0, 0].set(True))
         states = step(model, states, view)
         history.append(states)
     return model, history
@@ -74,7 +74,7 @@ def test_section_7_2_the_count_stands_still_while_the_tap_is_off():
     marks = []
     for k in range(1, 14):
         on = not 3 <= k <= 6  # the first drop comes at update 2
-        states = states.replace(toggled=states.toggled.at[0, 0].set(on))
+        states = states.replace(toggled_on=states.toggled_on.at[0, 0].set(on))
         before = states.water.active.sum()
         states = step(model, states, KITCHEN.view())
         marks.append(int(states.water.active.sum() - before))
@@ -136,7 +136,7 @@ def test_a_drop_rests_on_a_tray_and_falls_on_when_the_tray_goes():
     first = np.asarray(at_rest.pos[0, 0, 0])
     assert first[2] == pytest.approx(0.31 + DROP_RADIUS + 0.003, abs=1e-4)
     assert float(at_rest.speed[0, 0, 0]) == 0.0
-    states = history[-1].replace(toggled=history[-1].toggled & False)
+    states = history[-1].replace(toggled_on=history[-1].toggled_on & False)
     for _ in range(12):
         states = step(KITCHEN.model(), states, away)
     assert not states.water.active.any()  # they fell into the sink

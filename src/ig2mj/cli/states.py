@@ -11,18 +11,6 @@ import tyro
 if TYPE_CHECKING:
     from ig2mj.simulation import Simulation
 
-#: States that every object has and that fill a table by themselves: shown where they are asked for.
-PHYSICAL = (
-    "pose",
-    "aabb",
-    "joint_states",
-    "in_contact_objs",
-    "in_same_positive_vertical_axis_objs",
-    "in_same_negative_vertical_axis_objs",
-    "in_same_horizontal_plane_objs",
-    "rooms",
-)
-
 
 def run(
     scene: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="SCENE")],
@@ -58,7 +46,8 @@ def run(
     if state:
         names = [registry.find(s).name for s in state]
     else:
-        names = [n for n in registry.STATES if object or n not in PHYSICAL]
+        # Those that every object has fill a table by themselves: poses, boxes, contacts, rooms.
+        names = [s.name for s in registry.SPECS if object or s.abilities is not None]
     rows: dict[str, dict[str, Any]] = {}
     for name in names:
         kind = registry.STATES[name]

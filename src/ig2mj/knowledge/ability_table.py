@@ -48,16 +48,16 @@ ABILITIES: dict[str, Ability] = {
     # Fraction of the placed particles that must be exceeded (table A.1: one half).
     "dustyable": Ability("dusty", ("dust",), (), {"dusty_threshold": 0.5}),
     "stainable": Ability("stained", ("stain",), (), {"stained_threshold": 0.5}),
-    "toggleable": Ability("toggled_on", ("toggled",), ("toggle_button",)),
+    "toggleable": Ability("toggled_on", ("toggled_on",), ("toggle_button",)),
     # Newtons on the blade that must be exceeded (table A.4: ten).
     "sliceable": Ability("sliced", ("sliced",), (), {"slice_force": 10.0}),
     "slicer": Ability(None, (), ("slicer",)),
     "cleaningTool": Ability(None, (), ("cleaning_tool_area",)),
     # Part of a joint's range beyond which it counts as open (table A.1: five per cent).
     "openable": Ability("open", ("open",), (), {"open_fraction": 0.05}),
-    "heatSource": Ability(None, ("toggled",), ("heat_source",), _HEAT),
-    "coldSource": Ability(None, ("toggled",), ("heat_source",), _HEAT),
-    "waterSource": Ability(None, ("toggled",), ("water_source",)),
+    "heatSource": Ability(None, ("toggled_on",), ("heat_source",), _HEAT),
+    "coldSource": Ability(None, ("toggled_on",), ("heat_source",), _HEAT),
+    "waterSource": Ability(None, ("toggled_on",), ("water_source",)),
     # The paper's DropletSink. No category of the taxonomy has it: `overrides.json` gives it to those with a drain.
     "waterSink": Ability(None, (), ("water_sink",)),
     # In the taxonomy, with no state behind them.

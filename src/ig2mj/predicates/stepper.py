@@ -27,7 +27,7 @@ import numpy as np
 from ig2mj.engine.view import Array, PhysicsView, read_field
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.predicates.program import BODY_FIELDS, Found, StateProgram, status_of, swap_of
-from ig2mj.states.definitions import toggled
+from ig2mj.states.definitions import toggled_on
 from ig2mj.states.world import ExtendedStates, Swap
 
 __all__ = ["StateProgram", "StateStepper", "Step"]
@@ -94,7 +94,7 @@ class StateStepper:
         return True
 
     def _away(self, view: PhysicsView) -> bool:
-        return isinstance(view.agent.finger_pos, np.ndarray) and toggled.all_out_of_reach(self.program.model, view)
+        return isinstance(view.agent.finger_pos, np.ndarray) and toggled_on.all_out_of_reach(self.program.model, view)
 
     def _heat(self, last: Step, kept: Found) -> Step:
         states = last.states

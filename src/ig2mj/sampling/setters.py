@@ -21,9 +21,10 @@ from ig2mj.predicates.registry import PREDICATES
 from ig2mj.predicates.registry import find as find_predicate
 from ig2mj.sampling.surface_particles import sample_places
 from ig2mj.states import registry
-from ig2mj.states.definitions import dust, max_temperature, sliced, stain, temperature, toggled, wetness
+from ig2mj.states.definitions import dust, max_temperature, sliced, stain, temperature, toggled_on, wetness
 from ig2mj.states.definitions.open import sample_open
 from ig2mj.states.model import StateModel
+from ig2mj.states.spec import StateSpec
 from ig2mj.states.world import ExtendedStates, Swap
 
 Value = bool | float | int
@@ -66,7 +67,7 @@ def set_by_name(
     """Sets a state to a value, or a predicate of one object to a truth, in every world of `states`.
 
     Args:
-      name: a state that is a number or a switch (`ObjectState.field`), or a predicate: cooked, burnt, frozen, soaked,
+      name: a state that is a number or a switch (`StateSpec.set`), or a predicate: cooked, burnt, frozen, soaked,
         dusty, stained, toggled_on, open, sliced.
       object_name: its halves are set alike.
       value: a finite number, or a truth.
@@ -90,17 +91,16 @@ def set_by_name(
     kind = _state(name)
     if not kind.belongs_to(model, index):
         raise AbilityError(lacks(f"state '{kind.name}'", object_name, model, kind.abilities or ()))
-    if kind.field is None:
+    if kind.set is None:
         raise StateError(f"state '{kind.name}' cannot be set (settable: {', '.join(settable())})")
     if not np.isfinite(value):
         raise StateError(f"state '{kind.name}' of '{object_name}' cannot be {value}")
-    field = jnp.asarray(getattr(states, kind.field))
-    return Change(dataclasses.replace(states, **{kind.field: jnp.where(mask, field.dtype.type(value), field)}))
+    return Change(dataclasses.replace(states, **kind.set(states, mask, value)))
 
 
 def settable() -> list[str]:
     """Names that `set_by_name` takes."""
-    return [*(s.name for s in registry.STATES.values() if s.field is not None), *_SETTERS]
+    return [*(s.name for s in registry.SPECS if s.set is not None), *_SETTERS]
 
 
 def lacks(what: str, object_name: str, model: StateModel, abilities: tuple[str, ...]) -> str:
@@ -116,7 +116,7 @@ def _predicate_name(name: str) -> str:
         return ""
 
 
-def _state(name: str) -> registry.ObjectState:
+def _state(name: str) -> StateSpec:
     try:
         return registry.find(name)
     except UnknownNameError:
@@ -145,8 +145,8 @@ def _soaked(t: _Task, value: bool) -> Change:
 
 
 def _toggled_on(t: _Task, value: bool) -> Change:
-    new = toggled.set_toggled_on(t.model, t.states.toggled, t.mask, value)
-    return Change(dataclasses.replace(t.states, toggled=new))
+    new = toggled_on.set_toggled_on(t.model, t.states.toggled_on, t.mask, value)
+    return Change(dataclasses.replace(t.states, toggled_on=new))
 
 
 def _open(t: _Task, value: bool) -> Change:

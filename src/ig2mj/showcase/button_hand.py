@@ -12,11 +12,11 @@ REST = 0.50
 """m from the palm to the button between presses."""
 PRESS = 0.17
 """m from the palm to the button while pressing: the finger's last segment begins 0.083 m from the button, within the
-0.10 m of `ig2mj.states.definitions.toggled.REACH`, and its tip ends 0.04 m before it."""
+0.10 m of `ig2mj.states.definitions.toggled_on.REACH`, and its tip ends 0.04 m before it."""
 SPEED = 0.35
 """m/s."""
 HOLD = 12
-"""Control steps that the finger stays; a switch wants five (`ig2mj.states.definitions.toggled.HOLD`)."""
+"""Control steps that the finger stays; a switch wants five (`ig2mj.states.definitions.toggled_on.HOLD`)."""
 
 
 class ButtonHand:

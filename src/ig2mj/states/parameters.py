@@ -81,6 +81,10 @@ class StateParameters:
         """Which objects have the ability."""
         return np.array([ability in a for a in self.abilities], bool)
 
+    def column(self, ability: str, parameter: str, absent: float) -> Float[np.ndarray, "O"]:
+        """A parameter of an ability for all objects; `absent` for those without the ability."""
+        return np.array([a[ability][parameter] if ability in a else absent for a in self.abilities], np.float32)
+
     def halves_of(self, obj: int) -> tuple[int, ...]:
         """Objects that replace `obj` when it is sliced; empty for one that has no halves."""
         return tuple(int(h) for h in self.half_object[self.half_whole == obj])

@@ -12,14 +12,19 @@ particles.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
+from typing import Any
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.poses import quat_rotate
+from ig2mj.geometry.poses import quat_rotate, quat_rotate_inverse
+from ig2mj.states.model import StateModel
+from ig2mj.states.spec import Cut, EventStep, Saved, StateSpec
 
 NUM_PARTICLES = 20
 """Particles that dirty an object (paper table A.5, iGibson's particles.py)."""
@@ -52,14 +57,14 @@ class Particles:
 
 
 def no_particles(num_worlds: int, num_rows: int) -> Particles:
-    """Clean objects."""
+    """Clean objects. NumPy arrays."""
     shape = (num_worlds, num_rows, NUM_PARTICLES)
     return Particles(
-        alive=jnp.zeros(shape, bool),
-        placed=jnp.zeros(shape, bool),
-        body=jnp.zeros(shape, jnp.int32),
-        pos=jnp.zeros((*shape, 3), jnp.float32),
-        normal=jnp.zeros((*shape, 3), jnp.float32).at[..., 2].set(1.0),
+        alive=np.zeros(shape, bool),
+        placed=np.zeros(shape, bool),
+        body=np.zeros(shape, np.int32),
+        pos=np.zeros((*shape, 3), np.float32),
+        normal=np.tile(np.float32([0.0, 0.0, 1.0]), (*shape, 1)),
     )
 
 
@@ -148,3 +153,101 @@ def stain_sizes(bounding_box: Float[np.ndarray, "R 3"]) -> Float[np.ndarray, "R 
 def _gathered(field: Float[Array, "W B d"], body: Int[Array, "W R N"]) -> Float[Array, "W R N d"]:
     flat = body.reshape(body.shape[0], -1, 1)
     return jnp.take_along_axis(jnp.asarray(field), flat, axis=1).reshape(*body.shape, field.shape[-1])
+
+
+def particle_state(
+    name: str,
+    ability: str,
+    rows_of: Callable[[StateModel], Int[np.ndarray, "R"]],
+    update: Callable[[EventStep], Particles],
+    aliases: tuple[str, ...],
+) -> StateSpec:
+    """A state that is a row of particles for every object with an ability; its value is the level.
+
+    Args:
+      name: also of the field of `ExtendedStates`, and of the manifest's list of particles: null, or {"body", "pos",
+        "quat"} whose z axis is the normal. What is there counts as placed.
+      rows_of: objects of the rows. update: the particles after a step.
+    """
+
+    def get(model: StateModel, states: Any, view: PhysicsView, obj: int, world: int) -> float:
+        row = row_of(rows_of(model), obj)
+        levels: Any = np.asarray(_level(getattr(states, name)))
+        return 0.0 if row is None else float(levels[world, row])
+
+    def from_manifest(saved: Saved) -> None:
+        row = row_of(rows_of(saved.model), saved.obj)
+        if row is not None:
+            _fill(getattr(saved.states, name), row, saved)
+
+    def _fill(rows: Particles, row: int, saved: Saved) -> None:
+        for n, entry in enumerate(saved.values.get(name, ())[:NUM_PARTICLES]):
+            if entry is not None and entry["body"] in saved.bodies:
+                rows.alive[0, row, n] = rows.placed[0, row, n] = True
+                rows.body[0, row, n] = saved.bodies[entry["body"]]
+                rows.pos[0, row, n] = entry["pos"]
+                rows.normal[0, row, n] = _z_axis(np.asarray(entry["quat"], float))
+
+    return StateSpec(
+        name=name,
+        get=get,
+        abilities=(ability,),
+        unit="of placed",
+        aliases=aliases,
+        fields={name: Particles},
+        initial=lambda model: {name: no_particles(1, len(rows_of(model)))},
+        update=lambda step: step.having(**{name: update(step)}),
+        inherit=lambda states, cut: {name: inherit(getattr(states, name), rows_of(cut.model), cut)},
+        from_manifest=from_manifest,
+    )
+
+
+def row_of(rows: Int[np.ndarray, "R"], obj: int) -> int | None:
+    """The row of an object, or None."""
+    mine = np.flatnonzero(rows == obj)
+    return int(mine[0]) if len(mine) else None
+
+
+def inherit(particles: Particles, rows: Int[np.ndarray, "R"], cut: Cut) -> Particles:
+    """Rows of halves become copies of their wholes' rows, in the halves' frames.
+
+    Particles keep their place in the world: those of the side that a half lost come to lie on its cut.
+    """
+    p, tables = cut.model.parameters, cut.model.tables
+    place = {int(o): r for r, o in enumerate(rows)}
+    moves = [
+        (place[h], place[w], m)
+        for m, (h, w) in enumerate(zip(p.half_object.tolist(), p.half_whole.tolist(), strict=True))
+        if h in place and w in place
+    ]
+    if not moves:
+        return particles
+    to, start, half = (np.array(column) for column in zip(*moves, strict=True))
+    mask = cut.takes[:, rows[to]]
+    offset, turn = p.half_pos[half][:, None], p.half_quat[half][:, None]
+    obj = p.half_object[half]
+    pos = quat_rotate_inverse(turn, particles.pos[:, start] - offset)
+    centre, reach = tables.object_bbox_center[obj][:, None], tables.object_bbox[obj][:, None] / 2
+    pos = jnp.clip(pos, centre - reach, centre + reach)
+    normal = quat_rotate_inverse(turn, particles.normal[:, start])
+    root = np.broadcast_to(tables.object_root[obj][:, None], particles.body[:, start].shape)
+
+    def put(field: Array, value: Array) -> Array:
+        chosen = mask.reshape(*mask.shape, *[1] * (field.ndim - 2))
+        return jnp.asarray(field).at[:, to].set(jnp.where(chosen, value, field[:, to]).astype(field.dtype))
+
+    return Particles(
+        alive=put(particles.alive, particles.alive[:, start]),
+        placed=put(particles.placed, particles.placed[:, start]),
+        body=put(particles.body, root),
+        pos=put(particles.pos, pos),
+        normal=put(particles.normal, normal),
+    )
+
+
+_level = jax.jit(level)
+
+
+def _z_axis(quat: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3"]:
+    w, x, y, z = quat / np.linalg.norm(quat)
+    return np.array([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)])

@@ -1,14 +1,13 @@
-"""The one order in which extended states are updated after physics (design: spec/states.md section 2).
-
-    view -> toggled -> sliced -> water -> wetness -> cleaning -> open -> heat sources -> temperature -> max temperature
+"""The one order in which extended states are updated after physics (spec/states.md section 2): `EVENTS`, then `HEAT`.
 
 A state that depends on another sees this step's value of it, but for water: a tap that is switched on in this step lets
-the first drop go in the next, as in iGibson.
+the first drop go in the next, as in iGibson. Which heat source acts on what is found between the two parts; a caller
+that knows that nothing has happened since the last step may run `heat` alone.
 """
 
 from __future__ import annotations
 
-import dataclasses
+from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 import numpy as np
@@ -16,19 +15,40 @@ from jaxtyping import Bool
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.states.definitions import (
-    cleaning,
+    dust,
     heat_source,
     max_temperature,
     open,
     sliced,
+    stain,
     temperature,
-    toggled,
+    toggled_on,
     water,
     wetness,
 )
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Query, RelationPlan, Relations
-from ig2mj.states.world import ExtendedStates, Swap
+from ig2mj.states.spec import EventStep, HeatStep, StateSpec
+from ig2mj.states.swap import Swap
+
+if TYPE_CHECKING:
+    from ig2mj.states.world import ExtendedStates
+
+EVENTS: tuple[StateSpec, ...] = (
+    toggled_on.SPEC,  # fingers at buttons
+    sliced.SPEC,  # blades; halves inherit what their whole has at this point
+    water.SPEC,  # drops fall, land and are taken
+    wetness.SPEC,  # what is touched by drops absorbs them
+    dust.SPEC,  # cleaning tools
+    stain.SPEC,  # the same, soaked
+)
+"""The first part of a step. Nothing in it reads a temperature."""
+
+HEAT: tuple[StateSpec, ...] = (
+    temperature.SPEC,  # heat sources act, or the room does
+    max_temperature.SPEC,
+)
+"""The second part of a step."""
 
 
 def queries(model: StateModel) -> list[Query]:
@@ -63,44 +83,29 @@ def events(
 
     It reads no temperature (but slicing copies them); with the same view and the same other states it does the same.
     """
-    p = model.parameters
-
-    switch, press_count = toggled.update(model, states.toggled, states.press_count, view)
-    states = dataclasses.replace(states, toggled=switch, press_count=press_count)
-
-    cut_now = sliced.cut(model, states.sliced, view)
-    states, swap = sliced.apply(model, states, cut_now, view)
-
-    drops, contacts = water.update(model, states.water, view, states.toggled)
-    wet = wetness.update(model, states.wetness, contacts)
-    states = dataclasses.replace(states, water=drops, wetness=wet)
-
-    working = cleaning.working(model, states.toggled)
-    soaked = wetness.soaked(model, wet)[:, p.tool_object]
-    states = dataclasses.replace(
-        states,
-        dust=cleaning.update(model, states.dust, p.dust_rows, working, view),
-        stain=cleaning.update(model, states.stain, p.stain_rows, working & soaked, view),
-    )
-
+    step = EventStep.start(model, states, view)
+    for spec in EVENTS:
+        assert spec.update is not None
+        step = spec.update(step)
     opened = open.is_open(model, view.joint_pos)
-    on = heat_source.switched_on(model, states.toggled, opened)
+    on = heat_source.switched_on(model, step.states.toggled_on, opened)
     acts = heat_source.acts_on(model, on, view, relations)
-    return states, swap, _as_wholes(model, cut_now, acts)
+    return step.states, step.swap, _as_wholes(model, step.cut_now, acts)
 
 
 def heat(
     model: StateModel, states: ExtendedStates, acts: Bool[Array, "W O S"], touching: Bool[Array, "W O O"]
 ) -> ExtendedStates:
-    """The second part of a step: temperature and its maximum.
+    """The second part of a step: temperatures and what follows from them.
 
     Args:
       acts: from `events`. touching: read only where heat passes by contact.
     """
-    in_use = sliced.in_use(model, states.sliced)
-    warm = temperature.update(model, states.temperature, acts, in_use, touching)
-    hottest = max_temperature.update(model, states.max_temperature, warm, in_use)
-    return dataclasses.replace(states, temperature=warm, max_temperature=hottest)
+    step = HeatStep(model, states, acts, touching, sliced.in_use(model, states.sliced))
+    for spec in HEAT:
+        assert spec.update is not None
+        step = spec.update(step)
+    return step.states
 
 
 def _as_wholes(model: StateModel, cut_now: Bool[Array, "W O"], acts: Bool[Array, "W O S"]) -> Bool[Array, "W O S"]:

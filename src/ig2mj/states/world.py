@@ -6,39 +6,41 @@ particles of a row or drops of a source.
 
 from __future__ import annotations
 
-from typing import Any
+import dataclasses
+from typing import TYPE_CHECKING, Any
 
 from flax import struct
-from jaxtyping import Bool, Float, Int, UInt
+from jaxtyping import Float, Int, UInt
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.states.definitions.water import WaterDrops
-from ig2mj.states.particles import Particles
+from ig2mj.states.registry import SPECS
+from ig2mj.states.spec import Cut
 from ig2mj.states.swap import Swap
+
+if TYPE_CHECKING:
+    _Fields = Any
+else:
+    _Fields = dataclasses.make_dataclass(
+        "_Fields", [(name, kind) for spec in SPECS for name, kind in spec.fields.items()], frozen=True
+    )
 
 
 @struct.dataclass
-class ExtendedStates:
+class ExtendedStates(_Fields):
     """The extended states of all objects (paper table A.4). Physical states are in the view.
 
-    Scalars are kept for every object, because that is small and makes `states.temperature[w, o]` plain to read; an
-    object without the ability keeps the initial value. Particles and drops are kept only for those that have them.
-
-    Attributes:
-      temperature: Celsius. max_temperature: Celsius, -inf before the first update. wetness: droplets absorbed.
-      toggled: the switch. press_count: consecutive updates that a finger has been within reach of the button.
-      sliced: of wholes and halves. water: drops. dust, stain: particles.
+    One attribute for each of `StateSpec.fields` of `registry.SPECS`: `states.temperature[w, o]`. Scalars are kept for
+    every object, because that is small and plain to read; an object without the ability keeps the initial value.
+    Particles and drops are kept only for those that have them.
     """
 
-    temperature: Float[Array, "W O"]
-    max_temperature: Float[Array, "W O"]
-    wetness: Float[Array, "W O"]
-    toggled: Bool[Array, "W O"]
-    press_count: Int[Array, "W O"]
-    sliced: Bool[Array, "W O"]
-    water: WaterDrops
-    dust: Particles
-    stain: Particles
+    def inherited(self, cut: Cut) -> ExtendedStates:
+        """The states after halves took over what their wholes have."""
+        taken: dict[str, Any] = {}
+        for spec in SPECS:
+            if spec.inherit is not None:
+                taken.update(spec.inherit(self, cut))
+        return dataclasses.replace(self, **taken)
 
 
 @struct.dataclass

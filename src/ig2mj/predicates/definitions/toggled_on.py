@@ -11,13 +11,13 @@ from ig2mj.states.world import ExtendedStates
 
 
 def _toggled_on(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O"]:
-    return states.toggled
+    return states.toggled_on
 
 
 TOGGLED_ON = Predicate.of_states(
     _toggled_on,
     name="toggled_on",
-    reads=("states.toggled",),
+    reads=("states.toggled_on",),
     ability="toggleable",
     aliases=("toggledon",),
 )

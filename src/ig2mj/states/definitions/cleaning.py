@@ -27,10 +27,10 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.particles import Particles, world_positions
 
 
-def working(model: StateModel, toggled: Bool[Array, "W O"]) -> Bool[Array, "W T"]:
+def working(model: StateModel, toggled_on: Bool[Array, "W O"]) -> Bool[Array, "W T"]:
     """Tools that are switched on, or have no switch."""
     tools = model.parameters.tool_object
-    return toggled[:, tools] | ~model.parameters.has("toggleable")[tools]
+    return toggled_on[:, tools] | ~model.parameters.has("toggleable")[tools]
 
 
 def update(

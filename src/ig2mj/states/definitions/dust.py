@@ -7,14 +7,20 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
 from ig2mj.states import particles
+from ig2mj.states.definitions import cleaning
 from ig2mj.states.model import StateModel
-from ig2mj.states.particles import Particles
+from ig2mj.states.particles import Particles, particle_state
+from ig2mj.states.spec import EventStep
+
+
+def rows(model: StateModel) -> Int[np.ndarray, "R"]:
+    """The objects that carry rows of dust."""
+    return model.parameters.dust_rows
 
 
 def row_of(model: StateModel, obj: int) -> int | None:
     """The object's row of dust particles, or None: it is not dustyable."""
-    rows = np.flatnonzero(model.parameters.dust_rows == obj)
-    return int(rows[0]) if len(rows) else None
+    return particles.row_of(rows(model), obj)
 
 
 def dusty(model: StateModel, dust: Particles) -> Bool[Array, "W R"]:
@@ -40,3 +46,11 @@ def set_dusty(
 def set_not_dusty(dust: Particles, row: int, worlds: Bool[Array, "W"] | None = None) -> Particles:
     """Dusty(o)=False: all particles go (paper table A.5)."""
     return particles.remove(dust, row, worlds)
+
+
+def _update(step: EventStep) -> Particles:
+    able = cleaning.working(step.model, step.states.toggled_on)
+    return cleaning.update(step.model, step.states.dust, rows(step.model), able, step.view)
+
+
+SPEC = particle_state("dust", "dustyable", rows, _update, aliases=("dustiness_level",))

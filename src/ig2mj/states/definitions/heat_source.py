@@ -10,13 +10,22 @@ Axes: W worlds, O objects, S sources (`StateParameters.heat_*`).
 
 from __future__ import annotations
 
+import functools
+from typing import TYPE_CHECKING
+
+import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.states.definitions.open import is_open
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Query, Relations
+from ig2mj.states.spec import StateSpec
+
+if TYPE_CHECKING:
+    from ig2mj.states.world import ExtendedStates
 
 
 def queries(model: StateModel) -> list[Query]:
@@ -24,10 +33,10 @@ def queries(model: StateModel) -> list[Query]:
     return [("inside", int(i), int(j)) for i, j in _inside_pairs(model)]
 
 
-def switched_on(model: StateModel, toggled: Bool[Array, "W O"], opened: Bool[Array, "W O"]) -> Bool[Array, "W S"]:
+def switched_on(model: StateModel, toggled_on: Bool[Array, "W O"], opened: Bool[Array, "W O"]) -> Bool[Array, "W S"]:
     """Whether each source is on; one that acts by nearness and has no link never is."""
     p = model.parameters
-    on = ~p.heat_requires_toggled_on | toggled[:, p.heat_object]
+    on = ~p.heat_requires_toggled_on | toggled_on[:, p.heat_object]
     on &= ~p.heat_requires_closed | ~opened[:, p.heat_object]
     return on & (p.heat_requires_inside | (p.heat_link >= 0))
 
@@ -63,3 +72,19 @@ def _inside_pairs(model: StateModel) -> Int[np.ndarray, "P 2"]:
     containers = np.unique(p.heat_object[p.heat_requires_inside])
     pairs = [(i, j) for i in np.flatnonzero(p.thermal) for j in containers if i != j]
     return np.array(pairs, int).reshape(-1, 2)
+
+
+@functools.partial(jax.jit, static_argnums=0)
+def _switched_on(
+    model: StateModel, toggled_on: Bool[Array, "W O"], joint_pos: Float[Array, "W J"]
+) -> Bool[Array, "W S"]:
+    return switched_on(model, toggled_on, is_open(model, joint_pos))
+
+
+def _get(model: StateModel, states: ExtendedStates, view: PhysicsView, obj: int, world: int) -> bool:
+    on = np.asarray(_switched_on(model, states.toggled_on, view.joint_pos))
+    mine = np.flatnonzero(model.parameters.heat_object == obj)
+    return bool(len(mine) and on[world, mine[0]])
+
+
+SPEC = StateSpec(name="heat_source", get=_get, abilities=("heatSource", "coldSource"), aliases=("heat_source_or_sink",))

@@ -6,12 +6,12 @@ import jax.numpy as jnp
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array
+from ig2mj.states.definitions.temperature import THERMAL
 from ig2mj.states.model import StateModel
+from ig2mj.states.spec import HeatStep, StateSpec
 
-
-def initial(num_worlds: int, num_objects: int) -> Float[Array, "W O"]:
-    """-inf before the first update (iGibson's max_temperature.py)."""
-    return jnp.full((num_worlds, num_objects), -jnp.inf, jnp.float32)
+UNKNOWN = -float("inf")
+"""Celsius, before the first update (iGibson's max_temperature.py)."""
 
 
 def update(
@@ -51,3 +51,11 @@ def _set(
     else:
         changed = jnp.minimum(max_temperature, threshold - 1.0)
     return jnp.where(objects & jnp.isfinite(threshold), changed, max_temperature)
+
+
+def _update(step: HeatStep) -> HeatStep:
+    hottest = update(step.model, step.states.max_temperature, step.states.temperature, step.in_use)
+    return step.having(max_temperature=hottest)
+
+
+SPEC = StateSpec.of_objects("max_temperature", float, UNKNOWN, _update, unit="C", abilities=THERMAL)

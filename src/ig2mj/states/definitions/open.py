@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array
 from ig2mj.states.model import StateModel
+from ig2mj.states.spec import StateSpec
 
 OPEN_FRACTION = 0.05
 """For a joint whose object lacks the ability: it opens nothing, but can be asked."""
@@ -114,3 +115,12 @@ def _any_of_object(model: StateModel, of_joint: Bool[Array, "W J"]) -> Bool[Arra
     slots = np.array([np.concatenate([m, np.full(width - len(m), len(owner))]) for m in members], int)
     padded = jnp.concatenate([of_joint, jnp.zeros((of_joint.shape[0], 1), bool)], axis=-1)
     return jnp.any(padded[:, slots.reshape(model.tables.num_objects, width)], axis=-1)
+
+
+_is_open = jax.jit(is_open, static_argnums=0)
+
+SPEC = StateSpec(
+    name="open",
+    get=lambda model, states, view, o, w: bool(np.asarray(_is_open(model, view.joint_pos))[w, o]),
+    abilities=("openable",),
+)

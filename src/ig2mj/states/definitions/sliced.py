@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.poses import quat_multiply, quat_rotate, quat_rotate_inverse
+from ig2mj.geometry.poses import quat_multiply, quat_rotate
 from ig2mj.scene.tables import LinkKind
 from ig2mj.states.model import StateModel
-from ig2mj.states.particles import Particles
+from ig2mj.states.spec import Cut, EventStep, StateSpec
 from ig2mj.states.swap import Swap
 
 if TYPE_CHECKING:
@@ -69,66 +69,12 @@ def apply(
 
 
 def inherit(model: StateModel, states: ExtendedStates, cut_now: Bool[Array, "W O"]) -> ExtendedStates:
-    """Copies every extended state of the wholes that are cut to their halves.
-
-    Particles keep their place in the world: those of the side that a half lost come to lie on its cut.
-    """
+    """Lets the halves of the wholes that are cut take over every extended state (`StateSpec.inherit`)."""
     p = model.parameters
     source = np.arange(model.tables.num_objects)
     source[p.half_object] = p.half_whole
     is_half = source != np.arange(model.tables.num_objects)
-    takes = cut_now[:, source] & is_half
-
-    def of_whole(field: Array) -> Array:
-        return jnp.where(takes, field[:, source], field)
-
-    return dataclasses.replace(
-        states,
-        temperature=of_whole(states.temperature),
-        max_temperature=of_whole(states.max_temperature),
-        wetness=of_whole(states.wetness),
-        toggled=of_whole(states.toggled),
-        press_count=of_whole(states.press_count),
-        sliced=of_whole(states.sliced),
-        dust=_inherit_particles(model, states.dust, p.dust_rows, takes),
-        stain=_inherit_particles(model, states.stain, p.stain_rows, takes),
-    )
-
-
-def _inherit_particles(
-    model: StateModel, particles: Particles, rows: Int[np.ndarray, "R"], takes: Bool[Array, "W O"]
-) -> Particles:
-    """Rows of halves become copies of their wholes' rows, in the halves' frames."""
-    p, tables = model.parameters, model.tables
-    row_of = {int(o): r for r, o in enumerate(rows)}
-    moves = [
-        (row_of[h], row_of[w], m)
-        for m, (h, w) in enumerate(zip(p.half_object.tolist(), p.half_whole.tolist(), strict=True))
-        if h in row_of and w in row_of
-    ]
-    if not moves:
-        return particles
-    to, start, half = (np.array(column) for column in zip(*moves, strict=True))
-    mask = takes[:, rows[to]]
-    offset, turn = p.half_pos[half][:, None], p.half_quat[half][:, None]
-    obj = p.half_object[half]
-    pos = quat_rotate_inverse(turn, particles.pos[:, start] - offset)
-    centre, reach = tables.object_bbox_center[obj][:, None], tables.object_bbox[obj][:, None] / 2
-    pos = jnp.clip(pos, centre - reach, centre + reach)
-    normal = quat_rotate_inverse(turn, particles.normal[:, start])
-    root = np.broadcast_to(tables.object_root[obj][:, None], particles.body[:, start].shape)
-
-    def put(field: Array, value: Array) -> Array:
-        chosen = mask.reshape(*mask.shape, *[1] * (field.ndim - 2))
-        return jnp.asarray(field).at[:, to].set(jnp.where(chosen, value, field[:, to]).astype(field.dtype))
-
-    return Particles(
-        alive=put(particles.alive, particles.alive[:, start]),
-        placed=put(particles.placed, particles.placed[:, start]),
-        body=put(particles.body, root),
-        pos=put(particles.pos, pos),
-        normal=put(particles.normal, normal),
-    )
+    return states.inherited(Cut(model, cut_now[:, source] & is_half, source))
 
 
 def _swap(model: StateModel, cut_now: Bool[Array, "W O"], view: PhysicsView) -> Swap:
@@ -152,3 +98,14 @@ def set_sliced(
     """Slices the masked objects that are in one piece and in use (paper table A.5). There is no way back."""
     asked = objects & model.parameters.has("sliceable") & ~states.sliced & in_use(model, states.sliced)
     return apply(model, states, asked, view)
+
+
+def _update(step: EventStep) -> EventStep:
+    cut_now = cut(step.model, step.states.sliced, step.view)
+    states, swap = apply(step.model, step.states, cut_now, step.view)
+    return dataclasses.replace(step, states=states, cut_now=cut_now, swap=swap)
+
+
+SPEC = StateSpec.of_objects(
+    "sliced", bool, False, _update, settable=False, abilities=("sliceable",), aliases=("sliced_state",)
+)

@@ -7,14 +7,20 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
 from ig2mj.states import particles
+from ig2mj.states.definitions import cleaning, wetness
 from ig2mj.states.model import StateModel
-from ig2mj.states.particles import Particles
+from ig2mj.states.particles import Particles, particle_state
+from ig2mj.states.spec import EventStep
+
+
+def rows(model: StateModel) -> Int[np.ndarray, "R"]:
+    """The objects that carry rows of stain."""
+    return model.parameters.stain_rows
 
 
 def row_of(model: StateModel, obj: int) -> int | None:
     """The object's row of stain particles, or None: it is not stainable."""
-    rows = np.flatnonzero(model.parameters.stain_rows == obj)
-    return int(rows[0]) if len(rows) else None
+    return particles.row_of(rows(model), obj)
 
 
 def stained(model: StateModel, stain: Particles) -> Bool[Array, "W R"]:
@@ -40,3 +46,12 @@ def set_stained(
 def set_not_stained(stain: Particles, row: int, worlds: Bool[Array, "W"] | None = None) -> Particles:
     """Stained(o)=False: all particles go (paper table A.5)."""
     return particles.remove(stain, row, worlds)
+
+
+def _update(step: EventStep) -> Particles:
+    soaked = wetness.soaked(step.model, step.states.wetness)[:, step.model.parameters.tool_object]
+    able = cleaning.working(step.model, step.states.toggled_on) & soaked
+    return cleaning.update(step.model, step.states.stain, rows(step.model), able, step.view)
+
+
+SPEC = particle_state("stain", "stainable", rows, _update, aliases=("stain_level",))

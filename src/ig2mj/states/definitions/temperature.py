@@ -18,6 +18,7 @@ from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array
 from ig2mj.states.model import StateModel
+from ig2mj.states.spec import HeatStep, StateSpec
 
 AMBIENT_TEMPERATURE = 23.0
 """Celsius; also where every object starts (iGibson's temperature.py)."""
@@ -29,9 +30,8 @@ FROZEN_RANGE = (50.0, 10.0)
 """Celsius below the freezing temperature between which Frozen(o)=True is sampled (paper table A.5)."""
 
 
-def initial(num_worlds: int, num_objects: int) -> Float[Array, "W O"]:
-    """Everything at room temperature."""
-    return jnp.full((num_worlds, num_objects), AMBIENT_TEMPERATURE, jnp.float32)
+THERMAL = ("cookable", "burnable", "freezable")
+"""Any of these gives an object a temperature (table A.2)."""
 
 
 def update(
@@ -79,3 +79,11 @@ def set_frozen(
     else:
         target = freeze + 1.0
     return jnp.where(objects & model.parameters.has("freezable"), target, temperature)
+
+
+def _update(step: HeatStep) -> HeatStep:
+    now = update(step.model, step.states.temperature, step.acts, step.in_use, step.touching)
+    return step.having(temperature=now)
+
+
+SPEC = StateSpec.of_objects("temperature", float, AMBIENT_TEMPERATURE, _update, unit="C", abilities=THERMAL)

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import TYPE_CHECKING
 
 import jax
 import jax.numpy as jnp
@@ -28,6 +29,10 @@ from ig2mj.geometry.poses import quat_rotate_inverse
 from ig2mj.geometry.targets import RayTargets, fall_contact
 from ig2mj.scene.tables import LinkKind
 from ig2mj.states.model import StateModel
+from ig2mj.states.spec import EventStep, Saved, StateSpec, nothing_inherited
+
+if TYPE_CHECKING:
+    from ig2mj.states.world import ExtendedStates
 
 NUM_DROPS = 10
 """Drops of one source (iGibson's particles.py)."""
@@ -72,19 +77,19 @@ class WaterDrops:
 
 
 def no_drops(num_worlds: int, num_sources: int) -> WaterDrops:
-    """All taps off and full; the first drop comes as soon as one runs."""
+    """All taps off and full; the first drop comes as soon as one runs. NumPy arrays."""
     shape = (num_worlds, num_sources, NUM_DROPS)
     return WaterDrops(
-        active=jnp.zeros(shape, bool),
-        pos=jnp.zeros((*shape, 3), jnp.float32),
-        speed=jnp.zeros(shape, jnp.float32),
-        waited=jnp.full(shape[:2], np.iinfo(np.int16).max, jnp.int32),
-        running=jnp.zeros(shape[:2], bool),
+        active=np.zeros(shape, bool),
+        pos=np.zeros((*shape, 3), np.float32),
+        speed=np.zeros(shape, np.float32),
+        waited=np.full(shape[:2], np.iinfo(np.int16).max, np.int32),
+        running=np.zeros(shape[:2], bool),
     )
 
 
 def update(
-    model: StateModel, water: WaterDrops, view: PhysicsView, toggled: Bool[Array, "W O"]
+    model: StateModel, water: WaterDrops, view: PhysicsView, toggled_on: Bool[Array, "W O"]
 ) -> tuple[WaterDrops, Int[Array, "W O"]]:
     """One control step of all drops.
 
@@ -92,7 +97,7 @@ def update(
       The drops, and how many touched each soakable object: those it absorbs (paper), or that lie on it (iGibson).
     """
     parameters = model.parameters
-    num_worlds = toggled.shape[0]
+    num_worlds = toggled_on.shape[0]
     if len(parameters.water_object) == 0:
         return water, jnp.zeros((num_worlds, model.tables.num_objects), jnp.int32)
 
@@ -109,7 +114,7 @@ def update(
         pos=jnp.where(emitting[..., None], tap[:, :, None], moved.pos),
         speed=jnp.where(emitting, 0.0, moved.speed),
         waited=waited,
-        running=jnp.where(switched, toggled[:, parameters.water_object], True),
+        running=jnp.where(switched, toggled_on[:, parameters.water_object], True),
     )
     return updated, contacts
 
@@ -181,3 +186,39 @@ def _in_sink(model: StateModel, pos: Float[Array, "W C N 3"], view: PhysicsView)
     within_box = jnp.all(jnp.abs(local) <= half + DROP_RADIUS, axis=-1)
     within_reach = jnp.sum(offset * offset, axis=-1) <= SINK_REACH**2
     return jnp.any(jnp.where(np.any(half > 0, axis=-1), within_box, within_reach), axis=-1)
+
+
+def _update(step: EventStep) -> EventStep:
+    water, drops = update(step.model, step.states.water, step.view, step.states.toggled_on)
+    return dataclasses.replace(step.having(water=water), drops=drops)
+
+
+def _get(model: StateModel, states: ExtendedStates, view: PhysicsView, obj: int, world: int) -> int:
+    mine = np.flatnonzero(model.parameters.water_object == obj)
+    return int(np.asarray(states.water.active)[world, mine].sum()) if len(mine) else 0
+
+
+def _from_manifest(saved: Saved) -> None:
+    """From "water", {"steps_since_drop", "drops"}, with entries that are null or a position; drops start at rest."""
+    drops: WaterDrops = saved.states.water
+    said = saved.values.get("water", {})
+    for source in np.flatnonzero(saved.model.parameters.water_object == saved.obj):
+        for n, pos in enumerate(said.get("drops", ())[:NUM_DROPS]):
+            if pos is not None:
+                drops.active[0, source, n] = True
+                drops.pos[0, source, n] = pos
+        if said.get("steps_since_drop") is not None:
+            drops.waited[0, source] = said["steps_since_drop"]
+
+
+SPEC = StateSpec(
+    name="water_source",
+    get=_get,
+    abilities=("waterSource",),
+    unit="drops out",
+    fields={"water": WaterDrops},
+    initial=lambda model: {"water": no_drops(1, len(model.parameters.water_object))},
+    update=_update,
+    inherit=nothing_inherited,  # drops belong to their source
+    from_manifest=_from_manifest,
+)

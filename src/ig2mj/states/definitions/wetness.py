@@ -12,11 +12,7 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
 from ig2mj.states.model import StateModel
-
-
-def initial(num_worlds: int, num_objects: int) -> Float[Array, "W O"]:
-    """Everything dry."""
-    return jnp.zeros((num_worlds, num_objects), jnp.float32)
+from ig2mj.states.spec import EventStep, StateSpec
 
 
 def update(model: StateModel, wetness: Float[Array, "W O"], drops: Int[Array, "W O"]) -> Float[Array, "W O"]:
@@ -39,3 +35,12 @@ def set_soaked(
     """Makes the masked objects' wetness match the threshold, or 0 (paper table A.5)."""
     level = model.parameters.wetness_soaked if value else 0.0
     return jnp.where(objects & model.parameters.has("soakable"), level, wetness)
+
+
+def _update(step: EventStep) -> EventStep:
+    return step.having(wetness=update(step.model, step.states.wetness, step.drops))
+
+
+SPEC = StateSpec.of_objects(
+    "wetness", float, 0.0, _update, unit="droplets", abilities=("soakable",), aliases=("wetness_level",)
+)

@@ -1,4 +1,4 @@
-"""ToggledState: a switch that an agent flips by holding a finger at its button (spec/states.md section 9).
+"""ToggledOn: a switch that an agent flips by holding a finger at its button (spec/states.md section 9).
 
 The paper asks for contact of the agent with the TogglingLink, which is virtual and collides with nothing. iGibson
 realises that as nearness, and so do both sets of rules here: some finger's frame strictly within 0.10 m of the link at
@@ -15,11 +15,12 @@ from jaxtyping import Bool, Int
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.states.model import StateModel
+from ig2mj.states.spec import EventStep, StateSpec, Values, copied, filled, numbers, put
 
 REACH = 0.10
 """Metres between a finger's frame and the button (iGibson's toggle.py)."""
 
-SURELY = 0.01
+FAR_BEYOND = 0.01
 """Metres beyond the reach where no rounding can bring a finger back within it."""
 
 HOLD = 5
@@ -27,12 +28,12 @@ HOLD = 5
 
 
 def update(
-    model: StateModel, toggled: Bool[Array, "W O"], press_count: Int[Array, "W O"], view: PhysicsView
+    model: StateModel, toggled_on: Bool[Array, "W O"], press_count: Int[Array, "W O"], view: PhysicsView
 ) -> tuple[Bool[Array, "W O"], Int[Array, "W O"]]:
     """One step: the switches and the counts."""
     tables, buttons = model.tables, model.buttons
     if len(buttons) == 0 or view.agent.finger_pos.shape[1] == 0:
-        return toggled, press_count
+        return toggled_on, press_count
     offset = jnp.asarray(view.agent.finger_pos)[:, None] - jnp.asarray(view.link_pos)[:, buttons, None]
     near = jnp.any(jnp.sum(offset * offset, axis=-1) < REACH**2, axis=-1)  # [W, B]
     of_object = np.full(tables.num_objects, len(buttons))
@@ -40,7 +41,7 @@ def update(
     pressed = jnp.concatenate([near, jnp.zeros((near.shape[0], 1), bool)], axis=-1)[:, of_object]
     # Beyond HOLD the count stands, so that it can be held for ever.
     count = jnp.where(pressed, jnp.minimum(press_count, HOLD) + 1, 0)
-    return toggled ^ (count == HOLD), count
+    return toggled_on ^ (count == HOLD), count
 
 
 def all_out_of_reach(model: StateModel, view: PhysicsView) -> bool:
@@ -50,11 +51,38 @@ def all_out_of_reach(model: StateModel, view: PhysicsView) -> bool:
     """
     fingers = np.asarray(view.agent.finger_pos)[:, :, None]
     offset = np.abs(fingers - np.asarray(view.link_pos)[:, None, model.buttons]).max(axis=-1)
-    return bool((offset > REACH + SURELY).all())
+    return bool((offset > REACH + FAR_BEYOND).all())
 
 
 def set_toggled_on(
-    model: StateModel, toggled: Bool[Array, "W O"], objects: Bool[Array, "#W O"], value: bool
+    model: StateModel, toggled_on: Bool[Array, "W O"], objects: Bool[Array, "#W O"], value: bool
 ) -> Bool[Array, "W O"]:
     """Switches the masked objects on or off (paper table A.5)."""
-    return jnp.where(objects & model.parameters.has("toggleable"), value, toggled)
+    return jnp.where(objects & model.parameters.has("toggleable"), value, toggled_on)
+
+
+def _initial(model: StateModel) -> Values:
+    return {**filled(model, "toggled_on", bool, False), **filled(model, "press_count", int, 0)}
+
+
+def _update(step: EventStep) -> EventStep:
+    on, count = update(step.model, step.states.toggled_on, step.states.press_count, step.view)
+    return step.having(toggled_on=on, press_count=count)
+
+
+SPEC = StateSpec(
+    name="toggled_on",
+    get=lambda model, states, view, o, w: bool(np.asarray(states.toggled_on)[w, o]),
+    abilities=("toggleable",),
+    aliases=("toggled", "toggled_state"),
+    fields={"toggled_on": Bool[Array, "W O"], "press_count": Int[Array, "W O"]},
+    initial=_initial,
+    update=_update,
+    inherit=copied("toggled_on", "press_count"),
+    # The second keys are those of scenes converted by early versions.
+    from_manifest=numbers(
+        {"toggled_on": "toggled_on", "press_count": "press_count"}
+        | {"toggled": "toggled_on", "toggled_steps": "press_count"}
+    ),
+    set=put("toggled_on"),
+)
