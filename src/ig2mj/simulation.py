@@ -169,14 +169,16 @@ class Simulation(SimulationStates):
         return float(self.data.qpos[self._joint_address(name)])
 
     def set_joint(self, name: str, q: float | int) -> PhysicsView:
-        """Puts a hinge (rad) or slide (m) somewhere, at rest and awake; limits push back in the next step.
+        """Puts a hinge (rad) or slide (m) somewhere, at rest and awake.
 
         Raises:
-          UnknownNameError: no such joint. PoseError: it is a free joint, or q is not finite.
+          UnknownNameError: no such joint. PoseError: it is a free joint, or q is not finite or beyond its range.
         """
         address = self._joint_address(name)
+        place = float(_finite([q], 1, f"position of joint '{name}'")[0])
+        _check_range(self.scene.model, name, place)
         mask, values = np.zeros((1, self.scene.model.nq), bool), np.zeros((1, self.scene.model.nq))
-        mask[0, address], values[0, address] = True, _finite([q], 1, f"position of joint '{name}'")[0]
+        mask[0, address], values[0, address] = True, place
         self.physics = self.engine.write(self.physics, Write(qpos_mask=mask, qpos=values))
         return self.view
 
@@ -226,6 +228,16 @@ class Simulation(SimulationStates):
         ):
             raise PoseError(f"joint '{name}' is no hinge and no slide (use set_object_pose)")
         return int(model.jnt_qposadr[number])
+
+
+def _check_range(model: mujoco.MjModel, name: str, q: float) -> None:
+    """Raises PoseError where q is beyond the joint's range by more than rounding."""
+    joint = model.joint(name)
+    low, high = (float(v) for v in joint.range)
+    slack = 1e-6 * (high - low)
+    if joint.limited[0] and not low - slack <= q <= high + slack:
+        unit = "rad" if int(joint.type[0]) == int(mujoco.mjtJoint.mjJNT_HINGE) else "m"
+        raise PoseError(f"joint '{name}' goes from {low:.4g} to {high:.4g} {unit}; {q:.4g} is beyond its range")
 
 
 def _finite(values: Vector, length: int, what: str) -> np.ndarray:

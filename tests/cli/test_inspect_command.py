@@ -86,3 +86,14 @@ def test_a_home_that_does_not_exist_suggests_near_names(tiny_home_folder, capsys
     assert "there is no such scene" in error and f"near matches: {tiny_home_folder.name}" in error
     assert cli.call(["inspect", "zzzzzz"]) == 2
     assert f"or one of {tiny_home_folder.name}" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("home", ["small_home", "birch"])
+def test_inspect_and_homes_list_count_the_same_objects(home, capsys):
+    """Neither counts parked halves or the building (`ObjectEntry.in_household`)."""
+    assert cli.call(["homes", "list", "--json"]) == 0
+    listed = next(h for h in json.loads(capsys.readouterr().out) if h["home"] == home)
+    assert cli.call(["inspect", home, "--show", "rooms"]) == 0
+    title = capsys.readouterr().out.splitlines()[0]
+    assert title.startswith(f"{home}: {listed['objects']} objects ({listed['movable']} movable,")
+    assert "of the building" in title

@@ -7,6 +7,7 @@ import json
 import pytest
 
 from ig2mj import cli
+from ig2mj.simulation import Simulation
 
 
 def _json(capsys, *argv: str, status: int = 0) -> dict:
@@ -69,3 +70,25 @@ def test_bad_input_is_one_line_and_status_2(tiny_home_folder, capsys, argv, word
     assert cli.call([argv[0], str(tiny_home_folder), *argv[1:]]) == 2
     error = capsys.readouterr().err
     assert words in error and error.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "argv",
+    [
+        ["states", "--object", "aple"],
+        ["states", "--state", "temperatur"],
+        ["states", "--set", "cooked=apple", "cooked=apple=maybe"],
+        ["states", "--set", "toggled_on=aple"],
+        ["predicates", "(cooked aple)"],
+    ],
+)
+def test_arguments_are_checked_before_anything_is_simulated(tiny_home_folder, monkeypatch, argv):
+    monkeypatch.setattr(Simulation, "step", lambda *_, **__: pytest.fail("simulated"))
+    assert cli.call([argv[0], str(tiny_home_folder), *argv[1:], "--seconds", "60"]) == 2
+
+
+def test_the_switch_has_one_name_and_the_old_one_is_understood(tiny_home_folder, capsys):
+    """`toggled_on`, as the predicate: set, asked and listed."""
+    for name in ("toggled_on", "toggled"):
+        out = _json(capsys, "states", str(tiny_home_folder), "--set", "toggled_on=stove", "--state", name)
+        assert out["objects"]["stove"] == {"toggled_on": True}

@@ -59,13 +59,45 @@ def test_section_22_a_tap_on_from_update_k_drops_at_k_plus_1_and_then_every_four
     assert _emissions(history)[:7] == [k + 1 + 4 * n for n in range(7)]
 
 
-def test_section_22_the_tenth_drop_comes_at_k_plus_37_and_then_the_tap_is_dry():
+@pytest.mark.parametrize("compat", ["paper", "igibson"])
+def test_what_lies_under_a_tap_does_not_make_it_run_dry(compat):
+    """Section 22 has the tenth drop at k + 37. iGibson's drops then roll away; ours make room, the oldest first."""
     bench = Thing("bench", PLATE, pos=(0, 0, 0.3))
-    home = HandWorld(SINK, bench)
-    _, history = _run(home, [home.view()] * 50, compat="igibson")
-    assert _emissions(history)[-1] == 38
-    assert len(_emissions(history)) == NUM_DROPS
+    _, history = _run(HandWorld(SINK, bench), [HandWorld(SINK, bench).view()] * 60, compat=compat)
+    assert _emissions(history) == list(range(2, 61, 4))
+    newest = np.asarray(history[-1].water.age[0, 0])
+    assert sorted(newest) == [2 + 4 * n for n in range(NUM_DROPS)]  # the ten that left last
     assert history[-1].water.active.all()
+
+
+def test_a_tap_whose_drops_all_still_fall_waits_as_in_section_7_2():
+    air = Thing("air_tap", (((0, 0, 100), (0.1, 0.1, 0.1)),), {"waterSource": {}}, links={"water_source": (0, 0, 0.5)})
+    deep = Thing("ground", PLATE, pos=(0, 0, -9.4))  # 9.8 m: 1.41 s, two updates more than ten drops take
+    home = HandWorld(air, deep)
+    _, history = _run(home, [home.view()] * 52, on_from=99)
+    found = _emissions(history)
+    assert found[:NUM_DROPS] == [2 + 4 * n for n in range(NUM_DROPS)]
+    assert found[NUM_DROPS] > 2 + 4 * NUM_DROPS
+
+
+@pytest.mark.parametrize("compat", ["paper", "igibson"])
+def test_a_towel_under_a_tap_over_a_basin_takes_55_drops_in_220_updates(compat):
+    """In iGibson the drops roll off the towel into the basin, and 55 leave the tap; as many leave it here."""
+    towel = Thing("towel", PLATE, {"soakable": {"wetness_soaked": 1.0}}, pos=(0, 0, 0.3))
+    home = HandWorld(SINK, towel)
+    model, history = _run(home, [home.view()] * 220, compat=compat)
+    assert len(_emissions(history)) == 55
+    assert bool(soaked(model, history[-1].wetness)[0, 1])
+    if compat == "paper":
+        assert float(history[-1].wetness[0, 1]) == 54.0  # the last one still falls
+
+
+@pytest.mark.parametrize("compat", ["paper", "igibson"])
+def test_a_rag_held_under_a_tap_after_a_plate_gets_soaked(compat):
+    plate, both = KITCHEN.view({"tray": (0, 0, 0.2)}), KITCHEN.view({"tray": (0, 0, 0.2), "rag": (0, 0, 0.35)})
+    model, history = _run(KITCHEN, [plate] * 120 + [both] * 30, compat=compat)
+    assert not bool(soaked(model, history[119].wetness)[0, 1])
+    assert bool(soaked(model, history[-1].wetness)[0, 1])
 
 
 def test_section_7_2_the_count_stands_still_while_the_tap_is_off():

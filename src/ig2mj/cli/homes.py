@@ -161,9 +161,9 @@ def list_(
         return
     if kind == "homes":
         title = f"{len(data)} homes, {sum(len(h['rooms']) for h in data)} rooms (ig2mj view HOME)"
-        columns = ("home", ">objects", ">loose", "rooms")
+        columns = ("home", ">objects", ">movable", "rooms")
         data.sort(key=lambda h: h["objects"])
-        rows = [(h["home"], h["objects"], h["loose"], ", ".join(h["rooms"])) for h in data]
+        rows = [(h["home"], h["objects"], h["movable"], ", ".join(h["rooms"])) for h in data]
     else:
         title = f"{sum(c['models'] for c in data)} models of {len(data)} categories"
         columns = ("category", "?synset", ">size x y z (m)", ">kg", "fixed", ">models")
@@ -254,17 +254,17 @@ def pictures(
 
 
 def shipped_homes() -> list[dict[str, Any]]:
-    """Name, rooms and number of objects (parked ones and the building not counted) of every home in scenes_mjcf/."""
+    """Name, rooms and number of objects (see `ObjectEntry.in_household`) of every home in scenes_mjcf/."""
     from ig2mj.scene import paths
     from ig2mj.scene.manifest import load_manifest
 
     homes = []
     for name in paths.shipped_homes():
         manifest = load_manifest(paths.SHIPPED_HOMES / name)
-        objects = [o for o in manifest.objects if not o.parked and o.category not in ("walls", "floors", "ceilings")]
+        objects = [o for o in manifest.objects if o.in_household]
         rooms = list(manifest.rooms.instances)
-        loose = sum(not o.fixed for o in objects)
-        homes.append({"home": name, "rooms": rooms, "objects": len(objects), "loose": loose})
+        movable = sum(not o.fixed for o in objects)
+        homes.append({"home": name, "rooms": rooms, "objects": len(objects), "movable": movable})
     return homes
 
 

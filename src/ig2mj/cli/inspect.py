@@ -93,12 +93,16 @@ def _print_tables(manifest: Manifest, objects: list[ObjectEntry], show: tuple[Ki
     from ig2mj.cli.printing import make_table, stdout_console
 
     console = stdout_console()
-    movable = sum(not o.fixed for o in objects)
-    joints = sum(len(o.joints) for o in objects)
-    mass = sum(o.mass for o in objects if not o.fixed)
+    household = [o for o in objects if o.in_household]
+    movable = [o for o in household if not o.fixed]
+    parked = sum(o.parked for o in objects)
+    building = len(objects) - len(household) - parked
+    joints = sum(len(o.joints) for o in household)
     console.print(
-        f"{manifest.name}: {len(objects)} objects ({movable} movable, {mass:.1f} kg), {joints} joints, "
-        f"{len(manifest.rooms.instances)} rooms",
+        f"{manifest.name}: {len(household)} objects ({len(movable)} movable, {sum(o.mass for o in movable):.1f} kg), "
+        f"{joints} joints, {len(manifest.rooms.instances)} rooms"
+        + (f"; beside them {parked} parked" * (parked > 0))
+        + (f"{' and' if parked else '; beside them'} {building} of the building" * (building > 0)),
         markup=False,
     )
     makers = {"rooms": _room_rows, "objects": _object_rows, "joints": _joint_rows, "abilities": _ability_rows}

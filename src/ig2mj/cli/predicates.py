@@ -11,9 +11,6 @@ if TYPE_CHECKING:
     from ig2mj.predicates.logic import Atom
     from ig2mj.simulation import Simulation
 
-#: Everything is inside the walls; it need not be said.
-BUILDING = ("walls", "floors", "ceilings")
-
 
 def run(
     scene: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="SCENE")],
@@ -43,7 +40,7 @@ def run(
     from ig2mj.predicates import parse
 
     parsed = None if expression is None else parse(expression, "EXPRESSION")
-    world = started(scene, compat, seconds, set)
+    world = started(scene, compat, seconds, set, lambda world: parsed is None or world.compiled(parsed, strict))
     if parsed is None:
         _print_holding(world, json)
         return 0
@@ -105,6 +102,7 @@ def _candidates(world: Simulation) -> list[Atom]:
 
     from ig2mj.geometry.boxes import point_in_box
     from ig2mj.predicates import PREDICATES, atom
+    from ig2mj.scene.manifest import BUILDING
 
     tables, view, names = world.scene.tables, world.view, world.scene.object_names
     asked = []
@@ -117,7 +115,7 @@ def _candidates(world: Simulation) -> list[Atom]:
     com = np.asarray(view.object_com)[0][:, None]
     within = np.asarray(point_in_box(com, np.asarray(view.aabb_low)[0], np.asarray(view.aabb_high)[0]))
     pairs = np.argwhere(within & ~np.eye(len(names), dtype=bool))
-    building = np.isin(tables.object_categories, BUILDING)
+    building = np.isin(tables.object_categories, sorted(BUILDING))  # everything is inside the walls
     loose = ~tables.object_fixed
     asked += [atom("inside", names[a], names[b]) for a, b in pairs if loose[a] and not building[b]]
     on_floor = np.flatnonzero(np.any(touching[:, tables.object_is_floor], axis=1) & ~tables.object_is_floor)

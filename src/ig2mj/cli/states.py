@@ -39,15 +39,17 @@ def run(
     from ig2mj.errors import UnknownNameError
     from ig2mj.states import registry
 
-    world = started(scene, compat, seconds, set)
-    for name in object:
-        if name not in world.scene.object_names:
-            raise UnknownNameError("object", name, world.scene.object_names)
+    def check(world: Simulation) -> None:
+        for name in object:
+            if name not in world.scene.object_names:
+                raise UnknownNameError("object", name, world.scene.object_names)
+
     if state:
         names = [registry.find(s).name for s in state]
     else:
         # Those that every object has fill a table by themselves: poses, boxes, contacts, rooms.
         names = [s.name for s in registry.SPECS if object or s.abilities is not None]
+    world = started(scene, compat, seconds, set, check)
     rows: dict[str, dict[str, Any]] = {}
     for name in names:
         kind = registry.STATES[name]

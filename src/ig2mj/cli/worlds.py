@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Literal
 
 from ig2mj.errors import Ig2mjError
@@ -14,17 +14,26 @@ if TYPE_CHECKING:
 
 
 def started(
-    scene: pathlib.Path, compat: Literal["paper", "igibson"], seconds: float, settings: Sequence[str]
+    scene: pathlib.Path,
+    compat: Literal["paper", "igibson"],
+    seconds: float,
+    settings: Sequence[str],
+    check: Callable[[Simulation], object] = lambda world: None,
 ) -> Simulation:
-    """The scene's world after `settings` ("STATE=OBJECT" or "STATE=OBJECT=VALUE") and `seconds`."""
+    """The scene's world after `settings` ("STATE=OBJECT" or "STATE=OBJECT=VALUE") and `seconds`.
+
+    Args:
+      check: of the other arguments of a command; raises before anything is set or simulated.
+    """
     if not math.isfinite(seconds) or seconds < 0:
         raise Ig2mjError("--seconds must be finite and not negative")
+    parsed = [_parsed(setting) for setting in settings]
     from ig2mj.simulation import Simulation
     from ig2mj.states.options import StateOptions
 
     world = Simulation(scene, states=StateOptions(compat=compat))
-    for setting in settings:
-        name, name_of_object, value = _parsed(setting)
+    check(world)
+    for name, name_of_object, value in parsed:
         world.set_state(name, name_of_object, value)
     world.step(count=round(seconds / (world.engine.substeps * world.engine.timestep)))
     return world

@@ -63,6 +63,10 @@ class PartEntry(msgspec.Struct):
     quat: Quat
 
 
+BUILDING = frozenset({"walls", "floors", "ceilings"})
+"""Categories of the house itself. They are objects of a scene, but a home is not said to have them."""
+
+
 class ObjectEntry(msgspec.Struct, omit_defaults=True):
     """One object of the scene."""
 
@@ -89,6 +93,11 @@ class ObjectEntry(msgspec.Struct, omit_defaults=True):
     assisted_grasp: bool = True  # avg_category_specs' enable_ag
     object_scope: str | None = None  # BDDL instances this object is bound to, as in the source
     state: dict[str, Any] = {}  # initial extended state, where the source had one; keys as ig2mj names states
+
+    @property
+    def in_household(self) -> bool:
+        """Whether it counts as an object of the home: in use (no parked half), and no part of the building."""
+        return not self.parked and self.category not in BUILDING
 
 
 class RoomEntry(msgspec.Struct):

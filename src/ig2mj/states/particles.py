@@ -64,7 +64,7 @@ def no_particles(num_worlds: int, num_rows: int) -> Particles:
         placed=np.zeros(shape, bool),
         body=np.zeros(shape, np.int32),
         pos=np.zeros((*shape, 3), np.float32),
-        normal=np.tile(np.float32([0.0, 0.0, 1.0]), (*shape, 1)),
+        normal=np.tile(np.array([0.0, 0.0, 1.0], np.float32), (*shape, 1)),
     )
 
 

@@ -16,9 +16,6 @@ import numpy as np
 
 from ig2mj.scene.scene import Scene
 
-#: Categories of building parts: large, many and obvious, so that their names only hide the rest.
-UNNAMED_CATEGORIES = frozenset({"walls", "floors", "ceilings"})
-
 
 @runtime_checkable
 class Drawing(Protocol):
@@ -55,7 +52,7 @@ class ObjectNames:
     title = "object names"
 
     def __init__(self, scene: Scene):
-        shown = [o for o in scene.manifest.objects if not o.parked and o.category not in UNNAMED_CATEGORIES]
+        shown = [o for o in scene.manifest.objects if o.in_household]
         self._names = [o.name for o in shown]
         self._bodies = np.array([scene.model.body(o.bodies[0]).id for o in shown], dtype=int)
         self._centres = np.array([o.base_link_offset for o in shown], dtype=float).reshape(-1, 3)

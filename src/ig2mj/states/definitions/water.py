@@ -7,7 +7,11 @@ it rests until that goes away. Drops that fall out of the house come back to the
 
 Rules in force (spec/states.md section 17, rows 2 and 3): the paper's droplets are absorbed, and sinks (`water_sink`
 links) take drops; in iGibson's code a soaked object leaves the drop where it is, and only the source's own object takes
-drops back, so that a tap over anything else runs dry after ten.
+drops back.
+
+iGibson's drops are balls: they roll off a towel into the basin, which is how a tap over a towel keeps running there.
+Ours do not roll. Instead, when all drops of a source are out, the one that has lain longest makes room for the next: a
+source never runs dry because of what lies under it. One whose drops are all still falling waits, as in iGibson.
 
 Axes: W worlds, C sources, N = 10 drops of each, O objects.
 """
@@ -55,6 +59,9 @@ GRAVITY = 9.8
 LOST_BELOW = 10.0
 """Metres below its source at which a drop has left the house."""
 
+OLDEST = 2**30
+"""Updates at which a drop's age stands still: a year."""
+
 SINK_REACH = 0.1
 """Metres around a sink link that is a point, not a box: drops this near are taken."""
 
@@ -64,14 +71,15 @@ class WaterDrops:
     """The drops of all sources.
 
     Attributes:
-      active: on the way or at rest, not in the source. pos: centre, world frame. speed: downwards, m/s.
-      waited: updates since the last drop, counted up to the period. running: the source was on at the last update (the
-      next drop depends on it, one step late, as in iGibson).
+      active: on the way or at rest, not in the source. pos: centre, world frame. speed: downwards, m/s. age: updates
+      since the drop left its source. waited: updates since the last drop, counted up to the period. running: the source
+      was on at the last update (the next drop depends on it, one step late, as in iGibson).
     """
 
     active: Bool[Array, "W C N"]
     pos: Float[Array, "W C N 3"]
     speed: Float[Array, "W C N"]
+    age: Int[Array, "W C N"]
     waited: Int[Array, "W C"]
     running: Bool[Array, "W C"]
 
@@ -83,6 +91,7 @@ def no_drops(num_worlds: int, num_sources: int) -> WaterDrops:
         active=np.zeros(shape, bool),
         pos=np.zeros((*shape, 3), np.float32),
         speed=np.zeros(shape, np.float32),
+        age=np.zeros(shape, np.int32),
         waited=np.full(shape[:2], np.iinfo(np.int16).max, np.int32),
         running=np.zeros(shape[:2], bool),
     )
@@ -113,6 +122,7 @@ def update(
         active=moved.active | emitting,
         pos=jnp.where(emitting[..., None], tap[:, :, None], moved.pos),
         speed=jnp.where(emitting, 0.0, moved.speed),
+        age=jnp.where(emitting | ~moved.active, 0, jnp.minimum(moved.age, OLDEST - 1) + 1),
         waited=waited,
         running=jnp.where(switched, toggled_on[:, parameters.water_object], True),
     )
@@ -120,11 +130,15 @@ def update(
 
 
 def _emission(model: StateModel, water: WaterDrops) -> tuple[Bool[Array, "W C N"], Int[Array, "W C"]]:
-    """Which drop each source lets go now, and its count. The count stands still while it is off or empty."""
+    """Which drop each source lets go now, and its count, which stands still while it is off or has none to give."""
     period = math.ceil(DROP_PERIOD / model.options.timestep - 1e-9)
-    able = water.running & ~jnp.all(water.active, axis=-1)
+    lying = water.active & (water.speed == 0) & (water.age > 0)
+    turn = jnp.where(
+        lying, water.age, jnp.where(water.active, -1, OLDEST + 1)
+    )  # the first in the source, or the oldest
+    able = water.running & jnp.any(turn >= 0, axis=-1)
     due = able & (water.waited >= period)
-    next_drop = jnp.argmin(water.active, axis=-1)  # the first that is in the source
+    next_drop = jnp.argmax(turn, axis=-1)
     emitting = due[..., None] & (np.arange(NUM_DROPS) == next_drop[..., None])
     return emitting, jnp.where(due, 0, jnp.where(able, jnp.minimum(water.waited + 1, period), water.waited))
 
@@ -206,6 +220,7 @@ def _from_manifest(saved: Saved) -> None:
         for n, pos in enumerate(said.get("drops", ())[:NUM_DROPS]):
             if pos is not None:
                 drops.active[0, source, n] = True
+                drops.age[0, source, n] = 1
                 drops.pos[0, source, n] = pos
         if said.get("steps_since_drop") is not None:
             drops.waited[0, source] = said["steps_since_drop"]
