@@ -31,8 +31,22 @@ def _field(doc: str) -> Any:
     return dataclasses.field(metadata={"doc": doc})
 
 
+class _MadeLater:
+    """Lets an engine leave fields to be made when somebody reads them first: it puts no array but `_later`, a function
+    from a field's name to its array, into the instance."""
+
+    if not typing.TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Array:
+            later = self.__dict__.get("_later")
+            if later is None:
+                raise AttributeError(name)
+            array = self.__dict__[name] = later(name)
+            return array
+
+
 @struct.dataclass
-class AgentView:
+class AgentView(_MadeLater):
     """All agents, their hands and fingers at the end of a control step; world frame, SI units, w-x-y-z quaternions."""
 
     base_pos: Float[Array, "W A 3"] = _field("origin of the base body")
@@ -57,7 +71,7 @@ class AgentView:
 
 
 @struct.dataclass
-class PhysicsView:
+class PhysicsView(_MadeLater):
     """A snapshot of physics at the end of a control step: world frame, SI units, w-x-y-z quaternions, float32.
 
     Contacts, and with them `touching` and forces, are those of the engine's last collision stage (see the engines).

@@ -34,11 +34,26 @@ def touching_units(
     return remembered if np.array_equal(touching, remembered) else touching
 
 
+LINK, FINGER = 1, 2
+"""Bits of `force_roles`: what presses. What is pressed on has the bit of what presses on it, shifted by `PRESSED`."""
+
+PRESSED = 2
+"""Bits by which those of what is pressed on are shifted."""
+
+
+def force_roles(layout: ModelLayout, geom_object: np.ndarray) -> np.ndarray:
+    """Bits [G] that say whose forces a contact of the geom may tell: an annotated link's on an object, a finger's on a
+    graspable body."""
+    presses = LINK * (layout.link_of_geom >= 0) + FINGER * (layout.finger_of_geom >= 0)
+    pressed = LINK * (geom_object >= 0) + FINGER * (layout.graspable_of_geom >= 0)
+    return (presses + (pressed << PRESSED)).astype(np.uint8)
+
+
 def add_forces(
     data: mujoco.MjData,
     layout: ModelLayout,
     geom_object: np.ndarray,
-    presses: np.ndarray,
+    roles: np.ndarray,
     pyramidal: bool,
     link_force: np.ndarray,
     finger_force: np.ndarray,
@@ -46,7 +61,7 @@ def add_forces(
     """Raises forces (N) to those of the physics step just taken; says whether any was found.
 
     Args:
-      presses: [G] the geom is an annotated link's or a finger's.
+      roles: `force_roles`.
       link_force: [L, O], the largest single contact, as in iGibson's slicer (spec/states.md 10.1).
       finger_force: [F, Y], the sum over the contacts of a finger with a graspable body.
     """
@@ -54,28 +69,28 @@ def add_forces(
         return False
     contact = data.contact
     geom = contact.geom
-    row, side = presses[geom].nonzero()
-    if not len(row):
+    role = roles.take(geom)
+    meets = role & (role >> PRESSED)[:, ::-1]
+    if not meets.any():
         return False
+    row, side = meets.nonzero()
     address = contact.efc_address[row]
     real = address >= 0
     if not real.all():
         row, side, address = row[real], side[real], address[real]
-    own, other = geom[row, side], geom[row, 1 - side]
+    kind, own, other = meets[row, side], geom[row, side], geom[row, 1 - side]
     normal = data.efc_force[address]
     if pyramidal:  # the normal force is the sum over the pyramid's edges, two per friction direction
         edges = 2 * (contact.dim[row] - 1)
         for k in range(1, int(edges.max(initial=0))):
             more = edges > k
             normal = normal + np.where(more, data.efc_force[np.where(more, address + k, 0)], 0.0)
-    link, thing = layout.link_of_geom[own], geom_object[other]
-    of_link = (link >= 0) & (thing >= 0)
+    of_link, of_finger = (kind & LINK) != 0, (kind & FINGER) != 0
     if of_link.any():
-        np.maximum.at(link_force, (link[of_link], thing[of_link]), normal[of_link])
-    finger, body = layout.finger_of_geom[own], layout.graspable_of_geom[other]
-    of_finger = (finger >= 0) & (body >= 0)
+        np.maximum.at(link_force, (layout.link_of_geom[own[of_link]], geom_object[other[of_link]]), normal[of_link])
     if of_finger.any():
         total = np.zeros_like(finger_force)
-        np.add.at(total, (finger[of_finger], body[of_finger]), normal[of_finger])
+        place = layout.finger_of_geom[own[of_finger]], layout.graspable_of_geom[other[of_finger]]
+        np.add.at(total, place, normal[of_finger])
         np.maximum(finger_force, total, out=finger_force)
-    return bool(of_link.any() or of_finger.any())
+    return len(row) > 0

@@ -17,7 +17,7 @@ import functools
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import jax
 import mujoco
@@ -27,14 +27,15 @@ from jaxtyping import Bool, Float
 from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snapshot, Write, check_arguments
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
-from ig2mj.engine.native.agent_rows import AgentPlan, pose_arrays
+from ig2mj.engine.native.contacts import FINGER, LINK, PRESSED, force_roles
+from ig2mj.engine.native.later import RAW, Agents, LaterPlan, ObjectMotion
 from ig2mj.engine.native.one_world import Statics, World
 from ig2mj.engine.native.vicinity import Masks, VicinityTable
 from ig2mj.engine.native.view_rows import FIELDS, Changed, PoseRows
 from ig2mj.engine.native.writing import apply_write
 from ig2mj.engine.object_boxes import make_box_table
 from ig2mj.engine.snapshot_check import check_snapshot
-from ig2mj.engine.view import SCHEMA, AgentView, Array, PhysicsView, assemble, axis_sizes
+from ig2mj.engine.view import SCHEMA, AgentView, Array, PhysicsView, axis_sizes
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_jax
 from ig2mj.scene.scene import Scene
@@ -49,26 +50,42 @@ class NativePhysics:
       view: the view last made; while nothing moves, the same object is handed out again.
     """
 
-    def __init__(self, worlds: list[World], arrays: dict[str, np.ndarray]):
-        self.worlds, self.arrays = worlds, arrays
+    def __init__(self, worlds: list[World], arrays: dict[str, np.ndarray], later: LaterPlan):
+        self.worlds, self.arrays, self.later = worlds, arrays, later
         self.view: PhysicsView | None = None
 
     def update(self, changed: int) -> PhysicsView:
         """The view of the present state: copies of what changed, the old arrays for the rest."""
         if self.view is None:
-            self.view = assemble({name: self.arrays[name].copy() for name in SCHEMA})
+            self.view, changed = PhysicsView.__new__(PhysicsView), Changed.ALL
+            self.view.__dict__["agent"] = AgentView.__new__(AgentView)
         elif changed:
             self.view = _copied(self.view)
-            fields = self.view.__dict__
-            plain, of_agent = _fields_of(changed)
-            for name in plain:
-                fields[name] = self.arrays[name].copy()
-            if of_agent:
-                agent = fields["agent"] = _copied(self.view.agent)
-                for path, name in of_agent:
-                    agent.__dict__[name] = self.arrays[path].copy()
+        if changed:
+            arrays, fields = self.arrays, self.view.__dict__
+            for name in _fields_of(changed):
+                fields[name] = arrays[name].copy()
+            if changed & Changed.OBJECTS:
+                _make_later(
+                    self.view, _VELOCITIES, ObjectMotion(self.later, arrays["qvel"].copy(), fields["object_quat"])
+                )
+            if changed & (Changed.AGENT | Changed.FORCE):
+                fields["agent"] = self._agents(_copied(self.view.agent), fields, changed)
         return self.view
 
+    def _agents(self, agent: AgentView, fields: dict[str, Any], changed: int) -> AgentView:
+        if changed & Changed.AGENT:
+            raw = {name: self.arrays[name].copy() for name in RAW}
+            contacts = [world.agent_contacts for world in self.worlds]
+            later = Agents(self.later, fields["body_pos"], fields["body_quat"], raw, contacts)
+            _make_later(agent, _OF_AGENTS, later)
+        if changed & Changed.FORCE:
+            agent.__dict__["finger_force"] = self.arrays["agent.finger_force"].copy()
+        return agent
+
+
+_VELOCITIES = ("object_linvel", "object_angvel")
+_OF_AGENTS = tuple(field.name for field in dataclasses.fields(AgentView) if field.name != "finger_force")
 
 View = TypeVar("View", PhysicsView, AgentView)
 
@@ -80,12 +97,16 @@ def _copied(view: View) -> View:
     return new
 
 
+def _make_later(view: PhysicsView | AgentView, names: tuple[str, ...], later: Callable[[str], np.ndarray]) -> None:
+    fields = view.__dict__
+    for name in names:
+        fields.pop(name, None)
+    fields["_later"] = later
+
+
 @functools.cache
-def _fields_of(changed: int) -> tuple[tuple[str, ...], tuple[tuple[str, str], ...]]:
-    """Names of the view's own fields in some groups; paths and names of its agents'."""
-    names = [name for name, group in FIELDS.items() if group & changed]
-    of_agent = tuple((name, name.removeprefix("agent.")) for name in names if name.startswith("agent."))
-    return tuple(name for name in names if not name.startswith("agent.")), of_agent
+def _fields_of(changed: int) -> tuple[str, ...]:
+    return tuple(name for name, group in FIELDS.items() if group & changed)
 
 
 class NativeEngine:
@@ -132,10 +153,7 @@ class NativeEngine:
         self._models = [_engine_model(scene.model, timestep) for _ in range(self.threads)]
         model = self._models[0]
         self.layout: ModelLayout = make_layout(model, self.tables)
-        count = self.layout.num_object_units
-        _, unit_starts = np.unique(self.layout.unit_object[:count], return_index=True)
-        _, agent_starts = np.unique(self.layout.unit_agent[count:], return_index=True)
-        presses = (self.layout.link_of_geom >= 0) | (self.layout.finger_of_geom >= 0)
+        roles = force_roles(self.layout, self.tables.geom_object)
         self._statics = Statics(
             tables=self.tables,
             layout=self.layout,
@@ -143,15 +161,13 @@ class NativeEngine:
                 self.tables,
                 self.layout,
                 make_box_table(boxes, model, self.tables, self.layout),
-                AgentPlan.build(model, self.tables),
                 np.asarray(model.body_treeid, int),
             ),
-            contact_unit=np.where(self.layout.collides, self.layout.geom_unit, -1),
-            unit_starts=unit_starts,
-            agent_starts=agent_starts,
+            later=LaterPlan.build(model, self.tables, self.layout, touch_tolerance),
+            has_agents=len(self.tables.agent_names) > 0,
             vicinity=VicinityTable.build(model, self.layout.equality_tree),
-            presses=presses,
-            any_presses=bool(presses.any()),
+            force_roles=roles,
+            any_forces=any((roles & bit).any() and (roles & bit << PRESSED).any() for bit in (LINK, FINGER)),
             pyramidal=model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL,
             tolerance=touch_tolerance,
             substeps=substeps,
@@ -162,13 +178,13 @@ class NativeEngine:
 
     def reset(self) -> NativePhysics:
         """New worlds at the scene's initial state: its first keyframe, else the zero pose; everything awake."""
-        arrays = _working_arrays(self.num_worlds, self.tables)
+        arrays = _working_arrays(self.num_worlds, self._models[0], self.tables)
         worlds = [
             World(self._statics, self._models[share], self._masks[share], {n: a[w] for n, a in arrays.items()}, int(w))
             for share, numbers in enumerate(self._shares)
             for w in numbers
         ]
-        physics = NativePhysics(worlds, arrays)
+        physics = NativePhysics(worlds, arrays, self._statics.later)
 
         physics.update(self._run(physics, World.start))
         return physics
@@ -289,8 +305,10 @@ def _engine_model(model: mujoco.MjModel, timestep: float) -> mujoco.MjModel:
     return own
 
 
-def _working_arrays(num_worlds: int, tables: SceneTables) -> dict[str, np.ndarray]:
+def _working_arrays(num_worlds: int, model: mujoco.MjModel, tables: SceneTables) -> dict[str, np.ndarray]:
+    """By field of the view; and by name of MuJoCo's array for those of which copies are kept."""
     sizes = axis_sizes(tables, num_worlds)
-    packed = pose_arrays(num_worlds, tables)
-    made = {name: np.zeros(field.shape(sizes), field.dtype) for name, field in SCHEMA.items() if name not in packed}
-    return made | packed
+    fields = {name: SCHEMA[name] for name in (*FIELDS, "agent.finger_force")}
+    arrays = {name: np.zeros(field.shape(sizes), field.dtype) for name, field in fields.items()}
+    raw = {"qpos": (model.nq,), "qvel": (model.nv,), "cvel": (model.nbody, 6), "subtree_com": (model.nbody, 3)}
+    return arrays | {name: np.zeros((num_worlds, *raw[name])) for name in RAW}

@@ -9,6 +9,7 @@ import numpy as np
 
 from ig2mj.engine.layout import ModelLayout
 from ig2mj.engine.native.contacts import add_forces, touching_units
+from ig2mj.engine.native.later import AgentContacts, LaterPlan, agents_touching, of_owners
 from ig2mj.engine.native.sleep import restore_sleep, wake_trees
 from ig2mj.engine.native.vicinity import Masks, Vicinity, VicinityTable
 from ig2mj.engine.native.view_rows import Changed, PosePlan, PoseRows
@@ -23,20 +24,19 @@ class Statics:
     """What all worlds of an engine share.
 
     Attributes:
-      unit_starts: [O] first unit of each object. agent_starts: [A] first unit of each agent, counted from V.
-      presses: [G] the geom is an annotated link's or a finger's; any_presses: there is such a geom.
+      later: plan of the fields that are made later. has_agents: there is one.
+      force_roles: [G] see `ig2mj.engine.native.contacts`. any_forces: some contact's force is of interest.
       See `ig2mj.engine.layout`, `ig2mj.engine.native.view_rows` and `ig2mj.engine.native.vicinity` for the rest.
     """
 
     tables: SceneTables
     layout: ModelLayout
     poses: PoseRows
-    contact_unit: np.ndarray
-    unit_starts: np.ndarray
-    agent_starts: np.ndarray
+    later: LaterPlan
+    has_agents: bool
     vicinity: VicinityTable
-    presses: np.ndarray
-    any_presses: bool
+    force_roles: np.ndarray
+    any_forces: bool
     pyramidal: bool
     tolerance: float
     substeps: int
@@ -47,7 +47,8 @@ class World:
 
     Attributes:
       data: MuJoCo's state. rows: this world's row of each of the engine's working arrays, by field of the view.
-      units: [U, U] remembered touching of units.
+      units: [V, V] remembered touching of objects' units.
+      agent_contacts: what tells which objects the agents touch.
       eq_data: [E, 11] this world's equality parameters; its engine puts them into the model before it steps.
     """
 
@@ -55,7 +56,13 @@ class World:
         self.statics, self.model, self.masks, self.rows, self.number = statics, model, masks, rows, number
         self.data = mujoco.MjData(model)
         self._near = Vicinity(statics.vicinity, model, self.data)
-        self.units = np.zeros((statics.layout.num_units, statics.layout.num_units), bool)
+        count = statics.layout.num_object_units
+        self.units = np.zeros((count, count), bool)
+        nothing = np.zeros((statics.layout.num_units - count, count), bool)
+        self._no_contacts = np.zeros((0, 2), np.int32), np.zeros(0)
+        self.agent_contacts = AgentContacts(nothing, None, *self._no_contacts)
+        self._agent_fresh: np.ndarray | None = None
+        self._sleeping_agents = np.zeros(0, int)
         self.eq_data = np.array(model.eq_data)
         self._plans: dict[bytes, PosePlan] = {}
         self._fresh = np.zeros_like(self.units)  # [U, U] pairs with an awake unit
@@ -83,12 +90,12 @@ class World:
         self._near.begin()
         self._let_near()
         mujoco.mj_step2(model, data)
-        found = statics.any_presses and self._collect_force()
+        found = statics.any_forces and self._collect_force()
         for _ in range(statics.substeps - 1):
             self._near.moved()
             self._let_near()
             mujoco.mj_step(model, data)
-            found |= statics.any_presses and self._collect_force()
+            found |= statics.any_forces and self._collect_force()
         self._near.moved()
         self._let_near()
         mujoco.mj_step1(model, data)
@@ -142,7 +149,27 @@ class World:
         changed |= self.statics.poses.refresh(plan, self.data, self.rows) | self._refresh_held()
         if self._any_fresh or changed & Changed.AWAKE or everything:
             changed |= self._refresh_touching(everything)
+        if self.statics.has_agents:
+            changed |= self._note_agent_contacts()
         return changed
+
+    def _note_agent_contacts(self) -> int:
+        data = self.data
+        if data.ncon:
+            contact = data.contact
+            geom, dist = contact.geom.copy(), contact.dist.copy()
+        else:
+            geom, dist = self._no_contacts
+        if self._agent_fresh is None:  # then what they touch hangs on this instant's contacts alone
+            self.agent_contacts = AgentContacts(self.agent_contacts.remembered, None, geom, dist)
+        else:
+            self.agent_contacts = AgentContacts(self.agents_touch(), self._agent_fresh, geom, dist)
+        self.rows["cvel"][self._sleeping_agents] = 0.0  # MuJoCo leaves old velocities where a body sleeps
+        return Changed.AGENT
+
+    def agents_touch(self) -> np.ndarray:
+        """Touching of agents' units with objects' [agents' units, V]."""
+        return agents_touching(self.statics.later, self.agent_contacts)
 
     def start(self) -> int:
         """The scene's initial state: its first keyframe, else the zero pose."""
@@ -159,14 +186,24 @@ class World:
         wake_trees(model, data, np.arange(model.ntree))
         mujoco.mj_step1(model, data)
         self.refresh(everything=True)
-        return self.load({**fields, "tree_asleep": asleep, "touching": self.units})
+        return self.load({**fields, "tree_asleep": asleep, "touching": self._touching()})
 
     def save(self) -> dict[str, np.ndarray]:
         """Copies of the fields of a snapshot (see `ig2mj.engine.base.Snapshot`)."""
         data = self.data
         fields = {name: np.array(getattr(data, name)) for name in (*_STATE, "tree_asleep")}
         fields["eq_active"] = fields["eq_active"].astype(bool)
-        return fields | {"eq_data": self.eq_data.copy(), "time": np.asarray(data.time), "touching": self.units.copy()}
+        return fields | {"eq_data": self.eq_data.copy(), "time": np.asarray(data.time), "touching": self._touching()}
+
+    def _touching(self) -> np.ndarray:
+        of_agents = self.agents_touch()
+        return np.block([[self.units, of_agents.T], [of_agents, np.zeros((len(of_agents),) * 2, bool)]])
+
+    def _take_touching(self, touching: np.ndarray) -> None:
+        count = len(self.units)
+        self.units = np.array(touching[:count, :count])
+        known = np.array(touching[count:, :count])
+        self.agent_contacts = AgentContacts(known, np.zeros_like(known), *self._no_contacts)
 
     def load(self, fields: dict[str, np.ndarray]) -> int:
         """Takes the fields of a snapshot, and refreshes everything."""
@@ -181,7 +218,7 @@ class World:
         self._set_state(fields)
         restore_sleep(model, data, fields["tree_asleep"])
         mujoco.mj_step1(model, data)
-        self.units = np.array(fields["touching"], bool)
+        self._take_touching(np.asarray(fields["touching"], bool))
         return self.clear_force() | self.refresh(everything=True)
 
     def _set_state(self, fields: dict[str, np.ndarray]) -> None:
@@ -205,7 +242,7 @@ class World:
             self.data,
             statics.layout,
             statics.tables.geom_object,
-            statics.presses,
+            statics.force_roles,
             statics.pyramidal,
             self.rows["link_force"],
             self.rows["agent.finger_force"],
@@ -249,7 +286,13 @@ class World:
         self._awake_before, self._awake = self._awake, data.tree_awake != 0
         self._none_awake = not self._awake.any()
         self._steady_plan = self._plan(self._awake)
-        unit_awake = np.concatenate([self._awake, [False]])[layout.unit_tree]
+        every_unit = np.concatenate([self._awake, [False]])[layout.unit_tree]
+        unit_awake, agent_awake = np.split(every_unit, [len(self.units)])
+        if self.statics.has_agents:
+            self._agent_fresh = None if agent_awake.all() else agent_awake[:, None] | unit_awake
+            tree = np.asarray(self.model.body_treeid)
+            asleep = (tree >= 0) & ~self._awake[tree]
+            self._sleeping_agents = np.flatnonzero(asleep & (self.statics.tables.body_agent >= 0))
         self._fresh = unit_awake[:, None] | unit_awake
         self._any_fresh = bool(unit_awake.any())
         asleep = ~self._awake[self.model.dof_treeid]
@@ -276,26 +319,12 @@ class World:
 
     def _refresh_touching(self, everything: bool) -> int:
         statics, data = self.statics, self.data
-        units = touching_units(data, statics.contact_unit, statics.tolerance, self.units, self._fresh)
+        later = statics.later
+        units = touching_units(data, later.object_unit, statics.tolerance, self.units, self._fresh)
         if units is self.units and not everything:
             return Changed.NOTHING
-        before, self.units = self.units, units
-        count = statics.layout.num_object_units
-        changed = Changed.NOTHING
-        if everything or not np.array_equal(before[:count, :count], units[:count, :count]):
-            touching = self.rows["touching"]
-            touching[:] = _of_owners(_of_owners(units[:count, :count], statics.unit_starts, 0), statics.unit_starts, 1)
-            np.fill_diagonal(touching, False)
-            changed |= Changed.TOUCHING
-        if len(statics.agent_starts) and (everything or not np.array_equal(before[count:], units[count:])):
-            touched = _of_owners(units[count:, :count], statics.agent_starts, 0)
-            self.rows["agent.touching"][:] = _of_owners(touched, statics.unit_starts, 1)
-            changed |= Changed.AGENT_TOUCHING
-        return changed
-
-
-def _of_owners(touching: np.ndarray, starts: np.ndarray, axis: int) -> np.ndarray:
-    """Whether any unit of each owner touches; `starts`: its first unit along the axis."""
-    if len(starts) == touching.shape[axis]:
-        return touching
-    return np.logical_or.reduceat(touching, starts, axis)
+        self.units = units
+        touching = self.rows["touching"]
+        touching[:] = of_owners(of_owners(units, later.unit_starts, 0), later.unit_starts, 1)
+        np.fill_diagonal(touching, False)
+        return Changed.TOUCHING

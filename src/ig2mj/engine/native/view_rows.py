@@ -11,9 +11,8 @@ import mujoco
 import numpy as np
 
 from ig2mj.engine.layout import ModelLayout
-from ig2mj.engine.native.agent_rows import AgentPlan, write_agents
+from ig2mj.engine.native.later import RAW
 from ig2mj.engine.object_boxes import BoxPlan, BoxTable, plan_boxes, world_boxes
-from ig2mj.engine.view import SCHEMA
 from ig2mj.scene.tables import SceneTables
 
 
@@ -30,45 +29,36 @@ class Changed:
     AWAKE = 64
     AGENT = 128
     HELD = 256
-    AGENT_TOUCHING = 512
-    ALL = 1023
+    ALL = 511
 
-
-_GROUPS = {
-    "body_": Changed.BODIES,
-    "object_": Changed.OBJECTS,
-    "aabb_": Changed.OBJECTS,
-    "link_force": Changed.FORCE,
-    "link_": Changed.LINKS,
-    "joint_": Changed.JOINTS,
-    "touching": Changed.TOUCHING,
-    "awake": Changed.AWAKE,
-    "held": Changed.HELD,
-    "agent.finger_force": Changed.FORCE,
-    "agent.touching": Changed.AGENT_TOUCHING,
-    "agent.": Changed.AGENT,
-}
-"""Groups by the first prefix that fits."""
 
 FIELDS: dict[str, int] = {
-    name: next(group for prefix, group in _GROUPS.items() if name.startswith(prefix)) for name in SCHEMA
+    "object_pos": Changed.OBJECTS,
+    "object_quat": Changed.OBJECTS,
+    "object_com": Changed.OBJECTS,
+    "aabb_low": Changed.OBJECTS,
+    "aabb_high": Changed.OBJECTS,
+    "body_pos": Changed.BODIES,
+    "body_quat": Changed.BODIES,
+    "link_pos": Changed.LINKS,
+    "link_quat": Changed.LINKS,
+    "joint_pos": Changed.JOINTS,
+    "touching": Changed.TOUCHING,
+    "link_force": Changed.FORCE,
+    "awake": Changed.AWAKE,
+    "held": Changed.HELD,
 }
-"""The view's fields, and the group that each is written with."""
+"""The view's own fields that have working arrays, and the group that each is written with. Velocities of objects belong
+to OBJECTS, all of agents to AGENT but for the forces of fingers, which are written with FORCE."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class PosePlan:
-    """Which rows of the view move with a set of trees; runs of rows are slices, which NumPy copies faster.
-
-    Attributes:
-      free, free_dofs: [n], [n, 6] those of the objects that are free, and the addresses of their velocities.
-    """
+    """Which rows of the view move with a set of trees; runs of rows are slices, which NumPy copies faster."""
 
     bodies: np.ndarray | slice
     objects: np.ndarray | slice
     roots: np.ndarray
-    free: np.ndarray | slice
-    free_dofs: np.ndarray
     links: np.ndarray
     link_bodies: np.ndarray
     boxes: BoxPlan
@@ -85,7 +75,6 @@ class PoseRows:
     tables: SceneTables
     layout: ModelLayout
     boxes: BoxTable
-    agents: AgentPlan
     body_tree: np.ndarray
 
     def plan(self, trees: np.ndarray | None) -> PosePlan:
@@ -97,13 +86,10 @@ class PoseRows:
             moves = np.concatenate([trees, [False]])[self.body_tree]
             chosen = np.any(self.layout.object_trees & trees, axis=1)
         links = np.flatnonzero(moves[tables.link_body])
-        free = np.flatnonzero(chosen & (self.layout.object_dofadr >= 0))
         return PosePlan(
             bodies=_run_of(np.flatnonzero(moves)),
             objects=_run_of(np.flatnonzero(chosen)),
             roots=tables.object_root[chosen],
-            free=_run_of(free),
-            free_dofs=self.layout.object_dofadr[free, None] + np.arange(6),
             links=links,
             link_bodies=tables.link_body[links],
             boxes=plan_boxes(self.boxes, chosen),
@@ -126,11 +112,7 @@ class PoseRows:
             rows["object_quat"][plan.objects] = xquat[plan.roots]
             rows["object_com"][plan.objects] = data.xipos[plan.roots]
             rows["aabb_low"][plan.objects], rows["aabb_high"][plan.objects] = world_boxes(plan.boxes, xpos, xmat)
-            if len(plan.free_dofs):
-                velocity = data.qvel[plan.free_dofs]  # linear in the world's axes, angular in the body's
-                turn = xmat[self.tables.object_root[plan.free]].reshape(-1, 3, 3)
-                rows["object_linvel"][plan.free] = velocity[:, :3]
-                rows["object_angvel"][plan.free] = (turn @ velocity[:, 3:, None])[..., 0]
+            rows["qvel"][:] = data.qvel
             changed |= Changed.OBJECTS
         if plan.joints:
             rows["joint_pos"][:] = data.qpos[tables.openable_qposadr]
@@ -142,7 +124,8 @@ class PoseRows:
             rows["link_quat"][plan.links] = _multiply(xquat[plan.link_bodies], tables.link_quat[plan.links])
             changed |= Changed.LINKS
         if plan.agents:
-            write_agents(self.agents, data, rows)
+            for name in RAW:
+                rows[name][:] = getattr(data, name)
             changed |= Changed.AGENT
         return changed
 

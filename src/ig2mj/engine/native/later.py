@@ -1,0 +1,217 @@
+"""Fields of the native engine's views that are made when somebody reads them first.
+
+An agent is awake in every step, so what its fields cost would be paid by a home in which all else sleeps, while a step
+of the states reads few of them. Each world therefore only keeps raw copies of MuJoCo's arrays, which takes a tenth of
+the time, and views make the fields from those. Views between which nothing of a group changed share one object of a
+class below, so that a field is made once and stays the same array.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+
+from ig2mj.engine.layout import ModelLayout
+from ig2mj.scene.tables import SceneTables
+
+RAW = ("qpos", "qvel", "cvel", "subtree_com")
+"""MuJoCo's arrays of which copies are kept."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class LaterPlan:
+    """Index arrays of a scene, shared by all views.
+
+    Attributes:
+      free, free_dofs: [n], [n, 6] objects with a free joint, and the addresses of their velocities.
+      roots: [B] root of each body's tree. camera_body, camera_pos, camera_quat: [A...] eyes in their bodies' frames.
+      unit_starts: [O] first unit of each object. agent_starts: [A] first unit of each agent, counted from V.
+      agent_unit, object_unit: [G] unit of each geom that collides, agents' counted from V; -1 none.
+      tolerance: metres.
+    """
+
+    tables: SceneTables
+    free: np.ndarray
+    free_dofs: np.ndarray
+    roots: np.ndarray
+    camera_body: np.ndarray
+    camera_pos: np.ndarray
+    camera_quat: np.ndarray
+    unit_starts: np.ndarray
+    agent_starts: np.ndarray
+    agent_unit: np.ndarray
+    object_unit: np.ndarray
+    tolerance: float
+
+    @classmethod
+    def build(cls, model: mujoco.MjModel, tables: SceneTables, layout: ModelLayout, tolerance: float) -> LaterPlan:
+        """Of an engine's model."""
+        free = np.flatnonzero(layout.object_dofadr >= 0)
+        count, camera = layout.num_object_units, tables.agent_camera
+        unit = np.where(layout.collides, layout.geom_unit, -1)
+        known = camera >= 0
+        return cls(
+            tables=tables,
+            free=free,
+            free_dofs=layout.object_dofadr[free, None] + np.arange(6),
+            roots=np.array(model.body_rootid),
+            camera_body=np.where(known, model.cam_bodyid[camera] if model.ncam else 0, tables.agent_body),
+            camera_pos=np.where(known[:, None], model.cam_pos[camera] if model.ncam else 0.0, 0.0),
+            camera_quat=np.where(known[:, None], model.cam_quat[camera] if model.ncam else 0.0, [1.0, 0, 0, 0]),
+            unit_starts=np.unique(layout.unit_object[:count], return_index=True)[1],
+            agent_starts=np.unique(layout.unit_agent[count:], return_index=True)[1],
+            agent_unit=np.where(unit >= count, unit - count, -1),
+            object_unit=np.where(unit < count, unit, -1),
+            tolerance=tolerance,
+        )
+
+
+class AgentContacts(NamedTuple):
+    """What is needed to tell what the agents of one world touch.
+
+    Attributes:
+      remembered: [agents' units, V] touching that is taken over where `fresh` is false (both of a pair sleep).
+      fresh: of the same shape, or None: everywhere.
+      geom, dist: [C, 2], [C] the contacts.
+    """
+
+    remembered: np.ndarray
+    fresh: np.ndarray | None
+    geom: np.ndarray
+    dist: np.ndarray
+
+
+def agents_touching(plan: LaterPlan, contacts: AgentContacts) -> np.ndarray:
+    """Touching of agents' units with objects' [agents' units, V]."""
+    if contacts.fresh is None:
+        touching = np.zeros_like(contacts.remembered)
+    else:
+        touching = contacts.remembered & ~contacts.fresh
+    geom = contacts.geom[contacts.dist <= plan.tolerance]
+    if len(geom):
+        agent, thing = plan.agent_unit[geom], plan.object_unit[geom]
+        for side in (0, 1):
+            both = (agent[:, side] >= 0) & (thing[:, 1 - side] >= 0)
+            touching[agent[both, side], thing[both, 1 - side]] = True
+    return touching
+
+
+class ObjectMotion:
+    """Velocities of objects."""
+
+    def __init__(self, plan: LaterPlan, qvel: np.ndarray, object_quat: np.ndarray):
+        """`qvel` [W, nv]: nobody changes it any more. `object_quat`: the view's."""
+        self._plan, self._qvel, self._quat = plan, qvel, object_quat
+        self._made: dict[str, np.ndarray] = {}
+
+    def __call__(self, name: str) -> np.ndarray:
+        """The field. Raises AttributeError where it is none of these."""
+        if name not in ("object_linvel", "object_angvel"):
+            raise AttributeError(name)
+        if not self._made:
+            plan = self._plan
+            linear, angular = (np.zeros((*self._quat.shape[:2], 3), np.float32) for _ in range(2))
+            if len(plan.free):  # a free joint's: linear in the world's axes, angular in the body's
+                velocity = self._qvel[:, plan.free_dofs]
+                linear[:, plan.free] = velocity[..., :3]
+                angular[:, plan.free] = _rotate(self._quat[:, plan.free], velocity[..., 3:])
+            self._made = {"object_linvel": linear, "object_angvel": angular}
+        return self._made[name]
+
+
+class Agents:
+    """All fields of agents but for the forces of fingers."""
+
+    def __init__(
+        self,
+        plan: LaterPlan,
+        body_pos: np.ndarray,
+        body_quat: np.ndarray,
+        raw: dict[str, np.ndarray],
+        contacts: list[AgentContacts],
+    ):
+        """Nobody changes any of the arrays any more.
+
+        Args:
+          body_pos, body_quat: the view's. raw: [W, ...] by the names of `RAW`. contacts: of each world.
+        """
+        self._plan, self._pos, self._quat, self._raw, self._contacts = plan, body_pos, body_quat, raw, contacts
+        self._made: dict[str, np.ndarray] = {}
+
+    def __call__(self, name: str) -> np.ndarray:
+        """The field. Raises AttributeError where it is none of these."""
+        if name not in self._made:
+            if name.startswith("_") or not hasattr(self, f"_make_{name.rpartition('_')[2]}"):
+                raise AttributeError(name)
+            getattr(self, f"_make_{name.rpartition('_')[2]}")(name.rpartition("_")[0])
+        return self._made[name]
+
+    def _bodies(self, part: str) -> np.ndarray:
+        tables = self._plan.tables
+        return {"base": tables.agent_body, "hand": tables.hand_body, "finger": tables.finger_body}[part]
+
+    def _make_pos(self, part: str) -> None:
+        if part == "joint":
+            self._made["joint_pos"] = (
+                self._raw["qpos"].take(self._plan.tables.agent_joint_qposadr, 1).astype(np.float32)
+            )
+        elif part == "eye":
+            self._make_eyes()
+        else:
+            self._made[f"{part}_pos"] = self._pos.take(self._bodies(part), 1)
+
+    def _make_quat(self, part: str) -> None:
+        if part == "eye":
+            self._make_eyes()
+        else:
+            self._made[f"{part}_quat"] = self._quat.take(self._bodies(part), 1)
+
+    def _make_eyes(self) -> None:
+        plan = self._plan
+        pos, quat = self._pos.take(plan.camera_body, 1), self._quat.take(plan.camera_body, 1)
+        self._made["eye_pos"] = (pos + _rotate(quat, plan.camera_pos)).astype(np.float32)
+        self._made["eye_quat"] = _multiply(quat, plan.camera_quat).astype(np.float32)
+
+    def _make_vel(self, part: str) -> None:
+        self._made["joint_vel"] = self._raw["qvel"].take(self._plan.tables.agent_joint_dofadr, 1).astype(np.float32)
+
+    def _make_linvel(self, part: str) -> None:
+        """From MuJoCo's velocities about the centre of mass of the whole tree: rotation, then translation."""
+        bodies = self._bodies(part)
+        velocity = self._raw["cvel"].take(bodies, 1)
+        lever = self._pos.take(bodies, 1) - self._raw["subtree_com"].take(self._plan.roots[bodies], 1)
+        angular = velocity[..., :3]
+        self._made[f"{part}_linvel"] = (velocity[..., 3:] + np.cross(angular, lever)).astype(np.float32)
+        self._made[f"{part}_angvel"] = angular.astype(np.float32)
+
+    _make_angvel = _make_linvel
+
+    def _make_touching(self, part: str) -> None:
+        plan = self._plan
+        units = np.stack([agents_touching(plan, contacts) for contacts in self._contacts])
+        self._made["touching"] = of_owners(of_owners(units, plan.agent_starts, 1), plan.unit_starts, 2)
+
+
+def of_owners(touching: np.ndarray, starts: np.ndarray, axis: int) -> np.ndarray:
+    """Whether any unit of each owner touches; `starts`: its first unit along the axis."""
+    if len(starts) == touching.shape[axis]:
+        return touching
+    return np.logical_or.reduceat(touching, starts, axis)
+
+
+def _rotate(quat: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Vectors [..., 3] rotated by w-x-y-z quaternions [..., 4]."""
+    w, u = quat[..., :1], quat[..., 1:]
+    twice = 2 * np.cross(u, vector)
+    return vector + w * twice + np.cross(u, twice)
+
+
+def _multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Products of quaternions [..., 4], w-x-y-z."""
+    w, v = p[..., :1], p[..., 1:]
+    s, u = q[..., :1], q[..., 1:]
+    real = w * s - (v * u).sum(-1, keepdims=True)
+    return np.concatenate([real, w * u + s * v + np.cross(v, u)], -1)
