@@ -55,6 +55,33 @@ def test_no_axis_pulls_with_more_than_the_papers_force():
     assert np.isfinite(data.qpos).all()
 
 
+def test_a_hand_far_from_its_target_is_no_projectile():
+    """It moves at most at force over damping, and comes to a near target as a critically damped servo does."""
+    model, data = lone_hand(pos=(0, 0, 1))
+    damping = model.dof_damping[:3]
+    assert damping == pytest.approx(2 * np.sqrt(model.actuator_gainprm[:3, 0] * model.body_subtreemass[1]), rel=1e-6)
+    data.ctrl[:] = hand_ctrl((100, -100, 100))
+    speeds = []
+    for _ in range(240):
+        mujoco.mj_step(model, data)
+        speeds.append(np.abs(data.qvel[:3]).max())
+    assert max(speeds) < 1.01 * HAND_FORCE / damping[0] < 2.3
+    assert speeds[-1] == pytest.approx(HAND_FORCE / damping[0], rel=1e-3)
+
+
+def test_a_hand_comes_to_a_near_target_without_passing_it():
+    model, data = lone_hand(pos=(0, 0, 1))
+    data.ctrl[:] = hand_ctrl((0.1, 0, 0))
+    way = []
+    for _ in range(60):
+        mujoco.mj_step(model, data)
+        way.append(data.qpos[0])
+    assert max(way) < 0.1005 and way[-1] == pytest.approx(0.1, abs=1e-3)
+    rate = np.sqrt(model.actuator_gainprm[0, 0] / model.body_subtreemass[1])
+    t = 1 / 120 * np.arange(1, 61)
+    assert np.abs(way - 0.1 * (1 - (1 + rate * t) * np.exp(-rate * t))).max() < 0.02, "1/120 s is coarse"
+
+
 def test_fingers_close_toward_the_palms_face_and_the_hand_never_hits_itself():
     model, data = lone_hand()
     tip = data.body("hand_index_distal")

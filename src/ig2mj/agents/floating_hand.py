@@ -3,6 +3,10 @@
 The palm's frame is that of BehaviorRobot's right hand (spec/robots_tasks_sensors.md section 1.3): fingers point along
 -z, the palm faces -y, the thumb is on the +x side. Three slides along the world's axes and three hinges (x, then y,
 then z) carry it. Position servos limited to the paper's 300 N drive them, each axis by itself, as in Bullet.
+
+The damping of the slides lies in their joints and not in the servos' limited force, so that a hand whose target jumps
+across the house moves at most at 300 N / 136 N s/m = 2.2 m/s along each axis; near its target it moves as with a damped
+servo. With the damping inside the limit it reached 50 m/s and threw things out of the house (docs/notes.md).
 """
 
 from __future__ import annotations
@@ -123,14 +127,16 @@ def add_floating_hand(
     turn = np.zeros(9)
     mujoco.mju_quat2Mat(turn, np.array(quat, np.float64) / np.linalg.norm(quat))
     world_axes = turn.reshape(3, 3)  # rows: the world's axes in the palm's frame, where joint axes are given
-    servos: list[tuple[str, float, float]] = []
+    servos: list[tuple[str, float, float, float]] = []  # joint, stiffness, limit of its force, damping ratio
     mass = PALM_MASS + 10 * SEGMENT_MASS
+    critical = 2 * mass * np.sqrt(STIFFNESS_RATE)  # N s/m
     for axis, letter in zip(world_axes, "xyz", strict=True):
-        palm.add_joint(name=f"{name}_{letter}", type=mujoco.mjtJoint.mjJNT_SLIDE, axis=list(axis))
-        servos.append((f"{name}_{letter}", mass * STIFFNESS_RATE, HAND_FORCE))
+        joint = f"{name}_{letter}"
+        palm.add_joint(name=joint, type=mujoco.mjtJoint.mjJNT_SLIDE, axis=list(axis), damping=[critical, 0.0, 0.0])
+        servos.append((joint, mass * STIFFNESS_RATE, HAND_FORCE, 0.0))
     for axis, word in zip(np.eye(3), ("roll", "pitch", "yaw"), strict=True):
         palm.add_joint(name=f"{name}_{word}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=list(axis), armature=ARMATURE)
-        servos.append((f"{name}_{word}", ARMATURE * STIFFNESS_RATE, HAND_FORCE))
+        servos.append((f"{name}_{word}", ARMATURE * STIFFNESS_RATE, HAND_FORCE, 1.0))
     _solid(palm, mujoco.mjtGeom.mjGEOM_BOX, PALM_HALF, PALM_MASS)
     palm.add_camera(name=f"{name}/eye", pos=[0.0, 0.08, 0.12], fovy=60.0)
 
@@ -160,12 +166,12 @@ def add_floating_hand(
                 limited=mujoco.mjtLimited.mjLIMITED_TRUE,
                 armature=0.002,
             )
-            servos.append((joint, 0.002 * STIFFNESS_RATE, FINGER_TORQUE))
+            servos.append((joint, 0.002 * STIFFNESS_RATE, FINGER_TORQUE, 1.0))
             _solid(body, mujoco.mjtGeom.mjGEOM_CAPSULE, (0.009, 0, 0), SEGMENT_MASS, end=along * length)
             fingers.append(body.name)
             parent, place = body, along * length
 
-    for joint, stiffness, limit in servos:
+    for joint, stiffness, limit, ratio in servos:
         servo = spec.add_actuator(
             name=joint.removesuffix("_joint"),
             target=joint,
@@ -173,7 +179,7 @@ def add_floating_hand(
             forcelimited=mujoco.mjtLimited.mjLIMITED_TRUE,
             forcerange=[-limit, limit],
         )
-        servo.set_to_position(kp=stiffness, dampratio=1.0)
+        servo.set_to_position(kp=stiffness, dampratio=ratio)
     bodies = [name, *fingers]
     for k, one in enumerate(bodies):
         for other in bodies[k + 1 :]:

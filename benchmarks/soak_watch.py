@@ -1,0 +1,153 @@
+"""What `soak.py` sees of its worlds: which went wrong, by which object, and what that object touched last.
+
+Axes: W worlds, O objects, G geoms.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.base import Engine
+from ig2mj.engine.mjx.contacts import warp_contacts
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.scene.scene import Scene
+from ig2mj.worlds import guards
+
+FLAGS = ("overflow", "not_finite", "fell", "outside", "too_fast")
+"""What a world counts as, the first that is true. The guards' flags, and `outside`: beyond the walls or the ceiling."""
+
+OUTSIDE = 1 << 8
+"""Beside `guards.Flag`."""
+
+BEYOND = 0.5
+"""Metres beyond the building's box from which an object's centre of mass is outside."""
+
+_BITS = (guards.Flag.OVERFLOW, guards.Flag.NOT_FINITE, guards.Flag.FELL, OUTSIDE, guards.Flag.TOO_FAST)
+
+
+@dataclasses.dataclass(frozen=True)
+class House:
+    """Box of walls and floors, and where the hand starts. Metres, world frame."""
+
+    low: Float[np.ndarray, "3"]
+    high: Float[np.ndarray, "3"]
+    start: Float[np.ndarray, "3"]
+
+    @classmethod
+    def of(cls, scene: Scene, start: Any) -> House:
+        model, data = scene.model, scene.start_data()
+        categories = np.array(scene.tables.object_categories)
+        building = np.flatnonzero(np.isin(categories, ("walls", "floors")))
+        geoms = np.flatnonzero(np.isin(scene.tables.geom_object, building) & (model.geom_contype != 0))
+        turn = data.geom_xmat[geoms].reshape(-1, 3, 3)
+        middle = data.geom_xpos[geoms] + np.einsum("gij,gj->gi", turn, model.geom_aabb[geoms, :3])
+        half = np.einsum("gij,gj->gi", np.abs(turn), model.geom_aabb[geoms, 3:])
+        low, high = (middle - half).min(0), (middle + half).max(0)
+        return cls(low, high, np.asarray(start, float))
+
+    def above_floor(self, floor: float = 0.05) -> House:
+        """The same house from a little above its lowest floor."""
+        return dataclasses.replace(self, low=np.array([*self.low[:2], floor]))
+
+
+@struct.dataclass
+class Seen:
+    """Of every world in its present episode.
+
+    Attributes:
+      flags: when it was first flagged; 0: it never was. object, place, speed: of the object, at that moment (m, m/s).
+      touched: geoms that each object touched last, one that stands still and one that moves; -1 none.
+      last: those of `object` when its world was flagged.
+    """
+
+    flags: Int[Array, "W"]
+    object: Int[Array, "W"]
+    place: Float[Array, "W 3"]
+    speed: Float[Array, "W"]
+    touched: Int[Array, "W O 2"]
+    last: Int[Array, "W 2"]
+
+
+class Watch:
+    """Looks at the worlds of an engine after each control step; `look` is pure where the engine is."""
+
+    def __init__(self, engine: Engine, start: Any):
+        scene = engine.scene
+        self.engine, self.model, self.tables = engine, scene.model, scene.tables
+        self.box = House.of(scene, start)
+        self.house = self.box.above_floor()
+        self.floor = guards.lowest_support(engine.view(engine.reset()), self.tables.object_fixed)
+        self.loose: Bool[np.ndarray, "O"] = ~self.tables.object_fixed & ~self.tables.object_parked
+        self._still = np.asarray(self.model.body_weldid)[self.model.geom_bodyid] == 0
+
+    def start(self, physics: Any) -> Seen:
+        """Nothing was seen yet."""
+        count, objects = self.engine.num_worlds, self.tables.num_objects
+        zero, none = jnp.zeros(count, jnp.int32), jnp.full((count, 2), -1, jnp.int32)
+        place, touched = jnp.zeros((count, 3), jnp.float32), jnp.full((count, objects, 2), -1, jnp.int32)
+        return Seen(zero, zero + 0, place, jnp.zeros(count, jnp.float32), touched, none)
+
+    def fresh(self, seen: Seen, physics: Any, mask: Bool[Array, "W"]) -> Seen:
+        """The masked worlds begin a new episode."""
+        return seen.replace(
+            flags=jnp.where(mask, 0, seen.flags), touched=jnp.where(mask[:, None, None], -1, seen.touched)
+        )
+
+    def look(self, seen: Seen, physics: Any, view: PhysicsView) -> Seen:
+        """After a control step."""
+        com, velocity = jnp.asarray(view.object_com), jnp.asarray(view.object_linvel)
+        speed = jnp.where(self.loose, jnp.linalg.norm(velocity, axis=-1), 0.0)
+        off = jnp.maximum(self.box.low - com, com - self.box.high).max(-1) - BEYOND
+        away = jnp.where(self.loose & jnp.isfinite(off), off, -jnp.inf)
+        flags = guards.check(self.engine.health(physics), view, np.where(self.loose, self.floor, -np.inf))
+        flags = jnp.asarray(flags) | jnp.where((away > 0).any(1), OUTSIDE, 0)
+        left = (flags & (OUTSIDE | int(guards.Flag.FELL))) != 0
+        culprit = jnp.where(left, away.argmax(1), speed.argmax(1)).astype(jnp.int32)
+        touched = self._touched(seen.touched, physics)
+        new = (seen.flags == 0) & (flags != 0)
+        row = jnp.arange(len(culprit))
+
+        def keep(now: Array, before: Array) -> Array:
+            return jnp.where(new.reshape((-1,) + (1,) * (now.ndim - 1)), now, before)
+
+        return Seen(
+            flags=keep(flags.astype(jnp.int32), seen.flags),
+            object=keep(culprit, seen.object),
+            place=keep(com[row, culprit].astype(jnp.float32), seen.place),
+            speed=keep(speed[row, culprit].astype(jnp.float32), seen.speed),
+            touched=touched,
+            last=keep(touched[row, culprit], seen.last),
+        )
+
+    def _touched(self, before: Int[Array, "W O 2"], physics: Any) -> Int[Array, "W O 2"]:
+        """With the contacts of the last physics step; the native engine's are not looked at."""
+        if self.engine.name != "warp":
+            return before
+        contacts, owner = warp_contacts(physics.data), jnp.asarray(self.tables.geom_object)
+        geom = jnp.maximum(contacts.geom, 0)
+        felt = contacts.valid & (contacts.dist <= 0.0)
+        for side in range(2):
+            thing, other = owner[geom[:, side]], geom[:, 1 - side]
+            world = jnp.where(felt & (thing >= 0), contacts.world, self.engine.num_worlds)
+            column = jnp.where(jnp.asarray(self._still)[other], 0, 1)
+            before = before.at[world, thing, column].set(other.astype(jnp.int32), mode="drop")
+        return before
+
+    def report(self, seen: Seen, world: int) -> dict[str, Any]:
+        """What happened in a flagged world, for people."""
+        flags, thing = int(seen.flags[world]), int(seen.object[world])
+        kind = next(name for name, bit in zip(FLAGS, _BITS, strict=True) if flags & int(bit))
+        return {
+            "kind": kind,
+            "world": world,
+            "object": self.tables.object_names[thing],
+            "place": np.asarray(seen.place[world], float).round(2).tolist(),
+            "speed": round(float(seen.speed[world]), 1),
+            "touched": [self.model.geom(int(g)).name for g in np.asarray(seen.last[world]) if g >= 0],
+        }
