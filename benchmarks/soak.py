@@ -1,10 +1,10 @@
-"""Random controls at full range, for very many steps: how often does something leave the house or move too fast, and what?
+"""Random controls at full range, for very many steps: how often does what leave the house or move too fast?
 
     python benchmarks/soak.py [HOME ...] [--world-steps 4e7] [--worlds 8192] [--engine warp] [--out DIR]
     python benchmarks/soak.py --replay DIR/birch_world12.npz
 
 A floating hand of 300 N gets a new target in one of twenty control steps: a place anywhere in the house, any turn, any
-grip. A world is flagged where a buffer overflowed, a number is not finite, an object fell out of the house, lies outside
+grip. A world is flagged where a buffer overflowed, a number is not finite, an object fell out of the house, is outside
 of its walls, or moved faster than 20 m/s (`ig2mj.worlds.guards`); it counts once, with the object and with the geoms
 that this object touched last, and starts afresh. A world-step is a physics step of one world (1/120 s).
 
@@ -109,7 +109,7 @@ class Run:
         if args.engine == "warp":
             self.engine = WarpEngine(scene, count, profile=case.profile.for_worlds(count), initial=initial)
         else:
-            self.engine = NativeEngine(scene, count, initial=initial)
+            self.engine = NativeEngine(scene, count)
         self.watch = Watch(self.engine, case.reach.start)
         self.rows = jax.tree.map(lambda a: np.asarray(a), case.pool.physics)
         pure = self.engine.pure

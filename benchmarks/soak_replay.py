@@ -42,7 +42,7 @@ class Dump:
         """Writes it to an npz file."""
         header = json.dumps({"home": self.home, "start": [float(x) for x in self.start], "report": self.report})
         fields = {f.name: np.asarray(getattr(self.row, f.name)) for f in dataclasses.fields(self.row)}
-        np.savez_compressed(file, header=np.array(header), ctrl=self.ctrl, **fields)
+        np.savez_compressed(file, header=np.array(header), controls=self.ctrl, **fields)
 
     @classmethod
     def load(cls, file: pathlib.Path) -> Dump:
@@ -50,7 +50,7 @@ class Dump:
         with np.load(file) as archive:
             header = json.loads(str(archive["header"]))
             row = Snapshot(**{f.name: archive[f.name] for f in dataclasses.fields(Snapshot)})
-            return cls(header["home"], tuple(header["start"]), header["report"], row, archive["ctrl"])
+            return cls(header["home"], tuple(header["start"]), header["report"], row, archive["controls"])
 
 
 def replay(file: pathlib.Path) -> list[dict[str, Any]]:
