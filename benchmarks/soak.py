@@ -32,6 +32,7 @@ from soak_replay import Dump, replay
 from soak_watch import FLAGS, House, Seen, Watch
 
 from ig2mj.agents.floating_hand import FINGER_CLOSED, THUMB_CLOSED
+from ig2mj.engine.base import Snapshot
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.view import Array
 from ig2mj.engine.warp.engine import WarpEngine
@@ -115,8 +116,13 @@ class Run:
         pure = self.engine.pure
         self._many = jax.jit(self._steps, donate_argnums=0) if pure else self._steps
         self._fresh = jax.jit(self._restart, donate_argnums=0) if pure else self._restart
+        self.snapshot = jax.jit(self._copy) if pure else self._copy
         self._controls = jax.jit(lambda key, step, before: controls(self.watch.house, key, step, before))
         self.lasting = STEPS * self.engine.substeps * count
+
+    def _copy(self, physics: Any) -> Snapshot:
+        """All worlds; in arrays of their own, since the next call is given those of the physics."""
+        return jax.tree.map(jnp.copy if self.engine.pure else np.array, self.engine.snapshot(physics))
 
     def start(self) -> Soak:
         count, size = self.args.worlds, self.engine.scene.model.nu
@@ -154,16 +160,15 @@ class Run:
             soak, _ = self._step(soak, None)
         return soak
 
-    def dump(self, starts: list[tuple[Any, np.ndarray, np.ndarray, np.ndarray]], soak: Soak, world: int) -> Dump:
+    def dump(self, starts: list[tuple[Snapshot, np.ndarray, np.ndarray, np.ndarray]], soak: Soak, world: int) -> Dump:
         """The world's oldest start of its present episode, and its controls from there to now."""
         episode = int(soak.episode[world])
-        physics, ctrl, number, step = next(s for s in starts if s[2][world] == episode)
+        physics, ctrl, _, step = next(s for s in starts if s[2][world] == episode)
         key = self._keys(jnp.asarray(soak.episode))
         past, before, since = [], jnp.asarray(ctrl), jnp.asarray(step)
         for k in range(int(soak.step[world]) - int(step[world])):
             before = self._controls(key, since + k, before)
             past.append(np.asarray(before[world]))
-        del number
         row = jax.tree.map(lambda a: np.asarray(a[world]), physics)
         report = self.watch.report(soak.seen, world)
         return Dump(self.case.scene.folder.name, tuple(self.case.reach.start), report, row, np.array(past))
@@ -176,9 +181,8 @@ def soak(home: str, args: Args) -> dict[str, Any]:
     state, starts, dumped = run.start(), collections.deque(maxlen=KEPT), 0
     events: list[dict[str, Any]] = []
     done, began, timed, timed_steps = 0, time.monotonic(), 0.0, 0
-    snapshot = jax.jit(run.engine.snapshot) if run.engine.pure else run.engine.snapshot
     while done < args.world_steps and time.monotonic() - began < 60 * args.minutes:
-        starts.append((snapshot(state.physics), *(np.array(a) for a in (state.ctrl, state.episode, state.step))))
+        starts.append((run.snapshot(state.physics), *(np.array(a) for a in (state.ctrl, state.episode, state.step))))
         start = time.monotonic()
         state = jax.block_until_ready(run._many(state)) if run.engine.pure else run._many(state)
         if done:
