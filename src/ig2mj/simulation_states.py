@@ -102,6 +102,11 @@ class SimulationStates:
     def _view(self) -> PhysicsView:
         return self.engine.view(self.physics)
 
+    def prepare(self) -> None:
+        """Compiles what the first step needs, without taking it."""
+        if self.state_options is not None:
+            StateStepper(self._rules.program).step(self.states, self._view)
+
     def _step_states(self, view: PhysicsView) -> PhysicsView:
         """The states after a control step; returns the view, a new one where slicing moved things."""
         if self.state_options is None:

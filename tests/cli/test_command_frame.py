@@ -11,6 +11,7 @@ import sys
 import types
 
 import pytest
+from PIL import Image
 
 from ig2mj import cli
 from ig2mj.errors import Ig2mjError, InputError
@@ -206,3 +207,23 @@ def test_output_cut_off_by_head_is_no_error(tmp_path):
     with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         process.stdout.close()
         assert b"Traceback" not in process.stderr.read()
+
+
+@pytest.mark.skipif(not pathlib.Path("/dev/full").exists(), reason="needs a device that is always full")
+def test_a_full_disk_names_the_file_that_was_written(tmp_path, monkeypatch, capsys):
+    """The error of a write has no file name of its own."""
+    page = tmp_path / "page.html"
+    page.symlink_to("/dev/full")
+    picture = tmp_path / "picture.png"
+    picture.symlink_to("/dev/full")
+
+    def write_page(scene: pathlib.Path) -> None:
+        page.write_text("text")
+
+    def write_picture(scene: pathlib.Path, file: pathlib.Path) -> None:
+        Image.new("RGB", (64, 64)).save(file)
+
+    for work, file in ((lambda: write_page(tmp_path), page), (lambda: write_picture(tmp_path, picture), picture)):
+        monkeypatch.setattr(cli, "_dispatch", lambda _, work=work: work())
+        assert cli.call(["view"]) == 2
+        assert capsys.readouterr().err == f"error: {file}: No space left on device\n"

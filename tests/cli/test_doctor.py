@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+import threading
 
 import pytest
 from packaging.requirements import Requirement
@@ -13,6 +14,7 @@ from ig2mj import cli
 from ig2mj.diagnosis import checks as diagnosis
 from ig2mj.diagnosis.checks import Check
 from ig2mj.install_hint import requirements
+from ig2mj.viewer import offscreen
 
 GPU = ("NVIDIA H200", 580)
 
@@ -163,3 +165,24 @@ def test_the_whole_doctor_runs_here_and_finds_this_installation_healthy():
     report = json.loads(done.stdout)
     assert done.returncode == 0, [c for c in report["checks"] if c["required"] and not c["ok"]]
     assert {c["group"] for c in report["checks"]} == {"machine", "packages", "engines", "pictures", "tools", "caches"}
+
+
+def test_progress_names_what_is_still_being_tried(monkeypatch):
+    """`ig2mj doctor` shows it after two seconds (`process.waiting`)."""
+    release = threading.Event()
+
+    def slow(backend: str) -> None:
+        assert release.wait(60)
+
+    monkeypatch.setattr(offscreen, "probe", slow)
+    monkeypatch.setattr(diagnosis, "run_probe", lambda name: {"error": "not tried"})
+    said: list[str] = []
+
+    def note(text: str) -> None:
+        said.append(text)
+        if "JAX" not in text and "Warp" not in text and "MuJoCo" not in text:
+            release.set()
+
+    diagnosis.diagnose(note)
+    assert said[0] == "trying MuJoCo, JAX, Warp, to draw with egl, to draw with osmesa, to draw with warp"
+    assert "trying to draw with egl, to draw with osmesa, to draw with warp" in said

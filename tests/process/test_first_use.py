@@ -152,3 +152,16 @@ def test_jax_is_given_a_folder_below_ig2mjs(tmp_path):
         environment = {"IG2MJ_CACHE_DIR": str(folder), "PATH": "", "JAX_PLATFORMS": "cpu"}
         done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment, check=True)
         assert done.stdout.split() == lines
+
+
+def test_programs_are_named_by_what_they_do():
+    assert xla_text("jit(whole)").startswith("compiling the rules of states and goal, once per machine")
+    assert xla_text("jit(_rules)").startswith("compiling the rules of states, goal and guards,")
+    assert xla_text("jit(some_step)").startswith("compiling a program (some_step),")
+    assert xla_text("jit(<lambda>)").startswith("compiling a program, ")
+
+
+def test_a_line_is_cut_to_one_row_of_the_terminal_so_that_it_can_be_overwritten(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "30")
+    assert waiting._cut("x" * 29) == "x" * 29
+    assert waiting._cut("compiling a program with a long name (2 s)") == "compiling a program with a..."

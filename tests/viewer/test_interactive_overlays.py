@@ -9,10 +9,12 @@ import mujoco
 import numpy as np
 import pytest
 
+import ig2mj
 from ig2mj.errors import MissingDependencyError
 from ig2mj.scene.rooms import Rooms
 from ig2mj.viewer import interactive
 from ig2mj.viewer.interactive import ViewerState, open_viewer
+from ig2mj.viewer.label_space import Sight, uncovered
 from ig2mj.viewer.overlays import Clock, Label, ObjectNames, Overlay, RoomNames, default_overlays
 from ig2mj.viewer.overview import home_overview
 
@@ -165,6 +167,7 @@ class FakeHandle:
         self.left, self.synced, self.texts = pictures, 0, []
         self.cam, self.perturb = mujoco.MjvCamera(), mujoco.MjvPerturb()
         self.user_scn = mujoco.MjvScene(model, maxgeom=100)
+        self.viewport = mujoco.MjrRect(0, 0, 800, 600)
 
     def __enter__(self):
         return self
@@ -214,7 +217,7 @@ def test_the_window_shows_every_step_also_of_a_world_that_hands_out_copies(tiny_
     monkeypatch.setattr(interactive, "_launch", launch_window)
     world = CopyingWorld(tiny_home)
     interactive.launch(world, step_time=0.001, key_callback=pressed.append)
-    assert (world.steps, handle.synced) == (3, 3)
+    assert (world.steps, handle.synced) == (3, 1 + 3)
     assert shown[0].time == pytest.approx(3 / 30)
     assert pressed == [ord("6")]
     names = {handle.user_scn.geoms[i].label for i in range(handle.user_scn.ngeom)}
@@ -236,3 +239,54 @@ def test_the_mouse_pushes_the_held_body_and_lets_it_go(tiny_home, data):
     perturb.active = 0
     assert interactive._drag(tiny_home.model, data, perturb, body) == 0
     assert not data.xfrc_applied.any()
+
+
+def test_before_anything_slow_the_window_says_what_is_prepared(tiny_home, monkeypatch):
+    handle = FakeHandle(tiny_home.model, pictures=1)
+    monkeypatch.setattr(interactive, "_launch", lambda *_: handle)
+    world, shown = CopyingWorld(tiny_home), []
+    prepare = lambda: shown.append((handle.synced, handle.texts[-1][0][2:]))  # noqa: E731
+    interactive.launch(world, step_time=0.001, prepare=prepare)
+    assert shown == [(1, interactive.PREPARING)]
+    assert handle.texts[-1][0][2] != "preparing"  # then the clock stands there
+
+
+def test_a_simulation_prepares_without_changing_anything(tiny_home):
+    world = ig2mj.Simulation(tiny_home)
+    before, view = world.states, world.view
+    world.prepare()
+    assert world.time == 0.0 and world.states is before and world.view is view
+
+
+WINDOW = Sight(np.zeros(3), np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]), np.pi / 2, (800, 600))
+"""At the origin, looking along +x."""
+
+
+def test_labels_that_would_cover_a_nearer_one_give_way():
+    near, hidden, beside = (
+        Label((2.0, 0.0, 0.0), "near"),
+        Label((4.0, 0.0, 0.01), "far"),
+        Label((4.0, 2.0, 0.0), "left"),
+    )
+    behind = Label((-1.0, 0.0, 0.0), "behind")
+    assert uncovered([hidden, behind, beside, near], WINDOW) == [beside, near]
+    assert uncovered([hidden, beside], WINDOW) == [hidden, beside]
+    assert uncovered([], WINDOW) == []
+
+
+def test_the_free_camera_of_the_window_is_where_mujoco_has_it(tiny_home, data):
+    handle = FakeHandle(tiny_home.model, 0)
+    handle.cam.lookat[:], handle.cam.distance = (0.3, -0.2, 0.5), 3.0
+    handle.cam.azimuth, handle.cam.elevation = 70.0, -25.0
+    sight = Sight.of_window(handle, tiny_home.model.vis.global_.fovy)
+    scene, option = mujoco.MjvScene(tiny_home.model, maxgeom=500), mujoco.MjvOption()
+    mujoco.mjv_updateScene(tiny_home.model, data, option, None, handle.cam, mujoco.mjtCatBit.mjCAT_ALL.value, scene)
+    theirs = scene.camera[0]
+    middle = (np.array(theirs.pos) + np.array(scene.camera[1].pos)) / 2  # of the two eyes
+    np.testing.assert_allclose(sight.eye, middle, atol=1e-5)
+    np.testing.assert_allclose(sight.axes[1:], [theirs.up, theirs.forward], atol=1e-5)
+    at, depth = sight.pixels(np.array([handle.cam.lookat]))
+    np.testing.assert_allclose(at[0], (400, 300), atol=1e-6)
+    assert depth[0] == pytest.approx(3.0)
+    handle.cam.type = mujoco.mjtCamera.mjCAMERA_FIXED
+    assert Sight.of_window(handle, 45.0) is None

@@ -33,10 +33,13 @@ with models skipped (`convert`), 130 interrupted.
 from __future__ import annotations
 
 import difflib
+import errno
 import importlib
 import os
+import pathlib
 import sys
 import textwrap
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from inspect import getdoc
 from typing import Any
@@ -99,10 +102,25 @@ def describe_error(error: Exception) -> tuple[str, int]:
     if isinstance(error, ModuleNotFoundError) and error.name and not error.name.startswith("ig2mj"):
         return f"the Python package '{error.name}' is not installed ({pip_install_module(error.name)})", 2
     if isinstance(error, OSError):
-        where = f"{error.filename}: " if error.filename else ""
+        name = error.filename or _written(error)
+        where = f"{name}: " if name else ""
         return f"{where}{error.strerror or error}", 2
     text = " ".join(str(error).split())
     return f"ig2mj failed with {type(error).__name__}: {text} (run it again with --debug for the traceback)", 1
+
+
+def _written(error: OSError) -> pathlib.Path | None:
+    """The file whose writing failed: an error of a write (a full disk) does not name it, but whoever wrote knows it."""
+    if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
+        return None
+    frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
+    for frame in reversed(frames):
+        if frame.f_globals.get("__name__", "").startswith(("rich.", "ig2mj.cli.printing")):
+            return None  # the terminal, or where standard output goes
+        found = [value for value in frame.f_locals.values() if isinstance(value, pathlib.PurePath)]
+        if found:
+            return found[-1]  # the last that it dealt with
+    return None
 
 
 def _dispatch(args: list[str]) -> int:

@@ -15,13 +15,12 @@ def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
     Args:
       json: print JSON instead of a table.
     """
-    from rich.console import Console
-
     from ig2mj.diagnosis.checks import diagnose, healthy
+    from ig2mj.process.waiting import WAITING
 
-    stderr = Console(stderr=True)
-    with stderr.status("looking at this machine") as status:
-        checks = diagnose(lambda text: status.update(text))
+    now = ["looking at this machine"]
+    with WAITING.during(lambda: now[0]):  # on a terminal one line that changes, elsewhere a line now and then
+        checks = diagnose(lambda text: now.__setitem__(0, text))
     ok = healthy(checks)
     if json:
         _print_json(checks, ok)

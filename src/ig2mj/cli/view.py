@@ -55,6 +55,9 @@ def run(
     if picture is not None:
         _write_picture(scene, picture, camera, eye, target, size, seconds, collision)
         return
+    import sys
+
+    print(f"opening {scene}: first the scene is loaded, then the window comes", file=sys.stderr, flush=True)
     from ig2mj.simulation import Simulation
 
     world = Simulation(scene)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import dataclasses
+import functools
 import importlib.metadata
 import json
 import os
@@ -49,20 +50,30 @@ class Check:
 
 
 def diagnose(progress: Callable[[str], None] = lambda text: None) -> list[Check]:
-    """Looks at everything. `progress` is told what is being tried. Takes some seconds, the first time a minute."""
-    progress("trying MuJoCo, JAX and Warp, and drawing a picture with each rendering backend")
-    with concurrent.futures.ThreadPoolExecutor(max_workers=2) as pool:
-        probes = {name: pool.submit(run_probe, name) for name in ("mujoco", "jax", "warp")}
-        pictures = pool.submit(_pictures)
-        mujoco, jax, warp = (probes[name].result() for name in ("mujoco", "jax", "warp"))
-        drawn = pictures.result()
+    """Looks at everything. `progress` is told what is still being tried. Takes seconds, the first time a minute."""
+    from ig2mj.viewer.offscreen import BACKENDS, probe
+
+    tasks: dict[str, Callable[[], Any]] = {
+        "MuJoCo": lambda: run_probe("mujoco"),
+        "JAX": lambda: run_probe("jax"),
+        "Warp": lambda: run_probe("warp"),
+        **{f"to draw with {name}": functools.partial(probe, name) for name in BACKENDS},
+    }
+    with concurrent.futures.ThreadPoolExecutor(max_workers=len(tasks)) as pool:
+        waiting = {pool.submit(task): name for name, task in tasks.items()}
+        found: dict[str, Any] = {}
+        progress(f"trying {', '.join(waiting.values())}")
+        for done in concurrent.futures.as_completed(list(waiting)):
+            found[waiting.pop(done)] = done.result()
+            progress(f"trying {', '.join(waiting.values())}")
+    mujoco, jax, warp, *drawn = (found[name] for name in tasks)
     nvidia = nvidia_driver()
     return [
         *machine_checks(nvidia),
         *package_checks(requirements()),
         mujoco_check(mujoco),
         *accelerator_checks(jax, warp, nvidia),
-        *picture_checks(drawn),
+        *picture_checks(dict(zip(BACKENDS, drawn, strict=True))),
         *tool_checks(),
         *cache_checks(warp),
     ]
@@ -227,12 +238,6 @@ def nvidia_driver() -> tuple[str, int] | None:
         return name.strip(), int(version.strip().split(".")[0])
     except (OSError, subprocess.SubprocessError, ValueError, IndexError):
         return None
-
-
-def _pictures() -> dict[str, str | None]:
-    from ig2mj.viewer.offscreen import available_backends
-
-    return available_backends()
 
 
 def _installed(requirement: Requirement) -> tuple[str, bool]:

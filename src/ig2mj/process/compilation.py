@@ -59,9 +59,22 @@ def report_xla_compilation() -> None:
     jax.monitoring.register_event_duration_secs_listener(end)
 
 
+PROGRAMS = {
+    "whole": "the rules of states and goal",
+    "heat_step": "the rules of temperatures",
+    "rules": "the rules of states, goal and guards",
+    "step": "a step of all worlds",
+    "episode_0": "the start of all worlds",
+    "reset": "the reset of worlds",
+}
+"""What our programs do, by the names of the functions that JAX compiles."""
+
+
 def xla_text(program: str) -> str:
-    """The line about a program of XLA."""
-    return f"compiling {program or 'a program'}, once per machine, scene and number of worlds"
+    """The line about a program of XLA, e.g. "jit(whole)"."""
+    name = program.removeprefix("jit(").removesuffix(")").lstrip("_")
+    what = PROGRAMS.get(name) or (f"a program ({name})" if name.isidentifier() else "a program")
+    return f"compiling {what}, once per machine, scene and number of worlds"
 
 
 def report_warp_compilation() -> None:

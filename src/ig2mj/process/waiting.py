@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import shutil
 import sys
 import threading
 import time
@@ -91,9 +92,15 @@ class Waiting:
                     self._changed.wait(due - now)
                     continue
                 line = f"{work.text()} ({now - work.began:.0f} s)"
-                _write(f"\r{line}\x1b[K" if in_terminal else f"{line}\n")
+                _write(f"\r{_cut(line)}\x1b[K" if in_terminal else f"{line}\n")
                 self._drawn, self._told = in_terminal, now
             self._thread = None
+
+
+def _cut(line: str) -> str:
+    """So much of a line as one row of the terminal holds: a longer one would leave its first row behind."""
+    width = shutil.get_terminal_size().columns - 1
+    return line if len(line) <= width else line[: width - 3] + "..."
 
 
 def _write(text: str) -> None:

@@ -19,7 +19,8 @@ import numpy as np
 
 from ig2mj.errors import EngineError, MissingDependencyError
 from ig2mj.scene.scene import Scene
-from ig2mj.viewer.overlays import Drawing, Overlay, default_overlays
+from ig2mj.viewer.label_space import Sight, uncovered
+from ig2mj.viewer.overlays import Drawing, Label, Overlay, default_overlays
 from ig2mj.viewer.overview import home_overview
 from ig2mj.viewer.state_marks import draw_marks
 
@@ -28,6 +29,9 @@ from ig2mj.viewer.state_marks import draw_marks
 OVERLAY_KEYS = "6789"
 #: GLFW's codes of the other keys.
 _SPACE, _SLASH, _ENTER, _BACKSPACE, _RIGHT = 32, 47, 257, 259, 262
+PREPARING = ("preparing", "states are compiled; once per machine and scene")
+"""What the window says before the first step."""
+
 _NO_DISPLAY = "a window needs a display: set DISPLAY, or write a picture with `ig2mj view SCENE --picture out.png`"
 
 
@@ -87,26 +91,32 @@ class ViewerState:
             (font, corner.mjGRID_BOTTOMLEFT, *_columns(help_rows)),
         ]
 
-    def draw_labels(self, data: mujoco.MjData, scene: mujoco.MjvScene) -> None:
-        """Replaces the user geoms of `scene` by the labels of the overlays that are on."""
+    def draw_labels(self, data: mujoco.MjData, scene: mujoco.MjvScene, sight: Sight | None = None) -> None:
+        """Replaces the user geoms of `scene` by the marks and labels of the overlays that are on.
+
+        Args:
+          sight: what the camera sees, so that labels which would cover a nearer one give way; None: all are written.
+        """
         scene.ngeom = 0
+        labels: list[Label] = []
         for overlay, on in zip(self.overlays, self.shown, strict=True):
             if isinstance(overlay, Drawing):
                 draw_marks(scene, overlay.marks(data)) if on else overlay.hide()
-            for label in overlay.labels(data) if on else ():
-                if scene.ngeom >= scene.maxgeom:
-                    return
-                geom = scene.geoms[scene.ngeom]
-                mujoco.mjv_initGeom(
-                    geom,
-                    mujoco.mjtGeom.mjGEOM_LABEL,
-                    np.zeros(3),
-                    np.array(label.pos, dtype=float),
-                    np.eye(3).ravel(),
-                    np.array(label.rgba, dtype=np.float32),
-                )
-                geom.label = label.text[:99]  # mjvGeom holds 100 bytes
-                scene.ngeom += 1
+            labels += overlay.labels(data) if on else ()
+        for label in labels if sight is None else uncovered(labels, sight):
+            if scene.ngeom >= scene.maxgeom:
+                return
+            geom = scene.geoms[scene.ngeom]
+            mujoco.mjv_initGeom(
+                geom,
+                mujoco.mjtGeom.mjGEOM_LABEL,
+                np.zeros(3),
+                np.array(label.pos, dtype=float),
+                np.eye(3).ravel(),
+                np.array(label.rgba, dtype=np.float32),
+            )
+            geom.label = label.text[:99]  # mjvGeom holds 100 bytes
+            scene.ngeom += 1
 
 
 @runtime_checkable
@@ -125,7 +135,11 @@ class World(Protocol):
 
 
 def launch(world: World, **options: Any) -> None:
-    """Opens the window on a world and runs it until the window is closed; `options` as in `open_viewer`."""
+    """Opens the window on a world and runs it until the window is closed; `options` as in `open_viewer`.
+
+    A world that has a method `prepare` is prepared while the window says so.
+    """
+    options.setdefault("prepare", getattr(world, "prepare", None))
     shown = world.data
 
     def show() -> None:
@@ -153,6 +167,7 @@ def open_viewer(
     step_time: float = 1 / 30,
     paused: bool = False,
     key_callback: Callable[[int], None] | None = None,
+    prepare: Callable[[], object] | None = None,
 ) -> None:
     """Opens the window and runs the simulation until it is closed.
 
@@ -164,6 +179,7 @@ def open_viewer(
       step_time: simulated seconds of one control step; steps are paced to real time.
       paused: begin paused.
       key_callback: is told of every key (GLFW code) that is pressed, in this thread.
+      prepare: does what takes long, such as compiling; must not change `data`, which is drawn meanwhile.
 
     Raises:
       MissingDependencyError: there is no display.
@@ -174,6 +190,10 @@ def open_viewer(
         view = home_overview(scene, data)
         handle.cam.lookat[:] = view.lookat
         handle.cam.distance, handle.cam.azimuth, handle.cam.elevation = view.distance, view.azimuth, view.elevation
+        handle.set_texts([(mujoco.mjtFontScale.mjFONTSCALE_150, mujoco.mjtGridPos.mjGRID_TOPLEFT, *PREPARING)])
+        handle.sync()
+        if prepare is not None:
+            prepare()  # without the lock, so that the window lives
         due = time.monotonic()
         held = 0
         while handle.is_running():
@@ -189,7 +209,7 @@ def open_viewer(
                 held = _drag(scene.model, data, handle.perturb, held)
                 if state.wants_step():
                     step()
-                state.draw_labels(data, handle.user_scn)
+                state.draw_labels(data, handle.user_scn, Sight.of_window(handle, scene.model.vis.global_.fovy))
                 texts = state.texts(data)
             handle.set_texts(texts)
             handle.sync()
