@@ -57,6 +57,7 @@ COMMANDS: dict[str, str] = {
     "predicates": "tell what holds in a scene, or what an expression still lacks",
     "calibrate": "measure the batched engine's buffers for a scene",
     "pool": "make a pool of settled initial states for batched resets",
+    "activity": "list BEHAVIOR's activities, and what each asks for in a home",
     "homes": "build our own dataset of household objects and homes",
     "doctor": "tell what this machine can run, and how to mend what it cannot",
 }

@@ -148,10 +148,13 @@ def ground(expression: Expression, groups: Callable[[str], Sequence[str]]) -> Ex
     return _ground(expression, groups, {})
 
 
-def _ground(e: Expression, groups: Callable[[str], Sequence[str]], bound: Mapping[str, str]) -> Expression:
-    def instances(variable: str, group: str, body: Expression) -> tuple[Expression, ...]:
-        return tuple(_ground(body, groups, {**bound, variable: name}) for name in groups(group))
+def _instances(
+    variable: str, group: str, body: Expression, groups: Callable[[str], Sequence[str]], bound: Mapping[str, str]
+) -> tuple[Expression, ...]:
+    return tuple(_ground(body, groups, {**bound, variable: name}) for name in groups(group))
 
+
+def _ground(e: Expression, groups: Callable[[str], Sequence[str]], bound: Mapping[str, str]) -> Expression:
     match e:
         case Atom(predicate, arguments):
             return Atom(predicate, tuple(bound.get(name, name.removeprefix("?")) for name in arguments))
@@ -162,11 +165,11 @@ def _ground(e: Expression, groups: Callable[[str], Sequence[str]], bound: Mappin
         case Not(part):
             return Not(_ground(part, groups, bound))
         case ForAll(variable, group, body):
-            return And(instances(variable, group, body))
+            return And(_instances(variable, group, body, groups, bound))
         case Exists(variable, group, body):
-            return Or(instances(variable, group, body))
+            return Or(_instances(variable, group, body, groups, bound))
         case ForN(count, variable, group, body):
-            return Exactly(count, instances(variable, group, body))
+            return Exactly(count, _instances(variable, group, body, groups, bound))
         case ForPairs(first, second, body):
             rows = _pairs(first, second, body, groups, bound)
             return Pairing(min(len(rows), len(groups(second[1]))), rows)

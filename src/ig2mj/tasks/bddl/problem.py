@@ -121,7 +121,7 @@ class _Reader:
         several = len(goal.parts) > 2 and self.tolerates(goal, "has several conditions: the first counts")
         if len(goal.parts) != 2 and not several:
             raise self.error(goal, "takes one condition", "join several with (and ...)")
-        whole = self.condition(goal.parts[1], {})
+        whole = self.condition(next(iter(goal.parts[1:])), {})
         parts = whole.parts if isinstance(whole, logic.And) else (whole,)
         name = self.only_word(sections["problem"])
         return Problem(name, self.domain, self.objects, rooms, tuple(init), parts, self.file, tuple(self.remarks))
@@ -231,9 +231,10 @@ class _Reader:
         return int(word.text)
 
     def only_word(self, section: Group) -> str:
-        if len(section.parts) != 2 or not isinstance(word := section.parts[1], Word):
-            raise self.error(section, "takes one name")
-        return word.text
+        match section.parts:
+            case (_, Word(text)):
+                return text
+        raise self.error(section, "takes one name")
 
     def tolerates(self, at: Tree, what: str) -> bool:
         """Notes an oddity where these are passed over."""

@@ -65,6 +65,16 @@ class Activity:
         """Object -> its synset."""
         return {name: synset for synset, names in self.objects.items() for name in names}
 
+    @functools.cached_property
+    def needs(self) -> Mapping[str, frozenset[str]]:
+        """Object -> predicates of it alone that hold at the start or that the goal wants true: it must be able to."""
+        found: dict[str, set[str]] = {}
+        every = logic.ground(logic.And((*self.init, *self.goal)), self.objects.__getitem__)
+        _note_wanted(every, True, found)
+        for whole, _ in self.halves.values():
+            found.setdefault(whole, set()).add("sliced")
+        return {name: frozenset(predicates) for name, predicates in found.items()}
+
 
 def lower(problem: Problem, name: str) -> Activity:
     """The activity that a definition describes.
@@ -88,9 +98,24 @@ def lower(problem: Problem, name: str) -> Activity:
         halves=lowering.halves,
         rooms=problem.rooms,
         init=tuple(dict.fromkeys(init)),
-        goal=goal,
+        goal=tuple(dict.fromkeys(goal)),
         remarks=problem.remarks,
     )
+
+
+def _note_wanted(e: Expression, positive: bool, found: dict[str, set[str]]) -> None:
+    match e:
+        case Atom(predicate, (name,)):
+            if positive:
+                found.setdefault(name, set()).add(predicate)
+        case Not(part):
+            _note_wanted(part, not positive, found)
+        case logic.And(parts) | logic.Or(parts) | logic.Exactly(_, parts):
+            for p in parts:
+                _note_wanted(p, positive, found)
+        case logic.Pairing(_, rows):
+            for p in (p for row in rows for p in row if p is not None):
+                _note_wanted(p, positive, found)
 
 
 class _Lowering:
@@ -98,12 +123,12 @@ class _Lowering:
         self.problem, self.old = problem, problem.domain != BEHAVIOR_1K
         self.synset = problem.synset_of()
         self.unknown: set[str] = set()
-        every = logic.atoms(logic.ground(logic.And((*problem.init, *problem.goal)), self.members))
-        self.substances = {
-            self.synset[a.arguments[1]] for a in every if not self.old and a.predicate in ("covered", "saturated")
-        }
-        future = {a.arguments[0] for a in every if a.predicate == "future"}
-        self.halves = {} if self.old else self.find_halves(future)
+        self.substances: set[str] = set()
+        self.halves: dict[str, tuple[str, int]] = {}
+        if not self.old:
+            every = logic.atoms(logic.ground(logic.And((*problem.init, *problem.goal)), self.members))
+            self.substances = {self.synset[a.arguments[1]] for a in every if a.predicate in ("covered", "saturated")}
+            self.halves = self.find_halves({a.arguments[0] for a in every if a.predicate == "future"})
 
     def members(self, group: str) -> tuple[str, ...]:
         return self.problem.objects[group]
@@ -201,6 +226,18 @@ def groups_of(e: Expression) -> set[str]:
     found: set[str] = set()
     rewrite(e, functools.partial(_note_groups, found))
     return found
+
+
+def names_in(e: Expression) -> set[str]:
+    """Names (and variables) that the atoms of an expression have as arguments."""
+    found: set[str] = set()
+    rewrite(e, functools.partial(_note_names, found))
+    return found
+
+
+def _note_names(found: set[str], a: Atom, bound: Mapping[str, str]) -> Atom:
+    found.update(a.arguments)
+    return a
 
 
 def _note_groups(found: set[str], a: Atom, bound: Mapping[str, str]) -> Atom:

@@ -1,0 +1,183 @@
+"""`ig2mj activity`: BEHAVIOR's activities: which there are, what they ask for, in which homes they can be done."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+if TYPE_CHECKING:
+    from ig2mj.scene.manifest import Manifest
+    from ig2mj.tasks.bddl.binding import Binding
+    from ig2mj.tasks.bddl.vocabulary import Activity
+
+Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
+
+
+def list_(behavior1k: Flag = False, json: Flag = False) -> None:
+    """List the activities, and the shipped homes in which each can be done.
+
+    Args:
+      behavior1k: those of BEHAVIOR-1K (fetch them first) instead of BEHAVIOR-100.
+      json: print JSON instead of a table.
+    """
+    from ig2mj.cli.printing import make_table, print_json, stdout_console
+    from ig2mj.tasks.bddl.definitions import activity_names, load_activity
+    from ig2mj.tasks.bddl.vocabulary import VocabularyError
+
+    names = activity_names(behavior1k)
+    homes = _homes(None)
+    found: list[dict[str, Any]] = []
+    for name in names:
+        try:
+            activity = load_activity(name, behavior1k)
+        except VocabularyError as e:
+            found.append({"activity": name, "lacks": list(e.predicates)})
+            continue
+        bound, _ = _bind_everywhere(activity, homes)
+        best = min(bound, key=lambda b: len(b.additions), default=None)
+        found.append(
+            {
+                "activity": name,
+                "objects": sum(map(len, activity.objects.values())),
+                "homes": [b.home for b in bound],
+                "added": len(best.additions) if best else None,
+            }
+        )
+    if json:
+        print_json(found)
+        return
+    fit = sum(bool(row.get("homes")) for row in found)
+    title = f"{len(found)} activities; {fit} can be bound in a shipped home (ig2mj activity show NAME)"
+    rows = [
+        (row["activity"], row.get("objects", "-"), len(row.get("homes", ())) or "-",
+         "-" if row.get("added") is None else row["added"],
+         f"no state for {', '.join(row['lacks'])}" if "lacks" in row else ", ".join(row["homes"]))
+        for row in found
+    ]  # fmt: skip
+    console = stdout_console()
+    console.print(make_table(title, ("activity", ">objects", ">homes", ">to add", "?where"), rows, console.width))
+
+
+def show(
+    name: Annotated[str, tyro.conf.Positional],
+    scene: Annotated[str | None, tyro.conf.arg(metavar="HOME")] = None,
+    behavior1k: Flag = False,
+    json: Flag = False,
+) -> int:
+    """Tell what an activity asks for, and which objects of a home play it.
+
+    Exit status 1 when it cannot be bound in the home (without --scene: in any that ships).
+
+    Args:
+      name: of the activity, or a BDDL file of your own.
+      scene: the home; default the shipped one in which the least has to be added.
+      behavior1k: of BEHAVIOR-1K instead of BEHAVIOR-100: some names occur in both.
+      json: print JSON instead of text.
+    """
+    from ig2mj.cli.printing import print_json
+    from ig2mj.tasks.bddl.definitions import load_activity
+
+    activity = load_activity(name, behavior1k)
+    bound, errors = _bind_everywhere(activity, _homes(scene))
+    best = min(bound, key=lambda b: len(b.additions), default=None)
+    if json:
+        print_json(_as_data(activity, best, errors))
+    else:
+        print("\n".join([*_as_text(activity), "", *_binding_as_text(best, [b.home for b in bound], errors)]))
+    return 0 if best else 1
+
+
+def fetch() -> None:
+    """Download BEHAVIOR-1K's definitions (bddl 3.6.0, MIT, 2 MB by pip) into the user's cache."""
+    from ig2mj.tasks.bddl import behavior1k
+    from ig2mj.tasks.bddl.definitions import activity_names
+
+    folder = behavior1k.fetch()
+    print(f"{folder}: {len(activity_names(behavior_1k=True))} activities (ig2mj activity list --behavior1k)")
+
+
+SUBCOMMANDS = {"list": list_, "show": show, "fetch": fetch}
+
+
+def _homes(scene: str | None) -> list[Manifest]:
+    """Manifests of the home that was named, or of all that ship. Raises InputError."""
+    from ig2mj.scene.manifest import load_manifest
+    from ig2mj.scene.paths import scene_folder, shipped_homes
+
+    return [load_manifest(scene_folder(pathlib.Path(name))) for name in ([scene] if scene else shipped_homes())]
+
+
+def _bind_everywhere(activity: Activity, homes: list[Manifest]) -> tuple[list[Binding], dict[str, list[str]]]:
+    """Bindings in the homes that fit, and of the others the reasons."""
+    from ig2mj.tasks.bddl.binding import BindingError, bind
+
+    bound, errors = [], {}
+    for manifest in homes:
+        try:
+            bound.append(bind(activity, manifest))
+        except BindingError as e:
+            errors[manifest.name] = list(e.reasons)
+    return bound, errors
+
+
+def _as_text(activity: Activity) -> list[str]:
+    from ig2mj.tasks.bddl.words import INDENT, sentences
+
+    names = [name for found in activity.objects.values() for name in found]
+    rooms = [f"{INDENT}{name} in a {kind}" for name, kind in activity.rooms.items()]
+    return [
+        f"{activity.name} ({'BEHAVIOR-1K' if activity.behavior_1k else 'BEHAVIOR-100'}, {len(names)} objects)",
+        *([f"  note: {remark}" for remark in activity.remarks]),
+        *(["", "where:", *rooms] if rooms else []),
+        *("", "at the start:"),
+        *sentences(activity.init, INDENT),
+        *("", "goal:"),
+        *sentences(activity.goal, INDENT),
+    ]
+
+
+def _binding_as_text(best: Binding | None, fit: list[str], errors: dict[str, list[str]]) -> list[str]:
+    if best is None:
+        near = sorted(errors, key=lambda home: len(errors[home]))[:3]
+        return ["cannot be bound:", *(f"  {home}: {'; '.join(errors[home])}" for home in near)]
+    new = _added_names(best)
+    lines = [f"in {best.home}:"]
+    for name, bound in best.objects.items():
+        room = f", {best.rooms[name]}" if name in best.rooms else ""
+        added = ", added from the object library" if bound in new else ""
+        lines.append(f"  {name:<32} {bound}{room}{added}")
+    lines += [f"  {s} is not in the taxonomy: {instead} stands in" for s, instead in best.stand_ins.items()]
+    others = [home for home in fit if home != best.home]
+    return [*lines, *([f"also fits: {', '.join(others)}"] if others else [])]
+
+
+def _added_names(binding: Binding) -> set[str]:
+    """Names in the scene of what the library adds."""
+    from ig2mj.scene.additions import name_additions
+
+    (home,) = _homes(binding.home)
+    return {name for name, _ in name_additions((o.name for o in home.objects), binding.additions)}
+
+
+def _as_data(activity: Activity, best: Binding | None, errors: dict[str, list[str]]) -> dict[str, Any]:
+    from ig2mj.predicates.logic import text
+
+    return {
+        "activity": activity.name,
+        "objects": activity.objects,
+        "rooms": activity.rooms,
+        "init": [text(c) for c in activity.init],
+        "goal": [text(c) for c in activity.goal],
+        "binding": None
+        if best is None
+        else {
+            "home": best.home,
+            "objects": best.objects,
+            "rooms": best.rooms,
+            "additions": best.additions,
+            "stand_ins": best.stand_ins,
+        },
+        "not_bound": errors,
+    }
