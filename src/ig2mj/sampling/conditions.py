@@ -1,0 +1,150 @@
+"""Conditions to be sampled together: what must hold, of which objects, and in which order it is made true.
+
+A condition is an atom or its negation. A category in place of an object's name means any one object of it, the same
+one in all conditions of a row (`plate` here and there is one plate; `plate#2` is another one).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+from collections.abc import Iterable, Sequence
+
+import networkx
+import numpy as np
+
+from ig2mj.errors import StateError, UnknownNameError
+from ig2mj.predicates.logic import And, Atom, Expression, Not
+from ig2mj.predicates.parse import parse
+from ig2mj.predicates.registry import find
+from ig2mj.sampling.rules import PLACEMENTS
+from ig2mj.scene.tables import SceneTables
+
+_NUMBERED = re.compile(r"(?P<category>.+)#(?P<number>\d+)")
+
+
+@dataclasses.dataclass(frozen=True)
+class Condition:
+    """What must hold: an atom of objects' names, or that it does not."""
+
+    predicate: str
+    arguments: tuple[str, ...]
+    value: bool = True
+
+    @property
+    def atom(self) -> Atom:
+        """As an expression, without the negation."""
+        return Atom(self.predicate, self.arguments)
+
+    @property
+    def expression(self) -> Expression:
+        """As an expression."""
+        return self.atom if self.value else Not(self.atom)
+
+    @property
+    def is_placement(self) -> bool:
+        """It says where an object is."""
+        return self.predicate in PLACEMENTS
+
+    def __str__(self) -> str:
+        text = f"({' '.join((self.predicate, *self.arguments))})"
+        return text if self.value else f"(not {text})"
+
+
+def read_conditions(sources: Iterable[str | Expression]) -> list[Condition]:
+    """Conditions from expressions: atoms, their negations, and conjunctions of these.
+
+    Raises:
+      ExpressionError: a text is no expression. StateError: it is none of these forms.
+      UnknownNameError: no such predicate.
+    """
+    found: list[Condition] = []
+    for source in sources:
+        found += _conditions(parse(source) if isinstance(source, str) else source, True)
+    return found
+
+
+def _conditions(expression: Expression, value: bool) -> list[Condition]:
+    if isinstance(expression, Atom):
+        return [Condition(find(expression.predicate).name, expression.arguments, value)]
+    if isinstance(expression, Not):
+        return _conditions(expression.part, not value)
+    if isinstance(expression, And) and value:
+        return [c for part in expression.parts for c in _conditions(part, True)]
+    raise StateError("only predicates, their negations and conjunctions of them can be sampled, not other expressions")
+
+
+def bind(conditions: Sequence[Condition], tables: SceneTables, rng: np.random.Generator) -> list[Condition]:
+    """The conditions with every category replaced by an object of it, drawn at random; no object stands for two.
+
+    Raises:
+      UnknownNameError: neither an object, nor a room, nor a category of the scene. StateError: too few objects of it.
+    """
+    bound: dict[str, str] = {}
+    wholes = [
+        (name, category)
+        for name, category, whole in zip(
+            tables.object_names, tables.object_categories, tables.object_part_of, strict=True
+        )
+        if whole < 0
+    ]
+    used = {a for c in conditions for a in c.arguments if a in tables.object_names}
+    for name in dict.fromkeys(a for c in conditions for a in c.arguments):
+        if name in bound or name in tables.object_names or name in tables.room_names or name in tables.agent_names:
+            continue
+        match = _NUMBERED.fullmatch(name)
+        category = match["category"] if match else name
+        members = [n for n, c in wholes if c == category]
+        if not members:
+            known = [*tables.object_names, *tables.room_names, *dict.fromkeys(tables.object_categories)]
+            raise UnknownNameError("object, room or category", name, known)
+        free = [n for n in members if n not in used]
+        if not free:
+            raise StateError(f"the scene has too few objects of category '{category}' for '{name}'")
+        bound[name] = free[int(rng.integers(len(free)))]
+        used.add(bound[name])
+    return [dataclasses.replace(c, arguments=tuple(bound.get(a, a) for a in c.arguments)) for c in conditions]
+
+
+@dataclasses.dataclass(frozen=True)
+class Plan:
+    """The order of work.
+
+    Attributes:
+      joints: conditions about open, done first: what is in a drawer is put there when it stands as it shall.
+      placements: (object, conditions on where it is), supports before what they bear; the first condition that holds is
+        the rule that proposes places.
+      states: all others; cuts come last.
+    """
+
+    joints: tuple[Condition, ...]
+    placements: tuple[tuple[str, tuple[Condition, ...]], ...]
+    states: tuple[Condition, ...]
+
+
+def order(conditions: Sequence[Condition]) -> Plan:
+    """Orders conditions by what depends on what.
+
+    Raises:
+      StateError: objects are to be placed on each other in a circle.
+    """
+    graph = networkx.DiGraph()
+    where: dict[str, list[Condition]] = {}
+    for condition in conditions:
+        if condition.is_placement:
+            where.setdefault(condition.arguments[0], []).append(condition)
+            graph.add_node(condition.arguments[0])
+            if condition.value and len(condition.arguments) > 1:
+                graph.add_edge(condition.arguments[1], condition.arguments[0])
+    try:
+        names = [n for n in networkx.lexicographical_topological_sort(graph) if n in where]
+    except networkx.NetworkXUnfeasible:
+        circle = " -> ".join(a for a, _ in networkx.find_cycle(graph))
+        raise StateError(f"objects cannot be placed on each other in a circle: {circle}") from None
+    placements = tuple((n, tuple(sorted(where[n], key=lambda c: not c.value))) for n in names)
+    rest = [c for c in conditions if not c.is_placement]
+    return Plan(
+        joints=tuple(c for c in rest if c.predicate == "open"),
+        placements=placements,
+        states=tuple(sorted((c for c in rest if c.predicate != "open"), key=lambda c: c.predicate == "sliced")),
+    )

@@ -1,0 +1,127 @@
+"""Where an object comes to lie when it is let down straight onto the surfaces of a level, and whether it stays there.
+
+An object that goes down vertically stops where the gap between its underside and the surfaces first closes. That gives
+the height for any shape of object and of surface, from a book on a table to an apple in a bowl. Then:
+
+- *clear*: nothing hangs into it, and it hangs over nothing that is already there;
+- *supported fully*: all of its base is on surfaces of the allowed objects (the paper's guarantee, table A.5);
+- *balanced*: its centre of mass is above the polygon of the cells in which it touches, which is all that a bowl or a
+  stool smaller than the object can offer.
+
+Axes: N candidate places, M rows and K columns of the object's window.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.sampling.columns import CELL, Level
+from ig2mj.sampling.footprint import Footprint
+
+TOUCH = 0.004
+"""Metres. A gap that is no wider counts as contact: the cells round heights off."""
+
+LEVEL_BASE = 0.006
+"""Metres. All of a fully supported base is this close to a surface."""
+
+HEADROOM = 0.004
+"""Metres between an object and what is above it."""
+
+MARGIN = 0.35
+"""Radians. Contact cells, seen from the centre of mass, leave no angle wider than pi minus this."""
+
+CHUNK = 2_000_000
+"""Cells looked at together."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Rest:
+    """Candidates of one level, one entry per place.
+
+    Attributes:
+      row, col: the origin's cell, of the world's grid. height: of the origin, metres.
+      clear, full, balanced: see the module's text; `full` and `balanced` are false where it is not clear, and where the
+        support is no allowed object.
+    """
+
+    row: Int[np.ndarray, "N"]
+    col: Int[np.ndarray, "N"]
+    height: Float[np.ndarray, "N"]
+    clear: Bool[np.ndarray, "N"]
+    full: Bool[np.ndarray, "N"]
+    balanced: Bool[np.ndarray, "N"]
+
+
+def rest_at(
+    level: Level,
+    shape: Footprint,
+    row: Int[np.ndarray, "N"],
+    col: Int[np.ndarray, "N"],
+    supports: Collection[int],
+) -> Rest:
+    """Lets an object down with its origin in given cells; its window must lie within the level's.
+
+    Args:
+      level: surfaces and ceilings. shape: the object. row, col: of the world's grid. supports: objects that may bear
+        it.
+    """
+    window = level.window
+    top = row + shape.row - window.row
+    left = col + shape.col - window.col
+    assert len(row) == 0 or (min(top.min(), left.min()) >= 0), "the level's window is too small"
+    cells_r, cells_c = np.nonzero(shape.covered)
+    under, over = shape.underside[cells_r, cells_c], shape.topside[cells_r, cells_c]
+    base = shape.base[cells_r, cells_c]
+    place = np.stack([cells_c + shape.col, cells_r + shape.row], 1) * CELL - shape.centre  # seen from the centre
+    allowed = np.isin(level.owner, list(supports))
+    parts = []
+    step = max(1, CHUNK // len(under))
+    for start in range(0, len(row), step):
+        r = top[start : start + step, None] + cells_r
+        c = left[start : start + step, None] + cells_c
+        surface = level.surface[r, c]
+        height = (surface - under).max(1)
+        gap = height[:, None] + under - surface
+        clear = ~level.blocked[r, c].any(1) & np.isfinite(height)
+        clear &= (height[:, None] + over + HEADROOM <= level.ceiling[r, c]).all(1)
+        contact = gap <= TOUCH
+        bears = allowed[r, c]
+        proper = clear & np.where(contact, bears, True).all(1)
+        balanced = np.zeros(len(r), bool)
+        balanced[proper] = _balanced(contact[proper], place)
+        full = balanced & ((gap <= LEVEL_BASE) & bears)[:, base].all(1)
+        parts.append((height, clear, full, balanced))
+    height, clear, full, balanced = (np.concatenate(p) for p in zip(*parts, strict=True)) if parts else _nothing()
+    return Rest(row, col, height, clear, full, balanced)
+
+
+def _nothing() -> tuple[np.ndarray, ...]:
+    return np.zeros(0), np.zeros(0, bool), np.zeros(0, bool), np.zeros(0, bool)
+
+
+def _balanced(contact: Bool[np.ndarray, "N P"], place: Float[np.ndarray, "P 2"]) -> Bool[np.ndarray, "N"]:
+    """Whether the origin lies inside the polygon of each row's contact cells: no angle without contact is too wide."""
+    corners = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]]) * CELL / 2
+    place = (place[:, None] + corners).reshape(-1, 2)
+    contact = np.repeat(contact, 4, axis=1)
+    angle = np.arctan2(place[:, 1], place[:, 0])
+    order = np.argsort(angle)
+    angle = angle[order]
+    touched = contact[:, order]
+    count = touched.sum(1)
+    index = np.arange(len(angle))
+    last = np.maximum.accumulate(np.where(touched, index, -1), axis=1)
+    previous = np.concatenate([np.full((len(touched), 1), -1), last[:, :-1]], 1)
+    gap = np.where(touched & (previous >= 0), angle - angle[np.maximum(previous, 0)], 0.0).max(1, initial=0.0)
+    first = touched.argmax(1)
+    around = angle[first] + 2 * np.pi - angle[np.maximum(last[:, -1], 0)]
+    return (count > 0) & (np.maximum(gap, around) <= np.pi - MARGIN)
+
+
+def origin(shape: Footprint, row: int, col: int, height: float) -> Float[np.ndarray, "3"]:
+    """World position of the object's main body for a candidate."""
+    return np.array([(col + 0.5) * CELL + shape.shift[0], (row + 0.5) * CELL + shape.shift[1], height])

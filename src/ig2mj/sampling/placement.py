@@ -1,0 +1,310 @@
+"""Placing one object: candidates from a rule, tried until one is free, settles, and makes the predicate true.
+
+What iGibson only hopes for is checked: that the object is supported, that it stands in nothing, that the predicate
+holds after physics has had its say, and that everything is at rest then. Every rejection is counted under its reason.
+
+Axes: N candidates.
+"""
+
+from __future__ import annotations
+
+import collections
+import dataclasses
+import itertools
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.engine.base import Snapshot
+from ig2mj.sampling.columns import CELL, Window
+from ig2mj.sampling.drop import Rest, origin, rest_at
+from ig2mj.sampling.footprint import Footprint
+from ig2mj.sampling.query import SceneQuery
+
+LIFT = 0.002
+"""Metres by which an object is put above where it will rest, so that rounding to cells makes it stand in nothing."""
+
+PENETRATION = 0.001
+"""Metres. An object that stands deeper in something when it is let go is not let go."""
+
+RESTING_PENETRATION = 0.002
+"""Metres. No sampled state stands deeper in anything (at rest, by gravity)."""
+
+MOVED = 0.01
+"""Metres. Nothing else may move farther while the object settles."""
+
+SLIPPED = (0.05, 0.08)
+"""Metres. An object that moves farther (sideways, downwards) while it settles has not been supported."""
+
+SETTLED_TRIES = 8
+"""Candidates of one orientation and level that are let go, before another one is drawn."""
+
+LIFTS = 3
+"""Times that an object that stands in something is lifted by as much as it stands in it."""
+
+DRAWS = 24
+"""Orientations tried at most."""
+
+PUSHES, TOUCHING = 6, 0.001
+"""Pushes at most against another object, and the gap in metres that is left: well within the tolerance of touching."""
+
+SUPPORT = ("full", "balanced", "loose")
+"""How well an object must be supported, the best first (see `ig2mj.sampling.drop`)."""
+
+LOOSE_SPREAD = 0.01
+"""Metres. Among loosely supported candidates the lowest are let go first, but for differences of this size."""
+
+FIRST_DRAWS = 9
+"""Orientations over which the demand goes down from full support to the least."""
+
+AREAS = 8
+"""Areas of a rule that are looked at for one orientation."""
+
+RANDOM_CELLS = 96
+"""Candidates drawn at random per orientation and level, before many more are looked at."""
+
+MANY_CELLS = 3_000_000
+"""Where none of the first will do, as many candidates are looked at as make this number of cells under the object."""
+
+Truth = Callable[[], bool]
+
+
+@dataclasses.dataclass(frozen=True)
+class Area:
+    """Where an object may be put: what a rule (`on_top.py`, `inside.py`, ...) gives.
+
+    Attributes:
+      low, high: x and y between which the object's origin comes to lie, metres.
+      height: world z from which surfaces are looked for downwards.
+      supports: objects that may bear it.
+      allowed: for cells (row, col of the world's grid), whether the object's origin may be there; None: all.
+      push_towards: object that the placed one is pushed against before it is let go; -1: none.
+      loose: where neither full support nor balance is found, physics may decide where the object comes to rest, as in a
+        bowl or a basket.
+      holds_at_once: the predicate does not depend on contact, so that it can be asked before physics.
+    """
+
+    low: Float[np.ndarray, "2"]
+    high: Float[np.ndarray, "2"]
+    height: float
+    supports: tuple[int, ...]
+    allowed: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
+    push_towards: int = -1
+    loose: bool = False
+    holds_at_once: bool = False
+
+
+Areas = Callable[[Footprint, np.random.Generator], Iterator[Area]]
+"""A rule: areas to try for an object of a given footprint, the likely ones first; may be endless."""
+
+
+@dataclasses.dataclass
+class Budget:
+    """How much may still be tried. Work is counted, not timed, so that a seed gives the same state on any machine.
+
+    Attributes:
+      work: candidates that may be let go, and searches for candidates; each is one unit, some 5 to 20 ms.
+      seconds: wall time after which nothing is begun any more; infinite unless somebody is waiting.
+    """
+
+    work: int = 250
+    seconds: float = math.inf
+
+    def __post_init__(self) -> None:
+        self._end = time.monotonic() + self.seconds
+
+    def spend(self) -> bool:
+        """Takes a unit; False where none is left."""
+        if self.spent():
+            return False
+        self.work -= 1
+        return True
+
+    def spent(self) -> bool:
+        """Whether it is used up."""
+        return self.work <= 0 or time.monotonic() >= self._end
+
+    def part(self, share: int) -> Budget:
+        """A budget of one part in `share` of what is left; what it spends is not taken from this one."""
+        return Budget(max(self.work // share, 1), self._end - time.monotonic())
+
+
+Rejections = collections.Counter
+
+
+@dataclasses.dataclass(frozen=True)
+class _Task:
+    """What is being placed, and how."""
+
+    object_index: int
+    truth: Truth
+    rng: np.random.Generator
+    budget: Budget
+    rejected: Rejections
+    before: Snapshot
+
+
+class Placer:
+    """Places objects in a `SceneQuery`'s world, one after another."""
+
+    def __init__(self, query: SceneQuery):
+        """Binds a world."""
+        self.query = query
+        self.tables = query.scene.tables
+        self._orientations = [_orientations(entry.orientations) for entry in query.scene.manifest.objects]
+
+    def place(
+        self,
+        object_index: int,
+        areas: Areas,
+        truth: Truth,
+        rng: np.random.Generator,
+        budget: Budget,
+        rejected: Rejections,
+    ) -> bool:
+        """Puts an object into an area so that `truth` holds afterwards; leaves the world as it was where it cannot.
+
+        Args:
+          areas: see `Areas`. truth: asked after the object has settled. rejected: counts are added to it.
+        """
+        task = _Task(object_index, truth, rng, budget, rejected, self.query.save())
+        for draw in range(DRAWS):
+            if budget.spent():
+                rejected["budget spent"] += 1
+                break
+            support = SUPPORT[min(draw * len(SUPPORT) // FIRST_DRAWS, len(SUPPORT) - 1)]
+            quat, shift = self._orientation(object_index, rng), rng.uniform(-CELL / 2, CELL / 2, 2)
+            shape = self.query.footprint(object_index, quat, shift)
+            for area in itertools.islice(areas(shape, rng), AREAS):
+                if self._try_area(task, quat, shape, area, support):
+                    return True
+                if budget.spent():
+                    break
+        self.query.load(task.before)
+        return False
+
+    def _try_area(self, task: _Task, quat: np.ndarray, shape: Footprint, area: Area, support: str) -> bool:
+        if not task.budget.spend():
+            return False
+        rest = self._candidates(task, shape, area, support)
+        order = task.rng.permutation(len(rest.row))
+        if support == "loose":  # deep down, it is more likely to stay
+            spread = task.rng.uniform(0.0, LOOSE_SPREAD, len(order))
+            order = order[np.argsort(rest.height[order] + spread, kind="stable")]
+        for n in order[:SETTLED_TRIES]:
+            if not task.budget.spend():
+                return False
+            pos = origin(shape, int(rest.row[n]), int(rest.col[n]), float(rest.height[n]) + LIFT)
+            reason = self._let_go(task, pos, quat, area, support)
+            if not reason:
+                return True
+            task.rejected[reason] += 1
+            self.query.load(task.before)
+        return False
+
+    def _candidates(self, task: _Task, shape: Footprint, area: Area, support: str) -> Rest:
+        """Candidates that pass the tests on columns; first of a few cells drawn at random, else of many."""
+        cells = Window.around(area.low, area.high)
+        rows, cols = shape.underside.shape
+        window = Window(cells.row + shape.row, cells.col + shape.col, cells.rows + rows, cells.cols + cols)
+        level = self.query.level(window, area.height, without=(task.object_index,))
+        every = np.arange(cells.rows * cells.cols)
+        if area.allowed is not None:
+            every = every[area.allowed(cells.row + every // cells.cols, cells.col + every % cells.cols)]
+        many = MANY_CELLS // max(int(shape.covered.sum()), 1)
+        if len(every) > many:
+            every = task.rng.choice(every, many, replace=False)
+        some = every if len(every) <= RANDOM_CELLS else task.rng.choice(every, RANDOM_CELLS, replace=False)
+        rest, good = _none(), np.zeros(0, bool)
+        for chosen in (some, every):
+            row, col = cells.row + chosen // cells.cols, cells.col + chosen % cells.cols
+            rest = rest_at(level, shape, row, col, area.supports)
+            good = {"full": rest.full, "balanced": rest.balanced, "loose": rest.clear}[support]
+            if support == "loose" and not area.loose:
+                good = rest.balanced
+            if good.any() or len(chosen) == len(every):
+                break
+        if not good.any():
+            if not len(rest.row) or not np.isin(level.owner, area.supports).any():
+                task.rejected["no surface"] += 1
+            elif not rest.clear.any():
+                task.rejected["no room"] += 1
+            else:
+                task.rejected["not supported"] += 1
+        return Rest(*(getattr(rest, f.name)[good] for f in dataclasses.fields(Rest)))
+
+    def _let_go(self, task: _Task, pos: np.ndarray, quat: np.ndarray, area: Area, support: str) -> str:
+        """Puts the object there and lets physics settle; the reason why that is no good, or ''."""
+        query, placed = self.query, task.object_index
+        com = np.array(query.view.object_com[0])
+        on_top_of_it = np.array(query.view.touching[0, placed])  # what lies on it may fall when it is taken away
+        query.place(placed, pos, quat)
+        if area.push_towards >= 0:
+            pos = self._pushed(placed, pos, quat, area.push_towards)
+        for _ in range(LIFTS):
+            deep = query.penetration(placed)
+            if deep <= PENETRATION:
+                break
+            pos = pos + np.array([0.0, 0.0, deep])
+            query.place(placed, pos, quat)
+        else:
+            return "collides"
+        loose = support == "loose" and area.loose
+        if area.holds_at_once and not loose and not task.truth():
+            return "predicate false"
+        start = np.array(query.view.object_com[0, placed])
+        asleep = query.settle()
+        now = np.asarray(query.view.object_com[0])
+        moved = now[placed] - start
+        if not loose and (np.linalg.norm(moved[:2]) > SLIPPED[0] or moved[2] < -SLIPPED[1]):
+            return "fell"
+        others = np.linalg.norm(now - com, axis=1) > MOVED
+        others[placed] = False
+        if (others & ~on_top_of_it).any():
+            return "moves others"
+        if not asleep:
+            return "not at rest"
+        if query.penetration(placed) > RESTING_PENETRATION:
+            return "stands in something"
+        if not task.truth():
+            return "predicate false"
+        return ""
+
+    def _pushed(self, object_index: int, pos: np.ndarray, quat: np.ndarray, other: int) -> Float[np.ndarray, "3"]:
+        """The position after the object has been pushed level against another one, until they all but touch."""
+        for _ in range(PUSHES):
+            distance, towards = self.query.clearance(object_index, other)
+            level = np.array([*towards[:2], 0.0])
+            if distance <= TOUCHING or np.linalg.norm(level) < 1e-6:
+                break
+            pos = pos + level / np.linalg.norm(level) * (distance - TOUCHING / 2)
+            self.query.place(object_index, pos, quat)
+        return pos
+
+    def _orientation(self, object_index: int, rng: np.random.Generator) -> Float[np.ndarray, "4"]:
+        """A stable orientation drawn by its probability, turned about the vertical by any angle."""
+        quats, prob = self._orientations[object_index]
+        if quats is None:
+            quat = np.array(self.query.view.object_quat[0, object_index], float)
+        else:
+            quat = quats[rng.choice(len(prob), p=prob)]
+        half = rng.uniform(-np.pi, np.pi) / 2
+        w, x, y, z = quat
+        c, s = np.cos(half), np.sin(half)
+        turned = np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])
+        return turned / np.linalg.norm(turned)
+
+
+def _orientations(entries: Sequence) -> tuple[np.ndarray | None, np.ndarray]:
+    if not entries:
+        return None, np.zeros(0)
+    prob = np.array([e.prob for e in entries], float)
+    return np.array([e.quat for e in entries], float), prob / prob.sum()
+
+
+def _none() -> Rest:
+    empty, flags = np.zeros(0, int), np.zeros(0, bool)
+    return Rest(empty, empty, np.zeros(0), flags, flags, flags)

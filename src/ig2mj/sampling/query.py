@@ -1,0 +1,179 @@
+"""`SceneQuery`: questions about one scene that need physics or collision geometry, answered by the native engine.
+
+Where are surfaces (`level`), how deep would objects stand in others (`penetration`), where does everything come to
+rest (`settle`)? Samplers ask; nothing above this package touches MuJoCo's data for them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Collection
+
+import mujoco
+import numpy as np
+from jaxtyping import Bool, Float
+
+from ig2mj.engine.base import Snapshot, Write
+from ig2mj.engine.native.engine import NativeEngine, NativePhysics
+from ig2mj.engine.view import PhysicsView
+from ig2mj.sampling.columns import ColumnMap, Level, Window
+from ig2mj.sampling.footprint import Footprint, footprint
+from ig2mj.sampling.overlap import Overlaps
+from ig2mj.scene.scene import Scene
+
+SETTLE_SECONDS = 3.0
+"""Simulated seconds within which what was placed must come to rest."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Ray:
+    """Where a ray first meets collision geometry.
+
+    Attributes:
+      distance: metres, inf where it meets nothing. object: its number, -1 for none. normal: of the surface, in
+        the world frame.
+    """
+
+    distance: float
+    object: int
+    normal: Float[np.ndarray, "3"]
+
+
+class SceneQuery:
+    """One world of a scene on the native engine, for samplers.
+
+    Attributes:
+      scene: what is sampled in. engine, physics: the world, in which everything that is not being placed may sleep.
+    """
+
+    def __init__(self, scene: Scene, engine: NativeEngine | None = None, physics: NativePhysics | None = None):
+        """Makes a world at the scene's start, or takes over world 0 of an engine."""
+        self.scene = scene
+        self.engine = engine if engine is not None else NativeEngine(scene)
+        self.physics = physics if physics is not None else self.engine.reset()
+        tables = scene.tables
+        self._map = ColumnMap(tables)
+        self._geom_object = np.asarray(tables.geom_object)
+        self._mass = _object_masses(scene)
+        self._overlaps = Overlaps(scene)
+
+    @property
+    def view(self) -> PhysicsView:
+        """The view of the present state; world axis of length 1."""
+        return self.engine.view(self.physics)
+
+    @property
+    def _data(self) -> mujoco.MjData:
+        return self.engine.to_mujoco(self.physics, 0)[1]
+
+    def save(self) -> Snapshot:
+        """The present state."""
+        return self.engine.export(self.physics, 0)
+
+    def load(self, snapshot: Snapshot) -> None:
+        """Goes back to a state that `save` gave."""
+        self.physics = self.engine.load(self.physics, snapshot)
+
+    def level(self, window: Window, height: float, without: Collection[int] = ()) -> Level:
+        """What a window of vertical columns looks like from a height; see `ColumnMap.level`."""
+        self._update_map()
+        return self._map.level(window, height, without)
+
+    def box(self, object_index: int) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+        """World box of an object's collision geometry, low and high corner, metres."""
+        self._update_map()
+        return self._map.box(object_index)
+
+    def _update_map(self) -> None:
+        data = self._data
+        self._map.update(np.array(data.xpos), np.array(data.xmat).reshape(-1, 3, 3))
+
+    def footprint(self, object_index: int, quat: Float[np.ndarray, "4"], shift: Float[np.ndarray, "2"]) -> Footprint:
+        """An object's footprint with its main body turned to `quat` (w-x-y-z), and its joints as they are."""
+        tables, data = self.scene.tables, self._data
+        root = int(tables.object_root[object_index])
+        pieces = np.flatnonzero(tables.piece_object == object_index)
+        geoms = tables.piece_geom[pieces]
+        back = np.array(data.xmat[root]).reshape(3, 3)
+        pos = (np.array(data.geom_xpos[geoms]) - data.xpos[root]) @ back
+        turn = back.T @ np.array(data.geom_xmat[geoms]).reshape(-1, 3, 3)
+        bodies, mass = self._mass[object_index]
+        centre = (mass @ np.array(data.xipos[bodies]) / mass.sum() - data.xpos[root]) @ back
+        rotation = np.zeros(9)
+        mujoco.mju_quat2Mat(rotation, np.asarray(quat, float))
+        return footprint(tables, object_index, pos, turn, centre, rotation.reshape(3, 3), shift)
+
+    def place(self, object_index: int, pos: Float[np.ndarray, "3"], quat: Float[np.ndarray, "4"]) -> None:
+        """Puts an object's main body somewhere (world frame, w-x-y-z), at rest and awake."""
+        count = self.scene.tables.num_objects
+        mask = np.zeros((1, count), bool)
+        positions, turns = np.zeros((1, count, 3)), np.zeros((1, count, 4))
+        mask[0, object_index], positions[0, object_index], turns[0, object_index] = True, pos, quat
+        self.write(Write(object_mask=mask, object_pos=positions, object_quat=turns))
+
+    def write(self, write: Write) -> None:
+        """Changes the world; see `ig2mj.engine.base.Write`."""
+        self.physics = self.engine.write(self.physics, write)
+
+    def penetration(self, object_index: int) -> float:
+        """How deep an awake object stands in anything that is no part of it, metres; 0 where it does not."""
+        contact = self._data.contact
+        if not len(contact.dist):
+            return 0.0
+        owner = self._geom_object[contact.geom]
+        mine = (owner == object_index).any(1) & (owner[:, 0] != owner[:, 1])
+        return float(max(0.0, -contact.dist[mine].min(initial=0.0)))
+
+    def penetrations(self) -> Float[np.ndarray, "O"]:
+        """How deep each object stands in anything that is no part of it, metres, whether it sleeps or not."""
+        return self._overlaps.deepest(np.array(self._data.qpos))
+
+    def clearance(self, object_index: int, other: int, farthest: float = 1.0) -> tuple[float, Float[np.ndarray, "3"]]:
+        """Distance of two objects' collision geometry, metres, and the vector from the first to the second.
+
+        Args:
+          farthest: what is farther apart is not measured: this distance and a zero vector are the answer.
+        """
+        model, data = self.engine.to_mujoco(self.physics, 0)
+        tables = self.scene.tables
+        best, vector = farthest, np.zeros(3)
+        between = np.zeros(6)
+        for one in tables.piece_geom[tables.piece_object == object_index]:
+            for two in tables.piece_geom[tables.piece_object == other]:
+                distance = mujoco.mj_geomDistance(model, data, int(one), int(two), best, between)
+                if distance < best:
+                    best, vector = float(distance), between[3:] - between[:3]
+        return best, vector
+
+    def touched_by(self, object_index: int) -> Bool[np.ndarray, "O"]:
+        """Objects that an object touches now."""
+        return np.asarray(self.view.touching)[0, object_index]
+
+    def settle(self, seconds: float = SETTLE_SECONDS) -> bool:
+        """Steps until everything sleeps, or for some simulated time; whether everything sleeps."""
+        view = self.view
+        for _ in range(round(seconds / (self.engine.substeps * self.engine.timestep))):
+            self.physics, view = self.engine.step(self.physics)
+            if not np.asarray(view.awake).any():
+                return True
+        return not np.asarray(view.awake).any()
+
+    def ray(self, start: Float[np.ndarray, "3"], direction: Float[np.ndarray, "3"]) -> Ray:
+        """The first collision geometry that a ray meets."""
+        model, data = self.engine.to_mujoco(self.physics, 0)
+        geom, normal = np.array([-1], np.int32), np.zeros(3)
+        groups = np.array([0, 0, 0, 1, 0, 0], np.uint8)
+        distance = mujoco.mj_ray(model, data, start, direction, groups, 1, -1, geom, normal)
+        if geom[0] < 0:
+            return Ray(float("inf"), -1, normal)
+        return Ray(float(distance), int(self._geom_object[geom[0]]), normal)
+
+
+def _object_masses(scene: Scene) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Bodies of each object, and their masses."""
+    body_object, mass = scene.tables.body_object, np.asarray(scene.model.body_mass)
+    found = []
+    for o in range(scene.tables.num_objects):
+        bodies = np.flatnonzero(body_object == o)
+        found.append((bodies, np.maximum(mass[bodies], 1e-9)))
+    return found

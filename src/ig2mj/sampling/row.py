@@ -1,0 +1,187 @@
+"""One initial state that fulfils a set of conditions: objects are placed one after another, with backtracking.
+
+Joints first, then placements from supports to what they bear, then states that need no place. What is settled is kept;
+where an object finds no place, the one before it is placed anew. At the end everything is checked together: all
+conditions hold, everything sleeps, nothing stands in anything.
+"""
+
+from __future__ import annotations
+
+import collections
+import dataclasses
+from collections.abc import Sequence
+
+import jax
+import numpy as np
+
+from ig2mj.engine.base import Snapshot, Write
+from ig2mj.errors import StateError
+from ig2mj.predicates.literals import object_index, room_index
+from ig2mj.sampling.conditions import Condition, order
+from ig2mj.sampling.placement import RESTING_PENETRATION, Areas, Budget, Placer, Rejections
+from ig2mj.sampling.query import SceneQuery
+from ig2mj.sampling.rules import PLACEMENTS, elsewhere
+from ig2mj.sampling.setters import Change, set_by_name
+from ig2mj.sampling.truths import Truths
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import ExtendedStates, Swap
+
+SHARE = 3
+"""An object may use up one part in so many of what is left of the row's budget before the one before it is moved."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Row:
+    """A sampled state of one world: physics without the world axis, extended states with one of length 1."""
+
+    physics: Snapshot
+    states: ExtendedStates
+
+
+class RowSampler:
+    """Samples rows of one scene."""
+
+    def __init__(self, query: SceneQuery, model: StateModel, states: ExtendedStates):
+        """Binds a world at rest: rows begin there.
+
+        Args:
+          query: its present state is the start of every row. states: those of the start.
+        """
+        self.query, self.model, self._initial = query, model, states
+        self._start = query.save()
+        self._placer = Placer(query)
+        self._truths: dict[tuple[Condition, ...], Truths] = {}
+
+    def sample(
+        self, conditions: Sequence[Condition], rng: np.random.Generator, budget: Budget, rejected: Rejections
+    ) -> Row | None:
+        """A row, or None where the budget did not suffice; the world is left in it.
+
+        Args:
+          conditions: of objects' names (see `conditions.bind`). rejected: counts of reasons are added to it.
+
+        Raises:
+          StateError, AbilityError, UnknownNameError: a condition that can never be made true.
+        """
+        plan = order(conditions)
+        self._truth = self._truths_of(tuple(conditions))
+        self.query.load(self._start)
+        self._states = self._initial
+        for condition in plan.joints:
+            self._set(condition, rng)
+        if plan.joints:
+            self.query.settle()
+        if not self._place_all(plan.placements, rng, budget, rejected):
+            return None
+        for condition in plan.states:
+            self._set(condition, rng)
+        if any(c.predicate == "sliced" for c in plan.states):
+            self.query.settle()
+        problem = self._problem(conditions, [name for name, _ in plan.placements])
+        if problem:
+            rejected[problem] += 1
+            return None
+        return Row(self.query.save(), self._states)
+
+    def _truths_of(self, conditions: tuple[Condition, ...]) -> Truths:
+        if conditions not in self._truths:
+            if len(self._truths) >= 64:
+                self._truths.clear()
+            self._truths[conditions] = Truths(self.model, conditions)
+        return self._truths[conditions]
+
+    def _place_all(
+        self,
+        placements: Sequence[tuple[str, tuple[Condition, ...]]],
+        rng: np.random.Generator,
+        budget: Budget,
+        rejected: Rejections,
+    ) -> bool:
+        """Places every object; where one finds no place, goes back to the one before."""
+        before: list[Snapshot] = []
+        k = 0
+        while k < len(placements):
+            if budget.spent():
+                return False
+            name, wanted = placements[k]
+            before.append(self.query.save())
+            part = budget if len(placements) == 1 else budget.part(SHARE)
+            left = part.work
+            reasons: Rejections = collections.Counter()
+            placed = self._place(name, wanted, rng, part, reasons)
+            if part is not budget:
+                budget.work -= left - part.work + 1
+            if placed:
+                k += 1
+            else:
+                for reason, count in reasons.items():
+                    rejected[f"{name}: {reason}"] += count
+                back = max(k - 1, 0)
+                self.query.load(before[back])
+                del before[back:]
+                if k == 0 and not reasons:
+                    return False
+                k = back
+        return True
+
+    def _place(
+        self, name: str, wanted: tuple[Condition, ...], rng: np.random.Generator, budget: Budget, rejected: Rejections
+    ) -> bool:
+        """Places one object, if it is not where it shall be already and negations are all that is asked."""
+        index = object_index(self.model, name)
+        rule = wanted[0]
+        if self.model.tables.object_fixed[index]:
+            if self._holds(wanted):
+                return True
+            raise StateError(f"'{name}' is fixed: it cannot be moved so that {rule} becomes true")
+        if not rule.value and self._holds(wanted):
+            return True
+        return self._placer.place(index, self._areas(index, rule), lambda: self._holds(wanted), rng, budget, rejected)
+
+    def _areas(self, index: int, rule: Condition) -> Areas:
+        if rule.predicate == "on_floor":
+            second = room_index(self.model, rule.arguments[1])
+        else:
+            second = object_index(self.model, rule.arguments[1])
+        return (PLACEMENTS[rule.predicate] if rule.value else elsewhere.areas)(self.query, index, second)
+
+    def _holds(self, conditions: Sequence[Condition]) -> bool:
+        return self._truth.hold(conditions, self._states, self.query.view)
+
+    def _set(self, condition: Condition, rng: np.random.Generator) -> None:
+        key = jax.random.key(int(rng.integers(2**31)))
+        (name,) = condition.arguments
+        change = set_by_name(self.model, self._states, self.query.view, condition.predicate, name, condition.value, key)
+        self._states = change.states
+        self._apply(change)
+
+    def _apply(self, change: Change) -> None:
+        """What physics has to follow with: halves that take the whole's place, joints."""
+        query, tables = self.query, self.model.tables
+        if change.swap is not None:
+            query.write(_teleports(self.model.swap_objects, change.swap, tables.num_objects))
+        if change.joints is not None:
+            positions, moves = change.joints
+            width = query.scene.model.nq
+            mask, qpos = np.zeros((1, width), bool), np.zeros((1, width))
+            mask[:, tables.openable_qposadr], qpos[:, tables.openable_qposadr] = moves, positions
+            query.write(Write(qpos_mask=mask, qpos=qpos))
+
+    def _problem(self, conditions: Sequence[Condition], placed: Sequence[str]) -> str:
+        """Why the finished row is no good, or ''."""
+        if not self._holds(conditions):
+            return "predicate false at the end"
+        if np.asarray(self.query.view.awake).any() and not self.query.settle():
+            return "not at rest at the end"
+        if not self._holds(conditions):
+            return "predicate false at the end"
+        deepest = self.query.penetrations()
+        if any(deepest[object_index(self.model, name)] > RESTING_PENETRATION for name in placed):
+            return "stands in something at the end"
+        return ""
+
+
+def _teleports(objects: np.ndarray, swap: Swap, count: int) -> Write:
+    mask, pos, quat = np.zeros((1, count), bool), np.zeros((1, count, 3)), np.zeros((1, count, 4))
+    mask[:, objects], pos[:, objects], quat[:, objects] = swap.mask, swap.pos, swap.quat
+    return Write(object_mask=mask, object_pos=pos, object_quat=quat)

@@ -1,0 +1,33 @@
+"""Inside(a, b): the surfaces that are met going down from points inside b's box (paper, pose sampling algorithm)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ig2mj.sampling.footprint import Footprint
+from ig2mj.sampling.placement import Area, Areas
+from ig2mj.sampling.query import SceneQuery
+
+HEIGHTS = 6
+"""Heights that are tried for one orientation, spread evenly over b's box: every shelf and drawer is a level."""
+
+
+def areas(query: SceneQuery, _: int, container: int) -> Areas:
+    """The rule for putting something into `container`."""
+
+    def inside(shape: Footprint, rng: np.random.Generator) -> Iterator[Area]:
+        low, high = query.box(container)
+        layer = (np.arange(HEIGHTS) + rng.uniform(size=HEIGHTS)) / HEIGHTS
+        for part in rng.permutation(layer):
+            yield Area(
+                low[:2],
+                high[:2],
+                float(low[2] + part * (high[2] - low[2])),
+                (container,),
+                loose=True,
+                holds_at_once=True,
+            )
+
+    return inside
