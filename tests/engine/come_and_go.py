@@ -39,7 +39,8 @@ def main() -> None:
         for _ in range(3):
             physics, view = step(physics)
         speed = float(np.abs(np.asarray(physics.data.qvel)).max())
-        assert np.isfinite(speed) and np.isfinite(np.asarray(view.object_pos)).all()
+        assert speed < 5.0, "everything rests"
+        assert np.isfinite(np.asarray(view.object_pos)).all()
         used = (jax.devices()[0].memory_stats() or {}).get("bytes_in_use", 0)
         print(engine.num_worlds, round(speed, 3), used, flush=True)
         del engine, step, physics, view

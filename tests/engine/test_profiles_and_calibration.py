@@ -17,7 +17,15 @@ from ig2mj.calibration.reach import find_reach
 from ig2mj.engine.health import Overflow
 from ig2mj.engine.warp.buffer_sizes import ALIGN
 from ig2mj.engine.warp.engine import WarpEngine
-from ig2mj.engine.warp.profile import PROFILE_FILE, EngineProfile, default_profile, fit, load_profile, save_profile
+from ig2mj.engine.warp.profile import (
+    PROFILE_FILE,
+    EngineProfile,
+    default_profile,
+    fit,
+    holds_everything,
+    load_profile,
+    save_profile,
+)
 from ig2mj.errors import EngineError, InputError
 from ig2mj.scene import manifest as mf
 
@@ -34,6 +42,15 @@ def test_without_a_file_everything_fits(tiny_home, tmp_path):
     assert profile == default_profile(tiny_home.model)
     assert profile.awake_dofs == tiny_home.model.nv
     assert profile.constraints > 4 * profile.contacts >= 4 * 64
+
+
+def test_measured_buffers_do_not_hold_a_scene_before_it_has_come_to_rest(tiny_home):
+    """Then worlds start settled; small_home started in nine worlds with contacts lost, and things flew off."""
+    widest = default_profile(tiny_home.model)
+    assert holds_everything(widest, tiny_home.model)
+    for name in ("awake_dofs", "constraints", "contacts", "convex_contacts"):
+        less = msgspec.structs.replace(widest, **{name: getattr(widest, name) - 1})
+        assert not holds_everything(less, tiny_home.model)
 
 
 def test_no_more_can_be_awake_than_there_is(tiny_home):

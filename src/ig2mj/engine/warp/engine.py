@@ -21,7 +21,7 @@ from ig2mj.engine.mjx.engine import MjxEngine, MjxPhysics
 from ig2mj.engine.native.settle import settle
 from ig2mj.engine.view import Array
 from ig2mj.engine.warp import patches
-from ig2mj.engine.warp.profile import EngineProfile, fit, load_profile
+from ig2mj.engine.warp.profile import EngineProfile, fit, holds_everything, load_profile
 from ig2mj.process import prepare_warp
 from ig2mj.scene.scene import Scene
 
@@ -66,7 +66,7 @@ class WarpEngine(MjxEngine):
         self._iterations = iterations or int(scene.model.opt.iterations)
         self._ls_iterations = ls_iterations or int(scene.model.opt.ls_iterations)
         self._worlds_of_buffers = num_worlds
-        if initial is None and self.profile.awake_dofs < scene.model.nv:
+        if initial is None and not holds_everything(self.profile, scene.model):
             initial = settle(scene)
         super().__init__(scene, num_worlds, initial=initial, **options)
 

@@ -66,6 +66,13 @@ def default_profile(model: mujoco.MjModel) -> EngineProfile:
     )
 
 
+def holds_everything(profile: EngineProfile, model: mujoco.MjModel) -> bool:
+    """Whether buffers of this size hold a scene with everything awake, as it is before it has come to rest."""
+    widest = default_profile(model)
+    names = ("awake_dofs", "constraints", "contacts", "convex_contacts")
+    return all(getattr(profile, name) >= getattr(widest, name) for name in names)
+
+
 def load_profile(folder: str | os.PathLike, model: mujoco.MjModel) -> EngineProfile:
     """The profile beside a scene's manifest, or the safe default where there is none.
 
