@@ -6,7 +6,7 @@ import pathlib
 
 import mujoco
 
-from ig2mj.errors import InputError
+from ig2mj.errors import InputError, without_lines
 
 
 def write_model(spec: mujoco.MjSpec, file: pathlib.Path) -> mujoco.MjModel:
@@ -20,4 +20,4 @@ def write_model(spec: mujoco.MjSpec, file: pathlib.Path) -> mujoco.MjModel:
         file.write_text(spec.to_xml(), encoding="utf-8")
         return mujoco.MjModel.from_xml_path(str(file))
     except (ValueError, mujoco.FatalError) as e:
-        raise InputError(spec.modelname, f"does not compile: {' '.join(str(e).split())}") from e
+        raise InputError(spec.modelname, f"does not compile: {without_lines(e)}") from e

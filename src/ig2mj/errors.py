@@ -7,6 +7,7 @@ The command line prints that line and exits with status 2.
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 
 
@@ -42,6 +43,11 @@ def _rebuild_input_error(kind: type[InputError], fields: dict[str, str]) -> Inpu
 
 class ManifestError(InputError):
     """A scene's manifest.json does not fit its schema or its scene.xml."""
+
+
+def without_lines(message: object) -> str:
+    """A compiler's message without line numbers, for a text that ig2mj generated: the user has no such lines."""
+    return re.sub(r",? line -?\d+", "", " ".join(str(message).split()))
 
 
 class UnknownNameError(Ig2mjError):

@@ -7,6 +7,9 @@ import itertools
 import mujoco
 import numpy as np
 import pytest
+from ig2mj_converters.mjcf.file import write_model
+
+from ig2mj.errors import InputError
 
 
 def test_no_self_collision_inside_an_object_section_0_fact_7(house):
@@ -165,3 +168,11 @@ def test_equal_models_share_their_meshes(task_house):
     m = task_house.model
     meshes = [m.geom_dataid[g] for part in ("apple_7_part_0", "apple_7_part_1") for g in task_house.geoms(part)]
     assert len(set(meshes)) == 1
+
+
+def test_an_error_of_a_written_model_names_the_element_and_no_line_of_the_generated_file(tmp_path):
+    spec = mujoco.MjSpec.from_string('<mujoco model="cup">\n<worldbody/>\n</mujoco>')
+    spec.worldbody.add_geom(name="cup/collision_0", type=mujoco.mjtGeom.mjGEOM_BOX, size=[0, 0, 0])
+    with pytest.raises(InputError, match=r"cup: does not compile: .*cup/collision_0") as error:
+        write_model(spec, tmp_path / "scene.xml")
+    assert "line" not in str(error.value)

@@ -148,6 +148,21 @@ def test_files_that_are_missing_or_broken_are_named(tmp_path):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize(("objects", "tells_line"), [((), True), (("apple",), False)])
+def test_an_error_names_a_line_only_where_it_is_one_of_the_users_file(tmp_path, objects, tells_line):
+    """With added objects MuJoCo reads a text made from several files, whose lines are nobody's."""
+    homes.write_tiny_home(tmp_path)
+    lines = (tmp_path / "scene.xml").read_text().splitlines()
+    number = next(n for n, line in enumerate(lines) if '<geom name="box/collision_0"' in line)
+    lines[number] = lines[number].replace('<geom name="box/collision_0"', '<geom name="box/collision_0" mass="-1"')
+    (tmp_path / "scene.xml").write_text("\n".join(lines))
+    with pytest.raises(InputError, match="box/collision_0") as error:
+        ig2mj.load_scene(tmp_path, objects=objects)
+    assert str(error.value).startswith(f"{tmp_path / 'scene.xml'}: MuJoCo cannot load it")
+    assert (f"line {number + 1}" in str(error.value)) == tells_line
+    assert (", line " in str(error.value)) == tells_line
+
+
 def test_rooms_named_by_the_manifest_must_be_on_the_map(tmp_path):
     homes.write_tiny_home(tmp_path)
     manifest = homes.home_manifest()

@@ -11,7 +11,7 @@ from typing import Protocol, runtime_checkable
 
 import mujoco
 
-from ig2mj.errors import InputError, UnknownNameError
+from ig2mj.errors import InputError, UnknownNameError, without_lines
 from ig2mj.scene.additions import Addition, add_objects
 from ig2mj.scene.build_tables import build_tables
 from ig2mj.scene.manifest import AgentEntry, Manifest, ObjectEntry, load_manifest
@@ -123,7 +123,7 @@ def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: S
         spec = spec or read_spec(file)
         manifest = copy.copy(manifest)
         manifest.agents = [*manifest.agents, *(_attach(agent, spec) for agent in agents)]
-    model = _compile(spec, file)
+    model = _compile(spec, file, generated=bool(objects))
     rooms = load_rooms(folder / manifest.rooms.file) if manifest.rooms.file else None
     tables = build_tables(model, manifest, rooms, folder / MANIFEST_FILE)
     return Scene(folder, manifest, model, tables, rooms, tuple(agents), tuple(additions))
@@ -145,15 +145,15 @@ def _spec_from_text(text: str, file: pathlib.Path) -> mujoco.MjSpec:
     try:
         return mujoco.MjSpec.from_string(text)
     except ValueError as e:
-        raise _not_mjcf(file, e) from e
+        raise _not_mjcf(file, without_lines(e)) from e
 
 
-def _compile(spec: mujoco.MjSpec | None, file: pathlib.Path) -> mujoco.MjModel:
+def _compile(spec: mujoco.MjSpec | None, file: pathlib.Path, generated: bool) -> mujoco.MjModel:
     try:
         return mujoco.MjModel.from_xml_path(str(file)) if spec is None else spec.compile()
     except (ValueError, OSError) as e:
-        raise _not_mjcf(file, e) from e
+        raise _not_mjcf(file, without_lines(e) if generated else e) from e
 
 
-def _not_mjcf(file: pathlib.Path, e: Exception) -> InputError:
+def _not_mjcf(file: pathlib.Path, e: Exception | str) -> InputError:
     return InputError(file, f"MuJoCo cannot load it: {e}", mend="convert the scene again")
