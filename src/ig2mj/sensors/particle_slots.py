@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import quat_to_matrix
 from ig2mj.sensors.render_model import NOWHERE
+from ig2mj.sensors.tints import DUST_COLOUR, STAIN_COLOUR, WATER_COLOUR
 from ig2mj.states.definitions.water import DROP_RADIUS, NUM_DROPS
 from ig2mj.states.model import StateModel
 from ig2mj.states.particles import (
@@ -24,11 +25,6 @@ from ig2mj.states.particles import (
     world_positions,
 )
 from ig2mj.states.world import ExtendedStates
-
-DUST_COLOUR = (0.55, 0.52, 0.47)
-STAIN_COLOUR = (0.30, 0.16, 0.07)
-WATER_COLOUR = (0.35, 0.60, 0.90)
-"""rgb 0..1."""
 
 
 @struct.dataclass

@@ -1,7 +1,8 @@
-"""How objects look in their states: frozen, burnt, cooked, soaked or switched on (spec/states.md section 13).
+"""The colours of states: of objects that are frozen, burnt, cooked, soaked or switched on (spec/states.md section 13),
+and of dust, stains and water. Their one home; cameras and viewers take them from here.
 
 Of the states that are true the first of `TINTS` is shown. iGibson mixes the state's colour into the object's texture;
-here it is mixed into the object's colour, per world. Shared by cameras and viewers.
+here it is mixed into the object's colour, per world.
 
 Axes: W worlds, O objects, G geoms.
 """
@@ -44,6 +45,13 @@ TINTS = (
 )
 """Highest priority first (spec/states.md section 13)."""
 
+DUST_COLOUR = (0.55, 0.52, 0.47)
+STAIN_COLOUR = (0.30, 0.16, 0.07)
+WATER_COLOUR = (0.35, 0.60, 0.90)
+"""rgb 0..1, of particles and drops."""
+
+WATER_ALPHA = 0.7
+"""Drops are a little transparent in viewers; cameras draw them opaque."""
 
 UNTINTED = -1
 """Where no state shows."""

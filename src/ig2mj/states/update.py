@@ -50,6 +50,9 @@ HEAT: tuple[StateSpec, ...] = (
 )
 """The second part of a step."""
 
+HEAT_FIELDS = tuple(name for spec in HEAT for name in spec.fields)
+"""What the second part changes."""
+
 
 def queries(model: StateModel) -> list[Query]:
     """The relations between objects that an update needs."""

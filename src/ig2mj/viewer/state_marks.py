@@ -16,16 +16,21 @@ from jaxtyping import Float, Int
 
 from ig2mj.engine.view import PhysicsView
 from ig2mj.scene.tables import SceneTables
-from ig2mj.sensors.particle_slots import DUST_COLOUR, STAIN_COLOUR, WATER_COLOUR
 from ig2mj.sensors.render_model import mean_colours
-from ig2mj.sensors.tints import UNTINTED, tinted, tints, tints_of_geoms
+from ig2mj.sensors.tints import (
+    DUST_COLOUR,
+    STAIN_COLOUR,
+    UNTINTED,
+    WATER_ALPHA,
+    WATER_COLOUR,
+    tinted,
+    tints,
+    tints_of_geoms,
+)
 from ig2mj.states import particles
 from ig2mj.states.definitions.water import DROP_RADIUS
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
-
-WATER_ALPHA = 0.7
-"""Drops are a little transparent."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 from ig2mj.engine.view import PhysicsView
 from ig2mj.scene.scene import Scene
 from ig2mj.sensors.tints import TINTS, UNTINTED
+from ig2mj.states.definitions.temperature import AMBIENT_TEMPERATURE
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 from ig2mj.viewer.overlays import Label
@@ -77,7 +78,7 @@ def describe(model: StateModel, states: ExtendedStates, world: int = 0) -> dict[
         dirt[name] = dict(zip(of.tolist(), alive.tolist(), strict=True))
     for o in range(model.tables.num_objects):
         words = []
-        if p.thermal[o] and abs(host["temperature"][o] - 23.0) > CHANGED_BY:
+        if p.thermal[o] and abs(host["temperature"][o] - AMBIENT_TEMPERATURE) > CHANGED_BY:
             words.append(f"{host['temperature'][o]:.0f} C")
         if tint[o] != UNTINTED:
             words.append(TINTS[tint[o]].predicate.name.replace("_", " "))
