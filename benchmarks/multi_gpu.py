@@ -19,16 +19,15 @@ from batch_case import Case
 
 from ig2mj.calibration.pushing import push, start_pushing
 from ig2mj.engine.warp.engine import WarpEngine
-from ig2mj.worlds.batch import Worlds
-from ig2mj.worlds.sharding import ShardedWorlds
+from ig2mj.worlds import Core, Rules, ShardedWorlds
 
 STEPS = 30
 
 
-def make(case: Case, num_worlds: int) -> Worlds:
+def make(case: Case, num_worlds: int) -> Core:
     start = jax.tree.map(lambda a: a[0], case.pool.physics)
     engine = WarpEngine(case.scene, num_worlds, profile=case.profile.for_worlds(num_worlds), initial=start)
-    return Worlds(engine, case.model, case.pool, case.goal)
+    return Core(engine, Rules(case.model, case.goal), case.pool)
 
 
 def shared(case: Case, num_worlds: int, devices: list) -> ShardedWorlds:

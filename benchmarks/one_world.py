@@ -8,14 +8,13 @@ import jax
 import mujoco
 import numpy as np
 
-from ig2mj.engine.base import Write
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.view import PhysicsView
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus
-from ig2mj.predicates.stepper import StateProgram, StateStepper
 from ig2mj.scene.scene import Scene
-from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
+from ig2mj.worlds.core import Core
+from ig2mj.worlds.rules import Rules
 
 
 class OneWorld:
@@ -30,17 +29,14 @@ class OneWorld:
         self.engine = NativeEngine(scene, 1)
         self.physics: Any = self.engine.reset()
         self.view: PhysicsView = self.engine.view(self.physics)
-        self._stepper = StateStepper(StateProgram(model, goal))
-        self.states = initial_states(model, 1)
-        self.status: GoalStatus | None = None
+        rules = Rules(model, goal)
+        self._advance, self.states = Core(self.engine, rules).advance, rules.initial
+        self.status = GoalStatus.empty(1)
 
     def step(self, ctrl: np.ndarray | None = None) -> None:
         """Physics, view, states and goal; ctrl [nu]. Waits for the results, as a user of one world does."""
-        self.engine_step(ctrl)
-        before = self.states
-        self.states, swap, self.status = self._stepper.step(before, self.view)
-        if swap is not None:
-            self._teleport(swap)
+        before, row = self.states, None if ctrl is None else ctrl[None]
+        self.physics, self.view, self.states, self.status = self._advance(self.physics, before, row)
         if self.states is not before:
             jax.block_until_ready((self.states.temperature, self.status))
 
@@ -61,13 +57,6 @@ class OneWorld:
     def bare(self) -> BarePhysics:
         """MuJoCo alone, from the present state on."""
         return BarePhysics(*self.mujoco)
-
-    def _teleport(self, swap: Any) -> None:
-        objects, count = self.model.swap_objects, len(self.scene.object_names)
-        mask, pos, quat = np.zeros((1, count), bool), np.zeros((1, count, 3)), np.zeros((1, count, 4))
-        mask[:, objects], pos[:, objects], quat[:, objects] = swap.mask, swap.pos, swap.quat
-        self.physics = self.engine.write(self.physics, Write(object_mask=mask, object_pos=pos, object_quat=quat))
-        self.view = self.engine.view(self.physics)
 
 
 class BarePhysics:

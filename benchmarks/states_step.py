@@ -28,9 +28,10 @@ from stateful_home import GOAL, write_stateful_home
 import ig2mj
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.predicates import compile_expression
-from ig2mj.predicates.stepper import StateProgram, StateStepper
 from ig2mj.process import run_programs_inline
-from ig2mj.states import RelationPlan, StateModel, initial_states, queries, update
+from ig2mj.states import StateModel, initial_states
+from ig2mj.worlds.lazy.stepper import StateStepper
+from ig2mj.worlds.rules import Rules
 
 SETTLE_STEPS = 200
 """Control steps given to the home to come to rest."""
@@ -76,10 +77,8 @@ def best(actions: dict[str, Callable[[], object]], seconds: float) -> list[Row]:
     return [Row(name, value) for name, value in found.items()]
 
 
-def one_world(scene: ig2mj.Scene, model: StateModel, seconds: float) -> list[Row]:
+def one_world(scene: ig2mj.Scene, rules: Rules, seconds: float) -> list[Row]:
     """Beside the native engine."""
-    goal = compile_expression(model, GOAL)
-    program = StateProgram(model, goal)
     engine = NativeEngine(scene)
     physics = engine.reset()
     for _ in range(SETTLE_STEPS):
@@ -89,7 +88,7 @@ def one_world(scene: ig2mj.Scene, model: StateModel, seconds: float) -> list[Row
     moved[1].object_com[0, loose[0]] += 1e-3  # one thing moves a millimetre, back and forth
     moved[1].body_pos[0, scene.tables.object_root[loose[0]]] += 1e-3
 
-    still, cooling, moving, beside = (Stepped(program, model) for _ in range(4))
+    still, cooling, moving, beside = (Stepped(rules) for _ in range(4))
     # Not a number never equals the one before: this world never settles, as one in which something cools.
     cooling.states = cooling.states.replace(temperature=cooling.states.temperature.at[0, loose[0]].set(jnp.nan))
 
@@ -117,30 +116,20 @@ def one_world(scene: ig2mj.Scene, model: StateModel, seconds: float) -> list[Row
 class Stepped:
     """States that go on from step to step; every step waits for its status."""
 
-    def __init__(self, program: StateProgram, model: StateModel):
-        self.stepper, self.states, self.count = StateStepper(program), initial_states(model, 1), 0
+    def __init__(self, rules: Rules):
+        self.stepper, self.states, self.count = StateStepper.of(rules, 1), rules.initial, 0
 
     def step(self, view: ig2mj.engine.view.PhysicsView) -> bool:
         self.states, _, status = self.stepper.step(self.states, view)
         self.count += 1
-        assert status is not None
         return bool(np.asarray(status.holds)[0])
 
 
-def many_worlds(scene: ig2mj.Scene, model: StateModel, worlds: int, seconds: float) -> Row:
+def many_worlds(scene: ig2mj.Scene, rules: Rules, worlds: int, seconds: float) -> Row:
     """The one function of a batch: relations, states, goal."""
-    goal = compile_expression(model, GOAL)
-    plan = RelationPlan.build(model, [*queries(model), *goal.queries])
     engine = NativeEngine(scene)
     view = jax.tree.map(lambda leaf: jnp.repeat(jnp.asarray(leaf), worlds, axis=0), engine.view(engine.reset()))
-
-    @jax.jit
-    def step(states, view):
-        relations = plan.evaluate(view)
-        states, swap = update(model, states, view, relations)
-        return states, goal.status(states, view, relations), swap
-
-    states = initial_states(model, worlds)
+    step, states = jax.jit(rules.step), initial_states(rules.model, worlds)
     (row,) = best({f"{worlds} worlds in one function": lambda: jax.block_until_ready(step(states, view))}, seconds)
     return Row(row.case, row.microseconds / worlds)
 
@@ -150,8 +139,9 @@ def main(args: Args) -> None:
     with tempfile.TemporaryDirectory() as folder:
         scene = ig2mj.load_scene(write_stateful_home(pathlib.Path(folder) / "home", args.objects))
     model = StateModel.of_manifest(scene.tables, scene.manifest)
-    rows = one_world(scene, model, args.seconds)
-    rows += [many_worlds(scene, model, count, args.seconds) for count in args.worlds]
+    rules = Rules(model, compile_expression(model, GOAL))
+    rows = one_world(scene, rules, args.seconds)
+    rows += [many_worlds(scene, rules, count, args.seconds) for count in args.worlds]
     table = Table(title=f"{args.objects} objects, goal of 10 literals, {jax.devices()[0].device_kind}")
     table.add_column("case")
     table.add_column("us per world and step", justify="right")

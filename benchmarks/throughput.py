@@ -34,7 +34,7 @@ from ig2mj.calibration.pushing import push, start_pushing
 from ig2mj.engine.health import CAPACITY, Overflow
 from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.sensors.batch_camera import BatchCamera
-from ig2mj.worlds.batch import Worlds
+from ig2mj.worlds import Core, Rules
 
 STEPS = 30
 """Control steps of one timed call."""
@@ -54,7 +54,7 @@ def run(case: Case, num_worlds: int, disturbed: bool, what: str, lock: pathlib.P
     engine = WarpEngine(
         scene, num_worlds, profile=profile, initial=jax.tree.map(lambda a: a[0], case.pool.physics), **solver
     )
-    worlds = Worlds(engine, model, case.pool, case.goal)
+    worlds = Core(engine, Rules(model, case.goal), case.pool)
     watch, seconds = Watch(engine), engine.substeps * engine.timestep
     call, carry = _program(case, worlds, watch, disturbed, what)
     before = np.array(carry[0].world.view.object_com)
@@ -101,7 +101,7 @@ def run(case: Case, num_worlds: int, disturbed: bool, what: str, lock: pathlib.P
     return row
 
 
-def _program(case: Case, worlds: Worlds, watch: Watch, disturbed: bool, what: str):
+def _program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str):
     """The jitted function of `STEPS` control steps, and the carry to begin with."""
     engine = watch.engine
     seconds = engine.substeps * engine.timestep
@@ -117,7 +117,7 @@ def _program(case: Case, worlds: Worlds, watch: Watch, disturbed: bool, what: st
     def full(carry, _):
         batch, pusher, com, palm = carry
         pusher = control(batch, pusher, com, palm)
-        batch, status = worlds.step(batch, pusher.ctrl)
+        batch, status = worlds.step_fn(batch, pusher.ctrl)
         seen = status.fraction.mean()
         view, physics = batch.world.view, batch.world.physics
         if camera is not None:

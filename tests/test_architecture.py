@@ -34,7 +34,6 @@ LAYERS = [
     "learn",
     "demos",
     "viewer",
-    "simulation_states",
     "simulation",
     "planning",
     "calibration",

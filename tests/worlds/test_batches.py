@@ -1,4 +1,4 @@
-"""`Worlds`: episodes, resets from a pool, random streams, guards (issue, items 1, 3, 4 and 5)."""
+"""`Core`: episodes, resets from a pool, random streams, guards (issue, items 1, 3, 4 and 5)."""
 
 from __future__ import annotations
 
@@ -24,10 +24,11 @@ from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.viewer.replay import Replay
 from ig2mj.worlds import guards
-from ig2mj.worlds.batch import Worlds
+from ig2mj.worlds.core import Core
 from ig2mj.worlds.debug import DebugWorlds
 from ig2mj.worlds.guards import Flag
 from ig2mj.worlds.random_streams import episode_keys, pick_rows, step_keys
+from ig2mj.worlds.rules import Rules
 
 
 @pytest.fixture(scope="module")
@@ -40,17 +41,18 @@ def model(scene) -> StateModel:
     return StateModel.of_manifest(scene.tables, scene.manifest)
 
 
-def native(scene, model, count: int, pool=None, **more) -> Worlds:
-    return Worlds(NativeEngine(scene, count, threads=1), model, pool, **more)
+def native(scene, model, count: int, pool=None, goal=None, initial=None) -> Core:
+    return Core(NativeEngine(scene, count, threads=1), Rules(model, goal, initial), pool)
 
 
 def box_x(batch, scene) -> np.ndarray:
     return np.asarray(batch.world.view.object_pos)[:, scene.object_index("box"), 0]
 
 
-def teleport(worlds: Worlds, batch, name: str, pos, world: int):
+def teleport(worlds: Core, batch, name: str, pos, world: int):
     """Puts an object somewhere in one world."""
-    engine, tables = worlds.engine, worlds.model.tables
+    engine = worlds.engine
+    tables = engine.tables
     mask = np.zeros((engine.num_worlds, tables.num_objects), bool)
     at, turn = np.zeros((*mask.shape, 3), np.float32), np.zeros((*mask.shape, 4), np.float32)
     index = tables.object_names.index(name)
@@ -129,7 +131,7 @@ def test_reset_touches_the_masked_worlds_only(scene, model, bench_pool):
 def test_without_a_pool_episodes_start_where_the_scene_does(scene, model):
     values = initial_states(model, 1)
     values = dataclasses.replace(values, wetness=values.wetness + 7)
-    worlds = native(scene, model, 2, initial_values=values)
+    worlds = native(scene, model, 2, initial=values)
     batch = worlds.start()
     assert (np.asarray(batch.world.states.wetness) == 7).all()
     assert box_x(batch, scene) == pytest.approx(0.0)
@@ -196,9 +198,9 @@ def test_what_is_lost_names_the_setting_to_raise():
 
 
 @pytest.fixture(scope="module")
-def warp_worlds(scene, model, bench_pool) -> Worlds:
+def warp_worlds(scene, model, bench_pool) -> Core:
     goal = compile_expression(model, "(on_top box table)")
-    return Worlds(WarpEngine(scene, 2), model, bench_pool, goal)
+    return Core(WarpEngine(scene, 2), Rules(model, goal), bench_pool)
 
 
 @pytest.mark.slow
@@ -206,9 +208,9 @@ def test_reset_inside_scan_with_autoreset(warp_worlds, scene):
     """Issue, item 1: a step and its resets are pure functions that `lax.scan` runs; world 1 falls again and again."""
 
     def body(batch, _):
-        batch, status = warp_worlds.step(batch)
+        batch, status = warp_worlds.step_fn(batch)
         flagged = batch.flags != 0
-        batch = warp_worlds.reset(batch, flagged | (batch.world.step >= 5))
+        batch = warp_worlds.reset_fn(batch, flagged | (batch.world.step >= 5))
         return batch, (flagged, batch.world.step, status.holds)
 
     batch = teleport(warp_worlds, warp_worlds.start(seed=3), "box", [0, 0, -2.0], 1)
@@ -229,10 +231,10 @@ def test_a_state_that_is_not_finite_is_flagged_in_its_world(warp_worlds):
     rows.qvel[1, 0], rows.tree_asleep[1] = np.nan, -11
     physics = jax.jit(warp_worlds.engine.load)(batch.world.physics, rows)
     batch = dataclasses.replace(batch, world=dataclasses.replace(batch.world, physics=physics))
-    batch, _ = jax.jit(warp_worlds.step)(batch)
+    batch, _ = warp_worlds.step(batch)
     assert np.asarray(batch.flags).tolist() == [0, int(Flag.NOT_FINITE)]
-    batch = jax.jit(warp_worlds.reset)(batch, batch.flags != 0)
-    batch, _ = jax.jit(warp_worlds.step)(batch)
+    batch = warp_worlds.reset(batch, batch.flags != 0)
+    batch, _ = warp_worlds.step(batch)
     assert not np.asarray(batch.flags).any(), "the pool's row replaces all that was not a number"
 
 
@@ -244,7 +246,7 @@ def overflowing(scene, model, bench_pool, tmp_path_factory) -> DebugWorlds:
     row.qpos[scene.model.joint("box/free").qposadr[0] + 2] = 0.4495
     row.tree_asleep[:] = FULLY_AWAKE
     engine = WarpEngine(scene, 2, profile=tiny, initial=row)
-    return DebugWorlds(Worlds(engine, model), scene, tmp_path_factory.mktemp("dumps"))
+    return DebugWorlds(Core(engine, Rules(model)), scene, tmp_path_factory.mktemp("dumps"))
 
 
 @pytest.mark.slow
@@ -266,13 +268,12 @@ def test_buffers_that_are_too_small_are_an_error_with_a_dump(overflowing, scene)
 
 @pytest.mark.slow
 def test_a_world_that_overflowed_is_put_right_by_a_reset(overflowing):
-    batch = overflowing.start()
     with pytest.raises(EngineError):
-        overflowing.step(batch)
-    batch, _ = overflowing._step(batch)
+        overflowing.step(overflowing.start())
+    batch = overflowing.batch
     assert np.asarray(batch.flags).tolist() == [int(Flag.OVERFLOW)] * 2
     with pytest.raises(EngineError, match=r"world 0: overflow \(NEFC; raise constraints in engine_profile.json"):
-        overflowing.worlds.raise_flagged(batch)
+        overflowing.core.raise_flagged(batch)
     batch = overflowing.reset(batch, np.array([True, False]))
     assert not np.asarray(batch.world.physics.overflow)[0] and np.asarray(batch.flags).tolist() == [0, 1]
 
@@ -287,16 +288,15 @@ def test_a_world_of_many_goes_on_in_a_simulation(warp_worlds, scene):
     physics = jax.jit(warp_worlds.engine.load)(batch.world.physics, rows)
     hot = batch.world.states.replace(temperature=batch.world.states.temperature + 50)
     batch = dataclasses.replace(batch, world=dataclasses.replace(batch.world, physics=physics, states=hot))
-    step = jax.jit(warp_worlds.step)
     for _ in range(3):
-        batch, _ = step(batch)
+        batch, _ = warp_worlds.step(batch)
     states = jax.tree.map(lambda a: np.asarray(a)[1:], batch.world.states)
     simulation = Simulation.from_snapshot(scene, warp_worlds.engine.export(batch.world.physics, 1), states)
     there = float(np.asarray(warp_worlds.engine.time(batch.world.physics))[1])
     assert simulation.time == pytest.approx(there, abs=1e-5) and there > 0.09
     assert simulation.state("temperature", "box") == pytest.approx(float(states.temperature[0, 1]), abs=1e-5)
     for _ in range(3):
-        batch, _ = step(batch)
+        batch, _ = warp_worlds.step(batch)
     view = simulation.step(count=3)
     np.testing.assert_allclose(view.object_pos[0], np.asarray(batch.world.view.object_pos)[1], atol=1e-4)
     heat = float(np.asarray(batch.world.states.temperature)[1, 1])

@@ -25,7 +25,7 @@ from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.sampling.settled import make_pool
 from ig2mj.simulation import Simulation
 from ig2mj.states.model import StateModel
-from ig2mj.worlds.batch import Worlds
+from ig2mj.worlds import Core, Rules
 
 pytestmark = [pytest.mark.gpu, pytest.mark.timeout(900)]
 
@@ -119,17 +119,18 @@ def profile(scene, reach, gpu):
     return calibrate(scene, reach, engine="native", rounds=2)
 
 
-def make(scene, model, pool, profile, count: int) -> Worlds:
+def make(scene, model, pool, profile, count: int) -> Core:
     start = jax.tree.map(lambda a: np.asarray(a[0]), pool.physics)
-    return Worlds(WarpEngine(scene, count, profile=profile.for_worlds(count), initial=start), model, pool)
+    engine = WarpEngine(scene, count, profile=profile.for_worlds(count), initial=start)
+    return Core(engine, Rules(model), pool)
 
 
 @pytest.fixture(scope="module")
-def batch_of_many(scene, model, pool, profile) -> Worlds:
+def batch_of_many(scene, model, pool, profile) -> Core:
     return make(scene, model, pool, profile, WORLDS)
 
 
-def rollout(worlds: Worlds, reach, batch, length: int):
+def rollout(worlds: Core, reach, batch, length: int):
     """Control steps with a hand that pushes, in one program; the batch after them, and what was ever flagged."""
     engine = worlds.engine
     seconds = engine.substeps * engine.timestep
@@ -137,7 +138,7 @@ def rollout(worlds: Worlds, reach, batch, length: int):
     def body(carry, _):
         batch, pusher, com, palm, ever = carry
         pusher = push(reach, pusher, com, palm, batch.world.key, batch.world.step, seconds)
-        batch, _ = worlds.step(batch, pusher.ctrl)
+        batch, _ = worlds.step_fn(batch, pusher.ctrl)
         view = batch.world.view
         ever |= batch.world.physics.overflow
         return (batch, pusher, view.object_com, view.agent.base_pos[:, 0], ever), None
@@ -201,7 +202,7 @@ def test_a_world_of_many_goes_on_natively(batch_of_many, pushed, scene):
     clock = np.asarray(batch_of_many.engine.time(after.world.physics))[world]
     assert simulation.time == pytest.approx(float(clock), abs=1e-5) and clock > STEPS / 30 - 1e-3
     ctrl = jnp.asarray(after.world.physics.data.ctrl)
-    stepped, _ = jax.jit(batch_of_many.step)(after, ctrl)
+    stepped, _ = jax.jit(batch_of_many.step_fn)(after, ctrl)  # `after` is used by other tests
     view = simulation.step()
     np.testing.assert_allclose(view.object_pos[0], np.asarray(stepped.world.view.object_pos)[world], atol=1e-3)
 
@@ -218,9 +219,9 @@ def test_resets_inside_a_program_put_flagged_worlds_right(batch_of_many, scene):
     batch = dataclasses.replace(batch, world=dataclasses.replace(batch.world, physics=physics))
 
     def body(batch, _):
-        batch, _ = batch_of_many.step(batch)
+        batch, _ = batch_of_many.step_fn(batch)
         flagged = batch.flags != 0
-        return batch_of_many.reset(batch, flagged), flagged
+        return batch_of_many.reset_fn(batch, flagged), flagged
 
     batch, flagged = jax.jit(lambda b: jax.lax.scan(body, b, None, 3))(batch)
     wanted = np.zeros((3, WORLDS), bool)

@@ -19,9 +19,10 @@ from ig2mj.errors import EngineError, InputError
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.viewer.replay import Progress, Replay
-from ig2mj.worlds.batch import Worlds
+from ig2mj.worlds.core import Core
 from ig2mj.worlds.debug import DebugWorlds
 from ig2mj.worlds.recorder import Frames, load_dump, read_dump, save_dump
+from ig2mj.worlds.rules import Rules
 
 
 @pytest.fixture(scope="module")
@@ -33,8 +34,8 @@ def scene(bench_folder):
 @pytest.fixture(scope="module")
 def debug(scene, tmp_path_factory) -> DebugWorlds:
     model = StateModel.of_manifest(scene.tables, scene.manifest)
-    worlds = Worlds(NativeEngine(scene, 2, threads=1), model)
-    return DebugWorlds(worlds, scene, tmp_path_factory.mktemp("dumps"), length=4)
+    core = Core(NativeEngine(scene, 2, threads=1), Rules(model))
+    return DebugWorlds(core, scene, tmp_path_factory.mktemp("dumps"), length=4)
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +48,7 @@ def error(debug, scene) -> str:
     mask[1, scene.object_index("box")] = True
     pos, quat = np.zeros((2, 4, 3)), np.tile([1.0, 0, 0, 0], (2, 4, 1))
     pos[..., 2] = -3.0
-    physics = debug.worlds.engine.write(batch.world.physics, Write(object_mask=mask, object_pos=pos, object_quat=quat))
+    physics = debug.core.engine.write(batch.world.physics, Write(object_mask=mask, object_pos=pos, object_quat=quat))
     batch = dataclasses.replace(batch, world=dataclasses.replace(batch.world, physics=physics))
     with pytest.raises(EngineError) as caught:
         debug.step(batch)
@@ -76,8 +77,8 @@ def test_a_dump_holds_the_last_steps_oldest_first(dump):
 
 
 def test_a_dump_is_loaded_into_an_engine_and_goes_on(dump, debug, scene):
-    worlds = debug.worlds
-    like = Frames(worlds.engine.snapshot(worlds.engine.reset()), initial_states(worlds.model, 2))
+    engine = debug.core.engine
+    like = Frames(engine.snapshot(engine.reset()), initial_states(debug.core.rules.model, 2))
     frames, _ = load_dump(dump, like, "bench")
     row = jax.tree.map(lambda a: np.array(a[0]), frames.physics)
     engine = NativeEngine(scene)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -68,6 +69,8 @@ def test_a_pool_survives_its_file(pool, tmp_path):
 
 def test_rows_are_picked_in_order(pool):
     rows = pool.rows(np.array([2, 0]))
+    np.testing.assert_array_equal(rows.physics.qpos, np.asarray(pool.physics.qpos)[[2, 0]], "on the host, unrounded")
+    rows = pool.rows(jnp.array([2, 0]))
     np.testing.assert_array_equal(rows.physics.qpos, np.asarray(pool.physics.qpos, np.float32)[[2, 0]])
 
 

@@ -13,36 +13,28 @@ import pytest
 
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import EngineError
-from ig2mj.states.model import StateModel
-from ig2mj.worlds.batch import Worlds
-from ig2mj.worlds.sharding import ShardedWorlds
+from ig2mj.worlds import Core, Rules, ShardedWorlds
 
 SCRIPT = """
 import json, operator, sys
 import jax, numpy as np
 import ig2mj
-from ig2mj.engine.jax import JaxEngine
-from ig2mj.engine.warp import WarpEngine
-from ig2mj.states.model import StateModel
-from ig2mj.predicates.compile import compile_expression
-from ig2mj.worlds.batch import Worlds
-from ig2mj.worlds.sharding import ShardedWorlds
+from ig2mj.engine.registry import make_engine
+from ig2mj.worlds import Core, Rules, ShardedWorlds
 
 scene = ig2mj.load_scene(sys.argv[1])
-kind = {"jax": JaxEngine, "warp": WarpEngine}[sys.argv[2]]
-model = StateModel.of_manifest(scene.tables, scene.manifest)
-goal = compile_expression(model, "(on_top box table)")
+rules = Rules.of_scene(scene).with_goal("(on_top box table)")
 out = {"devices": len(jax.devices())}
 for name, devices in (("one", jax.devices()[:1]), ("two", jax.devices()[:2])):
-    worlds = ShardedWorlds(lambda count: Worlds(kind(scene, count), model, None, goal), 2, devices)
+    worlds = ShardedWorlds(lambda count: Core(make_engine(sys.argv[2], scene, count), rules), 2, devices)
     shards = worlds.start(seed=4)
     for _ in range(2):
         shards, _ = worlds.step(shards)
     shards = worlds.reset(shards, np.array([False, True]))
-    shards, statuses = worlds.step(shards)
+    shards, status = worlds.step(shards)
     fields = ("world.view.object_pos", "world.key", "number", "episode")
     out[name] = {f: np.asarray(worlds.gather(shards, operator.attrgetter(f))).tolist() for f in fields}
-    out[name]["holds"] = np.concatenate([np.asarray(v.holds) for v in statuses]).tolist()
+    out[name]["holds"] = np.asarray(status.holds).tolist()
     out[name]["on"] = len(worlds.gather(shards, operator.attrgetter("number")).sharding.device_set)
 print("RESULT" + json.dumps(out))
 """
@@ -66,8 +58,7 @@ def test_two_devices_give_what_one_gives(bench_folder, engine):
 
 
 def make(scene):
-    model = StateModel.of_manifest(scene.tables, scene.manifest)
-    return lambda count: Worlds(NativeEngine(scene, count, threads=1), model)
+    return lambda count: Core(NativeEngine(scene, count, threads=1), Rules.of_scene(scene))
 
 
 def test_worlds_must_divide_evenly(bench_folder):

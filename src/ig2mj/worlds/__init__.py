@@ -1,1 +1,25 @@
-"""Batches of worlds: the pure control step with states, reset from a pool, guards, recording, sharding."""
+"""How worlds start, step and reset: one core, and its faces for batches, for debugging and for several devices."""
+
+from ig2mj.worlds.batch import Batch
+from ig2mj.worlds.core import Core
+from ig2mj.worlds.debug import DebugWorlds
+from ig2mj.worlds.guards import Flag
+from ig2mj.worlds.pool import Pool, load_pool, save_pool
+from ig2mj.worlds.rules import Outcome, Rules
+from ig2mj.worlds.sharding import ShardedWorlds, Shards
+from ig2mj.worlds.worlds import Worlds
+
+__all__ = [
+    "Batch",
+    "Core",
+    "DebugWorlds",
+    "Flag",
+    "Outcome",
+    "Pool",
+    "Rules",
+    "ShardedWorlds",
+    "Shards",
+    "Worlds",
+    "load_pool",
+    "save_pool",
+]

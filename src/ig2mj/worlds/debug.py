@@ -6,7 +6,6 @@ import os
 import pathlib
 from typing import Any, Protocol, runtime_checkable
 
-import jax
 import mujoco
 import numpy as np
 from jaxtyping import Float
@@ -19,50 +18,53 @@ from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.scene.scene import Scene
 from ig2mj.worlds import guards
-from ig2mj.worlds.batch import Batch, Worlds
+from ig2mj.worlds.batch import Batch
+from ig2mj.worlds.core import Core
 from ig2mj.worlds.recorder import LENGTH, Recording, frames_of, record, save_dump, start_recording
 
 
 class DebugWorlds:
-    """`Worlds` stepped under watch. Slower: it waits for the device in every step, and copies every world's state."""
+    """A core stepped under watch. Slower: it waits for the device in every step, and copies every world's state.
 
-    def __init__(self, worlds: Worlds, scene: Scene, folder: str | os.PathLike = "dumps", length: int = LENGTH):
-        """Binds worlds of a scene to a folder for dumps; `length`: control steps kept."""
-        self.worlds, self.scene, self.folder, self.length = worlds, scene, pathlib.Path(folder), length
-        pure = worlds.engine.pure
-        self._step = jax.jit(worlds.step) if pure else worlds.step
-        self._reset = jax.jit(worlds.reset) if pure else worlds.reset
+    Attributes:
+      core: what is watched. batch: as the last step left it, also one that raised.
+    """
+
+    def __init__(self, core: Core, scene: Scene, folder: str | os.PathLike = "dumps", length: int = LENGTH):
+        """Binds the worlds of a scene to a folder for dumps; `length`: control steps kept."""
+        self.core, self.scene, self.folder, self.length = core, scene, pathlib.Path(folder), length
+        self.batch: Batch | None = None
         self._recording: Recording | None = None
-        self._seen: np.ndarray | None = None
 
     def start(self, seed: int = 0) -> Batch:
         """All worlds at the start of episode 0, and an empty recording."""
-        batch = self.worlds.start(seed)
-        self._recording = start_recording(self.worlds.engine, batch, self.length)
+        batch = self.core.start(seed)
+        self._recording = start_recording(self.core.engine, batch, self.length)
         return batch
 
-    def step(self, batch: Batch, ctrl: Float[Array, "W nu"] | None = None) -> tuple[Batch, GoalStatus | None]:
-        """One control step.
+    def step(self, batch: Batch, action: Float[Array, "W n"] | None = None) -> tuple[Batch, GoalStatus]:
+        """One control step; see `Core.step`.
 
         Raises:
           EngineError: a world is flagged; names world, flag, values, the setting to raise, and the dump.
         """
         assert self._recording is not None, "start first"
-        batch, status = self._step(batch, ctrl)
-        self._recording = record(self.worlds.engine, self._recording, batch)
+        batch, status = self.core.step(batch, action)
+        self.batch = batch
+        self._recording = record(self.core.engine, self._recording, batch)
         flagged = np.flatnonzero(np.asarray(batch.flags))
         if len(flagged):
             raise EngineError(self._report(batch, int(flagged[0])))
         return batch, status
 
     def reset(self, batch: Batch, mask: Array) -> Batch:
-        """See `Worlds.reset`."""
-        return self._reset(batch, mask)
+        """See `Core.reset`."""
+        return self.core.reset(batch, mask)
 
     def _report(self, batch: Batch, world: int) -> str:
         assert self._recording is not None
         scene = self.scene
-        overflow = int(np.asarray(self.worlds.engine.health(batch.world.physics).overflow)[world])
+        overflow = int(np.asarray(self.core.engine.health(batch.world.physics).overflow)[world])
         flags = int(np.asarray(batch.flags)[world])
         step = int(np.asarray(batch.world.step)[world])
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -75,7 +77,7 @@ class DebugWorlds:
 
     def _values(self, batch: Batch, world: int, flags: int) -> list[str]:
         """For every flag, the number that is beyond its limit."""
-        engine, physics, scene = self.worlds.engine, batch.world.physics, self.scene
+        engine, physics, scene = self.core.engine, batch.world.physics, self.scene
         row = engine.export(physics, world)
         finite = np.isfinite(row.qpos).all() and np.isfinite(row.qvel).all()
         said = []
@@ -92,10 +94,10 @@ class DebugWorlds:
             said.append(f"body '{self._first_lost(row)}' has no finite position or velocity")
         if flags & guards.Flag.FELL:
             height = np.asarray(batch.world.view.object_com)[world, :, 2]
-            below = height - self.worlds.floor
+            below = height - self.core.floor
             lowest = int(np.nanargmin(below))
             name = scene.object_names[lowest]
-            said.append(f"'{name}' at z = {height[lowest]:.3g} m, limit {self.worlds.floor[lowest]:.3g} m")
+            said.append(f"'{name}' at z = {height[lowest]:.3g} m, limit {self.core.floor[lowest]:.3g} m")
         if flags & guards.Flag.TOO_FAST:
             speed = float(np.asarray(engine.health(physics).top_speed)[world])
             said.append(f"{speed:.3g} m/s, limit {guards.TOP_SPEED:g} m/s")

@@ -32,14 +32,14 @@ class Flag(enum.IntFlag):
     TOO_FAST = 8
 
 
-def check(health: Health, view: PhysicsView, floor: Float[np.ndarray, "O"]) -> Int[Array, "W"]:
+def check(health: Health, object_com: Float[Array, "W O 3"], floor: Float[Array, "O"]) -> Int[Array, "W"]:
     """Flags of every world now.
 
     Args:
-      health: from the engine. view: of the same instant.
+      health: from the engine. object_com: of the view of the same instant.
       floor: metres; the height below which each object has left the house (`lowest_support`).
     """
-    com = jnp.asarray(view.object_com)
+    com = jnp.asarray(object_com)
     finite = jnp.asarray(health.finite)
     flags = jnp.where((jnp.asarray(health.overflow) & int(CAPACITY)) != 0, int(Flag.OVERFLOW), 0)
     flags |= jnp.where(~finite, int(Flag.NOT_FINITE), 0)

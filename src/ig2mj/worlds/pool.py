@@ -37,8 +37,9 @@ class Pool:
         return self.physics.qpos.shape[0]
 
     def rows(self, index: Int[Array, "W"]) -> Pool:
-        """The rows asked for, in that order; may be traced."""
-        return jax.tree.map(lambda a: jnp.asarray(a)[index], self)
+        """The rows of these numbers, in that order. On the host for numpy's numbers, else it may be traced."""
+        read = np.asarray if isinstance(index, np.ndarray) else jnp.asarray
+        return jax.tree.map(lambda a: read(a)[index], self)
 
 
 def stack(pools: list[Pool]) -> Pool:

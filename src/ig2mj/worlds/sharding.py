@@ -25,12 +25,10 @@ from jaxtyping import Bool, Float
 from ig2mj.engine.view import Array
 from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import GoalStatus
-from ig2mj.worlds.batch import Batch, Worlds
+from ig2mj.worlds.batch import Batch
+from ig2mj.worlds.core import Core, Policy
 
 AXIS = "worlds"
-
-Control = Callable[[Batch, Any], tuple[Float[Array, "W nu"] | None, Any]]
-"""Controls of the next step from a device's part of the worlds and a carry, and the new carry. Pure."""
 
 
 @struct.dataclass
@@ -41,13 +39,13 @@ class Shards:
 
 
 class ShardedWorlds:
-    """The functions of `Worlds`, over several devices. All of them are jitted, and use up the shards they are given."""
+    """The functions of a core, over several devices. They use up the shards they are given."""
 
-    def __init__(self, make: Callable[[int], Worlds], num_worlds: int, devices: Sequence[Any] | None = None):
+    def __init__(self, make: Callable[[int], Core], num_worlds: int, devices: Sequence[Any] | None = None):
         """Shares worlds out.
 
         Args:
-          make: builds `Worlds` of a given number of worlds: one device's part.
+          make: builds a core of a given number of worlds: one device's part.
           num_worlds: in all, on all hosts.
           devices: of this process; None: all of `jax.local_devices()`.
 
@@ -66,65 +64,62 @@ class ShardedWorlds:
         self._first = jax.process_index() * len(self.devices) * self.part
         self._sharding = NamedSharding(Mesh(np.array(self.devices), (AXIS,)), PartitionSpec(AXIS))
         self._threads = ThreadPoolExecutor(len(self.devices), "ig2mj-device")
-        self._start = jax.jit(self.local.start)
-        self._step = jax.jit(self.local.step, donate_argnums=0)
-        self._reset = jax.jit(self.local.reset, donate_argnums=0)
-        self._rollout = jax.jit(self._scan, static_argnums=(2, 3), donate_argnums=(0, 1))
+        self._start = jax.jit(self.local.start_fn)
+        _ = self.local.pool, self.local.floor  # made here, once, and not on every device's thread
 
     def start(self, seed: int = 0) -> Shards:
         """All worlds at the start of episode 0."""
         return Shards(tuple(self._each(lambda k: self._start(jnp.int32(seed), jnp.int32(self._first + k * self.part)))))
 
-    def step(self, shards: Shards, ctrl: Float[Array, "W nu"] | None = None) -> tuple[Shards, list[GoalStatus | None]]:
-        """One control step of every world, and each device's statuses.
+    def step(self, shards: Shards, action: Float[Array, "W n"] | None = None) -> tuple[Shards, GoalStatus]:
+        """One control step of every world, and what the goal says, over all worlds of this process.
 
         Args:
-          ctrl: of all worlds of this process, or None to keep the controls.
+          action: of all worlds of this process (see `Core.step`), or None to keep what was asked last.
         """
-        split = self.place(ctrl) if ctrl is not None else None
-        local = None if split is None else [s.data for s in sorted(split.addressable_shards, key=self._order)]
-        done = self._each(lambda k: self._step(shards.parts[k], None if local is None else local[k]))
-        return Shards(tuple(batch for batch, _ in done)), [status for _, status in done]
+        local = [None] * len(self.devices) if action is None else self._split(action)
+        done = self._each(lambda k: self.local.step(shards.parts[k], local[k]))
+        return Shards(tuple(batch for batch, _ in done)), self._joined([status for _, status in done])
 
-    def rollout(
-        self, shards: Shards, carries: Sequence[Any], control: Control, length: int
-    ) -> tuple[Shards, list[Any]]:
-        """`length` control steps without leaving the devices.
+    def rollout(self, shards: Shards, carries: Sequence[Any], policy: Policy, length: int) -> tuple[Shards, list[Any]]:
+        """`length` control steps without leaving the devices; see `Core.rollout`.
 
         Args:
-          carries: one per device. control: the same function object each time, or it is compiled again.
+          carries: one per device.
         """
-        done = self._each(lambda k: self._rollout(shards.parts[k], carries[k], control, length))
+        done = self._each(lambda k: self.local.rollout(shards.parts[k], carries[k], policy, length))
         return Shards(tuple(batch for batch, _ in done)), [carry for _, carry in done]
 
     def reset(self, shards: Shards, mask: Bool[Array, "W"]) -> Shards:
         """New episodes in the masked worlds of this process."""
-        local = [s.data for s in sorted(self.place(mask).addressable_shards, key=self._order)]
-        return Shards(tuple(self._each(lambda k: self._reset(shards.parts[k], local[k]))))
+        local = self._split(mask)
+        return Shards(tuple(self._each(lambda k: self.local.reset(shards.parts[k], local[k]))))
 
     def gather(self, shards: Shards, read: Callable[[Batch], Any]) -> Any:
         """What `read` takes of every part, as arrays over this process's worlds, sharded over its devices.
 
         `read` gives arrays that begin with the world axis, e.g. `lambda b: b.world.view.object_com`.
         """
-
-        def one(*pieces: jax.Array) -> jax.Array:
-            shape = (sum(p.shape[0] for p in pieces), *pieces[0].shape[1:])
-            return jax.make_array_from_single_device_arrays(shape, self._sharding, list(pieces))
-
-        return jax.tree.map(one, *(read(part) for part in shards.parts))
+        return self._joined([read(part) for part in shards.parts])
 
     def place(self, array: Array) -> jax.Array:
         """Puts an array over this process's worlds onto its devices."""
         return jax.device_put(array, self._sharding)
 
-    def _scan(self, batch: Batch, carry: Any, control: Control, length: int) -> tuple[Batch, Any]:
-        def body(state: tuple[Batch, Any], _: None) -> tuple[tuple[Batch, Any], None]:
-            one, kept = state
-            ctrl, kept = control(one, kept)
-            return (self.local.step(one, ctrl)[0], kept), None
+    def _joined(self, parts: Sequence[Any]) -> Any:
+        """One pytree of arrays over this process's worlds from one per device."""
 
-        return jax.lax.scan(body, (batch, carry), None, length)[0]
+        def one(*pieces: jax.Array) -> jax.Array:
+            shape = (sum(p.shape[0] for p in pieces), *pieces[0].shape[1:])
+            return jax.make_array_from_single_device_arrays(shape, self._sharding, list(pieces))
+
+        return jax.tree.map(one, *parts)
+
+    def _split(self, array: Array) -> list[jax.Array]:
+        """Each device's part of an array over this process's worlds."""
+        return [
+            s.data for s in sorted(self.place(array).addressable_shards, key=lambda s: self.devices.index(s.device))
+        ]
 
     def _each(self, act: Callable[[int], Any]) -> list[Any]:
         """Runs something for every device, each on its own thread with that device as the default."""
@@ -134,6 +129,3 @@ class ShardedWorlds:
                 return act(k)
 
         return list(self._threads.map(on, range(len(self.devices))))
-
-    def _order(self, shard: Any) -> int:
-        return self.devices.index(shard.device)

@@ -12,7 +12,8 @@ Axes: W worlds, O objects, S heat sources, I facts.
 from __future__ import annotations
 
 import dataclasses
-from typing import NamedTuple, TypeVar
+import weakref
+from typing import ClassVar, NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -26,7 +27,8 @@ from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Memo, RelationPlan
 from ig2mj.states.update import events, heat, queries
-from ig2mj.states.world import ExtendedStates, Swap
+from ig2mj.states.world import ExtendedStates
+from ig2mj.worlds.rules import Rules
 
 T = TypeVar("T")
 
@@ -58,13 +60,15 @@ class Found(NamedTuple):
 
 
 class StateProgram:
-    """The jitted functions of a scene; may serve any number of steppers.
+    """The jitted functions of a scene's rules; may serve any number of steppers.
 
     Attributes:
       heat: one step of temperatures, jitted. heats: places of what it makes among the states' leaves.
       gives: places of the leaves that a whole step makes; the others it hands through. view_reads: fields of the view
       that a whole step depends on. Both are known from the first step on. rows: bodies whose poses matter.
     """
+
+    _of_rules: ClassVar[weakref.WeakKeyDictionary] = weakref.WeakKeyDictionary()  # Rules -> {worlds: StateProgram}
 
     def __init__(self, model: StateModel, goal: CompiledExpression | None = None, num_worlds: int = 1):
         """Compiles nothing yet: that happens at the first step.
@@ -86,6 +90,14 @@ class StateProgram:
         self._takes: list[int] = []
         self._whole = None
         self.rows = _object_bodies(model)
+
+    @classmethod
+    def of(cls, rules: Rules, num_worlds: int) -> StateProgram:
+        """The program of these rules; asked again, the same object, so that it is compiled once."""
+        made = cls._of_rules.setdefault(rules, {})
+        if num_worlds not in made:
+            made[num_worlds] = cls(rules.model, rules.goal, num_worlds)
+        return made[num_worlds]
 
     def empty_memo(self) -> list[Array]:
         """A memo that knows nothing yet, flat."""
@@ -187,16 +199,6 @@ def inputs_that_matter(jaxpr: Jaxpr) -> list[bool]:
         if any(v in needed for v in equation.outvars):
             needed.update(v for v in equation.invars if not isinstance(v, Literal))
     return [v in needed for v in jaxpr.invars]
-
-
-def status_of(fields: tuple[Array, Array, Array] | None) -> GoalStatus | None:
-    """A status from what the compiled functions give."""
-    return None if fields is None else GoalStatus(*fields)
-
-
-def swap_of(fields: tuple[Array, Array, Array] | None) -> Swap | None:
-    """A swap from what the compiled functions give."""
-    return None if fields is None else Swap(*fields)
 
 
 def _copied(node: T) -> T:

@@ -1,8 +1,8 @@
 """`StateStepper`: states and a goal stepped from the host, doing no more than the change of the world asks for.
 
-`ig2mj.states.update` computes everything for all worlds in every step, which is right where thousands of worlds run on
-a device. One world beside the native engine mostly lies still, and there even an operation on nothing costs
-microseconds. So the work is cut up (`ig2mj.predicates.program`), with the same functions and bitwise the same results:
+`Rules.step` computes everything for all worlds in every step, which is right where thousands of worlds run on a device.
+Worlds beside the native engine mostly lie still, and there even an operation on nothing costs microseconds. So the work
+is cut up (`ig2mj.worlds.lazy.program`), with the same functions and bitwise the same results:
 
 - the whole step, where the states are others than those of the last step, where the last step changed more than
   temperatures, or where the view differs in anything that a step depends on. Relations come from a memo
@@ -19,30 +19,18 @@ Axes: W worlds.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import jax
 import numpy as np
 
 from ig2mj.engine.view import Array, PhysicsView, read_field
 from ig2mj.predicates.compile import GoalStatus
-from ig2mj.predicates.program import BODY_FIELDS, Found, StateProgram, status_of, swap_of
 from ig2mj.states.definitions import toggled_on
 from ig2mj.states.world import ExtendedStates, Swap
-
-__all__ = ["StateProgram", "StateStepper", "Step"]
-
+from ig2mj.worlds.lazy.program import BODY_FIELDS, Found, StateProgram
+from ig2mj.worlds.rules import Outcome, Rules
 
 LOOK_EVERY = 30
 """Steps of temperatures between two looks whether they still change; a look costs microseconds."""
-
-
-class Step(NamedTuple):
-    """What a step gives: states, the teleports that slicing asks for (None: none), and the goal's status."""
-
-    states: ExtendedStates
-    swap: Swap | None
-    status: GoalStatus | None
 
 
 class StateStepper:
@@ -51,9 +39,10 @@ class StateStepper:
     def __init__(self, program: StateProgram):
         """Begins with an empty memo."""
         self.program = program
+        self._no_status = GoalStatus.empty(program.num_worlds)
         self._memo = program.empty_memo()
         self._view: PhysicsView | None = None
-        self._step: Step | None = None
+        self._step: Outcome | None = None
         self._leaves: list[Array] = []
         self._kept: Found | None = None
         self._settled = False
@@ -62,8 +51,13 @@ class StateStepper:
         self._bytes: list[bytes | None] = []
         self._fingers_away = False
 
-    def step(self, states: ExtendedStates, view: PhysicsView) -> Step:
-        """One control step: `view` is physics after it."""
+    @classmethod
+    def of(cls, rules: Rules, num_worlds: int) -> StateStepper:
+        """A stepper of its own over the compiled functions that the rules keep for everyone."""
+        return cls(StateProgram.of(rules, num_worlds))
+
+    def step(self, states: ExtendedStates, view: PhysicsView) -> Outcome:
+        """`Rules.step`: one control step; `view` is physics after it."""
         last = self._step
         if last is None or states is not last.states:
             return self._everything(states, jax.tree.leaves(states), view)
@@ -96,7 +90,7 @@ class StateStepper:
     def _away(self, view: PhysicsView) -> bool:
         return isinstance(view.agent.finger_pos, np.ndarray) and toggled_on.all_out_of_reach(self.program.model, view)
 
-    def _heat(self, last: Step, kept: Found) -> Step:
+    def _heat(self, last: Outcome, kept: Found) -> Outcome:
         states = last.states
         warm, hottest, status = self.program.heat(
             states.temperature, states.max_temperature, states.sliced, kept.acts, kept.facts
@@ -107,10 +101,10 @@ class StateStepper:
         self._heat_steps += 1
         states = self.program.with_leaves(states, self.program.heats, [warm, hottest])
         self._put(self.program.heats, [warm, hottest])
-        self._step = Step(states, None, status_of(status))
+        self._step = Outcome(states, None, self._status(status))
         return self._step
 
-    def _everything(self, states: ExtendedStates, leaves: list[Array], view: PhysicsView) -> Step:
+    def _everything(self, states: ExtendedStates, leaves: list[Array], view: PhysicsView) -> Outcome:
         program = self.program
         found = program.whole(leaves, view, self._memo)
         self._leaves = leaves
@@ -118,14 +112,17 @@ class StateStepper:
         new = program.with_leaves(states, program.gives, found.leaves)
         quiet, swapped, self._settled = np.asarray(found.flags).tolist()
         self._memo, self._view, self._heat_steps = found.memo, view, 0
-        self._step = Step(new, None, status_of(found.status))
+        self._step = Outcome(new, None, self._status(found.status))
         self._kept = None
         if quiet and not program.model.options.contact_heat_rate:
             self._kept = found
             self._seen = [read_field(view, name) for name in program.view_reads]
             self._bytes = [None] * len(self._seen)
             self._fingers_away = "agent.finger_pos" in program.view_reads and self._away(view)
-        return self._step._replace(swap=swap_of(found.swap)) if swapped else self._step
+        return self._step._replace(swap=Swap(*found.swap)) if swapped and found.swap else self._step
+
+    def _status(self, fields: tuple[Array, Array, Array] | None) -> GoalStatus:
+        return self._no_status if fields is None else GoalStatus(*fields)
 
     def _put(self, places: list[int], leaves: list[Array]) -> None:
         for place, leaf in zip(places, leaves, strict=True):

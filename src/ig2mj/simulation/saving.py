@@ -1,0 +1,58 @@
+"""Files of one whole world: physics, states, random key and clock in one `.npz` (arrays only, no pickle)."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import jax
+import numpy as np
+from flax import struct
+
+from ig2mj.engine.base import Snapshot
+from ig2mj.errors import InputError
+from ig2mj.scene.scene import Scene
+from ig2mj.states.world import ExtendedStates
+from ig2mj.worlds.archive import load_tree, save_tree
+
+VERSION = 1
+"""Of the files that `save_world` writes."""
+
+
+@struct.dataclass
+class SavedWorld:
+    """What goes on changing in a world; every array begins with an axis of length 1, but for `key`.
+
+    Attributes:
+      physics, states: of the world. key: raw data of the random key. step: control steps since the reset.
+    """
+
+    physics: Snapshot
+    states: ExtendedStates
+    key: np.ndarray
+    step: np.ndarray
+
+
+def save_world(world: SavedWorld, file: str | os.PathLike, scene: Scene, engine: str) -> None:
+    """Writes a world of the scene; `engine`: name of what stepped it, for people. Raises InputError."""
+    header: dict[str, Any] = {
+        "version": VERSION,
+        "scene": scene.name,
+        "engine": engine,
+        "objects": list(scene.object_names),
+    }
+    save_tree(file, jax.tree.map(np.asarray, world), header)
+
+
+def load_world(file: str | os.PathLike, like: SavedWorld, scene: Scene) -> SavedWorld:
+    """Reads a world of the scene; `like`: any world of it, for the shapes.
+
+    Raises:
+      InputError: the file is missing, broken, of another scene, or of another version.
+    """
+    found, header = load_tree(file, jax.tree.map(np.asarray, like))
+    if header.get("version") != VERSION:
+        raise InputError(file, f"has version {header.get('version')}, this ig2mj reads {VERSION}")
+    if header.get("objects") != list(scene.object_names):
+        raise InputError(file, f"is of scene '{header.get('scene')}'", mend="restore it in that scene")
+    return found

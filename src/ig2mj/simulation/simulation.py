@@ -1,0 +1,361 @@
+"""`Simulation`: one world, for people: step it, move objects by name, ask what is true of it, look at it.
+
+    simulation = ig2mj.Simulation("small_home")
+    simulation.set_state("toggled_on", "stove_0", True)
+    simulation.step(count=300)                       # ten seconds
+    simulation.predicate("cooked", "fish_0")
+
+A core with a single world steps it (`ig2mj.worlds.core`); everything here only adds names to that.
+"""
+
+from __future__ import annotations
+
+import functools
+import os
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+
+from ig2mj.engine.base import Engine, Snapshot, Write
+from ig2mj.engine.registry import make_engine
+from ig2mj.engine.view import PhysicsView
+from ig2mj.errors import AbilityError, EngineError, StateError
+from ig2mj.predicates.compile import CompiledExpression
+from ig2mj.predicates.literals import object_index
+from ig2mj.predicates.logic import Atom, Expression
+from ig2mj.process import run_programs_inline
+from ig2mj.sampling.setters import lacks, set_by_name
+from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_openables, write_of_pose
+from ig2mj.simulation.saving import SavedWorld, load_world, save_world
+from ig2mj.states import registry
+from ig2mj.states.model import DEFAULTS, StateModel
+from ig2mj.states.options import StateOptions
+from ig2mj.states.world import ExtendedStates, WorldState
+from ig2mj.worlds.core import Core
+from ig2mj.worlds.rules import Rules
+
+
+class Simulation:
+    """One world of a scene on any engine.
+
+    Attributes:
+      scene: the household. engine: what steps physics. physics: the engine's state; use what the methods give instead.
+      state_options: how extended states behave; None where only physics is stepped.
+    """
+
+    def __init__(
+        self,
+        scene: Scene | str | os.PathLike,
+        engine: str | Engine = "native",
+        *,
+        states: StateOptions | None = DEFAULTS,
+        seed: int = 0,
+        **options: Any,
+    ):
+        """Starts at the scene's initial state.
+
+        Args:
+          scene: a loaded scene, or what `load_scene` takes.
+          engine: an engine's name, or an engine made for this scene with one world.
+          states: how extended states behave; None: physics only.
+          seed: of what `set_state` draws at random.
+          options: go to the engine, where it is given by name, e.g. `boxes="igibson"`.
+        """
+        run_programs_inline()
+        self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
+        self.engine: Engine = make_engine(engine, self.scene, 1, **options) if isinstance(engine, str) else engine
+        if self.engine.num_worlds != 1:
+            raise EngineError(f"a Simulation is one world, and the engine has {self.engine.num_worlds}")
+        self.state_options, self._seed = states, seed
+        self.physics = self.engine.reset()
+        self._initial = self.engine.export(self.physics, 0)
+        self._begin()
+
+    def _begin(self) -> None:
+        """States, clock and random key at their start; states are made at the first question about them."""
+        self._states: ExtendedStates | None = None
+        self._key, self._steps = jax.random.key(self._seed), 0
+
+    @classmethod
+    def from_snapshot(
+        cls, scene: Scene, snapshot: Snapshot, states: ExtendedStates | None = None, **options: Any
+    ) -> Simulation:
+        """Goes on, on the native engine, from a world of another one: how to look at world 1,234 of a batch.
+
+            Simulation.from_snapshot(scene, engine.export(batch.world.physics, 1234)).launch_viewer()
+
+        Args:
+          scene: that the world belongs to, with its agents.
+          snapshot: without the world axis. `reset` comes back to it, with the scene's first states.
+          states: extended states of that world, with a world axis of length 1; None: as the scene starts.
+          options: as of the constructor.
+
+        Raises:
+          EngineError: the snapshot is of another scene.
+        """
+        simulation = cls(scene, **options)
+        simulation.physics = simulation.engine.load(simulation.physics, snapshot)
+        simulation._initial = simulation.engine.export(simulation.physics, 0)
+        simulation._states = states
+        return simulation
+
+    @property
+    def time(self) -> float:
+        """Simulated seconds since the reset."""
+        return float(np.asarray(self.engine.time(self.physics))[0])
+
+    @property
+    def view(self) -> PhysicsView:
+        """Everything that states and predicates know of physics; world axis of length 1."""
+        return self.engine.view(self.physics)
+
+    @property
+    def model(self) -> mujoco.MjModel:
+        """MuJoCo's model of this world."""
+        return self.engine.to_mujoco(self.physics, 0)[0]
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's data of this world: live on the native engine (call `forward` after changing it), else a copy."""
+        return self.engine.to_mujoco(self.physics, 0)[1]
+
+    @functools.cached_property
+    def core(self) -> Core:
+        """What steps this world."""
+        rules = None if self.state_options is None else Rules.of_scene(self.scene, self.state_options)
+        return Core(self.engine, rules)
+
+    @property
+    def _rules(self) -> Rules:
+        if self.core.rules is None:
+            raise StateError("this simulation steps physics only; make it with states=StateOptions()")
+        return self.core.rules
+
+    @property
+    def state_model(self) -> StateModel:
+        """Constants of the states."""
+        return self._rules.model
+
+    @property
+    def states(self) -> ExtendedStates:
+        """Extended states; world axis of length 1."""
+        if self._states is None:
+            self._states = self._rules.initial
+        return self._states
+
+    @property
+    def _states_or_none(self) -> Any:
+        return self._states if self._states is not None or self.state_options is None else self.states
+
+    @property
+    def world(self) -> WorldState:
+        """Everything of this world, as compiled expressions and environments take it."""
+        seconds = self._steps * self.engine.substeps * self.engine.timestep
+        return WorldState(
+            physics=self.physics,
+            view=self.view,
+            states=self.states,
+            key=np.asarray(jax.random.key_data(self._key))[None],
+            step=np.array([self._steps], np.int32),
+            time=np.array([seconds], np.float32),
+        )
+
+    # Time.
+
+    def reset(self) -> PhysicsView:
+        """Back to the scene's initial state."""
+        self.physics = self.engine.load(self.physics, self._initial)
+        self._begin()
+        return self.view
+
+    def step(self, ctrl: Vector | None = None, count: int = 1) -> PhysicsView:
+        """Takes `count` control steps.
+
+        Args:
+          ctrl: [nu] controls of the agents' actuators; None keeps the last ones.
+
+        Raises:
+          EngineError: ctrl has another length than the model has actuators, or the physics went wrong.
+        """
+        row = None if ctrl is None else np.asarray(ctrl, np.float64)
+        if row is not None and row.shape != (self.scene.model.nu,):
+            raise EngineError(
+                f"ctrl has shape {row.shape}; scene '{self.scene.name}' has {self.scene.model.nu} actuators"
+            )
+        row, view = None if row is None else row[None], self.view
+        advance, physics, states, done = self.core.advance, self.physics, self._states_or_none, 0
+        try:
+            for done in range(1, count + 1):  # noqa: B007 (counted below, also where a step raises)
+                physics, view, states, _ = advance(physics, states, row)
+                row = None
+        finally:
+            self.physics, self._states = physics, states
+            self._steps += done
+        return view
+
+    def forward(self) -> PhysicsView:
+        """Brings everything derived up to date without passing time."""
+        return self._write(Write())
+
+    def _write(self, write: Write) -> PhysicsView:
+        self.physics = self.engine.write(self.physics, write)
+        return self.view
+
+    # Objects and joints.
+
+    def object_pose(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Frame of an object's main body: position [3] (m) and quaternion [4] (w-x-y-z), world frame."""
+        index, view = self.scene.object_index(name), self.view
+        return np.array(view.object_pos[0, index], np.float64), np.array(view.object_quat[0, index], np.float64)
+
+    def set_object_pose(self, name: str, pos: Vector, quat_wxyz: Vector | None = None) -> PhysicsView:
+        """Puts an object somewhere, at rest and awake.
+
+        Args:
+          pos: [3] m, world frame, of the main body's frame.
+          quat_wxyz: [4], of any length but zero; None keeps the rotation.
+
+        Raises:
+          UnknownNameError: no such object. PoseError: it is fixed, or the pose is no pose.
+        """
+        quat = self.object_pose(name)[1] if quat_wxyz is None else quat_wxyz
+        return self._write(write_of_pose(self.scene, name, pos, quat))
+
+    def joint(self, name: str) -> float:
+        """Position of a hinge (rad) or slide (m). Raises UnknownNameError; PoseError for a free joint."""
+        return float(self.data.qpos[joint_address(self.scene, name)])
+
+    def set_joint(self, name: str, q: float | int) -> PhysicsView:
+        """Puts a hinge (rad) or slide (m) somewhere, at rest and awake.
+
+        Raises:
+          UnknownNameError: no such joint. PoseError: it is a free joint, or q is not finite or beyond its range.
+        """
+        return self._write(write_of_joint(self.scene, name, q))
+
+    # States and predicates.
+
+    def state(self, name: str, object_name: str | None = None) -> Any:
+        """A state of one object, or of every object that has it: {object: value}.
+
+        Args:
+          name: see `ig2mj.states.registry.STATES`.
+          object_name: halves of a sliced object are objects of their own.
+
+        Raises:
+          UnknownNameError: no such state or object. AbilityError: the object does not have this state.
+        """
+        kind, model, view = registry.find(name), self.state_model, self.view
+        if object_name is not None:
+            index = object_index(model, object_name)
+            if not kind.belongs_to(model, index):
+                raise AbilityError(lacks(f"state '{kind.name}'", object_name, model, kind.abilities or ()))
+            return kind.get(model, self.states, view, index, 0)
+        names = self.scene.object_names
+        having = [o for o in range(len(names)) if kind.belongs_to(model, o)]
+        return {names[o]: kind.get(model, self.states, view, o, 0) for o in having}
+
+    def set_state(self, name: str, object_name: str, value: bool | float | int) -> None:
+        """Sets a state, or makes a predicate of one object true or false as the paper samples it (table A.5).
+
+        Args:
+          name: temperature, max_temperature or wetness, with a number; or cooked, burnt, frozen, soaked,
+            dusty, stained, toggled_on, open, or sliced (only True).
+          object_name: its halves, where it has some, are set alike.
+
+        Raises:
+          UnknownNameError, AbilityError: as for `state`. StateError: the state cannot be set, or not to this value.
+        """
+        self._key, key = jax.random.split(self._key)
+        change = set_by_name(self.state_model, self.states, self.view, name, object_name, value, key)
+        self._states = change.states
+        if change.swap is not None:
+            self.physics, _ = self.core.teleport(self.physics, self.view, change.swap)
+        if change.joints is not None:
+            self._write(write_of_openables(self.scene, *change.joints))
+
+    def predicate(self, name: str, *arguments: str, strict: bool = False) -> bool:
+        """Whether a predicate holds now, e.g. `predicate("on_top", "book", "table")`.
+
+        Raises:
+          UnknownNameError: no such predicate, object or room. ArityError: too many or too few arguments.
+          AbilityError: with `strict`, the object lacks the ability; otherwise that is False.
+        """
+        return self.holds(Atom(name, arguments), strict=strict)
+
+    def holds(self, expression: Expression | str, strict: bool = False) -> bool:
+        """Whether an expression holds now; text as `ig2mj.predicates.parse` reads it. Raises ExpressionError, and as
+        `predicate`."""
+        return bool(self.compiled(expression, strict)(self.world)[0])
+
+    def compiled(self, expression: Expression | str, strict: bool = False) -> CompiledExpression:
+        """An expression compiled for this scene, to be asked again and again: `compiled(goal)(simulation.world)`."""
+        return self._rules.compiled(expression, strict)
+
+    def explain(self, expression: Expression | str) -> str:
+        """Whether an expression holds now, and what is missing where it does not."""
+        return self.compiled(expression).explain(self.world)
+
+    # Files.
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Writes the whole world, physics and states, to one `.npz` (arrays only, no pickle). Raises InputError."""
+        save_world(self._everything(), path, self.scene, self.engine.name)
+
+    def restore(self, path: str | os.PathLike) -> PhysicsView:
+        """Goes back to a world that `save` wrote, of this scene. Raises InputError."""
+        found = load_world(path, self._everything(), self.scene)
+        self.physics = self.engine.load(self.physics, found.physics)
+        self._states = jax.tree.map(jnp.asarray, found.states)
+        self._key = jax.random.wrap_key_data(jnp.asarray(found.key))
+        self._steps = int(found.step[0])
+        return self.view
+
+    def _everything(self) -> SavedWorld:
+        return SavedWorld(
+            physics=jax.tree.map(lambda leaf: np.asarray(leaf)[None], self.engine.export(self.physics, 0)),
+            states=self.states,
+            key=np.asarray(jax.random.key_data(self._key)),
+            step=np.array([self._steps]),
+        )
+
+    # Pictures.
+
+    def render(self, camera: Any = None, *, width: int = 640, height: int = 480, **options: Any) -> np.ndarray:
+        """A picture, uint8 [height, width, 3]; objects are tinted by state, dust, stains and water are drawn.
+
+        Args:
+          camera: a camera's name or number, an `ig2mj.viewer.offscreen.FreeView`, or None for an overview.
+          options: see `ig2mj.viewer.offscreen.render`.
+        """
+        from ig2mj.viewer import offscreen, state_marks
+
+        model, data = self.engine.to_mujoco(self.physics, 0)
+        if self.state_options is None or options.get("segmentation"):
+            return offscreen.render(model, data, camera, width=width, height=height, **options)
+        found = state_marks.marks(self.state_model, self.states, self.view)
+        options.setdefault("decorate", lambda scene: state_marks.draw_marks(scene, found))
+        tint = state_marks.tint_of_objects(self.state_model, self.states)
+        with state_marks.Tinter(model, self.scene.tables).shown(tint):
+            return offscreen.render(model, data, camera, width=width, height=height, **options)
+
+    def launch_viewer(self, **options: Any) -> None:
+        """Opens MuJoCo's viewer on this world and steps it until the window is closed.
+
+        Args:
+          options: `overlays`, `paused`; see `ig2mj.viewer.interactive.open_viewer`.
+
+        Raises:
+          MissingDependencyError: there is no display.
+        """
+        from ig2mj.viewer import interactive, overlays, states_overlay
+
+        if self.state_options is not None:
+            shown = [*overlays.default_overlays(self.scene), states_overlay.StatesOverlay(self, self.model)]
+            options.setdefault("overlays", shown)
+        options.setdefault("step_time", self.engine.substeps * self.engine.timestep)
+        interactive.launch(self, **options)

@@ -1,0 +1,384 @@
+"""`Core`: how worlds start, step and reset. There is no other stepping in this package.
+
+    core = Core(make_engine("native", scene, 64), Rules.of_scene(scene).with_goal("(cooked fish_0)"))
+    batch = core.start(seed=0)
+    batch, status = core.step(batch)
+    batch = core.reset(batch, status.holds)
+
+A control step is, in this order: the robots' controllers, physics, the view of it, extended states and the goal, what
+slicing moves, guards, clocks. It is the same for every engine. On a pure engine (see `ig2mj.engine.base`) the methods
+are compiled; on the native one they work on the engine's worlds in place, and states are only computed where something
+can have changed (`ig2mj.worlds.lazy`). Either way a batch that was given to a method is used up: go on with the one
+that it returns.
+
+`step_fn`, `reset_fn` and `start_fn` are the same functions, not compiled: call them inside your own `jax.jit` or
+`lax.scan` on a pure engine, or directly on any.
+
+The faces are `Worlds` (a batch, by names), `DebugWorlds` (watched), `ShardedWorlds` (several devices) and
+`ig2mj.Simulation` (one world).
+
+Axes: W worlds, O objects, n numbers of an action.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt
+
+from ig2mj.agents.base import Controller
+from ig2mj.engine.base import Engine, Physics, Snapshot, Write
+from ig2mj.engine.health import Health
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.predicates.compile import GoalStatus
+from ig2mj.states.world import ExtendedStates, Swap, WorldState
+from ig2mj.worlds import guards
+from ig2mj.worlds.batch import Batch
+from ig2mj.worlds.lazy.stepper import StateStepper
+from ig2mj.worlds.pool import Pool
+from ig2mj.worlds.random_streams import episode_keys, pick_rows
+from ig2mj.worlds.rules import Outcome, Rules
+
+Policy = Callable[[Batch, Any], tuple[Float[Array, "W n"] | None, Any]]
+"""The next step's action (or controls) from the batch and a carry, and the new carry. Pure."""
+
+
+class Core:
+    """Start, step and reset of the worlds of one engine.
+
+    Attributes:
+      advance: see `advance_fn`.
+      engine: physics. rules: states and goal; None: physics only. controllers: of the scene's robots.
+      action_low, action_high: [n] limits of an action, of all robots one after the other.
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        rules: Rules | None = None,
+        pool: Pool | None = None,
+        controllers: Sequence[Controller] = (),
+    ):
+        """Binds an engine to the rules of its scene.
+
+        Args:
+          pool: what episodes start from; None: from where the engine's `reset` stands, with `rules.initial`.
+          controllers: one for each robot of the scene, in the order of its actuators; actions go through them. Without
+            any, an action is MuJoCo's controls.
+        """
+        self.engine, self.rules, self.controllers = engine, rules, tuple(controllers)
+        self.action_low = np.concatenate([np.zeros(0), *(c.action_low for c in self.controllers)])
+        self.action_high = np.concatenate([np.zeros(0), *(c.action_high for c in self.controllers)])
+        self._given_pool = pool
+        self._physics_step = engine.step  # a world at rest steps in under 2 us: even looking up a name counts
+        self._control = jax.jit(self._control_fn)
+        self._count, self._fresh = jax.jit(self._count_fn), jax.jit(_fresh)
+        self._draw = jax.jit(_draw, static_argnums=4)
+        if engine.pure:
+            self.advance = jax.jit(self.advance_fn)
+            self._step = jax.jit(self.step_fn, donate_argnums=0)
+            self._reset = jax.jit(self.reset_fn, donate_argnums=0)
+            self._rollout = jax.jit(self._scanned, static_argnums=(2, 3), donate_argnums=(0, 1))
+            self._begin = jax.jit(self._episode_0, donate_argnums=0)
+            self._write, self._load = jax.jit(self.write_fn, donate_argnums=0), jax.jit(self.load_fn, donate_argnums=0)
+            self._react = rules.step if rules is not None else self._no_rules
+            self._if_any, self._index = _cond_any, jnp.asarray
+        else:
+            self.advance, self._step, self._reset = self.advance_fn, self.step_fn, self.reset_fn
+            self._rollout, self._begin = self._looped, self._episode_0
+            self._write, self._load = self.write_fn, self.load_fn
+            self._react = StateStepper.of(rules, engine.num_worlds).step if rules is not None else self._no_rules
+            self._if_any, self._index = _call, np.asarray
+        self._no_status = GoalStatus.empty(engine.num_worlds)
+
+    # A control step.
+
+    def step(self, batch: Batch, action: Float[Array, "W n"] | None = None) -> tuple[Batch, GoalStatus]:
+        """One control step of every world.
+
+        Args:
+          action: of the robots, clipped to `action_low` and `action_high`; without controllers, MuJoCo's controls
+            [W, nu]. None: what was asked of the actuators last stays.
+
+        Returns:
+          The batch after the step, and what the goal says of it: of the states after it, and of the view before slicing
+          moved anything.
+        """
+        return self._step(batch, action)
+
+    def step_fn(self, batch: Batch, action: Float[Array, "W n"] | None = None) -> tuple[Batch, GoalStatus]:
+        """`step`, not compiled."""
+        world, controllers = batch.world, batch.controllers
+        if self.controllers and action is not None:
+            action, controllers = self._control(action, world.view, controllers)
+        physics, view, states, status = self.advance_fn(world.physics, world.states, action)
+        step, time, flags, troubles = self._count(
+            world.step,
+            world.time,
+            batch.flags,
+            batch.troubles,
+            self.engine.health(physics),
+            view.object_com,
+            self.floor,
+        )
+        world = WorldState(physics=physics, view=view, states=states, key=world.key, step=step, time=time)
+        batch = dataclasses.replace(batch, world=world, controllers=controllers, flags=flags, troubles=troubles)
+        return batch, status
+
+    def advance_fn(
+        self, physics: Physics, states: ExtendedStates, ctrl: Float[Array, "W nu"] | None = None
+    ) -> tuple[Physics, PhysicsView, ExtendedStates, GoalStatus]:
+        """What of a step is not about episodes: physics, its view, the states and the goal after one control step.
+
+        `advance` is the same, compiled where that helps: for those who keep these four themselves, as `Simulation`
+        does. Of its arguments only physics is used up.
+
+        Args:
+          ctrl: MuJoCo's controls; None keeps the last ones.
+        """
+        physics, view = self._physics_step(physics, ctrl)
+        states, swap, status = self._react(states, view)
+        if swap is not None:
+            physics, view = self.teleport(physics, view, swap)
+        # What hands do to what they hold belongs here: it reads the states, and writes to physics as slicing does.
+        return physics, view, states, status
+
+    def teleport(self, physics: Physics, view: PhysicsView, swap: Swap) -> tuple[Physics, PhysicsView]:
+        """Physics and view after what slicing moves; worlds where it moves nothing keep their view."""
+        assert self.rules is not None, "without rules nothing is sliced"
+        rules, cut = self.rules, jnp.asarray(swap.mask).any(1)
+
+        def act(physics: Physics, view: PhysicsView) -> tuple[Physics, PhysicsView]:
+            physics = self.engine.write(physics, rules.teleports(swap, view))
+            now = self.engine.view(physics)
+            return physics, now if self.engine.num_worlds == 1 else _fresh(cut, now, view)
+
+        return self._if_any(cut, act, physics, view)
+
+    def rollout(self, batch: Batch, carry: Any, policy: Policy, length: int) -> tuple[Batch, Any]:
+        """`length` control steps, on a pure engine without leaving the device.
+
+        Args:
+          policy: gives each step's action. The same function object each time, or it is compiled again.
+          carry: what the policy remembers; used up, as the batch is.
+        """
+        return self._rollout(batch, carry, policy, length)
+
+    def _control_fn(
+        self, action: Float[Array, "W n"], view: PhysicsView, states: tuple[Any, ...]
+    ) -> tuple[Float[Array, "W nu"], tuple[Any, ...]]:
+        """All robots' controllers: MuJoCo's controls, and what the controllers remember."""
+        action = jnp.clip(jnp.asarray(action), self.action_low, self.action_high)
+        sizes = np.cumsum([c.action_size for c in self.controllers])[:-1]
+        asked = jnp.split(action, sizes, axis=-1)
+        done = [c.control(a, view, s) for c, a, s in zip(self.controllers, asked, states, strict=True)]
+        return jnp.concatenate([ctrl for ctrl, _ in done], axis=-1), tuple(state for _, state in done)
+
+    def _count_fn(
+        self,
+        step: Int[Array, "W"],
+        time: Float[Array, "W"],
+        flags: Int[Array, "W"],
+        troubles: Int[Array, "W K"],
+        health: Health,
+        object_com: Float[Array, "W O 3"],
+        floor: Float[Array, "O"],
+    ) -> tuple[Int[Array, "W"], Float[Array, "W"], Int[Array, "W"], Int[Array, "W K"]]:
+        """Clocks and guards after a step."""
+        now = guards.check(health, object_com, floor)
+        seconds = jnp.float32(self.engine.substeps * self.engine.timestep)
+        return step + 1, time + seconds, flags | now, troubles + guards.count(now & ~flags)
+
+    def _no_rules(self, states: ExtendedStates, view: PhysicsView) -> Outcome:
+        return Outcome(states, None, self._no_status)
+
+    def _scanned(self, batch: Batch, carry: Any, policy: Policy, length: int) -> tuple[Batch, Any]:
+        def body(state: tuple[Batch, Any], _: None) -> tuple[tuple[Batch, Any], None]:
+            batch, carry = state
+            action, carry = policy(batch, carry)
+            return (self.step_fn(batch, action)[0], carry), None
+
+        return jax.lax.scan(body, (batch, carry), None, length)[0]
+
+    def _looped(self, batch: Batch, carry: Any, policy: Policy, length: int) -> tuple[Batch, Any]:
+        for _ in range(length):
+            action, carry = policy(batch, carry)
+            batch, _ = self.step_fn(batch, action)
+        return batch, carry
+
+    # Episodes.
+
+    def start(self, seed: int | Int[Array, ""] = 0, first: int | Int[Array, ""] = 0) -> Batch:
+        """All worlds at the start of their first episode.
+
+        Args:
+          seed: of everything random. first: global number of the first world, where a batch is a part of all worlds.
+        """
+        return self._begin(self.engine.reset(), seed, first)
+
+    def start_fn(self, seed: int | Int[Array, ""] = 0, first: int | Int[Array, ""] = 0) -> Batch:
+        """`start`, not compiled."""
+        return self._episode_0(self.engine.reset(), seed, first)
+
+    def reset(self, batch: Batch, mask: Bool[Array, "W"]) -> Batch:
+        """Starts a new episode in the masked worlds, from a random row of the pool."""
+        return self._reset(batch, mask)
+
+    def reset_fn(self, batch: Batch, mask: Bool[Array, "W"]) -> Batch:
+        """`reset`, not compiled."""
+        world = batch.world
+        episode, key, row = self._draw(batch.seed, batch.number, batch.episode, mask, self.pool.size)
+        rows = self.pool.rows(self._index(row))
+        physics = self.engine.load(world.physics, rows.physics, mask)
+        started = (rows.states, key, jnp.zeros_like(world.step), jnp.zeros_like(world.time), self._controllers())
+        going = (world.states, world.key, world.step, world.time, batch.controllers)
+        states, key, step, time, controllers = self._fresh(mask, started, going)
+        view = self.engine.view(physics)
+        world = WorldState(physics=physics, view=view, states=states, key=key, step=step, time=time)
+        flags = jnp.where(mask, 0, batch.flags)
+        return dataclasses.replace(batch, world=world, controllers=controllers, episode=episode, flags=flags)
+
+    def _episode_0(self, physics: Physics, seed: int | Int[Array, ""], first: int | Int[Array, ""]) -> Batch:
+        """The start, from physics in any state."""
+        count = self.engine.num_worlds
+        nothing = jnp.zeros(count, jnp.int32)
+        world = WorldState(
+            physics=physics,
+            view=self.engine.view(physics),
+            states=self.pool.rows(np.zeros(count, int)).states,
+            key=jnp.zeros((count, 2), jnp.uint32),
+            step=nothing,
+            time=jnp.zeros(count, jnp.float32),
+        )
+        batch = Batch(
+            world=world,
+            controllers=self._controllers(),
+            number=first + jnp.arange(count, dtype=jnp.int32),
+            seed=jnp.asarray(seed, jnp.int32),
+            episode=nothing - 1,
+            flags=nothing,
+            troubles=jnp.zeros((count, len(guards.Flag)), jnp.int32),
+        )
+        return self.reset_fn(batch, jnp.ones(count, bool))
+
+    # Changes from outside.
+
+    def write(self, batch: Batch, write: Write) -> Batch:
+        """Moves objects and joints, or switches grasps, without passing time."""
+        return self._write(batch, write)
+
+    def write_fn(self, batch: Batch, write: Write) -> Batch:
+        """`write`, not compiled."""
+        return self._with(batch, self.engine.write(batch.world.physics, write), batch.world.states)
+
+    def load(
+        self,
+        batch: Batch,
+        physics: Snapshot,
+        states: ExtendedStates | None = None,
+        mask: Bool[Array, "W"] | None = None,
+    ) -> Batch:
+        """Replaces worlds by saved ones; clocks, keys and flags stay.
+
+        Args:
+          physics: of every world (`engine.snapshot`), or of one without the world axis.
+          states: of every world; None: they stay, too.
+          mask: the worlds to replace; None: all.
+        """
+        return self._load(batch, physics, states, mask)
+
+    def load_fn(
+        self,
+        batch: Batch,
+        physics: Snapshot,
+        states: ExtendedStates | None = None,
+        mask: Bool[Array, "W"] | None = None,
+    ) -> Batch:
+        """`load`, not compiled."""
+        world = batch.world
+        if states is None:
+            states = world.states
+        elif mask is not None:
+            states = self._fresh(mask, states, world.states)
+        return self._with(batch, self.engine.load(world.physics, physics, mask), states)
+
+    def _with(self, batch: Batch, physics: Physics, states: ExtendedStates) -> Batch:
+        view = self.engine.view(physics)
+        return dataclasses.replace(
+            batch, world=dataclasses.replace(batch.world, physics=physics, view=view, states=states)
+        )
+
+    @functools.cached_property
+    def pool(self) -> Pool:
+        """What episodes start from."""
+        pool = self._given_pool
+        if pool is None:
+            states: Any = self.rules.initial if self.rules is not None else None
+            pool = Pool(physics=jax.tree.map(lambda a: a[None], self._scene_start[0]), states=states)
+        if not self.engine.pure:
+            return jax.tree.map(np.asarray, pool)
+        with jax.ensure_compile_time_eval():  # may be asked for first while a step is traced
+            return jax.device_put(jax.tree.map(_single_precision, pool))
+
+    @functools.cached_property
+    def floor(self) -> Float[np.ndarray, "O"]:
+        """Metres: the height below which each object has left the house."""
+        return guards.lowest_support(self._scene_start[1], self.engine.tables.object_fixed)
+
+    @functools.cached_property
+    def _scene_start(self) -> tuple[Snapshot, PhysicsView]:
+        """One world where the engine's reset puts it."""
+        with jax.ensure_compile_time_eval():
+            physics = self.engine.reset()
+            return self.engine.export(physics, 0), jax.tree.map(lambda a: np.asarray(a[:1]), self.engine.view(physics))
+
+    def _controllers(self) -> tuple[Any, ...]:
+        return tuple(c.initial(self.engine.num_worlds) for c in self.controllers)
+
+    # What went wrong.
+
+    def metrics(self, batch: Batch) -> dict[str, int]:
+        """How often worlds were flagged so far, by flag, and episodes begun. On the host."""
+        return {"episodes": int(np.asarray(batch.episode).sum()) + len(batch.number), **guards.metrics(batch.troubles)}
+
+    def raise_flagged(self, batch: Batch) -> None:
+        """Raises EngineError for the first flagged world, naming world, flag and the setting to raise. On the host."""
+        guards.raise_first(batch.flags, self.engine.health(batch.world.physics).overflow)
+
+
+def _draw(
+    seed: Int[Array, ""], number: Int[Array, "W"], episode: Int[Array, "W"], mask: Bool[Array, "W"], rows: int
+) -> tuple[Int[Array, "W"], UInt[Array, "W 2"], Int[Array, "W"]]:
+    """Episodes after a reset of the masked worlds, their keys, and the row of the pool that each begins with."""
+    episode = jnp.where(mask, episode + 1, episode)
+    key = episode_keys(seed, number, episode)
+    return episode, key, pick_rows(key, rows)
+
+
+def _fresh(mask: Bool[Array, "W"], started: Any, going: Any) -> Any:
+    """What has started in the masked worlds, and what goes on in the others; any pytree over worlds."""
+
+    def choose(new: Array, old: Array) -> Array:
+        return jnp.where(mask.reshape((-1,) + (1,) * (old.ndim - 1)), new, old)
+
+    return jax.tree.map(choose, started, going)
+
+
+def _cond_any(chosen: Bool[Array, "W"], act: Callable, *operands: Any) -> Any:
+    return jax.lax.cond(chosen.any(), act, lambda *same: same, *operands)
+
+
+def _call(chosen: Bool[Array, "W"], act: Callable, *operands: Any) -> Any:
+    """`_cond_any` beside the native engine, where nothing is asked for unless a world is chosen."""
+    return act(*operands)
+
+
+def _single_precision(array: Array) -> np.ndarray:
+    values = np.asarray(array)
+    return values.astype(np.float32) if values.dtype == np.float64 else values

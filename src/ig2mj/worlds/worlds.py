@@ -1,0 +1,98 @@
+"""`Worlds`: a batch of worlds of one home, to train in.
+
+    worlds = ig2mj.Worlds("small_home", 1024, goal="(cooked fish_0)")
+    batch = worlds.start(seed=0)
+    batch, status = worlds.step(batch)             # status.holds: Bool[1024]
+    batch = worlds.reset(batch, status.holds)
+
+Axes: W worlds, n numbers of an action.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+import jax
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.agents.base import Controller, Robot
+from ig2mj.engine.base import Engine
+from ig2mj.engine.registry import make_engine
+from ig2mj.engine.view import Array
+from ig2mj.predicates.compile import CompiledExpression, GoalStatus
+from ig2mj.predicates.logic import Expression
+from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.states.model import DEFAULTS
+from ig2mj.states.options import StateOptions
+from ig2mj.worlds.batch import Batch
+from ig2mj.worlds.core import Core
+from ig2mj.worlds.pool import Pool
+from ig2mj.worlds.rules import Rules
+
+
+class Worlds:
+    """Many worlds of a home; a core with a scene.
+
+    Attributes:
+      scene: the household. core: what steps it, with `step_fn`, `reset_fn` and `rollout` for programs of your own.
+    """
+
+    def __init__(
+        self,
+        scene: Scene | str | os.PathLike,
+        num_worlds: int = 1,
+        engine: str | Engine | None = None,
+        *,
+        goal: CompiledExpression | Expression | str | None = None,
+        pool: Pool | None = None,
+        states: StateOptions | None = DEFAULTS,
+        **options: Any,
+    ):
+        """Makes the worlds; `start` puts them at their start.
+
+        Args:
+          scene: a loaded scene, or what `load_scene` takes. The robots it was loaded with take the actions of `step`.
+          engine: an engine's name, or an engine made for this scene with `num_worlds` worlds; None: "warp" where JAX
+            has a GPU, else "native".
+          goal: evaluated at the end of every step. Without one, nothing is ever reached.
+          pool: what episodes start from (`ig2mj pool` makes one); None: from the scene's initial state.
+          states: how extended states behave; None: physics only.
+          options: go to the engine, where it is given by name.
+
+        Raises:
+          EngineError: the engine cannot run this scene. Others: as `load_scene` and `compile_expression`.
+        """
+        self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
+        if engine is None:
+            engine = "warp" if jax.default_backend() == "gpu" else "native"
+        if isinstance(engine, str):
+            engine = make_engine(engine, self.scene, num_worlds, **options)
+        rules = Rules.of_scene(self.scene, states).with_goal(goal) if states is not None else None
+        self.core = Core(engine, rules, pool, controllers_of(self.scene))
+
+    @property
+    def engine(self) -> Engine:
+        """What steps physics."""
+        return self.core.engine
+
+    def start(self, seed: int | Int[Array, ""] = 0) -> Batch:
+        """All worlds at the start of their first episode; `seed` of everything random."""
+        return self.core.start(seed)
+
+    def step(self, batch: Batch, action: Float[Array, "W n"] | None = None) -> tuple[Batch, GoalStatus]:
+        """One control step of every world, and what the goal says of it; see `Core.step`. Uses up the batch."""
+        return self.core.step(batch, action)
+
+    def reset(self, batch: Batch, mask: Bool[Array, "W"]) -> Batch:
+        """Starts a new episode in the masked worlds, from a random row of the pool. Uses up the batch."""
+        return self.core.reset(batch, mask)
+
+    def metrics(self, batch: Batch) -> dict[str, int]:
+        """Episodes begun, and how often worlds were flagged, by `guards.Flag`. On the host."""
+        return self.core.metrics(batch)
+
+
+def controllers_of(scene: Scene) -> list[Controller]:
+    """The controllers of the scene's robots, in the order of its agents."""
+    return [agent.controller(scene.tables, k) for k, agent in enumerate(scene.agents) if isinstance(agent, Robot)]
