@@ -8,10 +8,16 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from ig2mj.scene.scene import Scene, load_scene
     from ig2mj.simulation import Simulation
+    from ig2mj.worlds import Worlds
 
-__all__ = ["Scene", "Simulation", "load_scene"]
+__all__ = ["Scene", "Simulation", "Worlds", "load_scene"]
 
-_HOME = {"Scene": "ig2mj.scene.scene", "load_scene": "ig2mj.scene.scene", "Simulation": "ig2mj.simulation"}
+_HOME = {
+    "Scene": "ig2mj.scene.scene",
+    "load_scene": "ig2mj.scene.scene",
+    "Simulation": "ig2mj.simulation",
+    "Worlds": "ig2mj.worlds",
+}
 
 
 def __getattr__(name: str) -> Any:

@@ -118,9 +118,14 @@ def _with_model(scene: Scene, model: mujoco.MjModel, file: str | os.PathLike) ->
     bodies, geoms = len(scene.tables.body_object), len(scene.tables.geom_object)
     if model.nbody < bodies or model.ngeom < geoms or (model.geom_type[:geoms] != scene.model.geom_type[:geoms]).any():
         raise InputError(file, "was dumped from another version of the scene", mend="give the scene it was dumped from")
+    more = (0, model.nbody - bodies)
+    of_bodies = {
+        name: np.pad(getattr(scene.tables, name), more, constant_values=-1)
+        for name in ("body_object", "body_agent", "body_hand")
+    }
     tables = dataclasses.replace(
         scene.tables,
-        body_object=np.pad(scene.tables.body_object, (0, model.nbody - bodies), constant_values=-1),
+        **of_bodies,
         geom_object=np.pad(scene.tables.geom_object, (0, model.ngeom - geoms), constant_values=-1),
     )
     return dataclasses.replace(scene, model=model, tables=tables)

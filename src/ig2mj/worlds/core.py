@@ -23,14 +23,13 @@ Axes: W worlds, O objects, n numbers of an action.
 from __future__ import annotations
 
 import dataclasses
-import functools
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, Int, UInt
+from jaxtyping import Bool, Float, Int
 
 from ig2mj.agents.base import Controller
 from ig2mj.engine.base import Engine, Physics, Snapshot, Write
@@ -42,11 +41,14 @@ from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.lazy.stepper import StateStepper
 from ig2mj.worlds.pool import Pool
-from ig2mj.worlds.random_streams import episode_keys, pick_rows
 from ig2mj.worlds.rules import Outcome, Rules
+from ig2mj.worlds.starts import Starts, chosen
 
 Policy = Callable[[Batch, Any], tuple[Float[Array, "W n"] | None, Any]]
 """The next step's action (or controls) from the batch and a carry, and the new carry. Pure."""
+
+States = Any
+"""`ExtendedStates`; None where only physics is stepped."""
 
 
 class Core:
@@ -54,7 +56,8 @@ class Core:
 
     Attributes:
       advance: see `advance_fn`.
-      engine: physics. rules: states and goal; None: physics only. controllers: of the scene's robots.
+      engine: physics. rules: states and goal. controllers: of the scene's robots. starts: what
+        episodes start from.
       action_low, action_high: [n] limits of an action, of all robots one after the other.
     """
 
@@ -68,6 +71,7 @@ class Core:
         """Binds an engine to the rules of its scene.
 
         Args:
+          rules: states and goal; None: physics only, which `advance` alone can step.
           pool: what episodes start from; None: from where the engine's `reset` stands, with `rules.initial`.
           controllers: one for each robot of the scene, in the order of its actuators; actions go through them. Without
             any, an action is MuJoCo's controls.
@@ -75,11 +79,10 @@ class Core:
         self.engine, self.rules, self.controllers = engine, rules, tuple(controllers)
         self.action_low = np.concatenate([np.zeros(0), *(c.action_low for c in self.controllers)])
         self.action_high = np.concatenate([np.zeros(0), *(c.action_high for c in self.controllers)])
-        self._given_pool = pool
+        self.starts = Starts(engine, rules.initial if rules is not None else None, pool)
         self._physics_step = engine.step  # a world at rest steps in under 2 us: even looking up a name counts
         self._control = jax.jit(self._control_fn)
-        self._count, self._fresh = jax.jit(self._count_fn), jax.jit(_fresh)
-        self._draw = jax.jit(_draw, static_argnums=4)
+        self._count, self._chosen = jax.jit(self._count_fn), jax.jit(chosen)
         if engine.pure:
             self.advance = jax.jit(self.advance_fn)
             self._step = jax.jit(self.step_fn, donate_argnums=0)
@@ -118,22 +121,15 @@ class Core:
         if self.controllers and action is not None:
             action, controllers = self._control(action, world.view, controllers)
         physics, view, states, status = self.advance_fn(world.physics, world.states, action)
-        step, time, flags, troubles = self._count(
-            world.step,
-            world.time,
-            batch.flags,
-            batch.troubles,
-            self.engine.health(physics),
-            view.object_com,
-            self.floor,
-        )
+        clocks = (world.step, world.time, batch.flags, batch.troubles)
+        step, time, flags, troubles = self._count(*clocks, self.engine.health(physics), view.object_com)
         world = WorldState(physics=physics, view=view, states=states, key=world.key, step=step, time=time)
         batch = dataclasses.replace(batch, world=world, controllers=controllers, flags=flags, troubles=troubles)
         return batch, status
 
     def advance_fn(
-        self, physics: Physics, states: ExtendedStates, ctrl: Float[Array, "W nu"] | None = None
-    ) -> tuple[Physics, PhysicsView, ExtendedStates, GoalStatus]:
+        self, physics: Physics, states: States, ctrl: Float[Array, "W nu"] | None = None
+    ) -> tuple[Physics, PhysicsView, States, GoalStatus]:
         """What of a step is not about episodes: physics, its view, the states and the goal after one control step.
 
         `advance` is the same, compiled where that helps: for those who keep these four themselves, as `Simulation`
@@ -157,7 +153,7 @@ class Core:
         def act(physics: Physics, view: PhysicsView) -> tuple[Physics, PhysicsView]:
             physics = self.engine.write(physics, rules.teleports(swap, view))
             now = self.engine.view(physics)
-            return physics, now if self.engine.num_worlds == 1 else _fresh(cut, now, view)
+            return physics, now if self.engine.num_worlds == 1 else chosen(cut, now, view)
 
         return self._if_any(cut, act, physics, view)
 
@@ -188,14 +184,13 @@ class Core:
         troubles: Int[Array, "W K"],
         health: Health,
         object_com: Float[Array, "W O 3"],
-        floor: Float[Array, "O"],
     ) -> tuple[Int[Array, "W"], Float[Array, "W"], Int[Array, "W"], Int[Array, "W K"]]:
         """Clocks and guards after a step."""
-        now = guards.check(health, object_com, floor)
+        now = guards.check(health, object_com, self.starts.floor)
         seconds = jnp.float32(self.engine.substeps * self.engine.timestep)
         return step + 1, time + seconds, flags | now, troubles + guards.count(now & ~flags)
 
-    def _no_rules(self, states: ExtendedStates, view: PhysicsView) -> Outcome:
+    def _no_rules(self, states: States, view: PhysicsView) -> Outcome:
         return Outcome(states, None, self._no_status)
 
     def _scanned(self, batch: Batch, carry: Any, policy: Policy, length: int) -> tuple[Batch, Any]:
@@ -233,12 +228,12 @@ class Core:
     def reset_fn(self, batch: Batch, mask: Bool[Array, "W"]) -> Batch:
         """`reset`, not compiled."""
         world = batch.world
-        episode, key, row = self._draw(batch.seed, batch.number, batch.episode, mask, self.pool.size)
-        rows = self.pool.rows(self._index(row))
+        episode, key, row = self.starts.draw(batch.seed, batch.number, batch.episode, mask)
+        rows = self.starts.pool.rows(self._index(row))
         physics = self.engine.load(world.physics, rows.physics, mask)
         started = (rows.states, key, jnp.zeros_like(world.step), jnp.zeros_like(world.time), self._controllers())
         going = (world.states, world.key, world.step, world.time, batch.controllers)
-        states, key, step, time, controllers = self._fresh(mask, started, going)
+        states, key, step, time, controllers = self._chosen(mask, started, going)
         view = self.engine.view(physics)
         world = WorldState(physics=physics, view=view, states=states, key=key, step=step, time=time)
         flags = jnp.where(mask, 0, batch.flags)
@@ -251,7 +246,7 @@ class Core:
         world = WorldState(
             physics=physics,
             view=self.engine.view(physics),
-            states=self.pool.rows(np.zeros(count, int)).states,
+            states=self.starts.pool.rows(np.zeros(count, int)).states,
             key=jnp.zeros((count, 2), jnp.uint32),
             step=nothing,
             time=jnp.zeros(count, jnp.float32),
@@ -305,7 +300,7 @@ class Core:
         if states is None:
             states = world.states
         elif mask is not None:
-            states = self._fresh(mask, states, world.states)
+            states = self._chosen(mask, states, world.states)
         return self._with(batch, self.engine.load(world.physics, physics, mask), states)
 
     def _with(self, batch: Batch, physics: Physics, states: ExtendedStates) -> Batch:
@@ -313,30 +308,6 @@ class Core:
         return dataclasses.replace(
             batch, world=dataclasses.replace(batch.world, physics=physics, view=view, states=states)
         )
-
-    @functools.cached_property
-    def pool(self) -> Pool:
-        """What episodes start from."""
-        pool = self._given_pool
-        if pool is None:
-            states: Any = self.rules.initial if self.rules is not None else None
-            pool = Pool(physics=jax.tree.map(lambda a: a[None], self._scene_start[0]), states=states)
-        if not self.engine.pure:
-            return jax.tree.map(np.asarray, pool)
-        with jax.ensure_compile_time_eval():  # may be asked for first while a step is traced
-            return jax.device_put(jax.tree.map(_single_precision, pool))
-
-    @functools.cached_property
-    def floor(self) -> Float[np.ndarray, "O"]:
-        """Metres: the height below which each object has left the house."""
-        return guards.lowest_support(self._scene_start[1], self.engine.tables.object_fixed)
-
-    @functools.cached_property
-    def _scene_start(self) -> tuple[Snapshot, PhysicsView]:
-        """One world where the engine's reset puts it."""
-        with jax.ensure_compile_time_eval():
-            physics = self.engine.reset()
-            return self.engine.export(physics, 0), jax.tree.map(lambda a: np.asarray(a[:1]), self.engine.view(physics))
 
     def _controllers(self) -> tuple[Any, ...]:
         return tuple(c.initial(self.engine.num_worlds) for c in self.controllers)
@@ -352,33 +323,10 @@ class Core:
         guards.raise_first(batch.flags, self.engine.health(batch.world.physics).overflow)
 
 
-def _draw(
-    seed: Int[Array, ""], number: Int[Array, "W"], episode: Int[Array, "W"], mask: Bool[Array, "W"], rows: int
-) -> tuple[Int[Array, "W"], UInt[Array, "W 2"], Int[Array, "W"]]:
-    """Episodes after a reset of the masked worlds, their keys, and the row of the pool that each begins with."""
-    episode = jnp.where(mask, episode + 1, episode)
-    key = episode_keys(seed, number, episode)
-    return episode, key, pick_rows(key, rows)
+def _cond_any(mask: Bool[Array, "W"], act: Callable[..., Any], *operands: Any) -> Any:
+    return jax.lax.cond(mask.any(), act, lambda *same: same, *operands)
 
 
-def _fresh(mask: Bool[Array, "W"], started: Any, going: Any) -> Any:
-    """What has started in the masked worlds, and what goes on in the others; any pytree over worlds."""
-
-    def choose(new: Array, old: Array) -> Array:
-        return jnp.where(mask.reshape((-1,) + (1,) * (old.ndim - 1)), new, old)
-
-    return jax.tree.map(choose, started, going)
-
-
-def _cond_any(chosen: Bool[Array, "W"], act: Callable, *operands: Any) -> Any:
-    return jax.lax.cond(chosen.any(), act, lambda *same: same, *operands)
-
-
-def _call(chosen: Bool[Array, "W"], act: Callable, *operands: Any) -> Any:
+def _call(mask: Bool[Array, "W"], act: Callable[..., Any], *operands: Any) -> Any:
     """`_cond_any` beside the native engine, where nothing is asked for unless a world is chosen."""
     return act(*operands)
-
-
-def _single_precision(array: Array) -> np.ndarray:
-    values = np.asarray(array)
-    return values.astype(np.float32) if values.dtype == np.float64 else values

@@ -94,10 +94,10 @@ class DebugWorlds:
             said.append(f"body '{self._first_lost(row)}' has no finite position or velocity")
         if flags & guards.Flag.FELL:
             height = np.asarray(batch.world.view.object_com)[world, :, 2]
-            below = height - self.core.floor
+            below = height - self.core.starts.floor
             lowest = int(np.nanargmin(below))
             name = scene.object_names[lowest]
-            said.append(f"'{name}' at z = {height[lowest]:.3g} m, limit {self.core.floor[lowest]:.3g} m")
+            said.append(f"'{name}' at z = {height[lowest]:.3g} m, limit {self.core.starts.floor[lowest]:.3g} m")
         if flags & guards.Flag.TOO_FAST:
             speed = float(np.asarray(engine.health(physics).top_speed)[world])
             said.append(f"{speed:.3g} m/s, limit {guards.TOP_SPEED:g} m/s")

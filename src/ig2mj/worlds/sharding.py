@@ -65,7 +65,7 @@ class ShardedWorlds:
         self._sharding = NamedSharding(Mesh(np.array(self.devices), (AXIS,)), PartitionSpec(AXIS))
         self._threads = ThreadPoolExecutor(len(self.devices), "ig2mj-device")
         self._start = jax.jit(self.local.start_fn)
-        _ = self.local.pool, self.local.floor  # made here, once, and not on every device's thread
+        _ = self.local.starts.pool, self.local.starts.floor  # made here, once, and not on every device's thread
 
     def start(self, seed: int = 0) -> Shards:
         """All worlds at the start of episode 0."""

@@ -46,7 +46,7 @@ class Worlds:
         *,
         goal: CompiledExpression | Expression | str | None = None,
         pool: Pool | None = None,
-        states: StateOptions | None = DEFAULTS,
+        states: StateOptions = DEFAULTS,
         **options: Any,
     ):
         """Makes the worlds; `start` puts them at their start.
@@ -57,7 +57,7 @@ class Worlds:
             has a GPU, else "native".
           goal: evaluated at the end of every step. Without one, nothing is ever reached.
           pool: what episodes start from (`ig2mj pool` makes one); None: from the scene's initial state.
-          states: how extended states behave; None: physics only.
+          states: how extended states behave.
           options: go to the engine, where it is given by name.
 
         Raises:
@@ -68,7 +68,7 @@ class Worlds:
             engine = "warp" if jax.default_backend() == "gpu" else "native"
         if isinstance(engine, str):
             engine = make_engine(engine, self.scene, num_worlds, **options)
-        rules = Rules.of_scene(self.scene, states).with_goal(goal) if states is not None else None
+        rules = Rules.of_scene(self.scene, states).with_goal(goal)
         self.core = Core(engine, rules, pool, controllers_of(self.scene))
 
     @property

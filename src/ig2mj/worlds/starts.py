@@ -1,0 +1,81 @@
+"""`Starts`: what episodes of an engine's worlds start from, and the random streams that pick it.
+
+Axes: W worlds, O objects.
+"""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int, UInt
+
+from ig2mj.engine.base import Engine, Snapshot
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.worlds import guards
+from ig2mj.worlds.pool import Pool
+from ig2mj.worlds.random_streams import episode_keys, pick_rows
+
+
+class Starts:
+    """Rows to start from, and the floor below which an object has left the house. Made when they are first needed."""
+
+    def __init__(self, engine: Engine, initial: Any, pool: Pool | None):
+        """`initial`: states of one world, for where no pool is given: then all start where the engine's reset does."""
+        self._engine, self._initial, self._given = engine, initial, pool
+        self._draw = jax.jit(_draw, static_argnums=4)
+
+    @functools.cached_property
+    def pool(self) -> Pool:
+        """What episodes start from, as the engine can load it best."""
+        pool = self._given
+        if pool is None:
+            pool = Pool(physics=jax.tree.map(lambda a: a[None], self._scene[0]), states=self._initial)
+        if not self._engine.pure:
+            return jax.tree.map(np.asarray, pool)
+        with jax.ensure_compile_time_eval():  # may be asked for first while a step is traced
+            return jax.device_put(jax.tree.map(_single_precision, pool))
+
+    @functools.cached_property
+    def floor(self) -> Float[np.ndarray, "O"]:
+        """Metres: the height below which each object has left the house."""
+        return guards.lowest_support(self._scene[1], self._engine.tables.object_fixed)
+
+    @functools.cached_property
+    def _scene(self) -> tuple[Snapshot, PhysicsView]:
+        """One world where the engine's reset puts it."""
+        with jax.ensure_compile_time_eval():
+            physics = self._engine.reset()
+            view = jax.tree.map(lambda a: np.asarray(a[:1]), self._engine.view(physics))
+            return self._engine.export(physics, 0), view
+
+    def draw(
+        self, seed: Int[Array, ""], number: Int[Array, "W"], episode: Int[Array, "W"], mask: Bool[Array, "W"]
+    ) -> tuple[Int[Array, "W"], UInt[Array, "W 2"], Int[Array, "W"]]:
+        """Episodes after a reset of the masked worlds, their keys, and the row of the pool that each begins with."""
+        return self._draw(seed, number, episode, mask, self.pool.size)
+
+
+def chosen(mask: Bool[Array, "W"], these: Any, others: Any) -> Any:
+    """`these` in the masked worlds, `others` elsewhere; pytrees of arrays over worlds."""
+
+    def choose(this: Array, other: Array) -> Array:
+        return jnp.where(mask.reshape((-1,) + (1,) * (other.ndim - 1)), this, other)
+
+    return jax.tree.map(choose, these, others)
+
+
+def _draw(
+    seed: Int[Array, ""], number: Int[Array, "W"], episode: Int[Array, "W"], mask: Bool[Array, "W"], rows: int
+) -> tuple[Int[Array, "W"], UInt[Array, "W 2"], Int[Array, "W"]]:
+    episode = jnp.where(mask, episode + 1, episode)
+    key = episode_keys(seed, number, episode)
+    return episode, key, pick_rows(key, rows)
+
+
+def _single_precision(array: Array) -> np.ndarray:
+    values = np.asarray(array)
+    return values.astype(np.float32) if values.dtype == np.float64 else values
