@@ -166,6 +166,10 @@ class Simulation:
 
     # Time.
 
+    def prepare(self) -> None:
+        """Compiles what the first step needs, without taking it."""
+        self.core.prepare(self.physics, self._states_or_none)
+
     def reset(self) -> PhysicsView:
         """Back to the scene's initial state."""
         self.physics = self.engine.load(self.physics, self._initial)

@@ -41,14 +41,11 @@ from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.lazy.stepper import StateStepper
 from ig2mj.worlds.pool import Pool
-from ig2mj.worlds.rules import Outcome, Rules
+from ig2mj.worlds.rules import Outcome, Rules, States
 from ig2mj.worlds.starts import Starts, chosen
 
 Policy = Callable[[Batch, Any], tuple[Float[Array, "W n"] | None, Any]]
 """The next step's action (or controls) from the batch and a carry, and the new carry. Pure."""
-
-States = Any
-"""`ExtendedStates`; None where only physics is stepped."""
 
 
 class Core:
@@ -144,6 +141,11 @@ class Core:
             physics, view = self.teleport(physics, view, swap)
         # What hands do to what they hold belongs here: it reads the states, and writes to physics as slicing does.
         return physics, view, states, status
+
+    def prepare(self, physics: Physics, states: States) -> None:
+        """Compiles what the first step needs, without taking it, where the two can be told apart: natively."""
+        if not self.engine.pure:
+            self._react(states, self.engine.view(physics))
 
     def teleport(self, physics: Physics, view: PhysicsView, swap: Swap) -> tuple[Physics, PhysicsView]:
         """Physics and view after what slicing moves; worlds where it moves nothing keep their view."""

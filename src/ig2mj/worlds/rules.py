@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import functools
 import weakref
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import jax.numpy as jnp
 
@@ -26,11 +26,14 @@ from ig2mj.states.relations.plan import RelationPlan
 from ig2mj.states.update import queries, update
 from ig2mj.states.world import ExtendedStates, Swap
 
+States = Any
+"""`ExtendedStates`; None where only physics is stepped."""
+
 
 class Outcome(NamedTuple):
     """What the rules make of a control step: states, teleports that slicing asks for (None: none), the goal."""
 
-    states: ExtendedStates
+    states: States
     swap: Swap | None
     status: GoalStatus
 
