@@ -1,7 +1,8 @@
 """The object library: converted models that can be added to any home when it is loaded (`load_scene(objects=...)`).
 
 One model, the first, of every category that is not fixed to a house: more of a category are copies of it. All that an
-activity may place somewhere is there; beds, sinks and cabinets belong to homes.
+activity may place somewhere is there, also what homes have fixed but BEHAVIOR places; beds, sinks and cabinets belong
+to homes.
 """
 
 from __future__ import annotations
@@ -16,11 +17,15 @@ ASSETS = "../../.."
 """From a model's folder to the meshes and textures that all homes and models share."""
 
 
+PLACED = ("car", "christmas_tree", "christmas_tree_decorated", "grill", "pool")
+"""Fixed where a home has them, but activities put them anywhere on a floor: free in the library."""
+
+
 def library_models(dataset: pathlib.Path) -> list[tuple[str, str, pathlib.Path]]:
     """(category, model, URDF) of each model of the library that the dataset holds, sorted by category."""
     found = []
     for category, entry in catalogue().items():
-        if entry.fixed:
+        if entry.fixed and category not in PLACED:
             continue
         folders = sorted(f for f in (dataset / "objects" / category).glob(f"*{category}_00") if f.is_dir())
         found += [(category, folder.name, folder / f"{folder.name}.urdf") for folder in folders]

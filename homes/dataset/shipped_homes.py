@@ -1,4 +1,4 @@
-"""The homes of the dataset: the small one and the fifteen; writing their scenes into a dataset root."""
+"""The homes of the dataset: the small one and the sixteen; writing their scenes into a dataset root."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def furnished(name: str, seed: int = 0) -> HomeInProgress:
         return small_home.furnish(seed)
     if name not in DRAWINGS:
         raise UnknownNameError("home", name, home_names())
-    return furnish_home(plan(name, seed), DRAWINGS[name].objects, seed)
+    return furnish_home(plan(name, seed), DRAWINGS[name].objects, seed, DRAWINGS[name].pieces)
 
 
 def build_homes(

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 import random
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 
 from ..plans.plan import Plan, Room
 from . import kitchen, living, sleeping, working
 from .clutter import fill
 from .kit import RoomKit
+from .kitchen import with_doors
 from .placed import Thing
 from .room import ROOMY, HomeInProgress
 from .start import lay_doormat, start_home
@@ -45,8 +47,15 @@ SMALL_SHARE = 0.8
 """The same in homes of less than ROOMY things: a kitchen without a stove is none."""
 
 
-def furnish_home(plan: Plan, objects: int, seed: int = 0) -> HomeInProgress:
-    """Furnishes a plan. objects: how many things in all, doors and windows included; fewer where nothing more fits."""
+def furnish_home(
+    plan: Plan, objects: int, seed: int = 0, pieces: Mapping[str, Sequence[str]] | None = None
+) -> HomeInProgress:
+    """Furnishes a plan.
+
+    Args:
+      objects: how many things in all, doors and windows included; fewer where nothing more fits.
+      pieces: room kind -> furniture beside what rooms of that kind have anyway.
+    """
     home = start_home(plan, random.Random(f"{seed}/{plan.name}/things"), seed=seed, limit=objects)
     openings = len(home.things.things)
     if home.roomy:
@@ -54,7 +63,7 @@ def furnish_home(plan: Plan, objects: int, seed: int = 0) -> HomeInProgress:
     share = FURNITURE_SHARE if home.roomy else SMALL_SHARE
     limit = openings + round(share * (objects - openings))
     rooms = sorted(plan.rooms, key=lambda room: ORDER.get(room.kind, 2))
-    running = [(room, RULES[room.kind](RoomKit(home, room))) for room in rooms]
+    running = [(room, _rule(home, room, pieces or {})) for room in rooms]
     turn = 0
     while running and len(home.things.things) < limit:
         for room, rule in list(running):
@@ -67,6 +76,25 @@ def furnish_home(plan: Plan, objects: int, seed: int = 0) -> HomeInProgress:
     while not home.full and next(small, None) is not None:
         pass
     return home
+
+
+FIRST = {"kitchen": 8, "bedroom": 1, "living_room": 2, "utility_room": 3}
+"""Pieces that a room of this kind gets by its rule before its extra ones; others: 0."""
+
+
+def _rule(home: HomeInProgress, room: Room, pieces: Mapping[str, Sequence[str]]) -> Iterator[Thing | None]:
+    kit = RoomKit(home, room)
+    rule = RULES[room.kind](kit)
+    yield from itertools.islice(rule, FIRST.get(room.kind, 0))
+    for category in pieces.get(room.kind, ()):
+        if category == "breakfast_table":
+            yield from kitchen.table_with_chairs(kit, category, 1)
+        else:
+            index = home.index(category, with_doors) if category == "sink" else None
+            yield kit.at_wall(
+                category, index=index, place="corner", room_before=kitchen.BEFORE, under_window=False
+            ) or kit.at_wall(category, index=index, room_before=kitchen.BEFORE)
+    yield from rule
 
 
 ORDER = {"kitchen": 0, "living_room": 1, "bathroom": 1, "bedroom": 1, "corridor": 4}

@@ -1,13 +1,15 @@
-"""The fifteen homes: drawings, sizes, and how many things each holds. 108 rooms in all.
+"""The sixteen homes: drawings, sizes, and how many things each holds. 119 rooms in all.
 
 A drawing has one letter per cell (see `plan.grid_rooms`); `columns` from the left and `rows` from the top, metres.
-Three homes have the sizes of the paper's table A.7: aspen 20, birch 60, spruce 120 objects.
+Three homes have the sizes of the paper's table A.7: aspen 20, birch 60, spruce 120 objects. Sequoia
+has what BEHAVIOR-100's activities ask for and no other home has.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import random
+from collections.abc import Mapping
 
 from .openings import make_plan
 from .plan import Plan, grid_rooms
@@ -29,6 +31,7 @@ class Drawing:
       objects: that it holds in all, doors and windows included, walls, floors and ceilings not.
       columns, rows, cells: see the module.
       open_plan, passages: pairs of letters with no wall, and with a wide opening, between them.
+      pieces: room kind -> furniture that its rooms get beside what their kind has (`furnish_home`).
     """
 
     objects: int
@@ -37,6 +40,20 @@ class Drawing:
     cells: str
     open_plan: tuple[str, ...] = ()
     passages: tuple[str, ...] = ()
+    pieces: Mapping[str, tuple[str, ...]] = dataclasses.field(default_factory=dict)
+
+
+BEHAVIOR_PIECES = {
+    "bedroom": ("bottom_cabinet", "bottom_cabinet", "bottom_cabinet"),
+    "closet": ("bottom_cabinet", "shelf"),
+    "garage": ("bottom_cabinet", "shelf"),
+    "home_office": ("bottom_cabinet",),
+    "kitchen": ("countertop", "countertop", "oven", "breakfast_table"),
+    "living_room": ("bottom_cabinet",),
+    "storage_room": ("sink", "console_table", "shelf"),
+    "utility_room": ("sink",),
+}
+"""What BEHAVIOR-100's activities ask for that no other home has."""
 
 
 DRAWINGS: dict[str, Drawing] = {
@@ -56,6 +73,15 @@ DRAWINGS: dict[str, Drawing] = {
     ),
     "rowan": Drawing(
         146, (3.4, 1.4, 4.0, 1.8), (3.1, 2.2, 2.5, 3.1), "B C L V / T C L V / S C K K / O C D D", ("KD",), ("CL",)
+    ),
+    "sequoia": Drawing(
+        150,
+        (5.0, 2.4, 3.9, 3.2, 5.4),
+        (3.8, 1.5, 4.8),
+        "B T O N S / C C C C C / G W L D K",
+        (),
+        ("CL", "LD"),
+        BEHAVIOR_PIECES,
     ),
     "spruce": Drawing(
         120, (3.6, 2.2, 2.4, 3.0, 3.6), (3.4, 1.5, 3.7), "B N T H K / C C C C K / E L L Z D", ("KD",), ("CL", "CK")

@@ -194,4 +194,4 @@ def test_rotation_becomes_the_urdfs_roll_pitch_yaw():
 def test_an_unknown_home_is_refused_with_the_near_name():
     with pytest.raises(UnknownNameError, match="aspen"):
         furnished("aspn")
-    assert len(home_names()) == 16
+    assert len(home_names()) == 17

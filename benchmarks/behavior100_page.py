@@ -1,0 +1,84 @@
+"""`docs/behavior100.md`, written from the files of `behavior100.py`."""
+
+from __future__ import annotations
+
+import json
+import pathlib
+from typing import Any
+
+TITLES = {"behavior100": "BEHAVIOR-100", "behavior1k": "BEHAVIOR-1K"}
+FEW = 4
+"""Homes that are named in a row; of more only their number is told."""
+Row = dict[str, Any]
+
+
+def write_page(page: pathlib.Path, results: pathlib.Path) -> None:
+    """Writes the page from `<results>/<suite>/<home>.json` of all suites that there are."""
+    lines = [
+        "# BEHAVIOR's activities in the homes",
+        "",
+        "Written by `python benchmarks/behavior100.py` (and `--suite behavior1k`); not by hand. An activity *fits* a",
+        "home when every object it names can be bound: to an object of the home of that synset, in the kind of room",
+        "the activity asks for and able to do what it wants of it, or to one that is added from the object library.",
+        "Each home was loaded with what is added, and start and goal of every activity that fits were compiled",
+        "against it. `ig2mj activity show NAME` tells the conditions in words and the binding. *added*: objects from",
+        "the library in the home that needs fewest (*best*). *literals*: of the goal / of the start.",
+        "",
+    ]
+    for suite, title in TITLES.items():
+        files = sorted((results / suite).glob("*.json"))
+        if files:
+            homes = [json.loads(file.read_text(encoding="utf-8")) for file in files]
+            lines += _suite(title, {home["home"]: home["activities"] for home in homes})
+    page.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
+
+
+def _suite(title: str, found: dict[str, dict[str, Row]]) -> list[str]:
+    names = sorted(next(iter(found.values())))
+    fit = {n: {home: rows[n] for home, rows in found.items() if "objects" in rows[n]} for n in names}
+    every = [(name, home, rows[name]) for home, rows in found.items() for name in names]
+    failed = [f"{name} in {home}: {row['failed']}" for name, home, row in every if "failed" in row]
+    per_home = ", ".join(f"{home} {sum('objects' in row for row in rows.values())}" for home, rows in found.items())
+    lines = [
+        f"## {title}",
+        "",
+        f"{sum(map(bool, fit.values()))} of {len(names)} activities fit one of {len(found)} homes;",
+        f"{len(failed)} times one that fits did not compile. Activities by home:",
+        f"{per_home}.",
+        *(f"- {line}" for line in failed),
+        "",
+        "| activity | objects | homes that fit | best | added | literals |",
+        "|---|--:|---|---|--:|--:|",
+    ]
+    instead: set[str] = set()
+    unable: set[str] = set()
+    for name, homes in fit.items():
+        if not homes:
+            continue
+        best = min(homes, key=lambda home, homes=homes: homes[home]["added"])
+        row = homes[best]
+        instead |= {f"{synset} ({other})" for synset, other in row["stand_ins"].items()}
+        unable |= {name} if row["without_ability"] else set()
+        shown = ", ".join(homes) if len(homes) <= FEW else f"{len(homes)} of {len(found)}"
+        literals = f"{row['goal_literals']} / {row['start_literals']}"
+        cells = (name, row["objects"], shown, best, row["added"], literals)
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    lines.append("")
+    if missing := [name for name in names if not fit[name]]:
+        lines += ["What the others lack, in the home that comes nearest:", ""]
+        lines += ["| activity | home | lacks |", "|---|---|---|"]
+        for name in missing:
+            reasons = {home: rows[name].get("missing", ()) for home, rows in found.items()}
+            near = min(reasons, key=lambda home, reasons=reasons: len(reasons[home]))
+            lines.append(f"| {name} | {near} | {'; '.join(reasons[near])} |")
+        lines.append("")
+    if unable:
+        lines += [
+            "A condition that is to be false is asked of an object that can never fulfil it, and counts as false, in:",
+            f"{', '.join(sorted(unable))}.",
+            "",
+        ]
+    if instead:
+        lines += ["Synsets that ig2mj's taxonomy does not know, and what stands in for them:"]
+        lines += [f"{', '.join(sorted(instead))}.", ""]
+    return lines
