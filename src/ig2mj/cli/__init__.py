@@ -56,6 +56,7 @@ COMMANDS: dict[str, str] = {
     "states": "list the extended states of a scene's objects",
     "predicates": "tell what holds in a scene, or what an expression still lacks",
     "calibrate": "measure the batched engine's buffers for a scene",
+    "sample": "sample initial states in which conditions hold, as a pool for batched resets",
     "pool": "make a pool of settled initial states for batched resets",
     "activity": "list BEHAVIOR's activities, and what each asks for in a home",
     "homes": "build our own dataset of household objects and homes",

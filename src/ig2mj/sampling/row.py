@@ -47,10 +47,14 @@ class RowSampler:
         Args:
           query: its present state is the start of every row. states: those of the start.
         """
-        self.query, self.model, self._initial = query, model, states
-        self._start = query.save()
+        self.query, self.model = query, model
         self._placer = Placer(query)
         self._truths: dict[tuple[Condition, ...], Truths] = {}
+        self.start_from(query.save(), states)
+
+    def start_from(self, start: Snapshot, states: ExtendedStates) -> None:
+        """Lets the next rows begin with another state of the scene."""
+        self._start, self._initial = start, states
 
     def sample(
         self, conditions: Sequence[Condition], rng: np.random.Generator, budget: Budget, rejected: Rejections
@@ -82,6 +86,10 @@ class RowSampler:
             rejected[problem] += 1
             return None
         return Row(self.query.save(), self._states)
+
+    def holds(self, conditions: Sequence[Condition], states: ExtendedStates) -> bool:
+        """Whether conditions hold in the world as it is now, with the given extended states."""
+        return self._truths_of(tuple(conditions)).hold(conditions, states, self.query.view)
 
     def _truths_of(self, conditions: tuple[Condition, ...]) -> Truths:
         if conditions not in self._truths:

@@ -26,10 +26,14 @@ from ig2mj.errors import AbilityError, EngineError, StateError
 from ig2mj.predicates.compile import CompiledExpression
 from ig2mj.predicates.literals import object_index
 from ig2mj.predicates.logic import Atom, Expression
+from ig2mj.predicates.registry import find
 from ig2mj.process import run_programs_inline
+from ig2mj.sampling.conditions import Condition
+from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.setters import lacks, set_by_name
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_openables, write_of_pose
+from ig2mj.simulation.sampling import WorldSampler
 from ig2mj.simulation.saving import SavedWorld, load_world, save_world
 from ig2mj.states import registry
 from ig2mj.states.model import DEFAULTS, StateModel
@@ -45,6 +49,7 @@ class Simulation:
     Attributes:
       scene: the household. engine: what steps physics. physics: the engine's state; use what the methods give instead.
       state_options: how extended states behave; None where only physics is stepped.
+      last_sampling: why candidates of the last `set_predicate` were turned down: {reason: how often}.
     """
 
     def __init__(
@@ -73,6 +78,7 @@ class Simulation:
         self.state_options, self._seed = states, seed
         self.physics = self.engine.reset()
         self._initial = self.engine.export(self.physics, 0)
+        self.last_sampling: dict[str, int] = {}
         self._begin()
 
     def _begin(self) -> None:
@@ -281,6 +287,34 @@ class Simulation:
             self.physics, _ = self.core.teleport(self.physics, self.view, change.swap)
         if change.joints is not None:
             self._write(write_of_openables(self.scene, *change.joints))
+
+    def set_predicate(self, name: str, *arguments: str, value: bool = True, seed: int = 0) -> bool:
+        """Makes a predicate true or false by sampling, as table A.5 of the paper says, and lets the world come to rest.
+
+        `set_predicate("on_top", "plate_0", "breakfast_table_0")` puts the plate somewhere on the table.
+
+        Args:
+          seed: the same seed in the same world gives the same result.
+
+        Returns:
+          Whether it was done. If not, the world is as it was, and `last_sampling` counts the reasons.
+
+        Raises:
+          UnknownNameError, ArityError: no such predicate, object or room, or too many or few. AbilityError: the object
+          lacks the ability. StateError: it can never be made so, because the object is fixed, for instance.
+        """
+        condition = Condition(find(name).name, arguments, value)
+        now = self.engine.export(self.physics, 0)
+        row = self._sampler.sample(condition, now, self.states, seed, Budget())
+        self.last_sampling = dict(self._sampler.rejected)
+        if row is None:
+            return False
+        self.physics, self._states = self.engine.load(self.physics, row.physics), row.states
+        return True
+
+    @functools.cached_property
+    def _sampler(self) -> WorldSampler:
+        return WorldSampler(self.scene, self.state_model)
 
     def predicate(self, name: str, *arguments: str, strict: bool = False) -> bool:
         """Whether a predicate holds now, e.g. `predicate("on_top", "book", "table")`.

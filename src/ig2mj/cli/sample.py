@@ -1,0 +1,115 @@
+"""`ig2mj sample SCENE CONDITION ...`: samples initial states that fulfil conditions, or disturbs a scene at random."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import Annotated
+
+import tyro
+
+
+def run(
+    scene: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="SCENE")],
+    conditions: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="CONDITION")] = (),
+    count: int = 64,
+    out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    seed: int = 0,
+    jobs: int = 0,
+    add: Annotated[tuple[str, ...], tyro.conf.arg(metavar="CATEGORY")] = (),
+    disturb: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    share: float = 0.3,
+    json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+) -> int:
+    """Sample initial states in which conditions hold, and write them as a pool for batched resets.
+
+    A condition is a predicate, its negation, or a conjunction: "(on_top book_0 table_0)", "(not (open fridge_0))". A
+    category in place of a name means any one object of it; plate and plate#2 are two. Exit status 0 only if all rows
+    were made; else the reasons are counted.
+
+    Args:
+      scene: folder of a converted scene, or the name of a home that comes with ig2mj.
+      conditions: what must hold, all together.
+      count: rows.
+      out: the file; default: pool.npz in the working directory.
+      seed: the same seed gives the same pool.
+      jobs: processes; 0: one per processor.
+      add: add an object of this category (or category/model) from the object library.
+      disturb: no conditions: shift, turn and drop loose objects at random instead.
+      share: with --disturb: probability that a loose object is moved, per row.
+      json: print the result as JSON.
+    """
+    from ig2mj.cli.files import check_folder_of
+    from ig2mj.errors import Ig2mjError
+    from ig2mj.scene.scene import load_scene
+
+    if count < 1:
+        raise Ig2mjError(f"--count {count}: a pool needs at least one row")
+    if jobs < 0:
+        raise Ig2mjError(f"--jobs {jobs}: 0 takes one process per processor, else at least one is needed")
+    if not 0 <= share <= 1:
+        raise Ig2mjError(f"--share {share}: a probability is between 0 and 1")
+    if disturb == bool(conditions):
+        raise Ig2mjError('give conditions, such as "(on_top apple_0 breakfast_table_0)", or --disturb')
+    file = out or pathlib.Path("pool.npz")
+    check_folder_of(file)
+    loaded = load_scene(scene, objects=add)
+    if disturb:
+        return _disturb(loaded, count, file, seed, share, jobs)
+    return _sample(loaded, conditions, count, file, seed, jobs, json)
+
+
+def _disturb(loaded, count: int, file: pathlib.Path, seed: int, share: float, jobs: int) -> int:
+    from ig2mj.cli.printing import add_bar, progress_bar
+    from ig2mj.sampling.settled import make_pool
+    from ig2mj.states.model import StateModel
+    from ig2mj.worlds.pool import save_pool
+
+    model = StateModel.of_manifest(loaded.tables, loaded.manifest)
+    with progress_bar() as bar:
+        report = add_bar(bar, f"settling {loaded.name}")
+        pool = make_pool(
+            loaded,
+            model,
+            count,
+            seed=seed,
+            share=share,
+            threads=jobs or None,
+            progress=lambda done: report("", done, count),
+        )
+    save_pool(pool, file, loaded.name, {"seed": seed, "share": share})
+    print(f"{file}: {pool.size} settled states of {loaded.name}")
+    return 0
+
+
+def _sample(loaded, conditions, count: int, file: pathlib.Path, seed: int, jobs: int, as_json: bool) -> int:
+    import json
+    import sys
+
+    from ig2mj.cli.printing import add_bar, make_table, progress_bar, stdout_console
+    from ig2mj.sampling.many import sample
+    from ig2mj.worlds.pool import save_pool
+
+    with progress_bar() as bar:
+        report = add_bar(bar, f"sampling in {loaded.name}")
+        done = sample(
+            loaded,
+            conditions,
+            count,
+            seed,
+            jobs=jobs,
+            progress=lambda made, failed: report(f"{failed} given up" if failed else "", made + failed, count),
+        )
+    if done.pool is not None:
+        save_pool(done.pool, file, loaded.name, {"seed": seed, "conditions": list(conditions), "rows": list(done.rows)})
+    if as_json:
+        reasons = dict(done.rejected.most_common())
+        print(json.dumps({"file": str(file) if done.pool else None, "rows": len(done.rows), "requested": count,
+                          "seconds": round(done.seconds, 3), "rejected": reasons}))  # fmt: skip
+    elif done.pool is not None:
+        print(f"{file}: {done.pool.size} of {count} states of {loaded.name} in {done.seconds:.1f} s "
+              f"(look: ig2mj view {loaded.folder.name} --pool {file})")  # fmt: skip
+    if not done.complete and not as_json:
+        print(f"{count - len(done.rows)} of {count} rows could not be sampled", file=sys.stderr)
+        rows = [(reason, str(n)) for reason, n in done.rejected.most_common(12)]
+        stdout_console().print(make_table("why candidates were turned down", ("reason", "times"), rows))
+    return 0 if done.complete else 1
