@@ -25,6 +25,9 @@ from ig2mj.scene.tables import SceneTables
 
 Vector = Sequence[float | int] | np.ndarray
 
+ACTION_PERIOD = 0.1
+"""Seconds between two actions: three control steps (spec/robots_tasks_sensors.md section 2.6)."""
+
 ControllerState = Any
 """What a controller remembers from step to step: a pytree of arrays that begin with the world axis."""
 
@@ -69,6 +72,11 @@ class Controller(Protocol):
         """How far each hand is asked to close: 0 open, 1 closed. From one half on it grasps (spec A.1)."""
         ...
 
+    def eye(self, view: PhysicsView, state: ControllerState) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
+        """Pose of the agent's camera in the world (MuJoCo's camera axes). The view has it as compiled; an agent that
+        moves its eye without joints says here where it is."""
+        ...
+
     def proprioception(self, view: PhysicsView, state: ControllerState) -> Float[Array, "W m"]:
         """What the agent feels of itself."""
         ...
@@ -97,6 +105,10 @@ class Robot(Protocol):
         """
         ...
 
-    def controller(self, tables: SceneTables, agent: int) -> Controller:
-        """The controller of this robot, compiled into the scene of these tables as agent number `agent`."""
+    def controller(self, tables: SceneTables, agent: int, period: float = ACTION_PERIOD) -> Controller:
+        """The controller of this robot, compiled into the scene of these tables as agent number `agent`.
+
+        Args:
+          period: seconds between two calls of `control`.
+        """
         ...

@@ -19,7 +19,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from ig2mj.agents.base import Vector
+from ig2mj.agents.base import ACTION_PERIOD, Vector
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.tables import SceneTables
@@ -66,8 +66,8 @@ class FloatingHand:
     def attach(self, spec: mujoco.MjSpec, pos: Vector | None = None, quat: Vector | None = None) -> AgentEntry:
         return add_floating_hand(spec, self.name, self.pos if pos is None else pos, self.quat if quat is None else quat)
 
-    def controller(self, tables: SceneTables, agent: int) -> HandController:
-        return HandController()
+    def controller(self, tables: SceneTables, agent: int, period: float = ACTION_PERIOD) -> HandController:
+        return HandController(agent)
 
 
 class HandController:
@@ -80,6 +80,9 @@ class HandController:
     action_high = np.array([100.0] * 3 + [np.pi] * 3 + [THUMB_CLOSED] * 2 + [FINGER_CLOSED] * 8)
     action_low = np.array([-100.0] * 3 + [-np.pi] * 3 + [0.0] * 10)
     proprioception_names = ()
+
+    def __init__(self, agent: int):
+        self._agent = agent
 
     @property
     def action_size(self) -> int:
@@ -98,6 +101,11 @@ class HandController:
     def grip(self, state: Float[Array, "W 16"]) -> Float[Array, "W 1"]:
         """Mean over the fingers."""
         return jnp.mean(state[:, 6:] / self.action_high[6:], axis=1, keepdims=True)
+
+    def eye(
+        self, view: PhysicsView, state: Float[Array, "W 16"]
+    ) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
+        return view.agent.eye_pos[:, self._agent], view.agent.eye_quat[:, self._agent]
 
     def proprioception(self, view: PhysicsView, state: Float[Array, "W 16"]) -> Float[Array, "W 0"]:
         return jnp.zeros((state.shape[0], 0), jnp.float32)

@@ -113,13 +113,17 @@ class RoomsEntry(msgspec.Struct, omit_defaults=True):
 
 
 class AgentEntry(msgspec.Struct, omit_defaults=True):
-    """An agent compiled into the scene: its base body, its camera, the finger bodies that press buttons, its hands."""
+    """An agent compiled into the scene: its base body, its camera, the finger bodies that press buttons, its hands.
+
+    `no_contact` names, for bodies of the agent, categories of objects that they pass through.
+    """
 
     name: str
     body: str
     camera: str | None = None
     fingers: list[str] = []
     hands: list[str] = []
+    no_contact: dict[str, list[str]] = {}
 
 
 class Manifest(msgspec.Struct, omit_defaults=True):

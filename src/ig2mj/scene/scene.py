@@ -82,8 +82,7 @@ class Scene:
             spec = _spec_from_text(add_objects(file, own, [f"{a.category}/{a.model}" for a in self.additions])[0], file)
         else:
             spec = read_spec(file)
-        for agent in self.agents:
-            _attach(agent, spec)
+        _attach_all(self.agents, spec, self.manifest)
         return spec
 
     def start_data(self) -> mujoco.MjData:
@@ -122,15 +121,22 @@ def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: S
     if agents:
         spec = spec or read_spec(file)
         manifest = copy.copy(manifest)
-        manifest.agents = [*manifest.agents, *(_attach(agent, spec) for agent in agents)]
+        manifest.agents = [*manifest.agents, *_attach_all(agents, spec, manifest)]
     model = _compile(spec, file, generated=bool(objects))
     rooms = load_rooms(folder / manifest.rooms.file) if manifest.rooms.file else None
     tables = build_tables(model, manifest, rooms, folder / MANIFEST_FILE)
     return Scene(folder, manifest, model, tables, rooms, tuple(agents), tuple(additions))
 
 
-def _attach(agent: Agent, spec: mujoco.MjSpec) -> AgentEntry:
-    return agent.attach(spec) if isinstance(agent, Attachable) else agent(spec)
+def _attach_all(agents: Sequence[Agent], spec: mujoco.MjSpec, manifest: Manifest) -> list[AgentEntry]:
+    """Adds the agents, and what must be compiled for them and the scene together."""
+    entries = [agent.attach(spec) if isinstance(agent, Attachable) else agent(spec) for agent in agents]
+    for entry in entries:
+        for body, categories in entry.no_contact.items():
+            for passed in (o for o in manifest.objects if o.category in categories):
+                for name in passed.bodies:
+                    spec.add_exclude(bodyname1=body, bodyname2=name)
+    return entries
 
 
 def read_spec(file: pathlib.Path) -> mujoco.MjSpec:
