@@ -12,18 +12,16 @@ Axes: W worlds, n numbers of an action, m numbers of proprioception, U actuators
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from ig2mj.agents.parts import Vector
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.tables import SceneTables
-
-Vector = Sequence[float | int] | np.ndarray
 
 ACTION_PERIOD = 0.1
 """Seconds between two actions: three control steps (spec/robots_tasks_sensors.md section 2.6)."""

@@ -19,7 +19,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from ig2mj.agents.base import ACTION_PERIOD, Vector
+from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.agents.parts import Vector
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.tables import SceneTables
@@ -102,9 +103,7 @@ class HandController:
         """Mean over the fingers."""
         return jnp.mean(state[:, 6:] / self.action_high[6:], axis=1, keepdims=True)
 
-    def eye(
-        self, view: PhysicsView, state: Float[Array, "W 16"]
-    ) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
+    def eye(self, view: PhysicsView, state: Float[Array, "W 16"]) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
         return view.agent.eye_pos[:, self._agent], view.agent.eye_quat[:, self._agent]
 
     def proprioception(self, view: PhysicsView, state: Float[Array, "W 16"]) -> Float[Array, "W 0"]:

@@ -20,10 +20,10 @@ of width 2 F / (2 m PULL_RATE), within a step of 1/120 s, in which it gains F / 
 
 GEOM = mujoco.mjtGeom
 
+Vector = Sequence[float | int] | np.ndarray
 
-def material(
-    spec: mujoco.MjSpec, name: str, rgb: Sequence[float], shininess: float = 0.5, specular: float = 0.4
-) -> str:
+
+def material(spec: mujoco.MjSpec, name: str, rgb: Vector, shininess: float = 0.5, specular: float = 0.4) -> str:
     """Adds a material once and returns its name."""
     if spec.material(name) is None:
         spec.add_material(name=name, rgba=[*rgb, 1.0], shininess=shininess, specular=specular)
@@ -33,11 +33,11 @@ def material(
 def visual(
     body: mujoco.MjsBody,
     shape: GEOM,
-    size: Sequence[float],
+    size: Vector,
     material: str,
-    pos: Sequence[float] = (0, 0, 0),
-    quat: Sequence[float] = (1, 0, 0, 0),
-    end: Sequence[float] | np.ndarray | None = None,
+    pos: Vector = (0, 0, 0),
+    quat: Vector = (1, 0, 0, 0),
+    end: Vector | None = None,
 ) -> None:
     """A geom to look at, `<body>/visual_<i>`; from `pos` to `end` where that is given (capsules and cylinders)."""
     number = sum(geom.name.startswith(f"{body.name}/visual_") for geom in body.geoms)
@@ -57,15 +57,18 @@ def visual(
 def collision(
     body: mujoco.MjsBody,
     shape: GEOM,
-    size: Sequence[float],
+    size: Vector,
     mass: float = 0.0,
-    pos: Sequence[float] = (0, 0, 0),
-    quat: Sequence[float] = (1, 0, 0, 0),
-    end: Sequence[float] | np.ndarray | None = None,
+    pos: Vector = (0, 0, 0),
+    quat: Vector = (1, 0, 0, 0),
+    end: Vector | None = None,
     friction: float = 1.0,
-    condim: int = 3,
+    frictionless: bool = False,
 ) -> None:
-    """A geom that collides, `<body>/collision_<i>` in group 3."""
+    """A geom that collides, `<body>/collision_<i>` in group 3.
+
+    Of two geoms the larger friction counts in MuJoCo; a frictionless one has priority, whatever it slides on.
+    """
     number = sum(geom.name.startswith(f"{body.name}/collision_") for geom in body.geoms)
     body.add_geom(
         name=f"{body.name}/collision_{number}",
@@ -73,7 +76,8 @@ def collision(
         size=_padded(size),
         mass=mass,
         friction=[friction, 0.005, 0.0001],
-        condim=condim,
+        condim=1 if frictionless else 3,
+        priority=1 if frictionless else 0,
         gap=CONTACT_GAP,
         margin=0.0,
         group=3,
@@ -81,7 +85,7 @@ def collision(
     )
 
 
-def set_inertia(body: mujoco.MjsBody, mass: float, com: Sequence[float], full: Sequence[float]) -> None:
+def set_inertia(body: mujoco.MjsBody, mass: float, com: Vector, full: Vector) -> None:
     """Gives a body its inertia. `full`: kg m^2 about the centre of mass, in URDF's order xx, xy, xz, yy, yz, zz."""
     xx, xy, xz, yy, yz, zz = full
     body.explicitinertial = True
@@ -154,7 +158,7 @@ def add_pulled_joints(
         servo(spec, f"{name}_turn", 0.0, 2 * inertia * PULL_RATE, force, name=f"{name}_w{letter}", axis=k)
 
 
-def extend_keyframes(spec: mujoco.MjSpec, qpos: Sequence[float], dofs: int, controls: Sequence[float]) -> None:
+def extend_keyframes(spec: mujoco.MjSpec, qpos: Vector, dofs: int, controls: Vector) -> None:
     """Keyframes of a scene know nothing of what was attached: its joints and actuators come last in them."""
     for key in spec.keys:
         for field, values in (("qpos", qpos), ("qvel", [0.0] * dofs), ("ctrl", controls)):
@@ -171,27 +175,27 @@ def exclude_all(spec: mujoco.MjSpec, bodies: Iterable[str]) -> None:
             spec.add_exclude(bodyname1=one, bodyname2=other)
 
 
-def multiply(a: Sequence[float], b: Sequence[float]) -> Float[np.ndarray, "4"]:
+def multiply(a: Vector, b: Vector) -> Float[np.ndarray, "4"]:
     """Product of two quaternions, on the host."""
     out = np.zeros(4)
     mujoco.mju_mulQuat(out, np.asarray(a, np.float64), np.asarray(b, np.float64))
     return out
 
 
-def rotate(quat: Sequence[float], vector: Sequence[float]) -> Float[np.ndarray, "3"]:
+def rotate(quat: Vector, vector: Vector) -> Float[np.ndarray, "3"]:
     """A vector turned by a quaternion, on the host."""
     out = np.zeros(3)
     mujoco.mju_rotVecQuat(out, np.asarray(vector, np.float64), np.asarray(quat, np.float64))
     return out
 
 
-def normalized(v: Sequence[float]) -> np.ndarray:
+def normalized(v: Vector) -> np.ndarray:
     return np.asarray(v, np.float64) / np.linalg.norm(v)
 
 
-def _padded(size: Sequence[float]) -> list[float]:
+def _padded(size: Vector) -> list[float]:
     return [*size, *[0.0] * (3 - len(size))]
 
 
-def _placed(pos: Sequence[float], quat: Sequence[float], end: Sequence[float] | np.ndarray | None) -> dict:
+def _placed(pos: Vector, quat: Vector, end: Vector | None) -> dict:
     return {"pos": list(pos), "quat": list(quat)} if end is None else {"fromto": [*pos, *end]}

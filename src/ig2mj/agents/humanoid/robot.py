@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Literal
 
 import mujoco
 import numpy as np
 
-from ig2mj.agents.base import ACTION_PERIOD, Vector
+from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.humanoid.controller import HumanoidController
 from ig2mj.agents.humanoid.frames import (
     BODY_HEIGHT,
@@ -21,6 +20,7 @@ from ig2mj.agents.humanoid.frames import (
 from ig2mj.agents.humanoid.hand import add_hand
 from ig2mj.agents.parts import (
     GEOM,
+    Vector,
     add_pulled_joints,
     collision,
     exclude_all,
@@ -47,6 +47,9 @@ BODY_RADIUS, BODY_HALF = 0.2, 0.3
 NO_CONTACT = ("floors", "carpet")
 """Categories that the body passes through: it hovers, and its legs are not simulated."""
 
+SHELL = {"grey": (0.90, 0.90, 0.92), "blue": (0.62, 0.74, 0.90)}
+"""Colours, for two of them in one home."""
+
 FIELD_OF_VIEW = 120.0
 """Degrees, vertical: that of the paper's experiments (spec section 2.6)."""
 
@@ -59,25 +62,26 @@ class Humanoid:
       pos, quat: start of the body's middle in the world, m and w-x-y-z; the floor is `BODY_HEIGHT` below it.
       compat: "paper" (50 N, 1 kg) or "igibson" (7,500 N, 15 kg).
       grasp_flags: proprioception has 22 numbers instead of 20: for each hand whether it holds something.
-      look: "grey" or "blue": tint of the shell, for two of them in one home.
+      look: "grey" or "blue": tint of the shell.
     """
 
     name: str = "humanoid"
     pos: Vector = (0, 0, BODY_HEIGHT)
     quat: Vector = (1, 0, 0, 0)
-    compat: Literal["paper", "igibson"] = "paper"
+    compat: str = "paper"
     grasp_flags: bool = True
-    look: Literal["grey", "blue"] = "grey"
+    look: str = "grey"
 
     def __post_init__(self) -> None:
         if self.compat not in BODY:
             raise UnknownNameError("preset of the humanoid", self.compat, BODY)
+        if self.look not in SHELL:
+            raise UnknownNameError("look of the humanoid", self.look, SHELL)
 
     def attach(self, spec: mujoco.MjSpec, pos: Vector | None = None, quat: Vector | None = None) -> AgentEntry:
         pos = np.asarray(self.pos if pos is None else pos, np.float64)
         quat = normalized(np.asarray(self.quat if quat is None else quat))
-        shell = (0.90, 0.90, 0.92) if self.look == "grey" else (0.62, 0.74, 0.90)
-        white = material(spec, f"{self.name}/shell", shell, 0.7, 0.5)
+        white = material(spec, f"{self.name}/shell", SHELL[self.look], 0.7, 0.5)
         dark = material(spec, f"{self.name}/joints", (0.16, 0.17, 0.19), 0.4, 0.3)
         accent = material(spec, f"{self.name}/accent", (0.10, 0.42, 0.72), 0.8, 0.6)
 

@@ -1,0 +1,196 @@
+"""Fetch's eleven-number action and its proprioception (spec/robots_tasks_sensors.md sections 1.2 and 1.6).
+
+| numbers | in units of |
+|---|---|
+| forward, turn_left | the drive's largest speeds |
+| head_pan, head_tilt | 1.57 rad/s |
+| eef_x, eef_y, eef_z | 0.2 m that the gripper is to move in the base's frame |
+| eef_rx, eef_ry, eef_rz | 0.5 rad that it is to turn about the base's axes (a rotation vector) |
+| gripper | open from 0 on, closed below |
+
+As in iGibson the joints move at twice the distance to the solution of the inverse kinematics per second, and an
+action's goal begins at the present pose: in an action of 0.1 s a fifth of the way is made. Its velocities become
+positions of servos, which go on from the last ones and not from where the arm sags to.
+
+Axes: W worlds, 14 joints, 8 joints of trunk and arm.
+"""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+from jaxtyping import Bool, Float
+
+from ig2mj.agents.controllers import (
+    differential_drive,
+    drive_limits,
+    scale_command,
+    sines_and_cosines,
+    two_finger_grip,
+    wheel_odometry,
+)
+from ig2mj.agents.fetch.figures import (
+    ARM,
+    AXLE,
+    CAMERA_JOINTS,
+    CHAIN,
+    CHAIN_JOINTS,
+    FINGERS,
+    LOWER,
+    MAX_WHEEL,
+    TRUNK,
+    UPPER,
+    VELOCITY,
+    WHEEL_RADIUS,
+    WHEELS,
+)
+from ig2mj.agents.kinematics import forward, inverse
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.poses import quat_multiply, quat_rotate_inverse, rotation_vector_to_quat
+from ig2mj.scene.tables import SceneTables
+
+GAIN = 2.0
+"""1/s: joint velocity for each radian (or metre) to the solution (iGibson's kv)."""
+
+STRETCH = np.array([0.2, 0.2, 0.2, 0.5, 0.5, 0.5])
+"""m and rad: goal of a full command."""
+
+LEASH = 0.15
+"""rad or m that a servo's target may be ahead of its joint: a blocked arm does not push ever harder."""
+
+JOINT_NAMES = (
+    *("r_wheel", "l_wheel", "torso_lift", "head_pan", "head_tilt"),
+    *("shoulder_pan", "shoulder_lift", "upperarm_roll", "elbow_flex", "forearm_roll", "wrist_flex", "wrist_roll"),
+    *("r_gripper_finger", "l_gripper_finger"),
+)
+
+
+@struct.dataclass
+class FetchState:
+    """What the controller remembers.
+
+    Attributes:
+      target: positions that the servos are at, of the joints from the trunk on.
+      solution: of the inverse kinematics at the last action, which is averaged with the next; known: there was one.
+      closed: the gripper was told to close. held: it held something at the last action.
+    """
+
+    target: Float[Array, "W 12"]
+    solution: Float[Array, "W 8"]
+    known: Bool[Array, "W"]
+    closed: Bool[Array, "W"]
+    held: Bool[Array, "W"]
+
+
+class FetchController:
+    """See the module's text. `ig2mj.agents.base.Controller`."""
+
+    action_names = (
+        *("forward", "turn_left", "head_pan", "head_tilt"),
+        *("eef_x", "eef_y", "eef_z", "eef_rx", "eef_ry", "eef_rz", "gripper"),
+    )
+    action_low, action_high = -np.ones(11), np.ones(11)
+
+    proprioception_names = (
+        *(f"camera_qpos_{f}_{n}" for f in ("sin", "cos") for n in ("pan", "tilt")),
+        *(f"base_qpos_{f}_{n}" for f in ("sin", "cos") for n in ("r_wheel", "l_wheel")),
+        *(f"robot_lin_vel_{n}" for n in "xyz"),
+        *(f"robot_ang_vel_{n}" for n in "xyz"),
+        *("dd_base_lin_vel", "dd_base_ang_vel"),
+        *(f"arm_0_qpos_{f}_{JOINT_NAMES[j]}" for f in ("sin", "cos") for j in ARM),
+        *(f"eef_0_pos_{n}" for n in "xyz"),
+        *(f"eef_0_quat_{n}" for n in "wxyz"),
+        *("gripper_0_qpos_right", "gripper_0_qpos_left", "grasp_0", "trunk_qpos"),
+    )
+
+    def __init__(self, tables: SceneTables, agent: int, period: float, start: Float[np.ndarray, "14"]):
+        self._agent, self._period, self._start = agent, period, np.asarray(start)
+        name = tables.agent_names[agent]
+        self._joints = np.array([tables.agent_joint_names.index(f"{name}_{n}_joint") for n in JOINT_NAMES])
+        self._hand = np.flatnonzero(tables.hand_agent == agent)
+        self._drive = drive_limits(WHEEL_RADIUS, AXLE, MAX_WHEEL)
+
+    @property
+    def action_size(self) -> int:
+        return len(self.action_names)
+
+    def initial(self, num_worlds: int) -> FetchState:
+        no = jnp.zeros(num_worlds, bool)
+        target = jnp.tile(jnp.asarray(self._start[2:], jnp.float32), (num_worlds, 1))
+        return FetchState(target, jnp.zeros((num_worlds, 8), jnp.float32), no, no, no)
+
+    def control(
+        self, action: Float[Array, "W 11"], view: PhysicsView, state: FetchState
+    ) -> tuple[Float[Array, "W 14"], FetchState]:
+        ones = np.ones(2)
+        q = jnp.asarray(view.agent.joint_pos)[:, self._joints]
+        drive = scale_command(action[:, :2], -ones, ones, -self._drive, self._drive)
+        wheels = differential_drive(drive, WHEEL_RADIUS, AXLE, MAX_WHEEL)[:, ::-1]  # ours are right, left
+
+        speed = VELOCITY[CAMERA_JOINTS]
+        camera = self._move(state, q, CAMERA_JOINTS, scale_command(action[:, 2:4], -ones, ones, -speed, speed))
+        solution = self._solve(scale_command(action[:, 4:10], -np.ones(6), np.ones(6), -STRETCH, STRETCH), q)
+        goal = jnp.where(state.known[:, None], (solution + state.solution) / 2, solution)
+        chain = self._move(state, q, CHAIN_JOINTS, GAIN * (goal - q[:, np.array(CHAIN_JOINTS)]))
+
+        command = jnp.asarray(action, jnp.float32)[:, 10:]
+        held = jnp.asarray(view.held)[:, self._hand].any((1, 2))
+        newly = (held & ~state.held)[:, None]
+        fingers = jnp.where(newly, q[:, np.array(FINGERS)], state.target[:, np.array(FINGERS) - 2])
+        fingers = jnp.where(held[:, None], fingers, two_finger_grip(command, LOWER[12], UPPER[12]))
+
+        target = jnp.concatenate([chain[:, :1], camera, chain[:, 1:], fingers], axis=1)
+        new = FetchState(target, solution, jnp.ones_like(state.known), command[:, 0] < 0, held)
+        return jnp.concatenate([wheels, target], axis=1), new
+
+    def _solve(self, command: Float[Array, "W 6"], q: Float[Array, "W 14"]) -> Float[Array, "W 8"]:
+        """Trunk and arm for a gripper that is moved by a command from where it is."""
+        q = q[:, np.array(CHAIN_JOINTS)]
+        pos, quat, _ = forward(CHAIN, q)
+        turned = quat_multiply(rotation_vector_to_quat(command[:, 3:]), quat)
+        return inverse(CHAIN, q, pos + command[:, :3], turned, self._start[CHAIN_JOINTS])
+
+    def _move(
+        self, state: FetchState, q: Float[Array, "W 14"], joints: list[int], velocity: Float[Array, "W n"]
+    ) -> Float[Array, "W n"]:
+        """Targets after an action at these velocities, within the limits of position and velocity.
+
+        Where one joint would be too fast all are slowed down alike, so that the gripper keeps its direction (iGibson
+        clips each by itself).
+        """
+        at = np.array(joints)
+        velocity = velocity / jnp.maximum(1.0, jnp.max(jnp.abs(velocity) / VELOCITY[at], axis=1, keepdims=True))
+        target = jnp.clip(state.target[:, at - 2] + velocity * self._period, q[:, at] - LEASH, q[:, at] + LEASH)
+        return jnp.clip(target, jnp.asarray(LOWER[at], jnp.float32), jnp.asarray(UPPER[at], jnp.float32))
+
+    def grip(self, state: FetchState) -> Float[Array, "W 1"]:
+        return state.closed[:, None].astype(jnp.float32)
+
+    def eye(self, view: PhysicsView, state: FetchState) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
+        return jnp.asarray(view.agent.eye_pos)[:, self._agent], jnp.asarray(view.agent.eye_quat)[:, self._agent]
+
+    def proprioception(self, view: PhysicsView, state: FetchState) -> Float[Array, "W m"]:
+        """iGibson's default list: sines and cosines of joints, velocities of the base in its own frame (m/s, rad/s),
+        the gripper's pose in the base's frame (m, w-x-y-z), fingers and trunk (m); grasp is 1 or -1."""
+        agent = view.agent
+        q, speed = jnp.asarray(agent.joint_pos)[:, self._joints], jnp.asarray(agent.joint_vel)[:, self._joints]
+        pos, quat, _ = forward(CHAIN, q[:, np.array(CHAIN_JOINTS)])
+        base = agent.base_quat[:, self._agent]
+        held = jnp.asarray(view.held)[:, self._hand].any((1, 2))
+        return jnp.concatenate(
+            [
+                sines_and_cosines(q[:, np.array(CAMERA_JOINTS)]),
+                sines_and_cosines(q[:, np.array(WHEELS)]),
+                quat_rotate_inverse(base, agent.base_linvel[:, self._agent]),
+                quat_rotate_inverse(base, agent.base_angvel[:, self._agent]),
+                wheel_odometry(speed[:, np.array(WHEELS[::-1])], WHEEL_RADIUS, AXLE),
+                sines_and_cosines(q[:, np.array(ARM)]),
+                pos,
+                quat,
+                q[:, np.array(FINGERS)],
+                jnp.where(held, 1.0, -1.0)[:, None],
+                q[:, np.array(TRUNK)],
+            ],
+            axis=1,
+        )

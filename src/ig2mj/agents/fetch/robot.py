@@ -1,0 +1,165 @@
+"""Fetch: a driving base, a trunk that lifts, a head with a camera, an arm of seven joints with a gripper.
+
+Frames, masses and limits are those of its maker (`figures`), geometry is our own, of primitives. Gravity is compensated
+from the trunk on, as the robot's own controllers do it. The base's frame is on the floor, x forward, z up.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import mujoco
+import numpy as np
+
+from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.agents.fetch.appearance import Look, draw_link
+from ig2mj.agents.fetch.controller import FetchController
+from ig2mj.agents.fetch.figures import (
+    ARM_POSES,
+    BASE,
+    CAMERA,
+    GRIPPER,
+    GRIPPER_INERTIA,
+    JOINTS,
+    TORSO,
+    Joint,
+    start_positions,
+)
+from ig2mj.agents.parts import (
+    GEOM,
+    Vector,
+    collision,
+    exclude_all,
+    extend_keyframes,
+    normalized,
+    servo,
+    set_inertia,
+)
+from ig2mj.errors import UnknownNameError
+from ig2mj.scene.manifest import AgentEntry
+from ig2mj.scene.tables import SceneTables
+
+SERVO_RATE = 30.0
+"""1/s: natural frequency of the critically damped servos of trunk, head and arm."""
+
+ROTOR_SHARE = 0.3
+"""Inertia of motor and gear, as a share of what a servo is made for: the servo is stable in any pose of the arm."""
+
+WHEEL_GAIN = 20.0
+"""N m s of the wheels' velocity servos."""
+
+WHEEL_CONTACT = 0.0613
+"""m: radius of the sphere with which a wheel meets the floor."""
+
+CASTERS = ((0.16, 0.11), (0.16, -0.11), (-0.21, 0.11), (-0.21, -0.11))
+"""m: where they stand in the base's frame."""
+
+FIELD_OF_VIEW = 90.0
+"""Degrees, vertical."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Fetch:
+    """The robot.
+
+    Attributes:
+      pos, quat: of its base on the floor.
+      pose: of the arm at the start, which inverse kinematics keeps near; iGibson's names (`figures.ARM_POSES`).
+    """
+
+    name: str = "fetch"
+    pos: Vector = (0, 0, 0)
+    quat: Vector = (1, 0, 0, 0)
+    pose: str = "diagonal30"
+
+    def __post_init__(self) -> None:
+        if self.pose not in ARM_POSES:
+            raise UnknownNameError("pose of Fetch's arm", self.pose, ARM_POSES)
+
+    def attach(self, spec: mujoco.MjSpec, pos: Vector | None = None, quat: Vector | None = None) -> AgentEntry:
+        pos, quat = self.pos if pos is None else pos, normalized(self.quat if quat is None else quat)
+        base = spec.worldbody.add_body(name=self.name, pos=list(pos), quat=list(quat))
+        base.add_freejoint(name=f"{self.name}/free")
+        set_inertia(base, *_joined(BASE, TORSO))
+        look = Look.of(spec, self.name)
+        draw_link(base, "base_link", look)
+        for x, y in CASTERS:
+            collision(base, GEOM.mjGEOM_SPHERE, (0.03,), 0, (x, y, 0.0245), frictionless=True)
+        links, start = {"base_link": base}, start_positions(self.pose)
+        for joint, q in zip(JOINTS, start, strict=True):
+            links[joint.link] = self._add_link(spec, links[joint.parent], joint, float(q), look)
+            if joint.link == "wrist_roll_link":
+                gripper = links[joint.link].add_body(name=f"{self.name}_gripper_link", pos=list(GRIPPER), gravcomp=1)
+                set_inertia(gripper, *GRIPPER_INERTIA)
+                draw_link(gripper, "gripper_link", look)
+                links["gripper_link"] = gripper
+        links["head_tilt_link"].add_camera(
+            name=f"{self.name}/eye", pos=list(CAMERA), quat=[0.5, 0.5, -0.5, -0.5], fovy=FIELD_OF_VIEW
+        )
+        exclude_all(spec, [body.name for body in links.values()])
+        controls = [0.0, 0.0, *start[2:]]
+        extend_keyframes(spec, [*map(float, pos), *quat, *start], 6 + len(JOINTS), controls)
+        return AgentEntry(
+            name=self.name,
+            body=self.name,
+            camera=f"{self.name}/eye",
+            fingers=[f"{self.name}_{side}_gripper_finger_link" for side in "rl"],
+            hands=[f"{self.name}_gripper_link"],
+        )
+
+    def _add_link(
+        self, spec: mujoco.MjSpec, parent: mujoco.MjsBody, joint: Joint, q: float, look: Look
+    ) -> mujoco.MjsBody:
+        """The link at joint position `q`, which is the joint's reference; its servo."""
+        kind, turned = mujoco.mjtJoint, np.array([1.0, 0.0, 0.0, 0.0])
+        place = np.array(joint.origin)
+        if joint.slides:
+            place = place + joint.direction * q
+        else:
+            mujoco.mju_axisAngle2Quat(turned, joint.direction, q)
+        wheel = "wheel" in joint.name
+        body = parent.add_body(
+            name=f"{self.name}_{joint.link}", pos=list(place), quat=list(turned), gravcomp=0 if wheel else 1
+        )
+        set_inertia(body, joint.mass, joint.com, joint.inertia)
+        unit = np.rad2deg(1.0) if spec.compiler.degree and not joint.slides else 1.0  # MjSpec: the compiler's unit
+        limited = joint.lower < joint.upper
+        name = f"{self.name}_{joint.name}"
+        rotor = 0.02 if wheel else ROTOR_SHARE * joint.moved
+        body.add_joint(
+            name=name,
+            type=kind.mjJNT_SLIDE if joint.slides else kind.mjJNT_HINGE,
+            axis=list(joint.direction),
+            ref=q * unit,
+            range=[joint.lower * unit, joint.upper * unit] if limited else [0, 0],
+            limited=mujoco.mjtLimited.mjLIMITED_TRUE if limited else mujoco.mjtLimited.mjLIMITED_FALSE,
+            armature=rotor,
+            damping=joint.damping if "head" not in joint.name else 0.0,
+        )
+        short = name.removesuffix("_joint")
+        if wheel:
+            servo(spec, name, 0.0, WHEEL_GAIN, joint.effort, name=short)
+            collision(body, GEOM.mjGEOM_SPHERE, (WHEEL_CONTACT,), friction=1.0)
+        else:
+            stiffness, damping = joint.moved * SERVO_RATE**2, 2 * joint.moved * SERVO_RATE
+            servo(spec, name, stiffness, damping, joint.effort, name=short)
+        draw_link(body, joint.link, look)
+        return body
+
+    def controller(self, tables: SceneTables, agent: int, period: float = ACTION_PERIOD) -> FetchController:
+        return FetchController(tables, agent, period, start_positions(self.pose))
+
+
+Inertia = tuple[float, tuple[float, ...], tuple[float, ...]]
+
+
+def _joined(*parts: Inertia) -> Inertia:
+    """Mass, centre and inertia (xx, xy, xz, yy, yz, zz) of parts whose centres are given in one frame."""
+    total = sum(mass for mass, _, _ in parts)
+    centre = sum(mass * np.array(com) for mass, com, _ in parts) / total
+    tensor = np.zeros((3, 3))
+    for mass, com, (xx, xy, xz, yy, yz, zz) in parts:
+        arm = np.array(com) - centre
+        tensor += np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        tensor += mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+    return total, tuple(centre.tolist()), tuple(tensor[np.triu_indices(3)].tolist())
