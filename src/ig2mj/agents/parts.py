@@ -58,7 +58,7 @@ def collision(
     body: mujoco.MjsBody,
     shape: GEOM,
     size: Vector,
-    mass: float = 0.0,
+    mass: float | int = 0.0,
     pos: Vector = (0, 0, 0),
     quat: Vector = (1, 0, 0, 0),
     end: Vector | None = None,
