@@ -119,7 +119,7 @@ def _written(error: OSError) -> pathlib.Path | None:
     for frame in reversed(frames):
         if frame.f_globals.get("__name__", "").startswith(("rich.", "ig2mj.cli.printing")):
             return None  # the terminal, or where standard output goes
-        found = [value for value in frame.f_locals.values() if isinstance(value, pathlib.PurePath)]
+        found = [value for value in frame.f_locals.values() if isinstance(value, pathlib.Path)]
         if found:
             return found[-1]  # the last that it dealt with
     return None
