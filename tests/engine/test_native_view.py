@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import re
 
+import jax
 import mujoco
 import numpy as np
 import pytest
@@ -308,3 +310,13 @@ def test_a_world_gone_wrong_is_named_with_its_bodies(home, tmp_path, monkeypatch
         home.step()
     home.reset()
     assert np.isfinite(home.step().object_pos).all()
+
+
+def test_a_scene_without_agents_and_cameras_has_a_whole_view(tmp_path):
+    """All fields can be read, as batches made of one world's view do; those of agents are empty."""
+    file = homes.write_tiny_home(tmp_path / "tiny") / "scene.xml"
+    file.write_text(re.sub(r"<camera [^>]*/>", "", file.read_text()))
+    scene = ig2mj.load_scene(file)
+    assert scene.model.ncam == 0
+    view = jax.tree.map(np.asarray, ig2mj.Simulation(scene).view)
+    assert view.agent.eye_pos.shape == (1, 0, 3) and view.agent.eye_quat.shape == (1, 0, 4)

@@ -15,6 +15,7 @@ from ig2mj.engine.view import SCHEMA, read_field, replace_fields
 from ig2mj.predicates import compile_expression
 from ig2mj.states import initial_states, update
 from ig2mj.states.definitions import dust
+from ig2mj.states.update import HEAT_FIELDS
 from ig2mj.worlds.lazy.program import StateProgram
 from ig2mj.worlds.lazy.stepper import StateStepper
 
@@ -219,3 +220,10 @@ def test_a_stepper_needs_no_goal():
         states, swap, status = stepper.step(states, VIEWS[1])
     assert swap is None and status.literals.shape == (1, 0) and not status.holds[0]
     assert stepper._kept is None  # a finger is at the button: the count goes on
+
+
+def test_the_short_way_computes_all_that_the_second_part_of_an_update_changes():
+    """A state added to `update.HEAT` must be added here, too, or it would stand still while nothing else happens."""
+    program, states = StateProgram(HOME.model()), initial_states(HOME.model(), 1)
+    names = [tuple(key.name for key in path) for path, _ in jax.tree_util.tree_flatten_with_path(states)[0]]
+    assert [names[place] for place in program.heats] == [(name,) for name in HEAT_FIELDS]

@@ -68,7 +68,7 @@ def plan_view(model: mujoco.MjModel, tables: SceneTables, layout: ModelLayout, b
         base_joints=joints_above(model, tables.agent_body),
         hand_joints=joints_above(model, tables.hand_body),
         camera_body=np.where(known, model.cam_bodyid[camera] if model.ncam else 0, tables.agent_body),
-        camera_pos=np.where(known[:, None], model.cam_pos[camera] if model.ncam else 0.0, 0.0),
+        camera_pos=np.where(known[:, None], model.cam_pos[camera] if model.ncam else 0.0, np.zeros(3)),
         camera_quat=np.where(known[:, None], model.cam_quat[camera] if model.ncam else 0.0, [1.0, 0.0, 0.0, 0.0]),
     )
 

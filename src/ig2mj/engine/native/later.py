@@ -59,7 +59,7 @@ class LaterPlan:
             free_dofs=layout.object_dofadr[free, None] + np.arange(6),
             roots=np.array(model.body_rootid),
             camera_body=np.where(known, model.cam_bodyid[camera] if model.ncam else 0, tables.agent_body),
-            camera_pos=np.where(known[:, None], model.cam_pos[camera] if model.ncam else 0.0, 0.0),
+            camera_pos=np.where(known[:, None], model.cam_pos[camera] if model.ncam else 0.0, np.zeros(3)),
             camera_quat=np.where(known[:, None], model.cam_quat[camera] if model.ncam else 0.0, [1.0, 0, 0, 0]),
             unit_starts=np.unique(layout.unit_object[:count], return_index=True)[1],
             agent_starts=np.unique(layout.unit_agent[count:], return_index=True)[1],
