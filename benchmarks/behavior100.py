@@ -39,7 +39,7 @@ PAGE = ROOT / "docs" / "behavior100.md"
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
     parser.add_argument("--suite", choices=("behavior100", "behavior1k"), default="behavior100")
     parser.add_argument("--homes", nargs="*", help="just these homes")
     parser.add_argument("--resume", action="store_true", help="keep what an earlier run found, do the other homes")

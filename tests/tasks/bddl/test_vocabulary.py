@@ -3,8 +3,10 @@
 import pytest
 
 from ig2mj.predicates import PREDICATES, logic
+from ig2mj.tasks.bddl import behavior1k
 from ig2mj.tasks.bddl.definitions import activity_names, load_activity
 from ig2mj.tasks.bddl.problem import parse_problem
+from ig2mj.tasks.bddl.synsets import kinds
 from ig2mj.tasks.bddl.vocabulary import VocabularyError, lower
 
 
@@ -101,3 +103,33 @@ def test_a_whole_that_is_no_longer_real_is_sliced():
 def test_what_no_state_expresses_is_named(objects, condition, lacking):
     with pytest.raises(VocabularyError, match=f"activity 'a' uses {lacking}, which ig2mj has no state for"):
         lowered(objects, goal=condition)
+
+
+@pytest.mark.parametrize(
+    ("name", "instead"),
+    [
+        ("bookcase.n.01", "shelf.n.01"),
+        ("wicker_basket.n.01", "basket.n.01"),  # the synset right above
+        ("carton__of__milk.n.01", "milk"),  # what is in it
+        ("bottle__of__vodka.n.01", "bottle.n.01"),  # else what it is in
+        ("half__apple.n.01", "half_apple"),  # its own category
+        ("statue.n.09", None),  # furniture is too general to stand in
+        ("nowhere.n.01", None),
+    ],
+)
+def test_what_stands_in_for_synsets_of_behavior_1k(name, instead, monkeypatch):
+    hierarchy = {
+        "bookcase.n.01": (("furniture.n.01",), ("bookcase",)),
+        "wicker_basket.n.01": (("basket.n.01",), ("wicker_basket",)),
+        "carton__of__milk.n.01": (("grocery.n.02",), ("carton_of_milk",)),
+        "bottle__of__vodka.n.01": (("grocery.n.02",), ("bottle_of_vodka",)),
+        "half__apple.n.01": ((), ("half_apple",)),
+        "statue.n.09": (("furniture.n.01",), ("statue",)),
+    }
+    monkeypatch.setattr(behavior1k, "hierarchy", lambda: hierarchy)
+    found = kinds.__wrapped__(name, True)
+    assert found.instead == instead and bool(found.categories) == (instead is not None)
+
+
+def test_an_office_is_a_home_office():
+    assert lowered("d_1 - desk.n.01", "(inroom d_1 private_office)").rooms == {"d_1": "home_office"}

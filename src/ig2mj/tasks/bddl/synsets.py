@@ -2,7 +2,7 @@
 
 BEHAVIOR-100 speaks of synsets of ig2mj's own taxonomy (`ig2mj.knowledge`). BEHAVIOR-1K has a finer one of its own; for
 what ours does not know something near stands in, and says so: a synset with a category of the same name, the thing in
-`bottle__of__soda` (soda, else a bottle), the synset right above.
+`carton__of__milk` (milk, else a carton), the synset right above; a few are named one by one.
 """
 
 from __future__ import annotations
@@ -17,6 +17,18 @@ FLOOR = "floor.n.01"
 AGENT = "agent.n.01"
 MOST_CATEGORIES = 8
 """A synset above with more categories than these is too general to stand in (furniture, container, grocery)."""
+
+STAND_INS = {
+    "bookcase.n.01": "shelf.n.01",
+    "bottle__of__soda.n.01": "pop.n.02",
+    "can__of__soda.n.01": "pop.n.02",
+    "mail.n.04": "envelope.n.01",
+    "packing_box.n.02": "carton.n.02",
+    "sunglasses.n.02": "sunglass.n.01",
+}
+"""Synsets of BEHAVIOR-1K that are the same thing under another name here, though their taxonomy does not say so."""
+ROOM_STAND_INS = {"private_office": "home_office", "shared_office": "home_office"}
+"""Kinds of room of BEHAVIOR-1K that a home has under another name."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -43,9 +55,10 @@ def kinds(name: str, behavior_1k: bool = False) -> Kinds:
     known = set(categories())
     stem = name.split(".")[0]
     for word in (*own, stem, *reversed(stem.split("__of__"))):
-        if word in known:
+        if word in known and name not in STAND_INS:
             return Kinds((word,), word)
-    for synset_above in above:
+    container = [f"{stem.split('__of__')[0]}.n.01"] if "__of__" in stem else []
+    for synset_above in (STAND_INS.get(name, ""), *above, *container):
         if synset_above in taxonomy() and 0 < len(found := categories_of(synset_above)) <= MOST_CATEGORIES:
             return Kinds(_ordered(synset_above, found), synset_above)
     return Kinds(())

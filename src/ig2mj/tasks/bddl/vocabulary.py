@@ -23,7 +23,7 @@ from ig2mj.errors import Ig2mjError
 from ig2mj.predicates import find, logic
 from ig2mj.predicates.logic import Atom, Expression, Not
 from ig2mj.tasks.bddl.problem import Problem
-from ig2mj.tasks.bddl.synsets import FLOOR
+from ig2mj.tasks.bddl.synsets import FLOOR, ROOM_STAND_INS
 
 BEHAVIOR_1K = "omnigibson"
 DIRT = {"stain.n.01": "stained", "dust.n.01": "dusty"}
@@ -96,7 +96,7 @@ def lower(problem: Problem, name: str) -> Activity:
         behavior_1k=problem.domain == BEHAVIOR_1K,
         objects={s: names for s, names in kept.items() if names},
         halves=lowering.halves,
-        rooms=problem.rooms,
+        rooms=problem.rooms if lowering.old else {n: ROOM_STAND_INS.get(k, k) for n, k in problem.rooms.items()},
         init=tuple(dict.fromkeys(init)),
         goal=tuple(dict.fromkeys(goal)),
         remarks=problem.remarks,
