@@ -16,7 +16,9 @@ from .base import inputs
 from .base.description import Instance, ObjectModel
 from .base.options import ConvertOptions
 from .base.output import replaced_folder
+from .base.process_pool import TaskPool
 from .bodies.assembly import Assembly, extent
+from .bodies.kinematics import model_bounds
 from .bodies.placements import Placement, make_halves
 from .finish import Outcome, finish, version_record
 from .mjcf.appearance import add_ground, add_setting
@@ -26,10 +28,11 @@ from .mjcf.model_builder import ModelBuilder
 from .mjcf.object import add_object
 from .mjcf.parking import CLEARANCE, resting_pose
 from .mjcf.scene import SceneBuild, add_start_key, rest_start
-from .model_task import BuiltModel, build_model
+from .model_task import BuiltModel, build_model, decompose_model
 from .reading.dataset import Dataset
 from .reading.joint_limits import clamp
 from .reading.metadata import read_metadata
+from .reading.scaling import scale_model
 from .reading.urdf import read_urdf
 
 
@@ -45,7 +48,8 @@ def convert_object(
     """Converts one object: `object.xml`, `manifest.json`, `meshes/`, and the report.
 
     The object stands on a ground plane, free to move; the halves of a sliceable one lie beside it. Masses are the
-    URDF's own; missing ones come from the category's density where the URDF lies in a dataset, else from a general one.
+    URDF's own; without any, the object weighs its bounding box times the category's density where the URDF lies in a
+    dataset, else a general one (`link_inertials`).
 
     Args:
       category: what it is, in iGibson's names: decides its abilities. model: its name, default the URDF's.
@@ -59,7 +63,7 @@ def convert_object(
     start = time.perf_counter()
     options.progress(f"reading {file.name}", 0, 2)
     source, dataset = _read(file, category, model or file.stem)
-    built = {source.model: _build(source, dataset, bounding_box, options)}
+    built = {source.model: _build(source, dataset, _scale(source, bounding_box), options)}
     built |= _halves(dataset, built[source.model], options)
     read_seconds = time.perf_counter() - start
     options.progress(f"writing {source.model}", 1, 2)
@@ -102,32 +106,18 @@ def _dataset_root(file: pathlib.Path) -> pathlib.Path | None:
     return parents[3] if inside and inputs.is_folder(parents[3] / "metadata") else None
 
 
-def _build(
-    source: ObjectModel,
-    dataset: Dataset | None,
-    bounding_box: tuple[float, float, float] | None,
-    options: ConvertOptions,
-) -> BuiltModel:
-    own_masses = any(link.inertial is not None for link in source.links.values())
-    density = None
-    if dataset is not None and not own_masses and source.metadata.bbox_size is not None:
-        density = dataset.density(source.category)
+def _build(source: ObjectModel, dataset: Dataset | None, scale: np.ndarray, options: ConvertOptions) -> BuiltModel:
+    density = None if dataset is None else dataset.density(source.category)
     hulls = options.hull_options()
+    with TaskPool(options.jobs) as pool:
+        found = decompose_model(source, hulls, pool, options.progress)
+    return build_model(source, found, scale, density, hulls, options.bullet_inertia, igibson_visuals=False)
 
-    def built(scale: np.ndarray) -> BuiltModel:
-        return build_model(
-            source,
-            scale,
-            density,
-            hulls,
-            options.bullet_inertia,
-            igibson_visuals=False,
-            jobs=options.jobs,
-            progress=options.progress,
-        )
 
+def _scale(source: ObjectModel, bounding_box: tuple[float, float, float] | None) -> np.ndarray:
+    """Scale [3] that gives the object the size wanted. Raises InputError."""
     if bounding_box is None:
-        return built(np.ones(3))
+        return np.ones(3)
     wanted = np.asarray(bounding_box, dtype=float)
     if not np.all(np.isfinite(wanted)) or np.any(wanted <= 0):
         raise InputError(
@@ -135,11 +125,11 @@ def _build(
         )
     size = source.metadata.bbox_size
     if size is None:
-        low, high = extent(built(np.ones(3)).assembly, np.eye(4))
-        size = high - low
+        box = model_bounds(scale_model(source, 1.0))
+        size = np.zeros(3) if box is None else box[1] - box[0]
     if np.any(np.asarray(size) <= 0):
         raise InputError(source.file, "is flat: it cannot be scaled to a bounding box", element="--bbox")
-    return built(wanted / size)
+    return wanted / size
 
 
 def _halves(dataset: Dataset | None, whole: BuiltModel, options: ConvertOptions) -> dict[str, BuiltModel]:
@@ -150,17 +140,7 @@ def _halves(dataset: Dataset | None, whole: BuiltModel, options: ConvertOptions)
     made = {}
     for number, part in enumerate(parts):
         source = dataset.model(part.category, part.model)
-        density = dataset.density(source.category) if source.metadata.bbox_size is not None else None
-        made[f"{whole.assembly.model.model}_part_{number}"] = build_model(
-            source,
-            whole.assembly.scale,
-            density,
-            options.hull_options(),
-            options.bullet_inertia,
-            igibson_visuals=False,
-            jobs=options.jobs,
-            progress=options.progress,
-        )
+        made[f"{whole.assembly.model.model}_part_{number}"] = _build(source, dataset, whole.assembly.scale, options)
     return made
 
 

@@ -17,16 +17,17 @@ from .base import inputs
 from .base.description import Instance, SceneDescription
 from .base.options import ConvertOptions
 from .base.output import replaced_folder
-from .base.process_pool import map_tasks
+from .base.process_pool import TaskPool
 from .base.transforms import quat_from_rotation
 from .bodies.assembly import has_own_look
 from .bodies.placements import Placement, complete_parts, make_halves, place_instances
 from .finish import Outcome, finish, version_record
+from .hulls.pieces import HullOptions
 from .mjcf.file import write_model
 from .mjcf.manifest_entries import room_entries, task_entry, vec3
 from .mjcf.model_builder import ModelBuilder
 from .mjcf.scene import SceneBuild, build_scene, fill_states, rest_start
-from .model_task import BuiltModel, ModelTask, forget_datasets, is_quick, model_task, run_task
+from .model_task import BuiltModel, forget_datasets, is_quick, model_tasks, run_task
 from .reading.dataset import Dataset
 from .reading.room_maps import write_rooms
 from .reading.scene_urdf import parse_object_scope
@@ -158,21 +159,20 @@ def _build_models(
 def _run_tasks(
     dataset: Dataset, scene: SceneDescription, instances: list[Instance], options: ConvertOptions
 ) -> dict[str, BuiltModel]:
-    """Builds each distinct model once, over the process pool."""
-    tasks: dict[tuple, ModelTask] = {}
-    keys: dict[str, tuple] = {}
-    for instance in instances:
-        hulls = options.hull_options(building=instance.kind == "building")
-        task = model_task(dataset, scene, instance, hulls, options.bullet_inertia)
-        tasks.setdefault(task.key, task)
-        keys[instance.name] = task.key
-    work = list(tasks.values())
-    labels = [task.label for task in work]
-    results = map_tasks(run_task, work, labels, options.jobs, options.progress, is_quick)
-    for result in results:
-        inputs.add(result.inputs)
-    by_key = dict(zip(tasks, results, strict=True))
-    return {name: by_key[key] for name, key in keys.items()}
+    """Builds each model at each of its sizes once, over the process pool."""
+
+    def hulls(instance: Instance) -> HullOptions:
+        return options.hull_options(building=instance.kind == "building")
+
+    tasks, names = model_tasks(dataset, scene, instances, hulls, options.bullet_inertia)
+    with TaskPool(options.jobs) as pool:
+        results = pool.map(run_task, tasks, [task.label for task in tasks], options.progress, is_quick)
+    built: dict[str, BuiltModel] = {}
+    for models, sizes in zip(results, names, strict=True):
+        for model, same in zip(models, sizes, strict=True):
+            inputs.add(model.inputs)
+            built |= dict.fromkeys(same, model)
+    return {instance.name: built[instance.name] for instance in instances}
 
 
 def _manifest(

@@ -1,4 +1,4 @@
-"""The work on one model at one scale: read, scale, decompose, weigh, plan. What a process pool is given."""
+"""The work on one model: read, decompose, then for every size scale, weigh, plan. What a process pool is given."""
 
 from __future__ import annotations
 
@@ -6,21 +6,23 @@ import dataclasses
 import functools
 import hashlib
 import time
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from ig2mj.errors import Ig2mjError
 
 from .base import inputs
-from .base.description import Instance, ObjectModel, SceneDescription, Shape
+from .base.description import Instance, ObjectModel, SceneDescription
 from .base.options import Progress, no_progress
-from .base.process_pool import map_tasks
+from .base.process_pool import TaskPool
 from .bodies.assembly import Assembly, assemble
 from .bodies.inertia import link_inertials
-from .hulls.link_hulls import decompose_link, is_cached
+from .bodies.kinematics import model_bounds
+from .hulls.link_hulls import LinkPieces, decompose_links, is_cached, scaled_pieces
 from .hulls.pieces import HullOptions, LinkHulls
 from .reading.dataset import Dataset
-from .reading.scaling import instance_scale, scale_model
+from .reading.scaling import instance_scale, link_maps, scale_model
 
 
 @dataclasses.dataclass
@@ -30,6 +32,8 @@ class BuiltModel:
     Attributes:
       hulls: link -> its collision geometry. encrypted: visuals were replaced by hulls.
       file_hash: of the URDF and its meshes. seconds: the work took.
+      source_box: [2, 3] lowest and highest corner of the source's collision shapes in base axes, joints at 0, scaled;
+        None without shapes.
       inputs: what was read for it (`inputs.Record.answers`), for when that happened in another process.
     """
 
@@ -38,85 +42,118 @@ class BuiltModel:
     encrypted: bool
     file_hash: str
     seconds: float
+    source_box: np.ndarray | None = None
     inputs: dict[str, str] = dataclasses.field(default_factory=dict)
 
 
 @dataclasses.dataclass(frozen=True)
 class ModelTask:
-    """One model at one scale out of a dataset. Equal tasks give equal results, so instances share them."""
+    """One model out of a dataset, at every scale that a scene has it in: it is read and decomposed once.
+
+    Attributes:
+      instances: one for each scale; they differ in nothing else that matters.
+    """
 
     root: str
-    scene: SceneDescription = dataclasses.field(compare=False, repr=False)
-    instance: Instance = dataclasses.field(compare=False, repr=False)
-    key: tuple
+    scene: SceneDescription = dataclasses.field(repr=False)
+    instances: tuple[Instance, ...] = dataclasses.field(repr=False)
     hulls: HullOptions
     bullet_inertia: bool
 
     @property
     def label(self) -> str:
         """What the progress bar says."""
-        return f"{self.instance.category}/{self.instance.model}"
+        return f"{self.instances[0].category}/{self.instances[0].model}"
 
 
-def model_task(
-    dataset: Dataset, scene: SceneDescription, instance: Instance, hulls: HullOptions, bullet_inertia: bool
-) -> ModelTask:
-    """The task that builds an instance's model."""
+def model_tasks(
+    dataset: Dataset,
+    scene: SceneDescription,
+    instances: Sequence[Instance],
+    hulls: Callable[[Instance], HullOptions],
+    bullet_inertia: bool,
+) -> tuple[list[ModelTask], list[list[list[str]]]]:
+    """The tasks that build the models of these instances.
+
+    Returns:
+      The tasks, and for each scale of each task the names of the instances that have it.
+    """
     bare = SceneDescription(name=scene.name, file=scene.file, instances=[])
-    key = (
-        instance.kind,
-        instance.category,
-        instance.model,
-        _rounded(instance.bounding_box),
-        _rounded(instance.scale),
-    )
-    return ModelTask(str(dataset.root), bare, instance, key, hulls, bullet_inertia)
+    models: dict[tuple, dict[tuple, list[Instance]]] = {}
+    for instance in instances:
+        scale = (_rounded(instance.bounding_box), _rounded(instance.scale))
+        scales = models.setdefault((instance.kind, instance.category, instance.model), {})
+        scales.setdefault(scale, []).append(instance)
+    tasks, names = [], []
+    for scales in models.values():
+        firsts = tuple(same[0] for same in scales.values())
+        tasks.append(ModelTask(str(dataset.root), bare, firsts, hulls(firsts[0]), bullet_inertia))
+        names.append([[instance.name for instance in same] for same in scales.values()])
+    return tasks, names
 
 
-def run_task(task: ModelTask) -> BuiltModel:
-    """Does the work of a task. Raises InputError as the readers do."""
+def run_task(task: ModelTask) -> list[BuiltModel]:
+    """Does the work of a task, one result for each of its instances. Raises InputError as the readers do."""
     with inputs.recording() as record:
         dataset = _dataset(task.root)
-        instance = task.instance
-        model = dataset.instance_model(task.scene, instance)
-        scale = instance_scale(instance, model)
-        weighed = instance.kind != "building" and model.metadata.bbox_size is not None
-        density = dataset.density(instance.category) if weighed else None
-        built = build_model(model, scale, density, task.hulls, task.bullet_inertia, igibson_visuals=True)
-    built.inputs = record.answers
+        first = task.instances[0]
+        source = dataset.instance_model(task.scene, first)
+        density = dataset.density(first.category) if first.kind != "building" else None
+        found = decompose_model(source, task.hulls)
+        built = [
+            build_model(
+                source, found, instance_scale(instance, source), density, task.hulls, task.bullet_inertia,
+                igibson_visuals=True,
+            )
+            for instance in task.instances
+        ]  # fmt: skip
+    for model in built:
+        model.inputs = record.answers
     return built
 
 
 def is_quick(task: ModelTask) -> bool:
     """Whether all the geometry of a task is in the cache; a task that will fail is left to `run_task`, so not quick."""
     try:
-        model = _dataset(task.root).instance_model(task.scene, task.instance)
-        scaled = scale_model(model, instance_scale(task.instance, model))
+        source = scale_model(_dataset(task.root).instance_model(task.scene, task.instances[0]), 1.0)
     except Ig2mjError:
         return False
-    return all(is_cached(link.collisions, task.hulls) for link in scaled.links.values() if link.collisions)
+    return all(is_cached(link.collisions, task.hulls) for link in source.links.values() if link.collisions)
+
+
+def decompose_model(
+    model: ObjectModel, hulls: HullOptions, pool: TaskPool | None = None, progress: Progress = no_progress
+) -> dict[str, LinkPieces]:
+    """The convex pieces of every link of a model as it was read, unscaled: the work that takes long.
+
+    pool: does shapes and parts of all links side by side.
+    """
+    links = {name: link.collisions for name, link in scale_model(model, 1.0).links.items()}
+    return decompose_links(links, hulls, pool, progress)
 
 
 def build_model(
     model: ObjectModel,
+    found: Mapping[str, LinkPieces],
     scale: np.ndarray,
     density: float | None,
     hulls: HullOptions,
     bullet_inertia: bool,
     *,
     igibson_visuals: bool,
-    jobs: int = 1,
-    progress: Progress = no_progress,
 ) -> BuiltModel:
-    """From a model as read to one ready to be written (see `scale_model`, `decompose_link`, `link_inertials`).
+    """From a model as read to one ready to be written (see `scale_model`, `scaled_pieces`, `link_inertials`).
 
-    jobs: processes that decompose links.
+    Args:
+      found: what `decompose_model` made of it.
+      density: kg per m3 of the bounding box; None: the general one (see `link_inertials`).
     """
     start = time.perf_counter()
     scaled = scale_model(model, scale)
-    tasks = [(link.collisions, hulls) for link in scaled.links.values()]
-    found = map_tasks(_decompose, tasks, list(scaled.links), jobs, progress, _is_decomposed)
-    decomposed = dict(zip(scaled.links, found, strict=True))
+    maps = link_maps(model, scale)
+    decomposed = {
+        name: scaled_pieces(found[name], link.collisions, maps[name], hulls) for name, link in scaled.links.items()
+    }
     inertials = link_inertials(scaled, density, bullet_inertia)
     pieces = {name: link_hulls.pieces for name, link_hulls in decomposed.items()}
     assembly = assemble(scaled, scale, pieces, inertials, igibson_visuals=igibson_visuals)
@@ -125,15 +162,8 @@ def build_model(
         if model.links[name].collisions and not link_hulls.pieces:
             assembly.warnings.append(f"link '{name}' has no usable collision geometry")
     encrypted = any(shape.encrypted for link in model.links.values() for shape in link.visuals)
-    return BuiltModel(assembly, decomposed, encrypted, _file_hash(model), time.perf_counter() - start)
-
-
-def _decompose(task: tuple[list[Shape], HullOptions]) -> LinkHulls:
-    return decompose_link(*task)
-
-
-def _is_decomposed(task: tuple[list[Shape], HullOptions]) -> bool:
-    return not task[0] or is_cached(*task)
+    seconds = time.perf_counter() - start + sum(pieces.seconds for pieces in found.values())
+    return BuiltModel(assembly, decomposed, encrypted, _file_hash(model), seconds, model_bounds(scaled))
 
 
 def forget_datasets() -> None:

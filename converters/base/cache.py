@@ -21,7 +21,7 @@ import numpy as np
 
 from .cache_folder import cache_folder, prune
 
-VERSION = 2
+VERSION = 3
 """Raise it whenever the code that makes the cached results changes what they are."""
 
 LIMIT = 2**30

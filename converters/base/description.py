@@ -36,6 +36,7 @@ class Shape:
       scale: the element's mesh scale, per axis.
       file: where the mesh came from. encrypted: it is there but unreadable by design; `meshes` is empty.
       rgba: flat colour, where the source had one. texture: image file and uv per vertex, where usable.
+      was_primitive: a mesh that an uneven scale made of a primitive.
     """
 
     kind: str
@@ -50,6 +51,7 @@ class Shape:
     rgba: tuple[float, float, float, float] | None = None
     texture: pathlib.Path | None = None
     uv: list[np.ndarray] | None = None  # per mesh [n, 2]
+    was_primitive: bool = False
 
 
 @dataclasses.dataclass

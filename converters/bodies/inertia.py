@@ -7,7 +7,7 @@ import trimesh
 
 from ..base.description import Inertial, Link, ObjectModel
 from ..hulls.solids import Solid, combine, hull_volume, joined, shape_solids, signed_volume
-from .kinematics import shape_bounds
+from .kinematics import model_bounds, shape_bounds
 
 DEFAULT_DENSITY = 67.0
 """kg per m^3 of the bounding box, of a category without a spec (section 6)."""
@@ -24,26 +24,46 @@ TINY = 1e-3
 def link_inertials(model: ObjectModel, density: float | None, bullet: bool = False) -> dict[str, Inertial]:
     """Inertials of all links of a model that `scaling.scale_model` returned.
 
-    With a density and a bounding box the URDF's masses are thrown away, as in iGibson: the mass of the whole is
-    density x scaled bounding box, split over the links by the volume of their collision meshes. The centre of mass is
-    the volume's where the mesh is watertight, else the surface's. Bodies left without mass get `MIN_MASS`.
+    One rule for scenes and single objects: the mass of the whole is density x scaled bounding box, split over the links
+    by the volume of their collision shapes, and the centre of mass is the volume's where the mesh is watertight, else
+    the surface's. A URDF that has inertials of its own keeps them; its links without one get their share of the above.
+    (iGibson throws them away, but its own objects have none.) Bodies left without mass get `MIN_MASS`.
 
     Args:
       model: the scaled model. Warnings are appended to `model.warnings`.
-      density: kg per m^3 of the bounding box, of the category; None keeps the URDF's own inertials and computes only
-        missing or impossible ones (building parts, plain URDFs).
+      density: kg per m^3 of the bounding box, of the category; None: `DEFAULT_DENSITY`, with a warning.
       bullet: inertia by Bullet's formula on the axis-aligned box instead of the true one of the convex hulls.
 
     Returns:
       link name -> Inertial (link frame), for every link. Fixed-joint children are separate: merging is the builder's.
     """
-    if density is not None and model.metadata.bbox_size is not None:
-        masses = _split_mass(model, density * float(np.prod(model.metadata.bbox_size)))
-        result = {name: _computed(link, masses[name], bullet) for name, link in model.links.items()}
-    else:
-        result = {name: _kept(link, model, density or DEFAULT_DENSITY, bullet) for name, link in model.links.items()}
+    own = [link for link in model.links.values() if link.inertial is not None]
+    shares: dict[str, float] = {}
+    if len(own) < len(model.links) and (size := _size(model)) is not None:
+        total = (DEFAULT_DENSITY if density is None else density) * float(np.prod(size))
+        shares = _split_mass(model, total)
+        if density is None and not own:
+            text = f"has no inertials: {total:.3g} kg, {DEFAULT_DENSITY:g} kg/m3 of its box, split by volume"
+            model.warnings.append(text)
+    result = {}
+    for name, link in model.links.items():
+        if link.inertial is not None:
+            result[name] = _kept(link, link.inertial, model, bullet)
+            continue
+        share = shares.get(name, 0.0)
+        if own and share > 0:
+            model.warnings.append(f"link '{name}' has no inertial: {share:.3g} kg, its share of the object's size")
+        result[name] = _computed(link, share, bullet)
     _give_least_mass(model, result)
     return result
+
+
+def _size(model: ObjectModel) -> np.ndarray | None:
+    """The bounding box [3] that the density refers to: metadata.json's, else that of the collision shapes."""
+    if model.metadata.bbox_size is not None:
+        return model.metadata.bbox_size
+    box = model_bounds(model)
+    return None if box is None else np.maximum(box[1] - box[0], MIN_RADIUS)
 
 
 def link_com(link: Link) -> np.ndarray | None:
@@ -76,7 +96,11 @@ def _surface_centre(body: trimesh.Trimesh) -> np.ndarray:
 
 
 def _split_mass(model: ObjectModel, total: float) -> dict[str, float]:
-    """Mass per link, by the signed volume of its meshes, or by hulls where any of those is not positive."""
+    """Mass per link, by the signed volume of its meshes, or by hulls where any of those is not positive.
+
+    Primitives count only where the object has no bounding box in metadata.json, or no mesh: in iGibson they weigh
+    nothing, and its own objects must keep their masses.
+    """
     signed, hulls = {}, {}
     for name, link in model.links.items():
         meshes = [m for shape in link.collisions for m in shape.meshes]
@@ -87,6 +111,12 @@ def _split_mass(model: ObjectModel, total: float) -> dict[str, float]:
     if any(signed[name] <= TINY * hulls[name] for name in with_mesh):
         volumes = hulls
         model.warnings.append("a collision mesh encloses no volume: masses are split by the volumes of convex hulls")
+    primitives = {
+        name: sum(s.volume for shape in link.collisions if shape.kind != "mesh" for s in shape_solids(shape))
+        for name, link in model.links.items()
+    }
+    if model.metadata.bbox_size is None:
+        volumes = {name: volume + primitives[name] for name, volume in volumes.items()}
     if sum(volumes.values()) <= 0:
         volumes = {
             name: sum(s.volume for shape in link.collisions for s in shape_solids(shape))
@@ -108,24 +138,31 @@ def _computed(link: Link, mass: float, bullet: bool) -> Inertial:
     return Inertial(mass, _tensor(link, mass, pose, bullet), pose)
 
 
-def _kept(link: Link, model: ObjectModel, density: float, bullet: bool) -> Inertial:
-    """The URDF's inertial, or one computed where it is missing, or its tensor where that is impossible."""
-    given = link.inertial
-    if given is None:
-        boxes = [b for shape in link.collisions if (b := shape_bounds(shape)) is not None]
-        if not boxes:
-            return Inertial(0.0, np.zeros((3, 3)))
-        extent = np.max([b[1] for b in boxes], axis=0) - np.min([b[0] for b in boxes], axis=0)
-        mass = density * float(np.prod(np.maximum(extent, MIN_RADIUS)))
-        model.warnings.append(f"link '{link.name}' has no inertial: {mass:.3g} kg from its size")
-        return _computed(link, mass, bullet)
+def _kept(link: Link, given: Inertial, model: ObjectModel, bullet: bool) -> Inertial:
+    """The URDF's inertial, or its mass with a computed tensor where no rigid body of this size has that tensor."""
     if given.mass == 0:
         return Inertial(0.0, np.zeros((3, 3)), given.pose.copy())
-    if not bullet and is_possible(given.inertia):
+    problem = "no rigid body has its inertia"
+    if is_possible(given.inertia):
+        problem = _too_wide(link, given)
+    if not bullet and not problem:
         return given
     if not bullet and np.any(given.inertia):
-        model.warnings.append(f"link '{link.name}': no rigid body has its inertia; it is computed from its shape")
+        model.warnings.append(f"link '{link.name}': {problem}; it is computed from its shape")
     return Inertial(given.mass, _tensor(link, given.mass, given.pose, bullet), given.pose.copy())
+
+
+def _too_wide(link: Link, given: Inertial) -> str:
+    """What is wrong with an inertia whose mass would have to lie outside the link: a placeholder; else ''."""
+    boxes = [b for shape in link.collisions or link.visuals if (b := shape_bounds(shape)) is not None]
+    if not boxes:
+        return ""
+    size = np.max([b[1] for b in boxes], axis=0) - np.min([b[0] for b in boxes], axis=0)
+    half = 0.5 * float(np.linalg.norm(size))
+    radius = float(np.sqrt(np.linalg.eigvalsh(given.inertia)[2] / given.mass))
+    return (
+        f"its inertia is that of a mass {radius:.2g} m away, and it is {2 * half:.2g} m across" if radius > half else ""
+    )
 
 
 def is_possible(inertia: np.ndarray) -> bool:

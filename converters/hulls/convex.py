@@ -115,6 +115,26 @@ def union_volume(hulls: Sequence[Hull]) -> float:
     return min(max(volume, low), high)
 
 
+def clip_to(hull: Hull, bounds: Hull) -> Hull | None:
+    """What of the hull lies within another, `bounds`; the hull itself where it stays inside to 0.1 micrometre."""
+    import manifold3d
+
+    if bounds.contains(hull.vertices, 1e-7).all():
+        return hull
+    solids = [manifold3d.Manifold.hull_points(np.ascontiguousarray(h.vertices)) for h in (hull, bounds)]
+    common = manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Intersect)
+    return hull_of(np.asarray(common.to_mesh64().vert_properties)[:, :3]) if common.volume() > 0 else None
+
+
+def union_mesh(hulls: Sequence[Hull]) -> tuple[np.ndarray, np.ndarray]:
+    """The surface of the union: vertices [n, 3] and faces [m, 3], closed and wound outward."""
+    import manifold3d
+
+    solids = [manifold3d.Manifold.hull_points(np.ascontiguousarray(h.vertices)) for h in hulls]
+    mesh = manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add).to_mesh64()
+    return np.asarray(mesh.vert_properties, np.float64)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64)
+
+
 def mesh_union_volume(meshes: Sequence[tuple[np.ndarray, np.ndarray]]) -> float | None:
     """m3 of the union of closed meshes (vertices, faces), or None where one of them is no proper solid."""
     import manifold3d
@@ -128,8 +148,10 @@ def mesh_union_volume(meshes: Sequence[tuple[np.ndarray, np.ndarray]]) -> float 
     return float(manifold3d.Manifold.batch_boolean(solids, manifold3d.OpType.Add).volume())
 
 
-def reduce_vertices(hull: Hull, limit: int) -> Hull:
+def reduce_vertices(hull: Hull, limit: int, *, keep_volume: bool = True) -> Hull:
     """A hull of at most `limit` vertices with the same bounding box and, as nearly as that allows, the same volume.
+
+    With `keep_volume` False it stays inside the given hull, and is smaller.
 
     Picks extreme vertices (the six of the bounding box first, then always the one farthest outside what is picked),
     then spreads them about the middle until the volume is back, clipped to the bounding box.
@@ -139,6 +161,8 @@ def reduce_vertices(hull: Hull, limit: int) -> Hull:
     picked = _farthest_first(hull, limit)
     low, high = hull.vertices.min(axis=0), hull.vertices.max(axis=0)
     best = picked
+    if not keep_volume:
+        return best
     middle = picked.vertices.mean(axis=0)
     spread = 1.0
     for _ in range(6):

@@ -13,7 +13,7 @@ import scipy.sparse
 import scipy.stats.qmc
 import trimesh
 
-from .convex import Hull, hull_of, mesh_union_volume, sample_surface, surface_distance
+from .convex import Hull, hull_of, mesh_union_volume, sample_surface, surface_distance, thickness
 
 SAMPLES = 2048
 """Points that decide how much of a hull is filled: standard error about 1 % at worst."""
@@ -23,6 +23,10 @@ WORK = 10_000_000
 """Most (point, triangle) pairs of one winding-number sum."""
 OPEN_UP = 0.7
 """z of the normal of an opening's plane from which on it counts as facing up."""
+THIN = 0.05
+"""Metres: nothing is kept inside a closed shell that is no thicker."""
+COVERED = 0.01
+"""Every point of a shell's hull is this near to its mesh, relative to the diagonal."""
 OPEN_SHARE = 0.03
 """Openings smaller than this share of the hull's surface are defects, not openings."""
 
@@ -261,3 +265,16 @@ def hull_stands_for(hull: Hull, triangles: np.ndarray, volume: float, ratio: flo
     marks = sample_surface(hull.vertices[hull.faces], 600)
     marks = marks[:: -(-len(marks) // MARKS)]
     return float(surface_distance(marks, triangles).max()) <= max(min(depth, 0.05 * hull.diagonal), 1e-6)
+
+
+def is_thin_shell(hull: Hull, triangles: np.ndarray) -> bool:
+    """Whether the mesh is the whole surface of its hull, and the hull is thin: a board, a panel, a knob.
+
+    What the faces enclose does not matter then: modelling programs leave such shells without volume (doubled faces,
+    faces that do not meet), and nothing could be put inside them.
+    """
+    if not len(triangles) or thickness(hull.vertices) > THIN:
+        return False
+    marks = sample_surface(hull.vertices[hull.faces], 600)
+    marks = marks[:: -(-len(marks) // MARKS)]
+    return float(surface_distance(marks, triangles).max()) <= COVERED * hull.diagonal

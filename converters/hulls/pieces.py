@@ -8,7 +8,9 @@ from typing import Literal
 import numpy as np
 
 PieceKind = Literal["box", "cylinder", "sphere", "capsule", "hull"]
-PieceSource = Literal["primitive", "group", "hull", "component", "boxes", "sheet", "coacd", "fallback", "merged"]
+PieceSource = Literal[
+    "primitive", "group", "hull", "component", "boxes", "sheet", "coacd", "fallback", "merged", "recut"
+]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -18,20 +20,25 @@ class HullOptions:
     Attributes:
       max_hulls: most pieces per link; more are merged. None: no limit, for walls, floors and ceilings, whose segments
         must never be merged across a door.
+      few_hulls: so many pieces are never merged: they cost too little to be worth any error.
+      max_volume_error: between these two numbers a link has as few pieces as keep the error of its volume below this,
+        relative, and its openings open.
       max_hull_vertices: most vertices per hull; fewer by best fit.
       primitives: try box, cylinder and sphere on every piece.
       hull_ratio: one hull stands for a mesh without groups if its volume is at most this many times the mesh's.
       hull_depth: and if no point of the hull is farther from the mesh than this, metres (or 5 % of the diagonal,
         whichever is less): a small door in a large wall changes the volume little.
       coacd_threshold: CoACD's concavity, relative to the mesh's size.
-      time_limit: seconds for all CoACD runs on one link.
+      time_limit: seconds of processor time for all CoACD runs on one link.
       min_thickness: flat pieces are thickened to this, metres.
       seed: CoACD's.
       threads: CoACD's; does not change the result.
       cache: look up and keep results in the user's cache folder.
     """
 
-    max_hulls: int | None = 16
+    max_hulls: int | None = 64
+    few_hulls: int = 16
+    max_volume_error: float = 0.15
     max_hull_vertices: int = 32
     primitives: bool = True
     hull_ratio: float = 1.1
@@ -65,7 +72,7 @@ class Piece:
       source: where it came from. "primitive": the source said so; "group": one `o`/`g` group; "hull": the whole
         mesh's hull; "component": a connected part's hull; "boxes": an exact cut into boxes; "sheet": a side of a
         container without thickness; "coacd"; "fallback": one hull because decomposition failed; "merged": by the
-        budget.
+        budget; "recut": the whole link cut up anew, because merging would have filled too much.
       volume: of the geom that is emitted, m3.
       fit_error: greatest distance between the surface of the geom and the hull it stands for before any reduction,
         metres.

@@ -63,13 +63,9 @@ def scale_model(model: ObjectModel, s: np.ndarray | tuple[float, float, float] |
     """
     s = _checked(np.broadcast_to(np.asarray(s, dtype=float), 3), model, f"model '{model.model}'")
     warnings = list(model.warnings)
-    uniform = float(np.ptp(s)) <= 1e-9 * float(s.max())
-    rotations = {name: pose[:3, :3] for name, pose in link_poses(model).items()}
-    turned = [name for name, rotation in rotations.items() if not is_identity(rotation)]
-    maps = {
-        name: np.diag(s) if uniform or name not in turned else rotations[name].T @ np.diag(s) @ rotations[name]
-        for name in model.links
-    }
+    uniform = _is_uniform(s)
+    turned = [name for name, pose in link_poses(model).items() if not is_identity(pose[:3, :3])]
+    maps = link_maps(model, s)
     if s.max() > LARGE_RATIO * s.min():
         warnings.append(f"scaled very unevenly: {' x '.join(f'{v:.3g}' for v in s)}")
     if sheared := [name for name in turned if not _is_diagonal(maps[name])]:
@@ -89,6 +85,20 @@ def scale_model(model: ObjectModel, s: np.ndarray | tuple[float, float, float] |
     return dataclasses.replace(
         model, links=links, joints=joints, metadata=_scaled_metadata(model.metadata, s), warnings=warnings
     )
+
+
+def link_maps(model: ObjectModel, s: np.ndarray) -> dict[str, np.ndarray]:
+    """link -> [3, 3], the map of its frame that stretches the whole object by s [3] along its base's axes."""
+    maps = {}
+    for name, pose in link_poses(model).items():
+        rotation = pose[:3, :3]
+        straight = _is_uniform(s) or is_identity(rotation)
+        maps[name] = np.diag(s) if straight else rotation.T @ np.diag(s) @ rotation
+    return maps
+
+
+def _is_uniform(s: np.ndarray) -> bool:
+    return float(np.ptp(s)) <= 1e-9 * float(s.max())
 
 
 def _checked(s: np.ndarray, model: ObjectModel, element: str) -> np.ndarray:
@@ -155,7 +165,7 @@ def _scaled_shape(shape: Shape, linear: np.ndarray, link: str, warnings: list[st
         return dataclasses.replace(shape, pose=pose, size=size)
     warnings.append(f"link '{link}': the uneven scale turns a {shape.kind} into a mesh")
     mesh = _mapped(_tessellated(shape), inside)
-    return dataclasses.replace(shape, kind="mesh", pose=pose, size=(), meshes=[mesh], grouped=True)
+    return dataclasses.replace(shape, kind="mesh", pose=pose, size=(), meshes=[mesh], grouped=True, was_primitive=True)
 
 
 def _is_diagonal(linear: np.ndarray) -> bool:

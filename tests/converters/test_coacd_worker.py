@@ -1,5 +1,8 @@
 """Convex decomposition may hang, crash or be repeated: the converter goes on, and does no work twice."""
 
+import pathlib
+import resource
+import subprocess
 import sys
 import time
 
@@ -8,7 +11,7 @@ import pytest
 import trimesh
 from ig2mj_converters.base.cache_folder import ENVIRONMENT
 from ig2mj_converters.base.description import Mesh, Shape
-from ig2mj_converters.hulls import workers
+from ig2mj_converters.hulls import coacd_process
 from ig2mj_converters.hulls.link_hulls import HullOptions, decompose_link
 
 
@@ -25,21 +28,69 @@ def bowl():
     return Shape("mesh", meshes=[Mesh(np.asarray(shell.vertices), np.asarray(shell.faces))])
 
 
+def wait_for(condition, seconds=20):
+    """What the condition returns once it is true, or after so many seconds."""
+    end = time.monotonic() + seconds
+    while not (found := condition()) and time.monotonic() < end:
+        time.sleep(0.05)
+    return found
+
+
+def alive(process):
+    try:
+        return "(zombie)" not in pathlib.Path(f"/proc/{process}/status").read_text()
+    except FileNotFoundError:
+        return False
+
+
 def use_worker(monkeypatch, code):
-    monkeypatch.setattr(workers, "COMMAND", (sys.executable, "-c", code))
+    monkeypatch.setattr(coacd_process, "COMMAND", (sys.executable, "-c", code))
 
 
 def test_a_hanging_worker_is_stopped_and_one_hull_stands_in(monkeypatch):
-    use_worker(monkeypatch, "import time; time.sleep(60)")
-    started = time.monotonic()
+    use_worker(monkeypatch, "while True: pass")
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     result = decompose_link([bowl()], HullOptions(time_limit=0.8))
-    assert time.monotonic() - started < 10
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before < 5  # three tries of one second
     assert result.method == "fallback" and result.after == 1
-    assert any("took longer" in w for w in result.warnings)
+    assert any("took longer than 1 s of processor time" in w for w in result.warnings)
     assert any("one hull" in w for w in result.warnings)
 
 
-@pytest.mark.parametrize("mishap", ["import time; time.sleep(60)", "import os; os.abort()"])
+def test_a_worker_that_sleeps_for_ever_is_stopped_too(monkeypatch):
+    use_worker(monkeypatch, "import time; time.sleep(60)")
+    monkeypatch.setattr(coacd_process, "ASLEEP_FACTOR", 0.0)
+    monkeypatch.setattr(coacd_process, "ASLEEP_GRACE", 0.5)
+    result = decompose_link([bowl()], HullOptions(cache=False))
+    assert result.stopped and sum("did not end" in w for w in result.warnings) == 3
+
+
+def test_a_busy_machine_does_not_shorten_the_time_limit(monkeypatch, tmp_path):
+    """The limit is processor time: a worker that mostly waits for the processor may take longer by the clock."""
+    slow = "import sys, time, numpy; time.sleep(1.5); numpy.savez(sys.argv[2], count=1, piece_0=numpy.eye(4, 3))"
+    use_worker(monkeypatch, slow)
+    pieces = coacd_process.run_coacd(np.zeros((3, 3)), np.zeros((1, 3), int), {}, cpu_limit=1)
+    assert len(pieces) == 1
+
+
+def test_coacd_ends_when_the_converter_is_killed(tmp_path):
+    """The worker notices the end of its standard input, whatever ended the process at the other end."""
+    out = tmp_path / "pid"
+    code = f"import os, time; open({str(out)!r}, 'w').write(str(os.getpid())); time.sleep(60)"
+    hang = f"import threading; from ig2mj_converters.hulls import coacd_process as c; threading.Thread(target=c._end_with_parent, daemon=True).start(); {code}"  # noqa: E501
+    parent = (
+        "import sys, numpy; from ig2mj_converters.hulls import coacd_process as c;"
+        f"c.COMMAND = (sys.executable, '-c', {hang!r});"
+        "c.run_coacd(numpy.zeros((3, 3)), numpy.zeros((1, 3), int), {}, cpu_limit=60)"
+    )
+    process = subprocess.Popen([sys.executable, "-c", parent])
+    child = int(wait_for(lambda: out.read_text() if out.exists() else ""))
+    process.kill()
+    process.wait()
+    assert wait_for(lambda: not alive(child))
+
+
+@pytest.mark.parametrize("mishap", ["while True: pass", "import os; os.abort()"])
 def test_what_time_or_a_signal_made_worse_is_tried_again_next_time(mishap, monkeypatch, own_cache):
     with monkeypatch.context() as patch:
         use_worker(patch, mishap)
@@ -65,23 +116,23 @@ def test_a_crashing_worker_is_tried_coarser_and_then_one_hull_stands_in(monkeypa
 
 def test_coarser_settings_are_used_when_the_finest_fail(monkeypatch):
     tried = []
-    cube = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+    cube = 0.05 * np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (-1, 0)], float)
 
-    def picky(vertices, faces, parameters, *, time_limit, threads):
+    def picky(vertices, faces, parameters, *, cpu_limit, threads):
         tried.append(parameters["threshold"])
         if len(tried) == 1:
-            raise workers.WorkerError("crashed (signal 11)")
+            raise coacd_process.DecompositionError("crashed (signal 11)")
         return [cube]
 
-    monkeypatch.setattr(workers, "run_coacd", picky)
+    monkeypatch.setattr(coacd_process, "run_coacd", picky)
     result = decompose_link([bowl()], HullOptions(cache=False))
     assert tried == [0.05, 0.1] and result.method == "coacd" and len(result.warnings) == 1
 
 
 def test_an_exception_in_the_worker_is_told_in_one_line(monkeypatch):
     use_worker(monkeypatch, "raise RuntimeError('no luck')")
-    with pytest.raises(workers.WorkerError, match="no luck"):
-        workers.run_coacd(np.zeros((3, 3)), np.zeros((1, 3), int), {}, time_limit=30)
+    with pytest.raises(coacd_process.DecompositionError, match="no luck"):
+        coacd_process.run_coacd(np.zeros((3, 3)), np.zeros((1, 3), int), {}, cpu_limit=30)
 
 
 def test_a_second_conversion_is_ten_times_faster_and_equal():

@@ -11,8 +11,7 @@ import shutil
 import mujoco
 import numpy as np
 import pytest
-from ig2mj_converters import model_task
-from ig2mj_converters.base import inputs
+from ig2mj_converters.base import inputs, process_pool
 from ig2mj_converters.base.output import replaced_folder
 from tiny_dataset import write_dataset
 from tiny_geometry import box, write_obj
@@ -79,18 +78,19 @@ def test_the_object_command(dataset, tmp_path):
     assert entry.mass == pytest.approx(90.0 / (0.6 * 0.6 * 1.6) * 0.6 * 0.6 * 1.6, rel=1e-6)
 
 
-def test_the_links_of_one_object_are_shared_among_the_jobs(dataset, tmp_path, monkeypatch):
+def test_the_shapes_of_one_object_are_shared_among_the_jobs(dataset, tmp_path, monkeypatch):
     seen = []
 
-    def here(function, tasks, labels, jobs, *_):
-        seen.append((list(labels), jobs))
+    def here(pool, function, tasks, labels, *_):
+        seen.append((list(labels), pool.jobs))
         return [pickle.loads(pickle.dumps(function(pickle.loads(pickle.dumps(task))))) for task in tasks]
 
-    monkeypatch.setattr(model_task, "map_tasks", here)
+    monkeypatch.setattr(process_pool.TaskPool, "map", here)
     urdf = dataset / "objects" / "bottom_cabinet" / "cab0" / "cab0.urdf"
     args = ["convert", "object", "--urdf", str(urdf), "--category", "bottom_cabinet", "--no-report", "--no-cache"]
     assert call([*args, "--jobs", "3", "--out", str(tmp_path / "out")]) == 0
-    assert seen == [(["base_link", "link_0", "link_1"], 3)]
+    assert {jobs for _, jobs in seen} == {3}
+    assert [label.split(":")[0] for label in seen[0][0]] == ["link base_link", "link link_0", "link link_1"]
 
 
 def test_the_object_command_scales_to_a_bounding_box(dataset, tmp_path):

@@ -26,7 +26,7 @@ def wire_rack():
 def test_a_wire_rack_of_92_hulls_is_merged_to_the_budget_quickly():
     hulls = wire_rack()
     started = time.perf_counter()
-    merged = budget.merge_to_budget(hulls, 16)
+    merged = budget.Merging(hulls, 16).at(16)
     assert time.perf_counter() - started < 5
     assert len(merged) == 16
     assert sorted(i for m in merged for i in m.members) == list(range(92))
@@ -40,23 +40,23 @@ def test_a_wire_rack_of_92_hulls_is_merged_to_the_budget_quickly():
 
 def test_halves_of_a_box_are_merged_before_anything_else():
     halves = [box((1, 1, 1), (0, 0, 0)), box((1, 1, 1), (1, 0, 0)), box((0.2, 0.2, 3), (0.5, 0, 2))]
-    merged = budget.merge_to_budget(halves, 2)
+    merged = budget.Merging(halves, 2).at(2)
     assert [m.members for m in merged] == [(0, 1), (2,)]
     assert merged[0].hull.volume == pytest.approx(2.0)
 
 
 def test_pieces_far_apart_still_come_down_to_one():
     spread = [box((0.1, 0.1, 0.1), (10.0 * i, 0, 0)) for i in range(60)]
-    assert len(budget.merge_to_budget(spread, 1)) == 1
+    assert len(budget.Merging(spread, 1).at(1)) == 1
 
 
 def test_within_the_budget_nothing_is_merged():
     hulls = wire_rack()[:16]
-    assert [m.members for m in budget.merge_to_budget(hulls, 16)] == [(i,) for i in range(16)]
+    assert [m.members for m in budget.Merging(hulls, 16).at(16)] == [(i,) for i in range(16)]
 
 
 def test_merging_is_the_same_every_time():
-    first, again = (budget.merge_to_budget(wire_rack(), 9) for _ in range(2))
+    first, again = (budget.Merging(wire_rack(), 9).at(9) for _ in range(2))
     assert [m.members for m in first] == [m.members for m in again]
 
 

@@ -7,8 +7,8 @@ import pytest
 import trimesh
 from ig2mj_converters.base.description import Mesh, Shape
 from ig2mj_converters.hulls import convex
+from ig2mj_converters.hulls.coacd_process import DecompositionError
 from ig2mj_converters.hulls.link_hulls import HullOptions, decompose_link
-from ig2mj_converters.hulls.workers import WorkerError
 
 NO_CACHE = HullOptions(cache=False)
 
@@ -18,9 +18,9 @@ def no_coacd(monkeypatch):
     """Fails the test's link, visibly, if a general decomposition is started."""
 
     def refuse(*_, **__):
-        raise WorkerError("was not to be started")
+        raise DecompositionError("was not to be started")
 
-    monkeypatch.setattr("ig2mj_converters.hulls.workers.run_coacd", refuse)
+    monkeypatch.setattr("ig2mj_converters.hulls.coacd_process.run_coacd", refuse)
 
 
 def shape(*meshes, grouped=False, **more):
@@ -100,7 +100,7 @@ def test_real_house_walls_keep_their_doors(shared_data, no_coacd):
 def test_walls_are_never_merged_without_a_budget():
     segments = [shape(box((1, 0.2, 2.5), (2.0 * i, 0, 1.25))) for i in range(30)]
     assert decompose_link(segments, HullOptions(cache=False, max_hulls=None)).after == 30
-    assert decompose_link(segments, NO_CACHE).after == 16
+    assert decompose_link(segments, HullOptions(cache=False, max_hulls=16)).after == 16
 
 
 def test_an_l_shape_without_groups_is_cut_up():
@@ -146,7 +146,7 @@ def test_a_bowl_of_a_single_sheet_stays_open_within_the_budget(no_coacd):
     bowl = trimesh.creation.icosphere(3, 0.2)
     bowl.update_faces(bowl.triangles_center[:, 2] < 0)
     result = decompose_link([shape(bowl)], NO_CACHE)
-    assert result.after == 16 and result.before > 100
+    assert 16 <= result.after <= 24 and result.before > 100
     assert not filled(result, [[0, 0, -0.02], [0, 0, -0.1], [0.1, 0, -0.05]]).any()
     np.testing.assert_allclose(outline(result), [0.4, 0.4, 0.2], rtol=0.015)
 

@@ -24,9 +24,10 @@ class Common:
     """What both conversions take.
 
     Attributes:
-      jobs: processes that work on the models.
+      jobs: processes that work side by side: on the models of a scene, on the parts of a single object.
       seed: seeds convex decomposition, and chooses models that a scene names "random".
-      max_hulls: most convex pieces per link; more are merged.
+      max_hulls: most convex pieces per link. A link of more than 16 gets as few as keep the error of its volume under
+        15 % and its openings open.
       max_hull_vertices: most vertices per piece.
       bullet_inertia: inertia of each link's box, as Bullet computes it, instead of that of its hulls.
       colours: of visuals without a texture: the source's, or household ones by category; auto prefers the source's,
@@ -38,7 +39,7 @@ class Common:
 
     jobs: int = 1
     seed: int = 0
-    max_hulls: int = 16
+    max_hulls: int = 64
     max_hull_vertices: int = 32
     bullet_inertia: Flag = False
     colours: COLOURS = "auto"
