@@ -30,8 +30,7 @@ import numpy as np
 import ig2mj
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.states import StateModel, states_of_manifest
-from ig2mj.worlds.batch import Worlds
-from ig2mj.worlds.pool import Pool, load_pool, save_pool
+from ig2mj.worlds import Core, Pool, Rules, load_pool, save_pool
 
 home, folder = sys.argv[1:]
 scene = ig2mj.load_scene(home)
@@ -56,7 +55,7 @@ engine = NativeEngine(scene)
 physics = jax.tree.map(lambda leaf: np.asarray(leaf)[None], engine.export(engine.reset(), 0))
 save_pool(Pool(physics=physics, states=aged), folder + "/pool.npz", scene.name)
 pool = load_pool(folder + "/pool.npz", Pool(physics=physics, states=aged), scene.name)
-batch = Worlds(NativeEngine(scene, num_worlds=2), model, pool).start(seed=0)
+batch = Core(NativeEngine(scene, num_worlds=2), Rules(model), pool).start(seed=0)
 told["of a pool"] = np.asarray(batch.world.states.age)[:, scene.object_index("apple")].tolist()
 print(json.dumps(told))
 """
