@@ -105,7 +105,7 @@ class Watch:
         speed = jnp.where(self.loose, jnp.linalg.norm(velocity, axis=-1), 0.0)
         off = jnp.maximum(self.box.low - com, com - self.box.high).max(-1) - BEYOND
         away = jnp.where(self.loose & jnp.isfinite(off), off, -jnp.inf)
-        flags = guards.check(self.engine.health(physics), view, np.where(self.loose, self.floor, -np.inf))
+        flags = guards.check(self.engine.health(physics), com, np.where(self.loose, self.floor, -np.inf))
         flags = jnp.asarray(flags) | jnp.where((away > 0).any(1), OUTSIDE, 0)
         left = (flags & (OUTSIDE | int(guards.Flag.FELL))) != 0
         culprit = jnp.where(left, away.argmax(1), speed.argmax(1)).astype(jnp.int32)
