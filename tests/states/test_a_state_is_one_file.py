@@ -30,7 +30,7 @@ import numpy as np
 import ig2mj
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.states import StateModel, states_of_manifest
-from ig2mj.worlds import Core, Pool, Rules, load_pool, save_pool
+from ig2mj.worlds import Pool, Worlds, load_pool, save_pool
 
 home, folder = sys.argv[1:]
 scene = ig2mj.load_scene(home)
@@ -55,7 +55,9 @@ engine = NativeEngine(scene)
 physics = jax.tree.map(lambda leaf: np.asarray(leaf)[None], engine.export(engine.reset(), 0))
 save_pool(Pool(physics=physics, states=aged), folder + "/pool.npz", scene.name)
 pool = load_pool(folder + "/pool.npz", Pool(physics=physics, states=aged), scene.name)
-batch = Core(NativeEngine(scene, num_worlds=2), Rules(model), pool).start(seed=0)
+worlds = Worlds(scene, 2, "native", pool=pool)
+batch = worlds.start(seed=0)
+batch = worlds.reset(worlds.step(batch)[0], np.array([True, True]))
 told["of a pool"] = np.asarray(batch.world.states.age)[:, scene.object_index("apple")].tolist()
 print(json.dumps(told))
 """
