@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import os
 import pathlib
 import time
@@ -9,6 +10,7 @@ import time
 import mujoco
 import numpy as np
 
+from ig2mj import knowledge
 from ig2mj.errors import InputError
 from ig2mj.scene.manifest import FORMAT_VERSION, Manifest
 
@@ -34,6 +36,7 @@ from .reading.joint_limits import clamp
 from .reading.metadata import read_metadata
 from .reading.scaling import scale_model
 from .reading.urdf import read_urdf
+from .reading.xml_reader import shortened
 
 
 def convert_object(
@@ -62,7 +65,7 @@ def convert_object(
     file = pathlib.Path(urdf)
     start = time.perf_counter()
     options.progress(f"reading {file.name}", 0, 2)
-    source, dataset = _read(file, category, model or file.stem)
+    source, dataset = _read(file, category, model or file.stem, options)
     built = {source.model: _build(source, dataset, _scale(source, bounding_box), options)}
     built |= _halves(dataset, built[source.model], options)
     read_seconds = time.perf_counter() - start
@@ -86,14 +89,18 @@ def convert_object(
     return outcome
 
 
-def _read(file: pathlib.Path, category: str, name: str) -> tuple[ObjectModel, Dataset | None]:
+def _read(file: pathlib.Path, category: str, name: str, options: ConvertOptions) -> tuple[ObjectModel, Dataset | None]:
     """Reads the URDF, its metadata, and the dataset it lies in, if it does."""
     if not inputs.is_file(file):
         raise InputError(file, "is no file", element="--urdf", mend="name an object's URDF")
     if not name.strip() or not category.strip():
         raise InputError(file, "the object needs a category and a name", element="--category, --model")
     root = _dataset_root(file)
-    source = read_urdf(file, category, name)
+    source = read_urdf(file, category, name, mesh_root=options.mesh_root, package_path=options.package_path)
+    if knowledge.synset(category) is None:
+        near = difflib.get_close_matches(category, knowledge.categories(), n=3, cutoff=0.6)
+        hint = f"; near matches: {', '.join(near)}" if near else ""
+        source.warnings.append(f"--category {shortened(category)} is not known, so the object can do nothing{hint}")
     prepared = inputs.is_folder(file.parent / "misc")
     source.metadata = read_metadata(file.parent, source.warnings if prepared else [])
     return source, None if root is None else Dataset(root)

@@ -113,9 +113,15 @@ def _use_category_colours(built: dict[str, BuiltModel], options: ConvertOptions)
 def _drop_missing(dataset: Dataset, scene: SceneDescription, options: ConvertOptions) -> list[str]:
     """Takes instances whose model the dataset lacks out of the scene, or refuses, listing all of them."""
     missing = dataset.missing(scene)
+    lines = [f"{i.name} ({i.category}/{i.model})" for i in missing]
+    if options.skip_missing:  # without it the reader refuses the first mesh that is not there
+        absent = {i.name for i in missing}
+        for instance in scene.instances:
+            if instance.name not in absent and (meshes := dataset.missing_meshes(scene, instance)):
+                missing.append(instance)
+                lines.append(f"{instance.name} ({instance.category}/{instance.model}): no {', '.join(meshes)}")
     if not missing:
         return []
-    lines = [f"{i.name} ({i.category}/{i.model})" for i in missing]
     if not options.skip_missing:
         problem = f"{len(lines)} models are not in the dataset: {', '.join(lines)}"
         raise InputError(scene.file, problem, mend="--skip-missing converts without them")

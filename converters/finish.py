@@ -11,6 +11,7 @@ from typing import Any
 
 import mujoco
 
+from ig2mj.errors import InputError
 from ig2mj.scene.manifest import Manifest, check_manifest, save_manifest
 
 from .base.description import RoomMaps
@@ -19,8 +20,12 @@ from .base.outcome import CheckResult, Outcome
 from .bodies.joint_rules import openable_ends
 from .mjcf.model_builder import ModelBuilder
 from .model_task import BuiltModel
+from .report.check_still import SourceBox
 from .report.checks import run_checks
 from .report.page import RENDERED, ReportInput, write_report
+
+FIRST_WARNINGS = 5
+"""So many warnings are told at the shell; the report has all."""
 
 
 def version_record(options: ConvertOptions) -> dict[str, Any]:
@@ -54,10 +59,14 @@ def finish(
       timings: stage -> seconds so far; the checks' are added.
       warnings: about the whole scene.
     """
+    lines = [*warnings, *builder.textures.warnings, *builder.warnings.get("", [])]
+    per_object = {name: _object_warnings(name, model_built, builder) for name, model_built in built.items()}
+    said = [*lines, *(f"{name}: {line}" for name, found in per_object.items() for line in found)]
+    if options.strict and said:
+        more = f" (and {len(said) - 1} more warnings)" if len(said) > 1 else ""
+        raise InputError(manifest.name, f"{said[0]}{more}", mend="--strict takes warnings for errors")
     check_manifest(manifest)
     save_manifest(manifest, folder / "manifest.json")
-    warnings = [*warnings, *builder.textures.warnings, *builder.warnings.get("", [])]
-    per_object = {name: _object_warnings(name, model_built, builder) for name, model_built in built.items()}
     checks: list[CheckResult] = []
     provisional = [
         f"'{name}': the decomposition of link '{link}' was stopped"
@@ -67,13 +76,13 @@ def finish(
     ]
     if options.report:
         start = time.perf_counter()
-        checks = run_checks(model, manifest, overlaps_allowed)
+        checks = run_checks(model, manifest, overlaps_allowed, _source_boxes(built))
         timings["checks"] = time.perf_counter() - start
         given = ReportInput(
             kind=kind,
             hulls={name: model_built.hulls for name, model_built in built.items()},
             checks=checks,
-            warnings=warnings,
+            warnings=lines,
             object_warnings={name: lines for name, lines in per_object.items() if lines},
             skipped=skipped,
             timings=timings,
@@ -83,11 +92,22 @@ def finish(
         facts = write_report(folder, model, manifest, given, options.renderer, options.view)
         if options.renderer is not None and facts["pictures"] != RENDERED:
             provisional.append(facts["pictures"])
-    count = len(warnings) + sum(len(lines) for lines in per_object.values())
     written = hashlib.sha256((folder / "manifest.json").read_bytes()).hexdigest()
     return Outcome(
-        len(manifest.objects), list(skipped), checks, count, timings, provisional, written, builder.files_outside()
-    )
+        len(manifest.objects), list(skipped), checks, len(said), timings, provisional, written, builder.files_outside(),
+        first_warnings=list(dict.fromkeys(said))[:FIRST_WARNINGS],
+    )  # fmt: skip
+
+
+def _source_boxes(built: Mapping[str, BuiltModel]) -> dict[str, SourceBox]:
+    """Object name -> the size of its source's collision shapes, and how far fitted primitives may be off it."""
+    boxes = {}
+    for name, model in built.items():
+        if model.source_box is not None:
+            pieces = [piece for link in model.hulls.values() for piece in link.pieces]
+            fit = max((piece.fit_error for piece in pieces if piece.kind != "hull"), default=0.0)
+            boxes[name] = SourceBox(model.source_box[1] - model.source_box[0], fit)
+    return boxes
 
 
 def _object_warnings(name: str, built: BuiltModel, builder: ModelBuilder) -> list[str]:

@@ -10,10 +10,11 @@ import os
 import pathlib
 import re
 import urllib.parse
+from collections.abc import Sequence
 
 from ig2mj.errors import InputError
 
-from ..reading.xml_reader import read_xml
+from ..reading.xml_reader import read_xml, shortened
 from . import inputs
 
 PACKAGE_SEARCH_DEPTH = 8  # how many folders above an URDF are looked at for its ROS package
@@ -32,6 +33,11 @@ class FileGuard:
       folder: what relative names start from.
       roots: resolved folders below which files may be read; None: anywhere.
       dataset: dataset mode: names must be relative and without `package://`.
+
+    Args:
+      mesh_root: another folder below which files may be read, as `../sibling/meshes` needs.
+      package_path: folders that hold packages, or are one: looked at first for `package://name/...`, and the only ones
+        (with `mesh_root` and the URDF's own package) for `package:///...`, which names no package.
     """
 
     def __init__(
@@ -40,10 +46,14 @@ class FileGuard:
         root: str | os.PathLike | None = None,
         folder: str | os.PathLike | None = None,
         allow_outside: bool = False,
+        *,
+        mesh_root: str | os.PathLike | None = None,
+        package_path: Sequence[str | os.PathLike] = (),
     ):
         self.file = pathlib.Path(file)
         self.folder = pathlib.Path(folder) if folder is not None else self.file.parent
         self.dataset = root is not None
+        self._packages: list[pathlib.Path] = []
         if root is not None:
             self.roots: list[pathlib.Path] | None = [pathlib.Path(root).resolve()]
         elif allow_outside:
@@ -52,6 +62,10 @@ class FileGuard:
             self.roots = [self.folder.resolve()]
             if (package := package_root(self.file.parent)) is not None:
                 self.roots.append(package)
+            self._packages = [_folder(p, "--package-path") for p in package_path]
+            if mesh_root is not None:
+                self._packages.append(_folder(mesh_root, "--mesh-root"))
+            self.roots += self._packages
 
     def resolve(self, filename: str, element: str, base: pathlib.Path | None = None) -> pathlib.Path:
         """Path of a file that is named in the URDF, or in a file in the folder `base`.
@@ -59,50 +73,69 @@ class FileGuard:
         The path need not exist. Raises OutsideError where it may not be read, InputError for names that are none.
         """
         name = filename.strip().replace("\\", "/")
+        said = shortened(name)
         if not name or any(ord(c) < 32 for c in name):
-            raise InputError(self.file, f"{filename!r} is no file name", element=element)
+            raise InputError(self.file, f"{shortened(filename)!r} is no file name", element=element)
         scheme = _SCHEME.match(name)
         if scheme and self.dataset:
-            raise OutsideError(self.file, f"'{name}' is not below the dataset root", element=element)
+            raise OutsideError(self.file, f"'{said}' is not below the dataset root", element=element)
         if scheme and scheme[1] in ("package", "model"):
             path = self._in_package(name[scheme.end() :], element)
         elif scheme and scheme[1] == "file":
             path = pathlib.Path(urllib.parse.unquote(name[scheme.end() :]))
         elif scheme:
-            raise OutsideError(self.file, f"'{name}' is an address, not a local file", element=element)
+            raise OutsideError(self.file, f"'{said}' is an address, not a local file", element=element)
         else:
             if self.dataset and (name.startswith("/") or re.match(r"[A-Za-z]:", name)):
                 raise OutsideError(
-                    self.file, f"'{name}' is absolute", element=element, mend="name it relative to the model's folder"
+                    self.file, f"'{said}' is absolute", element=element, mend="name it relative to the model's folder"
                 )
             path = (base or self.folder) / name
         try:
             real = inputs.real_path(path)
         except (OSError, RuntimeError) as e:
-            raise InputError(self.file, f"'{name}' cannot be resolved: {e}", element=element) from e
+            raise InputError(self.file, f"'{said}' cannot be resolved: {e}", element=element) from e
         if self.roots is not None and not any(real.is_relative_to(root) for root in self.roots):
             where = "the dataset root" if self.dataset else "the URDF's folder and its package"
-            raise OutsideError(
-                self.file, f"'{name}' lies outside {where}", element=element, mend="move the file inside"
-            )
+            mend = "move the file inside" if self.dataset else "move the file inside, or name its folder by --mesh-root"
+            raise OutsideError(self.file, f"'{said}' lies outside {where}", element=element, mend=mend)
         return real
 
     def _in_package(self, rest: str, element: str) -> pathlib.Path:
         package, _, inside = rest.partition("/")
+        if not package and self._packages:
+            own = package_root(self.file.parent)
+            folders = [*self._packages, *([] if own is None else [own])]
+            return next((f / inside for f in folders if inputs.is_file(f / inside)), folders[0] / inside)
         if package in ("", ".", ".."):
-            raise InputError(self.file, f"'package://{rest}' names no package", element=element)
-        root = find_package(self.file.parent, package)
+            mend = "name the package's folder by --package-path" if not package else ""
+            raise InputError(self.file, f"'package://{shortened(rest)}' names no package", element=element, mend=mend)
+        root = self._on_path(package) or find_package(self.file.parent, package)
         if root is None:
             raise InputError(
                 self.file,
-                f"no folder above it is the package '{package}'",
+                f"no folder above it is the package '{shortened(package)}'",
                 element=element,
-                mend=f"put the URDF into the package's folder, named '{package}' or with a package.xml",
+                mend="put the URDF into the package's folder, with a package.xml, or name it by --package-path",
             )
         beside = self.file.parent.resolve() / package
         if self.roots is not None and root not in self.roots and not (beside.is_symlink() or beside == root):
             self.roots.append(root)
         return root / inside
+
+    def _on_path(self, package: str) -> pathlib.Path | None:
+        for folder in self._packages:
+            if folder.name == package or _package_name(folder / "package.xml") == package:
+                return folder
+            if inputs.is_folder(folder / package):
+                return inputs.real_path(folder / package)
+        return None
+
+
+def _folder(path: str | os.PathLike, option: str) -> pathlib.Path:
+    if not inputs.is_folder(path):
+        raise InputError(path, "is no folder", element=option)
+    return inputs.real_path(path)
 
 
 def package_root(folder: pathlib.Path) -> pathlib.Path | None:

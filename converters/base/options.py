@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import pathlib
 from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -38,6 +39,9 @@ class ConvertOptions:
       keep_hovering: start loose objects exactly where the source has them, even in mid-air.
       jobs: processes. cache: use the caches of decompositions and of finished outputs.
       report: write report.json and report.html.
+      strict: take warnings for errors, and leave no output.
+      mesh_root, package_path: of an object: a folder below which its meshes may lie, although it is not above the URDF;
+        folders in which packages (`package://`) are looked for first.
       renderer, view: what draws the report's pictures (see `report.write_report`).
     """
 
@@ -58,6 +62,9 @@ class ConvertOptions:
     jobs: int = 1
     cache: bool = True
     report: bool = True
+    strict: bool = False
+    mesh_root: pathlib.Path | None = None
+    package_path: tuple[pathlib.Path, ...] = ()
     renderer: Renderer | None = None
     view: Callable[..., Any] | None = None
     progress: Progress = no_progress

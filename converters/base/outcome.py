@@ -44,6 +44,7 @@ class Outcome:
       manifest_hash: SHA-256 of the manifest that was written.
       shared: files outside the output's folder that it uses (see `ConvertOptions.assets`), relative to the folder.
       cached: the result came out of the cache.
+      first_warnings: the first few, one line each.
     """
 
     objects: int
@@ -55,6 +56,7 @@ class Outcome:
     manifest_hash: str = ""
     shared: list[str] = dataclasses.field(default_factory=list)
     cached: bool = False
+    first_warnings: list[str] = dataclasses.field(default_factory=list)
 
     def to_json(self) -> str:
         """As text; numpy numbers become plain ones."""

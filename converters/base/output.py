@@ -23,7 +23,7 @@ def replaced_folder(out: str | os.PathLike) -> Iterator[pathlib.Path]:
     A run that is killed leaves the old output or none, and at worst a hidden folder that the next run removes.
 
     Raises:
-      InputError: `out` is a file, or a folder with something else in it.
+      InputError: `out` is a file, or a folder with something else in it; or the disk is full.
     """
     target = pathlib.Path(out).absolute()
     _check(target)
@@ -34,6 +34,10 @@ def replaced_folder(out: str | os.PathLike) -> Iterator[pathlib.Path]:
         folder.chmod(0o755)
         yield folder
         _move_into_place(folder, target)
+    except OSError as e:
+        if e.filename is not None:
+            raise
+        raise InputError(target, f"cannot be written: {e.strerror or e}", element="--out") from e
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 

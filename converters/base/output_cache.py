@@ -54,6 +54,8 @@ def key_of(request: Mapping[str, Any], options: ConvertOptions) -> str:
         "options": options.record(),
         "skip_missing": options.skip_missing,
         "report": options.report,
+        "strict": options.strict,
+        "folders": [os.path.abspath(p) for p in (options.mesh_root or "", *options.package_path)],  # noqa: PTH100
         "assets": options.assets,
         "pictures": options.renderer is not None and os.environ.get("MUJOCO_GL", ""),
         "versions": [sys.version, *(_version(name) for name in PACKAGES)],

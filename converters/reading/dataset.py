@@ -12,13 +12,15 @@ from ig2mj.errors import InputError, UnknownNameError
 
 from ..base import inputs
 from ..base.description import Instance, ObjectModel, SceneDescription
-from ..base.file_access import OutsideError
+from ..base.file_access import FileGuard, OutsideError
 from ..bodies.inertia import DEFAULT_DENSITY
 from .dataset_files import CategorySpec, read_lines, read_overlaps, read_specs, read_version
+from .mesh_files import encrypted_twin
 from .metadata import read_metadata
 from .room_maps import read_room_maps, room_at
 from .scene_urdf import FIXED_FURNITURE, SceneOptions, read_scene
 from .urdf import read_urdf
+from .xml_reader import read_xml
 
 __all__ = ["CategorySpec", "Dataset", "SceneOptions"]
 
@@ -181,6 +183,24 @@ class Dataset:
             if not there:
                 absent.append(instance)
         return absent
+
+    def missing_meshes(self, scene: SceneDescription, instance: Instance) -> list[str]:
+        """Collision meshes that an instance's URDF names and the dataset lacks, as named there."""
+        if instance.kind == "building":
+            file = self._building_file(scene.name, instance.category, instance.model)
+            folder = self._inside("scenes", scene.name)
+        elif instance.kind == "object":
+            folder = self._inside("objects", instance.category, instance.model)
+            simplified = folder / f"{instance.model}_simplified.urdf"
+            file = simplified if inputs.is_file(simplified) else folder / f"{instance.model}.urdf"
+        else:
+            return []
+        guard = FileGuard(file, self.root, folder)
+        named = dict.fromkeys(
+            mesh.get("filename") or "" for mesh in read_xml(file, "robot").iterfind("link/collision/geometry/mesh")
+        )
+        paths = {name: guard.resolve(name, "mesh") for name in named if name}
+        return [name for name, path in paths.items() if not inputs.is_file(path) and encrypted_twin(path) is None]
 
     def _building_file(self, scene: str, category: str, model: str) -> pathlib.Path:
         return self._inside("scenes", scene, "urdf", f"{model}_{category}.urdf")

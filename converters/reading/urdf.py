@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pathlib
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ..base.file_access import FileGuard
 from ..base.transforms import read_origin
 from .urdf_geometry import GeometryReader, Rgba, read_colour
 from .urdf_tree import check_name, find_tree
-from .xml_reader import Element, number, numbers, read_xml, where
+from .xml_reader import Element, is_huge, number, numbers, read_xml, where
 
 JOINT_TYPES = ("fixed", "revolute", "prismatic", "continuous", "floating")
 MOVING = ("revolute", "prismatic", "continuous")
@@ -29,6 +30,8 @@ def read_urdf(
     *,
     mesh_folder: pathlib.Path | None = None,
     allow_outside: bool = False,
+    mesh_root: pathlib.Path | None = None,
+    package_path: Sequence[pathlib.Path] = (),
 ) -> ObjectModel:
     """Reads an object's URDF and its meshes (unscaled, link frames); metadata is left empty.
 
@@ -39,6 +42,7 @@ def read_urdf(
         None (plain URDF): meshes may lie below the URDF's folder or its package's root.
       mesh_folder: what relative mesh paths start from; default the URDF's folder.
       allow_outside: plain URDF only: read meshes from anywhere.
+      mesh_root, package_path: plain URDF only: see `FileGuard`.
 
     Raises:
       InputError: naming the file and the element.
@@ -49,7 +53,7 @@ def read_urdf(
         path = simplified
     warnings: list[str] = []
     robot = read_xml(path, "robot", warnings)
-    guard = FileGuard(path, root, mesh_folder, allow_outside)
+    guard = FileGuard(path, root, mesh_folder, allow_outside, mesh_root=mesh_root, package_path=package_path)
     materials: dict[str, Rgba | None] = {m.get("name") or "": read_colour(m, path) for m in robot.iterfind("material")}
     reader = GeometryReader(guard, materials, warnings)
     links: dict[str, Link] = {}
@@ -135,13 +139,24 @@ def _read_limits(joint: Joint, element: Element, file: pathlib.Path, warnings: l
     if limit is None or (limit.get("lower") is None and limit.get("upper") is None):
         warnings.append(f"{where(element)}: a {joint.type} joint without limits can move without end")
     else:
-        lower, upper = number(limit, "lower", file, 0.0), number(limit, "upper", file, 0.0)
-        if lower > upper:
+        lower, upper = _limit(limit, "lower", file), _limit(limit, "upper", file)
+        if lower is None or upper is None:
+            if lower is not upper:
+                warnings.append(f"{where(limit)}: only one limit is finite; the joint can move without end")
+        elif lower > upper:
             warnings.append(f"{where(limit)}: lower {lower:g} > upper {upper:g}; the joint can move without end")
         else:
             joint.lower, joint.upper = lower, upper
     if limit is not None:
         joint.effort, joint.velocity = (_positive_or_none(limit, a, file) for a in ("effort", "velocity"))
+
+
+def _limit(element: Element, attribute: str, file: pathlib.Path) -> float | None:
+    """A limit of a joint; None for "no limit", which real files write as inf or as a number beyond all use."""
+    word = (element.get(attribute) or "").strip()
+    if word.lower().lstrip("+-") in ("inf", "infinity") or is_huge(word):
+        return None
+    return number(element, attribute, file, 0.0)
 
 
 def _positive_or_none(element: Element, attribute: str, file: pathlib.Path) -> float | None:

@@ -16,7 +16,7 @@ from ..base.file_access import FileGuard
 from ..base.transforms import read_origin
 from .mesh_files import MeshPart, encrypted_twin, is_encrypted, read_collision, read_visual
 from .mesh_limits import MeshError
-from .xml_reader import Element, local_name, number, numbers, where
+from .xml_reader import Element, local_name, number, numbers, shortened, where
 
 Rgba = tuple[float, float, float, float]
 CONVEX_ENOUGH = 0.9
@@ -137,6 +137,8 @@ class GeometryReader:
         s = numbers(mesh, "scale", count, self.guard.file, (1.0, 1.0, 1.0))
         if np.any(s == 0):
             raise InputError(self.guard.file, f"scale='{text}' makes the mesh flat", element=where(mesh))
+        if np.any(s < 0):
+            self.warnings.append(f"{where(mesh)}: scale='{text}' mirrors the mesh")
         x, y, z = np.broadcast_to(s, 3)
         return float(x), float(y), float(z)
 
@@ -161,7 +163,7 @@ def read_colour(material: Element, file: object) -> Rgba | None:
 def _in_urdf(error: MeshError, guard: FileGuard, mesh: Element, named: str) -> InputError:
     """The error of a mesh file, told from the URDF that names it where the file is not there at all."""
     if error.problem == "mesh does not exist":
-        return InputError(guard.file, f"its mesh '{named}' does not exist", element=where(mesh))
+        return InputError(guard.file, f"its mesh '{shortened(named)}' does not exist", element=where(mesh))
     return error
 
 

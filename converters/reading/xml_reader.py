@@ -22,6 +22,8 @@ from ..base import inputs
 
 MAX_XML_BYTES = 128 * 2**20  # the largest cached BEHAVIOR scenes are a few MiB
 MAX_NUMBER = 1e15  # beyond, products of a few numbers are no numbers any more
+QUOTED = 120
+"""Characters of a name that a message quotes at most."""
 Element = Any  # lxml.etree._Element, for which there are no type stubs
 
 # libxml2 goes quiet after its first syntax error, so only errors that leave it talking may be let pass.
@@ -147,7 +149,7 @@ def where(element: Element) -> str:
     node = element
     while node is not None:
         name = node.get("name")
-        names.append(f"{local_name(node)} '{name}'" if name is not None else local_name(node))
+        names.append(f"{local_name(node)} '{shortened(name)}'" if name is not None else local_name(node))
         if name is not None or node.getparent() is None or node.getparent().getparent() is None:
             break
         node = node.getparent()
@@ -160,6 +162,11 @@ def parse_number(word: str) -> float | None:
         return None
     value = float(word)
     return value if abs(value) <= MAX_NUMBER else None
+
+
+def is_huge(word: str) -> bool:
+    """Whether it is a decimal number beyond `MAX_NUMBER`."""
+    return bool(_NUMBER.match(word)) and abs(float(word)) > MAX_NUMBER
 
 
 def numbers(
@@ -181,12 +188,14 @@ def numbers(
     words = [word.removesuffix(",") for word in text.split()]  # "0.1, 0, 0" is common, and harmless
     if len(words) != count:
         raise InputError(
-            file, f"{attribute}='{_short(text)}' has {len(words)} numbers instead of {count}", element=where(element)
+            file,
+            f"{attribute}='{shortened(text, 40)}' has {len(words)} numbers instead of {count}",
+            element=where(element),
         )
     values = [parse_number(w) for w in words]
     for word, value in zip(words, values, strict=True):
         if value is None:
-            raise InputError(file, f"{attribute}: '{_short(word)}' is no finite number", element=where(element))
+            raise InputError(file, f"{attribute}: '{shortened(word, 40)}' is no finite number", element=where(element))
     return np.array(values, dtype=float)
 
 
@@ -195,5 +204,6 @@ def number(element: Element, attribute: str, file: object, default: float | None
     return float(numbers(element, attribute, 1, file, None if default is None else (default,))[0])
 
 
-def _short(text: str) -> str:
-    return text if len(text) <= 40 else text[:37] + "..."
+def shortened(text: str, most: int = QUOTED) -> str:
+    """A text to be quoted in a message, of at most so many characters."""
+    return text if len(text) <= most else text[: most - 3] + "..."

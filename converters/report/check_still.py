@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Collection
+import dataclasses
+from collections.abc import Collection, Mapping
 
 import mujoco
 import numpy as np
@@ -17,6 +18,8 @@ BOX_TOLERANCE = 0.015
 """Relative, per axis: collision AABB at q = 0 against the asked bounding box (dataset_format.md section 8.15)."""
 BOX_SLACK = 2e-3
 """Metres that are always allowed: thin things are thickened."""
+SOURCE_TOLERANCE, SOURCE_SLACK = 1e-3, 2e-3
+"""Relative and in metres: collision AABB against that of the source's meshes. Flat groups are thickened by 1 mm."""
 MASS_TOLERANCE = 1e-3
 """Relative: the model's mass of an object against the manifest's."""
 PENETRATION_TOLERANCE = 1e-3
@@ -45,8 +48,20 @@ def check_compiles(model: mujoco.MjModel) -> CheckResult:
     return CheckResult("compiles", finite, text, failures)
 
 
-def check_boxes(model: mujoco.MjModel, manifest: Manifest, index: ModelIndex) -> CheckResult:
-    """AABB of each object's collision geoms with all joints at 0, in base-link axes, against its bounding box.
+@dataclasses.dataclass(frozen=True)
+class SourceBox:
+    """Size [3] of the box round an object's source shapes, in base axes at joint positions 0, metres; and how far the
+    result may be off it, since primitives were fitted, metres."""
+
+    size: np.ndarray
+    fit: float = 0.0
+
+
+def check_boxes(
+    model: mujoco.MjModel, manifest: Manifest, index: ModelIndex, sources: Mapping[str, SourceBox]
+) -> CheckResult:
+    """AABB of each object's collision geoms with all joints at 0, in base-link axes, against the requested bounding box
+    and against that of the source's meshes.
 
     Trees split off at floating joints (pillows) and annotated links (a blade) are left out where that fits better.
     """
@@ -73,16 +88,25 @@ def check_boxes(model: mujoco.MjModel, manifest: Manifest, index: ModelIndex) ->
         measured[entry.name] = {"asked": asked.tolist(), "got": got.tolist()}
         if np.any(np.abs(got - asked) > np.maximum(BOX_TOLERANCE * asked, BOX_SLACK)):
             worst = int(np.abs(error).argmax())
-            failures.append(
-                {
-                    "object": entry.name,
-                    "problem": f"{'xyz'[worst]} is {got[worst]:.3f} m, asked {asked[worst]:.3f} m",
-                    "asked": asked.tolist(),
-                    "got": got.tolist(),
-                    "error": float(error[worst]),
-                }
-            )
+            problem = f"{'xyz'[worst]} is {got[worst]:.3f} m, asked {asked[worst]:.3f} m"
+            failures.append({"object": entry.name, "problem": problem, "asked": asked.tolist(), "got": got.tolist(),
+                             "error": float(error[worst])})  # fmt: skip
+        if (source := sources.get(entry.name)) is not None:
+            measured[entry.name]["source"] = source.size.tolist()
+            failures += _off_source(entry.name, sizes, source)
     return _result("bounding_box", failures, measured, len(manifest.objects), "objects have the asked size")
+
+
+def _off_source(name: str, sizes: list[np.ndarray], source: SourceBox) -> list[dict[str, object]]:
+    """The failure, if there is one, of an object whose size is the nearest of `sizes` to its source's."""
+    got = min(sizes, key=lambda size: float(np.abs(size - source.size).max()))
+    off = got - source.size
+    if np.all(np.abs(off) <= SOURCE_SLACK + SOURCE_TOLERANCE * source.size + 2 * source.fit):
+        return []
+    worst = int(np.abs(off).argmax())
+    problem = f"{'xyz'[worst]} is {got[worst]:.4f} m, {source.size[worst]:.4f} m in the source's meshes"
+    error = float(off[worst] / max(source.size[worst], 1e-9))
+    return [{"object": name, "problem": problem, "source": source.size.tolist(), "got": got.tolist(), "error": error}]
 
 
 def _extent(model: mujoco.MjModel, data: mujoco.MjData, base: int, geoms: np.ndarray) -> np.ndarray:

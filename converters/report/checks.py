@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 
 import mujoco
 
@@ -15,22 +15,25 @@ from ig2mj.scene.manifest import Manifest
 from ..base.outcome import CheckResult
 from ..mjcf.model_index import index_model
 from . import check_motion, check_still
+from .check_still import SourceBox
 
 
 def run_checks(
     model: mujoco.MjModel,
     manifest: Manifest,
     overlaps_allowed: Collection[frozenset[str]] = (),
+    sources: Mapping[str, SourceBox] | None = None,
 ) -> list[CheckResult]:
     """All checks, in the order of `CheckResult.name`. The model is left as it was.
 
     Args:
       overlaps_allowed: pairs of object names from misc/bbox_overlap.json that may penetrate at t = 0.
+      sources: object name -> size of its source's collision shapes, measured on them.
     """
     index = index_model(model, manifest)
     checks: list[Callable[[], CheckResult]] = [
         lambda: check_still.check_compiles(model),
-        lambda: check_still.check_boxes(model, manifest, index),
+        lambda: check_still.check_boxes(model, manifest, index, sources or {}),
         lambda: check_still.check_mass(model, manifest, index),
         lambda: check_still.check_penetration(model, index, overlaps_allowed),
         lambda: check_motion.check_settle(model, manifest, index),

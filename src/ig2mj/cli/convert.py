@@ -33,6 +33,7 @@ class Common:
       colours: of visuals without a texture: the source's, or household ones by category; auto prefers the source's,
         unless every object of a scene is of one flat colour.
       no_cache: convert anew even if nothing has changed, and keep nothing for the next time.
+      strict: take warnings for errors: exit status 2, and no output.
       no_report: no checks, no report.json and report.html.
       json: print what was done as JSON.
     """
@@ -44,6 +45,7 @@ class Common:
     bullet_inertia: Flag = False
     colours: COLOURS = "auto"
     no_cache: Flag = False
+    strict: Flag = False
     no_report: Flag = False
     json: Flag = False
 
@@ -108,6 +110,8 @@ def convert_object(
     out: pathlib.Path,
     model: str | None = None,
     bbox: tuple[float, float, float] | None = None,
+    mesh_root: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None,
+    package_path: Annotated[tuple[pathlib.Path, ...], tyro.conf.arg(metavar="DIR")] = (),
     common: Annotated[Common, tyro.conf.OmitArgPrefixes] = DEFAULTS,
 ) -> int:
     """Converts one URDF object, iGibson's or any other: OUT/object.xml, manifest.json, meshes/, report.html.
@@ -120,10 +124,12 @@ def convert_object(
       out: folder for the result; an earlier result there is replaced when everything went well.
       model: name of the object; default the file's.
       bbox: wanted size in the axes of its base link, metres; default the size it has.
+      mesh_root: folder below which meshes may lie that the URDF names by ../ or by an absolute path.
+      package_path: folders with the packages of `package://` names.
     """
     from ig2mj_converters.conversion import convert_object as convert
 
-    options = _options(common)
+    options = _options(common, mesh_root=mesh_root, package_path=package_path)
     with _progress(f"converting {urdf.name}") as options_with:
         outcome = convert(urdf, category, out, model=model, bounding_box=bbox, options=options_with(options))
     return _tell(outcome, out, "object.xml", common.json)
@@ -132,7 +138,7 @@ def convert_object(
 SUBCOMMANDS = {"scene": convert_scene, "object": convert_object}
 
 
-def _options(common: Common, **of_scene: Any) -> ConvertOptions:
+def _options(common: Common, **of_command: Any) -> ConvertOptions:
     """Conversion options from the command line, and the renderer for the report's pictures."""
     from ig2mj_converters.base.options import ConvertOptions
 
@@ -151,9 +157,10 @@ def _options(common: Common, **of_scene: Any) -> ConvertOptions:
         colours=common.colours,
         cache=not common.no_cache,
         report=not common.no_report,
+        strict=common.strict,
         renderer=None if common.no_report else _render,
         view=None if common.no_report else _free_view,
-        **of_scene,
+        **of_command,
     )
 
 
@@ -192,6 +199,7 @@ def _tell(outcome: Outcome, out: pathlib.Path, main_file: str, as_json: bool) ->
             "objects": outcome.objects,
             "skipped": outcome.skipped,
             "warnings": outcome.warnings,
+            "first_warnings": outcome.first_warnings,
             "checks": {check.name: {"passed": check.passed, "summary": check.summary} for check in outcome.checks},
             "cached": outcome.cached,
             "seconds": {stage: round(seconds, 3) for stage, seconds in outcome.timings.items()},
@@ -206,6 +214,11 @@ def _tell(outcome: Outcome, out: pathlib.Path, main_file: str, as_json: bool) ->
             print(f"  skipped, not in the dataset: {line}")
         for check in failed:
             print(f"  check {check.name}: {check.summary}")
+        for line in outcome.first_warnings:
+            print(f"  warning: {line}")
+        if outcome.warnings > len(outcome.first_warnings):
+            where = f"; {out / 'report.html'} has all" if outcome.checks else ""
+            print(f"  ... {outcome.warnings} warnings in all{where}")
         if outcome.checks:
             print(f"  report: {out / 'report.html'}")
     return SKIPPED if outcome.skipped else 0
