@@ -1,6 +1,6 @@
 """Worlds made by hand: tables and views without any physics engine, for tests of states and predicates.
 
-    home = HandWorld(Thing("stove", abilities={"heatSource": {...}}, links={"heat_source": (0, 0, 0.5)}), Thing("fish"))
+    home = HandWorld(Item("stove", abilities={"heatSource": {...}}, links={"heat_source": (0, 0, 0.5)}), Item("fish"))
     model = home.model()
     view = home.view({"fish": (0, 0, 0.6)})
 
@@ -37,7 +37,7 @@ CORNERS = np.array([(x, y, z) for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)
 
 
 @dataclasses.dataclass
-class Thing:
+class Item:
     """One object. `boxes`: (centre, half size). `links`: kind -> position, or (position, half size) for a box link."""
 
     name: str
@@ -71,11 +71,11 @@ def shell(width: float, depth: float, height: float, wall: float = 0.02, top: bo
 
 
 class HandWorld:
-    """A scene of `Thing`s, perhaps with an agent."""
+    """A scene of `Item`s, perhaps with an agent."""
 
     def __init__(
         self,
-        *things: Thing,
+        *things: Item,
         rooms: Mapping[str, tuple[float, float]] | None = None,
         fingers: int = 0,
         agent: bool = False,
@@ -118,7 +118,7 @@ class HandWorld:
         agent_touches: Sequence[str] = (),
         worlds: int = 1,
     ) -> PhysicsView:
-        """A view in which named objects are elsewhere than their `Thing` says; `force` is on ("knife", "apple")."""
+        """A view in which named objects are elsewhere than their `Item` says; `force` is on ("knife", "apple")."""
         at = np.array([(pos or {}).get(t.name, t.pos) for t in self.things], np.float32).reshape(-1, 3)
         turn = np.array([(quat or {}).get(t.name, t.quat) for t in self.things], np.float32).reshape(-1, 4)
         low, high = self._boxes(at, turn)

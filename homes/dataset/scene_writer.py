@@ -9,7 +9,7 @@ import shutil
 from xml.sax.saxutils import quoteattr
 
 from ..furnish.arrangement import Arrangement
-from ..furnish.placed import Thing, rpy_of
+from ..furnish.placed import Placed, rpy_of
 from ..plans.building import write_building
 from ..plans.layout_maps import Maps
 from ..plans.plan import Plan
@@ -34,7 +34,7 @@ def write_scene(root: pathlib.Path, plan: Plan, home: Arrangement, seed: int = 0
     return folder
 
 
-def scene_urdf(name: str, things: list[Thing]) -> str:
+def scene_urdf(name: str, things: list[Placed]) -> str:
     """The pseudo-URDF: building parts, then one link per thing whose joint gives its bounding-box centre."""
     lines = ['<?xml version="1.0" ?>', '<robot name="igibson_scene">', '  <link name="world"/>']
     for part in reversed(BUILDING):

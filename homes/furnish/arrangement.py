@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from .placed import Hull, Thing, boxes_of
+from .placed import Hull, Placed, boxes_of
 
 AIR = 0.0008
 """m, kept between a thing and what it stands on: it settles by less than the converter's 5 mm."""
@@ -22,12 +22,12 @@ class Arrangement:
     """The things that stand, blocks of the building, and zones that moving parts sweep or people walk in.
 
     Attributes:
-      things: name -> Thing, in the order they were put.
+      things: name -> Placed, in the order they were put.
     """
 
     def __init__(self, blocks: np.ndarray):
         """blocks: [n, 2, 3] boxes of walls; nothing may stand in them."""
-        self.things: dict[str, Thing] = {}
+        self.things: dict[str, Placed] = {}
         self._solid = _Groups([_Group(None, _block_hulls(np.asarray(blocks, float).reshape(-1, 2, 3)))])
         self._swept = _Groups([])
         self._ways: list[tuple[str, np.ndarray]] = []
@@ -47,7 +47,7 @@ class Arrangement:
         self._counts[category] = number + 1
         return f"{category}_{number}"
 
-    def put(self, thing: Thing) -> Thing:
+    def put(self, thing: Placed) -> Placed:
         """Adds a thing where it is; ask `fits` first."""
         self.things[thing.name] = thing
         self._solid.add(_Group(thing, thing.parts()))
@@ -60,7 +60,7 @@ class Arrangement:
         """Zones [n, 2, 3] where no furniture may stand: before a door, before a cupboard."""
         self._ways.append((owner, np.asarray(boxes, float).reshape(-1, 2, 3)))
 
-    def fits(self, thing: Thing, *, ignore: Iterable[str] = (), gap: float = 0.0, ways: bool = True) -> bool:
+    def fits(self, thing: Placed, *, ignore: Iterable[str] = (), gap: float = 0.0, ways: bool = True) -> bool:
         """Whether a thing overlaps nothing that stands and nothing that moves, and its own moving parts meet
         nothing.
 
@@ -121,7 +121,7 @@ class _Groups:
 class _Group:
     """Hulls of one thing (None: the building), with the boxes around them and around all."""
 
-    def __init__(self, thing: Thing | None, hulls: list[Hull]):
+    def __init__(self, thing: Placed | None, hulls: list[Hull]):
         self.thing, self.hulls = thing, hulls
         self.boxes = boxes_of(hulls)
         self.low = self.boxes[:, 0].min(0) if hulls else np.zeros(3)

@@ -9,12 +9,12 @@ import numpy as np
 from ..plans.building import stair_boxes, wall_boxes
 from ..plans.plan import Plan
 from ..shapes.sweeps import Hull, face_normals, overlap
-from .placed import Thing, boxes_of
+from .placed import Placed, boxes_of
 
 TOLERANCE = 2e-5  # m: the rounding of normals
 
 
-def blocked(plan: Plan, things: Iterable[Thing]) -> list[tuple[str, str]]:
+def blocked(plan: Plan, things: Iterable[Placed]) -> list[tuple[str, str]]:
     """(thing, what is in the way) for everything whose moving parts meet a wall, stairs, or another fixed thing."""
     things = list(things)
     still = [(thing.name, thing.parts()) for thing in things if thing.fixed]

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from ..objects.catalogue import catalogue
 from .kit import RoomKit
-from .placed import Thing
+from .placed import Placed
 from .room import HomeInProgress
 from .table_setting import lay_table
 
@@ -138,11 +138,11 @@ ANY_WAY = ("toy", "ball", "sock", "t-shirt", "apple", "orange", "lemon", "tomato
 """What lies at any angle."""
 
 
-def fill(home: HomeInProgress) -> Iterator[Thing]:
+def fill(home: HomeInProgress) -> Iterator[Placed]:
     """Puts small things, one per host in turn, so that all rooms get some, until nothing fits any more."""
     kits = {room.name: RoomKit(home, room) for room in home.plan.rooms}
     held: dict[str, int] = {}
-    piles: dict[str, list[Thing]] = {}
+    piles: dict[str, list[Placed]] = {}
     hosts = [host for host in home.things.things.values() if host.host is None or host.category in HOLLOW]
     tables = {host.name: lay_table(kits[host.rooms[0]], host) for host in hosts if host.category == "breakfast_table"}
     hosts += [host for host in hosts if host.category in GENEROUS]
@@ -175,7 +175,7 @@ def fill(home: HomeInProgress) -> Iterator[Thing]:
         idle = 0 if put_any else idle + 1
 
 
-def _one_more(kit: RoomKit, host: Thing, number: int, pile: list[Thing], known) -> Thing | None:
+def _one_more(kit: RoomKit, host: Placed, number: int, pile: list[Placed], known) -> Placed | None:
     """pile: what lies in the host's latest pile, the lowest first; it is kept up to date."""
     kind, category, rng = kit.room.kind, host.category, kit.rng
     kept = IN_ROOM.get((kind, category), BOOKS if category == "shelf" else IN.get(category, ()))

@@ -8,7 +8,7 @@ from ..plans.building import stair_boxes
 from ..plans.layout_maps import HIGH, LOW, reachable
 from ..plans.plan import Plan, Rect
 from .arrangement import FLAT
-from .placed import Thing
+from .placed import Placed
 
 CELL = 0.05  # m
 RADIUS = 0.34
@@ -46,18 +46,18 @@ class Ground:
             x, y = opening.edge.point(opening.centre)
             self._gates.append((self._cell(y), self._cell(x)))
 
-    def allows(self, thing: Thing) -> bool:
+    def allows(self, thing: Placed) -> bool:
         """Whether every room and doorway can still be reached with this thing in its place."""
         after = self._without(thing)
         return after is None or self._sound(after)
 
-    def occupy(self, thing: Thing) -> None:
+    def occupy(self, thing: Placed) -> None:
         """Takes a thing's floor away."""
         after = self._without(thing)
         if after is not None:
             self.free = after
 
-    def _without(self, thing: Thing) -> np.ndarray | None:
+    def _without(self, thing: Placed) -> np.ndarray | None:
         if thing.category in (*FLAT, "door", "window"):
             return None
         after = self.free.copy()

@@ -11,11 +11,11 @@ from . import kitchen, living, sleeping, working
 from .clutter import fill
 from .kit import RoomKit
 from .kitchen import with_doors
-from .placed import Thing
+from .placed import Placed
 from .room import ROOMY, HomeInProgress
 from .start import lay_doormat, start_home
 
-Rule = Callable[[RoomKit], Iterator[Thing | None]]
+Rule = Callable[[RoomKit], Iterator[Placed | None]]
 
 RULES: dict[str, Rule] = {
     "balcony": living.balcony,
@@ -82,7 +82,7 @@ FIRST = {"kitchen": 8, "bedroom": 1, "living_room": 2, "utility_room": 3}
 """Pieces that a room of this kind gets by its rule before its extra ones; others: 0."""
 
 
-def _rule(home: HomeInProgress, room: Room, pieces: Mapping[str, Sequence[str]]) -> Iterator[Thing | None]:
+def _rule(home: HomeInProgress, room: Room, pieces: Mapping[str, Sequence[str]]) -> Iterator[Placed | None]:
     kit = RoomKit(home, room)
     rule = RULES[room.kind](kit)
     yield from itertools.islice(rule, FIRST.get(room.kind, 0))
@@ -114,6 +114,6 @@ def _steps(room: Room, objects: int) -> int:
     return 1 if room.kind in PLAIN else min(3, max(2, round(room.area / PIECE_AREA)))
 
 
-def _advance(rule: Iterator[Thing | None]) -> bool:
+def _advance(rule: Iterator[Placed | None]) -> bool:
     """Lets a rule go on until it has put one thing; False when it is through."""
     return any(thing is not None for thing in rule)

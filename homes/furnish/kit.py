@@ -13,7 +13,7 @@ import numpy as np
 from ..objects.catalogue import find
 from .arrangement import AIR, FLAT
 from .loose import LooseKit
-from .placed import Thing, yaw
+from .placed import Placed, yaw
 from .room import SIDES, HomeInProgress, degrees_of
 
 __all__ = ["SIDES", "HomeInProgress", "RoomKit"]
@@ -46,7 +46,7 @@ class RoomKit(LooseKit):
         fixed: bool | None = None,
         under_window: bool = True,
         most: int | None = None,
-    ) -> Thing | None:
+    ) -> Placed | None:
         """Stands (or hangs) something with its back to a wall.
 
         Args:
@@ -86,8 +86,8 @@ class RoomKit(LooseKit):
         fixed: bool | None = None,
         scale: float = 1.0,
         ways: bool = True,
-        carpet: Thing | None = None,
-    ) -> Thing | None:
+        carpet: Placed | None = None,
+    ) -> Placed | None:
         """Stands something with the middle of its box at a place, its front towards `degrees` about z.
 
         Args:
@@ -110,7 +110,7 @@ class RoomKit(LooseKit):
 
     def spread(
         self, middle: tuple[float, float], degrees: float, most: tuple[float, float], category: str = "carpet"
-    ) -> Thing | None:
+    ) -> Placed | None:
         """Spreads a carpet with its middle at a place, its short side along `degrees`, as large as it may be.
 
         Args:
@@ -127,8 +127,8 @@ class RoomKit(LooseKit):
                     return thing
         return None
 
-    def beside(self, anchor: Thing, category: str, which: int, *, index: int | None = None, gap: float = 0.03,
-               room_before: float = 0.0) -> Thing | None:  # fmt: skip
+    def beside(self, anchor: Placed, category: str, which: int, *, index: int | None = None, gap: float = 0.03,
+               room_before: float = 0.0) -> Placed | None:  # fmt: skip
         """Stands something at the left (+1) or right (-1) of another, backs in one line, fronts the same way."""
         index = self.home.index(category) if index is None else index
         form = self.shape(category, index)
@@ -138,9 +138,9 @@ class RoomKit(LooseKit):
         return self.at(category, (float(spot[0]), float(spot[1])), degrees_of(anchor), index=index, gap=gap * 0.5,
                        room_before=room_before)  # fmt: skip
 
-    def before(self, anchor: Thing, category: str, distance: float, *, index: int | None = None, along: float = 0.0,
-               side: float = 0.0, turn: float = 180.0, gap: float = 0.005, carpet: Thing | None = None,
-               ways: bool = False) -> Thing | None:  # fmt: skip
+    def before(self, anchor: Placed, category: str, distance: float, *, index: int | None = None, along: float = 0.0,
+               side: float = 0.0, turn: float = 180.0, gap: float = 0.005, carpet: Placed | None = None,
+               ways: bool = False) -> Placed | None:  # fmt: skip
         """Stands something in front of another, `distance` metres between their boxes, looking back at it.
 
         Args:
@@ -157,7 +157,7 @@ class RoomKit(LooseKit):
             category, place, degrees_of(anchor) + side + turn, index=index, gap=gap, ways=ways, carpet=carpet
         )
 
-    def desk_with(self, chair: str) -> list[Thing]:
+    def desk_with(self, chair: str) -> list[Placed]:
         """Stands a desk at a wall and a chair before it; empty where there is no place for both."""
         start = self.home.now()
         for side in self.shuffled(list(SIDES)):
@@ -171,7 +171,7 @@ class RoomKit(LooseKit):
                 self.home.back_to(start)
         return []
 
-    def _seat_at(self, desk: Thing, category: str) -> Thing | None:
+    def _seat_at(self, desk: Placed, category: str) -> Placed | None:
         """Stands a chair before a desk, as far under it as it goes."""
         index = self.home.index(category)
         for distance in (-0.15, -0.05, 0.04, 0.12):
@@ -181,7 +181,7 @@ class RoomKit(LooseKit):
                     return chair
         return None
 
-    def under_window(self, category: str) -> Thing | None:
+    def under_window(self, category: str) -> Placed | None:
         """Stands something low below one of the room's windows."""
         for window in self.shuffled(self.openings("window")):
             x, y = (float(v) for v in window.edge.point(window.centre))
@@ -190,11 +190,11 @@ class RoomKit(LooseKit):
                 return thing
         return None
 
-    def hang(self, category: str, height: float, near: tuple[float, float] | None = None) -> Thing | None:
+    def hang(self, category: str, height: float, near: tuple[float, float] | None = None) -> Placed | None:
         """Hangs something on a wall, its lower edge at `height` and with some bare wall around it."""
         return self.at_wall(category, height=height, gap=BARE_WALL, near=near)
 
-    def above(self, anchor: Thing, category: str, height: float, *, index: int | None = None) -> Thing | None:
+    def above(self, anchor: Placed, category: str, height: float, *, index: int | None = None) -> Placed | None:
         """Hangs something on the wall behind another thing, its lower edge at `height`."""
         index = self.home.index(category) if index is None else index
         side = next(name for name, way in SIDES.items() if np.allclose(way, anchor.front, atol=0.1))
@@ -207,7 +207,7 @@ class RoomKit(LooseKit):
 
     # --- the parts of it -------------------------------------------------------------------------------------------
 
-    def _stand(self, thing: Thing, gap: float, room_before: float, ways: bool = True) -> bool:
+    def _stand(self, thing: Placed, gap: float, room_before: float, ways: bool = True) -> bool:
         """Puts furniture where it is if all is well; then its name is set."""
         things = self.home.things
         if not things.fits(thing, gap=gap, ways=ways and thing.category not in FLAT):
@@ -229,7 +229,7 @@ class RoomKit(LooseKit):
             things.keep_free(thing.name, zone[None])
         return True
 
-    def _zone(self, thing: Thing, depth: float) -> np.ndarray:
+    def _zone(self, thing: Placed, depth: float) -> np.ndarray:
         """[2, 3] box of floor before a thing."""
         box = thing.box()
         front = thing.front
@@ -242,7 +242,7 @@ class RoomKit(LooseKit):
             zone[:, axis] = (box[0, axis] - depth, box[0, axis] - 0.002)
         return zone
 
-    def _inside(self, thing: Thing) -> bool:
+    def _inside(self, thing: Placed) -> bool:
         (low, high), (x0, y0, x1, y1) = thing.box(), self.rect
         return bool(low[0] >= x0 - 1e-6 and low[1] >= y0 - 1e-6 and high[0] <= x1 + 1e-6 and high[1] <= y1 + 1e-6)
 
@@ -272,7 +272,7 @@ class RoomKit(LooseKit):
         foot = {"south": (at, y0), "north": (at, y1), "west": (x0, at), "east": (x1, at)}[side]
         return np.array([*foot, 0.0]) + turn @ np.array([depth, middle, 0.0])
 
-    def _before_window(self, thing: Thing, side: str, allowed: bool) -> bool:
+    def _before_window(self, thing: Placed, side: str, allowed: bool) -> bool:
         """Whether it stands in a window's light."""
         low, high = thing.box()
         axis = "x" if side in ("south", "north") else "y"

@@ -6,7 +6,7 @@ import itertools
 from collections.abc import Iterator
 
 from .kit import RoomKit
-from .placed import Shape, Thing
+from .placed import Placed, Shape
 from .room import SIDES
 
 BEFORE = 0.55  # m, kept free before what has doors
@@ -20,12 +20,12 @@ OVER = {"stove": ("range_hood", 1.62), "bottom_cabinet": ("top_cabinet", 1.45)}
 """What hangs over parts of the run, and the height (m) of its lower edge."""
 
 
-def kitchen(kit: RoomKit) -> Iterator[Thing | None]:
+def kitchen(kit: RoomKit) -> Iterator[Placed | None]:
     """The fridge in a corner, the run beside it, wall cupboards over it, a microwave, a table where there is room."""
     sides = sorted(SIDES, key=lambda side: (-_longest(kit, side), side))
     fridge = kit.at_wall("fridge", side=sides, place="corner", room_before=BEFORE)
     yield fridge
-    run: list[Thing] = []
+    run: list[Placed] = []
     style = kit.home.index("bottom_cabinet")  # all cupboards of a kitchen alike
     hanging = kit.home.index("top_cabinet")
     last, way = fridge, 0
@@ -72,7 +72,7 @@ def with_doors(form: Shape) -> bool:
     return any(joint.openable for joint in form.model.joints)
 
 
-def island(kit: RoomKit) -> Iterator[Thing | None]:
+def island(kit: RoomKit) -> Iterator[Placed | None]:
     """A counter free in the room, two stools at its long side."""
     counter = in_the_middle(kit, "countertop", 0.8)
     yield counter
@@ -89,7 +89,7 @@ def _longest(kit: RoomKit, side: str) -> float:
     return max((high - low for low, high in kit.wall_spans(side)), default=0.0)
 
 
-def table_with_chairs(kit: RoomKit, category: str, chairs: int) -> Iterator[Thing | None]:
+def table_with_chairs(kit: RoomKit, category: str, chairs: int) -> Iterator[Placed | None]:
     """A table as near the middle as it and its chairs can stand, the chairs at it and facing it."""
     start = kit.home.now()
     table_index, index = kit.home.index(category), kit.home.index("straight_chair")
@@ -111,7 +111,7 @@ SPOTS = 70
 """Places that are tried for a table with all its chairs."""
 
 
-def _seated(kit: RoomKit, category: str, table_index: int, index: int, place: Place, chairs: int) -> list[Thing]:
+def _seated(kit: RoomKit, category: str, table_index: int, index: int, place: Place, chairs: int) -> list[Placed]:
     """The table, then its chairs; empty where the table does not fit."""
     spot, degrees = place
     table = kit.at(category, spot, degrees, index=table_index, gap=ROUND_TABLE)
@@ -142,7 +142,7 @@ def _middle_spots(kit: RoomKit) -> Iterator[Place]:
             yield spot, degrees
 
 
-def in_the_middle(kit: RoomKit, category: str, room_around: float = 0.3) -> Thing | None:
+def in_the_middle(kit: RoomKit, category: str, room_around: float = 0.3) -> Placed | None:
     """Stands something where it has most space around, near the room's middle."""
     index = kit.home.index(category)
     for gap in (room_around, room_around / 2):
@@ -153,7 +153,7 @@ def in_the_middle(kit: RoomKit, category: str, room_around: float = 0.3) -> Thin
     return None
 
 
-def dining_room(kit: RoomKit) -> Iterator[Thing | None]:
+def dining_room(kit: RoomKit) -> Iterator[Placed | None]:
     """A big table, four chairs, a sideboard, pictures, a plant."""
     yield from table_with_chairs(kit, "breakfast_table", 4)
     yield kit.at_wall("console_table", under_window=False)
@@ -167,7 +167,7 @@ def dining_room(kit: RoomKit) -> Iterator[Thing | None]:
     yield kit.at_wall("pot_plant", place="corner")
 
 
-def pantry_room(kit: RoomKit) -> Iterator[Thing | None]:
+def pantry_room(kit: RoomKit) -> Iterator[Placed | None]:
     """Shelves along the walls."""
     for _ in range(3):
         yield kit.at_wall("shelf", place="corner")
@@ -177,7 +177,7 @@ def pantry_room(kit: RoomKit) -> Iterator[Thing | None]:
     yield kit.at_wall("shelf", place="corner")
 
 
-def utility_room(kit: RoomKit) -> Iterator[Thing | None]:
+def utility_room(kit: RoomKit) -> Iterator[Placed | None]:
     """Washer, dryer, a cupboard, cleaning things."""
     washer = kit.at_wall("washer", place="corner", room_before=BEFORE)
     yield washer

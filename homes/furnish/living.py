@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from .kit import RoomKit
-from .placed import Thing
-from .watching import seats_around, watch_television
+from .placed import Placed
+from .television_area import place_television_area, seats_around
 
 LARGE = 20.0  # m2 of living room from which there is a piano or a second place to sit
 READING = 0.5  # m of floor kept free before a reading chair
@@ -14,9 +14,9 @@ RUNNER = (0.9, 1.7)  # m, width and length of a corridor's carpet at most
 RUNNER_EVERY = 3.2  # m of corridor
 
 
-def living_room(kit: RoomKit) -> Iterator[Thing | None]:
+def living_room(kit: RoomKit) -> Iterator[Placed | None]:
     """A television at one wall, the sofa opposite, the coffee table between them; books, a sideboard, plants."""
-    place = watch_television(kit)
+    place = place_television_area(kit)
     if place is None:
         yield kit.at_wall("sofa", place="middle") or kit.at_wall("armchair", place="corner")
     else:
@@ -47,12 +47,12 @@ def living_room(kit: RoomKit) -> Iterator[Thing | None]:
     yield kit.hang("picture", 1.5)
 
 
-def sideboard(kit: RoomKit) -> Thing | None:
+def sideboard(kit: RoomKit) -> Placed | None:
     """A narrow table at a wall."""
     return kit.at_wall("console_table", under_window=False)
 
 
-def reading_corner(kit: RoomKit) -> Iterator[Thing | None]:
+def reading_corner(kit: RoomKit) -> Iterator[Placed | None]:
     """A chair in a corner, a lamp and a small carpet by it."""
     category = kit.rng.choice(("armchair", "rocking_chair"))
     chair = kit.at_wall(category, place="corner", room_before=READING)
@@ -61,7 +61,7 @@ def reading_corner(kit: RoomKit) -> Iterator[Thing | None]:
         yield kit.beside(chair, "floor_lamp", 1) or kit.beside(chair, "floor_lamp", -1)
 
 
-def entrance(kit: RoomKit) -> Iterator[Thing | None]:
+def entrance(kit: RoomKit) -> Iterator[Placed | None]:
     """Coats and shoes by the front door, where the room has it."""
     door = kit.front_door
     if door is None:
@@ -73,7 +73,7 @@ def entrance(kit: RoomKit) -> Iterator[Thing | None]:
     yield from shoes(kit, (x, y))
 
 
-def shoes(kit: RoomKit, near: tuple[float, float] | None = None, category: str = "gym_shoe") -> Iterator[Thing | None]:
+def shoes(kit: RoomKit, near: tuple[float, float] | None = None, category: str = "gym_shoe") -> Iterator[Placed | None]:
     """A pair, side by side at a wall."""
     first = kit.at_wall(category, near=near)
     yield first
@@ -83,9 +83,9 @@ def shoes(kit: RoomKit, near: tuple[float, float] | None = None, category: str =
         )
 
 
-def television_room(kit: RoomKit) -> Iterator[Thing | None]:
+def television_room(kit: RoomKit) -> Iterator[Placed | None]:
     """As a living room, with less in it."""
-    place = watch_television(kit)
+    place = place_television_area(kit)
     if place is not None:
         yield place.television
         yield place.sofa
@@ -98,7 +98,7 @@ def television_room(kit: RoomKit) -> Iterator[Thing | None]:
     yield kit.hang("painting", 1.4)
 
 
-def library(kit: RoomKit) -> Iterator[Thing | None]:
+def library(kit: RoomKit) -> Iterator[Placed | None]:
     """Bookshelves all around, a chair to read in, a desk."""
     for _ in range(3):
         yield kit.at_wall("shelf", under_window=False, place="corner")
@@ -113,7 +113,7 @@ def library(kit: RoomKit) -> Iterator[Thing | None]:
     yield kit.at_wall("pot_plant", place="corner")
 
 
-def middle_carpet(kit: RoomKit) -> Thing | None:
+def middle_carpet(kit: RoomKit) -> Placed | None:
     """A carpet on the free floor in the middle of a room."""
     x0, y0, x1, y1 = kit.rect
     cx, cy = (x0 + x1) / 2, (y0 + y1) / 2
@@ -136,7 +136,7 @@ def middle_carpet(kit: RoomKit) -> Thing | None:
     return None
 
 
-def lobby(kit: RoomKit) -> Iterator[Thing | None]:
+def lobby(kit: RoomKit) -> Iterator[Placed | None]:
     """Coats, shoes, a mirror, a bench."""
     yield from entrance(kit)
     bench = kit.at_wall("bench", under_window=False)
@@ -150,7 +150,7 @@ def lobby(kit: RoomKit) -> Iterator[Thing | None]:
     yield kit.hang("picture", 1.5)
 
 
-def corridor(kit: RoomKit) -> Iterator[Thing | None]:
+def corridor(kit: RoomKit) -> Iterator[Placed | None]:
     """A narrow table with a mirror, pictures and a clock, carpets, plants, where the way stays free."""
     yield from entrance(kit)
     x0, y0, x1, y1 = kit.rect
@@ -176,7 +176,7 @@ def corridor(kit: RoomKit) -> Iterator[Thing | None]:
     yield kit.at_wall("pot_plant", place="corner")
 
 
-def balcony(kit: RoomKit) -> Iterator[Thing | None]:
+def balcony(kit: RoomKit) -> Iterator[Placed | None]:
     """A small table, chairs that fold, plants."""
     table = kit.at_wall("pedestal_table", place="middle")
     yield table
@@ -189,7 +189,7 @@ def balcony(kit: RoomKit) -> Iterator[Thing | None]:
         yield kit.at_wall("pot_plant", place="corner")
 
 
-def staircase(kit: RoomKit) -> Iterator[Thing | None]:
+def staircase(kit: RoomKit) -> Iterator[Placed | None]:
     """Something at the foot of the stairs."""
     yield kit.hang("picture", 1.5)
     yield kit.at_wall("pot_plant", place="corner")

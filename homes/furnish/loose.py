@@ -10,7 +10,7 @@ import numpy as np
 from ..objects.catalogue import find
 from ..shapes.surfaces import Surface, insides, tops
 from .arrangement import AIR, FLAT
-from .placed import Thing, lying, yaw
+from .placed import Placed, lying, yaw
 from .room import RoomBase
 
 MOST_POSES = 8  # stable orientations of a model at most (poses.MOST)
@@ -19,9 +19,9 @@ MOST_POSES = 8  # stable orientations of a model at most (poses.MOST)
 class LooseKit(RoomBase):
     """Puts things on tops, and in cupboards, fridges, drawers and shelves."""
 
-    def on(self, host: Thing, category: str, *, index: int | None = None, at: tuple[float, float] | str | None = None,
+    def on(self, host: Placed, category: str, *, index: int | None = None, at: tuple[float, float] | str | None = None,
            degrees: float | None = None, scale: float = 1.0, tries: int = 24, surface: Surface | None = None,
-           highest: bool = False, stand: int | None = None) -> Thing | None:  # fmt: skip
+           highest: bool = False, stand: int | None = None) -> Placed | None:  # fmt: skip
         """Puts something on top of another.
 
         Args:
@@ -36,15 +36,15 @@ class LooseKit(RoomBase):
             found = sorted(found, key=lambda s: -s.z)
         return self._put(host, category, index, found[:4], at, degrees, scale, tries, stand)
 
-    def inside(self, host: Thing, category: str, *, index: int | None = None, degrees: float | None = None,
+    def inside(self, host: Placed, category: str, *, index: int | None = None, degrees: float | None = None,
                scale: float = 1.0, tries: int = 24, surface: Surface | None = None,
-               stand: int | None = None) -> Thing | None:  # fmt: skip
+               stand: int | None = None) -> Placed | None:  # fmt: skip
         """Puts something into a cupboard, a fridge, a drawer, on a shelf: under something of the same object."""
         index = self.home.index(category) if index is None else index
         found = [surface] if surface else self.shuffled(list(insides(host.category, host.index, host.seed)))
         return self._put(host, category, index, found[:6], None, degrees, scale, tries, stand)
 
-    def _put(self, host, category, index, found: Iterable[Surface], at, degrees, scale, tries, stand) -> Thing | None:
+    def _put(self, host, category, index, found: Iterable[Surface], at, degrees, scale, tries, stand) -> Placed | None:
         resting_pose = resting(category, index, stand, self.home.seed)
         for surface in found:
             for _ in range(1 if at is not None and degrees is not None else tries):
@@ -89,7 +89,7 @@ def resting(category: str, index: int, stand: int | None = None, seed: int = 0) 
     return lying(category, index, 0, seed)
 
 
-def _within(thing: Thing, host: Thing, surface: Surface) -> bool:
+def _within(thing: Placed, host: Placed, surface: Surface) -> bool:
     """Whether a thing's box, seen from the host, stays on the surface."""
     points = np.concatenate(thing.hulls())
     local = (points - host.position) @ host.rotation / host.scale

@@ -71,7 +71,7 @@ def lying(category: str, index: int, which: int, seed: int = 0) -> np.ndarray:
 
 
 @dataclasses.dataclass(eq=False)
-class Thing:
+class Placed:
     """An object at its place.
 
     Attributes:

@@ -12,7 +12,7 @@ from ..objects.catalogue import find
 from ..plans.plan import Edge, Opening, Plan, Rect, Room
 from .arrangement import Arrangement
 from .ground import Ground
-from .placed import Shape, Thing, shape
+from .placed import Placed, Shape, shape
 
 SIDES = {"south": (0, 1), "east": (-1, 0), "north": (0, -1), "west": (1, 0)}
 """Side of a room -> the direction into the room."""
@@ -110,11 +110,11 @@ class RoomBase:
     def shape(self, category: str, index: int) -> Shape:
         return shape(category, index, self.home.seed)
 
-    def thing(self, category: str, index: int, position, turn: np.ndarray, fixed: bool | None = None) -> Thing:
+    def thing(self, category: str, index: int, position, turn: np.ndarray, fixed: bool | None = None) -> Placed:
         """A thing of this room that is not put yet."""
         fixed = find(category).fixed if fixed is None else fixed
         rooms, seed = (self.room.name,), self.home.seed
-        return Thing(category, category, index, np.asarray(position, float), turn, fixed, rooms, seed=seed)
+        return Placed(category, category, index, np.asarray(position, float), turn, fixed, rooms, seed=seed)
 
     def shuffled(self, values: list) -> list:
         values = list(values)
@@ -122,7 +122,7 @@ class RoomBase:
         return values
 
 
-def degrees_of(thing: Thing) -> float:
+def degrees_of(thing: Placed) -> float:
     """Yaw of a thing's front."""
     angle = float(np.degrees(np.arctan2(thing.rotation[1, 0], thing.rotation[0, 0])))
     return round(angle / 90) * 90 if abs(angle / 90 - round(angle / 90)) < 1e-6 else angle

@@ -9,7 +9,7 @@ import numpy as np
 from .kit import RoomKit
 from .kitchen import with_doors
 from .living import middle_carpet, shoes
-from .placed import Thing, yaw
+from .placed import Placed, yaw
 from .room import degrees_of
 
 LID = 0.2
@@ -18,7 +18,7 @@ ATTEMPTS = 12
 """At the three fittings of a bathroom."""
 
 
-def bedroom(kit: RoomKit) -> Iterator[Thing | None]:
+def bedroom(kit: RoomKit) -> Iterator[Placed | None]:
     """The bed's head at a wall, a stand with a lamp on each side, a chest of drawers, shelves, a desk, a carpet."""
     bed = kit.at_wall("bed", place="middle", under_window=False) or kit.at_wall("bed")
     yield bed
@@ -46,7 +46,7 @@ def bedroom(kit: RoomKit) -> Iterator[Thing | None]:
     yield from shoes(kit, category="sandal")
 
 
-def _beside_bed(kit: RoomKit, bed: Thing) -> Thing | None:
+def _beside_bed(kit: RoomKit, bed: Placed) -> Placed | None:
     """A carpet at the bed's foot or along one of its sides."""
     places = ((0.0, 0), (90.0, 1), (270.0, 1))
     for side, axis in places:
@@ -60,12 +60,12 @@ def _beside_bed(kit: RoomKit, bed: Thing) -> Thing | None:
     return None
 
 
-def _head(bed: Thing, side: float) -> tuple[float, float]:
+def _head(bed: Placed, side: float) -> tuple[float, float]:
     """Where a pillow lies: near the head, to one side; in the bed's frame."""
     return (-0.30 * float(bed.size[0]), side * float(bed.size[1]))
 
 
-def childs_room(kit: RoomKit) -> Iterator[Thing | None]:
+def childs_room(kit: RoomKit) -> Iterator[Placed | None]:
     """A bed, a shelf and a chest for toys, toys on the floor."""
     bed = kit.at_wall("bed", place="corner") or kit.at_wall("crib", place="corner")
     yield bed
@@ -84,7 +84,7 @@ def childs_room(kit: RoomKit) -> Iterator[Thing | None]:
     yield kit.at_wall("basket", place="corner")
 
 
-def playroom(kit: RoomKit) -> Iterator[Thing | None]:
+def playroom(kit: RoomKit) -> Iterator[Placed | None]:
     """Toys, a game table, a shelf, a board."""
     yield kit.at_wall("shelf", under_window=False, place="corner")
     yield kit.at_wall("chest", room_before=0.4, wall_gap=LID)
@@ -102,7 +102,7 @@ def playroom(kit: RoomKit) -> Iterator[Thing | None]:
     yield kit.at_wall("toy", place="corner")
 
 
-def closet(kit: RoomKit) -> Iterator[Thing | None]:
+def closet(kit: RoomKit) -> Iterator[Placed | None]:
     """Shelves and drawers for clothes."""
     for _ in range(2):
         yield kit.at_wall("shelf", place="corner")
@@ -113,7 +113,7 @@ def closet(kit: RoomKit) -> Iterator[Thing | None]:
     yield kit.at_wall("stool", place="corner")
 
 
-def bathroom(kit: RoomKit) -> Iterator[Thing | None]:
+def bathroom(kit: RoomKit) -> Iterator[Placed | None]:
     """Bathtub or shower, toilet, washbasin with a mirror, towels."""
     tub, toilet, sink = _fittings(kit)
     yield tub
@@ -131,7 +131,7 @@ def bathroom(kit: RoomKit) -> Iterator[Thing | None]:
     yield kit.at_wall("basket", place="corner")
 
 
-def _fittings(kit: RoomKit) -> list[Thing | None]:
+def _fittings(kit: RoomKit) -> list[Placed | None]:
     """Bathtub or shower, toilet and washbasin, tried until all three have found a place."""
     large = kit.room.area > 5.5
     start, found = kit.home.now(), []

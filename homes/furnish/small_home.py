@@ -11,7 +11,7 @@ from ..plans.openings import make_plan
 from ..plans.plan import Plan, Room
 from ..shapes.surfaces import insides, tops
 from .kit import HomeInProgress, RoomKit
-from .placed import Thing
+from .placed import Placed
 from .start import start_home
 
 NAME = "small_home"
@@ -94,7 +94,7 @@ def categories(seed: int = 0) -> list[str]:
     return sorted({thing.category for thing in furnish(seed).things.things.values()})
 
 
-def _pan_place(stove: Thing) -> tuple[float, float]:
+def _pan_place(stove: Placed) -> tuple[float, float]:
     """Where the middle of the pan's box goes, in the stove's frame: its disc lies on the front left ring, its handle
     points `HANDLE` degrees to the left of the front, and what is in it is within 0.2 m of the heat source."""
     x, y, _ = stove.shape.model.areas["heat_source"].xyz
@@ -108,7 +108,7 @@ class _NoRoom(Exception):
     """Something did not fit."""
 
 
-def _must(thing: Thing | None) -> Thing:
+def _must(thing: Placed | None) -> Placed:
     if thing is None:
         raise _NoRoom
     return thing

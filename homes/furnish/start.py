@@ -12,7 +12,7 @@ from ..plans.plan import Plan
 from ..plans.porch import front_door, porch_rails
 from .arrangement import AIR, Arrangement
 from .ground import Ground
-from .placed import Thing, yaw
+from .placed import Placed, yaw
 from .room import HomeInProgress
 
 WAY = 0.75  # m, kept free on both sides of a door
@@ -36,7 +36,7 @@ def start_home(
     return HomeInProgress(plan, things, Ground(plan), rng, models=models, limit=limit, seed=seed)
 
 
-def lay_doormat(home: HomeInProgress) -> Thing | None:
+def lay_doormat(home: HomeInProgress) -> Placed | None:
     """A mat outside the front door."""
     door = front_door(home.plan)
     if door is None:
@@ -45,7 +45,7 @@ def lay_doormat(home: HomeInProgress) -> Thing | None:
     x, y = door.edge.point(door.centre, outwards * (door.edge.thickness / 2 + DOORMAT_AT))
     turn = yaw(90.0 if door.edge.axis == "x" else 0.0)
     index = home.index("mat")
-    mat = Thing("mat", "mat", index, np.array([x, y, AIR]), turn, False, door.edge.rooms, seed=home.seed)
+    mat = Placed("mat", "mat", index, np.array([x, y, AIR]), turn, False, door.edge.rooms, seed=home.seed)
     if not home.things.fits(mat, ways=False):
         return None
     mat.name = home.things.name("mat")

@@ -7,15 +7,15 @@ from collections.abc import Iterator
 import numpy as np
 
 from .kit import RoomKit
-from .placed import Thing
+from .placed import Placed
 
 CENTREPIECES = ("bowl", "carafe", "pot_plant", "candle")
 COVER = (("plate", 0.18, 0.0), ("glass", 0.30, -0.17), ("tablefork", 0.18, 0.17), ("table_knife", 0.18, -0.16))
 """Piece, metres in from the table's edge, metres to the left of who sits there."""
-REACH = 0.75  # m, from the table's edge to the middle of a chair that belongs to it
+PLACE_DISTANCE = 0.75  # m, from the table's edge to the middle of a chair that belongs to it
 
 
-def lay_table(kit: RoomKit, table: Thing) -> Iterator[Thing]:
+def lay_table(kit: RoomKit, table: Placed) -> Iterator[Placed]:
     """Gives one thing after the other; first what stands in the middle, then all plates, all glasses, ..."""
     middle = kit.on(table, kit.rng.choice(CENTREPIECES), at="middle", degrees=0.0)
     if middle is not None:
@@ -29,7 +29,7 @@ def lay_table(kit: RoomKit, table: Thing) -> Iterator[Thing]:
                 yield put
 
 
-def _seats(kit: RoomKit, table: Thing) -> list[np.ndarray]:
+def _seats(kit: RoomKit, table: Placed) -> list[np.ndarray]:
     """Places [2] of the chairs that look at a table, in its frame."""
     seats = []
     for thing in kit.home.things.things.values():
@@ -37,12 +37,14 @@ def _seats(kit: RoomKit, table: Thing) -> list[np.ndarray]:
             continue
         local = table.rotation[:2, :2].T @ (thing.centre - table.centre)[:2]
         over = np.abs(local) - table.size[:2] / 2
-        if over.max() < REACH and float(thing.front @ (table.centre - thing.centre)[:2]) > 0:
+        if over.max() < PLACE_DISTANCE and float(thing.front @ (table.centre - thing.centre)[:2]) > 0:
             seats.append(local)
     return seats
 
 
-def _before_seat(kit: RoomKit, table: Thing, seat, piece: str, index: int, inwards: float, left: float) -> Thing | None:
+def _before_seat(
+    kit: RoomKit, table: Placed, seat, piece: str, index: int, inwards: float, left: float
+) -> Placed | None:
     half = table.size[:2] / 2
     axis = int(np.argmax(np.abs(seat) - half))
     way = np.zeros(2)

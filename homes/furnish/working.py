@@ -7,10 +7,10 @@ from collections.abc import Iterator
 from .kit import RoomKit
 from .kitchen import in_the_middle
 from .living import middle_carpet, shoes
-from .placed import Thing
+from .placed import Placed
 
 
-def home_office(kit: RoomKit) -> Iterator[Thing | None]:
+def home_office(kit: RoomKit) -> Iterator[Placed | None]:
     """A desk with a monitor and a keyboard, a swivel chair before it, shelves, a printer."""
     workplace = kit.desk_with("swivel_chair")
     yield from workplace
@@ -35,7 +35,7 @@ def home_office(kit: RoomKit) -> Iterator[Thing | None]:
     yield kit.at_wall("briefcase", place="corner")
 
 
-def garage(kit: RoomKit) -> Iterator[Thing | None]:
+def garage(kit: RoomKit) -> Iterator[Placed | None]:
     """A car where it fits, shelves with tools, a ladder, boxes."""
     yield _car(kit)
     yield kit.at_wall("shelf", place="corner")
@@ -49,7 +49,7 @@ def garage(kit: RoomKit) -> Iterator[Thing | None]:
     yield kit.at_wall("hose", place="corner")
 
 
-def _car(kit: RoomKit) -> Thing | None:
+def _car(kit: RoomKit) -> Placed | None:
     """A car along the room's long side, where its doors can open."""
     x0, y0, x1, y1 = kit.rect
     cx, cy = (x0 + x1) / 2, (y0 + y1) / 2
@@ -64,7 +64,7 @@ def _car(kit: RoomKit) -> Thing | None:
     return None
 
 
-def storage_room(kit: RoomKit) -> Iterator[Thing | None]:
+def storage_room(kit: RoomKit) -> Iterator[Placed | None]:
     """Shelves, boxes, cleaning things."""
     for _ in range(2):
         yield kit.at_wall("shelf", place="corner")
@@ -72,7 +72,7 @@ def storage_room(kit: RoomKit) -> Iterator[Thing | None]:
         yield kit.at_wall(category, place="corner")
 
 
-def exercise_room(kit: RoomKit) -> Iterator[Thing | None]:
+def exercise_room(kit: RoomKit) -> Iterator[Placed | None]:
     """A treadmill, a bench, a mat, balls."""
     yield kit.at_wall("treadmill", place="corner", room_before=0.4)
     yield in_the_middle(kit, "mat", 0.2)

@@ -6,7 +6,7 @@ import dataclasses
 import random
 from collections.abc import Collection, Iterator
 
-from ..furnish.placed import Thing, shape, yaw
+from ..furnish.placed import Placed, shape, yaw
 from ..objects.catalogue import find
 from .plan import Edge, Opening, Plan, Room, make_edges
 
@@ -78,7 +78,7 @@ def make_plan(
     return dataclasses.replace(plan, openings=tuple(openings))
 
 
-def opening_things(plan: Plan, seed: int = 0) -> Iterator[tuple[Opening, Thing]]:
+def opening_things(plan: Plan, seed: int = 0) -> Iterator[tuple[Opening, Placed]]:
     """The doors and windows that stand in the openings; both rooms in `rooms`."""
     for opening in plan.openings:
         if opening.kind == "passage":
@@ -92,7 +92,10 @@ def opening_things(plan: Plan, seed: int = 0) -> Iterator[tuple[Opening, Thing]]
         shift = KNOB / 2 if opening.kind == "door" else 0.0
         x, y = edge.point(opening.centre)
         position = turn @ [shift, -(form.low[1] + form.high[1]) / 2, 0.0] + [x, y, opening.bottom + AIR / 2]
-        yield opening, Thing(opening.kind, opening.kind, opening.index, position, turn, True, edge.rooms, seed=seed)
+        yield (
+            opening,
+            Placed(opening.kind, opening.kind, opening.index, position, turn, True, edge.rooms, seed=seed),
+        )
 
 
 def _cost(first: str, second: str, kinds: dict[str, str]) -> int:

@@ -122,7 +122,7 @@ def _looks_often(monkeypatch):
 @pytest.mark.parametrize("reach", [0.25, 0.1])
 @pytest.mark.parametrize("seed", range(6))
 def test_motion_and_contacts_are_bitwise_those_of_plain_mujoco(seed, reach, monkeypatch):
-    monkeypatch.setattr(vicinity, "REACH", reach)
+    monkeypatch.setattr(vicinity, "SPHERE_MARGIN", reach)
     model = _home(np.random.default_rng(seed))
     closed = _assert_same(model, 240, _drive_and_kick if seed % 2 else _drive)
     assert closed > 200  # of 960 physics steps

@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing
+from hand_world import HandWorld, Item
 
 from ig2mj.engine.view import SCHEMA, assemble, axis_sizes, blank_view, faults, read_field, replace_fields
 
@@ -52,5 +52,5 @@ def test_the_jax_engine_keeps_to_the_schema(bench_folder):
 
 
 def test_views_made_by_hand_keep_to_the_schema():
-    home = HandWorld(Thing("fish"), Thing("oven", fixed=True, joints=[(0, 1)]), fingers=2)
+    home = HandWorld(Item("fish"), Item("oven", fixed=True, joints=[(0, 1)]), fingers=2)
     assert faults(home.view(fingers=[(0, 0, 0), (1, 1, 1)], worlds=3), axis_sizes(home.tables, 3)) == []

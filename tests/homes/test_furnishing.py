@@ -11,7 +11,7 @@ from ig2mj_homes.dataset.shipped_homes import furnished, home_names
 from ig2mj_homes.furnish.arrangement import AIR, Arrangement
 from ig2mj_homes.furnish.ground import CELL, Ground
 from ig2mj_homes.furnish.home import RULES
-from ig2mj_homes.furnish.placed import Thing, rpy_of, shape, yaw
+from ig2mj_homes.furnish.placed import Placed, rpy_of, shape, yaw
 from ig2mj_homes.plans.layout_maps import Maps, reachable
 from ig2mj_homes.plans.shipped import DRAWINGS, plan
 from ig2mj_homes.shapes.surfaces import insides, tops
@@ -24,12 +24,12 @@ SMALL = ("aspen", "hazel", "small_home")
 each_home = pytest.mark.parametrize("name", home_names())
 
 
-def things(name: str, category: str) -> list[Thing]:
+def things(name: str, category: str) -> list[Placed]:
     return [t for t in home(name).things.things.values() if t.category == category]
 
 
-def box_thing(x: float, y: float, z: float = 0.0, degrees: float = 0.0) -> Thing:
-    return Thing("stool_9", "stool", 0, np.array([x, y, z]), yaw(degrees), True)
+def box_thing(x: float, y: float, z: float = 0.0, degrees: float = 0.0) -> Placed:
+    return Placed("stool_9", "stool", 0, np.array([x, y, z]), yaw(degrees), True)
 
 
 def test_every_room_kind_of_the_plans_has_a_rule():
@@ -147,7 +147,7 @@ def test_overlap_is_seen_and_near_misses_are_not():
 
 def test_what_opens_is_kept_free():
     placed = Arrangement(np.zeros((0, 2, 3)))
-    placed.put(Thing("fridge_0", "fridge", 0, np.zeros(3), np.eye(3), True))
+    placed.put(Placed("fridge_0", "fridge", 0, np.zeros(3), np.eye(3), True))
     before = shape("fridge", 0).high[0] + 0.25
     assert not placed.fits(box_thing(before, 0.0)), "the door swings here"
     assert placed.fits(box_thing(before + 1.0, 0.0))
@@ -168,7 +168,7 @@ def test_what_was_tried_is_taken_back():
 
 def test_carpets_need_no_air_around_them_and_block_no_way():
     placed = Arrangement(np.zeros((0, 2, 3)))
-    placed.put(Thing("carpet_0", "carpet", 0, np.zeros(3), np.eye(3), True))
+    placed.put(Placed("carpet_0", "carpet", 0, np.zeros(3), np.eye(3), True))
     length = float(shape("carpet", 0).size[0])
     assert placed.fits(box_thing(length / 2 + 0.2, 0.0), gap=0.1)
     assert not placed.fits(box_thing(length / 2 + 0.1, 0.0)), "half on it"

@@ -7,8 +7,8 @@ import functools
 import numpy as np
 import pytest
 from ig2mj_homes.dataset.shipped_homes import furnished
-from ig2mj_homes.furnish.placed import Thing
-from ig2mj_homes.furnish.watching import ASIDE, FARTHEST, NEAREST, aside, floor_between
+from ig2mj_homes.furnish.placed import Placed
+from ig2mj_homes.furnish.television_area import ASIDE, FARTHEST, NEAREST, aside, floor_between
 from ig2mj_homes.plans.plan import Room
 from ig2mj_homes.plans.shipped import DRAWINGS
 
@@ -20,7 +20,7 @@ EYES = 1.1
 OPENINGS = ("door", "window")
 
 
-def things_in(name: str, room: Room, *categories: str) -> list[Thing]:
+def things_in(name: str, room: Room, *categories: str) -> list[Placed]:
     """All things of a room, or those of some categories."""
     found = [t for t in home(name).things.things.values() if t.rooms == (room.name,)]
     return [t for t in found if not categories or t.category in categories]
@@ -30,7 +30,7 @@ def rooms_of(name: str, *kinds: str) -> list[Room]:
     return [room for room in home(name).plan.rooms if room.kind in kinds]
 
 
-def faces(a: Thing, b: Thing) -> bool:
+def faces(a: Placed, b: Placed) -> bool:
     return float(a.front @ (b.centre - a.centre)[:2]) > 0
 
 

@@ -9,7 +9,7 @@ import pytest
 from ig2mj_homes.dataset.shipped_homes import build_homes, furnished
 from ig2mj_homes.furnish.arrangement import Arrangement
 from ig2mj_homes.furnish.clearances import blocked
-from ig2mj_homes.furnish.placed import Thing, shape
+from ig2mj_homes.furnish.placed import Placed, shape
 from ig2mj_homes.objects.catalogue import build_model, catalogue, find
 from ig2mj_homes.objects.hinges import GRAVITY, friction, gravity_torque
 from ig2mj_homes.objects.model import HouseholdObject, ObjectBuilder
@@ -75,7 +75,7 @@ def test_a_door_is_kept_from_a_wall_that_its_corner_would_meet():
     door = next(link for link in fridge.model.links if link.name == "door_0")
     side = np.sign(-door.hulls[0][:, 1].mean() - 1e-9)  # of its hinge
     edge = max(abs(float(p[:, 1].max() if side < 0 else p[:, 1].min()) + door.origin[1]) for p in door.hulls)
-    lying = Thing("fridge_0", "fridge", 1, np.zeros(3), np.eye(3), True)
+    lying = Placed("fridge_0", "fridge", 1, np.zeros(3), np.eye(3), True)
     for gap, fits in ((0.02, True), (-0.002, False)):
         at = -side * (edge + gap)
         wall = np.sort(np.array([[0.2, at, 0], [3.0, at - side * 0.1, 2]]), axis=0)

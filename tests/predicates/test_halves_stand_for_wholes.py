@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing, world_of
+from hand_world import HandWorld, Item, world_of
 
 from ig2mj.predicates import compile_expression
 from ig2mj.states import initial_states
@@ -12,10 +12,10 @@ from ig2mj.states import initial_states
 CUBE = (((0, 0, 0), (0.05, 0.05, 0.05)),)
 FOOD = {"sliceable": {}, "freezable": {}}
 HOME = HandWorld(
-    Thing("apple", CUBE, FOOD, parts={"left": (-0.02, 0, 0), "right": (0.02, 0, 0)}, pos=(60, 0, 0)),
-    Thing("left", CUBE, FOOD, part_of="apple", pos=(0, 0, 1)),
-    Thing("right", CUBE, FOOD, part_of="apple", pos=(5, 0, 1)),
-    Thing("table", (((0, 0, 0), (0.5, 0.5, 0.02)),), pos=(0, 0, 0.93)),
+    Item("apple", CUBE, FOOD, parts={"left": (-0.02, 0, 0), "right": (0.02, 0, 0)}, pos=(60, 0, 0)),
+    Item("left", CUBE, FOOD, part_of="apple", pos=(0, 0, 1)),
+    Item("right", CUBE, FOOD, part_of="apple", pos=(5, 0, 1)),
+    Item("table", (((0, 0, 0), (0.5, 0.5, 0.02)),), pos=(0, 0, 0.93)),
 )
 
 

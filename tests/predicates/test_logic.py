@@ -8,7 +8,7 @@ import warnings
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing
+from hand_world import HandWorld, Item
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -30,9 +30,9 @@ from ig2mj.states import WorldState, initial_states
 
 SWITCH = {"toggleable": {}}
 HOME = HandWorld(
-    *(Thing(f"lamp_{k}", abilities=SWITCH, category="lamp", pos=(3 * k, 0, 0)) for k in range(3)),
-    *(Thing(f"radio_{k}", abilities=SWITCH, category="radio", pos=(0, 3 + 3 * k, 0)) for k in range(2)),
-    Thing("big rock (grey)", category="rock", pos=(0, 0, 9)),
+    *(Item(f"lamp_{k}", abilities=SWITCH, category="lamp", pos=(3 * k, 0, 0)) for k in range(3)),
+    *(Item(f"radio_{k}", abilities=SWITCH, category="radio", pos=(0, 3 + 3 * k, 0)) for k in range(2)),
+    Item("big rock (grey)", category="rock", pos=(0, 0, 9)),
     rooms={"kitchen_0": (-5.0, 5.0)},
 )
 
@@ -255,15 +255,15 @@ def test_groups_may_be_given_or_be_categories_or_synsets():
         model, "(forall (?x - favourites) (toggled_on ?x))", {"favourites": [A, "radio_1"]}
     )
     assert [a.arguments for a in given_group.atoms] == [(A,), ("radio_1",)]
-    kitchen = HandWorld(Thing("cup_0", category="cup"), Thing("apple_0", category="apple"))
+    kitchen = HandWorld(Item("cup_0", category="cup"), Item("apple_0", category="apple"))
     by_synset = compile_expression(kitchen.model(), "(exists (?x - apple.n.01) (under ?x cup_0))")
     assert [a.arguments for a in by_synset.atoms] == [("apple_0", "cup_0")]
 
 
 def test_explain_says_what_holds_and_what_is_missing_with_numbers():
     home = HandWorld(
-        Thing("fish", abilities={"cookable": {}, "burnable": {}}),
-        Thing("fridge", abilities={"openable": {}}, joints=[(0.0, 1.0)]),
+        Item("fish", abilities={"cookable": {}, "burnable": {}}),
+        Item("fridge", abilities={"openable": {}}, joints=[(0.0, 1.0)]),
     )
     states = initial_states(home.model(), 1)
     states = states.replace(max_temperature=states.max_temperature.at[0, 0].set(41.2))

@@ -7,7 +7,7 @@ import functools
 import jax
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing, shell
+from hand_world import HandWorld, Item, shell
 
 from ig2mj.predicates import PREDICATES, compile_expression
 from ig2mj.states import WorldState, initial_states
@@ -15,14 +15,14 @@ from ig2mj.states import WorldState, initial_states
 FOOD = {"cookable": {}, "burnable": {}, "freezable": {}}
 BALL = (((0, 0, 0), (0.05, 0.05, 0.05)),)
 HOME = HandWorld(
-    Thing("fish", BALL, FOOD, pos=(0, 0, 3)),
-    Thing("table", (((0, 0, 0), (0.5, 0.5, 0.02)),), {"dustyable": {}, "stainable": {}}, pos=(0, 0, 1)),
-    Thing("fridge", shell(0.6, 0.6, 0.6), {"openable": {}, "toggleable": {}}, pos=(3, 0, 1), joints=[(0.0, 1.5)],
+    Item("fish", BALL, FOOD, pos=(0, 0, 3)),
+    Item("table", (((0, 0, 0), (0.5, 0.5, 0.02)),), {"dustyable": {}, "stainable": {}}, pos=(0, 0, 1)),
+    Item("fridge", shell(0.6, 0.6, 0.6), {"openable": {}, "toggleable": {}}, pos=(3, 0, 1), joints=[(0.0, 1.5)],
           fixed=True, rooms=("hall_0",)),
-    Thing("rag", BALL, {"soakable": {}}, pos=(0, 4, 1)),
-    Thing("loaf", BALL, {"sliceable": {}}, pos=(0, -4, 1)),
-    Thing("floor", (((0, 0, -0.5), (5, 5, 0.5)),), floor=True, fixed=True, category="floors"),
-    Thing("wall", (((0, 0, 0), (0.05, 2, 2)),), pos=(-1.5, 0, 1), fixed=True),
+    Item("rag", BALL, {"soakable": {}}, pos=(0, 4, 1)),
+    Item("loaf", BALL, {"sliceable": {}}, pos=(0, -4, 1)),
+    Item("floor", (((0, 0, -0.5), (5, 5, 0.5)),), floor=True, fixed=True, category="floors"),
+    Item("wall", (((0, 0, 0), (0.05, 2, 2)),), pos=(-1.5, 0, 1), fixed=True),
     rooms={"kitchen_0": (-5.0, 1.0), "hall_0": (1.0, 5.0)},
     agent=True,
 )  # fmt: skip
@@ -224,7 +224,7 @@ def test_in_same_room_as_agent():
 
 
 def test_without_an_agent_every_agent_predicate_is_false():
-    home = HandWorld(Thing("fish", BALL), rooms={"kitchen_0": (-5.0, 5.0)})
+    home = HandWorld(Item("fish", BALL), rooms={"kitchen_0": (-5.0, 5.0)})
     for name in ("in_fov_of_agent", "in_hand_of_agent", "in_reach_of_agent", "in_same_room_as_agent"):
         goal = compile_expression(home.model(), f"({name} fish)")
         assert not goal(_world(home.view(), initial_states(home.model(), 1)))[0]

@@ -13,7 +13,7 @@ import sys
 import jaxtyping
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing
+from hand_world import HandWorld, Item
 
 import ig2mj
 from ig2mj.states import initial, initial_states, registry
@@ -142,7 +142,7 @@ def test_a_state_that_does_not_start_all_its_fields_is_refused(monkeypatch):
     forgetful = _spec({**PIECES, "initial": lambda model: {}})
     monkeypatch.setattr(initial, "SPECS", (*registry.SPECS, forgetful))
     with pytest.raises(ValueError, match="'age' has fields \\['age'\\] but starts"):
-        initial_states(HandWorld(Thing("rock")).model(), 1)
+        initial_states(HandWorld(Item("rock")).model(), 1)
 
 
 def test_every_state_that_keeps_something_has_its_place_in_the_order_of_update():

@@ -8,23 +8,23 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing, step
+from hand_world import HandWorld, Item, step
 
 from ig2mj.states import initial_states, particles
 from ig2mj.states.definitions import cleaning, dust, stain
 from ig2mj.states.particles import NUM_PARTICLES
 
 DIRT = {"dustyable": {}, "stainable": {}}
-TABLE = Thing("table", (((0, 0, 0), (1, 0.5, 0.01)),), DIRT)
-BROOM = Thing(
+TABLE = Item("table", (((0, 0, 0), (1, 0.5, 0.01)),), DIRT)
+BROOM = Item(
     "broom",
     (((0, 0, 0.5), (0.02, 0.02, 0.5)),),
     {"cleaningTool": {}},
     links={"cleaning_tool_area": ((0, 0, 0.0), (0.2, 0.1, 0.02))},
     pos=(0, 0, 9),
 )
-RAG = Thing("rag", (((0, 0, 0), (0.1, 0.1, 0.01)),), {"cleaningTool": {}, "soakable": {}}, pos=(0, 0, 8))
-VACUUM = Thing("vacuum", (((0, 0, 0), (0.1, 0.1, 0.1)),), {"cleaningTool": {}, "toggleable": {}}, pos=(0, 0, 7))
+RAG = Item("rag", (((0, 0, 0), (0.1, 0.1, 0.01)),), {"cleaningTool": {}, "soakable": {}}, pos=(0, 0, 8))
+VACUUM = Item("vacuum", (((0, 0, 0), (0.1, 0.1, 0.1)),), {"cleaningTool": {}, "toggleable": {}}, pos=(0, 0, 7))
 ROOM = HandWorld(TABLE, BROOM, RAG, VACUUM)
 
 # Twenty points along the table's length, 10 cm apart, on its upper face.
@@ -72,7 +72,7 @@ def test_section_22_twenty_placed_are_dirty_at_eleven_and_clean_at_ten(alive, di
 
 @pytest.mark.parametrize(("alive", "dirty"), [(16, True), (15, False)])
 def test_section_22_floors_are_dirty_at_sixteen_and_clean_at_fifteen_in_igibsons_code(alive, dirty):
-    home = HandWorld(Thing("floor", abilities=DIRT, category="floors", floor=True))
+    home = HandWorld(Item("floor", abilities=DIRT, category="floors", floor=True))
     model = home.model(compat="igibson")
     rows, _ = _set_dusty(model, initial_states(model, 1).dust, 0, *_points())
     rows = rows.replace(alive=rows.alive & (np.arange(NUM_PARTICLES) < alive))
@@ -81,7 +81,7 @@ def test_section_22_floors_are_dirty_at_sixteen_and_clean_at_fifteen_in_igibsons
 
 
 def test_table_a1_the_threshold_is_configurable_per_model():
-    home = HandWorld(Thing("shelf", abilities={"dustyable": {"dusty_threshold": 0.1}}))
+    home = HandWorld(Item("shelf", abilities={"dustyable": {"dusty_threshold": 0.1}}))
     model = home.model()
     rows, _ = _set_dusty(model, initial_states(model, 1).dust, 0, *_points())
     rows = rows.replace(alive=rows.alive & (np.arange(NUM_PARTICLES) < 3))

@@ -6,19 +6,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing
+from hand_world import HandWorld, Item
 
 from ig2mj.states.definitions import open as opened
 
 HINGE = (0.0, 1.57)
 HOME = HandWorld(
-    Thing("microwave", abilities={"openable": {}}, joints=[HINGE]),
-    Thing(
-        "cabinet", abilities={"openable": {}}, joints=[(0.0, 0.4), (0.5, -0.5)]
-    ),  # the second closes at its upper end
-    Thing("door", abilities={"openable": {}}, joints=[(0.0, 1.0)], both_sides=True),
-    Thing("jar", abilities={"openable": {}}),
-    Thing("chair", joints=[(0.0, 1.0)]),
+    Item("microwave", abilities={"openable": {}}, joints=[HINGE]),
+    Item("cabinet", abilities={"openable": {}}, joints=[(0.0, 0.4), (0.5, -0.5)]),  # the second closes at its upper end
+    Item("door", abilities={"openable": {}}, joints=[(0.0, 1.0)], both_sides=True),
+    Item("jar", abilities={"openable": {}}),
+    Item("chair", joints=[(0.0, 1.0)]),
 )
 
 

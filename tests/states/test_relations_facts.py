@@ -6,17 +6,17 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing, answers, shell
+from hand_world import HandWorld, Item, answers, shell
 
 from ig2mj.states import RelationPlan
 from ig2mj.states.relations.adjacency import HORIZONTAL_LENGTH, HORIZONTAL_LINES, VERTICAL_LENGTH
 
 SMALL = (((0, 0, 0), (0.05, 0.05, 0.05)),)
 HOME = HandWorld(
-    Thing("ball", SMALL, pos=(0, 0, 2)),
-    Thing("slab", (((0, 0, 0), (0.5, 0.5, 0.02)),), pos=(0, 0, 1)),
-    Thing("box", shell(0.6, 0.6, 0.6), pos=(5, 0, 1)),
-    Thing("basket", shell(0.6, 0.6, 0.6, top=False), pos=(8, 0, 1)),
+    Item("ball", SMALL, pos=(0, 0, 2)),
+    Item("slab", (((0, 0, 0), (0.5, 0.5, 0.02)),), pos=(0, 0, 1)),
+    Item("box", shell(0.6, 0.6, 0.6), pos=(5, 0, 1)),
+    Item("basket", shell(0.6, 0.6, 0.6, top=False), pos=(8, 0, 1)),
 )
 QUERIES = [
     (kind, a, b)
@@ -70,7 +70,7 @@ def test_section_17_row_8_igibsons_rays_end_after_one_and_five_metres():
 
 def test_section_19_2_no_number_of_pieces_on_the_ray_hides_one():
     stack = [((0, 0, -0.1 * k), (0.1, 0.1, 0.02)) for k in range(30)]
-    home = HandWorld(Thing("ball", SMALL, pos=(0, 0, 1)), Thing("rack", stack), Thing("floor", pos=(0, 0, -6)))
+    home = HandWorld(Item("ball", SMALL, pos=(0, 0, 1)), Item("rack", stack), Item("floor", pos=(0, 0, -6)))
     plan = RelationPlan.build(home.model(), [("vertical", 0, 2), ("vertical", 0, 1)])
     relations = answers(plan, home.view())
     assert relations.below([(0, 2), (0, 1)])[0].tolist() == [True, True]
@@ -97,13 +97,13 @@ def test_section_5_4_one_axis_is_not_enough():
     # Between two walls, with nothing above, below, in front or behind.
     walls = [((-0.5, 0, 0), (0.05, 0.3, 0.3)), ((0.5, 0, 0), (0.05, 0.3, 0.3))]
     tunnel = [*walls, ((0, 0, -0.4), (0.5, 0.3, 0.05)), ((0, 0, 0.4), (0.5, 0.3, 0.05))]
-    home = HandWorld(Thing("ball", SMALL), Thing("walls", walls), Thing("tunnel", tunnel))
+    home = HandWorld(Item("ball", SMALL), Item("walls", walls), Item("tunnel", tunnel))
     plan = RelationPlan.build(home.model(), [("inside", 0, 1), ("inside", 0, 2)])
     assert answers(plan, home.view()).inside([(0, 1), (0, 2)])[0].tolist() == [False, True]
 
 
 def test_section_5_4_a_wide_container_is_out_of_reach_of_igibsons_rays():
-    home = HandWorld(Thing("ball", SMALL), Thing("hall", shell(4, 4, 2)))
+    home = HandWorld(Item("ball", SMALL), Item("hall", shell(4, 4, 2)))
     for compat, expected in (("paper", True), ("igibson", False)):
         plan = RelationPlan.build(home.model(compat=compat), [("inside", 0, 1)])
         assert bool(answers(plan, home.view()).inside([(0, 1)])[0, 0]) == expected
@@ -111,7 +111,7 @@ def test_section_5_4_a_wide_container_is_out_of_reach_of_igibsons_rays():
 
 def test_section_5_5_near_is_a_third_of_the_mean_edge():
     # Unit cubes: one third of a metre between them (section 22).
-    cubes = HandWorld(Thing("a"), Thing("b"))
+    cubes = HandWorld(Item("a"), Item("b"))
     for compat in ("paper", "igibson"):
         plan = RelationPlan.build(cubes.model(compat=compat), [("near", 0, 1)])
         near = jax.jit(lambda view, plan=plan: plan.evaluate(view).near([(0, 1)])[0, 0])
@@ -122,7 +122,7 @@ def test_section_5_5_near_is_a_third_of_the_mean_edge():
 def test_section_17_row_7_the_paper_measures_closest_points_and_the_code_boxes():
     # A cube turned by 45 degrees: its box reaches farther than its side.
     turned = {"b": (np.cos(np.pi / 8), 0, 0, np.sin(np.pi / 8))}
-    cubes = HandWorld(Thing("a"), Thing("b"))
+    cubes = HandWorld(Item("a"), Item("b"))
     view = cubes.view({"b": (1.0, 1.0, 0)}, quat=turned)
     found = {}
     for compat in ("paper", "igibson"):
@@ -148,7 +148,7 @@ def test_nan_poses_and_the_object_itself_relate_to_nothing():
 
 def test_section_19_1_the_memo_notices_that_something_turned():
     # A plank under the ball turns about its own centre: no position changes.
-    home = HandWorld(Thing("ball", SMALL, pos=(0.5, 0, 1)), Thing("plank", (((0, 0, 0), (0.8, 0.1, 0.02)),)))
+    home = HandWorld(Item("ball", SMALL, pos=(0.5, 0, 1)), Item("plank", (((0, 0, 0), (0.8, 0.1, 0.02)),)))
     plan = RelationPlan.build(home.model(), [("vertical", 0, 1), ("near", 0, 1)])
     run = jax.jit(lambda view, memo: (lambda r: (r[0].below([(0, 1)]), r[1]))(plan.evaluate_changed(view, memo)))
     memo = plan.empty_memo(1)

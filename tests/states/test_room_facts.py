@@ -5,14 +5,14 @@ from __future__ import annotations
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing
+from hand_world import HandWorld, Item
 
 from ig2mj.states.relations.rooms import in_room, room_at, rooms_of
 
 HOME = HandWorld(
-    Thing("cup"),
-    Thing("fridge", fixed=True, rooms=("kitchen_0", "hall_0"), pos=(2, 0, 0)),
-    Thing("lamp", fixed=True, pos=(-2, 0, 0)),
+    Item("cup"),
+    Item("fridge", fixed=True, rooms=("kitchen_0", "hall_0"), pos=(2, 0, 0)),
+    Item("lamp", fixed=True, pos=(-2, 0, 0)),
     rooms={"kitchen_0": (-4.0, 0.0), "hall_0": (0.0, 3.0)},
 )
 
@@ -25,7 +25,7 @@ def test_section_12_the_pixel_under_a_point_names_the_room(x, room):
 
 
 def test_section_12_pixels_are_truncated_towards_zero():
-    home = HandWorld(Thing("cup"), rooms={"hall_0": (-5.0, 5.0)})
+    home = HandWorld(Item("cup"), rooms={"hall_0": (-5.0, 5.0)})
     assert int(room_at(home.tables, jnp.array([-5.05, 0.0]))) == 0  # half a pixel outside is still pixel 0
     assert int(room_at(home.tables, jnp.array([5.05, 0.0]))) == -1
 
@@ -46,7 +46,7 @@ def test_section_19_3_a_movable_object_is_compared_by_room_instance():
 
 
 def test_without_rooms_nothing_is_in_a_room():
-    home = HandWorld(Thing("cup"))
+    home = HandWorld(Item("cup"))
     assert not in_room(home.tables, home.view(), np.array([0]), jnp.zeros((1, 1), jnp.int32)).any()
     assert rooms_of(home.tables, home.view(), 0) == []
     assert int(room_at(home.tables, jnp.zeros(2))) == -1

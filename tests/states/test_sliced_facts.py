@@ -7,7 +7,7 @@ import functools
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hand_world import IDENTITY, HandWorld, Thing, step, stepper
+from hand_world import IDENTITY, HandWorld, Item, step, stepper
 
 from ig2mj.states import initial_states
 from ig2mj.states.definitions import sliced, stain
@@ -16,15 +16,15 @@ from ig2mj.states.particles import NUM_PARTICLES, world_positions
 FOOD = {"cookable": {}, "burnable": {}, "freezable": {}, "soakable": {}, "stainable": {}, "sliceable": {}}
 HALF = (((0, 0, 0), (0.02, 0.04, 0.04)),)
 HOME = HandWorld(
-    Thing("knife", (((0, 0, 0), (0.1, 0.01, 0.01)),), {"slicer": {}},
+    Item("knife", (((0, 0, 0), (0.1, 0.01, 0.01)),), {"slicer": {}},
           links={"slicer": ((0.05, 0, 0), (0.05, 0.01, 0.01))}),
-    Thing("apple", (((0, 0, 0), (0.04, 0.04, 0.04)),), FOOD, parts={"half_a": (-0.02, 0, 0), "half_b": (0.02, 0, 0)},
+    Item("apple", (((0, 0, 0), (0.04, 0.04, 0.04)),), FOOD, parts={"half_a": (-0.02, 0, 0), "half_b": (0.02, 0, 0)},
           pos=(1, 2, 0.5)),
-    Thing("half_a", HALF, FOOD, part_of="apple", parked=True, pos=(50, 0, 0)),
-    Thing("half_b", HALF, FOOD, part_of="apple", parked=True, pos=(51, 0, 0)),
-    Thing("bread", abilities={"sliceable": {"slice_force": 20.0}}, pos=(2, 2, 2)),
-    Thing("stick", links={"slicer": (0, 0, 0)}, abilities={"slicer": {}}),
-    Thing("stove", abilities={"heatSource": {"temperature": 500.0, "heating_rate": 0.02, "distance_threshold": 0.5}},
+    Item("half_a", HALF, FOOD, part_of="apple", parked=True, pos=(50, 0, 0)),
+    Item("half_b", HALF, FOOD, part_of="apple", parked=True, pos=(51, 0, 0)),
+    Item("bread", abilities={"sliceable": {"slice_force": 20.0}}, pos=(2, 2, 2)),
+    Item("stick", links={"slicer": (0, 0, 0)}, abilities={"slicer": {}}),
+    Item("stove", abilities={"heatSource": {"temperature": 500.0, "heating_rate": 0.02, "distance_threshold": 0.5}},
           links={"heat_source": (0, 0, 0)}, pos=(9, 9, 9)),
 )  # fmt: skip
 APPLE, HALF_A, HALF_B, BREAD = (HOME.index[n] for n in ("apple", "half_a", "half_b", "bread"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing, answers, shell, step
+from hand_world import HandWorld, Item, answers, shell, step
 
 from ig2mj.scene.manifest import OrientationEntry
 from ig2mj.states import RelationPlan, initial_states
@@ -13,15 +13,15 @@ from ig2mj.states import RelationPlan, initial_states
 SMALL = (((0, 0, 0), (0.05, 0.05, 0.05)),)
 
 
-def _inside(container: Thing) -> bool:
-    home = HandWorld(Thing("ball", SMALL), container)
+def _inside(container: Item) -> bool:
+    home = HandWorld(Item("ball", SMALL), container)
     plan = RelationPlan.build(home.model(), [("inside", 0, 1)])
     return bool(answers(plan, home.view()).inside([(0, 1)])[0, 0])
 
 
 def test_table_a3_shape():
-    assert _inside(Thing("box", shell(0.5, 0.5, 0.5)))
-    assert not _inside(Thing("box", (((0, 0, 0), (0.25, 0.25, 0.25)),)))  # solid
+    assert _inside(Item("box", shell(0.5, 0.5, 0.5)))
+    assert not _inside(Item("box", (((0, 0, 0), (0.25, 0.25, 0.25)),)))  # solid
 
 
 def test_table_a3_weight(tiny_home):
@@ -61,8 +61,8 @@ def test_table_a3_stable_orientations():
 def test_table_a3_heat_source_sink_link(with_link):
     links = {"heat_source": (0, 0, 0)} if with_link else {}
     home = HandWorld(
-        Thing("stove", abilities={"heatSource": {"temperature": 500.0}}, links=links),
-        Thing("fish", abilities={"cookable": {}}),
+        Item("stove", abilities={"heatSource": {"temperature": 500.0}}, links=links),
+        Item("fish", abilities={"cookable": {}}),
     )
     states = step(home.model(), initial_states(home.model(), 1), home.view())
     assert bool(states.temperature[0, 1] > 23.0) == with_link
@@ -71,8 +71,8 @@ def test_table_a3_heat_source_sink_link(with_link):
 @pytest.mark.parametrize(("area", "left"), [((0.1, 0.1, 0.1), 0), ((0.001, 0.001, 0.001), 20)])
 def test_table_a3_cleaning_tool_link(area, left):
     home = HandWorld(
-        Thing("table", abilities={"dustyable": {}}),
-        Thing("mop", abilities={"cleaningTool": {}}, links={"cleaning_tool_area": ((0, 0, 0), area)}),
+        Item("table", abilities={"dustyable": {}}),
+        Item("mop", abilities={"cleaningTool": {}}, links={"cleaning_tool_area": ((0, 0, 0), area)}),
     )
     states = initial_states(home.model(), 1)
     rows = states.dust
@@ -86,7 +86,7 @@ def test_table_a3_cleaning_tool_link(area, left):
 @pytest.mark.parametrize("with_link", [True, False])
 def test_table_a3_droplet_source_link(with_link):
     links = {"water_source": (0, 0, -2)} if with_link else {}
-    home = HandWorld(Thing("tap", abilities={"waterSource": {}}, links=links))
+    home = HandWorld(Item("tap", abilities={"waterSource": {}}, links=links))
     states = initial_states(home.model(), 1)
     for _ in range(3):
         states = step(home.model(), states, home.view())
@@ -95,9 +95,9 @@ def test_table_a3_droplet_source_link(with_link):
 
 @pytest.mark.parametrize("with_link", [True, False])
 def test_table_a3_droplet_sink_link(with_link):
-    tap = Thing("tap", (((0, 0, 5), (0.1, 0.1, 0.1)),), {"waterSource": {}}, links={"water_source": (0, 0, 0.5)})
+    tap = Item("tap", (((0, 0, 5), (0.1, 0.1, 0.1)),), {"waterSource": {}}, links={"water_source": (0, 0, 0.5)})
     links = {"water_sink": ((0, 0, 0), (0.2, 0.2, 0.2))} if with_link else {}
-    home = HandWorld(tap, Thing("drain", (((3, 0, 0), (0.1, 0.1, 0.1)),), links=links))
+    home = HandWorld(tap, Item("drain", (((3, 0, 0), (0.1, 0.1, 0.1)),), links=links))
     states = initial_states(home.model(), 1)
     for _ in range(30):
         states = step(home.model(), states, home.view())
@@ -108,7 +108,7 @@ def test_table_a3_droplet_sink_link(with_link):
 @pytest.mark.parametrize("with_link", [True, False])
 def test_table_a3_toggling_link(with_link):
     links = {"toggle_button": (0, 0, 0)} if with_link else {}
-    home = HandWorld(Thing("lamp", abilities={"toggleable": {}}, links=links), fingers=1)
+    home = HandWorld(Item("lamp", abilities={"toggleable": {}}, links=links), fingers=1)
     states = initial_states(home.model(), 1)
     for _ in range(5):
         states = step(home.model(), states, home.view(fingers=[(0, 0, 0.05)]))
@@ -120,8 +120,8 @@ def test_table_a3_slicing_link(with_link):
     blade = {"slicer": ((0, 0, 0), (0.1, 0.1, 0.1))}
     other = {"cleaning_tool_area": ((0, 0, 0), (0.1, 0.1, 0.1))}
     home = HandWorld(
-        Thing("knife", abilities={"slicer": {}}, links=blade if with_link else other),
-        Thing("bread", abilities={"sliceable": {}}),
+        Item("knife", abilities={"slicer": {}}, links=blade if with_link else other),
+        Item("bread", abilities={"sliceable": {}}),
     )
     view = home.view(force={("knife", "bread"): 99.0})
     states = step(home.model(), initial_states(home.model(), 1), view)

@@ -7,7 +7,7 @@ import copy
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing, step
+from hand_world import HandWorld, Item, step
 
 from ig2mj.knowledge import ABILITIES, required_states
 from ig2mj.states import StateModel, initial_states, registry, states_of_manifest
@@ -28,7 +28,7 @@ from ig2mj.states.registry import STATES
     ],
 )
 def test_table_a2_an_ability_brings_its_states(row, ability, states):
-    home = HandWorld(Thing("it", abilities={ability: {}}), Thing("rock"))
+    home = HandWorld(Item("it", abilities={ability: {}}), Item("rock"))
     model, world, view = home.model(), initial_states(home.model(), 1), home.view()
     assert set(required_states(ability)) == states, row
     for name in states:
@@ -42,8 +42,8 @@ def test_table_a2_a_heat_source_and_a_droplet_source_obey_the_toggled_state(abil
     link = {"heatSource": "heat_source", "waterSource": "water_source"}[ability]
     parameters = {"requires_toggled_on": True, "temperature": 500.0} if ability == "heatSource" else {}
     home = HandWorld(
-        Thing("it", (((0, 0, 5), (0.1, 0.1, 0.1)),), {ability: parameters, "toggleable": {}}, links={link: (0, 0, 0)}),
-        Thing("fish", abilities={"cookable": {}}),
+        Item("it", (((0, 0, 5), (0.1, 0.1, 0.1)),), {ability: parameters, "toggleable": {}}, links={link: (0, 0, 0)}),
+        Item("fish", abilities={"cookable": {}}),
     )
     for on in (False, True):
         states = initial_states(home.model(), 1)
@@ -56,9 +56,9 @@ def test_table_a2_a_heat_source_and_a_droplet_source_obey_the_toggled_state(abil
 
 
 ROWS = HandWorld(
-    Thing("cabinet", abilities={"openable": {}}, joints=[(0.0, 1.0), (0.0, 0.5)], pos=(1, 2, 3)),
-    Thing("cup", (((0, 0, 0), (0.05, 0.05, 0.1)),), {**{a: {} for a in ABILITIES}}, pos=(1, 2, 4)),
-    Thing("lamp", (((0, 0, 0), (0.05, 0.05, 0.1)),), pos=(1, 2, 6)),
+    Item("cabinet", abilities={"openable": {}}, joints=[(0.0, 1.0), (0.0, 0.5)], pos=(1, 2, 3)),
+    Item("cup", (((0, 0, 0), (0.05, 0.05, 0.1)),), {**{a: {} for a in ABILITIES}}, pos=(1, 2, 4)),
+    Item("lamp", (((0, 0, 0), (0.05, 0.05, 0.1)),), pos=(1, 2, 6)),
 )
 
 

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing, shell, step, stepper
+from hand_world import HandWorld, Item, shell, step, stepper
 
 from ig2mj.states import initial_states
 from ig2mj.states.definitions import temperature
@@ -25,8 +25,8 @@ DEFAULT = {}
 def _history(kind: str, parameters: dict, steps: int) -> np.ndarray:
     """Temperatures of a food under one source, from the start: [steps + 1]."""
     home = HandWorld(
-        Thing("source", shell(0.5, 0.5, 0.5), {kind: parameters, "toggleable": {}}, links={"heat_source": (0, 0, 0)}),
-        Thing("food", (((0, 0, 0), (0.05, 0.05, 0.05)),), FOOD),
+        Item("source", shell(0.5, 0.5, 0.5), {kind: parameters, "toggleable": {}}, links={"heat_source": (0, 0, 0)}),
+        Item("food", (((0, 0, 0), (0.05, 0.05, 0.05)),), FOOD),
     )
     model, view = home.model(), home.view()
     acts = np.zeros((1, 2, 1), bool)
@@ -79,14 +79,14 @@ def test_section_22_first_increment_of_the_stove():
 @functools.cache
 def _kitchen() -> HandWorld:
     return HandWorld(
-        Thing("stove", (((0, 0, 0), (0.3, 0.3, 0.4)),), {"heatSource": STOVE, "toggleable": {}},
+        Item("stove", (((0, 0, 0), (0.3, 0.3, 0.4)),), {"heatSource": STOVE, "toggleable": {}},
               links={"heat_source": (0, 0, 0.5)}),
-        Thing("oven", shell(0.5, 0.5, 0.5), {"heatSource": OVEN, "toggleable": {}, "openable": {}}, pos=(3, 0, 0),
+        Item("oven", shell(0.5, 0.5, 0.5), {"heatSource": OVEN, "toggleable": {}, "openable": {}}, pos=(3, 0, 0),
               links={"heat_source": (0, 0, 0)}, joints=[(0.0, 1.5)]),
-        Thing("fridge", shell(0.5, 0.5, 0.5), {"coldSource": FRIDGE, "openable": {}}, pos=(-3, 0, 0),
+        Item("fridge", shell(0.5, 0.5, 0.5), {"coldSource": FRIDGE, "openable": {}}, pos=(-3, 0, 0),
               joints=[(0.0, 1.5)]),
-        Thing("fish", (((0, 0, 0), (0.05, 0.02, 0.01)),), FOOD, pos=(0, 3, 0)),
-        Thing("book", (((0, 0, 0), (0.05, 0.02, 0.01)),), pos=(0, 4, 0)),
+        Item("fish", (((0, 0, 0), (0.05, 0.02, 0.01)),), FOOD, pos=(0, 3, 0)),
+        Item("book", (((0, 0, 0), (0.05, 0.02, 0.01)),), pos=(0, 4, 0)),
     )  # fmt: skip
 
 
@@ -129,11 +129,11 @@ def test_table_a2_an_oven_must_be_on_and_closed_and_a_fridge_needs_no_switch():
 def test_section_6_2_sources_add_up_and_switch_the_room_off():
     home = HandWorld(
         *(
-            Thing(f"stove_{k}", (((0, 0, -1), (0.1, 0.1, 0.1)),), {"heatSource": STOVE, "toggleable": {}},
+            Item(f"stove_{k}", (((0, 0, -1), (0.1, 0.1, 0.1)),), {"heatSource": STOVE, "toggleable": {}},
                   links={"heat_source": (0, 0, 0)})
             for k in range(2)
         ),
-        Thing("fish", (((0, 0, 0), (0.05, 0.02, 0.01)),), FOOD),
+        Item("fish", (((0, 0, 0), (0.05, 0.02, 0.01)),), FOOD),
     )  # fmt: skip
     after = _after(home, home.view(), on=("stove_0", "stove_1"))
     assert after[2] == pytest.approx(23 + 2 * 0.02 * 477 / 30, abs=1e-4)
@@ -152,7 +152,7 @@ def test_section_6_2_the_room_draws_temperatures_to_23_degrees():
 
 def test_section_19_19_heat_by_contact_is_off_and_can_be_switched_on():
     home = _kitchen()
-    home = HandWorld(*home.things, Thing("steak", (((0, 0, 0), (0.05, 0.02, 0.01)),), FOOD, pos=(0, 3, 0.02)))
+    home = HandWorld(*home.things, Item("steak", (((0, 0, 0), (0.05, 0.02, 0.01)),), FOOD, pos=(0, 3, 0.02)))
     view = home.view(touching=[("fish", "steak")])
     fish, steak = home.index["fish"], home.index["steak"]
 
@@ -204,7 +204,7 @@ def test_temperature_is_differentiable():
 
 
 def test_a_source_by_nearness_without_its_link_never_acts():
-    home = HandWorld(Thing("stove", abilities={"heatSource": {"temperature": 500.0}}), Thing("fish", abilities=FOOD))
+    home = HandWorld(Item("stove", abilities={"heatSource": {"temperature": 500.0}}), Item("fish", abilities=FOOD))
     assert _after(home, home.view())[1] == 23.0
 
 

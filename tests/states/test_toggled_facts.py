@@ -5,15 +5,15 @@ from __future__ import annotations
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing, step
+from hand_world import HandWorld, Item, step
 
 from ig2mj.states import initial_states
 from ig2mj.states.definitions.toggled_on import set_toggled_on
 
 LAMP = HandWorld(
-    Thing("lamp", abilities={"toggleable": {}}, links={"toggle_button": (0, 0, 1)}),
-    Thing("rock", links={"toggle_button": (0, 0, 1)}, pos=(0.02, 0, 0)),
-    Thing("radio", abilities={"toggleable": {}}, pos=(3, 0, 0)),
+    Item("lamp", abilities={"toggleable": {}}, links={"toggle_button": (0, 0, 1)}),
+    Item("rock", links={"toggle_button": (0, 0, 1)}, pos=(0.02, 0, 0)),
+    Item("radio", abilities={"toggleable": {}}, pos=(3, 0, 0)),
     fingers=2,
 )
 NEAR, AWAY = [(0, 0, 5), (0, 0.09, 1)], [(0, 0, 5), (0, 0.11, 1)]

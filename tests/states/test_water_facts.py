@@ -7,22 +7,22 @@ import itertools
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing, step
+from hand_world import HandWorld, Item, step
 
 from ig2mj.states import StateModel, initial_states
 from ig2mj.states.definitions.water import DROP_RADIUS, NUM_DROPS
 from ig2mj.states.definitions.wetness import set_soaked, soaked
 
 PLATE = (((0, 0, 0), (0.2, 0.2, 0.01)),)
-SINK = Thing(
+SINK = Item(
     "sink",
     (((0, 0, 0.0), (0.3, 0.3, 0.05)),),
     {"waterSource": {}, "toggleable": {}, "waterSink": {}},
     links={"water_source": (0, 0, 0.5)},
     fixed=True,
 )
-RAG = Thing("rag", PLATE, {"soakable": {"wetness_soaked": 1.0}}, pos=(5, 0, 0))
-TRAY = Thing("tray", PLATE, pos=(6, 0, 0))
+RAG = Item("rag", PLATE, {"soakable": {"wetness_soaked": 1.0}}, pos=(5, 0, 0))
+TRAY = Item("tray", PLATE, pos=(6, 0, 0))
 KITCHEN = HandWorld(SINK, RAG, TRAY)
 
 
@@ -51,7 +51,7 @@ def _emissions(history: list) -> list[int]:
 
 def test_section_22_a_tap_on_from_update_k_drops_at_k_plus_1_and_then_every_four():
     # Far from everything, no drop comes back: the tenth is the last.
-    air = Thing("air_tap", (((0, 0, 100), (0.1, 0.1, 0.1)),), {"waterSource": {}, "toggleable": {}},
+    air = Item("air_tap", (((0, 0, 100), (0.1, 0.1, 0.1)),), {"waterSource": {}, "toggleable": {}},
                 links={"water_source": (0, 0, 0.5)})  # fmt: skip
     home = HandWorld(air, RAG)
     k = 3
@@ -62,7 +62,7 @@ def test_section_22_a_tap_on_from_update_k_drops_at_k_plus_1_and_then_every_four
 @pytest.mark.parametrize("compat", ["paper", "igibson"])
 def test_what_lies_under_a_tap_does_not_make_it_run_dry(compat):
     """Section 22 has the tenth drop at k + 37. iGibson's drops then roll away; ours make room, the oldest first."""
-    bench = Thing("bench", PLATE, pos=(0, 0, 0.3))
+    bench = Item("bench", PLATE, pos=(0, 0, 0.3))
     _, history = _run(HandWorld(SINK, bench), [HandWorld(SINK, bench).view()] * 60, compat=compat)
     assert _emissions(history) == list(range(2, 61, 4))
     newest = np.asarray(history[-1].water.age[0, 0])
@@ -71,8 +71,8 @@ def test_what_lies_under_a_tap_does_not_make_it_run_dry(compat):
 
 
 def test_a_tap_whose_drops_all_still_fall_waits_as_in_section_7_2():
-    air = Thing("air_tap", (((0, 0, 100), (0.1, 0.1, 0.1)),), {"waterSource": {}}, links={"water_source": (0, 0, 0.5)})
-    deep = Thing("ground", PLATE, pos=(0, 0, -9.4))  # 9.8 m: 1.41 s, two updates more than ten drops take
+    air = Item("air_tap", (((0, 0, 100), (0.1, 0.1, 0.1)),), {"waterSource": {}}, links={"water_source": (0, 0, 0.5)})
+    deep = Item("ground", PLATE, pos=(0, 0, -9.4))  # 9.8 m: 1.41 s, two updates more than ten drops take
     home = HandWorld(air, deep)
     _, history = _run(home, [home.view()] * 52, on_from=99)
     found = _emissions(history)
@@ -83,7 +83,7 @@ def test_a_tap_whose_drops_all_still_fall_waits_as_in_section_7_2():
 @pytest.mark.parametrize("compat", ["paper", "igibson"])
 def test_a_towel_under_a_tap_over_a_basin_takes_55_drops_in_220_updates(compat):
     """In iGibson the drops roll off the towel into the basin, and 55 leave the tap; as many leave it here."""
-    towel = Thing("towel", PLATE, {"soakable": {"wetness_soaked": 1.0}}, pos=(0, 0, 0.3))
+    towel = Item("towel", PLATE, {"soakable": {"wetness_soaked": 1.0}}, pos=(0, 0, 0.3))
     home = HandWorld(SINK, towel)
     model, history = _run(home, [home.view()] * 220, compat=compat)
     assert len(_emissions(history)) == 55
@@ -116,7 +116,7 @@ def test_section_7_2_the_count_stands_still_while_the_tap_is_off():
 def test_a_tap_that_is_off_gives_no_water_and_one_without_a_switch_always_runs():
     _, history = _run(KITCHEN, [KITCHEN.view()] * 6, on_from=99)
     assert not history[-1].water.active.any()
-    home = HandWorld(Thing("spring", abilities={"waterSource": {}}, links={"water_source": (0, 0, 2)}))
+    home = HandWorld(Item("spring", abilities={"waterSource": {}}, links={"water_source": (0, 0, 2)}))
     _, history = _run(home, [home.view()] * 3, on_from=99)
     assert history[-1].water.active.any()
 
@@ -138,7 +138,7 @@ def test_section_17_row_2_igibsons_code_keeps_a_latch_and_does_not_take_the_drop
 
 
 def test_section_17_row_3_sinks_take_drops_in_the_paper_and_not_in_the_code():
-    drain = Thing("drain", PLATE, {"waterSink": {}}, links={"water_sink": (0, 0, 0)}, pos=(0, 0, 0.3))
+    drain = Item("drain", PLATE, {"waterSink": {}}, links={"water_sink": (0, 0, 0)}, pos=(0, 0, 0.3))
     home = HandWorld(SINK, drain)
     _, paper = _run(home, [home.view()] * 60)
     _, code = _run(home, [home.view()] * 60, compat="igibson")
@@ -147,8 +147,8 @@ def test_section_17_row_3_sinks_take_drops_in_the_paper_and_not_in_the_code():
 
 
 def test_table_a3_a_droplet_sink_link_takes_drops_without_any_surface():
-    box = Thing("hole", (((3, 0, 0), (0.1, 0.1, 0.1)),), {}, links={"water_sink": ((0, 0, 0.2), (0.1, 0.1, 0.1))})
-    tap = Thing("tap", (((0, 0, 5), (0.1, 0.1, 0.1)),), {"waterSource": {}}, links={"water_source": (0, 0, 0.5)})
+    box = Item("hole", (((3, 0, 0), (0.1, 0.1, 0.1)),), {}, links={"water_sink": ((0, 0, 0.2), (0.1, 0.1, 0.1))})
+    tap = Item("tap", (((0, 0, 5), (0.1, 0.1, 0.1)),), {"waterSource": {}}, links={"water_source": (0, 0, 0.5)})
     home = HandWorld(tap, box)
     _, history = _run(home, [home.view()] * 20)
     assert all(float(s.water.pos[0, 0, :, 2][s.water.active[0, 0]].min(initial=1.0)) > 0.05 for s in history)
@@ -176,22 +176,22 @@ def test_a_drop_rests_on_a_tray_and_falls_on_when_the_tray_goes():
 
 def test_no_drop_is_missed_at_speed():
     # A thin rag 8 m below: 12.5 m/s, 42 cm in one update.
-    thin = Thing("rag", (((0, 0, 0), (0.1, 0.1, 0.001)),), {"soakable": {}}, pos=(0, 0, -8))
-    tap = Thing("tap", (((0, 0, 5), (0.1, 0.1, 0.1)),), {"waterSource": {}}, links={"water_source": (0, 0, 0.5)})
+    thin = Item("rag", (((0, 0, 0), (0.1, 0.1, 0.001)),), {"soakable": {}}, pos=(0, 0, -8))
+    tap = Item("tap", (((0, 0, 5), (0.1, 0.1, 0.1)),), {"waterSource": {}}, links={"water_source": (0, 0, 0.5)})
     home = HandWorld(tap, thin)
     _, history = _run(home, [home.view()] * 45)
     assert float(history[-1].wetness[0, 1]) >= 1.0
 
 
 def test_a_drop_that_leaves_the_house_comes_back():
-    tap = Thing("tap", (((0, 0, 5), (0.1, 0.1, 0.1)),), {"waterSource": {}}, links={"water_source": (0, 0, 0.5)})
+    tap = Item("tap", (((0, 0, 5), (0.1, 0.1, 0.1)),), {"waterSource": {}}, links={"water_source": (0, 0, 0.5)})
     home = HandWorld(tap)
     _, history = _run(home, [home.view()] * 120)
     assert sum(int(s.water.active[0].all()) for s in history[80:]) < 40
 
 
 def test_section_19_6_a_source_without_its_link_crashes_nothing():
-    home = HandWorld(Thing("sink", abilities={"waterSource": {}, "toggleable": {}}), RAG)
+    home = HandWorld(Item("sink", abilities={"waterSource": {}, "toggleable": {}}), RAG)
     _, history = _run(home, [home.view()] * 2)
     assert history[-1].water.active.shape == (1, 0, NUM_DROPS)
     assert float(history[-1].wetness.sum()) == 0.0
@@ -208,7 +208,7 @@ def test_section_19_18_drying_is_off_and_can_be_switched_on():
 
 
 def test_table_a5_soaked_sets_the_level_to_the_threshold_or_zero():
-    home = HandWorld(Thing("rag", abilities={"soakable": {"wetness_soaked": 3.0}}), Thing("rock"))
+    home = HandWorld(Item("rag", abilities={"soakable": {"wetness_soaked": 3.0}}), Item("rock"))
     model = home.model()
     wetness = initial_states(model, 1).wetness
     wet = set_soaked(model, wetness, jnp.ones((1, 2), bool), True)

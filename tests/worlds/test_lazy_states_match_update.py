@@ -9,7 +9,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing, shell
+from hand_world import HandWorld, Item, shell
 
 from ig2mj.engine.view import SCHEMA, read_field, replace_fields
 from ig2mj.predicates import compile_expression
@@ -22,14 +22,14 @@ from ig2mj.worlds.lazy.stepper import StateStepper
 FOOD = {"cookable": {}, "burnable": {}, "freezable": {}, "sliceable": {}, "stainable": {}}
 SMALL = (((0, 0, 0), (0.05, 0.05, 0.05)),)
 HOME = HandWorld(
-    Thing("oven", shell(0.6, 0.6, 0.6), {"heatSource": {"temperature": 250.0, "requires_inside": True,
+    Item("oven", shell(0.6, 0.6, 0.6), {"heatSource": {"temperature": 250.0, "requires_inside": True,
           "requires_toggled_on": True}, "toggleable": {}}, links={"toggle_button": (0, 0, 0.5)}),
-    Thing("fish", SMALL, FOOD, pos=(3, 0, 1), parts={"half": (0, 0, 0)}),
-    Thing("half", SMALL, FOOD, pos=(40, 0, 0), part_of="fish", parked=True),
-    Thing("table", (((0, 0, 0), (1, 1, 0.02)),), {"dustyable": {}}, pos=(3, 0, 0)),
-    Thing("rag", SMALL, {"cleaningTool": {}, "soakable": {}}, pos=(9, 0, 0)),
-    Thing("tap", SMALL, {"waterSource": {}, "toggleable": {}}, links={"water_source": (0, 0, -0.1)}, pos=(9, 0, 1)),
-    Thing("knife", SMALL, {"slicer": {}}, links={"slicer": ((0, 0, 0), (0.1, 0.1, 0.1))}, pos=(20, 0, 0)),
+    Item("fish", SMALL, FOOD, pos=(3, 0, 1), parts={"half": (0, 0, 0)}),
+    Item("half", SMALL, FOOD, pos=(40, 0, 0), part_of="fish", parked=True),
+    Item("table", (((0, 0, 0), (1, 1, 0.02)),), {"dustyable": {}}, pos=(3, 0, 0)),
+    Item("rag", SMALL, {"cleaningTool": {}, "soakable": {}}, pos=(9, 0, 0)),
+    Item("tap", SMALL, {"waterSource": {}, "toggleable": {}}, links={"water_source": (0, 0, -0.1)}, pos=(9, 0, 1)),
+    Item("knife", SMALL, {"slicer": {}}, links={"slicer": ((0, 0, 0), (0.1, 0.1, 0.1))}, pos=(20, 0, 0)),
     fingers=1,
 )  # fmt: skip
 GOAL = """(and (cooked fish) (not (burnt fish)) (inside fish oven) (on_top fish table) (soaked rag) (dusty table)

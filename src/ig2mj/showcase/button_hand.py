@@ -12,7 +12,7 @@ REST = 0.50
 """m from the palm to the button between presses."""
 PRESS = 0.17
 """m from the palm to the button while pressing: the finger's last segment begins 0.083 m from the button, within the
-0.10 m of `ig2mj.states.definitions.toggled_on.REACH`, and its tip ends 0.04 m before it."""
+0.10 m of `ig2mj.states.definitions.toggled_on.BUTTON_DISTANCE`, and its tip ends 0.04 m before it."""
 SPEED = 0.35
 """m/s."""
 HOLD = 12

@@ -5,10 +5,10 @@ not: with one robot awake in a home of 60 objects that is half of the time. Bodi
 (`body_contype`, `body_conaffinity`) only while they cannot have a contact, so that the contacts, and with them
 everything, stay bitwise the same:
 
-- around every body that is awake lies a sphere with all its geoms in whatever pose, grown by `REACH`. What a grown
-  sphere's box meets stays in. If that may be woken by a touch, its own neighbours stay in, too, and so on.
+- around every body that is awake lies a sphere with all its geoms in whatever pose, grown by `SPHERE_MARGIN`. What a
+  grown sphere's box meets stays in. If that may be woken by a touch, its own neighbours stay in, too, and so on.
 - after each physics step, before the next collision, the speeds tell how far any body can have moved at most
-  (positions are integrated from just these speeds). When that comes to `REACH`, neighbours are looked for anew.
+  (positions are integrated from just these speeds). When that comes to `SPHERE_MARGIN`, neighbours are looked for anew.
 
 A mask is only used where it saves more than it costs (`WORTHWHILE`, `LASTING`).
 
@@ -25,7 +25,7 @@ import math
 import mujoco
 import numpy as np
 
-REACH = 0.25
+SPHERE_MARGIN = 0.25
 """Metres by which spheres are grown. Farther: more bodies stay in; nearer: they are looked for more often."""
 
 ROUNDING = 1e-6
@@ -40,7 +40,7 @@ LASTING = 6
 PATIENCE = 30
 """Control steps until it is tried again, where it was not worth it or fewer trees are awake than when last tried."""
 
-HARDLY = 1e-4
+NEGLIGIBLE_TRAVEL = 1e-4
 """Metres of a physics step that need not be known better."""
 
 _NEVER = 1e30
@@ -155,10 +155,10 @@ class Levers:
             for body in np.flatnonzero(below[own]).tolist():
                 # The joint's own body keeps its distance to the anchor, where no other joint lies between.
                 rigid = body == own and int(model.body_jntnum[own]) == 1
-                joint, point, slack = [*joint, k], [*point, body], [*slack, 0.0 if rigid else 2 * REACH]
+                joint, point, slack = [*joint, k], [*point, body], [*slack, 0.0 if rigid else 2 * SPHERE_MARGIN]
             for other in np.flatnonzero(below[own, own_body]).tolist():
                 if other != k:
-                    joint, point, slack = [*joint, k], [*point, model.nbody + other], [*slack, 2 * REACH]
+                    joint, point, slack = [*joint, k], [*point, model.nbody + other], [*slack, 2 * SPHERE_MARGIN]
         dof_joint = np.array(model.dof_jntid)
         kind, first = np.asarray(model.jnt_type)[dof_joint], np.asarray(model.jnt_dofadr)[dof_joint]
         free = (kind == int(mujoco.mjtJoint.mjJNT_FREE)) & (np.arange(model.nv) < first + 3)
@@ -248,7 +248,7 @@ class Vicinity:
             return
         # First a bound that is quick to compute and loose; it is all that an agent at rest needs.
         travel = math.sqrt(self._qvel.dot(self._qvel)) * self._loose
-        self._left -= travel if travel < HARDLY else self._travel()
+        self._left -= travel if travel < NEGLIGIBLE_TRAVEL else self._travel()
         if not self._left >= 0.0:
             self._look((self._tree_awake.tobytes(), self._eq_active.tobytes()))
 
@@ -279,7 +279,7 @@ class Vicinity:
         self._weights = np.where(sure, table.levers.weights(self._data), _NEVER)
         self._loose = max(1.0, float(np.linalg.norm(self._weights[sure]))) * table.timestep
         self._still = np.where(sure, 0, -1)
-        self._left = REACH - ROUNDING - self._travel()
+        self._left = SPHERE_MARGIN - ROUNDING - self._travel()
         if not self._left >= 0.0:
             return self._let_in()
         self.contype, self.conaffinity = table.contype * kept, table.conaffinity * kept
@@ -290,7 +290,7 @@ class Vicinity:
         pos, turn = data.xpos[table.bodies], data.xmat[table.bodies].reshape(-1, 3, 3)
         centre = pos + (turn @ table.centre)[..., 0]
         half = (np.abs(turn) @ table.half)[..., 0]
-        low, high, size = centre - half, centre + half, table.radius + REACH
+        low, high, size = centre - half, centre + half, table.radius + SPHERE_MARGIN
         kept = table.always.copy()
         new = (self._tree_awake != 0) | table.driven
         trees = np.zeros_like(new)

@@ -17,7 +17,7 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import EventStep, StateSpec, Values, copied, filled, numbers, put
 
-REACH = 0.10
+BUTTON_DISTANCE = 0.10
 """Metres between a finger's frame and the button (iGibson's toggle.py)."""
 
 FAR_BEYOND = 0.01
@@ -35,7 +35,7 @@ def update(
     if len(buttons) == 0 or view.agent.finger_pos.shape[1] == 0:
         return toggled_on, press_count
     offset = jnp.asarray(view.agent.finger_pos)[:, None] - jnp.asarray(view.link_pos)[:, buttons, None]
-    near = jnp.any(jnp.sum(offset * offset, axis=-1) < REACH**2, axis=-1)  # [W, B]
+    near = jnp.any(jnp.sum(offset * offset, axis=-1) < BUTTON_DISTANCE**2, axis=-1)  # [W, B]
     of_object = np.full(tables.num_objects, len(buttons))
     of_object[tables.link_object[buttons]] = np.arange(len(buttons))
     pressed = jnp.concatenate([near, jnp.zeros((near.shape[0], 1), bool)], axis=-1)[:, of_object]
@@ -51,7 +51,7 @@ def all_out_of_reach(model: StateModel, view: PhysicsView) -> bool:
     """
     fingers = np.asarray(view.agent.finger_pos)[:, :, None]
     offset = np.abs(fingers - np.asarray(view.link_pos)[:, None, model.buttons]).max(axis=-1)
-    return bool((offset > REACH + FAR_BEYOND).all())
+    return bool((offset > BUTTON_DISTANCE + FAR_BEYOND).all())
 
 
 def set_toggled_on(

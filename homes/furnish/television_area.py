@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from .kit import RoomKit
-from .placed import Thing
+from .placed import Placed
 from .room import SIDES
 
 OPPOSITE = {"south": "north", "north": "south", "east": "west", "west": "east"}
@@ -25,12 +25,12 @@ SIDE_PASSAGE = 0.06  # m of bare floor between furniture and the carpet's edge
 
 
 @dataclasses.dataclass
-class Watching:
+class TelevisionArea:
     """What was put. table: what the television stands on, None where it hangs."""
 
-    sofa: Thing
-    television: Thing
-    table: Thing | None
+    sofa: Placed
+    television: Placed
+    table: Placed | None
 
     @property
     def distance(self) -> float:
@@ -38,19 +38,19 @@ class Watching:
         return floor_between(self.sofa, self.table or self.television)
 
 
-def floor_between(sofa: Thing, other: Thing) -> float:
+def floor_between(sofa: Placed, other: Placed) -> float:
     """m between a sofa's front and the side of another thing that is turned to it."""
     across = abs(float(sofa.front @ (other.centre - sofa.centre)[:2]))
     return across - (sofa.size[0] + other.size[0]) / 2
 
 
-def aside(sofa: Thing, other: Thing) -> float:
+def aside(sofa: Placed, other: Placed) -> float:
     """m by which another thing is off the line that a sofa looks along."""
     x, y = (other.centre - sofa.centre)[:2]
     return abs(float(sofa.front[0] * y - sofa.front[1] * x))
 
 
-def watch_television(kit: RoomKit) -> Watching | None:
+def place_television_area(kit: RoomKit) -> TelevisionArea | None:
     """Puts a television at a wall and a sofa that faces it: with its back to the wall opposite where that is at a
     good distance, else free in the room."""
     start = kit.home.now()
@@ -63,12 +63,12 @@ def watch_television(kit: RoomKit) -> Watching | None:
                     table, television = put
                     sofa = (_freely if free_standing else _at_the_wall)(kit, side, table or television)
                     if sofa is not None:
-                        return Watching(sofa, television, table)
+                        return TelevisionArea(sofa, television, table)
                 kit.home.back_to(start)
     return None
 
 
-def _television(kit: RoomKit, side: str, share: float) -> tuple[Thing | None, Thing] | None:
+def _television(kit: RoomKit, side: str, share: float) -> tuple[Placed | None, Placed] | None:
     x0, y0, x1, y1 = kit.rect
     near = (x0 + share * (x1 - x0), y0 + share * (y1 - y0))
     table = kit.at_wall("console_table", side=side, near=near, under_window=False, most=3)
@@ -80,7 +80,7 @@ def _television(kit: RoomKit, side: str, share: float) -> tuple[Thing | None, Th
     return None if television is None else (table, television)
 
 
-def _at_the_wall(kit: RoomKit, side: str, screen: Thing) -> Thing | None:
+def _at_the_wall(kit: RoomKit, side: str, screen: Placed) -> Placed | None:
     near = (float(screen.centre[0]), float(screen.centre[1]))
     sofa = kit.at_wall("sofa", side=OPPOSITE[side], near=near, most=16)
     if sofa is None or aside(sofa, screen) > ASIDE or not NEAREST < floor_between(sofa, screen) < FARTHEST:
@@ -88,7 +88,7 @@ def _at_the_wall(kit: RoomKit, side: str, screen: Thing) -> Thing | None:
     return sofa
 
 
-def _freely(kit: RoomKit, side: str, screen: Thing) -> Thing | None:
+def _freely(kit: RoomKit, side: str, screen: Placed) -> Placed | None:
     index = kit.home.index("sofa")
     for along in (0.0, 0.2, -0.2, 0.4, -0.4):
         for distance in FREE_STANDING:
@@ -103,7 +103,9 @@ def _depth(kit: RoomKit, side: str) -> float:
     return (y1 - y0) if side in ("south", "north") else (x1 - x0)
 
 
-def seats_around(kit: RoomKit, place: Watching, armchairs: int = 2, carpet: bool = True) -> Iterator[Thing | None]:
+def seats_around(
+    kit: RoomKit, place: TelevisionArea, armchairs: int = 2, carpet: bool = True
+) -> Iterator[Placed | None]:
     """A carpet before the sofa, the coffee table on it, a lamp and a side table at the sofa's ends, armchairs at the
     coffee table's ends. carpet: False leaves it out."""
     sofa = place.sofa
