@@ -32,8 +32,8 @@ from soak_replay import Dump, replay
 from soak_watch import FLAGS, House, Seen, Watch
 
 from ig2mj.agents.floating_hand import FINGER_CLOSED, THUMB_CLOSED
-from ig2mj.engine.base import Snapshot
 from ig2mj.engine.native.engine import NativeEngine
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.worlds.random_streams import episode_keys, pick_rows, step_keys

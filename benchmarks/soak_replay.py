@@ -15,8 +15,9 @@ from soak_watch import BEYOND, House
 
 import ig2mj
 from ig2mj.agents.floating_hand import add_floating_hand
-from ig2mj.engine.base import Snapshot
 from ig2mj.engine.native.engine import NativeEngine
+from ig2mj.engine.snapshot import Snapshot
+from ig2mj.worlds.archive import build, read_arrays, read_header, save_tree
 from ig2mj.worlds.guards import TOP_SPEED
 
 DEEP = 0.005
@@ -41,16 +42,15 @@ class Dump:
     def save(self, file: pathlib.Path) -> None:
         """Writes it to an npz file."""
         header = json.dumps({"home": self.home, "start": [float(x) for x in self.start], "report": self.report})
-        fields = {f.name: np.asarray(getattr(self.row, f.name)) for f in dataclasses.fields(self.row)}
-        np.savez_compressed(file, header=np.array(header), controls=self.ctrl, **fields)
+        save_tree(file, {"row": self.row, "controls": self.ctrl}, {"kind": "soak", "note": header})
 
     @classmethod
     def load(cls, file: pathlib.Path) -> Dump:
         """Reads what `save` wrote."""
-        with np.load(file) as archive:
-            header = json.loads(str(archive["header"]))
-            row = Snapshot(**{f.name: archive[f.name] for f in dataclasses.fields(Snapshot)})
-            return cls(header["home"], tuple(header["start"]), header["report"], row, archive["controls"])
+        header = json.loads(read_header(file)["note"])
+        row = build(Snapshot, read_arrays(file, "row."), file)
+        controls = read_arrays(file, "controls")[""]
+        return cls(header["home"], tuple(header["start"]), header["report"], row, controls)
 
 
 def replay(file: pathlib.Path) -> list[dict[str, Any]]:

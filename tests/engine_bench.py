@@ -12,8 +12,9 @@ import jax
 import numpy as np
 
 import ig2mj
-from ig2mj.engine.base import Engine, Snapshot, Write
+from ig2mj.engine.base import Engine, Write
 from ig2mj.engine.registry import make_engine
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.scene.scene import Scene
 
 

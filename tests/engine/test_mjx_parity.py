@@ -3,8 +3,6 @@ the view says of a settled scene (issue "Thousands of households on one GPU", se
 
 from __future__ import annotations
 
-import dataclasses
-
 import bench_scene
 import engine_bench
 import jax
@@ -12,10 +10,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from ig2mj.engine.base import Snapshot
 from ig2mj.engine.health import Overflow
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.registry import make_engine
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.predicates.compile import compile_expression
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
@@ -38,7 +36,7 @@ def falling(native) -> Snapshot:
     row = native.engine.export(physics, 0)
     qvel = np.array(row.qvel)
     qvel[:3] += [0.3, 0.1, 0.0]
-    return dataclasses.replace(row, qvel=qvel, qacc_warmstart=np.zeros_like(qvel))
+    return row.with_whole(qvel=qvel, qacc_warmstart=np.zeros_like(qvel))
 
 
 def one_step(bench, row: Snapshot):
@@ -132,7 +130,7 @@ def sliding(native) -> Snapshot:
     row = native.engine.export(physics, 0)
     qvel = np.array(row.qvel)
     qvel[:6], qvel[6:9] = [-0.8, 0.2, 0.0, 0.0, 0.0, 2.0], [0.3, 0.0, 0.0]
-    return dataclasses.replace(row, qvel=qvel)
+    return row.with_whole(qvel=qvel)
 
 
 def rollout(bench, row: Snapshot, steps: int) -> np.ndarray:
@@ -154,7 +152,7 @@ def test_a_second_stays_beside_a_perturbed_native_shadow(name, bench_folder, sli
     strays = []
     for seed in range(4):
         noise = np.random.default_rng(seed).normal(size=sliding.qpos.shape) * 1e-6
-        shadow = rollout(native, dataclasses.replace(sliding, qpos=sliding.qpos + noise), 30)
+        shadow = rollout(native, sliding.with_whole(qpos=sliding.qpos + noise), 30)
         strays.append(np.abs(shadow - truth).max())
     off = np.abs(rollout(bench, sliding, 30) - truth).max()
     assert off < 2 * max(strays) + 1e-3
@@ -205,7 +203,7 @@ def test_predicates_of_a_settled_scene_are_equal(name, bench_folder, settled, na
 def test_predicates_of_the_whole_bench_are_equal(bench_folder):
     """With a lid, a hatch that stands open, and a hand; on the engines that sleep."""
     native = engine_bench.bench(bench_folder, "native", 2, False)
-    opened = dataclasses.replace(native.first, qpos=np.array(native.first.qpos))
+    opened = native.first.with_whole(qpos=np.array(native.first.qpos))
     opened.qpos[native.scene.model.joint("hatch_hinge").qposadr[0]] = 0.9
     physics, _ = native.run(native.fresh(opened), 60)
     row = native.engine.export(physics, 0)
@@ -244,7 +242,7 @@ def rests(name: str, scene) -> None:
     row = start.export(physics, 0)
     height = scene.model.joint("box/free").qposadr[0] + 2
     row.qpos[height] = bench_scene.TOP + 0.07
-    row.touching[:] = False
+    row.scene.touching[:] = False
     bench = engine_bench.Bench(scene, name, 1, substeps=1)
     physics, landed = bench.run(bench.fresh(row), 80)
     physics, later = bench.run(physics, 40)

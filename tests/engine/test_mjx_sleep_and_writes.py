@@ -8,8 +8,9 @@ import jax
 import numpy as np
 import pytest
 
-from ig2mj.engine.base import Engine, Snapshot, Write
+from ig2mj.engine.base import Engine, Write
 from ig2mj.engine.native.engine import NativeEngine
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.errors import EngineError, UnknownNameError
 
 

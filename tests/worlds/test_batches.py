@@ -158,12 +158,26 @@ def test_an_object_below_the_floor_is_flagged_once_and_put_right(scene, model, b
     for _ in range(2):
         batch, _ = worlds.step(batch)
     assert np.asarray(batch.flags).tolist() == [0, int(Flag.FELL), 0]
-    assert worlds.metrics(batch) == {"episodes": 3, "overflow": 0, "not_finite": 0, "fell": 1, "too_fast": 0}
+    assert worlds.metrics(batch) == {
+        "episodes": 3,
+        "overflow": 0,
+        "not_finite": 0,
+        "fell": 1,
+        "too_fast": 0,
+        "wrong_controls": 0,
+    }
     with pytest.raises(EngineError, match=r"^world 1: fell$"):
         worlds.raise_flagged(batch)
     batch = worlds.reset(batch, batch.flags != 0)
     assert not np.asarray(batch.flags).any()
-    assert worlds.metrics(batch) == {"episodes": 4, "overflow": 0, "not_finite": 0, "fell": 1, "too_fast": 0}
+    assert worlds.metrics(batch) == {
+        "episodes": 4,
+        "overflow": 0,
+        "not_finite": 0,
+        "fell": 1,
+        "too_fast": 0,
+        "wrong_controls": 0,
+    }
     batch, _ = worlds.step(batch)
     assert not np.asarray(batch.flags).any()
 
@@ -174,7 +188,7 @@ def test_an_object_shot_away_is_too_fast(scene, model):
     rows = worlds.engine.snapshot(batch.world.physics)
     qvel = np.array(rows.qvel)
     qvel[0, 2] = 25.0
-    physics = worlds.engine.load(batch.world.physics, dataclasses.replace(rows, qvel=qvel))
+    physics = worlds.engine.load(batch.world.physics, rows.with_whole(qvel=qvel))
     batch = dataclasses.replace(batch, world=dataclasses.replace(batch.world, physics=physics))
     batch, _ = worlds.step(batch)
     assert np.asarray(batch.flags).tolist() == [int(Flag.TOO_FAST), 0]

@@ -165,7 +165,14 @@ def test_measured_buffers_hold_while_hands_push_things_about(pushed, batch_of_ma
     assert (moved > 0.02).mean() > 0.25, "the hands do push"
     assert not (overflow & int(CAPACITY)).any()
     metrics = batch_of_many.metrics(after)
-    assert metrics == {"episodes": WORLDS, "overflow": 0, "not_finite": 0, "fell": 0, "too_fast": 0}
+    assert metrics == {
+        "episodes": WORLDS,
+        "overflow": 0,
+        "not_finite": 0,
+        "fell": 0,
+        "too_fast": 0,
+        "wrong_controls": 0,
+    }
 
 
 def test_world_0_is_the_same_among_few_and_among_many(scene, model, pool, profile, reach, batch_of_many, pushed):

@@ -113,7 +113,7 @@ def test_a_picture_shows_the_last_finite_step(dump, bare, tmp_path):
     frames, model, note = read_dump(dump, "bench")
     qpos = np.array(frames.qpos)
     qpos[2:] = np.nan
-    spoiled = Frames(dataclasses.replace(frames, qpos=qpos), initial_states(_model(bare), 4))
+    spoiled = Frames(frames.with_whole(qpos=qpos), initial_states(_model(bare), 4))
     save_dump(spoiled, tmp_path / "d.npz", "bench", {"text": note["text"]}, model)
     replay = Replay(bare, tmp_path / "d.npz")
     assert replay.show_last() == 1

@@ -58,7 +58,7 @@ def test_the_hand_of_a_pool_is_in_a_free_place_that_the_file_and_the_command_tel
 
     scene = ig2mj.load_scene(home, [FloatingHand(pos=start)])
     like = make_pool(scene, StateModel.of_manifest(scene.tables, scene.manifest), 1, share=0.0, threads=1)
-    pool = load_pool(file, like, "room")
+    pool = load_pool(file, scene)
     assert pool.size == 2
     assert not any(hits_the_cupboard(scene, qpos) for qpos in np.asarray(pool.physics.qpos))
     inside = ig2mj.load_scene(home, [FloatingHand(pos=(0, 0, 1))])

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import copy
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import ig2mj
 from ig2mj import cli
+from ig2mj.agents.floating_hand import FloatingHand
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import EngineError, InputError
 from ig2mj.sampling import settled
 from ig2mj.sampling.settled import make_pool
 from ig2mj.worlds.archive import read_header, save_tree
-from ig2mj.worlds.pool import Pool, load_pool, save_pool, stack
+from ig2mj.worlds.pool import FORMAT_VERSION, Pool, load_pool, save_pool
 
 
 @pytest.fixture(scope="module")
@@ -58,10 +64,10 @@ def test_a_home_that_never_rests_is_an_error(tiny_home, home_model, monkeypatch)
         make_pool(tiny_home, home_model, 1, share=1.0, threads=1)
 
 
-def test_a_pool_survives_its_file(pool, tmp_path):
+def test_a_pool_survives_its_file(pool, tiny_home, tmp_path):
     file = tmp_path / "pool.npz"
-    save_pool(pool, file, "tiny_home", {"seed": 5})
-    assert same(load_pool(file, stack([pool, pool]), "tiny_home"), pool), "the number of rows is the file's"
+    save_pool(pool, file, tiny_home, {"seed": 5})
+    assert same(load_pool(file, tiny_home), pool) and same(load_pool(file), pool)
     header = read_header(file)
     assert header["seed"] == 5 and header["scene"] == "tiny_home"
     assert [f.name for f in tmp_path.iterdir()] == ["pool.npz"], "no leftovers"
@@ -74,9 +80,21 @@ def test_rows_are_picked_in_order(pool):
     np.testing.assert_array_equal(rows.physics.qpos, np.asarray(pool.physics.qpos, np.float32)[[2, 0]])
 
 
-def broken(pool: Pool, file, kind: str) -> str:
+def test_a_pool_of_the_bare_scene_serves_the_scene_with_a_hand(pool, tiny_home, tiny_home_folder, home_model, tmp_path):
+    file = tmp_path / "pool.npz"
+    save_pool(pool, file, tiny_home)
+    with_hand = ig2mj.load_scene(tiny_home_folder, agents=[FloatingHand(pos=(0, 0, 2))])
+    engine = NativeEngine(with_hand, 2)
+    rows = load_pool(file, with_hand).rows(np.array([1, 0]))
+    physics = engine.load(engine.reset(), rows.physics)
+    held = engine.snapshot(physics)
+    np.testing.assert_allclose(held.scene.qpos, np.asarray(pool.physics.scene.qpos)[[1, 0]], atol=1e-6)
+    assert engine.view(physics).agent.base_pos[:, 0] == pytest.approx(np.array([[0, 0, 2]] * 2))
+
+
+def broken(pool: Pool, file, kind: str, scene: ig2mj.Scene) -> str:
     """Makes a broken file; returns what the error says of it."""
-    save_pool(pool, file, "tiny_home")
+    save_pool(pool, file, scene)
     data = file.read_bytes()
     if kind == "absent":
         file.unlink()
@@ -99,31 +117,54 @@ def broken(pool: Pool, file, kind: str) -> str:
         return "is no archive of this project"
     if kind == "version":
         save_tree(file, pool, {"kind": "pool", "format_version": 99, "scene": "tiny_home"})
-        return "is no pool of this version"
+        return "is no pool of format"
     if kind == "dump":
         save_tree(file, pool, {"kind": "dump", "format_version": 1, "scene": "tiny_home"})
-        return "is no pool of this version"
+        return "is no pool of format"
     if kind == "scene":
-        save_pool(pool, file, "palace")
+        manifest = copy.copy(scene.manifest)
+        manifest.name = "palace"
+        save_pool(pool, file, dataclasses.replace(scene, manifest=manifest))
         return "is a pool of scene 'palace', not of 'tiny_home'"
-    if kind == "shape":
-        physics = pool.physics.replace(qpos=np.asarray(pool.physics.qpos)[:, :-1])
-        save_pool(pool.replace(physics=physics), file, "tiny_home")
-        return "physics.qpos: has shape"
+    if kind == "digest":
+        tables = dataclasses.replace(scene.tables, object_names=(*scene.object_names[:-1], "vase"))
+        save_pool(pool, file, dataclasses.replace(scene, tables=tables))
+        return "was made before 'tiny_home' was converted as it is now"
+    if kind == "lengths":
+        save_pool(pool.replace(states=jax.tree.map(lambda a: np.asarray(a)[:-1], pool.states)), file, scene)
+        return "has arrays of different lengths"
+    if kind == "absence":
+        header = {"kind": "pool", "format_version": FORMAT_VERSION, "scene": scene.name, "digest": scene.digest}
+        save_tree(file, {"physics": pool.physics}, header)
+        return "is missing"
     assert kind == "empty"
-    save_pool(jax.tree.map(lambda a: np.asarray(a)[:0], pool), file, "tiny_home")
+    save_pool(jax.tree.map(lambda a: np.asarray(a)[:0], pool), file, scene)
     return "has no rows"
 
 
 @pytest.mark.parametrize(
     "kind",
-    ["absent", "text", "cut", "damaged", "array", "foreign", "version", "dump", "scene", "shape", "empty"],
+    [
+        "absent",
+        "text",
+        "cut",
+        "damaged",
+        "array",
+        "foreign",
+        "version",
+        "dump",
+        "scene",
+        "digest",
+        "lengths",
+        "absence",
+        "empty",
+    ],
 )
-def test_a_file_that_is_no_pool_of_the_scene_is_named(pool, tmp_path, kind):
+def test_a_file_that_is_no_pool_of_the_scene_is_named(pool, tiny_home, tmp_path, kind):
     file = tmp_path / "pool.npz"
-    says = broken(pool, file, kind)
+    says = broken(pool, file, kind, tiny_home)
     with pytest.raises(InputError) as caught:
-        load_pool(file, pool, "tiny_home")
+        load_pool(file, tiny_home)
     assert says in str(caught.value) and str(file) in str(caught.value) and "\n" not in str(caught.value)
 
 
@@ -131,7 +172,7 @@ def test_the_command_makes_a_pool(tiny_home_folder, tiny_home, pool, tmp_path, c
     file = tmp_path / "some.npz"
     assert cli.call(["pool", str(tiny_home_folder), "--count", "2", "--out", str(file), "--seed", "3"]) == 0
     assert "2 settled states of tiny_home" in capsys.readouterr().out
-    assert load_pool(file, pool, "tiny_home").size == 2
+    assert load_pool(file, tiny_home).size == 2
 
 
 @pytest.mark.parametrize(("options", "says"), [(["--count", "0"], "at least one row"), (["--share", "1.5"], "between")])

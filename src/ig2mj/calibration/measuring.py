@@ -18,11 +18,11 @@ import numpy as np
 
 from ig2mj.calibration.pushing import Pusher, push, start_pushing
 from ig2mj.calibration.reach import Reach
-from ig2mj.engine.base import Snapshot
 from ig2mj.engine.health import CAPACITY, SETTING
 from ig2mj.engine.mjx.contacts import warp_contacts
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.native.settle import settle
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.warp.buffer_sizes import QUANTITIES, Measurement, Tail, profile_of
 from ig2mj.engine.warp.candidate_pairs import CandidatePairs
 from ig2mj.engine.warp.engine import WarpEngine

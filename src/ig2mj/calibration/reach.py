@@ -21,9 +21,9 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ig2mj.agents.floating_hand import add_floating_hand
-from ig2mj.engine.base import Snapshot
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.native.settle import settle
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.errors import EngineError
 from ig2mj.sampling.perturbation import loose_objects
 from ig2mj.scene.scene import Scene

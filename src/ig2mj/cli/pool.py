@@ -62,6 +62,6 @@ def run(
             threads=threads or None,
             progress=lambda done: report("", done, count),
         )
-    save_pool(pool, file, loaded.name, {"seed": seed, "share": share, "hand": start})
+    save_pool(pool, file, loaded, {"seed": seed, "share": share, "hand": start})
     place = "" if start is None else f" with a hand at ({', '.join(f'{x:.3f}' for x in start)})"
     print(f"{file}: {pool.size} settled states of {loaded.name}{place}")

@@ -9,8 +9,8 @@ attributes:
   never uses the old one again, is right for both.
 - `num_worlds` is fixed when the engine is made.
 
-Axes: W worlds, O objects, B bodies, U units (see `ig2mj.engine.layout`), E equality constraints, nq, nv, nu, na as in
-MuJoCo.
+Axes: W worlds, O objects, H hands, B bodies, U units (see `ig2mj.engine.layout`), E equality constraints, nq, nv, nu,
+na as in MuJoCo.
 """
 
 from __future__ import annotations
@@ -19,9 +19,10 @@ from typing import Any, Protocol, runtime_checkable
 
 import mujoco
 from flax import struct
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from ig2mj.engine.health import Health
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
 from ig2mj.scene.tables import SceneTables
@@ -58,34 +59,6 @@ Physics = Any
 
 
 @struct.dataclass
-class Snapshot:
-    """Physics of one world, or of a batch of worlds (every array then begins with the world axis).
-
-    It is what an engine needs to go on exactly where the world stood, and the form in which worlds go to files, to
-    pools of initial states and from one engine to another. Arrays are numpy's or JAX's.
-
-    Attributes:
-      tree_asleep: MuJoCo's sleep state per kinematic tree: negative awake, else the next tree of its sleeping island.
-      eq_data: parameters of equality constraints, per world (design section 2, fact 9).
-      touching: remembered contact of units, see `ig2mj.engine.layout`.
-      The others are MuJoCo's fields of the same name; time has shape ().
-    """
-
-    qpos: Float[Array, "*W nq"]
-    qvel: Float[Array, "*W nv"]
-    act: Float[Array, "*W na"]
-    ctrl: Float[Array, "*W nu"]
-    qacc_warmstart: Float[Array, "*W nv"]
-    eq_active: Bool[Array, "*W E"]
-    eq_data: Float[Array, "*W E 12"]
-    mocap_pos: Float[Array, "*W M 3"]
-    mocap_quat: Float[Array, "*W M 4"]
-    time: Float[Array, "*W"]
-    tree_asleep: Int[Array, "*W T"]
-    touching: Bool[Array, "*W U U"]
-
-
-@struct.dataclass
 class Write:
     """A change to physics that is no simulation: teleports, joint positions, grasps. Leave out (None) what stays.
 
@@ -98,6 +71,9 @@ class Write:
         that hang on the object by no joint (split-off floating links) go along rigidly.
       qpos_mask, qpos: single coordinates, at MuJoCo's addresses (joints). Applied after the teleports.
       eq_active, eq_data: the whole of these two fields.
+      ignored_contacts: contacts between a hand's bodies (its palm and its fingers) and an object are dropped after the
+        narrow phase, from now on, until it is written again: they give neither forces nor touch, and wake nothing.
+        Contacts of all other pairs stay exactly as they were.
     """
 
     object_mask: Bool[Array, "W O"] | None = None
@@ -107,6 +83,7 @@ class Write:
     qpos: Float[Array, "W nq"] | None = None
     eq_active: Bool[Array, "W E"] | None = None
     eq_data: Float[Array, "W E 12"] | None = None
+    ignored_contacts: Bool[Array, "W H O"] | None = None
 
 
 @runtime_checkable
@@ -137,14 +114,15 @@ class Engine(Protocol):
 
         Args:
           physics: as returned by the last call.
-          ctrl: controls held during the step; None keeps those of the step before.
+          ctrl: controls held during the step; None keeps those of the step before. Those beyond 1e6 are clipped, NaNs
+            keep the value of before; `Health.wrong_controls` tells of both.
 
         Returns:
           The physics after the step and its view: poses, contacts and boxes of the same instant, forces of the steps
           that led to it.
 
         Raises:
-          EngineError: (native engine) a world's state is not finite any more.
+          EngineError: the controls have another shape; (native engine) a world's state is not finite any more.
         """
         ...
 
@@ -177,7 +155,8 @@ class Engine(Protocol):
 
         Args:
           physics: as returned by the last call.
-          snapshot: with the world axis: row w goes to world w. Without it: goes to every world.
+          snapshot: with the world axis: row w goes to world w. Without it: goes to every world. One of the bare scene
+            leaves the agents at their start.
           mask: the worlds to replace; None: all.
         """
         ...

@@ -59,12 +59,13 @@ class Health:
 
     Attributes:
       overflow: or of `Overflow` flags. finite: positions and velocities are numbers.
-      top_speed: m/s, of the fastest object now.
+      top_speed: m/s, of the fastest object now. wrong_controls: some control was no number, infinite or huge.
     """
 
     overflow: Int[Array, "W"]
     finite: Bool[Array, "W"]
     top_speed: Float[Array, "W"]
+    wrong_controls: Bool[Array, "W"]
 
 
 @struct.dataclass

@@ -10,11 +10,13 @@ Axes: O objects, U units, T trees, B bodies, G geoms, L annotated links, E equal
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
 from jaxtyping import Bool, Int
 
+from ig2mj.errors import EngineError
 from ig2mj.scene.tables import SceneTables
 
 
@@ -37,6 +39,7 @@ class ModelLayout:
       qpos_tree, qpos_dof: [nq] tree and first degree of freedom of the joint that owns the coordinate.
       qpos_ndof: [nq] number of degrees of freedom of that joint.
       equality_tree: [E, 2] trees that an equality constraint joins, -1: the world or nothing.
+      scene_sizes: how long the scene's part of each field of `ig2mj.engine.snapshot.AXIS` is; the agents' part follows.
       grasp_equality, grasp_hand, grasp_object: equality constraints between a hand's body and an object's.
     """
 
@@ -60,6 +63,7 @@ class ModelLayout:
     qpos_dof: Int[np.ndarray, "nq"]
     qpos_ndof: Int[np.ndarray, "nq"]
     equality_tree: Int[np.ndarray, "E 2"]
+    scene_sizes: Mapping[str, int]
     grasp_equality: Int[np.ndarray, "grasps"]
     grasp_hand: Int[np.ndarray, "grasps"]
     grasp_object: Int[np.ndarray, "grasps"]
@@ -137,10 +141,38 @@ def make_layout(model: mujoco.MjModel, tables: SceneTables) -> ModelLayout:
         qpos_dof=np.asarray(model.jnt_dofadr)[joint],
         qpos_ndof=joint_ndof[joint],
         equality_tree=np.where(equality_body >= 0, body_tree[equality_body], -1),
+        scene_sizes=_scene_sizes(model, tables, equality_body),
         grasp_equality=equality,
         grasp_hand=hand,
         grasp_object=grasped,
     )
+
+
+def _scene_sizes(model: mujoco.MjModel, tables: SceneTables, equality_body: np.ndarray) -> dict[str, int]:
+    """Raises EngineError where something of the scene comes after something of an agent."""
+    of_agent = tables.body_agent >= 0
+    of_joint, of_dof = of_agent[model.jnt_bodyid], of_agent[model.dof_bodyid]
+    mocap = np.flatnonzero(model.body_mocapid >= 0)
+    trees = np.zeros(model.ntree, bool)
+    trees[model.dof_treeid] = of_dof
+    equality = (of_agent[np.maximum(equality_body, 0)] & (equality_body >= 0)).any(1)
+    activations = np.repeat(tables.actuator_agent >= 0, model.actuator_actnum)
+    axes = {
+        "qpos": np.repeat(of_joint, np.diff(np.append(model.jnt_qposadr, model.nq))),
+        "qvel": of_dof,
+        "qacc_warmstart": of_dof,
+        "act": activations,
+        "ctrl": tables.actuator_agent >= 0,
+        "eq_active": equality,
+        "eq_data": equality,
+        "mocap_pos": of_agent[mocap],
+        "mocap_quat": of_agent[mocap],
+        "tree_asleep": trees,
+    }
+    for name, agents in axes.items():
+        if (np.diff(agents.astype(int)) < 0).any():
+            raise EngineError(f"{name} of agents stands before that of objects: scene.xml must have its agents last")
+    return {name: int((~agents).sum()) for name, agents in axes.items()}
 
 
 def _with_welded(model: mujoco.MjModel, bodies: np.ndarray) -> np.ndarray:

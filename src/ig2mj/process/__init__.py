@@ -12,6 +12,9 @@ or earlier by whoever wants to; a second call does nothing. What the user has de
   - JAX's option `jax_cpu_enable_async_dispatch` is off: small CPU programs run in the calling thread. Not where the
     variable JAX_CPU_ENABLE_ASYNC_DISPATCH is set.
 
+`prepare_mujoco` (every engine):
+  - MuJoCo's user warning: what it warns of goes to the logger "ig2mj.mujoco", not to a file in the working folder.
+
 `prepare_warp` (Warp engines):
   - `warp.config.log_level`: WARNING where it was INFO, and long compilations are reported on stderr instead.
   - `warp.config.kernel_cache_dir`: below IG2MJ_CACHE_DIR, where that is set and Warp's own folder was not chosen.
@@ -28,12 +31,21 @@ MUJOCO_GL (the backend tried first), and those named above. MuJoCo Warp's functi
 from __future__ import annotations
 
 from ig2mj.process.compilation import CACHE_VARIABLE, cache_folder
-from ig2mj.process.settings import prepare_jax, prepare_warp, quiet_warp, run_programs_inline, use_gl, used_gl
+from ig2mj.process.settings import (
+    prepare_jax,
+    prepare_mujoco,
+    prepare_warp,
+    quiet_warp,
+    run_programs_inline,
+    use_gl,
+    used_gl,
+)
 
 __all__ = [
     "CACHE_VARIABLE",
     "cache_folder",
     "prepare_jax",
+    "prepare_mujoco",
     "prepare_warp",
     "quiet_warp",
     "run_programs_inline",

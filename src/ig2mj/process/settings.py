@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import importlib
+import logging
 import os
 import pathlib
 from collections.abc import Iterator
@@ -117,3 +118,11 @@ def use_gl(backend: str) -> None:
 def used_gl() -> str | None:
     """The backend that this process draws with; None before the first picture."""
     return _gl
+
+
+@functools.cache
+def prepare_mujoco() -> None:
+    """MuJoCo's warnings go to the logger "ig2mj.mujoco" and no more to a file MUJOCO_LOG.TXT in the working folder."""
+    import mujoco
+
+    mujoco.set_mju_user_warning(logging.getLogger("ig2mj.mujoco").warning)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import functools
+import hashlib
 import os
 import pathlib
 from collections.abc import Callable, Sequence
@@ -62,6 +64,15 @@ class Scene:
     @property
     def object_names(self) -> tuple[str, ...]:
         return self.tables.object_names
+
+    @functools.cached_property
+    def digest(self) -> str:
+        """Hash of what the scene is without its agents: its files, and the objects that were added to it."""
+        hashed = hashlib.blake2b(digest_size=16)
+        for file in (model_file(self.folder), self.folder / MANIFEST_FILE):
+            hashed.update(file.read_bytes())
+        hashed.update("\n".join(self.object_names).encode())
+        return hashed.hexdigest()
 
     def object_index(self, name: str) -> int:
         """Place of the object on the O axis. Raises UnknownNameError, with near matches."""

@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Int
 
-from ig2mj.engine.base import Snapshot
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.errors import EngineError, InputError
 from ig2mj.scene.scene import Scene
 from ig2mj.viewer.overlays import Label, default_overlays
@@ -118,16 +118,10 @@ def _with_model(scene: Scene, model: mujoco.MjModel, file: str | os.PathLike) ->
     bodies, geoms = len(scene.tables.body_object), len(scene.tables.geom_object)
     if model.nbody < bodies or model.ngeom < geoms or (model.geom_type[:geoms] != scene.model.geom_type[:geoms]).any():
         raise InputError(file, "was dumped from another version of the scene", mend="give the scene it was dumped from")
-    more = (0, model.nbody - bodies)
-    of_bodies = {
-        name: np.pad(getattr(scene.tables, name), more, constant_values=-1)
-        for name in ("body_object", "body_agent", "body_hand")
-    }
-    tables = dataclasses.replace(
-        scene.tables,
-        **of_bodies,
-        geom_object=np.pad(scene.tables.geom_object, (0, model.ngeom - geoms), constant_values=-1),
-    )
+    more = {"body_object": model.nbody - bodies, "body_agent": model.nbody - bodies, "body_hand": model.nbody - bodies}
+    more |= {"geom_object": model.ngeom - geoms, "actuator_agent": model.nu - len(scene.tables.actuator_agent)}
+    padded = {n: np.pad(getattr(scene.tables, n), (0, count), constant_values=-1) for n, count in more.items()}
+    tables = dataclasses.replace(scene.tables, **padded)
     return dataclasses.replace(scene, model=model, tables=tables)
 
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import io
 import os
 import pathlib
+import typing
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any, TypeVar
 
 import jax
@@ -87,6 +89,24 @@ def read_arrays(file: str | os.PathLike, prefix: str) -> dict[str, np.ndarray]:
             return {n.removeprefix(prefix): archive[n] for n in archive.files if n.startswith(prefix)}
         except (ValueError, OSError, zipfile.BadZipFile, zlib.error) as e:
             raise InputError(file, f"is damaged: {e}") from e
+
+
+def build(kind: type[Tree], arrays: Mapping[str, np.ndarray], file: str | os.PathLike, prefix: str = "") -> Tree:
+    """A dataclass of arrays and of such dataclasses, from arrays by path.
+
+    Raises:
+      InputError: an array is missing.
+    """
+    hints, fields = typing.get_type_hints(kind), {}
+    for field in dataclasses.fields(typing.cast(Any, kind)):
+        name, hint = prefix + field.name, hints[field.name]
+        if dataclasses.is_dataclass(hint):
+            fields[field.name] = build(typing.cast(type, hint), arrays, file, f"{name}.")
+        elif name in arrays:
+            fields[field.name] = arrays[name]
+        else:
+            raise InputError(file, "is missing", element=name, mend="make the file again with this version")
+    return kind(**fields)
 
 
 def _name(keys: Any) -> str:

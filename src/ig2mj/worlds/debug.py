@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from ig2mj.engine.base import Snapshot
 from ig2mj.engine.health import Usage
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.engine.warp.profile import EngineProfile
 from ig2mj.errors import EngineError

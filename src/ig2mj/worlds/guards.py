@@ -30,6 +30,7 @@ class Flag(enum.IntFlag):
     NOT_FINITE = 2
     FELL = 4
     TOO_FAST = 8
+    WRONG_CONTROLS = 32
 
 
 def check(health: Health, object_com: Float[Array, "W O 3"], floor: Float[Array, "O"]) -> Int[Array, "W"]:
@@ -45,6 +46,7 @@ def check(health: Health, object_com: Float[Array, "W O 3"], floor: Float[Array,
     flags |= jnp.where(~finite, int(Flag.NOT_FINITE), 0)
     flags |= jnp.where(finite & (com[..., 2] < floor).any(1), int(Flag.FELL), 0)
     flags |= jnp.where(finite & (jnp.asarray(health.top_speed) > TOP_SPEED), int(Flag.TOO_FAST), 0)
+    flags |= jnp.where(jnp.asarray(health.wrong_controls), int(Flag.WRONG_CONTROLS), 0)
     return flags.astype(jnp.int32)
 
 

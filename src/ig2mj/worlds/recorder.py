@@ -7,7 +7,6 @@ Axes: S steps kept, W worlds, T steps of a dump.
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import os
 from typing import Any
@@ -19,11 +18,12 @@ import numpy as np
 from flax import struct
 from jaxtyping import Int
 
-from ig2mj.engine.base import Engine, Snapshot
+from ig2mj.engine.base import Engine
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.errors import InputError
 from ig2mj.states.world import ExtendedStates
-from ig2mj.worlds.archive import load_tree, read_arrays, read_header, save_tree
+from ig2mj.worlds.archive import build, load_tree, read_arrays, read_header, save_tree
 from ig2mj.worlds.batch import Batch
 
 LENGTH = 50
@@ -117,16 +117,16 @@ def read_dump(file: str | os.PathLike, scene: str) -> tuple[Snapshot, mujoco.MjM
     header = check_dump(file, scene)
     arrays = read_arrays(file, "frames.physics.")
     binary = read_arrays(file, MODEL).get("", np.zeros(0, np.uint8))
-    absent = [f.name for f in dataclasses.fields(Snapshot) if f.name not in arrays]
-    if absent or not len(binary):
-        raise InputError(file, "is missing", element=", ".join(absent) or MODEL, mend="record it again")
+    if not len(binary):
+        raise InputError(file, "is missing", element=MODEL, mend="record it again")
+    physics = build(Snapshot, arrays, file)
     try:
         model = mujoco.MjModel.from_binary_path("dump.mjb", assets={"dump.mjb": binary.tobytes()})
     except ValueError as e:
         raise InputError(file, f"MuJoCo cannot read it: {e}", element=MODEL, mend="use the MuJoCo of the run") from e
-    if arrays["qpos"].shape[1:] != (model.nq,) or not len(arrays["qpos"]):
-        raise InputError(file, f"has shape {arrays['qpos'].shape}", element="frames.physics.qpos")
-    return Snapshot(**arrays), model, header
+    if physics.qpos.shape[1:] != (model.nq,) or not len(physics.qpos):
+        raise InputError(file, f"has shape {physics.qpos.shape}", element="frames.physics.qpos")
+    return physics, model, header
 
 
 def check_dump(file: str | os.PathLike, scene: str) -> dict[str, Any]:

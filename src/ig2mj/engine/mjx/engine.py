@@ -19,7 +19,9 @@ from flax import struct
 from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 
-from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snapshot, Write, check_arguments
+from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Write, check_arguments
+from ig2mj.engine.contact_filter import BitLayers
+from ig2mj.engine.controls import check_shape, clip
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.mjx.contacts import Contacts, finger_forces, link_forces, normal_forces, touching_units
@@ -27,14 +29,14 @@ from ig2mj.engine.mjx.view import Moved, ViewPlan, make_view, plan_view
 from ig2mj.engine.mjx.writing import apply_write, reaches
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.native.sleep import FULLY_AWAKE, restore_sleep
-from ig2mj.engine.snapshot_check import check_snapshot
+from ig2mj.engine.snapshot import AXIS, Snapshot, fitted, make_snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_jax
 from ig2mj.scene.scene import Scene
 
-STATE_FIELDS = ("qpos", "qvel", "act", "ctrl", "qacc_warmstart", "eq_active", "mocap_pos", "mocap_quat", "time")
-"""Fields of MJX data that are state, and that a `Snapshot` has by the same name."""
+STATE_FIELDS = tuple(name for name in AXIS if name not in ("eq_data", "tree_asleep"))
+"""Fields of MJX data that are state, and that a `Snapshot` has by the same name; besides them the time."""
 
 
 @struct.dataclass
@@ -43,17 +45,20 @@ class MjxPhysics:
 
     Attributes:
       data: MJX data; arrays begin with the world axis, but for Warp's contact list (design section 2, fact 10).
-      eq_data: parameters of the equality constraints of each world.
+      eq_data: parameters of the equality constraints of each world. ignored: contacts of hands with objects dropped.
       touching: of units, as of the last step. link_force, finger_force: newtons, of the last control step.
-      overflow: or of MJX-Warp's overflow flags since the world was loaded (`ig2mj.engine.guards`).
+      overflow: or of MJX-Warp's overflow flags since the world was loaded (`ig2mj.worlds.guards`).
+      wrong_controls: some control had to be clipped since then.
     """
 
     data: Any
     eq_data: Float[Array, "W E 12"]
+    ignored: Bool[Array, "W H O"]
     touching: Bool[Array, "W U U"]
     link_force: Float[Array, "W L O"]
     finger_force: Float[Array, "W F Y"]
     overflow: Int[Array, "W"]
+    wrong_controls: Bool[Array, "W"]
 
 
 class MjxEngine(abc.ABC):
@@ -100,7 +105,8 @@ class MjxEngine(abc.ABC):
         self.host_model = self._host_model(scene.model)
         self.layout: ModelLayout = make_layout(self.host_model, self.tables)
         self.plan: ViewPlan = plan_view(self.host_model, self.tables, self.layout, boxes)
-        self._initial = initial if initial is not None else self._scene_start(touch_tolerance)
+        start = self._scene_start(touch_tolerance)
+        self._initial = fitted(initial, start, 1, scene.name) if initial is not None else start
         self._pyramidal = self.host_model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
         self._has_blades = bool((self.tables.link_geom >= 0).any())
         self._can_grasp = bool(len(self.tables.finger_body) and len(self.tables.graspable_body))
@@ -138,6 +144,10 @@ class MjxEngine(abc.ABC):
     @abc.abstractmethod
     def _overflow(self, data: mjx.Data) -> Int[Array, "W"]: ...
 
+    @abc.abstractmethod
+    def _act(self, act: Any, model: mjx.Model, data: mjx.Data, ignored: Bool[Array, "H O"] | None) -> mjx.Data:
+        """A function of MJX on one world, with the contacts that are ignored dropped."""
+
     # The protocol.
 
     def reset(self) -> MjxPhysics:
@@ -147,13 +157,16 @@ class MjxEngine(abc.ABC):
     def step(self, physics: MjxPhysics, ctrl: Float[Array, "W nu"] | None = None) -> tuple[MjxPhysics, PhysicsView]:
         """One control step of every world; see `Engine.step`."""
         data = physics.data
+        wrong_controls = physics.wrong_controls
         if ctrl is not None:
-            data = data.replace(ctrl=jnp.asarray(ctrl, jnp.float32))
+            check_shape(ctrl, self.num_worlds, self.host_model.nu)
+            clipped, wrong = clip(jnp.asarray(ctrl, jnp.float32), data.ctrl)
+            data, wrong_controls = data.replace(ctrl=clipped), wrong_controls | wrong
 
         def substep(carry: Any, _: Any) -> tuple[Any, None]:
             data, forces, overflow, _ = carry
             awake = self._tree_asleep(data) < 0
-            data = self._mapped(mjx.step, self.model, data, physics.eq_data)
+            data = self._mapped(mjx.step, self.model, data, physics.eq_data, physics.ignored)
             forces = jax.tree.map(jnp.maximum, forces, self._forces(data))
             return (data, forces, overflow | self._overflow(data), awake), None
 
@@ -174,6 +187,7 @@ class MjxEngine(abc.ABC):
             link_force=link_force,
             finger_force=finger_force,
             overflow=overflow,
+            wrong_controls=wrong_controls,
         )
         return physics, self.view(physics)
 
@@ -193,21 +207,31 @@ class MjxEngine(abc.ABC):
         eq_active = data.eq_active if write.eq_active is None else jnp.asarray(write.eq_active, data.eq_active.dtype)
         eq_data = physics.eq_data if write.eq_data is None else jnp.asarray(write.eq_data, jnp.float32)
         tree_moved |= self._trees_joined(physics, eq_active, eq_data)
-        changed = tree_moved.any() | (eq_active != data.eq_active).any() | (eq_data != physics.eq_data).any()
+        ignored = physics.ignored
+        if write.ignored_contacts is not None:
+            ignored = self._checked_filter(jnp.asarray(write.ignored_contacts, bool))
+            tree_moved |= reaches((ignored != physics.ignored).any(1), self.layout.object_trees)
+        changed = (ignored != physics.ignored).any()
+        changed |= tree_moved.any() | (eq_active != data.eq_active).any() | (eq_data != physics.eq_data).any()
         data = data.replace(qpos=qpos, qvel=qvel, eq_active=eq_active)
         data = self._with_sleep(
             data, jnp.where(tree_moved & (asleep < 0), FULLY_AWAKE, asleep), (asleep < 0) | tree_moved
         )
-        physics = dataclasses.replace(physics, data=data, eq_data=eq_data)
+        physics = dataclasses.replace(physics, data=data, eq_data=eq_data, ignored=ignored)
         return jax.lax.cond(changed, self._refresh, lambda p: p, physics)
 
     def snapshot(self, physics: MjxPhysics) -> Snapshot:
         """All worlds as a snapshot with the world axis."""
-        data = physics.data
+        data, count = physics.data, self.layout.num_object_units
         fields = {name: getattr(data, name) for name in STATE_FIELDS}
         fields["eq_active"] = fields["eq_active"].astype(bool)
-        return Snapshot(
-            **fields, eq_data=physics.eq_data, tree_asleep=self._tree_asleep(data), touching=physics.touching
+        return make_snapshot(
+            fields | {"eq_data": physics.eq_data, "tree_asleep": self._tree_asleep(data)},
+            self.layout.scene_sizes,
+            data.time,
+            physics.touching[:, :count, :count],
+            physics.touching[:, count:, :count],
+            physics.ignored,
         )
 
     def export(self, physics: MjxPhysics, world: int) -> Snapshot:
@@ -218,9 +242,9 @@ class MjxEngine(abc.ABC):
 
     def load(self, physics: MjxPhysics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> MjxPhysics:
         """Replaces worlds by snapshots; see `Engine.load`. Raises EngineError where it is of another scene."""
-        check_snapshot(snapshot, self.host_model, self.layout.num_units, self.num_worlds, self.scene.name)
+        snapshot = fitted(snapshot, self._initial, self.num_worlds, self.scene.name)
         chosen = jnp.ones(self.num_worlds, bool) if mask is None else jnp.asarray(mask, bool)
-        batched = snapshot.qpos.ndim == 2
+        batched = snapshot.time.ndim == 1
 
         def put(new: Any, old: Array) -> Array:
             new = jnp.asarray(new).astype(old.dtype)
@@ -228,17 +252,20 @@ class MjxEngine(abc.ABC):
             return jnp.where(chosen.reshape(shape), new if batched else new[None], old)
 
         data = physics.data
-        data = data.replace(**{name: put(getattr(snapshot, name), getattr(data, name)) for name in STATE_FIELDS})
+        fields = {name: put(snapshot.whole(name), getattr(data, name)) for name in STATE_FIELDS}
+        data = data.replace(**fields, time=put(snapshot.time, data.time))
         asleep = put(snapshot.tree_asleep, self._tree_asleep(data))
         data = self._with_sleep(data, asleep, asleep < 0)
         return dataclasses.replace(
             physics,
             data=self._kinematics(data),
             eq_data=put(snapshot.eq_data, physics.eq_data),
-            touching=put(snapshot.touching, physics.touching),
+            ignored=put(snapshot.agents.ignored_contacts, physics.ignored),
+            touching=put(_all_units(snapshot), physics.touching),
             link_force=jnp.where(chosen[:, None, None], 0.0, physics.link_force),
             finger_force=jnp.where(chosen[:, None, None], 0.0, physics.finger_force),
             overflow=jnp.where(chosen, 0, physics.overflow),
+            wrong_controls=physics.wrong_controls & ~chosen,
         )
 
     def health(self, physics: MjxPhysics) -> Health:
@@ -250,6 +277,7 @@ class MjxEngine(abc.ABC):
             overflow=physics.overflow,
             finite=jnp.isfinite(data.qpos).all(1) & jnp.isfinite(data.qvel).all(1),
             top_speed=jnp.sqrt(jnp.square(velocity).sum(-1).max(1, initial=0.0)),
+            wrong_controls=physics.wrong_controls,
         )
 
     def to_mujoco(self, physics: MjxPhysics, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
@@ -257,12 +285,13 @@ class MjxEngine(abc.ABC):
         row = self.export(physics, world)
         model = copy.copy(self.host_model)
         model.eq_data[:] = row.eq_data
+        masks = BitLayers(model, self.tables).masks(row.agents.ignored_contacts)
+        if masks is not None:
+            model.geom_contype[:], model.geom_conaffinity[:] = masks
         data = mujoco.MjData(model)
+        data.time = float(row.time)
         for name in STATE_FIELDS:
-            if name == "time":
-                data.time = float(row.time)
-            else:
-                getattr(data, name)[:] = getattr(row, name)
+            getattr(data, name)[:] = row.whole(name)
         mujoco.mj_forward(model, data)  # of all bodies: nothing sleeps in new data
         restore_sleep(model, data, np.asarray(row.tree_asleep))
         return model, data
@@ -282,10 +311,12 @@ class MjxEngine(abc.ABC):
         physics = MjxPhysics(
             data=spread(jnp.tile(template.ctrl, (worlds, 1))),
             eq_data=jnp.tile(jnp.asarray(self.host_model.eq_data, jnp.float32), (worlds, 1, 1)),
+            ignored=jnp.zeros((worlds, len(tables.hand_body), tables.num_objects), bool),
             touching=jnp.zeros((worlds, units, units), bool),
             link_force=jnp.zeros((worlds, len(tables.link_object), tables.num_objects), jnp.float32),
             finger_force=jnp.zeros((worlds, len(tables.finger_body), len(tables.graspable_body)), jnp.float32),
             overflow=jnp.zeros(worlds, jnp.int32),
+            wrong_controls=jnp.zeros(worlds, bool),
         )
         return self.load(physics, initial)
 
@@ -318,7 +349,7 @@ class MjxEngine(abc.ABC):
 
     def _refresh(self, physics: MjxPhysics) -> MjxPhysics:
         """Everything derived, of the present positions; wakes what was marked. No forces are reported."""
-        data = self._mapped(mjx.forward, self.model, physics.data, physics.eq_data)
+        data = self._mapped(mjx.forward, self.model, physics.data, physics.eq_data, physics.ignored)
         awake = self._tree_asleep(data) < 0
         return dataclasses.replace(
             physics,
@@ -328,11 +359,32 @@ class MjxEngine(abc.ABC):
             finger_force=jnp.zeros_like(physics.finger_force),
         )
 
-    def _map(self, act: Any, model: mjx.Model, data: mjx.Data, eq_data: Float[Array, "W E 12"]) -> mjx.Data:
+    def _map(
+        self,
+        act: Any,
+        model: mjx.Model,
+        data: mjx.Data,
+        eq_data: Float[Array, "W E 12"],
+        ignored: Bool[Array, "W H O"],
+    ) -> mjx.Data:
         """A function of MJX on every world. The model comes as an argument, so that a program holds it only once."""
-        if self.host_model.neq == 0:
+        of_world: dict[str, Array] = {}
+        if self.host_model.neq:
+            of_world["eq_data"] = eq_data
+        if ignored.size:
+            of_world["ignored"] = ignored
+        if not of_world:
             return jax.vmap(lambda d: act(model, d))(data)
-        return jax.vmap(lambda e, d: act(model.replace(eq_data=e), d))(eq_data, data)
+
+        def one(fields: dict[str, Array], d: mjx.Data) -> mjx.Data:
+            own = model.replace(eq_data=fields["eq_data"]) if "eq_data" in fields else model
+            return self._act(act, own, d, fields.get("ignored"))
+
+        return jax.vmap(one)(of_world, data)
+
+    def _checked_filter(self, ignored: Bool[Array, "W H O"]) -> Bool[Array, "W H O"]:
+        """What was asked to be ignored. Raises EngineError where this engine cannot."""
+        return ignored
 
     def _touching(
         self, data: mjx.Data, remembered: Bool[Array, "W U U"], tree_awake: Bool[Array, "W T"]
@@ -373,3 +425,14 @@ class MjxEngine(abc.ABC):
             mujoco.mj_resetDataKeyframe(self.host_model, data, 0)
         mujoco.mj_forward(self.host_model, data)
         return data
+
+
+def _all_units(snapshot: Snapshot) -> Bool[Array, "*W U U"]:
+    """Touching of all units from a snapshot's two parts; agents' with agents' is not kept."""
+    objects, agents = jnp.asarray(snapshot.scene.touching), jnp.asarray(snapshot.agents.touching)
+    count = agents.shape[-2]
+    if not count:
+        return objects
+    corner = jnp.zeros((*agents.shape[:-1], count), bool)
+    rows = jnp.concatenate([objects, agents.swapaxes(-1, -2)], -1)
+    return jnp.concatenate([rows, jnp.concatenate([agents, corner], -1)], -2)

@@ -6,15 +6,26 @@ section 2, fact 1), and nothing sleeps in it.
 
 from __future__ import annotations
 
+import contextlib
+import threading
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
 import jax.numpy as jnp
 import mujoco
 from jaxtyping import Bool, Float, Int
 from mujoco import mjx
+from mujoco.mjx._src import collision_driver
 
+from ig2mj.engine.contact_filter import geom_hands
 from ig2mj.engine.mjx.contacts import Contacts, jax_contacts
 from ig2mj.engine.mjx.engine import MjxEngine
 from ig2mj.engine.native.sleep import FULLY_AWAKE
 from ig2mj.engine.view import Array
+from ig2mj.engine.warp.patches.scope import ScopedReplacement
+
+FAR = 1000.0
+"""Metres: the distance written into a dropped contact, so that it gives neither force nor touch."""
 
 
 class JaxEngine(MjxEngine):
@@ -48,3 +59,49 @@ class JaxEngine(MjxEngine):
 
     def _overflow(self, data: mjx.Data) -> Int[Array, "W"]:
         return jnp.zeros(data.qpos.shape[0], jnp.int32)
+
+    def _act(self, act: Any, model: mjx.Model, data: mjx.Data, ignored: Bool[Array, "H O"] | None) -> mjx.Data:
+        if ignored is None:
+            return act(model, data)
+        hand, thing = geom_hands(self.host_model, self.tables), self.tables.geom_object
+        with _ignoring(jnp.asarray(hand), jnp.asarray(thing), ignored):
+            return act(model, data)
+
+
+class _Pairs(NamedTuple):
+    """`Write.ignored_contacts` of the world that is being traced, and hand and object of each geom."""
+
+    geom_hand: Int[Array, "G"]
+    geom_object: Int[Array, "G"]
+    ignored: Bool[Array, "H O"]
+
+
+_here = threading.local()
+_collision = ScopedReplacement()
+
+
+@contextlib.contextmanager
+def _ignoring(geom_hand: Array, geom_object: Array, ignored: Array) -> Iterator[None]:
+    """What this thread traces of MJX's collision inside the block drops the ignored contacts."""
+    _here.pairs = _Pairs(geom_hand, geom_object, ignored)
+    try:
+        with _collision.entered():
+            yield
+    finally:
+        _here.pairs = None
+
+
+def _without_ignored(model: mjx.Model, data: mjx.Data) -> mjx.Data:
+    data = _collision.original(collision_driver, "collision")(model, data)
+    pairs: _Pairs = _here.pairs
+    contact = data._impl.contact
+    geom = jnp.maximum(jnp.asarray(contact.geom), 0)
+    hand, thing = pairs.geom_hand[geom], pairs.geom_object[geom]
+    dropped = jnp.zeros(contact.dist.shape, bool)
+    for side in (0, 1):
+        own, other = hand[:, side], thing[:, 1 - side]
+        dropped |= (own >= 0) & (other >= 0) & pairs.ignored[jnp.maximum(own, 0), jnp.maximum(other, 0)]
+    return data.tree_replace({"_impl.contact.dist": jnp.where(dropped, FAR, contact.dist)})
+
+
+_collision.add({(collision_driver, "collision"): _without_ignored})

@@ -24,20 +24,23 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Snapshot, Write, check_arguments
+from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Write, check_arguments
+from ig2mj.engine.contact_filter import BitLayers
+from ig2mj.engine.controls import check_shape
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.native.contacts import FINGER, LINK, PRESSED, force_roles
 from ig2mj.engine.native.later import RAW, Agents, LaterPlan, ObjectMotion
+from ig2mj.engine.native.model_slot import ModelSlot
 from ig2mj.engine.native.one_world import Statics, World
 from ig2mj.engine.native.vicinity import Masks, VicinityTable
 from ig2mj.engine.native.view_rows import FIELDS, Changed, PoseRows
 from ig2mj.engine.native.writing import apply_write
 from ig2mj.engine.object_boxes import make_box_table
-from ig2mj.engine.snapshot_check import check_snapshot
+from ig2mj.engine.snapshot import Snapshot, fitted
 from ig2mj.engine.view import SCHEMA, AgentView, Array, PhysicsView, axis_sizes
 from ig2mj.errors import EngineError
-from ig2mj.process import prepare_jax
+from ig2mj.process import prepare_jax, prepare_mujoco
 from ig2mj.scene.scene import Scene
 from ig2mj.scene.tables import SceneTables
 
@@ -145,13 +148,14 @@ class NativeEngine:
         """
         check_arguments(boxes, num_worlds, substeps, timestep)
         prepare_jax()
+        prepare_mujoco()
         if threads is not None and threads < 1:
             raise EngineError(f"threads = {threads}: at least one is needed")
         self.scene, self.tables, self.num_worlds = scene, scene.tables, num_worlds
         self.substeps, self.timestep, self.boxes = substeps, timestep, boxes
         self.threads = min(threads or os.cpu_count() or 1, num_worlds)
-        self._models = [_engine_model(scene.model, timestep) for _ in range(self.threads)]
-        model = self._models[0]
+        self._slots = [ModelSlot(_engine_model(scene.model, timestep)) for _ in range(self.threads)]
+        model = self._slots[0].model
         self.layout: ModelLayout = make_layout(model, self.tables)
         roles = force_roles(self.layout, self.tables.geom_object)
         self._statics = Statics(
@@ -166,21 +170,22 @@ class NativeEngine:
             later=LaterPlan.build(model, self.tables, self.layout, touch_tolerance),
             has_agents=len(self.tables.agent_names) > 0,
             vicinity=VicinityTable.build(model, self.layout.equality_tree),
+            layers=BitLayers(model, self.tables),
             force_roles=roles,
             any_forces=any((roles & bit).any() and (roles & bit << PRESSED).any() for bit in (LINK, FINGER)),
             pyramidal=model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL,
             tolerance=touch_tolerance,
             substeps=substeps,
         )
-        self._masks = [Masks(self._statics.vicinity, model) for model in self._models]
+        self._masks = [Masks(self._statics.vicinity, slot.model) for slot in self._slots]
         self._shares = np.array_split(np.arange(num_worlds), self.threads)
         self._pool = ThreadPoolExecutor(self.threads, "ig2mj-native") if self.threads > 1 else None
 
     def reset(self) -> NativePhysics:
         """New worlds at the scene's initial state: its first keyframe, else the zero pose; everything awake."""
-        arrays = _working_arrays(self.num_worlds, self._models[0], self.tables)
+        arrays = _working_arrays(self.num_worlds, self._slots[0].model, self.tables)
         worlds = [
-            World(self._statics, self._models[share], self._masks[share], {n: a[w] for n, a in arrays.items()}, int(w))
+            World(self._statics, self._slots[share], self._masks[share], {n: a[w] for n, a in arrays.items()}, int(w))
             for share, numbers in enumerate(self._shares)
             for w in numbers
         ]
@@ -188,6 +193,15 @@ class NativeEngine:
 
         physics.update(self._run(physics, World.start))
         return physics
+
+    @functools.cached_property
+    def _start(self) -> Snapshot:
+        """World 0 of a reset."""
+        rows = {name: array[0] for name, array in _working_arrays(1, self._slots[0].model, self.tables).items()}
+        world = World(self._statics, self._slots[0], self._masks[0], rows, 0)
+        self._slots[0].put(world.fields)
+        world.start()
+        return world.save()
 
     def step(
         self, physics: NativePhysics, ctrl: Float[Array, "W nu"] | None = None
@@ -199,6 +213,7 @@ class NativeEngine:
             changed = self._run(physics, lambda world: world.step(None))
         else:
             rows = np.asarray(ctrl, np.float64)
+            check_shape(rows, self.num_worlds, self._slots[0].model.nu)
             changed = self._run(physics, lambda world: world.step(rows[world.number]))
         return physics, physics.update(changed)
 
@@ -213,9 +228,9 @@ class NativeEngine:
     def write(self, physics: NativePhysics, write: Write) -> NativePhysics:
         """Applies a change in place; see `Engine.write`."""
         rows = {
-            name: np.asarray(value)
-            for name in ("object_mask", "object_pos", "object_quat", "qpos_mask", "qpos", "eq_active", "eq_data")
-            if (value := getattr(write, name)) is not None
+            field.name: np.asarray(value)
+            for field in dataclasses.fields(Write)
+            if (value := getattr(write, field.name)) is not None
         }
 
         def apply(world: World) -> int:
@@ -234,6 +249,7 @@ class NativeEngine:
             overflow=np.zeros(self.num_worlds, np.int32),
             finite=np.asarray(np.isfinite(positions).all(1) & np.isfinite(velocity).all((1, 2))),
             top_speed=np.sqrt(np.square(velocity).sum(-1).max(1, initial=0.0)),
+            wrong_controls=np.array([world.wrong_controls for world in physics.worlds]),
         )
 
     def snapshot(self, physics: NativePhysics) -> Snapshot:
@@ -242,20 +258,18 @@ class NativeEngine:
 
     def export(self, physics: NativePhysics, world: int) -> Snapshot:
         """One world as a snapshot in float64 numpy arrays of its own."""
-        return Snapshot(**physics.worlds[world].save())
+        return physics.worlds[world].save()
 
     def load(self, physics: NativePhysics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> NativePhysics:
         """Replaces worlds in place; see `Engine.load`. Raises EngineError where the snapshot is of another scene."""
-        model = self._models[0]
-        arrays = {field.name: np.asarray(getattr(snapshot, field.name)) for field in dataclasses.fields(Snapshot)}
-        check_snapshot(snapshot, model, self.layout.num_units, self.num_worlds, self.scene.name)
-        batched = arrays["time"].ndim == 1
+        snapshot = jax.tree.map(np.asarray, fitted(snapshot, self._start, self.num_worlds, self.scene.name))
+        batched = snapshot.time.ndim == 1
         chosen = np.ones(self.num_worlds, bool) if mask is None else np.asarray(mask, bool)
 
         def replace(world: World) -> int:
             if not chosen[world.number]:
                 return Changed.NOTHING
-            return world.load({n: a[world.number] if batched else a for n, a in arrays.items()})
+            return world.load(jax.tree.map(lambda a: np.asarray(a[world.number]), snapshot) if batched else snapshot)
 
         physics.update(self._run(physics, replace))
         return physics
@@ -263,7 +277,7 @@ class NativeEngine:
     def to_mujoco(self, physics: NativePhysics, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """The live model and data of a world. Do not step them."""
         one = physics.worlds[world]
-        one.model.eq_data[:] = one.eq_data
+        one.model_slot.put(one.fields)
         return one.model, one.data
 
     def _run(self, physics: NativePhysics, act: Callable[[World], int]) -> int:
@@ -275,8 +289,7 @@ class NativeEngine:
             changed = Changed.NOTHING
             for number in share:
                 world = physics.worlds[number]
-                if len(world.eq_data):
-                    world.model.eq_data[:] = world.eq_data
+                world.model_slot.put(world.fields)
                 try:
                     changed |= act(world)
                 except EngineError as e:  # the other worlds go on; the caller hears of it when all are done

@@ -7,16 +7,20 @@ import dataclasses
 import mujoco
 import numpy as np
 
+from ig2mj.engine.contact_filter import BitLayers
+from ig2mj.engine.controls import LARGEST, clip
 from ig2mj.engine.layout import ModelLayout
 from ig2mj.engine.native.contacts import add_forces, touching_units
 from ig2mj.engine.native.later import AgentContacts, LaterPlan, agents_touching, of_owners
+from ig2mj.engine.native.model_slot import ModelSlot
 from ig2mj.engine.native.sleep import restore_sleep, wake_trees
 from ig2mj.engine.native.vicinity import Masks, Vicinity, VicinityTable
 from ig2mj.engine.native.view_rows import Changed, PosePlan, PoseRows
+from ig2mj.engine.snapshot import AXIS, Snapshot, make_snapshot
 from ig2mj.errors import EngineError
 from ig2mj.scene.tables import SceneTables
 
-_STATE = ("qpos", "qvel", "act", "ctrl", "qacc_warmstart", "eq_active", "mocap_pos", "mocap_quat")
+_STATE = tuple(name for name in AXIS if name not in ("eq_data", "tree_asleep"))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -25,6 +29,7 @@ class Statics:
 
     Attributes:
       later: plan of the fields that are made later. has_agents: there is one.
+      layers: the contact filter.
       force_roles: [G] see `ig2mj.engine.native.contacts`. any_forces: some contact's force is of interest.
       See `ig2mj.engine.layout`, `ig2mj.engine.native.view_rows` and `ig2mj.engine.native.vicinity` for the rest.
     """
@@ -35,6 +40,7 @@ class Statics:
     later: LaterPlan
     has_agents: bool
     vicinity: VicinityTable
+    layers: BitLayers
     force_roles: np.ndarray
     any_forces: bool
     pyramidal: bool
@@ -49,11 +55,14 @@ class World:
       data: MuJoCo's state. rows: this world's row of each of the engine's working arrays, by field of the view.
       units: [V, V] remembered touching of objects' units.
       agent_contacts: what tells which objects the agents touch.
-      eq_data: [E, 11] this world's equality parameters; its engine puts them into the model before it steps.
+      fields: fields of the model that this world has for itself, by name; its engine puts them into the model that the
+        worlds of a thread share before it does anything with the world. Always there: eq_data.
+      ignored: [H, O] contacts that are dropped. wrong_controls: some control was clipped since the world was loaded.
     """
 
-    def __init__(self, statics: Statics, model: mujoco.MjModel, masks: Masks, rows: dict[str, np.ndarray], number: int):
-        self.statics, self.model, self.masks, self.rows, self.number = statics, model, masks, rows, number
+    def __init__(self, statics: Statics, slot: ModelSlot, masks: Masks, rows: dict[str, np.ndarray], number: int):
+        self.statics, self.model, self.masks, self.rows, self.number = statics, slot.model, masks, rows, number
+        self.model_slot, model = slot, slot.model
         self.data = mujoco.MjData(model)
         self._near = Vicinity(statics.vicinity, model, self.data)
         count = statics.layout.num_object_units
@@ -63,7 +72,8 @@ class World:
         self.agent_contacts = AgentContacts(nothing, None, *self._no_contacts)
         self._agent_fresh: np.ndarray | None = None
         self._sleeping_agents = np.zeros(0, int)
-        self.eq_data = np.array(model.eq_data)
+        self.fields: dict[str, np.ndarray] = {"eq_data": slot.own("eq_data")}
+        self.ignored = np.zeros((len(statics.tables.hand_body), statics.tables.num_objects), bool)
         self._plans: dict[bytes, PosePlan] = {}
         self._fresh = np.zeros_like(self.units)  # [U, U] pairs with an awake unit
         self._any_fresh = False
@@ -77,12 +87,16 @@ class World:
         self._has_grasps = len(statics.layout.grasp_equality) > 0
         outside = (self.data.qvel, self.data.xfrc_applied, self.data.qfrc_applied)
         self._from_outside = tuple((array, np.zeros_like(array).tobytes()) for array in outside)
+        self.wrong_controls = False
         self._never_left_alone = model.nmocap > 0
 
     def step(self, ctrl: np.ndarray | None) -> int:
         """One control step, and the refresh after it. The data stands after `mj_step1` before and after."""
         model, data, statics = self.model, self.data, self.statics
         if ctrl is not None:
+            if not (ctrl.dot(ctrl) <= LARGEST**2):  # true for NaN, too
+                ctrl, wrong = clip(ctrl[None], data.ctrl[None])
+                ctrl, self.wrong_controls = ctrl[0], self.wrong_controls or bool(wrong[0])
             data.ctrl[:] = ctrl
         if self.only_time_passes():
             return Changed.NOTHING
@@ -182,50 +196,70 @@ class World:
             mujoco.mj_step1(model, data)
             return self.refresh(everything=True)
         # Some trees start asleep (`sleep="init"`): let them show their contacts once.
-        fields = self.save()
+        saved = self.save()
         wake_trees(model, data, np.arange(model.ntree))
         mujoco.mj_step1(model, data)
         self.refresh(everything=True)
-        return self.load({**fields, "tree_asleep": asleep, "touching": self._touching()})
+        shown = self.save()
+        return self.load(
+            saved.replace(
+                scene=saved.scene.replace(touching=shown.scene.touching),
+                agents=saved.agents.replace(touching=shown.agents.touching),
+            )
+        )
 
-    def save(self) -> dict[str, np.ndarray]:
-        """Copies of the fields of a snapshot (see `ig2mj.engine.base.Snapshot`)."""
+    def save(self) -> Snapshot:
+        """The world as a snapshot in arrays of its own."""
         data = self.data
         fields = {name: np.array(getattr(data, name)) for name in (*_STATE, "tree_asleep")}
         fields["eq_active"] = fields["eq_active"].astype(bool)
-        return fields | {"eq_data": self.eq_data.copy(), "time": np.asarray(data.time), "touching": self._touching()}
+        return make_snapshot(
+            fields | {"eq_data": np.array(self.fields["eq_data"])},
+            self.statics.layout.scene_sizes,
+            np.asarray(data.time),
+            self.units.copy(),
+            self.agents_touch().copy(),
+            self.ignored.copy(),
+        )
 
-    def _touching(self) -> np.ndarray:
-        of_agents = self.agents_touch()
-        return np.block([[self.units, of_agents.T], [of_agents, np.zeros((len(of_agents),) * 2, bool)]])
-
-    def _take_touching(self, touching: np.ndarray) -> None:
-        count = len(self.units)
-        self.units = np.array(touching[:count, :count])
-        known = np.array(touching[count:, :count])
-        self.agent_contacts = AgentContacts(known, np.zeros_like(known), *self._no_contacts)
-
-    def load(self, fields: dict[str, np.ndarray]) -> int:
-        """Takes the fields of a snapshot, and refreshes everything."""
+    def load(self, snapshot: Snapshot) -> int:
+        """Takes a snapshot without the world axis, and refreshes everything."""
         self.disturbed()
+        self.wrong_controls = False
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
-        self.eq_data = np.array(fields["eq_data"], np.float64)
-        model.eq_data[:] = self.eq_data
-        self._set_state(fields)
+        self.set_fields(eq_data=snapshot.eq_data)
+        self.ignore(np.asarray(snapshot.agents.ignored_contacts))
+        self._set_state(snapshot)
         wake_trees(model, data, np.arange(model.ntree))
         mujoco.mj_step1(model, data)  # kinematics of everything, while everything is awake
-        self._set_state(fields)
-        restore_sleep(model, data, fields["tree_asleep"])
+        self._set_state(snapshot)
+        restore_sleep(model, data, np.asarray(snapshot.tree_asleep))
         mujoco.mj_step1(model, data)
-        self._take_touching(np.asarray(fields["touching"], bool))
+        self.units = np.array(snapshot.scene.touching, bool)
+        known = np.array(snapshot.agents.touching, bool)
+        self.agent_contacts = AgentContacts(known, np.zeros_like(known), *self._no_contacts)
         return self.clear_force() | self.refresh(everything=True)
 
-    def _set_state(self, fields: dict[str, np.ndarray]) -> None:
+    def _set_state(self, snapshot: Snapshot) -> None:
         for name in _STATE:
-            getattr(self.data, name)[:] = fields[name]
-        self.data.qacc[:] = fields["qacc_warmstart"]
-        self.data.time = float(fields["time"])
+            getattr(self.data, name)[:] = snapshot.whole(name)
+        self.data.qacc[:] = snapshot.qacc_warmstart
+        self.data.time = float(snapshot.time)
+
+    def set_fields(self, **fields: np.ndarray | None) -> None:
+        """Fields of the model that this world has for itself from now on; None: the model's own again."""
+        kept = {name: array for name, array in (self.fields | fields).items() if array is not None}
+        self.fields = {name: np.array(array, self.model_slot.own(name).dtype) for name, array in kept.items()}
+        self.model_slot.put(self.fields)
+
+    def ignore(self, ignored: np.ndarray) -> None:
+        """Drops the contacts of hands with objects [H, O] from now on."""
+        if np.array_equal(ignored, self.ignored):
+            return
+        self.ignored = np.array(ignored, bool)
+        contype, conaffinity = self.statics.layers.masks(self.ignored) or (None, None)
+        self.set_fields(geom_contype=contype, geom_conaffinity=conaffinity)
 
     def clear_force(self) -> int:
         """Forgets the contact forces of the last control step."""

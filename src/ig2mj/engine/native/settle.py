@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ig2mj.engine.base import Snapshot
 from ig2mj.engine.native.engine import NativeEngine
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.scene.scene import Scene
 
 SETTLE_SECONDS = 10.0

@@ -38,13 +38,16 @@ def apply_write(world: World, rows: dict[str, np.ndarray]) -> int:
         joined |= data.eq_active.astype(bool) != rows["eq_active"]
         data.eq_active[:] = rows["eq_active"]
     if "eq_data" in rows:
-        joined |= (world.eq_data != rows["eq_data"]).any(1) & data.eq_active.astype(bool)
-        world.eq_data = rows["eq_data"].astype(np.float64)
-        model.eq_data[:] = world.eq_data
+        joined |= (world.fields["eq_data"] != rows["eq_data"]).any(1) & data.eq_active.astype(bool)
+        world.set_fields(eq_data=rows["eq_data"])
+    filtered = "ignored_contacts" in rows and bool((world.ignored != rows["ignored_contacts"]).any())
+    if filtered:
+        trees |= layout.object_trees[(world.ignored != rows["ignored_contacts"]).any(0)].any(0)
+        world.ignore(rows["ignored_contacts"])
     if joined.any():  # what a hand lets go may be ready to sleep: it would hang in the air
         free = layout.equality_tree[joined].ravel()
         trees[free[free >= 0]] = True
-    if rows and not trees.any():
+    if rows and not trees.any() and not filtered:
         return Changed.NOTHING
     world.disturbed()
     wake_trees(model, data, np.flatnonzero(trees))

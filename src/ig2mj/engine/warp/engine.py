@@ -11,17 +11,21 @@ from typing import Any
 
 import jax.numpy as jnp
 import mujoco
+import numpy as np
 from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 
-from ig2mj.engine.base import Snapshot
+from ig2mj.engine.contact_filter import geom_hands
 from ig2mj.engine.health import Usage
 from ig2mj.engine.mjx.contacts import Contacts, warp_contacts
 from ig2mj.engine.mjx.engine import MjxEngine, MjxPhysics
 from ig2mj.engine.native.settle import settle
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.engine.warp import patches
+from ig2mj.engine.warp.patches.ignored import encode
 from ig2mj.engine.warp.profile import EngineProfile, fit, holds_everything, load_profile
+from ig2mj.errors import EngineError
 from ig2mj.process import prepare_warp
 from ig2mj.scene.scene import Scene
 
@@ -81,12 +85,33 @@ class WarpEngine(MjxEngine):
         own.opt.iterations, own.opt.ls_iterations = self._iterations, self._ls_iterations
         return own
 
-    def _map(self, act: Any, model: mjx.Model, data: mjx.Data, eq_data: Float[Array, "W E 12"]) -> mjx.Data:
+    def _map(self, act: Any, *arguments: Any) -> mjx.Data:
         with patches.traced_with(self.own_kernels):
-            return super()._map(act, model, data, eq_data)
+            return super()._map(act, *arguments)
+
+    def _act(self, act: Any, model: mjx.Model, data: mjx.Data, ignored: Bool[Array, "H O"] | None) -> mjx.Data:
+        if ignored is not None and self._filters:  # see `ig2mj.engine.warp.patches.ignored`
+            model = model.tree_replace({"_impl.pair_adhesion": ignored.reshape(-1).astype(jnp.float32)})
+        return act(model, data)
+
+    @property
+    def _filters(self) -> bool:
+        model = self.host_model
+        return self.own_kernels and not model.npair and not np.any(model.geom_adhesion)
+
+    def _checked_filter(self, ignored: Bool[Array, "W H O"]) -> Bool[Array, "W H O"]:
+        if not self._filters:
+            raise EngineError(
+                f"contacts cannot be ignored in scene '{self.scene.name}': that needs our kernels for MuJoCo Warp, and "
+                "a scene without <pair> and without adhesion"
+            )
+        return ignored
 
     def _put_model(self, model: mujoco.MjModel) -> mjx.Model:
         put = mjx.put_model(model, impl="warp")
+        if len(self.tables.hand_body) and self._filters:
+            code = encode(geom_hands(model, self.tables), self.tables.geom_object, self.tables.num_objects)
+            put = put.tree_replace({"_impl.geom_adhesion": jnp.asarray(code)})
         return put if self._print_overflow else put.tree_replace({"opt._impl.warn_overflow": 0})
 
     def _put_data(self, model: mujoco.MjModel, data: mujoco.MjData) -> mjx.Data:

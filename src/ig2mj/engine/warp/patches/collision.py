@@ -10,6 +10,7 @@ from mujoco.mjx.third_party.mujoco_warp._src import collision_driver
 
 from ig2mj.engine.warp.patches.broadphase import awake_broadphase, serves
 from ig2mj.engine.warp.patches.contacts import mend_contacts
+from ig2mj.engine.warp.patches.ignored import drop_ignored
 from ig2mj.engine.warp.patches.replacements import original
 
 
@@ -28,7 +29,7 @@ def _keep_larger(first: wp.array[int], ncollision: wp.array[int]):
 
 
 def collision(m: Any, d: Any, awake_prev: Any = None) -> None:
-    """Collision detection as upstream; then contacts are checked against their geoms.
+    """Collision detection as upstream; then contacts are checked against their geoms and ignored ones dropped.
 
     Upstream counts pairs anew in the second pass, of what the first woke, and looks only at that number for an
     overflow; afterwards `d.ncollision` is that of the larger pass here.
@@ -41,3 +42,4 @@ def collision(m: Any, d: Any, awake_prev: Any = None) -> None:
         wp.launch(_keep_larger, dim=1, inputs=[first], outputs=[d.ncollision])
     if d.naconmax > 0:
         mend_contacts(m, d)
+        drop_ignored(m, d)

@@ -1,0 +1,246 @@
+"""`Snapshot`: physics of worlds outside of any engine, in two parts: the scene's and the agents'.
+
+It is what an engine needs to go on exactly where a world stood, and the form in which worlds go to files, to pools of
+initial states and from one engine to another. Agents are compiled into a scene after everything else, so their part of
+each of MuJoCo's arrays is its end. A snapshot of the bare scene can be loaded into the scene with any robot: the robot
+then stands at its start.
+
+Axes: V units of objects, X units of agents (see `ig2mj.engine.layout`), H hands, O objects; others as in MuJoCo, of one
+part.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.view import Array
+from ig2mj.errors import EngineError
+
+FORMAT_VERSION = 2
+"""Of what a file holds of a snapshot. 1: all arrays were of scene and agents together."""
+
+FULLY_AWAKE = -(1 + 10)
+"""`tree_asleep` of a tree that must rest for the full number of steps before it sleeps (mjMINAWAKE is 10)."""
+
+
+@struct.dataclass
+class ScenePart:
+    """What belongs to the scene's objects and building. Fields are MuJoCo's of the same name.
+
+    Attributes:
+      tree_asleep: sleep state per kinematic tree: negative awake, else the next tree of its sleeping island.
+      eq_data: parameters of equality constraints, per world (design section 2, fact 9).
+      touching: remembered contact of units.
+    """
+
+    qpos: Float[Array, "*W nq"]
+    qvel: Float[Array, "*W nv"]
+    act: Float[Array, "*W na"]
+    ctrl: Float[Array, "*W nu"]
+    qacc_warmstart: Float[Array, "*W nv"]
+    eq_active: Bool[Array, "*W E"]
+    eq_data: Float[Array, "*W E 12"]
+    mocap_pos: Float[Array, "*W M 3"]
+    mocap_quat: Float[Array, "*W M 4"]
+    tree_asleep: Int[Array, "*W T"]
+    touching: Bool[Array, "*W V V"]
+
+
+@struct.dataclass
+class AgentsPart:
+    """What belongs to agents: their coordinates, controls, and the equality constraints that one of their bodies has.
+
+    Attributes:
+      touching: remembered contact of agents' units with objects'.
+      ignored_contacts: pairs of hand and object whose contacts are dropped (`ig2mj.engine.base.Write`).
+      The others as in `ScenePart`.
+    """
+
+    qpos: Float[Array, "*W nq"]
+    qvel: Float[Array, "*W nv"]
+    act: Float[Array, "*W na"]
+    ctrl: Float[Array, "*W nu"]
+    qacc_warmstart: Float[Array, "*W nv"]
+    eq_active: Bool[Array, "*W E"]
+    eq_data: Float[Array, "*W E 12"]
+    mocap_pos: Float[Array, "*W M 3"]
+    mocap_quat: Float[Array, "*W M 4"]
+    tree_asleep: Int[Array, "*W T"]
+    touching: Bool[Array, "*W X V"]
+    ignored_contacts: Bool[Array, "*W H O"]
+
+
+AXIS: dict[str, int] = {
+    "qpos": -1,
+    "qvel": -1,
+    "act": -1,
+    "ctrl": -1,
+    "qacc_warmstart": -1,
+    "eq_active": -1,
+    "eq_data": -2,
+    "mocap_pos": -2,
+    "mocap_quat": -2,
+    "tree_asleep": -1,
+}
+"""Fields that are MuJoCo's arrays in two parts, and the axis along which they are."""
+
+
+@struct.dataclass
+class Snapshot:
+    """Physics of one world, or of a batch of worlds (every array then begins with the world axis). Numpy's or JAX's.
+
+    `qpos`, `qvel` and so on give MuJoCo's arrays of scene and agents together; the parts are what is stored.
+
+    Attributes:
+      scene, agents: the two parts. time: simulated seconds, of shape () or (W,).
+    """
+
+    scene: ScenePart
+    agents: AgentsPart
+    time: Float[Array, "*W"]
+
+    def whole(self, name: str) -> Array:
+        """One of MuJoCo's arrays (`AXIS`), of scene and agents together."""
+        scene, agents, axis = getattr(self.scene, name), getattr(self.agents, name), AXIS[name]
+        if not agents.shape[axis]:
+            return scene
+        jaxed = isinstance(scene, jax.Array) or isinstance(agents, jax.Array)
+        return (jnp if jaxed else np).concatenate([scene, agents], axis)
+
+    def with_whole(self, **fields: Any) -> Snapshot:
+        """The snapshot with others of MuJoCo's arrays, of scene and agents together."""
+        scene, agents = {}, {}
+        for name, array in fields.items():
+            scene[name], agents[name] = _split(array, AXIS[name], getattr(self.scene, name).shape[AXIS[name]])
+        return self.replace(scene=self.scene.replace(**scene), agents=self.agents.replace(**agents))
+
+    def without_agents(self) -> Snapshot:
+        """The scene's part alone, for a scene with other agents or none (numpy). What slept in one island with a part
+        of an agent wakes."""
+        asleep = np.array(self.scene.tree_asleep)
+        count = asleep.shape[-1]
+        while True:
+            following = np.take_along_axis(asleep, np.clip(asleep, 0, max(count - 1, 0)), -1)
+            lost = (asleep >= count) | ((asleep >= 0) & (following < 0))
+            if not lost.any():
+                break
+            asleep[lost] = FULLY_AWAKE
+        agents = AgentsPart(
+            **{name: _split(getattr(self.agents, name), axis, 0)[0] for name, axis in AXIS.items()},
+            touching=np.asarray(self.agents.touching)[..., :0, :],
+            ignored_contacts=np.asarray(self.agents.ignored_contacts)[..., :0, :],
+        )
+        return self.replace(scene=self.scene.replace(tree_asleep=asleep), agents=agents)
+
+    @property
+    def qpos(self) -> Float[Array, "*W nq"]:
+        return self.whole("qpos")
+
+    @property
+    def qvel(self) -> Float[Array, "*W nv"]:
+        return self.whole("qvel")
+
+    @property
+    def act(self) -> Float[Array, "*W na"]:
+        return self.whole("act")
+
+    @property
+    def ctrl(self) -> Float[Array, "*W nu"]:
+        return self.whole("ctrl")
+
+    @property
+    def qacc_warmstart(self) -> Float[Array, "*W nv"]:
+        return self.whole("qacc_warmstart")
+
+    @property
+    def eq_active(self) -> Bool[Array, "*W E"]:
+        return self.whole("eq_active")
+
+    @property
+    def eq_data(self) -> Float[Array, "*W E 12"]:
+        return self.whole("eq_data")
+
+    @property
+    def mocap_pos(self) -> Float[Array, "*W M 3"]:
+        return self.whole("mocap_pos")
+
+    @property
+    def mocap_quat(self) -> Float[Array, "*W M 4"]:
+        return self.whole("mocap_quat")
+
+    @property
+    def tree_asleep(self) -> Int[Array, "*W T"]:
+        return self.whole("tree_asleep")
+
+
+def make_snapshot(
+    fields: Mapping[str, Any],
+    sizes: Mapping[str, int],
+    time: Any,
+    touching: Any,
+    agents_touching: Any,
+    ignored_contacts: Any,
+) -> Snapshot:
+    """A snapshot of MuJoCo's arrays (`AXIS`).
+
+    Args:
+      fields: scene and agents together. sizes: how long the scene's part of each is (`ModelLayout.scene_sizes`).
+      touching, agents_touching, ignored_contacts: `ScenePart.touching`, and the agents' two.
+    """
+    parts = {name: _split(fields[name], axis, sizes[name]) for name, axis in AXIS.items()}
+    return Snapshot(
+        scene=ScenePart(**{name: part[0] for name, part in parts.items()}, touching=touching),
+        agents=AgentsPart(
+            **{name: part[1] for name, part in parts.items()},
+            touching=agents_touching,
+            ignored_contacts=ignored_contacts,
+        ),
+        time=time,
+    )
+
+
+def fitted(snapshot: Snapshot, start: Snapshot, num_worlds: int, scene: str) -> Snapshot:
+    """The snapshot, made to fit an engine; works while tracing.
+
+    Args:
+      snapshot: of one world, or with the world axis. One of the bare scene gets the agents of `start`.
+      start: of the engine, one world. num_worlds, scene: of the engine.
+
+    Raises:
+      EngineError: it is of another scene, of other agents or of another number of worlds.
+    """
+    batch = tuple(np.shape(snapshot.time))
+    if batch not in ((), (num_worlds,)):
+        raise EngineError(f"{batch[0]} snapshots do not fit {num_worlds} worlds (give one for each)")
+    bare = not any(getattr(snapshot.agents, name).shape[axis] for name, axis in AXIS.items())
+    if bare and not snapshot.agents.touching.shape[-2]:
+        agents = jax.tree.map(lambda a: np.broadcast_to(a, (*batch, *a.shape)), start.agents)
+        snapshot = snapshot.replace(agents=agents)
+    for part in ("scene", "agents"):
+        for field in dataclasses.fields(getattr(start, part)):
+            found = getattr(getattr(snapshot, part), field.name).shape[len(batch) :]
+            wanted = getattr(getattr(start, part), field.name).shape
+            if tuple(found) != tuple(wanted):
+                mend = (
+                    "load it into the scene that it was saved from"
+                    if part == "scene"
+                    else "load it into the scene with the agents that it was saved with, or take its `without_agents()`"
+                )
+                raise EngineError(
+                    f"the snapshot does not fit scene '{scene}': {field.name} of its {part} has shape {tuple(found)}, "
+                    f"the scene's {tuple(wanted)} ({mend})"
+                )
+    return snapshot
+
+
+def _split(array: Any, axis: int, count: int) -> tuple[Any, Any]:
+    after = (slice(None),) * (-axis - 1)
+    return array[(..., slice(None, count), *after)], array[(..., slice(count, None), *after)]

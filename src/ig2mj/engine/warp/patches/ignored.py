@@ -1,0 +1,61 @@
+"""Contacts of hands with objects that they ignore, dropped where contacts are found (`Write.ignored_contacts`).
+
+MJX hands MuJoCo Warp the fields of its model and nothing else. Two that say how sticky geoms are (`flg_adhesion` is off
+in every household) carry what is needed here: `geom_adhesion` which hand or object a geom is part of, as `encode`
+writes it; `pair_adhesion`, of which there is none without `<pair>`, the worlds' flags.
+"""
+
+# Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
+# pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
+# pyright: reportGeneralTypeIssues=false, reportOperatorIssue=false, reportReturnType=false
+
+from typing import Any, no_type_check
+
+import numpy as np
+import warp as wp
+
+from ig2mj.engine.warp.patches.contacts import FAR
+
+
+def encode(geom_hand: np.ndarray, geom_object: np.ndarray, num_objects: int) -> np.ndarray:
+    """One number for each geom [G]: above zero for a hand's, below for an object's; see `_drop`."""
+    of_hand = np.where(geom_hand >= 0, geom_hand * num_objects + 1, 0)
+    return np.where(geom_object >= 0, -(geom_object + 1), of_hand).astype(np.float32)
+
+
+@wp.kernel
+@no_type_check
+def _drop(
+    code: wp.array2d[float],
+    ignored: wp.array2d[float],
+    count: wp.array[int],
+    worldid: wp.array[int],
+    stride: int,
+    geom: wp.array[wp.vec2i],
+    dist: wp.array[float],
+):
+    first = wp.tid()
+    for contact in range(first, wp.min(count[0], dist.shape[0]), stride):
+        pair = geom[contact]
+        if pair[0] >= 0 and pair[1] >= 0:
+            one = code[0, pair[0]]
+            other = code[0, pair[1]]
+            if one * other < 0.0:
+                place = int(wp.max(one, other)) - 1 - int(wp.min(one, other)) - 1
+                world = worldid[contact] % ignored.shape[0]
+                if ignored[world, place] > 0.0:
+                    dist[contact] = wp.static(FAR)  # no constraint and no touch
+                    geom[contact] = wp.vec2i(-1, -1)  # and wakes nothing
+
+
+def drop_ignored(m: Any, d: Any) -> None:
+    """Takes ignored contacts of all worlds out; after collision detection."""
+    if m.npair or m.flg_adhesion or not m.pair_adhesion.shape[1]:
+        return
+    threads = max(1, min(d.naconmax, 1 << 17))
+    wp.launch(
+        _drop,
+        dim=threads,
+        inputs=[m.geom_adhesion, m.pair_adhesion, d.nacon, d.contact.worldid, threads],
+        outputs=[d.contact.geom, d.contact.dist],
+    )
