@@ -36,7 +36,7 @@ def test_wrong_numbers_are_clipped_and_flagged(full, tmp_path, monkeypatch):
     ctrl[1] = [np.inf, -1e30, 1e7]
     physics, view = full.run(physics, 1, ctrl)
     assert np.asarray(full.engine.snapshot(physics).ctrl)[1].tolist() == [1e6, -1e6, 1e6]
-    flags = np.asarray(check(full.engine.health(physics), view, np.full(len(full.scene.object_names), -9.0)))
+    flags = np.asarray(check(full.engine.health(physics), view.object_com, np.full(len(full.scene.object_names), -9.0)))
     assert (flags & int(Flag.WRONG_CONTROLS)).tolist() == [0, int(Flag.WRONG_CONTROLS)]
     physics = full.load(physics, full.every(full.first))
     assert not np.asarray(full.engine.health(physics).wrong_controls).any()

@@ -158,7 +158,7 @@ def _scene_sizes(model: mujoco.MjModel, tables: SceneTables, equality_body: np.n
     equality = (of_agent[np.maximum(equality_body, 0)] & (equality_body >= 0)).any(1)
     activations = np.repeat(tables.actuator_agent >= 0, model.actuator_actnum)
     axes = {
-        "qpos": np.repeat(of_joint, np.diff(np.append(model.jnt_qposadr, model.nq))),
+        "qpos": np.repeat(of_joint, np.diff(np.append(model.jnt_qposadr, model.nq)).astype(int)),
         "qvel": of_dof,
         "qacc_warmstart": of_dof,
         "act": activations,

@@ -120,7 +120,11 @@ class Snapshot:
         scene, agents = {}, {}
         for name, array in fields.items():
             scene[name], agents[name] = _split(array, AXIS[name], getattr(self.scene, name).shape[AXIS[name]])
-        return self.replace(scene=self.scene.replace(**scene), agents=self.agents.replace(**agents))
+        return dataclasses.replace(
+            self,
+            scene=dataclasses.replace(self.scene, **scene),
+            agents=dataclasses.replace(self.agents, **agents),
+        )
 
     def without_agents(self) -> Snapshot:
         """The scene's part alone, for a scene with other agents or none (numpy). What slept in one island with a part
@@ -138,7 +142,7 @@ class Snapshot:
             touching=np.asarray(self.agents.touching)[..., :0, :],
             ignored_contacts=np.asarray(self.agents.ignored_contacts)[..., :0, :],
         )
-        return self.replace(scene=self.scene.replace(tree_asleep=asleep), agents=agents)
+        return dataclasses.replace(self, scene=dataclasses.replace(self.scene, tree_asleep=asleep), agents=agents)
 
     @property
     def qpos(self) -> Float[Array, "*W nq"]:
@@ -223,7 +227,7 @@ def fitted(snapshot: Snapshot, start: Snapshot, num_worlds: int, scene: str) -> 
     bare = not any(getattr(snapshot.agents, name).shape[axis] for name, axis in AXIS.items())
     if bare and not snapshot.agents.touching.shape[-2]:
         agents = jax.tree.map(lambda a: np.broadcast_to(a, (*batch, *a.shape)), start.agents)
-        snapshot = snapshot.replace(agents=agents)
+        snapshot = dataclasses.replace(snapshot, agents=agents)
     for part in ("scene", "agents"):
         for field in dataclasses.fields(getattr(start, part)):
             found = getattr(getattr(snapshot, part), field.name).shape[len(batch) :]

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from ig2mj.engine.base import Snapshot
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.sampling.columns import CELL, Window
 from ig2mj.sampling.drop import Rest, origin, rest_at
 from ig2mj.sampling.footprint import Footprint

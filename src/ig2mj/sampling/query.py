@@ -13,8 +13,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ig2mj.engine.base import Snapshot, Write
+from ig2mj.engine.base import Write
 from ig2mj.engine.native.engine import NativeEngine, NativePhysics
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView
 from ig2mj.sampling.columns import ColumnMap, Level, Window
 from ig2mj.sampling.footprint import Footprint, footprint

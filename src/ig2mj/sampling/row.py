@@ -14,7 +14,8 @@ from collections.abc import Sequence
 import jax
 import numpy as np
 
-from ig2mj.engine.base import Snapshot, Write
+from ig2mj.engine.base import Write
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.errors import StateError
 from ig2mj.predicates.literals import object_index, room_index
 from ig2mj.sampling.conditions import Condition, order

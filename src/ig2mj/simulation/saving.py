@@ -9,7 +9,7 @@ import jax
 import numpy as np
 from flax import struct
 
-from ig2mj.engine.base import Snapshot
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.errors import InputError
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates

@@ -19,8 +19,9 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
-from ig2mj.engine.base import Engine, Snapshot, Write
+from ig2mj.engine.base import Engine, Write
 from ig2mj.engine.registry import make_engine
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import AbilityError, EngineError, StateError
 from ig2mj.predicates.compile import CompiledExpression

@@ -32,8 +32,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.agents.base import Controller
-from ig2mj.engine.base import Engine, Physics, Snapshot, Write
+from ig2mj.engine.base import Engine, Physics, Write
 from ig2mj.engine.health import Health
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.states.world import ExtendedStates, Swap, WorldState

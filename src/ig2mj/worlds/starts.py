@@ -13,7 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt
 
-from ig2mj.engine.base import Engine, Snapshot
+from ig2mj.engine.base import Engine
+from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.worlds import guards
 from ig2mj.worlds.pool import Pool

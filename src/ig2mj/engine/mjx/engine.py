@@ -285,7 +285,7 @@ class MjxEngine(abc.ABC):
         row = self.export(physics, world)
         model = copy.copy(self.host_model)
         model.eq_data[:] = row.eq_data
-        masks = BitLayers(model, self.tables).masks(row.agents.ignored_contacts)
+        masks = BitLayers(model, self.tables).masks(np.asarray(row.agents.ignored_contacts))
         if masks is not None:
             model.geom_contype[:], model.geom_conaffinity[:] = masks
         data = mujoco.MjData(model)

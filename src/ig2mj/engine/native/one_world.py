@@ -95,8 +95,8 @@ class World:
         model, data, statics = self.model, self.data, self.statics
         if ctrl is not None:
             if not (ctrl.dot(ctrl) <= LARGEST**2):  # true for NaN, too
-                ctrl, wrong = clip(ctrl[None], data.ctrl[None])
-                ctrl, self.wrong_controls = ctrl[0], self.wrong_controls or bool(wrong[0])
+                clipped, wrong = clip(ctrl[None], data.ctrl[None])
+                ctrl, self.wrong_controls = np.asarray(clipped[0]), self.wrong_controls or bool(wrong[0])
             data.ctrl[:] = ctrl
         if self.only_time_passes():
             return Changed.NOTHING
@@ -202,9 +202,10 @@ class World:
         self.refresh(everything=True)
         shown = self.save()
         return self.load(
-            saved.replace(
-                scene=saved.scene.replace(touching=shown.scene.touching),
-                agents=saved.agents.replace(touching=shown.agents.touching),
+            dataclasses.replace(
+                saved,
+                scene=dataclasses.replace(saved.scene, touching=shown.scene.touching),
+                agents=dataclasses.replace(saved.agents, touching=shown.agents.touching),
             )
         )
 
@@ -228,7 +229,7 @@ class World:
         self.wrong_controls = False
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
-        self.set_fields(eq_data=snapshot.eq_data)
+        self.set_fields(eq_data=np.asarray(snapshot.eq_data))
         self.ignore(np.asarray(snapshot.agents.ignored_contacts))
         self._set_state(snapshot)
         wake_trees(model, data, np.arange(model.ntree))
