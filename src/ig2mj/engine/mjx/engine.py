@@ -15,50 +15,24 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-from flax import struct
 from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 
 from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Write, check_arguments
-from ig2mj.engine.contact_filter import BitLayers
 from ig2mj.engine.controls import check_shape, clip
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.mjx.contacts import Contacts, finger_forces, link_forces, normal_forces, touching_units
+from ig2mj.engine.mjx.physics import STATE_FIELDS, MjxPhysics, all_units, mujoco_of
 from ig2mj.engine.mjx.view import Moved, ViewPlan, make_view, plan_view
 from ig2mj.engine.mjx.writing import apply_write, reaches
 from ig2mj.engine.native.engine import NativeEngine
-from ig2mj.engine.native.sleep import FULLY_AWAKE, restore_sleep
-from ig2mj.engine.snapshot import AXIS, Snapshot, fitted, make_snapshot
+from ig2mj.engine.native.sleep import FULLY_AWAKE
+from ig2mj.engine.snapshot import Snapshot, fitted, make_snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_jax
 from ig2mj.scene.scene import Scene
-
-STATE_FIELDS = tuple(name for name in AXIS if name not in ("eq_data", "tree_asleep"))
-"""Fields of MJX data that are state, and that a `Snapshot` has by the same name; besides them the time."""
-
-
-@struct.dataclass
-class MjxPhysics:
-    """Physics of a batch.
-
-    Attributes:
-      data: MJX data; arrays begin with the world axis, but for Warp's contact list (design section 2, fact 10).
-      eq_data: parameters of the equality constraints of each world. ignored: contacts of hands with objects dropped.
-      touching: of units, as of the last step. link_force, finger_force: newtons, of the last control step.
-      overflow: or of MJX-Warp's overflow flags since the world was loaded (`ig2mj.worlds.guards`).
-      wrong_controls: some control had to be clipped since then.
-    """
-
-    data: Any
-    eq_data: Float[Array, "W E 12"]
-    ignored: Bool[Array, "W H O"]
-    touching: Bool[Array, "W U U"]
-    link_force: Float[Array, "W L O"]
-    finger_force: Float[Array, "W F Y"]
-    overflow: Int[Array, "W"]
-    wrong_controls: Bool[Array, "W"]
 
 
 class MjxEngine(abc.ABC):
@@ -261,7 +235,7 @@ class MjxEngine(abc.ABC):
             data=self._kinematics(data),
             eq_data=put(snapshot.eq_data, physics.eq_data),
             ignored=put(snapshot.agents.ignored_contacts, physics.ignored),
-            touching=put(_all_units(snapshot), physics.touching),
+            touching=put(all_units(snapshot), physics.touching),
             link_force=jnp.where(chosen[:, None, None], 0.0, physics.link_force),
             finger_force=jnp.where(chosen[:, None, None], 0.0, physics.finger_force),
             overflow=jnp.where(chosen, 0, physics.overflow),
@@ -282,19 +256,7 @@ class MjxEngine(abc.ABC):
 
     def to_mujoco(self, physics: MjxPhysics, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """A copy of a world in MuJoCo's own structures; contacts and forces in it are of its present positions."""
-        row = self.export(physics, world)
-        model = copy.copy(self.host_model)
-        model.eq_data[:] = row.eq_data
-        masks = BitLayers(model, self.tables).masks(np.asarray(row.agents.ignored_contacts))
-        if masks is not None:
-            model.geom_contype[:], model.geom_conaffinity[:] = masks
-        data = mujoco.MjData(model)
-        data.time = float(row.time)
-        for name in STATE_FIELDS:
-            getattr(data, name)[:] = row.whole(name)
-        mujoco.mj_forward(model, data)  # of all bodies: nothing sleeps in new data
-        restore_sleep(model, data, np.asarray(row.tree_asleep))
-        return model, data
+        return mujoco_of(self.export(physics, world), self.host_model, self.tables)
 
     # Stages.
 
@@ -425,14 +387,3 @@ class MjxEngine(abc.ABC):
             mujoco.mj_resetDataKeyframe(self.host_model, data, 0)
         mujoco.mj_forward(self.host_model, data)
         return data
-
-
-def _all_units(snapshot: Snapshot) -> Bool[Array, "*W U U"]:
-    """Touching of all units from a snapshot's two parts; agents' with agents' is not kept."""
-    objects, agents = jnp.asarray(snapshot.scene.touching), jnp.asarray(snapshot.agents.touching)
-    count = agents.shape[-2]
-    if not count:
-        return objects
-    corner = jnp.zeros((*agents.shape[:-1], count), bool)
-    rows = jnp.concatenate([objects, agents.swapaxes(-1, -2)], -1)
-    return jnp.concatenate([rows, jnp.concatenate([agents, corner], -1)], -2)

@@ -1,0 +1,70 @@
+"""Physics of a batch on MJX as a pytree, and how it comes from and goes to snapshots and MuJoCo's structures."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from flax import struct
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.contact_filter import BitLayers
+from ig2mj.engine.native.sleep import restore_sleep
+from ig2mj.engine.snapshot import AXIS, Snapshot
+from ig2mj.engine.view import Array
+from ig2mj.scene.tables import SceneTables
+
+STATE_FIELDS = tuple(name for name in AXIS if name not in ("eq_data", "tree_asleep"))
+"""Fields of MJX data that are state, and that a `Snapshot` has by the same name; besides them the time."""
+
+
+@struct.dataclass
+class MjxPhysics:
+    """Physics of a batch.
+
+    Attributes:
+      data: MJX data; arrays begin with the world axis, but for Warp's contact list (design section 2, fact 10).
+      eq_data: parameters of the equality constraints of each world. ignored: contacts of hands with objects dropped.
+      touching: of units, as of the last step. link_force, finger_force: newtons, of the last control step.
+      overflow: or of MJX-Warp's overflow flags since the world was loaded (`ig2mj.worlds.guards`).
+      wrong_controls: some control had to be clipped since then.
+    """
+
+    data: Any
+    eq_data: Float[Array, "W E 12"]
+    ignored: Bool[Array, "W H O"]
+    touching: Bool[Array, "W U U"]
+    link_force: Float[Array, "W L O"]
+    finger_force: Float[Array, "W F Y"]
+    overflow: Int[Array, "W"]
+    wrong_controls: Bool[Array, "W"]
+
+
+def all_units(snapshot: Snapshot) -> Bool[Array, "*W U U"]:
+    """Touching of all units from a snapshot's two parts; agents' with agents' is not kept."""
+    objects, agents = jnp.asarray(snapshot.scene.touching), jnp.asarray(snapshot.agents.touching)
+    count = agents.shape[-2]
+    if not count:
+        return objects
+    corner = jnp.zeros((*agents.shape[:-1], count), bool)
+    rows = jnp.concatenate([objects, agents.swapaxes(-1, -2)], -1)
+    return jnp.concatenate([rows, jnp.concatenate([agents, corner], -1)], -2)
+
+
+def mujoco_of(row: Snapshot, model: mujoco.MjModel, tables: SceneTables) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """A snapshot without the world axis in MuJoCo's own structures; `model` is copied."""
+    model = copy.copy(model)
+    model.eq_data[:] = row.eq_data
+    masks = BitLayers(model, tables).masks(np.asarray(row.agents.ignored_contacts))
+    if masks is not None:
+        model.geom_contype[:], model.geom_conaffinity[:] = masks
+    data = mujoco.MjData(model)
+    data.time = float(row.time)
+    for name in STATE_FIELDS:
+        getattr(data, name)[:] = row.whole(name)
+    mujoco.mj_forward(model, data)  # of all bodies: nothing sleeps in new data
+    restore_sleep(model, data, np.asarray(row.tree_asleep))
+    return model, data
