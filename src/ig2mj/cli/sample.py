@@ -76,7 +76,7 @@ def _disturb(loaded, count: int, file: pathlib.Path, seed: int, share: float, jo
             threads=jobs or None,
             progress=lambda done: report("", done, count),
         )
-    save_pool(pool, file, loaded.name, {"seed": seed, "share": share})
+    save_pool(pool, file, loaded, {"seed": seed, "share": share})
     print(f"{file}: {pool.size} settled states of {loaded.name}")
     return 0
 
@@ -100,7 +100,7 @@ def _sample(loaded, conditions, count: int, file: pathlib.Path, seed: int, jobs:
             progress=lambda made, failed: report(f"{failed} given up" if failed else "", made + failed, count),
         )
     if done.pool is not None:
-        save_pool(done.pool, file, loaded.name, {"seed": seed, "conditions": list(conditions), "rows": list(done.rows)})
+        save_pool(done.pool, file, loaded, {"seed": seed, "conditions": list(conditions), "rows": list(done.rows)})
     if as_json:
         reasons = dict(done.rejected.most_common())
         print(json.dumps({"file": str(file) if done.pool else None, "rows": len(done.rows), "requested": count,
