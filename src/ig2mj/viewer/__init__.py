@@ -1,1 +1,5 @@
+"""Looking at worlds: pictures without a display, films, and MuJoCo's window with overlays."""
 
+from ig2mj.viewer.offscreen import FreeView, render
+
+__all__ = ["FreeView", "render"]

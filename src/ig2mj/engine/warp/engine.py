@@ -7,8 +7,11 @@ sleeping state.
 
 from __future__ import annotations
 
+import functools
+import sys
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
@@ -63,6 +66,7 @@ class WarpEngine(MjxEngine):
           print_overflow: let Warp print a line per overflowing world and step. The flags are kept in any case.
         """
         prepare_warp()
+        _say_once_if_slow()
         self.own_kernels = patches.for_new_engines()
         sizes = fit(profile, scene.model) if profile else load_profile(scene.folder, scene.model)
         self.profile = sizes.for_worlds(max(num_worlds, 1))  # a wrong number is told by `MjxEngine`
@@ -141,3 +145,12 @@ class WarpEngine(MjxEngine):
 
     def _overflow(self, data: mjx.Data) -> Int[Array, "W"]:
         return data._impl.overflow
+
+
+@functools.cache
+def _say_once_if_slow() -> None:
+    if jax.default_backend() == "cpu":
+        print(
+            'ig2mj: no GPU: the Warp engine takes a few steps a second on a processor; engine="native" is fast there',
+            file=sys.stderr,
+        )
