@@ -146,7 +146,7 @@ def test_mujoco_gets_a_world_for_pictures(small):
 
 def test_snapshots_of_other_scenes_are_refused(small, bench_folder):
     other = engine_bench.bench(bench_folder, "native", 2, False)
-    with pytest.raises(EngineError, match="does not fit scene 'bench': qpos has length"):
+    with pytest.raises(EngineError, match="does not fit scene 'bench': qpos of its scene has shape"):
         small.engine.load(small.fresh(), other.first)
     many = jax.tree.map(lambda a: np.repeat(np.asarray(a)[None], 5, axis=0), small.first)
     with pytest.raises(EngineError, match="5 snapshots do not fit 2 worlds"):
