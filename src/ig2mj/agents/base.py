@@ -18,6 +18,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from ig2mj.agents.hand_rays import HandRays
 from ig2mj.agents.parts import Vector
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.scene.manifest import AgentEntry
@@ -70,6 +71,10 @@ class Controller(Protocol):
         """How far each hand is asked to close: 0 open, 1 closed. From one half on it grasps (spec A.1)."""
         ...
 
+    def lag(self, view: PhysicsView, state: ControllerState) -> Float[Array, "W H"]:
+        """m by which each hand is behind where it is pulled to: what it holds, or what it runs into, is too much."""
+        ...
+
     def eye(self, view: PhysicsView, state: ControllerState) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
         """Pose of the agent's camera in the world (MuJoCo's camera axes). The view has it as compiled; an agent that
         moves its eye without joints says here where it is."""
@@ -101,6 +106,10 @@ class Robot(Protocol):
         Returns:
           What was added, for the manifest.
         """
+        ...
+
+    def hand_rays(self) -> tuple[HandRays, ...]:
+        """Where its hands look for what is in them, for assistive grasping; in the order of its entry's hands."""
         ...
 
     def controller(self, tables: SceneTables, agent: int, period: float = ACTION_PERIOD) -> Controller:

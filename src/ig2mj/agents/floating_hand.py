@@ -20,6 +20,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.agents.hand_rays import HandRays
 from ig2mj.agents.parts import Vector
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.scene.manifest import AgentEntry
@@ -67,6 +68,9 @@ class FloatingHand:
     def attach(self, spec: mujoco.MjSpec, pos: Vector | None = None, quat: Vector | None = None) -> AgentEntry:
         return add_floating_hand(spec, self.name, self.pos if pos is None else pos, self.quat if quat is None else quat)
 
+    def hand_rays(self) -> tuple[HandRays, ...]:
+        return ()
+
     def controller(self, tables: SceneTables, agent: int, period: float = ACTION_PERIOD) -> HandController:
         return HandController(agent)
 
@@ -102,6 +106,10 @@ class HandController:
     def grip(self, state: Float[Array, "W 16"]) -> Float[Array, "W 1"]:
         """Mean over the fingers."""
         return jnp.mean(state[:, 6:] / self.action_high[6:], axis=1, keepdims=True)
+
+    def lag(self, view: PhysicsView, state: Float[Array, "W 16"]) -> Float[Array, "W 1"]:
+        """Its grasps are not assisted."""
+        return jnp.zeros((state.shape[0], 1), jnp.float32)
 
     def eye(self, view: PhysicsView, state: Float[Array, "W 16"]) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
         return view.agent.eye_pos[:, self._agent], view.agent.eye_quat[:, self._agent]

@@ -22,6 +22,7 @@ from ig2mj.agents.controllers import (
     scale_command,
     wheel_odometry,
 )
+from ig2mj.agents.hand_rays import HandRays
 from ig2mj.agents.parts import (
     GEOM,
     Vector,
@@ -100,6 +101,9 @@ class TurtleBot:
         extend_keyframes(spec, [*map(float, pos), *quat, 0.0, 0.0], 8, [0.0, 0.0])
         return AgentEntry(name=self.name, body=self.name, camera=f"{self.name}/eye")
 
+    def hand_rays(self) -> tuple[HandRays, ...]:
+        return ()
+
     def controller(self, tables: SceneTables, agent: int, period: float = ACTION_PERIOD) -> TurtleBotController:
         return TurtleBotController(agent, tables, self.discrete)
 
@@ -139,6 +143,10 @@ class TurtleBotController:
         return differential_drive(command, WHEEL_RADIUS, AXLE, MAX_WHEEL), state
 
     def grip(self, state: Float[Array, "W 0"]) -> Float[Array, "W 0"]:
+        """It has no hands."""
+        return state
+
+    def lag(self, view: PhysicsView, state: Float[Array, "W 0"]) -> Float[Array, "W 0"]:
         """It has no hands."""
         return state
 

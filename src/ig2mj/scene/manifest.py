@@ -115,7 +115,8 @@ class RoomsEntry(msgspec.Struct, omit_defaults=True):
 class AgentEntry(msgspec.Struct, omit_defaults=True):
     """An agent compiled into the scene: its base body, its camera, the finger bodies that press buttons, its hands.
 
-    `no_contact` names, for bodies of the agent, categories of objects that they pass through.
+    `no_contact` names, for bodies of the agent, categories of objects that they pass through. For hands of `assisted`
+    agents equality constraints to everything graspable are compiled (`ig2mj.scene.grasp_equalities`).
     """
 
     name: str
@@ -124,6 +125,7 @@ class AgentEntry(msgspec.Struct, omit_defaults=True):
     fingers: list[str] = []
     hands: list[str] = []
     no_contact: dict[str, list[str]] = {}
+    assisted: bool = False
 
 
 class Manifest(msgspec.Struct, omit_defaults=True):

@@ -16,6 +16,7 @@ import mujoco
 from ig2mj.errors import InputError, UnknownNameError, without_lines
 from ig2mj.scene.additions import Addition, add_objects
 from ig2mj.scene.build_tables import build_tables
+from ig2mj.scene.grasp_equalities import add_grasp_equalities
 from ig2mj.scene.manifest import AgentEntry, Manifest, ObjectEntry, load_manifest
 from ig2mj.scene.paths import MANIFEST_FILE, model_file
 from ig2mj.scene.rooms import Rooms, load_rooms
@@ -147,6 +148,7 @@ def _attach_all(agents: Sequence[Agent], spec: mujoco.MjSpec, manifest: Manifest
             for passed in (o for o in manifest.objects if o.category in categories):
                 for name in passed.bodies:
                     spec.add_exclude(bodyname1=body, bodyname2=name)
+    add_grasp_equalities(spec, manifest, entries)
     return entries
 
 

@@ -69,7 +69,7 @@ class Worlds:
         if isinstance(engine, str):
             engine = make_engine(engine, self.scene, num_worlds, **options)
         rules = Rules.of_scene(self.scene, states).with_goal(goal)
-        self.core = Core(engine, rules, pool, controllers_of(self.scene))
+        self.core = Core(engine, rules, pool, controllers_of(self.scene, engine.substeps * engine.timestep))
 
     @property
     def engine(self) -> Engine:
@@ -93,6 +93,7 @@ class Worlds:
         return self.core.metrics(batch)
 
 
-def controllers_of(scene: Scene) -> list[Controller]:
-    """The controllers of the scene's robots, in the order of its agents."""
-    return [agent.controller(scene.tables, k) for k, agent in enumerate(scene.agents) if isinstance(agent, Robot)]
+def controllers_of(scene: Scene, period: float) -> list[Controller]:
+    """The controllers of the scene's robots, in the order of its agents; `period`: seconds between two actions."""
+    robots = [(k, agent) for k, agent in enumerate(scene.agents) if isinstance(agent, Robot)]
+    return [robot.controller(scene.tables, k, period) for k, robot in robots]

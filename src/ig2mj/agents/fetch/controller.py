@@ -47,7 +47,7 @@ from ig2mj.agents.fetch.figures import (
 )
 from ig2mj.agents.kinematics import forward, inverse
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.poses import quat_multiply, quat_rotate_inverse, rotation_vector_to_quat
+from ig2mj.geometry.poses import length, quat_multiply, quat_rotate_inverse, rotation_vector_to_quat
 from ig2mj.scene.tables import SceneTables
 
 GAIN = 2.0
@@ -166,6 +166,12 @@ class FetchController:
 
     def grip(self, state: FetchState) -> Float[Array, "W 1"]:
         return state.closed[:, None].astype(jnp.float32)
+
+    def lag(self, view: PhysicsView, state: FetchState) -> Float[Array, "W 1"]:
+        """From where trunk and arm are to where their servos pull them."""
+        q = jnp.asarray(view.agent.joint_pos)[:, self._joints][:, np.array(CHAIN_JOINTS)]
+        pulled, _, _ = forward(CHAIN, state.target[:, np.array(CHAIN_JOINTS) - 2])
+        return length(pulled - forward(CHAIN, q)[0])[:, None]
 
     def eye(self, view: PhysicsView, state: FetchState) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
         return jnp.asarray(view.agent.eye_pos)[:, self._agent], jnp.asarray(view.agent.eye_quat)[:, self._agent]

@@ -25,6 +25,7 @@ from ig2mj.agents.fetch.figures import (
     Joint,
     start_positions,
 )
+from ig2mj.agents.hand_rays import HandRays
 from ig2mj.agents.parts import (
     GEOM,
     Vector,
@@ -50,6 +51,10 @@ WHEEL_GAIN = 20.0
 
 WHEEL_CONTACT = 0.0613
 """m: radius of the sphere with which a wheel meets the floor."""
+
+FINGER_REACH, FINGER_EDGE, FINGER_FACE = 0.03, 0.0115, 0.0155
+"""m: corners of the fingers' inner faces in their frames, where rays run (iGibson's, on its own fingers: 0.04, 0.014
+and 0.012). Ours are 6 cm long, and the grasp point is in their middle, where the gripper's frame is."""
 
 CASTERS = ((0.16, 0.11), (0.16, -0.11), (-0.21, 0.11), (-0.21, -0.11))
 """m: where they stand in the base's frame."""
@@ -105,6 +110,7 @@ class Fetch:
             camera=f"{self.name}/eye",
             fingers=[f"{self.name}_{side}_gripper_finger_link" for side in "rl"],
             hands=[f"{self.name}_gripper_link"],
+            assisted=True,
         )
 
     def _add_link(
@@ -145,6 +151,22 @@ class Fetch:
             servo(spec, name, stiffness, damping, joint.effort, name=short)
         draw_link(body, joint.link, look)
         return body
+
+    def hand_rays(self) -> tuple[HandRays, ...]:
+        """Sixteen rays from corners of the right finger to corners of the left one (spec section 1.6)."""
+        corners = np.array([(x, 0.0, z) for x in (-FINGER_REACH, FINGER_REACH) for z in (-FINGER_EDGE, FINGER_EDGE)])
+        inward = np.array([0.0, FINGER_FACE, 0.0])
+        right, left = (f"{self.name}_{side}_gripper_finger_link" for side in "rl")
+        return (
+            HandRays(
+                palm=f"{self.name}_gripper_link",
+                grasp_point=np.zeros(3),
+                start_bodies=(right,) * 4,
+                starts=corners - inward,
+                end_bodies=(left,) * 4,
+                ends=corners + inward,
+            ),
+        )
 
     def controller(self, tables: SceneTables, agent: int, period: float = ACTION_PERIOD) -> FetchController:
         return FetchController(tables, agent, period, start_positions(self.pose))

@@ -168,6 +168,11 @@ class HumanoidController:
     def grip(self, state: HumanoidState) -> Float[Array, "W 2"]:
         return state.trigger
 
+    def lag(self, view: PhysicsView, state: HumanoidState) -> Float[Array, "W 2"]:
+        """From a hand to its target, as far as the body is where it is now."""
+        _, pos, _ = self.ghosts(view, state)
+        return length(pos - view.agent.hand_pos[:, self._hands])
+
     def eye(self, view: PhysicsView, state: HumanoidState) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
         """The camera where the head was sent: moves with the body, without delay and without mass."""
         base = view.agent.base_pos[:, self._agent], view.agent.base_quat[:, self._agent]

@@ -63,7 +63,7 @@ PALM_BASE, PALM_CENTER = (0.0, 0.0, 0.015), (0.0, -0.04, 0.01)
 """m, hand frame, right: where rays of assistive grasping start; the second is the grasp point."""
 
 TIP = (0.0, -0.055, 0.025)
-THUMB_START = ((0.0, -0.05, 0.02), (0.0, -0.02, 0.015))
+THUMB_START = ((-0.012, -0.020, 0.030), (-0.004, -0.008, 0.020))
 """m, right, in the frame of a finger's outer link: the tip; of the thumb's outer link: where rays start.
 
 The frames of links are parallel to the hand's while the hand is open; iGibson's are turned by a quarter about x.

@@ -8,14 +8,21 @@ import mujoco
 import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.agents.hand_rays import HandRays
 from ig2mj.agents.humanoid.controller import HumanoidController
 from ig2mj.agents.humanoid.frames import (
     BODY_HEIGHT,
     CAMERA_QUAT,
     EYE_POS,
+    FINGERS,
     HAND_POS,
     HAND_QUAT,
     HANDS,
+    PALM_BASE,
+    PALM_CENTER,
+    THUMB_START,
+    TIP,
+    mirrored,
 )
 from ig2mj.agents.humanoid.hand import add_hand
 from ig2mj.agents.parts import (
@@ -123,7 +130,25 @@ class Humanoid:
             fingers=[link for parts in hands for link in parts.links],
             hands=[parts.palm for parts in hands],
             no_contact={self.name: list(NO_CONTACT)},
+            assisted=True,
         )
+
+    def hand_rays(self) -> tuple[HandRays, ...]:
+        """Sixteen rays: thumb tip and middle, palm middle and base to the four other finger tips (paper A.1)."""
+        rays = []
+        for number, hand in enumerate(HANDS):
+            palm = f"{self.name}_{hand}"
+            rays.append(
+                HandRays(
+                    palm=palm,
+                    grasp_point=mirrored(number, PALM_CENTER),
+                    start_bodies=(f"{palm}_thumb_middle",) * 2 + (palm,) * 2,
+                    starts=mirrored(number, (*THUMB_START, PALM_CENTER, PALM_BASE)),
+                    end_bodies=tuple(f"{palm}_{finger}_middle" for finger in FINGERS[1:]),
+                    ends=mirrored(number, (TIP,) * 4),
+                )
+            )
+        return tuple(rays)
 
     def controller(self, tables: SceneTables, agent: int, period: float = ACTION_PERIOD) -> HumanoidController:
         return HumanoidController(tables, agent, period, self.grasp_flags)
