@@ -178,7 +178,7 @@ Inertia = tuple[float, tuple[float, ...], tuple[float, ...]]
 def _joined(*parts: Inertia) -> Inertia:
     """Mass, centre and inertia (xx, xy, xz, yy, yz, zz) of parts whose centres are given in one frame."""
     total = sum(mass for mass, _, _ in parts)
-    centre = sum(mass * np.array(com) for mass, com, _ in parts) / total
+    centre = np.sum([mass * np.array(com) for mass, com, _ in parts], axis=0) / total
     tensor = np.zeros((3, 3))
     for mass, com, (xx, xy, xz, yy, yz, zz) in parts:
         arm = np.array(com) - centre

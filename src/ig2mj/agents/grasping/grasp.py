@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
@@ -134,10 +135,13 @@ class Grasping:
         body = jnp.where(held | (window > 0), state.body, NOTHING)
         free = body == NOTHING
 
-        found, any_found = self._find(view)
-        takes = free & any_found & (state.window == 0)
-        if self.mode != "mitten":
-            takes &= grip > TRIGGER
+        wants = free & (state.window == 0) & ((self.mode == "mitten") | (grip > TRIGGER))
+        allowed = self._touched(view) & wants[..., None]
+        found, takes = jax.lax.cond(  # most of the time no hand closes on anything
+            allowed.any(),
+            lambda: self._candidates.nearest(view, allowed, rays=self.mode == "assisted"),
+            lambda: (jnp.zeros(wants.shape, jnp.int32), jnp.zeros(wants.shape, bool)),
+        )
         body = jnp.where(takes, found, body)
         local = jnp.where(takes[..., None], self._parameters(view, found), state.local)
         return GraspState(body, (held & ~lets_go) | takes, local, window, jnp.where(lets_go | takes, 0, strain))
@@ -162,17 +166,17 @@ class Grasping:
             ignored = jnp.asarray(self._object).T[jnp.maximum(state.body, 0)] & (state.body >= 0)[..., None]
         return Write(eq_active=active, eq_data=data, ignored_contacts=ignored)
 
-    def _find(self, view: PhysicsView) -> tuple[Int[Array, "W H"], Bool[Array, "W H"]]:
+    def _touched(self, view: PhysicsView) -> Bool[Array, "W H Y"]:
+        """What each hand presses on; for a mitten, which of its targets it touches at all."""
         touched = self._candidates.touched(view)
         if self.mode != "mitten":
-            return self._candidates.nearest(view, touched, rays=self.mode == "assisted")
+            return touched
         tables = self.scene.tables
         point = self._candidates.grasp_points(view)[:, :, None]
         low, high = jnp.asarray(view.aabb_low)[:, None], jnp.asarray(view.aabb_high)[:, None]
         near = length(jnp.maximum(0, jnp.maximum(low - point, point - high))) < MITTEN_REACH  # [W, H, O]
         near &= jnp.asarray(view.agent.touching)[:, tables.hand_agent]
-        allowed = (touched | near[..., tables.graspable_object]) & jnp.asarray(self._targets)
-        return self._candidates.nearest(view, allowed, rays=False)
+        return (touched | near[..., tables.graspable_object]) & jnp.asarray(self._targets)
 
     def _poses(self, view: PhysicsView, body: Int[Array, "W H"]):
         """Poses of the palms and of the bodies that they hold, or would."""

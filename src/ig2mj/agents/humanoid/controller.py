@@ -202,10 +202,10 @@ class HumanoidController:
 
 def _within(pos: Float[Array, "*b 3"], centre: np.ndarray, reach: float) -> Float[Array, "*b 3"]:
     """Targets in the body's frame, those out of reach brought back onto the sphere."""
-    centre = jnp.asarray(centre, jnp.float32)
-    offset = pos - centre
+    middle = jnp.asarray(centre, jnp.float32)
+    offset = pos - middle
     far = length(offset)[..., None]
-    return jnp.where(far > reach + REACH_SLACK, centre + offset * (reach / jnp.maximum(far, 1e-6)), pos)
+    return jnp.where(far > reach + REACH_SLACK, middle + offset * (reach / jnp.maximum(far, 1e-6)), pos)
 
 
 def _turn_rate(left: Float[Array, "*b 4"], gain: float) -> Float[Array, "*b 3"]:
