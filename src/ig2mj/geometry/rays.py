@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
@@ -149,7 +150,7 @@ def polyhedron_interval(
 ) -> Interval:
     """Interval of a line inside the intersection of half-spaces; (-1e30, 1e30) where all planes are padding."""
     low, low_by, high, high_by = clip_line(
-        [[planes[..., n, i] for i in range(4)] for n in range(planes.shape[-2])],
+        jnp.moveaxis(jnp.asarray(planes), (-2, -1), (0, 1)),
         [origin[..., i] for i in range(3)],
         [direction[..., i] for i in range(3)],
         inflate,
@@ -158,28 +159,52 @@ def polyhedron_interval(
 
 
 def clip_line(
-    planes: Sequence[Sequence], origin: Sequence, direction: Sequence, inflate: float = 0.0
+    planes: Float[AnyArray, "N 4 *#b"],
+    origin: Sequence,
+    direction: Sequence,
+    inflate: float = 0.0,
+    at_once: int | None = None,
 ) -> tuple[Float[Array, "*b"], Float[Array, "*b"], Float[Array, "*b"], Float[Array, "*b"]]:
     """Interval of a line inside half-spaces as two fractions: (low, low's divisor, high, high's divisor).
 
-    `planes` lists (nx, ny, nz, d), `origin` and `direction` list x, y, z; all of them broadcast. The loop is unrolled
-    into one elementwise pass that stores nothing per half-space. The divisors are positive and bounds are compared
-    crosswise, so that it holds no division (XLA would store every quotient) and a line parallel to a face needs no
-    threshold: slope 0 with negative room makes the divisor of high 0, its numerator negative: -inf.
+    `planes[n]` is (nx, ny, nz, d) of one half-space; `origin` and `direction` list x, y, z; all of them broadcast. The
+    divisors are positive and bounds are compared crosswise, so that there is no division (XLA would store every
+    quotient) and a line parallel to a face needs no threshold: slope 0 with negative room makes the divisor of high 0,
+    its numerator negative: -inf.
+
+    Args:
+      at_once: None unrolls the half-spaces into one elementwise pass that stores nothing per half-space: fastest to
+        run, slow to compile. A number takes so many in each turn of a loop: a short program, but on a CPU about twenty
+        times slower per half-space, since XLA computes each of the four bounds on its own.
     """
-    shape = jnp.broadcast_shapes(*(jnp.shape(x) for x in (*origin, *direction, *(planes[0] if planes else ()))))
+    planes = jnp.asarray(planes)
+    shape = jnp.broadcast_shapes(*(jnp.shape(x) for x in (*origin, *direction)), planes.shape[2:])
+    if inflate:
+        planes = planes.at[:, 3].add(inflate)
     spoilt = 0.0 * sum((*origin[1:], *direction), start=origin[0])  # NaN where any of them is
     low, low_by = jnp.broadcast_to(spoilt - UNBOUNDED, shape), jnp.ones(shape)
-    high, high_by = jnp.full(shape, UNBOUNDED), jnp.ones(shape)
-    for nx, ny, nz, offset in planes:
-        slope = nx * direction[0] + ny * direction[1] + nz * direction[2]
-        room = offset + inflate - (nx * origin[0] + ny * origin[1] + nz * origin[2])
-        entering = slope < 0.0
-        tighter = entering & (-room * low_by > -slope * low)
-        low, low_by = jnp.where(tighter, -room, low), jnp.where(tighter, -slope, low_by)
-        tighter = ~entering & (room * high_by < slope * high)
-        high, high_by = jnp.where(tighter, room, high), jnp.where(tighter, slope, high_by)
-    return low, low_by, high, high_by
+    bounds = (low, low_by, jnp.full(shape, UNBOUNDED), jnp.ones(shape))
+
+    def clip(bounds: tuple, some: Float[Array, "M 4 *#b"]) -> tuple[tuple, None]:
+        low, low_by, high, high_by = bounds
+        for plane in some:
+            nx, ny, nz, offset = jnp.unstack(plane)
+            slope = jnp.broadcast_to(nx * direction[0] + ny * direction[1] + nz * direction[2], shape)
+            room = jnp.broadcast_to(offset - (nx * origin[0] + ny * origin[1] + nz * origin[2]), shape)
+            entering = slope < 0.0
+            tighter = entering & (room * low_by < slope * low)
+            low, low_by = jax.lax.select(tighter, -room, low), jax.lax.select(tighter, -slope, low_by)
+            tighter = ~entering & (room * high_by < slope * high)
+            high, high_by = jax.lax.select(tighter, room, high), jax.lax.select(tighter, slope, high_by)
+        return (low, low_by, high, high_by), None
+
+    count = planes.shape[0]
+    if at_once is None or count <= at_once:
+        return clip(bounds, planes)[0]
+    missing = np.zeros((-count % at_once, 4, *planes.shape[2:]), np.float32)
+    missing[:, 3] = 1.0
+    blocks = jnp.concatenate([planes, missing]).reshape(-1, at_once, *planes.shape[1:])
+    return jax.lax.scan(clip, bounds, blocks)[0]
 
 
 def fractions_enter(

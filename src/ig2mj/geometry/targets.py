@@ -12,6 +12,7 @@ Axes: W worlds, P pairs, R lines, B bodies, K pieces of the scene, E entries.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
@@ -33,18 +34,18 @@ class EntryGroup:
     """Entries that are computed alike.
 
     Attributes:
-      kind: their shape. pair, body: of each entry. pos, rotation: pose of the piece in its body (primitives only;
+      kind: their shape. pair, body: of each entry; `body` may be traced. pos, rotation: pose of the piece in its body (primitives only;
       rotation maps piece axes to body axes). size: MuJoCo's geom_size. planes: half-spaces in the body's frame, with
       their number first, so that planes[n] is one half-space of every entry; zero of them for primitives.
     """
 
     kind: PieceKind
     pair: Int[np.ndarray, "E"]
-    body: Int[np.ndarray, "E"]
-    pos: Float[np.ndarray, "E 3"]
-    rotation: Float[np.ndarray, "E 3 3"]
-    size: Float[np.ndarray, "E 3"]
-    planes: Float[np.ndarray, "N 4 E"]
+    body: Int[AnyArray, "E"]
+    pos: Float[AnyArray, "E 3"]
+    rotation: Float[AnyArray, "E 3 3"]
+    size: Float[AnyArray, "E 3"]
+    planes: Float[AnyArray, "N 4 E"]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -53,16 +54,22 @@ class RayTargets:
 
     Attributes:
       num_pairs: P. groups: the entries. slots: for each pair the positions of its entries in the joined groups, padded
-      with the number of entries, [P, most entries of a pair].
+      with the number of entries, [P, most entries of a pair]. planes_at_once: of `rays.clip_line`.
     """
 
     num_pairs: int
     groups: tuple[EntryGroup, ...]
-    slots: Int[np.ndarray, "P S"]
+    slots: Int[AnyArray, "P S"]
+    planes_at_once: int | None = None
 
     @classmethod
-    def build(cls, tables: SceneTables, targets: Int[np.ndarray, "P"]) -> RayTargets:
-        """Lay out the work for P pairs, `targets` being the object index whose pieces each pair's rays may enter."""
+    def build(
+        cls, tables: SceneTables, targets: Int[np.ndarray, "P"], plane_steps: Sequence[int] = PLANE_STEPS
+    ) -> RayTargets:
+        """Lay out the work for P pairs, `targets` being the object index whose pieces each pair's rays may enter.
+
+        Fewer `plane_steps` make a shorter program that computes more padding.
+        """
         return cls.from_pieces(
             np.asarray(targets),
             tables.piece_object,
@@ -72,6 +79,7 @@ class RayTargets:
             tables.piece_kind,
             tables.piece_size,
             tables.piece_planes,
+            plane_steps,
         )
 
     @classmethod
@@ -85,16 +93,17 @@ class RayTargets:
         piece_kind: Int[np.ndarray, "K"],
         piece_size: Float[np.ndarray, "K 3"],
         piece_planes: Float[np.ndarray, "K N 4"],
+        plane_steps: Sequence[int] = PLANE_STEPS,
     ) -> RayTargets:
         """As `build`, from the pieces' tables one by one."""
         owned = [np.flatnonzero(piece_object == target) for target in targets]
         pair = np.concatenate([np.full(len(o), p) for p, o in enumerate(owned)] or [np.zeros(0)]).astype(int)
         piece = np.concatenate([*owned, np.zeros(0)]).astype(int)
-        steps = _plane_steps(piece_kind, piece_planes)
+        steps = _plane_steps(piece_kind[piece], piece_planes[piece], plane_steps)
         rotation = matrices_on_host(piece_quat)
         groups, order = [], []
-        for kind, step in sorted({(int(piece_kind[k]), int(steps[k])) for k in piece}):
-            members = np.flatnonzero((piece_kind[piece] == kind) & (steps[piece] == step))
+        for kind, step in sorted(set(zip(piece_kind[piece].tolist(), steps.tolist(), strict=True))):
+            members = np.flatnonzero((piece_kind[piece] == kind) & (steps == step))
             k = piece[members]
             order.append(members)
             groups.append(
@@ -148,7 +157,7 @@ def fall_contact(
     found = []
     for group in targets.groups:
         origin, direction = _in_body_frames(group, body_pos, body_quat, points[:, :, None], down)
-        low, low_by, high, high_by = _clip(group, origin, direction, inflate)
+        low, low_by, high, high_by = _clip(group, origin, direction, inflate, targets.planes_at_once)
         reaches = (low * high_by <= high * low_by) & (low <= distances[..., None] * low_by) & (high >= 0.0)
         found.append(jnp.where(reaches, jnp.maximum(low / low_by, 0.0), jnp.inf))
     return jnp.min(jnp.concatenate([*found, none], axis=-1)[:, :, targets.slots], axis=-1, initial=jnp.inf)
@@ -165,7 +174,8 @@ def _sides(
 ) -> UInt8[Array, "W P R"]:
     """FORWARDS and BACKWARDS bits of every pair and line, any piece of the target counting."""
     none = jnp.zeros((origins.shape[0], directions.shape[0], 1), jnp.uint8)  # what padded slots point to
-    found = [_group_sides(g, body_pos, body_quat, origins, directions, lengths, inflate) for g in targets.groups]
+    once = targets.planes_at_once
+    found = [_group_sides(g, body_pos, body_quat, origins, directions, lengths, inflate, once) for g in targets.groups]
     of_entries = jnp.concatenate([*found, none], axis=-1)[:, :, targets.slots]
     return jnp.swapaxes(jnp.bitwise_or.reduce(of_entries, axis=-1), 1, 2)
 
@@ -178,10 +188,11 @@ def _group_sides(
     directions: Float[AnyArray, "R 3"],
     lengths: Float[AnyArray, "R"],
     inflate: float,
+    planes_at_once: int | None,
 ) -> UInt8[Array, "W R E"]:
     """The bits for every entry. One array rather than two, or XLA goes through the half-spaces twice."""
     origin, direction = _in_body_frames(group, body_pos, body_quat, origins[:, None, group.pair], directions)
-    clipped = _clip(group, origin, direction, inflate)
+    clipped = _clip(group, origin, direction, inflate, planes_at_once)
     forwards, backwards = rays.fractions_enter(*clipped, lengths[:, None])
     return forwards * FORWARDS | backwards * BACKWARDS
 
@@ -194,7 +205,10 @@ def _in_body_frames(
     directions: Float[AnyArray, "#R 3"],
 ) -> tuple[list, list]:
     """Components x, y, z of origins and directions, each [W, R or 1, E], in the frame of each entry's body."""
-    bodies, place = np.unique(group.body, return_inverse=True)
+    if isinstance(group.body, np.ndarray):
+        bodies, place = np.unique(group.body, return_inverse=True)
+    else:
+        bodies, place = slice(None), group.body
     axes = quat_to_matrix(jnp.asarray(body_quat)[:, bodies])  # [W, bodies, 3, 3], columns are the body's axes
     offset = origins - jnp.asarray(body_pos)[:, None, group.body]
     columns = [[axes[:, None, :, i, j][:, :, place] for i in range(3)] for j in range(3)]
@@ -205,13 +219,15 @@ def _in_body_frames(
     return origin, [column[0] * x + column[1] * y + column[2] * z for column in columns]
 
 
-def _clip(group: EntryGroup, origin: list, direction: list, inflate: float) -> tuple[Array, Array, Array, Array]:
+def _clip(
+    group: EntryGroup, origin: list, direction: list, inflate: float, planes_at_once: int | None
+) -> tuple[Array, Array, Array, Array]:
     """The lines' intervals inside the entries' pieces as fractions (see `rays.clip_line`), each [W, R, E]."""
     if group.kind is PieceKind.POLYHEDRON:
         # The barrier keeps the half-spaces one array (as separate constants they cost five times the time on a CPU)
         # and the gathers before from being repeated for each of them.
         planes, origin, direction = jax.lax.optimization_barrier((jnp.asarray(group.planes), origin, direction))
-        return rays.clip_line([list(plane) for plane in planes], origin, direction, inflate)
+        return rays.clip_line(planes, origin, direction, inflate, planes_at_once)
     # A vector in piece axes is rotation^T v, which is v @ rotation.
     o = jnp.einsum("wrei,eij->wrej", jnp.stack(origin, axis=-1) - group.pos, group.rotation)
     d = jnp.einsum("wrei,eij->wrej", jnp.stack(direction, axis=-1), group.rotation)
@@ -221,11 +237,14 @@ def _clip(group: EntryGroup, origin: list, direction: list, inflate: float) -> t
     return jnp.clip(low, -bound, bound), jnp.ones_like(low), jnp.clip(high, -bound, bound), jnp.ones_like(high)
 
 
-def _plane_steps(kind: Int[np.ndarray, "K"], planes: Float[np.ndarray, "K N 4"]) -> Int[np.ndarray, "K"]:
-    """Number of half-spaces of each polyhedron rounded up to a step; 0 for the other kinds."""
-    count = np.any(planes[..., :3] != 0.0, axis=-1).sum(axis=-1)
-    steps = np.array([*PLANE_STEPS, max(planes.shape[1], PLANE_STEPS[-1] + 1)])
-    return np.where(kind == PieceKind.POLYHEDRON, np.minimum(steps[np.searchsorted(steps, count)], planes.shape[1]), 0)
+def _plane_steps(
+    kind: Int[np.ndarray, "E"], planes: Float[np.ndarray, "E N 4"], steps: Sequence[int]
+) -> Int[np.ndarray, "E"]:
+    """Number of half-spaces of each polyhedron rounded up to a step, or to the largest number; 0 for other kinds."""
+    count = np.where(kind == PieceKind.POLYHEDRON, np.any(planes[..., :3] != 0.0, axis=-1).sum(axis=-1), 0)
+    most = int(count.max(initial=0))
+    rounded = np.array([*(s for s in steps if s < most), most])
+    return np.where(kind == PieceKind.POLYHEDRON, rounded[np.searchsorted(rounded, count)], 0)
 
 
 def _planes_in_body(

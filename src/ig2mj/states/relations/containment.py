@@ -3,9 +3,11 @@
 Either the vertical and any horizontal axis, or both axes of one of the four planes (table A.1, Inside; spec/states.md
 5.4). Nine lines against every piece of the container are dear, and few objects are near any container at all. So only
 the pairs that are asked for by a mask are computed: their numbers are listed, container by container, and worked off in
-chunks, as many as there are. Memory is that of one chunk, whatever the number of worlds.
+chunks, as many as there are. Memory is that of one chunk, whatever the number of worlds. Containers of similar size
+share one loop, in which each chunk takes its container's pieces from a table: the compiled program does not grow with
+their number.
 
-Axes: W worlds, P pairs, C pairs of a chunk, R lines.
+Axes: W worlds, P pairs, K containers, C pairs of a chunk, R lines.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.target_table import TargetTable
 from ig2mj.geometry.targets import RayTargets, lines_enter_targets
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.adjacency import (
@@ -36,14 +39,8 @@ SMALLEST_CHUNK = 8
 CHUNKS_PER_WORLD = 1 / 4
 """Chunks grow with the number of worlds, so that their number does not."""
 
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Container:
-    """One target: its object, its pieces laid out alone, and the bodies they ride on."""
-
-    obj: int
-    targets: RayTargets
-    bodies: Int[np.ndarray, "B"]
+ALIKE = 4
+"""Containers whose pieces differ less than this in number share a loop, in which all cost as much as the largest."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -51,24 +48,29 @@ class ContainerPairs:
     """Pairs (object, container), laid out once.
 
     Attributes:
-      pairs: in the order asked for. containers: the distinct targets. order: pairs sorted by container. start: where
-      each container's pairs begin in `order`, and the end.
+      pairs: in the order given. order: pairs sorted by loop and container. start: where each container's pairs begin in
+        `order`, and the end. tables: pieces of the containers of each loop, in the same order.
     """
 
     model: StateModel
     pairs: Int[np.ndarray, "P 2"]
-    containers: tuple[Container, ...]
     order: Int[np.ndarray, "P"]
     start: Int[np.ndarray, "K"]
+    tables: tuple[TargetTable, ...]
 
     @classmethod
     def build(cls, model: StateModel, pairs: Int[np.ndarray, "P 2"]) -> ContainerPairs:
         """`pairs` are object indices."""
-        found = np.unique(pairs[:, 1])
-        order = np.argsort(pairs[:, 1], kind="stable")
-        start = np.searchsorted(pairs[order, 1], found)
-        containers = tuple(_container(model, int(obj)) for obj in found)
-        return cls(model, pairs, containers, order, np.append(start, len(pairs)))
+        owner = model.tables.piece_object
+        pieces = np.bincount(owner[owner >= 0], minlength=model.tables.num_objects)
+        found, place = np.unique(pairs[:, 1], return_inverse=True)
+        sizes = np.floor(np.log(np.maximum(pieces[found], 1)) / np.log(ALIKE)).astype(int)
+        by_size = np.argsort(sizes, kind="stable")
+        rank = np.argsort(by_size)[place]
+        order = np.argsort(rank, kind="stable")
+        start = np.append(np.searchsorted(rank[order], np.arange(len(found))), len(pairs))
+        loops = [found[by_size[sizes[by_size] == size]] for size in np.unique(sizes)]
+        return cls(model, pairs, order, start, tuple(TargetTable.build(model.tables, loop) for loop in loops))
 
     def inside(self, view: PhysicsView, needed: Bool[Array, "W P"]) -> Bool[Array, "W P"]:
         """Whether each object is inside; false where `needed` is."""
@@ -80,62 +82,59 @@ class ContainerPairs:
         numbers = jnp.nonzero(mask, size=worlds * count, fill_value=worlds * count)[0]
         numbers = jnp.concatenate([numbers, jnp.full(chunk, worlds * count)])
         before = jnp.concatenate([jnp.zeros(1, rank.dtype), rank])[self.start * worlds]
-        found = jnp.zeros(worlds * count, bool)
-        for k, container in enumerate(self.containers):
-            found = self._work_off(container, view, numbers, before[k], before[k + 1], chunk, worlds, found)
+        found, first = jnp.zeros(worlds * count, bool), 0
+        for table in self.tables:
+            limits = before[first : first + len(table.bodies) + 1]
+            found = self._work_off(table, view, numbers, limits, chunk, worlds, found)
+            first += len(table.bodies)
         inverse = np.argsort(self.order)
         return found.reshape(count, worlds).T[:, inverse]
 
     def _work_off(
         self,
-        container: Container,
+        table: TargetTable,
         view: PhysicsView,
         numbers: Int[Array, "N"],
-        begin: Int[Array, ""],
-        end: Int[Array, ""],
+        limits: Int[Array, "K"],
         chunk: int,
         worlds: int,
         found: Bool[Array, "M"],
     ) -> Bool[Array, "M"]:
-        """Answers the listed pairs of one container, from `begin` to `end` of the list."""
-        com, bodies = jax.lax.stop_gradient(jnp.asarray(view.object_com)), container.bodies
+        """Answers the listed pairs of some containers: number k's stand in the list from limits[k] to limits[k + 1]."""
+        com = jax.lax.stop_gradient(jnp.asarray(view.object_com))
         pos, quat = (jax.lax.stop_gradient(jnp.asarray(f)) for f in (view.body_pos, view.body_quat))
         subject = jnp.asarray(self.pairs[self.order, 0])
+        chunks = (limits[1:] - limits[:-1] + chunk - 1) // chunk
+        until = jnp.cumsum(chunks)
 
-        def some(state: tuple) -> tuple:
-            at, found = state
+        def some(turn: Int[Array, ""], found: Bool[Array, "M"]) -> Bool[Array, "M"]:
+            k = jnp.sum(until <= turn)
+            at = limits[k] + (turn - until[k] + chunks[k]) * chunk
             number = jax.lax.dynamic_slice(numbers, (at,), (chunk,))
-            valid = at + np.arange(chunk) < end
+            valid = at + np.arange(chunk) < limits[k + 1]
             place, world = number // worlds, number % worlds
             origins = com[world, subject[jnp.minimum(place, len(self.order) - 1)]]
-            answer = self._lines(container, pos[world][:, bodies], quat[world][:, bodies], origins)
-            return at + chunk, found.at[jnp.where(valid, number, len(found))].set(answer, mode="drop")
+            bodies, targets = table.of(k)
+            answer = surrounded(self.model, targets, pos[world][:, bodies], quat[world][:, bodies], origins)
+            return found.at[jnp.where(valid, number, len(found))].set(answer, mode="drop")
 
-        return jax.lax.while_loop(lambda state: state[0] < end, some, (begin, found))[1]
-
-    def _lines(
-        self,
-        container: Container,
-        pos: Float[Array, "C B 3"],
-        quat: Float[Array, "C B 4"],
-        origins: Float[Array, "C 3"],
-    ) -> Bool[Array, "C"]:
-        compat = self.model.options.compat
-        lengths = np.full(len(LINES), HORIZONTAL_LENGTH[compat], np.float32)
-        lengths[-1] = VERTICAL_LENGTH[compat]
-        positive, negative = lines_enter_targets(
-            container.targets, pos, quat, origins[:, None], LINES, lengths, INFLATE[compat]
-        )
-        both = (positive & negative)[:, 0]
-        planes = both[:, 0:4] & both[:, 4:8]
-        return (both[:, 8] & jnp.any(both[:, :8], axis=-1)) | jnp.any(planes, axis=-1)
+        return jax.lax.fori_loop(0, until[-1], some, found)
 
 
-def _container(model: StateModel, obj: int) -> Container:
-    t = model.tables
-    pieces = np.flatnonzero(t.piece_object == obj)
-    bodies, riding = np.unique(t.piece_body[pieces], return_inverse=True)
-    owner = np.zeros(len(pieces), int)
-    shapes = (t.piece_pos, t.piece_quat, t.piece_kind, t.piece_size, t.piece_planes)
-    targets = RayTargets.from_pieces(np.zeros(1, int), owner, riding, *(shape[pieces] for shape in shapes))
-    return Container(obj, targets, bodies)
+def surrounded(
+    model: StateModel,
+    targets: RayTargets,
+    body_pos: Float[Array, "C B 3"],
+    body_quat: Float[Array, "C B 4"],
+    origins: Float[Array, "C 3"],
+) -> Bool[Array, "C"]:
+    """Whether orthogonal axes through points meet a container on both sides, `targets` being its pieces."""
+    compat = model.options.compat
+    lengths = np.full(len(LINES), HORIZONTAL_LENGTH[compat], np.float32)
+    lengths[-1] = VERTICAL_LENGTH[compat]
+    positive, negative = lines_enter_targets(
+        targets, body_pos, body_quat, origins[:, None], LINES, lengths, INFLATE[compat]
+    )
+    both = (positive & negative)[:, 0]
+    planes = both[:, 0:4] & both[:, 4:8]
+    return (both[:, 8] & jnp.any(both[:, :8], axis=-1)) | jnp.any(planes, axis=-1)

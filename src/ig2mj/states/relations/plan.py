@@ -24,6 +24,7 @@ from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.poses import AnyArray
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.adjacency import AdjacencyPairs
 from ig2mj.states.relations.containment import ContainerPairs
@@ -147,8 +148,8 @@ class RelationPlan:
         if isinstance(work, ContainerPairs):
             return work.inside(view, needed)[..., None]
         if isinstance(work, NearPairs):
-            values = work.near(view)[..., None]
-        elif kind == "vertical":
+            return work.near(view, needed)[..., None]
+        if kind == "vertical":
             values = jnp.stack(work.vertical(view), axis=-1)
         else:
             positive, negative = work.horizontal(view)
@@ -156,17 +157,7 @@ class RelationPlan:
         return needed[..., None] & values
 
     def _gate(self, kind: Kind, view: PhysicsView) -> Bool[Array, "W P"]:
-        """Cheap necessary conditions from world boxes: false means that the answer is no."""
-        pairs = self._work[kind].pairs
-        apart = pairs[:, 0] != pairs[:, 1]
-        if kind == "near":
-            return boxes_near(view, pairs) & apart
-        com = jnp.asarray(view.object_com)[:, pairs[:, 0]]
-        low = jnp.asarray(view.aabb_low)[:, pairs[:, 1]] - BOX_SLACK
-        high = jnp.asarray(view.aabb_high)[:, pairs[:, 1]] + BOX_SLACK
-        within = (low <= com) & (com <= high)
-        axes = {"inside": [0, 1, 2], "vertical": [0, 1], "horizontal": [2]}[kind]
-        return jnp.all(within[..., np.array(axes)], axis=-1) & apart
+        return gate(kind, view, self._work[kind].pairs)
 
     def _inputs(self, kind: Kind, view: PhysicsView) -> Float[Array, "W P K"]:
         pairs, bodies = self._work[kind].pairs, self._bodies[kind]
@@ -190,6 +181,19 @@ class RelationPlan:
         worlds = view.object_com.shape[0]
         none: dict[str, Array] = {kind: jnp.zeros((worlds, 0, 2), bool) for kind in KINDS if kind not in values}
         return {**none, **values}
+
+
+def gate(kind: Kind, view: PhysicsView, pairs: Int[AnyArray, "P 2"]) -> Bool[Array, "W P"]:
+    """Cheap necessary conditions from world boxes: false means that the answer is no."""
+    apart = pairs[:, 0] != pairs[:, 1]
+    if kind == "near":
+        return boxes_near(view, pairs) & apart
+    com = jnp.asarray(view.object_com)[:, pairs[:, 0]]
+    low = jnp.asarray(view.aabb_low)[:, pairs[:, 1]] - BOX_SLACK
+    high = jnp.asarray(view.aabb_high)[:, pairs[:, 1]] + BOX_SLACK
+    within = (low <= com) & (com <= high)
+    axes = {"inside": [0, 1, 2], "vertical": [0, 1], "horizontal": [2]}[kind]
+    return jnp.all(within[..., np.array(axes)], axis=-1) & apart
 
 
 BOX_SLACK = 0.005
