@@ -70,11 +70,9 @@ def _print_holding(world: Simulation, json: bool) -> None:
         found.setdefault(a.predicate, []).append(", ".join(a.arguments))
     rows = [[name, "; ".join(texts)] for name, texts in found.items()]
     console.print(make_table(f"{world.scene.name}, {world.time:.2f} s: what holds", ["predicate", "of"], rows))
-    known = [
-        [p.name, ", ".join(p.arguments), p.ability or "any object", ", ".join(p.reads)] for p in PREDICATES.values()
-    ]
+    known = [[p.name, ", ".join(p.arguments), p.ability or "any object"] for p in PREDICATES.values()]
     console.print()
-    console.print(make_table("all predicates", ["name", "arguments", "for", "?reads"], known, console.width))
+    console.print(make_table("all predicates", ["name", "arguments", "for"], known, console.width))
 
 
 def _print_json(world: Simulation, found: dict) -> None:
@@ -118,7 +116,8 @@ def _candidates(world: Simulation) -> list[Atom]:
     building = np.isin(tables.object_categories, sorted(BUILDING))  # everything is inside the walls
     loose = ~tables.object_fixed
     asked += [atom("inside", names[a], names[b]) for a, b in pairs if loose[a] and not building[b]]
-    on_floor = np.flatnonzero(np.any(touching[:, tables.object_is_floor], axis=1) & ~tables.object_is_floor)
+    near_floor = np.any(touching[:, tables.object_is_floor], axis=1) | (tables.object_fixed & ~building)
+    on_floor = np.flatnonzero(near_floor & ~tables.object_is_floor)
     if tables.room_map.size:
         asked += [atom("on_floor", names[o], room) for o in on_floor for room in tables.room_names]
     return asked

@@ -179,23 +179,20 @@ def clip_line(
     """
     planes = jnp.asarray(planes)
     shape = jnp.broadcast_shapes(*(jnp.shape(x) for x in (*origin, *direction)), planes.shape[2:])
-    if inflate:
-        planes = planes.at[:, 3].add(inflate)
     spoilt = 0.0 * sum((*origin[1:], *direction), start=origin[0])  # NaN where any of them is
     low, low_by = jnp.broadcast_to(spoilt - UNBOUNDED, shape), jnp.ones(shape)
     bounds = (low, low_by, jnp.full(shape, UNBOUNDED), jnp.ones(shape))
 
     def clip(bounds: tuple, some: Float[Array, "M 4 *#b"]) -> tuple[tuple, None]:
         low, low_by, high, high_by = bounds
-        for plane in some:
-            nx, ny, nz, offset = jnp.unstack(plane)
-            slope = jnp.broadcast_to(nx * direction[0] + ny * direction[1] + nz * direction[2], shape)
-            room = jnp.broadcast_to(offset - (nx * origin[0] + ny * origin[1] + nz * origin[2]), shape)
+        for nx, ny, nz, offset in ([plane[i] for i in range(4)] for plane in some):
+            slope = nx * direction[0] + ny * direction[1] + nz * direction[2]
+            room = offset + inflate - (nx * origin[0] + ny * origin[1] + nz * origin[2])
             entering = slope < 0.0
-            tighter = entering & (room * low_by < slope * low)
-            low, low_by = jax.lax.select(tighter, -room, low), jax.lax.select(tighter, -slope, low_by)
+            tighter = entering & (-room * low_by > -slope * low)
+            low, low_by = jnp.where(tighter, -room, low), jnp.where(tighter, -slope, low_by)
             tighter = ~entering & (room * high_by < slope * high)
-            high, high_by = jax.lax.select(tighter, room, high), jax.lax.select(tighter, slope, high_by)
+            high, high_by = jnp.where(tighter, room, high), jnp.where(tighter, slope, high_by)
         return (low, low_by, high, high_by), None
 
     count = planes.shape[0]

@@ -14,9 +14,9 @@ import dataclasses
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Array, Int
 
-from ig2mj.engine.view import Array
+from ig2mj.geometry.poses import AnyArray
 from ig2mj.geometry.targets import EntryGroup, RayTargets
 from ig2mj.scene.tables import SceneTables
 
@@ -77,7 +77,8 @@ class TargetTable:
 def _lengthened(group: EntryGroup, width: int) -> EntryGroup:
     """The group with room for `width` more entries at its end."""
 
-    def longer(values: np.ndarray, axis: int = 0) -> np.ndarray:
+    def longer(given: AnyArray, axis: int = 0) -> np.ndarray:
+        values = np.asarray(given)
         room = np.repeat(np.take(values, [0], axis=axis), width, axis=axis)
         return np.concatenate([values, room], axis=axis)
 
@@ -93,7 +94,7 @@ def _lengthened(group: EntryGroup, width: int) -> EntryGroup:
 
 
 def _slice(group: EntryGroup, begin: Int[Array, ""], width: int) -> EntryGroup:
-    def part(values: np.ndarray, axis: int = 0) -> Array:
+    def part(values: AnyArray, axis: int = 0) -> Array:
         return jax.lax.dynamic_slice_in_dim(jnp.asarray(values), begin, width, axis)
 
     return EntryGroup(

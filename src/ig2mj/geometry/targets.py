@@ -34,9 +34,10 @@ class EntryGroup:
     """Entries that are computed alike.
 
     Attributes:
-      kind: their shape. pair, body: of each entry; `body` may be traced. pos, rotation: pose of the piece in its body (primitives only;
-      rotation maps piece axes to body axes). size: MuJoCo's geom_size. planes: half-spaces in the body's frame, with
-      their number first, so that planes[n] is one half-space of every entry; zero of them for primitives.
+      kind: their shape. pair, body: of each entry; `body` may be traced. pos, rotation: pose of the piece in its body
+      (primitives only; rotation maps piece axes to body axes). size: MuJoCo's geom_size. planes: half-spaces in the
+      body's frame, with their number first, so that planes[n] is one half-space of every entry; zero of them for
+      primitives.
     """
 
     kind: PieceKind

@@ -10,21 +10,35 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, Literal
+from typing import Any, Literal, Protocol, runtime_checkable
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Int
 
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.poses import AnyArray
 from ig2mj.states.model import StateModel
-from ig2mj.states.relations.plan import Query, Relations
+from ig2mj.states.relations.plan import Query
 from ig2mj.states.relations.touching import finite
 from ig2mj.states.world import ExtendedStates
 
-Arguments = Int[np.ndarray, "P K"]
+Arguments = Int[AnyArray, "P K"]
+"""Indices known before tracing, or traced ones: a predicate treats both alike."""
+
 ANY_ROOM = -1
 """The room argument of `on_floor` where the floor itself is named, not a room."""
+
+
+@runtime_checkable
+class RelationsOfPairs(Protocol):
+    """Answers to pairs of object indices; see `ig2mj.states.relations.plan.Relations`."""
+
+    def inside(self, pairs: Any, /) -> Bool[Array, "W P"]: ...
+    def above(self, pairs: Any, /) -> Bool[Array, "W P"]: ...
+    def below(self, pairs: Any, /) -> Bool[Array, "W P"]: ...
+    def beside(self, pairs: Any, /) -> Bool[Array, "W P"]: ...
+    def near(self, pairs: Any, /) -> Bool[Array, "W P"]: ...
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,13 +48,13 @@ class Context:
     model: StateModel
     states: ExtendedStates
     view: PhysicsView
-    relations: Relations
+    relations: RelationsOfPairs
 
     @property
     def num_worlds(self) -> int:
         return self.view.object_com.shape[0]
 
-    def known(self, objects: Int[np.ndarray, "P"]) -> Bool[Array, "W P"]:
+    def known(self, objects: Int[AnyArray, "P"]) -> Bool[Array, "W P"]:
         """Whether the places of objects are finite; a NaN pose never makes a predicate true."""
         return finite(self.view)[:, objects]
 
@@ -64,16 +78,17 @@ def no_queries(model: StateModel, arguments: Arguments) -> list[Query]:
 class Predicate:
     """One logical predicate.
 
+    What it depends on is not written down but found by tracing it (`ig2mj.predicates.tracing`, `Questions.reads`).
+
     Attributes:
-      name: snake_case. arguments: what each argument is. reads: fields of the view, the states and the tables it
-        depends on. evaluate: truth for argument tuples. ability: without it the first argument's answer is False.
+      name: snake_case. arguments: what each argument is; an agent's index is the number of objects plus its own.
+        evaluate: truth for argument tuples. ability: without it the first argument's answer is False.
         aliases: other names (iGibson's, BDDL's tokens, the paper's). queries: relations it needs. why: for people, the
         numbers behind the answer in one world. per_object: see `of_states`.
     """
 
     name: str
-    arguments: tuple[Literal["object", "room"], ...]
-    reads: tuple[str, ...]
+    arguments: tuple[Literal["object", "room", "object or agent"], ...]
     evaluate: Evaluate
     ability: str | None = None
     aliases: tuple[str, ...] = ()

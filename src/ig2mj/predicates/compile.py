@@ -20,6 +20,7 @@ from collections.abc import Mapping, Sequence
 import jax
 import numpy as np
 from flax import struct
+from jax.core import Tracer
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array, PhysicsView
@@ -31,6 +32,7 @@ from ig2mj.predicates.evaluate import Truth, fraction, holds
 from ig2mj.predicates.literals import Literals
 from ig2mj.predicates.logic import Atom, Expression
 from ig2mj.predicates.parse import parse
+from ig2mj.predicates.questions import Questions
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Query, RelationPlan, Relations
 from ig2mj.states.world import ExtendedStates, WorldState
@@ -63,12 +65,15 @@ class CompiledExpression:
 
     Attributes:
       model: constants. source: the expression as given. ground: without quantifiers. literals: resolved.
+      questions: what answers for a single world, one program per predicate; None: every number of worlds has its own
+      fused program.
     """
 
     model: StateModel
     source: Expression
     ground: Expression
     literals: Literals
+    questions: Questions | None = None
 
     @functools.cached_property
     def atoms(self) -> tuple[Atom, ...]:
@@ -101,15 +106,21 @@ class CompiledExpression:
 
     def __call__(self, world: WorldState) -> Bool[Array, "W"]:
         """Whether the expression holds, in every world."""
-        return self._jitted(world.states, world.view).holds
+        return self._status_now(world).holds
 
     def fraction(self, world: WorldState) -> Float[Array, "W"]:
         """Share of literals that are as the expression wants them: 1 exactly where it holds (`evaluate.fraction`)."""
-        return self._jitted(world.states, world.view).fraction
+        return self._status_now(world).fraction
 
     def literals_of(self, world: WorldState) -> Bool[Array, "W L"]:
         """Truth of every literal (`atoms`), in every world."""
-        return self._jitted(world.states, world.view).literals
+        return self._status_now(world).literals
+
+    def _status_now(self, world: WorldState) -> GoalStatus:
+        states, view = world.states, world.view
+        if self.questions is None or len(states.sliced) != 1 or isinstance(states.sliced, Tracer):
+            return self._jitted(states, view)
+        return self.status_of(self.questions.facts(self.literals, states, view), states)
 
     def explain(self, world: WorldState, index: int = 0) -> str:
         """What is still missing in one world, as text to read."""
@@ -123,7 +134,11 @@ class CompiledExpression:
 
 
 def compile_expression(
-    model: StateModel, expression: Expression | str, groups: Groups | None = None, strict: bool = False
+    model: StateModel,
+    expression: Expression | str,
+    groups: Groups | None = None,
+    strict: bool = False,
+    questions: Questions | None = None,
 ) -> CompiledExpression:
     """Resolves an expression against a scene.
 
@@ -133,13 +148,14 @@ def compile_expression(
       groups: lists of objects by name, for quantifiers. Without an entry, a group is the objects of the category, or of
         the synset, of that name; halves of sliceable objects are not listed, their whole stands for them.
       strict: an object that lacks the ability is an error instead of False.
+      questions: see `CompiledExpression`.
 
     Raises:
       UnknownNameError, ArityError, AbilityError: see `Literals.build`. ExpressionError: the text is no expression.
     """
     source = parse(expression) if isinstance(expression, str) else expression
     grounded = logic.ground(source, lambda name: group_members(model, name, groups or {}))
-    return CompiledExpression(model, source, grounded, Literals.build(model, logic.atoms(grounded), strict))
+    return CompiledExpression(model, source, grounded, Literals.build(model, logic.atoms(grounded), strict), questions)
 
 
 def group_members(model: StateModel, name: str, groups: Groups) -> list[str]:

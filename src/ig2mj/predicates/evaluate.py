@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import operator
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
@@ -37,6 +37,11 @@ class Truth:
     def worlds(self) -> int:
         return self.values.shape[0]
 
+    @property
+    def xp(self) -> Any:
+        """The library of the arrays: JAX's, or NumPy for one question on the host, which then compiles nothing."""
+        return self.values.__array_namespace__()
+
 
 class Score(NamedTuple):
     """How near an expression is to being as wanted, 0 to 1, and for how many literals that counts."""
@@ -53,14 +58,14 @@ def holds(e: Expression, truth: Truth) -> Bool[Array, "W"]:
         case Not(part):
             return ~holds(part, truth)
         case And(parts):
-            return jnp.all(_each(parts, truth), axis=-1)
+            return truth.xp.all(_each(parts, truth), axis=-1)
         case Or(parts):
-            return jnp.any(_each(parts, truth), axis=-1)
+            return truth.xp.any(_each(parts, truth), axis=-1)
         case Exactly(count, parts):
-            return jnp.sum(_each(parts, truth), axis=-1) == count
+            return truth.xp.sum(_each(parts, truth), axis=-1) == count
         case Pairing(count, rows):
             grid = _grid(rows, lambda p: holds(p, truth), truth)
-            return jnp.minimum(_with_true(grid, 0), _with_true(grid, 1)) >= count
+            return truth.xp.minimum(_with_true(grid, 0), _with_true(grid, 1)) >= count
     raise TypeError(f"{e!r} is no ground expression")
 
 
@@ -77,20 +82,22 @@ def fraction(e: Expression, truth: Truth) -> Float[Array, "W"]:
 def _score(e: Expression, truth: Truth, wanted: bool) -> Score:
     match e:
         case Atom():
-            return Score((holds(e, truth) == wanted).astype(jnp.float32), 1.0)
+            return Score((holds(e, truth) == wanted).astype(np.float32), 1.0)
         case Not(part):
             return _score(part, truth, not wanted)
         case And(parts) | Or(parts):
             return (_mean if isinstance(e, And) == wanted else _best)(parts, truth, wanted)
         case Exactly(count, parts):
-            near = jnp.stack([_score(p, truth, True).value for p in parts] or [jnp.zeros(truth.worlds)])
-            extra = jnp.maximum(jnp.sum(near >= 1.0, axis=0) - count, 0)
+            near = truth.xp.stack(
+                [_score(p, truth, True).value for p in parts] or [truth.xp.zeros(truth.worlds, np.float32)]
+            )
+            extra = truth.xp.maximum(truth.xp.sum(near >= 1.0, axis=0) - count, 0)
             share = (_sum_of_best(near, count) - extra) / max(count, len(parts), 1)
             return _quantified(holds(e, truth), share, count, wanted)
         case Pairing(count, rows):
             grid = _grid(rows, lambda p: _score(p, truth, True).value, truth)
-            sides = [_sum_of_best(jnp.max(grid, axis=axis, initial=0.0), count) for axis in (0, 1)]
-            return _quantified(holds(e, truth), jnp.minimum(*sides) / max(count, 1), count, wanted)
+            sides = [_sum_of_best(truth.xp.max(grid, axis=axis, initial=0.0), count) for axis in (0, 1)]
+            return _quantified(holds(e, truth), truth.xp.minimum(*sides) / max(count, 1), count, wanted)
     raise TypeError(f"{e!r} is no ground expression")
 
 
@@ -99,11 +106,11 @@ def _mean(parts: Sequence[Expression], truth: Truth, wanted: bool) -> Score:
     others = [_score(p, truth, wanted) for p in rest]
     total = float(len(plain) + sum(s.weight for s in others))
     if not total:
-        return Score(jnp.ones(truth.worlds), 0.0)
+        return Score(truth.xp.ones(truth.worlds, np.float32), 0.0)
     values = [s.weight * s.value for s in others]
     if plain:
-        values.append(jnp.sum(_literal_values(plain, truth) == wanted, axis=-1).astype(jnp.float32))
-    value = functools.reduce(jnp.add, values)
+        values.append(truth.xp.sum(_literal_values(plain, truth) == wanted, axis=-1).astype(np.float32))
+    value = functools.reduce(operator.add, values)
     return Score(value / total, total)
 
 
@@ -112,19 +119,21 @@ def _best(parts: Sequence[Expression], truth: Truth, wanted: bool) -> Score:
     others = [_score(p, truth, wanted) for p in rest]
     values = [s.value for s in others]
     if plain:
-        values.append(jnp.any(_literal_values(plain, truth) == wanted, axis=-1).astype(jnp.float32))
+        values.append(truth.xp.any(_literal_values(plain, truth) == wanted, axis=-1).astype(np.float32))
     if not values:
-        return Score(jnp.zeros(truth.worlds), 1.0)
-    return Score(jnp.max(jnp.stack(values), axis=0), max([1.0, *(s.weight for s in others)]))
+        return Score(truth.xp.zeros(truth.worlds, np.float32), 1.0)
+    return Score(truth.xp.max(truth.xp.stack(values), axis=0), max([1.0, *(s.weight for s in others)]))
 
 
 def _sum_of_best(values: Float[Array, "N W"], count: int) -> Float[Array, "W"]:
-    return jnp.sum(jnp.sort(values, axis=0)[::-1][:count], axis=0)
+    xp = values.__array_namespace__()
+    return xp.sum(xp.sort(values, axis=0)[::-1][:count], axis=0)
 
 
 def _quantified(true: Bool[Array, "W"], share: Float[Array, "W"], count: int, wanted: bool) -> Score:
-    share = jnp.clip(share, 0.0, LESS_THAN_ONE) if wanted else jnp.zeros_like(share)
-    return Score(jnp.where(true == wanted, 1.0, share), float(max(count, 1)))
+    xp = true.__array_namespace__()
+    share = xp.clip(share, 0.0, LESS_THAN_ONE) if wanted else xp.zeros_like(share)
+    return Score(xp.where(true == wanted, 1.0, share), float(max(count, 1)))
 
 
 def _each(parts: Sequence[Expression], truth: Truth) -> Bool[Array, "W N"]:
@@ -133,8 +142,8 @@ def _each(parts: Sequence[Expression], truth: Truth) -> Bool[Array, "W N"]:
     found = [_literal_values(plain, truth)] if plain else []
     found += [holds(p, truth)[:, None] for p in rest]
     if not found:
-        return jnp.zeros((truth.worlds, 0), bool)
-    return jnp.concatenate(found, axis=-1) if len(found) > 1 else found[0]
+        return truth.xp.zeros((truth.worlds, 0), bool)
+    return truth.xp.concatenate(found, axis=-1) if len(found) > 1 else found[0]
 
 
 def _literals(parts: Sequence[Expression]) -> tuple[list[Expression], list[Expression]]:
@@ -156,11 +165,13 @@ def _literal_values(plain: Sequence[Expression], truth: Truth) -> Bool[Array, "W
 def _grid(rows: Rows, value: Callable[[Expression], Array], truth: Truth) -> Float[Array, "M N W"]:
     """Values of the parts; 0 where an object would be paired with itself."""
     width = len(rows[0]) if rows else 0
-    none = jnp.zeros(truth.worlds)
-    cells = [none if p is None else jnp.asarray(value(p), jnp.float32) for row in rows for p in row]
-    return jnp.stack(cells).reshape(len(rows), width, -1) if cells else jnp.zeros((len(rows), width, truth.worlds))
+    xp, shape = truth.xp, (len(rows), width, truth.worlds)
+    none = xp.zeros(truth.worlds, np.float32)
+    cells = [none if p is None else xp.asarray(value(p), np.float32) for row in rows for p in row]
+    return xp.stack(cells).reshape(shape) if cells else xp.zeros(shape, np.float32)
 
 
 def _with_true(grid: Float[Array, "M N W"], axis: int) -> Array:
     """How many rows (axis 1) or columns (axis 0) have a true cell."""
-    return jnp.sum(jnp.any(grid >= 1.0, axis=axis), axis=0)
+    xp = grid.__array_namespace__()
+    return xp.sum(xp.any(grid >= 1.0, axis=axis), axis=0)

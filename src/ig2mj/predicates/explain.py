@@ -9,7 +9,9 @@ import numpy as np
 
 from ig2mj.engine.view import PhysicsView
 from ig2mj.predicates import logic
+from ig2mj.predicates.base import Context
 from ig2mj.predicates.logic import And, Atom, Exactly, Expression, Not, Or, Pairing
+from ig2mj.predicates.questions import Questions
 from ig2mj.states.world import ExtendedStates
 
 if TYPE_CHECKING:
@@ -19,8 +21,9 @@ if TYPE_CHECKING:
 def explain(compiled: CompiledExpression, states: ExtendedStates, view: PhysicsView, world: int = 0) -> str:
     """Readable text about one world: one line when the expression holds, else what is missing."""
     states, view = jax.tree.map(lambda leaf: np.asarray(leaf)[world : world + 1], (states, view))
-    context = compiled.context(states, view)
-    truth = np.asarray(compiled.literals.evaluate(context))[0]
+    questions = compiled.questions or Questions.of(compiled.model)
+    context = Context(compiled.model, states, view, questions.relations(states, view))
+    truth = np.asarray(compiled.literals.combine(questions.facts(compiled.literals, states, view), states.sliced))[0]
     table = dict(zip(compiled.atoms, truth.tolist(), strict=True))
     if _value(compiled.ground, table):
         return f"{logic.text(compiled.source)} holds."

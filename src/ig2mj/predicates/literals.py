@@ -24,8 +24,10 @@ from ig2mj.errors import AbilityError, Ig2mjError, UnknownNameError
 from ig2mj.predicates.base import ANY_ROOM, Context, Predicate
 from ig2mj.predicates.logic import Atom
 from ig2mj.predicates.registry import find
+from ig2mj.predicates.tracing import reads_of_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Query
+from ig2mj.states.update import HEAT_FIELDS
 from ig2mj.states.world import ExtendedStates
 
 Instance = tuple[str, tuple[int, ...]]
@@ -39,9 +41,6 @@ class AbilityWarning(UserWarning):
 class ArityError(Ig2mjError):
     """A predicate was given the wrong number of arguments."""
 
-
-HEAT = {"states.temperature", "states.max_temperature"}
-"""What changes in every step while a thing is warm, though nothing moves."""
 
 _WARNED: set[tuple[str, str]] = set()
 
@@ -114,7 +113,9 @@ class Literals:
         """The facts with those replaced that read temperatures and nothing else."""
         for name, rows in self.instances.items():
             predicate = find(name)
-            if predicate.per_object is not None and set(predicate.reads) <= HEAT:
+            if predicate.per_object is not None and reads_of_states(predicate.per_object, self.model) <= set(
+                HEAT_FIELDS
+            ):
                 value = predicate.per_object(self.model, states)
                 facts = self._laid(facts, name, value[:, np.array(rows)[:, 0]])
         return facts
@@ -130,14 +131,16 @@ class Literals:
         """Literals from facts: halves stand for sliced wholes."""
         last = len(self.place)
         whole = np.array([self.place[(x.predicate.name, x.arguments)] if x.able else last for x in self.literals], int)
+        xp, axis = facts.__array_namespace__(), np.arange(len(self.literals))
+        sliced = np.asarray(sliced) if isinstance(facts, np.ndarray) else sliced
         found = facts[:, whole]
         for i, literal in enumerate(self.literals):
             if literal.able and len(_variants(self.model, literal)) > 1:
-                found = jnp.asarray(found).at[:, i].set(self._of_halves(literal, facts, sliced))
+                found = xp.where(axis == i, self._of_halves(literal, facts, sliced)[:, None], found)
         return found
 
     def _of_halves(self, literal: Literal, facts: Bool[Array, "W I"], sliced: Bool[Array, "W O"]) -> Bool[Array, "W"]:
-        parameters = self.model.parameters
+        parameters, xp = self.model.parameters, facts.__array_namespace__()
         roles = literal.predicate.arguments
         first = literal.arguments[0]
 
@@ -145,15 +148,15 @@ class Literals:
             """The literal with `subject` as first argument; its second argument may have halves."""
             rest = literal.arguments[1:]
             value = facts[:, self.place[(literal.predicate.name, (subject, *rest))]]
-            if rest and roles[1] == "object" and (halves := parameters.halves_of(rest[0])):
+            if rest and roles[1] != "room" and (halves := parameters.halves_of(rest[0])):
                 of_half = [facts[:, self.place[(literal.predicate.name, (subject, h))]] for h in halves]
-                value = jnp.where(sliced[:, rest[0]], jnp.any(jnp.stack(of_half), axis=0), value)
+                value = xp.where(sliced[:, rest[0]], xp.any(xp.stack(of_half), axis=0), value)
             return value
 
         halves = parameters.halves_of(first)
         if not halves:
             return about(first)
-        return jnp.where(sliced[:, first], jnp.all(jnp.stack([about(h) for h in halves]), axis=0), about(first))
+        return xp.where(sliced[:, first], xp.all(xp.stack([about(h) for h in halves]), axis=0), about(first))
 
 
 def resolve(model: StateModel, atom: Atom, strict: bool = False) -> Literal:
@@ -165,9 +168,12 @@ def resolve(model: StateModel, atom: Atom, strict: bool = False) -> Literal:
             f"not {len(atom.arguments)}"
         )
     roles = zip(predicate.arguments, atom.arguments, strict=True)
-    arguments = tuple(
-        object_index(model, name) if role == "object" else room_index(model, name) for role, name in roles
-    )
+    arguments = tuple(INDEX[role](model, name) for role, name in roles)
+    objects = model.tables.num_objects
+    if len(arguments) == 2 and predicate.arguments[1] == "object or agent" and min(arguments) >= objects:
+        raise Ig2mjError(
+            f"predicate '{predicate.name}' of two agents: contacts of agents with each other are not known"
+        )
     able = predicate.ability is None or predicate.ability in model.parameters.abilities[arguments[0]]
     if not able:
         name = atom.arguments[0]
@@ -200,11 +206,24 @@ def room_index(model: StateModel, name: str) -> int:
     raise UnknownNameError("room", name, [*tables.room_names, *floors])
 
 
+def object_or_agent_index(model: StateModel, name: str) -> int:
+    """Position of an object, or the number of objects and an agent's position. Raises UnknownNameError."""
+    objects, agents = model.tables.object_names, model.tables.agent_names
+    if name in agents and name not in objects:
+        return len(objects) + agents.index(name)
+    if name not in objects:
+        raise UnknownNameError("object or agent", name, [*objects, *agents])
+    return objects.index(name)
+
+
+INDEX = {"object": object_index, "room": room_index, "object or agent": object_or_agent_index}
+
+
 def _variants(model: StateModel, literal: Literal) -> list[tuple[int, ...]]:
     """The literal's arguments, then those with halves in the place of wholes."""
     choices = []
     for role, index in zip(literal.predicate.arguments, literal.arguments, strict=True):
-        halves = model.parameters.halves_of(index) if role == "object" else ()
+        halves = model.parameters.halves_of(index) if role != "room" else ()
         choices.append((index, *halves))
     if len(choices) == 1:
         return [(a,) for a in choices[0]]

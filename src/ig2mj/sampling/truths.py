@@ -1,4 +1,4 @@
-"""Whether conditions hold in a sampler's world: all conditions of a request in one compiled program."""
+"""Whether conditions hold in a sampler's world."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from ig2mj.engine.view import PhysicsView
 from ig2mj.predicates.compile import compile_expression
 from ig2mj.predicates.logic import And
+from ig2mj.predicates.questions import Questions
 from ig2mj.sampling.conditions import Condition
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates, WorldState
@@ -19,7 +20,9 @@ class Truths:
 
     def __init__(self, model: StateModel, conditions: Sequence[Condition]):
         """Compiles them. Raises what `compile_expression` raises."""
-        self._goal = compile_expression(model, And(tuple(c.atom for c in conditions)), strict=True)
+        self._goal = compile_expression(
+            model, And(tuple(c.atom for c in conditions)), strict=True, questions=Questions.of(model)
+        )
         place = {atom: i for i, atom in enumerate(self._goal.atoms)}
         self._place = {c: place[c.atom] for c in conditions}
 

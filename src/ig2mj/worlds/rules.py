@@ -18,6 +18,7 @@ from ig2mj.engine.base import Write
 from ig2mj.engine.view import PhysicsView
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus, compile_expression
 from ig2mj.predicates.logic import Expression
+from ig2mj.predicates.questions import Questions
 from ig2mj.scene.scene import Scene
 from ig2mj.states.initial import initial_states, states_of_manifest
 from ig2mj.states.model import DEFAULTS, StateModel
@@ -28,6 +29,10 @@ from ig2mj.states.world import ExtendedStates, Swap
 
 States = Any
 """`ExtendedStates`; None where only physics is stepped."""
+
+
+KEPT_EXPRESSIONS = 256
+"""Compiled expressions that a scene's rules keep: those asked for last."""
 
 
 class Outcome(NamedTuple):
@@ -78,11 +83,18 @@ class Rules:
         return Rules(self.model, compiled, self.initial)
 
     def compiled(self, expression: Expression | str, strict: bool = False) -> CompiledExpression:
-        """An expression compiled for this scene; asked again, the same object. Raises as `compile_expression`."""
+        """An expression compiled for this scene; asked again soon, the same object. Raises as `compile_expression`.
+
+        Of a single world it is answered by programs that all expressions share (`ig2mj.predicates.questions`).
+        """
         key = (expression, strict)
-        if key not in self._compiled:
-            self._compiled[key] = compile_expression(self.model, expression, strict=strict)
-        return self._compiled[key]
+        found = self._compiled.pop(key, None)
+        if found is None:
+            found = compile_expression(self.model, expression, strict=strict, questions=Questions.of(self.model))
+        self._compiled[key] = found  # the one used last stands last
+        if len(self._compiled) > KEPT_EXPRESSIONS:
+            del self._compiled[next(iter(self._compiled))]
+        return found
 
     @functools.cached_property
     def plan(self) -> RelationPlan:

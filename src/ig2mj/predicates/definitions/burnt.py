@@ -23,7 +23,6 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
 BURNT = Predicate.of_states(
     _burnt,
     name="burnt",
-    reads=("states.max_temperature",),
     ability="burnable",
     why=_why,
 )

@@ -26,7 +26,6 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
 COOKED = Predicate.of_states(
     _cooked,
     name="cooked",
-    reads=("states.max_temperature",),
     ability="cookable",
     why=_why,
 )

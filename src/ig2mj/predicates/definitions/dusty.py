@@ -12,8 +12,12 @@ from ig2mj.states.definitions import dust
 
 
 def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
-    rows = np.array([dust.row_of(context.model, int(o)) for (o,) in arguments], int)
-    return jnp.asarray(dust.dusty(context.model, context.states.dust))[:, rows]
+    having = context.model.parameters.dust_rows
+    if not len(having):
+        return context.none(arguments)
+    rows = np.zeros(context.model.tables.num_objects, int)
+    rows[having] = np.arange(len(having))
+    return jnp.asarray(dust.dusty(context.model, context.states.dust))[:, jnp.asarray(rows)[arguments[:, 0]]]
 
 
 def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
@@ -26,7 +30,6 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
 DUSTY = Predicate(
     name="dusty",
     arguments=("object",),
-    reads=("states.dust",),
     evaluate=_evaluate,
     ability="dustyable",
     why=_why,

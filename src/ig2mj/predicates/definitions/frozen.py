@@ -22,7 +22,6 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
 FROZEN = Predicate.of_states(
     _frozen,
     name="frozen",
-    reads=("states.temperature",),
     ability="freezable",
     why=_why,
 )

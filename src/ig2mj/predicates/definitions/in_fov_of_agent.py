@@ -15,11 +15,11 @@ import functools
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.frustum import Camera, points_in_frustum
-from ig2mj.geometry.poses import quat_rotate
+from ig2mj.geometry.poses import AnyArray, quat_rotate
 from ig2mj.geometry.surface import object_surfaces, sample_surface
 from ig2mj.geometry.targets import RayTargets, lines_enter_targets
 from ig2mj.predicates.base import Arguments, Context, Predicate
@@ -41,17 +41,14 @@ SIGHT_BUDGET = 2**24
 
 def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
     tables, objects = context.model.tables, arguments[:, 0]
-    found = context.none(arguments)
-    with_surface = np.isin(objects, tables.piece_object)
     agents = np.flatnonzero(tables.agent_camera >= 0)
-    if not with_surface.any() or len(agents) == 0:
-        return found
-    sight = functools.partial(_seen, context, objects[with_surface])
-    seen = functools.reduce(jnp.logical_or, [sight(int(agent)) for agent in agents])
-    return jnp.asarray(found).at[:, np.flatnonzero(with_surface)].set(seen)
+    if not np.any(tables.piece_object >= 0) or len(agents) == 0:
+        return context.none(arguments)
+    seen = functools.reduce(jnp.logical_or, [_seen(context, objects, int(agent)) for agent in agents])
+    return seen & jnp.asarray(_surfaces(tables)[2])[objects]
 
 
-def _seen(context: Context, objects: np.ndarray, agent: int) -> Bool[Array, "W P"]:
+def _seen(context: Context, objects: Int[AnyArray, "P"], agent: int) -> Bool[Array, "W P"]:
     """Whether one agent sees each object."""
     tables, view = context.model.tables, context.view
     points = _points(tables, view, objects)  # [W, P, N, 3]
@@ -78,7 +75,7 @@ def _seen(context: Context, objects: np.ndarray, agent: int) -> Bool[Array, "W P
 def _hidden(
     tables: SceneTables,
     view: PhysicsView,
-    objects: np.ndarray,
+    objects: Int[AnyArray, "P"],
     points: Float[Array, "W P N 3"],
     eye: Float[Array, "W 3"],
 ) -> Bool[Array, "W P N"]:
@@ -107,13 +104,22 @@ def _hidden(
     return jnp.any(blocked & another[:, None], axis=-1)
 
 
-def _points(tables: SceneTables, view: PhysicsView, objects: np.ndarray) -> Float[Array, "W P N 3"]:
+def _points(tables: SceneTables, view: PhysicsView, objects: Int[AnyArray, "P"]) -> Float[Array, "W P N 3"]:
     """The objects' sample points, world frame."""
-    with jax.ensure_compile_time_eval():  # constants: on the host, also while tracing
-        samples = [surface_points(tables, int(o)) for o in objects]
-    body, local = (np.stack(column) for column in zip(*samples, strict=True))
+    body, local = (jnp.asarray(column)[objects] for column in _surfaces(tables)[:2])
     pos, quat = jnp.asarray(view.body_pos)[:, body], jnp.asarray(view.body_quat)[:, body]
     return pos + quat_rotate(quat, local)
+
+
+@functools.lru_cache(maxsize=16)
+def _surfaces(tables: SceneTables) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Bodies [O, N] and places [O, N, 3] of all objects' sample points, and whether an object has pieces at all [O]."""
+    body, local = np.zeros((tables.num_objects, NUM_POINTS), int), np.zeros((tables.num_objects, NUM_POINTS, 3))
+    having = np.isin(np.arange(tables.num_objects), tables.piece_object)
+    with jax.ensure_compile_time_eval():  # constants: on the host, also while tracing
+        for o in np.flatnonzero(having):
+            body[o], local[o] = surface_points(tables, int(o))
+    return body, local.astype(np.float32), having
 
 
 @functools.lru_cache(maxsize=4096)
@@ -133,7 +139,6 @@ def surface_points(tables: SceneTables, obj: int) -> tuple[np.ndarray, np.ndarra
 IN_FOV_OF_AGENT = Predicate(
     name="in_fov_of_agent",
     arguments=("object",),
-    reads=("view.agent.eye_pos", "view.agent.eye_quat", "view.body_pos", "view.body_quat"),
     evaluate=_evaluate,
     aliases=("in_fov_of_robot", "infovofagent", "infovofrobot"),
 )

@@ -21,7 +21,6 @@ def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
 IN_HAND_OF_AGENT = Predicate(
     name="in_hand_of_agent",
     arguments=("object",),
-    reads=("view.held", "view.object_com"),
     evaluate=_evaluate,
     aliases=("in_hand_of_robot", "inhandofagent", "inhandofrobot"),
 )

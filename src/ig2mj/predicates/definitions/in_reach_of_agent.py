@@ -28,7 +28,6 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
 IN_REACH_OF_AGENT = Predicate(
     name="in_reach_of_agent",
     arguments=("object",),
-    reads=("view.object_com", "view.agent.base_pos"),
     evaluate=_evaluate,
     aliases=("in_reach_of_robot", "inreachofagent", "inreachofrobot"),
     why=_why,

@@ -31,7 +31,6 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
 IN_SAME_ROOM_AS_AGENT = Predicate(
     name="in_same_room_as_agent",
     arguments=("object",),
-    reads=("view.object_com", "view.agent.base_pos", "tables.room_map", "tables.object_rooms"),
     evaluate=_evaluate,
     aliases=("in_same_room_as_robot", "insameroomasagent", "insameroomasrobot"),
     why=_why,

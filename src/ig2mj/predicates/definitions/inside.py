@@ -21,7 +21,6 @@ def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
 INSIDE = Predicate(
     name="inside",
     arguments=("object", "object"),
-    reads=("view.object_com", "view.body_pos", "view.body_quat", "view.aabb_low", "view.aabb_high"),
     evaluate=_evaluate,
     aliases=("inside_of", "insideof"),
     queries=_queries,

@@ -40,7 +40,6 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
 NEXT_TO = Predicate(
     name="next_to",
     arguments=("object", "object"),
-    reads=("view.object_com", "view.body_pos", "view.body_quat", "view.aabb_low", "view.aabb_high"),
     evaluate=_evaluate,
     aliases=("nextto",),
     queries=_queries,

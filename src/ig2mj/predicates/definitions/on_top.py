@@ -30,7 +30,6 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
 ON_TOP = Predicate(
     name="on_top",
     arguments=("object", "object"),
-    reads=("view.touching", "view.object_com", "view.body_pos", "view.body_quat"),
     evaluate=_evaluate,
     aliases=("ontop", "on_top_of"),
     queries=_queries,

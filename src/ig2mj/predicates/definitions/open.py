@@ -24,7 +24,6 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
 OPEN = Predicate(
     name="open",
     arguments=("object",),
-    reads=("view.joint_pos",),
     evaluate=_evaluate,
     ability="openable",
     why=_why,

@@ -17,6 +17,5 @@ def _sliced(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O"]:
 SLICED = Predicate.of_states(
     _sliced,
     name="sliced",
-    reads=("states.sliced",),
     ability="sliceable",
 )

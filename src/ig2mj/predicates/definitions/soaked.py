@@ -23,7 +23,6 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
 SOAKED = Predicate.of_states(
     _soaked,
     name="soaked",
-    reads=("states.wetness",),
     ability="soakable",
     why=_why,
 )

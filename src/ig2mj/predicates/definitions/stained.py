@@ -12,8 +12,12 @@ from ig2mj.states.definitions import stain
 
 
 def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
-    rows = np.array([stain.row_of(context.model, int(o)) for (o,) in arguments], int)
-    return jnp.asarray(stain.stained(context.model, context.states.stain))[:, rows]
+    having = context.model.parameters.stain_rows
+    if not len(having):
+        return context.none(arguments)
+    rows = np.zeros(context.model.tables.num_objects, int)
+    rows[having] = np.arange(len(having))
+    return jnp.asarray(stain.stained(context.model, context.states.stain))[:, jnp.asarray(rows)[arguments[:, 0]]]
 
 
 def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
@@ -26,7 +30,6 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
 STAINED = Predicate(
     name="stained",
     arguments=("object",),
-    reads=("states.stain",),
     evaluate=_evaluate,
     ability="stainable",
     why=_why,

@@ -17,7 +17,6 @@ def _toggled_on(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O"]
 TOGGLED_ON = Predicate.of_states(
     _toggled_on,
     name="toggled_on",
-    reads=("states.toggled_on",),
     ability="toggleable",
     aliases=("toggledon",),
 )

@@ -26,7 +26,6 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
 UNDER = Predicate(
     name="under",
     arguments=("object", "object"),
-    reads=("view.object_com", "view.body_pos", "view.body_quat"),
     evaluate=_evaluate,
     queries=_queries,
     why=_why,

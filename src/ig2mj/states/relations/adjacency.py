@@ -20,10 +20,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.poses import compose
+from ig2mj.geometry.poses import AnyArray, compose
 from ig2mj.geometry.rays import rays_hit_pieces
 from ig2mj.geometry.targets import RayTargets, lines_enter_targets
 from ig2mj.states.model import StateModel
+
+Poses = tuple[Float[AnyArray, "W B 3"], Float[AnyArray, "W B 4"]]
 
 HORIZONTAL_ANGLES = np.deg2rad([0.0, 22.5, 45.0, 67.5])
 """Of the first axis of each plane; the second one is perpendicular."""
@@ -50,10 +52,10 @@ VERTICAL_LINE = np.array([[0.0, 0.0, 1.0]], np.float32)
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class AdjacencyPairs:
-    """Pairs whose rays are computed together, laid out once."""
+    """Pairs whose rays are computed together, laid out once; `pairs` may be traced."""
 
     model: StateModel
-    pairs: Int[np.ndarray, "P 2"]
+    pairs: Int[AnyArray, "P 2"]
     targets: RayTargets
 
     @classmethod
@@ -61,31 +63,28 @@ class AdjacencyPairs:
         """`pairs` are object indices: whose rays, against whose pieces."""
         return cls(model, pairs, RayTargets.build(model.tables, pairs[:, 1]))
 
-    def vertical(self, view: PhysicsView) -> tuple[Bool[Array, "W P"], Bool[Array, "W P"]]:
-        """Whether the target is above the object, and whether it is below (both may hold, or neither)."""
-        up, down = self._lines(view, VERTICAL_LINE, VERTICAL_LENGTH)
+    def vertical(self, view: PhysicsView, poses: Poses | None = None) -> tuple[Bool[Array, "W P"], Bool[Array, "W P"]]:
+        """Whether the target is above the object, and whether it is below (both may hold, or neither).
+
+        `poses`: of the bodies that `targets` counts, where these are not all of the scene.
+        """
+        up, down = self._lines(view, poses, VERTICAL_LINE, VERTICAL_LENGTH)
         return up[..., 0], down[..., 0]
 
-    def horizontal(self, view: PhysicsView) -> tuple[Bool[Array, "W P R"], Bool[Array, "W P R"]]:
+    def horizontal(
+        self, view: PhysicsView, poses: Poses | None = None
+    ) -> tuple[Bool[Array, "W P R"], Bool[Array, "W P R"]]:
         """Whether the target is on the positive and on the negative side, for each of `HORIZONTAL_LINES`."""
-        return self._lines(view, HORIZONTAL_LINES, HORIZONTAL_LENGTH)
-
-    @property
-    def _compat(self) -> str:
-        return self.model.options.compat
+        return self._lines(view, poses, HORIZONTAL_LINES, HORIZONTAL_LENGTH)
 
     def _lines(
-        self, view: PhysicsView, lines: Float[np.ndarray, "R 3"], length: dict[str, float]
+        self, view: PhysicsView, poses: Poses | None, lines: Float[np.ndarray, "R 3"], length: dict[str, float]
     ) -> tuple[Bool[Array, "W P R"], Bool[Array, "W P R"]]:
-        return self._enter(view, lines, np.full(len(lines), length[self._compat], np.float32))
-
-    def _enter(
-        self, view: PhysicsView, lines: Float[np.ndarray, "R 3"], lengths: Float[np.ndarray, "R"]
-    ) -> tuple[Bool[Array, "W P R"], Bool[Array, "W P R"]]:
+        compat = self.model.options.compat
+        lengths = np.full(len(lines), length[compat], np.float32)
         origins = jnp.asarray(view.object_com)[:, self.pairs[:, 0]]
-        return lines_enter_targets(
-            self.targets, view.body_pos, view.body_quat, origins, lines, lengths, INFLATE[self._compat]
-        )
+        pos, quat = poses or (view.body_pos, view.body_quat)
+        return lines_enter_targets(self.targets, pos, quat, origins, lines, lengths, INFLATE[compat])
 
 
 def neighbours(model: StateModel, view: PhysicsView, obj: int, world: int = 0) -> dict[str, list[str]]:

@@ -82,7 +82,8 @@ class ContainerPairs:
         numbers = jnp.nonzero(mask, size=worlds * count, fill_value=worlds * count)[0]
         numbers = jnp.concatenate([numbers, jnp.full(chunk, worlds * count)])
         before = jnp.concatenate([jnp.zeros(1, rank.dtype), rank])[self.start * worlds]
-        found, first = jnp.zeros(worlds * count, bool), 0
+        found: jax.Array = jnp.zeros(worlds * count, bool)
+        first = 0
         for table in self.tables:
             limits = before[first : first + len(table.bodies) + 1]
             found = self._work_off(table, view, numbers, limits, chunk, worlds, found)
@@ -98,8 +99,8 @@ class ContainerPairs:
         limits: Int[Array, "K"],
         chunk: int,
         worlds: int,
-        found: Bool[Array, "M"],
-    ) -> Bool[Array, "M"]:
+        found: Bool[jax.Array, "M"],
+    ) -> Bool[jax.Array, "M"]:
         """Answers the listed pairs of some containers: number k's stand in the list from limits[k] to limits[k + 1]."""
         com = jax.lax.stop_gradient(jnp.asarray(view.object_com))
         pos, quat = (jax.lax.stop_gradient(jnp.asarray(f)) for f in (view.body_pos, view.body_quat))
@@ -107,7 +108,7 @@ class ContainerPairs:
         chunks = (limits[1:] - limits[:-1] + chunk - 1) // chunk
         until = jnp.cumsum(chunks)
 
-        def some(turn: Int[Array, ""], found: Bool[Array, "M"]) -> Bool[Array, "M"]:
+        def some(turn: Int[jax.Array, ""], found: Bool[jax.Array, "M"]) -> Bool[jax.Array, "M"]:
             k = jnp.sum(until <= turn)
             at = limits[k] + (turn - until[k] + chunks[k]) * chunk
             number = jax.lax.dynamic_slice(numbers, (at,), (chunk,))

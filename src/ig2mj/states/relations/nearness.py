@@ -95,9 +95,9 @@ class NearPairs:
         numbers = jnp.nonzero(mask, size=total, fill_value=total)[0]
         numbers = jnp.concatenate([numbers, jnp.full(chunk, total)])
         most = limit(view, self.pairs).T.reshape(-1)
-        poses = tuple(jax.lax.stop_gradient(jnp.asarray(f)) for f in (view.body_pos, view.body_quat))
+        poses = jax.lax.stop_gradient((jnp.asarray(view.body_pos), jnp.asarray(view.body_quat)))
 
-        def some(turn: Int[Array, ""], found: Bool[Array, "M"]) -> Bool[Array, "M"]:
+        def some(turn: Int[jax.Array, ""], found: Bool[jax.Array, "M"]) -> Bool[jax.Array, "M"]:
             number = jax.lax.dynamic_slice(numbers, (turn * chunk,), (chunk,))
             row = jnp.minimum(number, total - 1)
             answer = self._of_rows(poses, row % worlds, row // worlds, most[row], number < total)
@@ -128,7 +128,7 @@ class NearPairs:
         listed = jnp.nonzero(close.reshape(-1), size=size, fill_value=size)[0]
         listed = jnp.concatenate([listed, jnp.full(block, size)])
 
-        def some(turn: Int[Array, ""], found: Bool[Array, "C"]) -> Bool[Array, "C"]:
+        def some(turn: Int[jax.Array, ""], found: Bool[jax.Array, "C"]) -> Bool[jax.Array, "C"]:
             number = jax.lax.dynamic_slice(listed, (turn * block,), (block,))
             row, i, j = jnp.unravel_index(jnp.minimum(number, size - 1), close.shape)
             a, b = first[row, i], second[row, j]

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.poses import AnyArray
 from ig2mj.scene.tables import SceneTables
 
 NO_ROOM = -1
@@ -30,7 +31,7 @@ def room_at(tables: SceneTables, xy: Float[Array, "*b 2"]) -> Int[Array, "*b"]:
 
 
 def in_room(
-    tables: SceneTables, view: PhysicsView, objects: Int[np.ndarray, "P"], rooms: Int[Array, "W P"]
+    tables: SceneTables, view: PhysicsView, objects: Int[AnyArray, "P"], rooms: Int[Array, "W P"]
 ) -> Bool[Array, "W P"]:
     """Whether each object is in a room (one per world and object, -1: false).
 
@@ -40,11 +41,11 @@ def in_room(
     if not tables.room_names:
         return jnp.zeros(rooms.shape, bool)
     at = room_at(tables, jnp.asarray(view.object_com)[:, objects, :2])
-    annotated = tables.object_rooms[objects]
+    annotated = jnp.asarray(tables.object_rooms)[objects]
     listed = jnp.take_along_axis(
         jnp.broadcast_to(annotated, (rooms.shape[0], *annotated.shape)), jnp.maximum(rooms, 0)[..., None], axis=-1
     )[..., 0]
-    fixed = tables.object_fixed[objects] & np.any(annotated, axis=-1)
+    fixed = jnp.asarray(tables.object_fixed)[objects] & jnp.any(annotated, axis=-1)
     return (rooms >= 0) & jnp.where(fixed, listed, at == rooms)
 
 

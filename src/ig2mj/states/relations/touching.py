@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Bool, Int
 
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.poses import AnyArray
 
 
-def touching(view: PhysicsView, pairs: Int[np.ndarray, "P 2"]) -> Bool[Array, "W P"]:
+def touching(view: PhysicsView, pairs: Int[AnyArray, "P 2"]) -> Bool[Array, "W P"]:
     """Whether the surfaces of two objects touch; false where a centre of mass is not finite."""
     num_objects = view.touching.shape[-1]
     flat = jnp.asarray(view.touching).reshape(view.touching.shape[0], -1)

@@ -18,11 +18,11 @@ from typing import ClassVar, NamedTuple, TypeVar
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.extend.core import Jaxpr, Literal
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import SCHEMA, Array, PhysicsView, assemble, read_field
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus
+from ig2mj.predicates.tracing import inputs_that_matter
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Memo, RelationPlan
@@ -190,15 +190,6 @@ class StateProgram:
         if self.goal is not None:
             status = _status_fields(self.goal.status_of(self.goal.literals.update_heat(facts, new), new))
         return new.temperature, new.max_temperature, status
-
-
-def inputs_that_matter(jaxpr: Jaxpr) -> list[bool]:
-    """Whether any result of a traced function can depend on each input (an operation depends on all that it takes)."""
-    needed = {v for v in jaxpr.outvars if not isinstance(v, Literal)}
-    for equation in reversed(jaxpr.eqns):
-        if any(v in needed for v in equation.outvars):
-            needed.update(v for v in equation.invars if not isinstance(v, Literal))
-    return [v in needed for v in jaxpr.invars]
 
 
 def _copied(node: T) -> T:
