@@ -227,10 +227,13 @@ def test_native_faces_agree_to_the_last_bit(told, scene, tmp_path, kind):
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
 @pytest.mark.parametrize("kind", ["worlds", "simulation", "debug", "sharded"])
-@pytest.mark.parametrize("engine", ["warp", "jax"])
-def test_engines_agree(told, scene, tmp_path, engine, kind):
-    """Physics differs by rounding; switches, cuts and droplets do not, and temperatures follow."""
-    for moment, (ours, theirs) in enumerate(zip(tell(make_face(kind, scene, engine, tmp_path)), told, strict=True)):
+def test_engines_agree(told, scene, tmp_path, kind):
+    """Physics differs by rounding; switches, cuts and droplets do not, and temperatures follow.
+
+    Not told by MJX in JAX, whose code above the physics step is the same: it has no contact of a cylinder with a box,
+    and without the cylinder its program of this home was not compiled after a quarter of an hour.
+    """
+    for moment, (ours, theirs) in enumerate(zip(tell(make_face(kind, scene, "warp", tmp_path)), told, strict=True)):
         for name in ("toggled_on", "sliced", "wetness", "press_count"):
             np.testing.assert_array_equal(ours[name], theirs[name], f"{name} at moment {moment}")
         for name in ("temperature", "max_temperature"):
