@@ -1,0 +1,127 @@
+"""Agent steps a second of a home with a robot that acts at random, and what went wrong meanwhile.
+
+    python benchmarks/robots.py birch --robot humanoid --worlds 1024 4096 --minutes 1
+
+An agent step is 1/10 s: one action, three control steps, twelve physics steps, with all extended states, guards and a
+goal of ten literals, in one program under `lax.scan`. Actions are drawn evenly from the whole range of the robot's
+controller, a new one in one of `--hold` agent steps. Overflow, numbers that are not finite, and objects that left the
+house or moved too fast are counted over all steps; physics steps are worlds times steps.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import pathlib
+import time
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from batch_case import ten_literals
+from throughput import device, memory
+
+import ig2mj
+from ig2mj.agents import Fetch, Humanoid, TurtleBot
+from ig2mj.calibration.reach import find_reach
+from ig2mj.engine import make_engine
+from ig2mj.sampling.settled import make_pool
+from ig2mj.worlds import Core, Rules
+from ig2mj.worlds.worlds import controllers_of
+
+ROBOTS = {"humanoid": Humanoid, "fetch": Fetch, "turtlebot": TurtleBot}
+CONTROL_STEPS = 3
+"""Control steps of an agent step."""
+
+SUBSTEPS = 12
+"""Physics steps of an agent step."""
+
+CALL = 10
+"""Agent steps of one call."""
+
+
+def run(home: str, robot: str, num_worlds: int, engine_name: str, minutes: float, hold: int, actions: float) -> dict:
+    """One row."""
+    bare = ig2mj.load_scene(home)
+    place = find_reach(bare).start
+    start = time.time()
+    scene = ig2mj.load_scene(home, agents=[ROBOTS[robot](pos=(*place[:2], ROBOTS[robot]().pos[2]))])
+    rules = Rules.of_scene(scene)
+    rules = rules.with_goal(ten_literals(rules.model))
+    engine = make_engine(engine_name, scene, num_worlds)
+    core = Core(engine, rules, make_pool(bare, rules.model, 16, share=0.2), controllers_of(scene))
+    low, high = jnp.asarray(core.action_low), jnp.asarray(core.action_high)
+
+    def agent_step(carry, _):
+        batch, action, key = carry
+        key, draw, change = jax.random.split(key, 3)
+        new = jax.random.uniform(draw, action.shape, minval=low * actions, maxval=high * actions)
+        action = jnp.where(jax.random.bernoulli(change, 1 / hold, (num_worlds, 1)), new, action)
+        batch, _ = core.step_fn(batch, action)
+        for _ in range(CONTROL_STEPS - 1):
+            batch, status = core.step_fn(batch, None)
+        return (batch, action, key), status.fraction.mean()
+
+    if engine.pure:
+        call = jax.jit(lambda carry: jax.lax.scan(agent_step, carry, None, CALL), donate_argnums=0)
+    else:
+
+        def call(carry):
+            for _ in range(CALL):
+                carry, seen = agent_step(carry, None)
+            return carry, seen
+
+    carry = (core.start(0), jnp.zeros((num_worlds, len(low))), jax.random.key(1))
+    carry, seen = jax.block_until_ready(call(carry))
+    ready = time.time() - start
+    began, calls = time.time(), 0
+    while calls < 2 or time.time() - began < 60 * minutes:
+        carry, seen = jax.block_until_ready(call(carry))
+        calls += 1
+    seconds = time.time() - began
+    batch = carry[0]
+    health = engine.health(batch.world.physics)
+    steps = num_worlds * calls * CALL
+    return {
+        "scene": scene.name,
+        "objects": bare.tables.num_objects,
+        "robot": robot,
+        "engine": engine_name,
+        "worlds": num_worlds,
+        "agent_steps_per_s": round(steps / seconds),
+        "control_steps_per_s": round(CONTROL_STEPS * steps / seconds),
+        "physics_steps": SUBSTEPS * num_worlds * (calls + 1) * CALL,
+        "ready_s": round(ready, 1),
+        "overflow": int((np.asarray(health.overflow) != 0).sum()),
+        "non_finite": int((~np.asarray(health.finite)).sum()),
+        "troubles": core.metrics(batch),
+        "actions": actions,
+        "hold": hold,
+        "mean_goal": float(np.asarray(seen).mean()),
+        **memory(num_worlds),
+        **device(),
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("homes", nargs="+")
+    parser.add_argument("--robot", choices=ROBOTS, default="humanoid")
+    parser.add_argument("--worlds", type=int, nargs="+", default=[4096])
+    parser.add_argument("--engine", choices=["native", "warp"], default="warp")
+    parser.add_argument("--minutes", type=float, default=0.5, help="wall time of the timed calls of a row")
+    parser.add_argument("--hold", type=int, default=5, help="mean number of agent steps that an action is held")
+    parser.add_argument("--actions", type=float, default=1.0, help="share of the action range that is drawn from")
+    parser.add_argument("--rows", type=pathlib.Path, help="rows are added to this file, as JSON lines")
+    args = parser.parse_args()
+    for home in args.homes:
+        for worlds in args.worlds:
+            row = run(home, args.robot, worlds, args.engine, args.minutes, args.hold, args.actions)
+            print(json.dumps(row), flush=True)
+            if args.rows:
+                with args.rows.open("a") as file:
+                    file.write(json.dumps(row) + "\n")
+
+
+if __name__ == "__main__":
+    main()
