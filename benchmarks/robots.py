@@ -49,7 +49,12 @@ def run(home: str, robot: str, num_worlds: int, engine_name: str, minutes: float
     rules = Rules.of_scene(scene)
     rules = rules.with_goal(ten_literals(rules.model))
     engine = make_engine(engine_name, scene, num_worlds)
-    core = Core(engine, rules, make_pool(bare, rules.model, 16, share=0.2), controllers_of(scene))
+    core = Core(
+        engine,
+        rules,
+        make_pool(bare, rules.model, 16, share=0.2),
+        controllers_of(scene, CONTROL_STEPS * engine.substeps * engine.timestep),
+    )
     low, high = jnp.asarray(core.action_low), jnp.asarray(core.action_high)
 
     def agent_step(carry, _):
