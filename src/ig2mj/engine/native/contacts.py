@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
+from typing import NamedTuple
+
 import mujoco
 import numpy as np
 
@@ -35,62 +38,123 @@ def touching_units(
 
 
 LINK, FINGER = 1, 2
-"""Bits of `force_roles`: what presses. What is pressed on has the bit of what presses on it, shifted by `PRESSED`."""
+"""Kinds of forces of interest, bits: an annotated link's on an object, a finger's on a graspable body."""
 
-PRESSED = 2
-"""Bits by which those of what is pressed on are shifted."""
-
-
-def force_roles(layout: ModelLayout, geom_object: np.ndarray) -> np.ndarray:
-    """Bits [G] that say whose forces a contact of the geom may tell: an annotated link's on an object, a finger's on a
-    graspable body."""
-    presses = LINK * (layout.link_of_geom >= 0) + FINGER * (layout.finger_of_geom >= 0)
-    pressed = LINK * (geom_object >= 0) + FINGER * (layout.graspable_of_geom >= 0)
-    return (presses + (pressed << PRESSED)).astype(np.uint8)
+_SECOND = 2
+"""Bits by which those of a contact's second geom are shifted."""
 
 
-def add_forces(
-    data: mujoco.MjData,
-    layout: ModelLayout,
-    geom_object: np.ndarray,
-    roles: np.ndarray,
-    pyramidal: bool,
-    link_force: np.ndarray,
-    finger_force: np.ndarray,
-) -> bool:
-    """Raises forces (N) to those of the physics step just taken; says whether any was found.
+class StepContacts(NamedTuple):
+    """Copies of what the forces of a physics step are computed from.
 
-    Args:
-      roles: `force_roles`.
-      link_force: [L, O], the largest single contact, as in iGibson's slicer (spec/states.md 10.1).
-      finger_force: [F, Y], the sum over the contacts of a finger with a graspable body.
+    Attributes:
+      meets: [C] bits: kinds of what the first geom presses with, and, shifted, of what the second one does.
+      geom, address, dim: [C, 2], [C], [C] MuJoCo's. force: [nefc] forces of constraints.
     """
-    if not data.ncon:
-        return False
-    contact = data.contact
-    geom = contact.geom
-    role = roles.take(geom)
-    meets = role & (role >> PRESSED)[:, ::-1]
-    if not meets.any():
-        return False
-    row, side = meets.nonzero()
-    address = contact.efc_address[row]
-    real = address >= 0
-    if not real.all():
-        row, side, address = row[real], side[real], address[real]
-    kind, own, other = meets[row, side], geom[row, side], geom[row, 1 - side]
-    normal = data.efc_force[address]
-    if pyramidal:  # the normal force is the sum over the pyramid's edges, two per friction direction
-        edges = 2 * (contact.dim[row] - 1)
-        for k in range(1, int(edges.max(initial=0))):
-            more = edges > k
-            normal = normal + np.where(more, data.efc_force[np.where(more, address + k, 0)], 0.0)
-    of_link, of_finger = (kind & LINK) != 0, (kind & FINGER) != 0
-    if of_link.any():
-        np.maximum.at(link_force, (layout.link_of_geom[own[of_link]], geom_object[other[of_link]]), normal[of_link])
-    if of_finger.any():
-        total = np.zeros_like(finger_force)
-        place = layout.finger_of_geom[own[of_finger]], layout.graspable_of_geom[other[of_finger]]
-        np.add.at(total, place, normal[of_finger])
-        np.maximum(finger_force, total, out=finger_force)
-    return len(row) > 0
+
+    meets: np.ndarray
+    geom: np.ndarray
+    address: np.ndarray
+    dim: np.ndarray
+    force: np.ndarray
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class ForcePlan:
+    """Constants of a scene, by which contacts whose forces are of interest are found.
+
+    Attributes:
+      first, second: [G] bits of a geom as the first and as the second one of a contact; a contact's kinds are those
+        that both have. kinds: those that the scene can have.
+      pyramidal: of the friction cone. shape: [F, Y].
+    """
+
+    layout: ModelLayout
+    geom_object: np.ndarray
+    first: np.ndarray
+    second: np.ndarray
+    kinds: int
+    pyramidal: bool
+    shape: tuple[int, int]
+
+    @classmethod
+    def build(cls, layout: ModelLayout, geom_object: np.ndarray, pyramidal: bool, shape: tuple[int, int]) -> ForcePlan:
+        """Of an engine's model."""
+        pressing = LINK * (layout.link_of_geom >= 0) + FINGER * (layout.finger_of_geom >= 0)
+        pressed = LINK * (geom_object >= 0) + FINGER * (layout.graspable_of_geom >= 0)
+        return cls(
+            layout=layout,
+            geom_object=geom_object,
+            first=(pressing + (pressed << _SECOND)).astype(np.uint8),
+            second=(pressed + (pressing << _SECOND)).astype(np.uint8),
+            kinds=sum(kind for kind in (LINK, FINGER) if (pressing & kind).any() and (pressed & kind).any()),
+            pyramidal=pyramidal,
+            shape=shape,
+        )
+
+    def collect(self, data: mujoco.MjData) -> StepContacts | None:
+        """Contacts of the physics step just taken, copied; None where no force is of interest."""
+        if not data.ncon:
+            return None
+        contact = data.contact
+        geom = contact.geom
+        meets = self.first.take(geom[:, 0]) & self.second.take(geom[:, 1])
+        if not np.count_nonzero(meets):
+            return None
+        return StepContacts(
+            meets, geom.copy(), contact.efc_address.copy(), contact.dim.copy(), np.array(data.efc_force)
+        )
+
+    def has_links(self, contacts: StepContacts) -> bool:
+        """Whether an annotated link is in any of the contacts."""
+        return bool(np.count_nonzero(contacts.meets & (LINK | LINK << _SECOND)))
+
+    def has_fingers(self, contacts: StepContacts) -> bool:
+        """Whether a finger is in any of the contacts."""
+        return bool(np.count_nonzero(contacts.meets & (FINGER | FINGER << _SECOND)))
+
+    def add_links(self, contacts: StepContacts, link_force: np.ndarray) -> bool:
+        """Raises forces [L, O] (N) to those of a physics step, of the largest single contact, as in iGibson's slicer
+        (spec/states.md 10.1); says whether any was found."""
+        own, other, normal = self._normals(contacts, LINK)
+        np.maximum.at(link_force, (self.layout.link_of_geom[own], self.geom_object[other]), normal)
+        return len(own) > 0
+
+    def of_fingers(self, steps: list[StepContacts]) -> np.ndarray:
+        """Forces [F, Y] (N) of a control step: of each physics step the sum over the contacts of a finger with a
+        graspable body, of all of them the largest."""
+        largest = np.zeros(self.shape, np.float32)
+        for contacts in steps:
+            own, other, normal = self._normals(contacts, FINGER)
+            total = np.zeros_like(largest)
+            np.add.at(total, (self.layout.finger_of_geom[own], self.layout.graspable_of_geom[other]), normal)
+            np.maximum(largest, total, out=largest)
+        return largest
+
+    def _normals(self, contacts: StepContacts, kind: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of contacts of a kind that act: the geom that presses, the one pressed on, the normal force (N)."""
+        sides = [((contacts.meets & (kind << shift)) != 0) & (contacts.address >= 0) for shift in (0, _SECOND)]
+        row, side = np.stack(sides, 1).nonzero()
+        address = contacts.address[row]
+        normal = contacts.force[address]
+        if self.pyramidal:  # the normal force is the sum over the pyramid's edges, two per friction direction
+            edges = 2 * (contacts.dim[row] - 1)
+            for k in range(1, int(edges.max(initial=0))):
+                more = edges > k
+                normal = normal + np.where(more, contacts.force[np.where(more, address + k, 0)], 0.0)
+        return contacts.geom[row, side], contacts.geom[row, 1 - side], normal
+
+
+class FingerForces:
+    """`AgentView.finger_force`, computed when somebody reads it first."""
+
+    def __init__(self, plan: ForcePlan, pressing: list[list[StepContacts]]):
+        """`pressing`: of each world, contacts of the physics steps of a control step; nobody changes them any more."""
+        self._plan, self._pressing = plan, pressing
+        self._made: np.ndarray | None = None
+
+    def __call__(self) -> np.ndarray:
+        """[W, F, Y] in newtons."""
+        if self._made is None:
+            self._made = np.stack([self._plan.of_fingers(steps) for steps in self._pressing])
+        return self._made

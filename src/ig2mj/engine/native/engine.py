@@ -29,7 +29,7 @@ from ig2mj.engine.contact_filter import BitLayers
 from ig2mj.engine.controls import check_shape
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
-from ig2mj.engine.native.contacts import FINGER, LINK, PRESSED, force_roles
+from ig2mj.engine.native.contacts import FingerForces, ForcePlan
 from ig2mj.engine.native.later import RAW, Agents, LaterPlan, ObjectMotion
 from ig2mj.engine.native.model_slot import ModelSlot
 from ig2mj.engine.native.one_world import Statics, World
@@ -53,9 +53,11 @@ class NativePhysics:
       view: the view last made; while nothing moves, the same object is handed out again.
     """
 
-    def __init__(self, worlds: list[World], arrays: dict[str, np.ndarray], later: LaterPlan):
-        self.worlds, self.arrays, self.later = worlds, arrays, later
+    def __init__(self, worlds: list[World], arrays: dict[str, np.ndarray], statics: Statics):
+        self.worlds, self.arrays, self.later, self.forces = worlds, arrays, statics.later, statics.forces
         self.view: PhysicsView | None = None
+        self.of_agents: Agents  # what makes the fields of the view's agents
+        self.of_fingers: FingerForces
 
     def update(self, changed: int) -> PhysicsView:
         """The view of the present state: copies of what changed, the old arrays for the rest."""
@@ -72,7 +74,7 @@ class NativePhysics:
                 _make_later(
                     self.view, _VELOCITIES, ObjectMotion(self.later, arrays["qvel"].copy(), fields["object_quat"])
                 )
-            if changed & (Changed.AGENT | Changed.FORCE):
+            if changed & (Changed.AGENT | Changed.FINGERS):
                 fields["agent"] = self._agents(_copied(self.view.agent), fields, changed)
         return self.view
 
@@ -80,11 +82,16 @@ class NativePhysics:
         if changed & Changed.AGENT:
             raw = {name: self.arrays[name].copy() for name in RAW}
             contacts = [world.agent_contacts for world in self.worlds]
-            later = Agents(self.later, fields["body_pos"], fields["body_quat"], raw, contacts)
-            _make_later(agent, _OF_AGENTS, later)
-        if changed & Changed.FORCE:
-            agent.__dict__["finger_force"] = self.arrays["agent.finger_force"].copy()
+            self.of_agents = Agents(self.later, fields["body_pos"], fields["body_quat"], raw, contacts)
+        if changed & Changed.FINGERS:  # worlds change no list that stands here
+            self.of_fingers = FingerForces(self.forces, [world.pressing for world in self.worlds])
+        names = _OF_AGENTS if changed & Changed.AGENT else ()
+        _make_later(agent, (*names, "finger_force") if changed & Changed.FINGERS else names, self._of_both())
         return agent
+
+    def _of_both(self) -> Callable[[str], np.ndarray]:
+        agents, fingers = self.of_agents, self.of_fingers
+        return lambda name: fingers() if name == "finger_force" else agents(name)
 
 
 _VELOCITIES = ("object_linvel", "object_angvel")
@@ -157,7 +164,6 @@ class NativeEngine:
         self._slots = [ModelSlot(_engine_model(scene.model, timestep)) for _ in range(self.threads)]
         model = self._slots[0].model
         self.layout: ModelLayout = make_layout(model, self.tables)
-        roles = force_roles(self.layout, self.tables.geom_object)
         self._statics = Statics(
             tables=self.tables,
             layout=self.layout,
@@ -171,9 +177,12 @@ class NativeEngine:
             has_agents=len(self.tables.agent_names) > 0,
             vicinity=VicinityTable.build(model, self.layout.equality_tree),
             layers=BitLayers(model, self.tables),
-            force_roles=roles,
-            any_forces=any((roles & bit).any() and (roles & bit << PRESSED).any() for bit in (LINK, FINGER)),
-            pyramidal=model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL,
+            forces=ForcePlan.build(
+                self.layout,
+                self.tables.geom_object,
+                model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL,
+                (len(self.tables.finger_body), len(self.tables.graspable_body)),
+            ),
             tolerance=touch_tolerance,
             substeps=substeps,
         )
@@ -189,7 +198,7 @@ class NativeEngine:
             for share, numbers in enumerate(self._shares)
             for w in numbers
         ]
-        physics = NativePhysics(worlds, arrays, self._statics.later)
+        physics = NativePhysics(worlds, arrays, self._statics)
 
         physics.update(self._run(physics, World.start))
         return physics
@@ -321,7 +330,6 @@ def _engine_model(model: mujoco.MjModel, timestep: float) -> mujoco.MjModel:
 def _working_arrays(num_worlds: int, model: mujoco.MjModel, tables: SceneTables) -> dict[str, np.ndarray]:
     """By field of the view; and by name of MuJoCo's array for those of which copies are kept."""
     sizes = axis_sizes(tables, num_worlds)
-    fields = {name: SCHEMA[name] for name in (*FIELDS, "agent.finger_force")}
-    arrays = {name: np.zeros(field.shape(sizes), field.dtype) for name, field in fields.items()}
+    arrays = {name: np.zeros(SCHEMA[name].shape(sizes), SCHEMA[name].dtype) for name in FIELDS}
     raw = {"qpos": (model.nq,), "qvel": (model.nv,), "cvel": (model.nbody, 6), "subtree_com": (model.nbody, 3)}
     return arrays | {name: np.zeros((num_worlds, *raw[name])) for name in RAW}

@@ -10,7 +10,7 @@ import numpy as np
 from ig2mj.engine.contact_filter import BitLayers
 from ig2mj.engine.controls import LARGEST, clip
 from ig2mj.engine.layout import ModelLayout
-from ig2mj.engine.native.contacts import add_forces, touching_units
+from ig2mj.engine.native.contacts import ForcePlan, StepContacts, touching_units
 from ig2mj.engine.native.later import AgentContacts, LaterPlan, agents_touching, of_owners
 from ig2mj.engine.native.model_slot import ModelSlot
 from ig2mj.engine.native.sleep import restore_sleep, wake_trees
@@ -30,7 +30,7 @@ class Statics:
     Attributes:
       later: plan of the fields that are made later. has_agents: there is one.
       layers: the contact filter.
-      force_roles: [G] see `ig2mj.engine.native.contacts`. any_forces: some contact's force is of interest.
+      forces: what forces of contacts are of interest.
       See `ig2mj.engine.layout`, `ig2mj.engine.native.view_rows` and `ig2mj.engine.native.vicinity` for the rest.
     """
 
@@ -41,9 +41,7 @@ class Statics:
     has_agents: bool
     vicinity: VicinityTable
     layers: BitLayers
-    force_roles: np.ndarray
-    any_forces: bool
-    pyramidal: bool
+    forces: ForcePlan
     tolerance: float
     substeps: int
 
@@ -55,6 +53,7 @@ class World:
       data: MuJoCo's state. rows: this world's row of each of the engine's working arrays, by field of the view.
       units: [V, V] remembered touching of objects' units.
       agent_contacts: what tells which objects the agents touch.
+      pressing: contacts of fingers in the physics steps of the last control step; a new list where it changes.
       fields: fields of the model that this world has for itself, by name; its engine puts them into the model that the
         worlds of a thread share before it does anything with the world. Always there: eq_data.
       ignored: [H, O] contacts that are dropped. wrong_controls: some control was clipped since the world was loaded.
@@ -81,7 +80,8 @@ class World:
         self._awake = self._awake_before = np.zeros(model.ntree, bool)
         self._none_awake = False
         self._steady_plan = self._plan(self._awake)
-        self._has_force = False
+        self._has_force = False  # rows["link_force"] is not zero
+        self.pressing: list[StepContacts] = []
         self._numbers = self.data.qpos, self.data.qvel
         self._timestep = float(model.opt.timestep)
         self._has_grasps = len(statics.layout.grasp_equality) > 0
@@ -104,19 +104,20 @@ class World:
         self._near.begin()
         self._let_near()
         mujoco.mj_step2(model, data)
-        found = statics.any_forces and self._collect_force()
+        steps = [statics.forces.collect(data)] if statics.forces.kinds else []
         for _ in range(statics.substeps - 1):
             self._near.moved()
             self._let_near()
             mujoco.mj_step(model, data)
-            found |= statics.any_forces and self._collect_force()
+            if steps:
+                steps.append(statics.forces.collect(data))
         self._near.moved()
         self._let_near()
         mujoco.mj_step1(model, data)
         self.masks.open()  # nobody else is to see a model with masks
-        if found:
-            self._has_force = True
-            changed |= Changed.FORCE
+        for contacts in steps:
+            if contacts is not None:
+                changed |= self._note_forces(contacts)
         return changed | self.refresh()
 
     def _let_near(self) -> None:
@@ -133,7 +134,7 @@ class World:
         the bytes of just these arrays). MuJoCo would still go through every geom.
         """
         data = self.data
-        if not self._none_awake or self._has_force or data.ntree_awake or self._never_left_alone:
+        if not self._none_awake or self._has_force or self.pressing or data.ntree_awake or self._never_left_alone:
             return False
         for array, zeros in self._from_outside:
             if array.tobytes() != zeros:
@@ -264,24 +265,27 @@ class World:
 
     def clear_force(self) -> int:
         """Forgets the contact forces of the last control step."""
-        if not self._has_force:
-            return Changed.NOTHING
-        self.rows["link_force"][:] = 0.0
-        self.rows["agent.finger_force"][:] = 0.0
-        self._has_force = False
-        return Changed.FORCE
+        changed = Changed.NOTHING
+        if self._has_force:
+            self.rows["link_force"][:] = 0.0
+            self._has_force = False
+            changed |= Changed.FORCE
+        if self.pressing:
+            self.pressing = []
+            changed |= Changed.FINGERS
+        return changed
 
-    def _collect_force(self) -> bool:
-        statics = self.statics
-        return add_forces(
-            self.data,
-            statics.layout,
-            statics.tables.geom_object,
-            statics.force_roles,
-            statics.pyramidal,
-            self.rows["link_force"],
-            self.rows["agent.finger_force"],
-        )
+    def _note_forces(self, contacts: StepContacts) -> int:
+        """Adds forces of a physics step of this control step: links' at once, since states read them in every step;
+        fingers' contacts are kept until somebody asks."""
+        changed, forces = Changed.NOTHING, self.statics.forces
+        if forces.has_links(contacts) and forces.add_links(contacts, self.rows["link_force"]):
+            self._has_force = True
+            changed |= Changed.FORCE
+        if forces.has_fingers(contacts):
+            self.pressing = [*self.pressing, contacts]  # views may hold the old list
+            changed |= Changed.FINGERS
+        return changed
 
     def _check_finite(self) -> None:
         data, model, (qpos, qvel) = self.data, self.model, self._numbers

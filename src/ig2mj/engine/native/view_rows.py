@@ -29,7 +29,8 @@ class Changed:
     AWAKE = 64
     AGENT = 128
     HELD = 256
-    ALL = 511
+    FINGERS = 512
+    ALL = 1023
 
 
 FIELDS: dict[str, int] = {
@@ -49,7 +50,7 @@ FIELDS: dict[str, int] = {
     "held": Changed.HELD,
 }
 """The view's own fields that have working arrays, and the group that each is written with. Velocities of objects belong
-to OBJECTS, all of agents to AGENT but for the forces of fingers, which are written with FORCE."""
+to OBJECTS, all of agents to AGENT but for the forces of fingers, which have FINGERS to themselves."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
