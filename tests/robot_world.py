@@ -29,11 +29,11 @@ class RobotWorld:
     def view(self):
         return self.simulation.view
 
-    def body(self, name: str):
-        return self.view.body_pos[0, self.scene.model.body(name).id]
+    def body(self, name: str) -> np.ndarray:
+        return np.asarray(self.view.body_pos)[0, self.scene.model.body(name).id]
 
-    def quat(self, name: str):
-        return self.view.body_quat[0, self.scene.model.body(name).id]
+    def quat(self, name: str) -> np.ndarray:
+        return np.asarray(self.view.body_quat)[0, self.scene.model.body(name).id]
 
     def act(self, action: np.ndarray | None = None, times: int = 1, **named: float) -> None:
         """Acts so many times: the whole action, or numbers by name and zeros."""

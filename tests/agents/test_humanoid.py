@@ -9,7 +9,7 @@ from robot_world import RobotWorld
 from scipy.spatial.transform import Rotation
 
 from ig2mj.agents.base import Controller, Robot
-from ig2mj.agents.humanoid import Humanoid
+from ig2mj.agents.humanoid import Humanoid, HumanoidController
 from ig2mj.agents.humanoid.frames import FINGER_CLOSED, HAND_POS, THUMB_CLOSED
 from ig2mj.agents.humanoid.robot import BODY
 from ig2mj.errors import UnknownNameError
@@ -44,8 +44,8 @@ def test_turns_of_a_hand_are_about_the_axes_of_the_body(tiny_home_folder, compat
     """Spec 1.4, test 2: a quarter about z in two actions, then a quarter about y."""
     world = RobotWorld(tiny_home_folder, Humanoid(pos=OUTSIDE, compat=compat))
     start = rotation(world.quat("humanoid_right_hand"))
-    for axis in ("yaw", "yaw", "pitch", "pitch"):
-        world.act(**{f"right_hand_{axis}": np.pi / 4})
+    for turn in ({"yaw": np.pi / 4, "pitch": 0.0},) * 2 + ({"yaw": 0.0, "pitch": np.pi / 4},) * 2:
+        world.act(right_hand_yaw=turn["yaw"], right_hand_pitch=turn["pitch"])
         world.act(times=3)
     wanted = Rotation.from_euler("y", np.pi / 2) * Rotation.from_euler("z", np.pi / 2)
     turned = rotation(world.quat("humanoid_right_hand")) * start.inv()
@@ -157,10 +157,12 @@ def test_the_eye_moves_by_itself_without_mass(tiny_home_folder):
 
 def test_ghosts_are_shown_for_a_hand_that_cannot_follow(tiny_home_folder):
     world = RobotWorld(tiny_home_folder, Humanoid(pos=OUTSIDE))
-    shown, _, _ = world.controller.ghosts(world.view, world.state)
+    controller = world.controller
+    assert isinstance(controller, HumanoidController)
+    shown, _, _ = controller.ghosts(world.view, world.state)
     assert not shown.any()
     _, state = world.controller.control(np.eye(28, dtype=np.float32)[[20]] * 0.3, world.view, world.state)
-    shown, pos, _ = world.controller.ghosts(world.view, state)
+    shown, pos, _ = controller.ghosts(world.view, state)
     assert shown.tolist() == [[False, True]]
     assert pos[0, 1] - world.body("humanoid") == pytest.approx(HAND_POS[1] + [0.3, 0, 0], abs=1e-3)
 

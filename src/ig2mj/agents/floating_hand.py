@@ -78,13 +78,13 @@ class FloatingHand:
 class HandController:
     """An action is the controls themselves: where palm and fingers are to go, see `hand_ctrl`. It feels nothing."""
 
-    action_names = (
+    action_names: tuple[str, ...] = (
         *("x", "y", "z", "roll", "pitch", "yaw"),
         *(f"{f}_{s}" for f in ("thumb", "index", "middle", "ring", "pinky") for s in ("proximal", "distal")),
     )
-    action_high = np.array([100.0] * 3 + [np.pi] * 3 + [THUMB_CLOSED] * 2 + [FINGER_CLOSED] * 8)
-    action_low = np.array([-100.0] * 3 + [-np.pi] * 3 + [0.0] * 10)
-    proprioception_names = ()
+    action_high: np.ndarray = np.array([100.0] * 3 + [np.pi] * 3 + [THUMB_CLOSED] * 2 + [FINGER_CLOSED] * 8)
+    action_low: np.ndarray = np.array([-100.0] * 3 + [-np.pi] * 3 + [0.0] * 10)
+    proprioception_names: tuple[str, ...] = ()
 
     def __init__(self, agent: int):
         self._agent = agent

@@ -112,6 +112,9 @@ class TurtleBotController:
     """Actions of -1 to 1 are the drive's largest speeds forwards and to the left; or one of five discrete ones."""
 
     def __init__(self, agent: int, tables: SceneTables, discrete: bool = False):
+        self.action_names: tuple[str, ...]
+        self.action_low: np.ndarray
+        self.action_high: np.ndarray
         self._agent, self._discrete = agent, discrete
         self._wheels = np.flatnonzero(tables.agent_joint_agent == agent)
         self._limits = drive_limits(WHEEL_RADIUS, AXLE, MAX_WHEEL)
@@ -122,7 +125,7 @@ class TurtleBotController:
         else:
             self.action_names = ("forward", "turn_left")
             self.action_low, self.action_high = -np.ones(2), np.ones(2)
-        self.proprioception_names = ("dd_base_lin_vel", "dd_base_ang_vel")
+        self.proprioception_names: tuple[str, ...] = ("dd_base_lin_vel", "dd_base_ang_vel")
 
     @property
     def action_size(self) -> int:

@@ -86,13 +86,14 @@ class FetchState:
 class FetchController:
     """See the module's text. `ig2mj.agents.base.Controller`."""
 
-    action_names = (
+    action_names: tuple[str, ...] = (
         *("forward", "turn_left", "head_pan", "head_tilt"),
         *("eef_x", "eef_y", "eef_z", "eef_rx", "eef_ry", "eef_rz", "gripper"),
     )
-    action_low, action_high = -np.ones(11), np.ones(11)
+    action_low: np.ndarray = -np.ones(11)
+    action_high: np.ndarray = np.ones(11)
 
-    proprioception_names = (
+    proprioception_names: tuple[str, ...] = (
         *(f"camera_qpos_{f}_{n}" for f in ("sin", "cos") for n in ("pan", "tilt")),
         *(f"base_qpos_{f}_{n}" for f in ("sin", "cos") for n in ("r_wheel", "l_wheel")),
         *(f"robot_lin_vel_{n}" for n in "xyz"),

@@ -88,7 +88,7 @@ class HumanoidState:
 class HumanoidController:
     """See the module's text. `ig2mj.agents.base.Controller`."""
 
-    action_names = (
+    action_names: tuple[str, ...] = (
         *(f"{part}_{n}" for part in ("body", "eye") for n in _POSE),
         *(f"{hand}_{n}" for hand in HANDS for n in (*_POSE, "trigger", "reset")),
     )
@@ -96,8 +96,8 @@ class HumanoidController:
     def __init__(self, tables: SceneTables, agent: int, period: float, grasp_flags: bool = True):
         name = tables.agent_names[agent]
         pose = [MAX_MOVE] * 3 + [MAX_TURN] * 3
-        self.action_high = np.array([*pose, *pose, *pose, 1.0, 1.0, *pose, 1.0, 1.0], np.float32)
-        self.action_low = -self.action_high
+        self.action_high: np.ndarray = np.array([*pose, *pose, *pose, 1.0, 1.0, *pose, 1.0, 1.0], np.float32)
+        self.action_low: np.ndarray = -self.action_high
         self._agent, self._gain = agent, 1.0 / period
         self._hands = np.flatnonzero(tables.hand_agent == agent)
         self._finger_joints = np.array(
@@ -108,7 +108,7 @@ class HumanoidController:
         )
         self._flags = grasp_flags
         flag = ("is_grasping",) if grasp_flags else ()
-        self.proprioception_names = (
+        self.proprioception_names: tuple[str, ...] = (
             *(f"{hand}_{n}" for hand in HANDS for n in _POSE),
             *(f"eye_{n}" for n in _POSE),
             *(f"{hand}_{n}" for hand in HANDS for n in ("trigger_fraction", *flag)),
