@@ -153,7 +153,7 @@ def goal(home: str) -> list[dict[str, Any]]:
         many_states, many_view = jax.tree.map(lambda leaf: jnp.repeat(jnp.asarray(leaf), worlds, 0), (states, view))  # noqa: B023
         start = clock()
         made = compile_expression(world.state_model, text)
-        compiled = jax.jit(lambda s, v: made.verdict(s, v)).lower(many_states, many_view).compile()  # noqa: B023
+        compiled = jax.jit(lambda s, v: made.status(s, v)).lower(many_states, many_view).compile()  # noqa: B023
         wall, cpu = since(start)
         spent = []
         for _ in range(30):

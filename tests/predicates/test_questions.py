@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hand_world import HandWorld, Thing, shell
+from hand_world import HandWorld, Item, shell
 
 from ig2mj.errors import Ig2mjError
 from ig2mj.predicates import PREDICATES, compile_expression, find
@@ -18,11 +18,11 @@ from ig2mj.states.world import WorldState
 BALL = (((0, 0, 0), (0.05, 0.05, 0.05)),)
 NUM_LOOSE = 6
 HOME = HandWorld(
-    *[Thing(f"ball_{i}", BALL) for i in range(NUM_LOOSE)],
-    Thing("slab", (((0, 0, 0), (0.5, 0.5, 0.02)),), pos=(0, 0, 0.5)),
-    Thing("crate", shell(0.6, 0.6, 0.6), pos=(0.3, 0, 1.0)),
-    Thing("basket", shell(0.4, 0.4, 0.4, top=False), pos=(-0.4, 0.2, 0.8)),
-    Thing("rack", [((0, 0, 0.2 * k), (0.3, 0.3, 0.01)) for k in range(9)], pos=(0.5, 0.5, 0)),
+    *[Item(f"ball_{i}", BALL) for i in range(NUM_LOOSE)],
+    Item("slab", (((0, 0, 0), (0.5, 0.5, 0.02)),), pos=(0, 0, 0.5)),
+    Item("crate", shell(0.6, 0.6, 0.6), pos=(0.3, 0, 1.0)),
+    Item("basket", shell(0.4, 0.4, 0.4, top=False), pos=(-0.4, 0.2, 0.8)),
+    Item("rack", [((0, 0, 0.2 * k), (0.3, 0.3, 0.01)) for k in range(9)], pos=(0.5, 0.5, 0)),
 )
 RELATIONS = ("inside", "on_top", "under", "next_to", "in_contact_with")
 
@@ -98,7 +98,7 @@ def test_a_single_world_is_answered_as_a_batch_is():
     assert np.asarray(fused.literals_of(world)).tolist() == asked.literals_of(world).tolist()
 
 
-AGENT_HOME = HandWorld(Thing("ball", BALL), Thing("cup", BALL), agent=True)
+AGENT_HOME = HandWorld(Item("ball", BALL), Item("cup", BALL), agent=True)
 
 
 @pytest.mark.parametrize("text", ["(in_contact_with {0} agent)", "(in_contact_with agent {0})"])
@@ -132,7 +132,7 @@ FLOOR = (((0, 0, -0.1), (4, 4, 0.1)),)
 def test_fixed_furniture_is_on_the_floor_where_its_box_reaches_it_whatever_it_touches(height, expected, touches):
     block = (((0, 0, 0), (0.3, 0.3, 0.5)),)
     home = HandWorld(
-        Thing("fridge", block, fixed=True), Thing("floor", FLOOR, floor=True, fixed=True), Thing("box", block)
+        Item("fridge", block, fixed=True), Item("floor", FLOOR, floor=True, fixed=True), Item("box", block)
     )
     touching = [("fridge", "floor"), ("box", "floor")] if touches else []
     view = home.view({"fridge": (0, 0, height), "box": (1, 0, height)}, touching=touching)
@@ -143,7 +143,7 @@ def test_fixed_furniture_is_on_the_floor_where_its_box_reaches_it_whatever_it_to
 
 
 def test_furniture_beside_a_floor_is_not_on_it():
-    home = HandWorld(Thing("fridge", BALL, fixed=True), Thing("floor", FLOOR, floor=True, fixed=True))
+    home = HandWorld(Item("fridge", BALL, fixed=True), Item("floor", FLOOR, floor=True, fixed=True))
     goal = compile_expression(home.model(), "(on_floor fridge floor)")
     states = initial_states(home.model(), 1)
     assert goal.status(states, home.view({"fridge": (3.9, 0, 0.05)})).holds[0]
