@@ -18,14 +18,16 @@ import time
 import jax
 import jax.numpy as jnp
 import numpy as np
+import scipy.ndimage
 from batch_case import ten_literals
-from throughput import device, memory
+from throughput import _bits, device, memory
 
 import ig2mj
 from ig2mj.agents import Fetch, Humanoid, TurtleBot
-from ig2mj.calibration.reach import find_reach
 from ig2mj.engine import make_engine
+from ig2mj.engine.health import CAPACITY
 from ig2mj.sampling.settled import make_pool
+from ig2mj.scene import Scene
 from ig2mj.worlds import Core, Rules
 from ig2mj.worlds.worlds import controllers_of
 
@@ -40,12 +42,24 @@ CALL = 10
 """Agent steps of one call."""
 
 
-def run(home: str, robot: str, num_worlds: int, engine_name: str, minutes: float, hold: int, actions: float) -> dict:
+def freest_place(scene: Scene) -> np.ndarray:
+    """x and y (m) of the point of the floor that is farthest from everything that stands on it."""
+    rooms = scene.rooms
+    if rooms is None or rooms.traversable is None:
+        raise SystemExit(f"{scene.name} has no map of its free floor")
+    distance = scipy.ndimage.distance_transform_edt(np.pad(rooms.traversable, 1))[1:-1, 1:-1]
+    row, col = np.unravel_index(int(np.argmax(distance)), distance.shape)
+    return (np.array([col, row]) + 0.5 - np.array(distance.shape)[::-1] / 2) * rooms.trav_resolution
+
+
+def run(
+    home: str, robot: str, num_worlds: int, engine_name: str, minutes: float, hold: int, actions: float, what: str
+) -> dict:
     """One row."""
     bare = ig2mj.load_scene(home)
-    place = find_reach(bare).start
+    place = freest_place(bare)
     start = time.time()
-    scene = ig2mj.load_scene(home, agents=[ROBOTS[robot](pos=(*place[:2], ROBOTS[robot]().pos[2]))])
+    scene = ig2mj.load_scene(home, agents=[ROBOTS[robot](pos=(*place, ROBOTS[robot]().pos[2]))])
     rules = Rules.of_scene(scene)
     rules = rules.with_goal(ten_literals(rules.model))
     engine = make_engine(engine_name, scene, num_worlds)
@@ -67,6 +81,25 @@ def run(home: str, robot: str, num_worlds: int, engine_name: str, minutes: float
             batch, status = core.step_fn(batch, None)
         return (batch, action, key), status.fraction.mean()
 
+    def physics_step(carry, _):
+        """Without states, guards and goal, and of the view only what the controllers read."""
+        batch, action, key = carry
+        key, draw = jax.random.split(key)
+        action = jax.random.uniform(draw, action.shape, minval=low * actions, maxval=high * actions)
+        world = batch.world
+        ctrl, controllers = core._control_fn(action, world.view, batch.controllers)
+        physics, view = engine.step(world.physics, ctrl)
+        for _ in range(CONTROL_STEPS - 1):
+            physics, view = engine.step(physics, None)
+        agent = world.view.replace(agent=view.agent, held=view.held)
+        return (
+            batch.replace(world=world.replace(physics=physics, view=agent), controllers=controllers),
+            action,
+            key,
+        ), 0.0
+
+    if what == "physics":
+        agent_step = physics_step
     if engine.pure:
         call = jax.jit(lambda carry: jax.lax.scan(agent_step, carry, None, CALL), donate_argnums=0)
     else:
@@ -97,9 +130,12 @@ def run(home: str, robot: str, num_worlds: int, engine_name: str, minutes: float
         "control_steps_per_s": round(CONTROL_STEPS * steps / seconds),
         "physics_steps": SUBSTEPS * num_worlds * (calls + 1) * CALL,
         "ready_s": round(ready, 1),
-        "overflow": int((np.asarray(health.overflow) != 0).sum()),
+        "overflow": int(((np.asarray(health.overflow) & int(CAPACITY)) != 0).sum()),
+        "overflow_bits": _bits(np.asarray(health.overflow)),
+        "start": place.round(2).tolist(),
         "non_finite": int((~np.asarray(health.finite)).sum()),
         "troubles": core.metrics(batch),
+        "what": what,
         "actions": actions,
         "hold": hold,
         "mean_goal": float(np.asarray(seen).mean()),
@@ -117,11 +153,12 @@ def main() -> None:
     parser.add_argument("--minutes", type=float, default=0.5, help="wall time of the timed calls of a row")
     parser.add_argument("--hold", type=int, default=5, help="mean number of agent steps that an action is held")
     parser.add_argument("--actions", type=float, default=1.0, help="share of the action range that is drawn from")
+    parser.add_argument("--what", choices=["full", "physics"], default="full", help="physics: without states and goal")
     parser.add_argument("--rows", type=pathlib.Path, help="rows are added to this file, as JSON lines")
     args = parser.parse_args()
     for home in args.homes:
         for worlds in args.worlds:
-            row = run(home, args.robot, worlds, args.engine, args.minutes, args.hold, args.actions)
+            row = run(home, args.robot, worlds, args.engine, args.minutes, args.hold, args.actions, args.what)
             print(json.dumps(row), flush=True)
             if args.rows:
                 with args.rows.open("a") as file:
