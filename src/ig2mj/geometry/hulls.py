@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
-from ig2mj.geometry.poses import AnyArray, length, normalize
+from ig2mj.geometry.poses import AnyArray, length, namespace, normalize
 from ig2mj.scene.tables import PieceKind
 
 
@@ -26,17 +26,18 @@ def signed_depth(
     polyhedra it is the negative distance from the farthest violated face's plane, which is nearer than the surface
     where an edge or a corner is nearest (`ig2mj.geometry.gjk.point_distance` is exact there).
     """
+    xp = namespace(size, planes, point)
     radius, half = size[..., 0], size[..., 1]
-    height = jnp.abs(point[..., 2])
+    height = xp.abs(point[..., 2])
     from_axis = length(point[..., :2])
-    from_end = jnp.stack(jnp.broadcast_arrays(from_axis, jnp.maximum(height - half, 0.0)), axis=-1)
+    from_end = xp.stack(xp.broadcast_arrays(from_axis, xp.maximum(height - half, 0.0)), axis=-1)
     side, end = radius - from_axis, half - height
-    corner = length(jnp.stack(jnp.broadcast_arrays(jnp.maximum(-side, 0.0), jnp.maximum(-end, 0.0)), axis=-1))
-    cylinder = jnp.where((side >= 0.0) & (end >= 0.0), jnp.minimum(side, end), -corner)
-    room = planes[..., 3] - jnp.sum(planes[..., :3] * point[..., None, :], axis=-1)
-    in_use = jnp.any(planes[..., :3] != 0.0, axis=-1)
-    polyhedron = jnp.min(jnp.where(in_use, room, jnp.inf), axis=-1, initial=jnp.inf)
-    return jnp.select(
+    corner = length(xp.stack(xp.broadcast_arrays(xp.maximum(-side, 0.0), xp.maximum(-end, 0.0)), axis=-1))
+    cylinder = xp.where((side >= 0.0) & (end >= 0.0), xp.minimum(side, end), -corner)
+    room = planes[..., 3] - xp.sum(planes[..., :3] * point[..., None, :], axis=-1)
+    in_use = xp.any(planes[..., :3] != 0.0, axis=-1)
+    polyhedron = xp.min(xp.where(in_use, room, xp.inf), axis=-1, initial=xp.inf)
+    return xp.select(
         [kind == k for k in (PieceKind.SPHERE, PieceKind.CAPSULE, PieceKind.CYLINDER)],
         [radius - length(point), radius - length(from_end), cylinder],
         polyhedron,

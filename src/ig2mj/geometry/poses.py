@@ -6,6 +6,9 @@ child frame into the parent frame. Quaternions are taken to be of unit length un
 
 from __future__ import annotations
 
+from types import ModuleType
+from typing import Any
+
 import jax.numpy as jnp
 import numpy as np
 import scipy.spatial.transform
@@ -18,6 +21,11 @@ Vec = Float[AnyArray, "*#b 3"]
 TINY = 1e-20
 
 
+def namespace(*arrays: Any) -> ModuleType:
+    """NumPy where all arrays are NumPy's, else `jax.numpy`: one formula for the host and for batches."""
+    return np if all(isinstance(a, np.ndarray) for a in arrays) else jnp
+
+
 def normalize(v: Float[AnyArray, "*b d"]) -> Float[Array, "*b d"]:
     """Vector of unit length along `v`; zero stays zero, with a finite gradient there."""
     square = jnp.sum(jnp.square(v), axis=-1, keepdims=True)
@@ -27,9 +35,10 @@ def normalize(v: Float[AnyArray, "*b d"]) -> Float[Array, "*b d"]:
 
 def length(v: Float[AnyArray, "*b d"]) -> Float[Array, "*b"]:
     """Euclidean length; its gradient at zero is zero rather than NaN."""
-    square = jnp.sum(jnp.square(v), axis=-1)
+    xp = namespace(v)
+    square = xp.sum(xp.square(v), axis=-1)
     usable = ~(square <= TINY)
-    return jnp.where(usable, jnp.sqrt(jnp.where(usable, square, 1.0)), 0.0)
+    return xp.where(usable, xp.sqrt(xp.where(usable, square, 1.0)), 0.0)
 
 
 def quat_normalize(q: Quat) -> Float[Array, "*b 4"]:

@@ -55,7 +55,7 @@ class RowSampler:
 
     def start_from(self, start: Snapshot, states: ExtendedStates) -> None:
         """Lets the next rows begin with another state of the scene."""
-        self._start, self._initial = start, states
+        self._start, self._initial = start, jax.tree.map(np.asarray, states)
 
     def sample(
         self, conditions: Sequence[Condition], rng: np.random.Generator, budget: Budget, rejected: Rejections
@@ -158,9 +158,8 @@ class RowSampler:
         return self._truth.hold(conditions, self._states, self.query.view)
 
     def _set(self, condition: Condition, rng: np.random.Generator) -> None:
-        key = jax.random.key(int(rng.integers(2**31)))
         (name,) = condition.arguments
-        change = set_by_name(self.model, self._states, self.query.view, condition.predicate, name, condition.value, key)
+        change = set_by_name(self.model, self._states, self.query.view, condition.predicate, name, condition.value, rng)
         self._states = change.states
         self._apply(change)
 

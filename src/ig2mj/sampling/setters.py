@@ -10,7 +10,6 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool
 
@@ -23,6 +22,7 @@ from ig2mj.sampling.surface_particles import sample_places
 from ig2mj.states import registry
 from ig2mj.states.definitions import dust, max_temperature, sliced, stain, temperature, toggled_on, wetness
 from ig2mj.states.definitions.open import sample_open
+from ig2mj.states.host import Randomness
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import StateSpec
 from ig2mj.states.world import ExtendedStates, Swap
@@ -52,7 +52,7 @@ class _Task(NamedTuple):
     object_name: str
     objects: tuple[int, ...]
     mask: Bool[Array, "1 O"]
-    key: jax.Array
+    key: Randomness
 
 
 def set_by_name(
@@ -62,7 +62,7 @@ def set_by_name(
     name: str,
     object_name: str,
     value: Value,
-    key: jax.Array,
+    key: Randomness,
 ) -> Change:
     """Sets a state to a value, or a predicate of one object to a truth, in every world of `states`.
 
@@ -71,7 +71,8 @@ def set_by_name(
         dusty, stained, toggled_on, open, sliced.
       object_name: its halves are set alike.
       value: a finite number, or a truth.
-      key: of what is drawn at random.
+      states: given as NumPy arrays, they stay that, and nothing is compiled (but for `sliced`).
+      key: of what is drawn at random; a generator on the host.
 
     Raises:
       UnknownNameError: no such state, predicate or object. AbilityError: the object lacks the ability.
@@ -152,13 +153,13 @@ def _toggled_on(t: _Task, value: bool) -> Change:
 def _open(t: _Task, value: bool) -> Change:
     if not np.any(t.model.tables.openable_object == t.objects[0]):
         raise StateError(f"'{t.object_name}' has no relevant joints to open")
-    joints, moves = sample_open(t.model, jnp.asarray(t.view.joint_pos), t.mask, value, t.key)
+    joints, moves = sample_open(t.model, np.asarray(t.view.joint_pos), t.mask, value, t.key)
     return Change(t.states, joints=(np.asarray(joints), np.asarray(moves)))
 
 
 def _sliced(t: _Task, value: bool) -> Change:
     if not value:
-        if bool(jnp.any(t.states.sliced[:, t.objects[0]])):
+        if bool(np.any(t.states.sliced[:, t.objects[0]])):
             raise StateError(f"'{t.object_name}' is sliced, and that is for good")
         return Change(t.states)
     only = np.isin(np.arange(t.model.tables.num_objects), t.objects[:1])[None]
@@ -172,7 +173,7 @@ def _dirty(field: str) -> Callable[[_Task, bool], Change]:
 
     def setter(t: _Task, value: bool) -> Change:
         rows, done = getattr(t.states, field), True
-        rng = np.random.default_rng(np.asarray(jax.random.key_data(t.key)))
+        rng = _generator(t.key)
         for obj in t.objects:
             row = module.row_of(t.model, obj)
             if row is None:
@@ -180,7 +181,7 @@ def _dirty(field: str) -> Callable[[_Task, bool], Change]:
             if value:
                 p = sample_places(t.model.tables, t.view, obj, rng)
                 rows, placed = put(t.model, rows, row, p.body, p.pos, p.normal, p.valid)
-                done &= bool(jnp.all(placed))
+                done &= bool(np.all(placed))
             else:
                 rows = clean(rows, row)
         if not done:
@@ -188,6 +189,10 @@ def _dirty(field: str) -> Callable[[_Task, bool], Change]:
         return Change(dataclasses.replace(t.states, **{field: rows}))
 
     return setter
+
+
+def _generator(key: Randomness) -> np.random.Generator:
+    return key if isinstance(key, np.random.Generator) else np.random.default_rng(np.asarray(jax.random.key_data(key)))
 
 
 _SETTERS: dict[str, Callable[[_Task, bool], Change]] = {

@@ -23,6 +23,7 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import quat_rotate, quat_rotate_inverse
+from ig2mj.states.host import namespace, put
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import Cut, EventStep, Saved, StateSpec
 
@@ -114,32 +115,34 @@ def place(
       The rows, and where it succeeded: with fewer than `minimum` valid points the object is left clean.
     """
     num_worlds = particles.alive.shape[0]
-    valid = jnp.broadcast_to(valid, (num_worlds, NUM_PARTICLES))
-    enough = jnp.sum(valid, axis=-1) >= minimum
+    xp = namespace(particles.alive, valid)
+    valid = xp.broadcast_to(valid, (num_worlds, NUM_PARTICLES))
+    enough = xp.sum(valid, axis=-1) >= minimum
     valid = valid & enough[:, None]
-    chosen = jnp.ones(num_worlds, bool) if worlds is None else jnp.asarray(worlds)
+    chosen = xp.ones(num_worlds, bool) if worlds is None else xp.asarray(worlds)
 
-    def put(field: Array, value: Array) -> Array:
+    def put_row(field: Array, value: Array) -> Array:
         mask = chosen.reshape(-1, *[1] * (field.ndim - 2))
-        return jnp.asarray(field).at[:, row].set(jnp.where(mask, value, field[:, row]))
+        return put(field, (slice(None), row), xp.where(mask, value, field[:, row]))
 
     placed = Particles(
-        alive=put(particles.alive, valid),
-        placed=put(particles.placed, valid),
-        body=put(particles.body, body),
-        pos=put(particles.pos, pos),
-        normal=put(particles.normal, normal),
+        alive=put_row(particles.alive, valid),
+        placed=put_row(particles.placed, valid),
+        body=put_row(particles.body, body),
+        pos=put_row(particles.pos, pos),
+        normal=put_row(particles.normal, normal),
     )
     return placed, enough & chosen
 
 
 def remove(particles: Particles, row: int, worlds: Bool[Array, "W"] | None = None) -> Particles:
     """Cleans the object of a row (paper table A.5, Dusty(o)=False)."""
-    keep = jnp.zeros((particles.alive.shape[0], 1), bool) if worlds is None else ~jnp.asarray(worlds)[:, None]
+    keep = np.zeros((particles.alive.shape[0], 1), bool) if worlds is None else ~worlds[:, None]
+    at = (slice(None), row)
     return dataclasses.replace(
         particles,
-        alive=jnp.asarray(particles.alive).at[:, row].set(particles.alive[:, row] & keep),
-        placed=jnp.asarray(particles.placed).at[:, row].set(particles.placed[:, row] & keep),
+        alive=put(particles.alive, at, particles.alive[at] & keep),
+        placed=put(particles.placed, at, particles.placed[at] & keep),
     )
 
 
@@ -232,16 +235,16 @@ def inherit(particles: Particles, rows: Int[np.ndarray, "R"], cut: Cut) -> Parti
     normal = quat_rotate_inverse(turn, particles.normal[:, start])
     root = np.broadcast_to(tables.object_root[obj][:, None], particles.body[:, start].shape)
 
-    def put(field: Array, value: Array) -> Array:
+    def put_rows(field: Array, value: Array) -> Array:
         chosen = mask.reshape(*mask.shape, *[1] * (field.ndim - 2))
         return jnp.asarray(field).at[:, to].set(jnp.where(chosen, value, field[:, to]).astype(field.dtype))
 
     return Particles(
-        alive=put(particles.alive, particles.alive[:, start]),
-        placed=put(particles.placed, particles.placed[:, start]),
-        body=put(particles.body, root),
-        pos=put(particles.pos, pos),
-        normal=put(particles.normal, normal),
+        alive=put_rows(particles.alive, particles.alive[:, start]),
+        placed=put_rows(particles.placed, particles.placed[:, start]),
+        body=put_rows(particles.body, root),
+        pos=put_rows(particles.pos, pos),
+        normal=put_rows(particles.normal, normal),
     )
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array
 from ig2mj.states.definitions.temperature import THERMAL
+from ig2mj.states.host import namespace
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import HeatStep, StateSpec
 
@@ -33,24 +35,25 @@ def set_cooked(
     The temperature stays: an object that is hotter than T_cook now is cooked again after the next update. In the
     paper's rules an object that is burnt already does not become Cooked by this.
     """
-    return _set(max_temperature, jnp.asarray(model.parameters.cook_temperature), objects, value)
+    return _set(max_temperature, model.parameters.cook_temperature, objects, value)
 
 
 def set_burnt(
     model: StateModel, max_temperature: Float[Array, "W O"], objects: Bool[Array, "#W O"], value: bool
 ) -> Float[Array, "W O"]:
     """Makes the masked objects Burnt, max(T_max, T_burn), or not, min(T_max, T_burn - 1) (paper table A.5)."""
-    return _set(max_temperature, jnp.asarray(model.parameters.burn_temperature), objects, value)
+    return _set(max_temperature, model.parameters.burn_temperature, objects, value)
 
 
 def _set(
     max_temperature: Float[Array, "W O"], threshold: Float[Array, "O"], objects: Bool[Array, "#W O"], value: bool
 ) -> Float[Array, "W O"]:
+    xp = namespace(max_temperature)
     if value:
-        changed = jnp.maximum(max_temperature, threshold)
+        changed = xp.maximum(max_temperature, threshold)
     else:
-        changed = jnp.minimum(max_temperature, threshold - 1.0)
-    return jnp.where(objects & jnp.isfinite(threshold), changed, max_temperature)
+        changed = xp.minimum(max_temperature, threshold - 1.0)
+    return xp.where(objects & np.isfinite(threshold), changed, max_temperature).astype(np.float32)
 
 
 def _update(step: HeatStep) -> HeatStep:

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array
+from ig2mj.states.host import Randomness, namespace, split, uniform
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import StateSpec
 
@@ -66,7 +67,7 @@ def sample_open(
     joint_pos: Float[Array, "W J"],
     objects: Bool[Array, "#W O"],
     value: bool,
-    key: jax.Array,
+    key: Randomness,
     fully: bool = False,
 ) -> tuple[Float[Array, "W J"], Bool[Array, "W J"]]:
     """Joint positions with which the masked objects are open, or closed (paper table A.5).
@@ -81,30 +82,32 @@ def sample_open(
       Positions, and which joints move.
     """
     tables = model.tables
-    pick, place = jax.random.split(key)
+    pick, place = split(key)
     mine = objects[:, tables.openable_object] & model.parameters.has("openable")[tables.openable_object]
-    moves = jnp.broadcast_to(mine, joint_pos.shape)
+    xp = namespace(joint_pos)
+    moves = xp.broadcast_to(mine, joint_pos.shape)
     if value and not fully:
         moves = moves & _random_subset(model, moves.shape[0], pick)
     end = tables.openable_open if value else tables.openable_closed
     if value and not model.paper:
         both_sides = tables.object_both_sides[tables.openable_object]
         end = np.where(both_sides, _other_thresholds(model), end)
-    share = 1.0 if fully else jax.random.uniform(place, joint_pos.shape, minval=SHARE[0], maxval=SHARE[1])
+    share = 1.0 if fully else uniform(place, joint_pos.shape, SHARE[0], SHARE[1])
     target = thresholds(model) + share * (end - thresholds(model))
-    return jnp.where(moves, target, joint_pos).astype(jnp.float32), moves
+    return xp.where(moves, target, joint_pos).astype(np.float32), moves
 
 
-def _random_subset(model: StateModel, worlds: int, key: jax.Array) -> Bool[Array, "W J"]:
+def _random_subset(model: StateModel, worlds: int, key: Randomness) -> Bool[Array, "W J"]:
     """Of each object's joints a subset whose size is uniform from 1 to all of them (spec/states.md section 11)."""
     tables = model.tables
-    order, size = jax.random.split(key)
-    rank_of = jax.random.uniform(order, (worlds, len(tables.openable_object)))
+    order, size = split(key)
+    rank_of = uniform(order, (worlds, len(tables.openable_object)))
     same = tables.openable_object[:, None] == tables.openable_object
-    rank = jnp.sum(same & (rank_of[:, None, :] < rank_of[:, :, None]), axis=-1)
+    xp = namespace(rank_of)
+    rank = xp.sum(same & (rank_of[:, None, :] < rank_of[:, :, None]), axis=-1)
     count = same.sum(axis=-1)
-    wanted = jax.random.uniform(size, (worlds, tables.num_objects))[:, tables.openable_object]
-    return rank < 1 + jnp.floor(wanted * count)
+    wanted = uniform(size, (worlds, tables.num_objects))[:, tables.openable_object]
+    return rank < 1 + xp.floor(wanted * count)
 
 
 def _any_of_object(model: StateModel, of_joint: Bool[Array, "W J"]) -> Bool[Array, "W O"]:

@@ -11,12 +11,12 @@ rules use Newton's here (spec/states.md 6.3). Differentiable in temperatures, ra
 
 from __future__ import annotations
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array
+from ig2mj.states.host import Randomness, namespace, uniform
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import HeatStep, StateSpec
 
@@ -66,19 +66,20 @@ def set_frozen(
     temperature: Float[Array, "W O"],
     objects: Bool[Array, "#W O"],
     value: bool,
-    key: jax.Array,
+    key: Randomness,
 ) -> Float[Array, "W O"]:
     """Makes the masked objects Frozen or not (paper table A.5).
 
     True: uniformly 10 to 50 degrees below the freezing temperature. False: one degree above it, even for an object that
     is warmer, as in iGibson.
     """
-    freeze = jnp.asarray(model.parameters.freeze_temperature)
+    freeze = model.parameters.freeze_temperature
     if value:
-        target = freeze - jax.random.uniform(key, temperature.shape, minval=FROZEN_RANGE[1], maxval=FROZEN_RANGE[0])
+        target = freeze - uniform(key, temperature.shape, FROZEN_RANGE[1], FROZEN_RANGE[0])
     else:
         target = freeze + 1.0
-    return jnp.where(objects & model.parameters.has("freezable"), target, temperature)
+    chosen = objects & model.parameters.has("freezable")
+    return namespace(temperature).where(chosen, target, temperature).astype(np.float32)
 
 
 def _update(step: HeatStep) -> HeatStep:

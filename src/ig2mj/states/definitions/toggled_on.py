@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.states.host import namespace
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import EventStep, StateSpec, Values, copied, filled, numbers, put
 
@@ -58,7 +59,7 @@ def set_toggled_on(
     model: StateModel, toggled_on: Bool[Array, "W O"], objects: Bool[Array, "#W O"], value: bool
 ) -> Bool[Array, "W O"]:
     """Switches the masked objects on or off (paper table A.5)."""
-    return jnp.where(objects & model.parameters.has("toggleable"), value, toggled_on)
+    return namespace(toggled_on).where(objects & model.parameters.has("toggleable"), value, toggled_on)
 
 
 def _initial(model: StateModel) -> Values:

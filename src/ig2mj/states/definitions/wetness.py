@@ -8,9 +8,11 @@ row 2). Drying is no part of either and off by default (`StateOptions.drying_rat
 from __future__ import annotations
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
+from ig2mj.states.host import namespace
 from ig2mj.states.model import StateModel
 from ig2mj.states.spec import EventStep, StateSpec
 
@@ -34,7 +36,8 @@ def set_soaked(
 ) -> Float[Array, "W O"]:
     """Makes the masked objects' wetness match the threshold, or 0 (paper table A.5)."""
     level = model.parameters.wetness_soaked if value else 0.0
-    return jnp.where(objects & model.parameters.has("soakable"), level, wetness)
+    chosen = objects & model.parameters.has("soakable")
+    return namespace(wetness).where(chosen, np.float32(level), wetness)
 
 
 def _update(step: EventStep) -> EventStep:

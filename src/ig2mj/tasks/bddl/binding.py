@@ -40,7 +40,7 @@ class Binding:
       activity, home: of which this is.
       objects: object of the activity -> object of the scene; a floor's is the home's floor. Halves are among them.
       rooms: object of the activity -> the room it has to be in, where the activity says so.
-      additions: what `load_scene(home, objects=...)` must add; their names are in `objects`.
+      additions: what `load_scene(home, objects=...)` must add. added: the names that these get, in that order.
       agents: object of the activity -> agent of the scene.
       stand_ins: synset -> what stands in for it, where our taxonomy does not know it.
     """
@@ -50,6 +50,7 @@ class Binding:
     objects: Mapping[str, str]
     rooms: Mapping[str, str]
     additions: tuple[str, ...]
+    added: tuple[str, ...]
     agents: Mapping[str, str]
     stand_ins: Mapping[str, str]
 
@@ -108,6 +109,7 @@ class _Binder:
             objects={name: self.objects[name] for name in order},
             rooms=self.rooms,
             additions=tuple(wanted),
+            added=tuple(new for new, _ in named),
             agents=dict(zip(mine, agents, strict=False)),
             stand_ins={s: k.instead for s, k in self.kinds.items() if k.instead is not None},
         )

@@ -1,0 +1,113 @@
+"""The start of a bound activity, sampled: initial states in which everything that its definition says holds.
+
+What `tasks.bddl.binding` adds to a home stands outside the house. An addition that the activity wants in a room, and
+for which no condition says where, is put on the floor of that room.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Sequence
+
+import jax
+import numpy as np
+
+from ig2mj.predicates.compile import CompiledExpression
+from ig2mj.sampling import many
+from ig2mj.sampling.conditions import Condition, read_conditions
+from ig2mj.sampling.many import Progress, Sampled
+from ig2mj.sampling.query import SceneQuery
+from ig2mj.scene.manifest import Manifest
+from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import WorldState
+from ig2mj.tasks.bddl.binding import Binding, BindingError, bind
+from ig2mj.tasks.bddl.goal import conditions
+from ig2mj.tasks.bddl.vocabulary import Activity
+from ig2mj.worlds.pool import Pool
+
+
+@dataclasses.dataclass(frozen=True)
+class SampledStart:
+    """Initial states of an activity.
+
+    Attributes:
+      sampled: the rows and the counted reasons. reached: numbers of rows of the pool in which the goal holds already.
+    """
+
+    sampled: Sampled
+    reached: tuple[int, ...]
+
+
+def fitting(activity: Activity, homes: Sequence[Manifest]) -> tuple[list[Binding], dict[str, list[str]]]:
+    """Bindings in the homes that fit, those that add least first, and of the other homes the reasons."""
+    bound: list[Binding] = []
+    errors: dict[str, list[str]] = {}
+    for manifest in homes:
+        try:
+            bound.append(bind(activity, manifest))
+        except BindingError as e:
+            errors[manifest.name] = list(e.reasons)
+    return sorted(bound, key=lambda b: len(b.additions)), errors
+
+
+def start_conditions(binding: Binding) -> list[Condition]:
+    """What must hold at the start, of the scene's objects; conditions of absent agents are left out.
+
+    Raises:
+      StateError: a condition is neither a predicate nor the negation of one.
+    """
+    found = list(dict.fromkeys(read_conditions(conditions(binding).init)))
+    placed = {c.arguments[0] for c in found if c.is_placement and c.value}
+    wanted = [
+        (binding.objects[name], room) for name, room in binding.rooms.items() if binding.objects[name] in binding.added
+    ]
+    return [*found, *(Condition("on_floor", (new, room)) for new, room in wanted if new not in placed)]
+
+
+def load_bound(binding: Binding, home: str | os.PathLike | None = None) -> Scene:
+    """The scene of a binding, with its additions. `home`: where it lies; default: the shipped one of that name."""
+    return load_scene(binding.home if home is None else home, objects=binding.additions)
+
+
+def sample_start(
+    binding: Binding,
+    scene: Scene,
+    count: int,
+    seed: int = 0,
+    *,
+    jobs: int = 1,
+    seconds_per_row: float = float("inf"),
+    progress: Progress = lambda done, failed: None,
+) -> SampledStart:
+    """Samples initial states of an activity.
+
+    Args:
+      scene: as `load_bound` gives it. The others: as of `ig2mj.sampling.many.sample`, which also says what is raised.
+    """
+    wanted = [c.expression for c in start_conditions(binding)]
+    done = many.sample(scene, wanted, count, seed, jobs=jobs, seconds_per_row=seconds_per_row, progress=progress)
+    return SampledStart(done, () if done.pool is None else rows_where_goal_holds(binding, scene, done.pool))
+
+
+def rows_where_goal_holds(binding: Binding, scene: Scene, pool: Pool) -> tuple[int, ...]:
+    """Numbers of the rows in which the activity is done before it begins."""
+    query = SceneQuery(scene)
+    model = StateModel.of_manifest(scene.tables, scene.manifest)
+    goal = conditions(binding).compile_goal(model)
+    return tuple(n for n in range(pool.size) if bool(np.asarray(goal(world_of_row(query, pool, n)))[0]))
+
+
+def explain_row(goal: CompiledExpression, scene: Scene, pool: Pool, row: int) -> str:
+    """What of a goal is still missing in a row of a pool, in words."""
+    return goal.explain(world_of_row(SceneQuery(scene), pool, row))
+
+
+def world_of_row(query: SceneQuery, pool: Pool, row: int) -> WorldState:
+    """A row of a pool as the state of one world."""
+    one = pool.rows(np.array([row]))
+    query.load(jax.tree.map(lambda a: a[0], one.physics))
+    nothing = np.zeros(1, np.int32)
+    key, time = np.zeros((1, 2), np.uint32), np.zeros(1, np.float32)
+    return WorldState(None, query.view, one.states, key=key, step=nothing, time=time)
