@@ -77,9 +77,9 @@ def test_homes_and_categories_are_listed_apart(narrow, capsys):
         (["homes", "convert", "--dataset", "{tmp}", "--out", "{tmp}/out"], "holds no scenes/"),
         (["homes", "sheet", "--out", "{tmp}/a.xyz", "--only", "apple"], "is no kind of picture"),
         (["homes", "sheet", "--out", "{tmp}/a.png", "--models", "0"], "at least one is needed"),
-        (["pool", "{home}", "--out", "{tmp}/none/pool.npz"], "does not exist"),
-        (["pool", "{home}", "--threads", "-1"], "--threads -1"),
-        (["pool", "{home}", "--share", "2"], "between 0 and 1"),
+        (["sample", "{home}", "--disturb", "--out", "{tmp}/none/pool.npz"], "does not exist"),
+        (["sample", "{home}", "--disturb", "--jobs", "-1"], "--jobs -1"),
+        (["sample", "{home}", "--disturb", "--share", "2"], "between 0 and 1"),
     ],
 )
 def test_what_cannot_work_is_told_at_once(tiny_home_folder, tmp_path, capsys, argv, says):

@@ -170,12 +170,12 @@ def test_a_file_that_is_no_pool_of_the_scene_is_named(pool, tiny_home, tmp_path,
 
 def test_the_command_makes_a_pool(tiny_home_folder, tiny_home, pool, tmp_path, capsys):
     file = tmp_path / "some.npz"
-    assert cli.call(["pool", str(tiny_home_folder), "--count", "2", "--out", str(file), "--seed", "3"]) == 0
+    assert cli.call(["sample", str(tiny_home_folder), "--disturb", "--count", "2", "--out", str(file), "--seed", "3"]) == 0
     assert "2 settled states of tiny_home" in capsys.readouterr().out
     assert load_pool(file, tiny_home).size == 2
 
 
 @pytest.mark.parametrize(("options", "says"), [(["--count", "0"], "at least one row"), (["--share", "1.5"], "between")])
 def test_the_command_refuses_senseless_numbers(tiny_home_folder, capsys, options, says):
-    assert cli.call(["pool", str(tiny_home_folder), *options]) == 2
+    assert cli.call(["sample", str(tiny_home_folder), "--disturb", *options]) == 2
     assert says in capsys.readouterr().err

@@ -57,8 +57,7 @@ COMMANDS: dict[str, str] = {
     "predicates": "tell what holds in a scene, or what an expression still lacks",
     "calibrate": "measure the batched engine's buffers for a scene",
     "sample": "sample initial states in which conditions hold, as a pool for batched resets",
-    "pool": "make a pool of settled initial states for batched resets",
-    "activity": "list BEHAVIOR's activities, and what each asks for in a home",
+    "activity": "list BEHAVIOR's activities, what each asks for in a home, and sample its starts",
     "homes": "build our own dataset of household objects and homes",
     "doctor": "tell what this machine can run, and how to mend what it cannot",
 }

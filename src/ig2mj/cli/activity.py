@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from ig2mj.cli.activity_pools import sample
+
 if TYPE_CHECKING:
     from ig2mj.scene.manifest import Manifest
     from ig2mj.tasks.bddl.binding import Binding
@@ -24,10 +26,11 @@ def list_(behavior1k: Flag = False, json: Flag = False) -> None:
     """
     from ig2mj.cli.printing import make_table, print_json, stdout_console
     from ig2mj.tasks.bddl.definitions import activity_names, load_activity
+    from ig2mj.tasks.bddl.start import fitting
     from ig2mj.tasks.bddl.vocabulary import VocabularyError
 
     names = activity_names(behavior1k)
-    homes = _homes(None)
+    homes = find_homes(None)
     found: list[dict[str, Any]] = []
     for name in names:
         try:
@@ -35,8 +38,8 @@ def list_(behavior1k: Flag = False, json: Flag = False) -> None:
         except VocabularyError as e:
             found.append({"activity": name, "lacks": list(e.predicates)})
             continue
-        bound, _ = _bind_everywhere(activity, homes)
-        best = min(bound, key=lambda b: len(b.additions), default=None)
+        bound, _ = fitting(activity, homes)
+        best = bound[0] if bound else None
         found.append(
             {
                 "activity": name,
@@ -64,9 +67,12 @@ def show(
     name: Annotated[str, tyro.conf.Positional],
     scene: Annotated[str | None, tyro.conf.arg(metavar="HOME")] = None,
     behavior1k: Flag = False,
+    pool: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="POOL.npz")] = None,
+    row: int = 0,
+    picture: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     json: Flag = False,
 ) -> int:
-    """Tell what an activity asks for, and which objects of a home play it.
+    """Tell what an activity asks for, and which objects of a home play it; or what is still false in a row of a pool.
 
     Exit status 1 when it cannot be bound in the home (without --scene: in any that ships).
 
@@ -74,18 +80,37 @@ def show(
       name: of the activity, or a BDDL file of your own.
       scene: the home; default the shipped one in which the least has to be added.
       behavior1k: of BEHAVIOR-1K instead of BEHAVIOR-100: some names occur in both.
+      pool: of initial states that `ig2mj activity sample` made: tell what of the goal is still false in one.
+      row: of the pool.
+      picture: write a picture of the row, too.
       json: print JSON instead of text.
     """
+    from ig2mj.cli.activity_pools import show_row
     from ig2mj.cli.printing import print_json
+    from ig2mj.errors import Ig2mjError
     from ig2mj.tasks.bddl.definitions import load_activity
+    from ig2mj.tasks.bddl.start import fitting
+    from ig2mj.worlds.pool import scene_name
 
     activity = load_activity(name, behavior1k)
-    bound, errors = _bind_everywhere(activity, _homes(scene))
-    best = min(bound, key=lambda b: len(b.additions), default=None)
+    if pool is not None:
+        if picture is not None:
+            from ig2mj.cli.files import check_picture
+
+            check_picture(picture)
+        found, errors = fitting(activity, findfind_homes(scene or scene_name(pool)))
+        if not found:
+            raise Ig2mjError(" ".join(line.strip() for line in binding_as_text(None, [], errors)))
+        show_row(found[0], pool, row, picture, scene, json)
+        return 0
+    if picture is not None or row:
+        raise Ig2mjError("--row and --picture belong to --pool")
+    bound, errors = fitting(activity, findfind_homes(scene))
+    best = bound[0] if bound else None
     if json:
         print_json(_as_data(activity, best, errors))
     else:
-        print("\n".join([*_as_text(activity), "", *_binding_as_text(best, [b.home for b in bound], errors)]))
+        print("\n".join([*_as_text(activity), "", *binding_as_text(best, [b.home for b in bound], errors)]))
     return 0 if best else 1
 
 
@@ -98,28 +123,15 @@ def fetch() -> None:
     print(f"{folder}: {len(activity_names(behavior_1k=True))} activities (ig2mj activity list --behavior1k)")
 
 
-SUBCOMMANDS = {"list": list_, "show": show, "fetch": fetch}
+SUBCOMMANDS = {"list": list_, "show": show, "sample": sample, "fetch": fetch}
 
 
-def _homes(scene: str | None) -> list[Manifest]:
+def find_homes(scene: str | None) -> list[Manifest]:
     """Manifests of the home that was named, or of all that ship. Raises InputError."""
     from ig2mj.scene.manifest import load_manifest
     from ig2mj.scene.paths import scene_folder, shipped_homes
 
-    return [load_manifest(scene_folder(pathlib.Path(name))) for name in ([scene] if scene else shipped_homes())]
-
-
-def _bind_everywhere(activity: Activity, homes: list[Manifest]) -> tuple[list[Binding], dict[str, list[str]]]:
-    """Bindings in the homes that fit, and of the others the reasons."""
-    from ig2mj.tasks.bddl.binding import BindingError, bind
-
-    bound, errors = [], {}
-    for manifest in homes:
-        try:
-            bound.append(bind(activity, manifest))
-        except BindingError as e:
-            errors[manifest.name] = list(e.reasons)
-    return bound, errors
+    return [load_manifest(scene_folder(pathlib.Path(name))) for name in ([scene] if scene else shippedfind_homes())]
 
 
 def _as_text(activity: Activity) -> list[str]:
@@ -138,27 +150,18 @@ def _as_text(activity: Activity) -> list[str]:
     ]
 
 
-def _binding_as_text(best: Binding | None, fit: list[str], errors: dict[str, list[str]]) -> list[str]:
+def binding_as_text(best: Binding | None, fit: list[str], errors: dict[str, list[str]]) -> list[str]:
     if best is None:
         near = sorted(errors, key=lambda home: len(errors[home]))[:3]
         return ["cannot be bound:", *(f"  {home}: {'; '.join(errors[home])}" for home in near)]
-    new = _added_names(best)
     lines = [f"in {best.home}:"]
     for name, bound in best.objects.items():
         room = f", {best.rooms[name]}" if name in best.rooms else ""
-        added = ", added from the object library" if bound in new else ""
+        added = ", added from the object library" if bound in best.added else ""
         lines.append(f"  {name:<32} {bound}{room}{added}")
     lines += [f"  {s} is not in the taxonomy: {instead} stands in" for s, instead in best.stand_ins.items()]
     others = [home for home in fit if home != best.home]
     return [*lines, *([f"also fits: {', '.join(others)}"] if others else [])]
-
-
-def _added_names(binding: Binding) -> set[str]:
-    """Names in the scene of what the library adds."""
-    from ig2mj.scene.additions import name_additions
-
-    (home,) = _homes(binding.home)
-    return {name for name, _ in name_additions((o.name for o in home.objects), binding.additions)}
 
 
 def _as_data(activity: Activity, best: Binding | None, errors: dict[str, list[str]]) -> dict[str, Any]:

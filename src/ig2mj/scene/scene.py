@@ -72,7 +72,7 @@ class Scene:
         hashed = hashlib.blake2b(digest_size=16)
         for file in (model_file(self.folder), self.folder / MANIFEST_FILE):
             hashed.update(file.read_bytes())
-        hashed.update("\n".join(self.object_names).encode())
+        hashed.update("\n".join((*self.object_names, *(a.sha256 for a in self.additions))).encode())
         return hashed.hexdigest()
 
     def object_index(self, name: str) -> int:

@@ -4,7 +4,7 @@ from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.debug import DebugWorlds
 from ig2mj.worlds.guards import Flag
-from ig2mj.worlds.pool import Pool, load_pool, save_pool
+from ig2mj.worlds.pool import Pool, load_pool, load_pool_scene, save_pool
 from ig2mj.worlds.rules import Outcome, Rules
 from ig2mj.worlds.sharding import ShardedWorlds, Shards
 from ig2mj.worlds.worlds import Worlds
@@ -21,5 +21,6 @@ __all__ = [
     "Shards",
     "Worlds",
     "load_pool",
+    "load_pool_scene",
     "save_pool",
 ]

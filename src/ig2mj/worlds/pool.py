@@ -8,7 +8,9 @@ Axis: P rows.
 
 from __future__ import annotations
 
+import dataclasses
 import os
+from collections.abc import Sequence
 from typing import Any
 
 import jax
@@ -20,12 +22,16 @@ from jaxtyping import Int
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.errors import InputError
-from ig2mj.scene.scene import Scene
+from ig2mj.scene.library import find_model
+from ig2mj.scene.scene import Agent, Scene, load_scene
 from ig2mj.states.world import ExtendedStates
 from ig2mj.worlds.archive import HEADER, build, read_arrays, read_header, save_tree
 
 FORMAT_VERSION = 2
 """1: scene and agents were not separate (`ig2mj.engine.snapshot`)."""
+
+
+_MEND = "make a pool of this scene with `ig2mj sample`"
 
 
 @struct.dataclass
@@ -51,9 +57,42 @@ def stack(pools: list[Pool]) -> Pool:
 
 
 def save_pool(pool: Pool, file: str | os.PathLike, scene: Scene, note: dict[str, Any] | None = None) -> None:
-    """Writes a pool of the scene. `note`: how it was made, for people."""
-    header = {"kind": "pool", "format_version": FORMAT_VERSION, "scene": scene.name, "digest": scene.digest}
+    """Writes a pool of the scene, with the objects that were added to it. `note`: how it was made, for people."""
+    header = {
+        "kind": "pool",
+        "format_version": FORMAT_VERSION,
+        "scene": scene.name,
+        "digest": scene.digest,
+        "additions": [dataclasses.asdict(a) for a in scene.additions],
+    }
     save_tree(file, pool, {**header, **(note or {})})
+
+
+def load_pool_scene(
+    file: str | os.PathLike, scene: str | os.PathLike | None = None, agents: Sequence[Agent] = ()
+) -> Scene:
+    """The scene that a pool was made in: the home with the same additions, and whatever agents.
+
+    Args:
+      scene: the home, as of `load_scene`; None: the shipped one of the name that the pool says.
+
+    Raises:
+      InputError: the file is no pool, or is one of another home, or a model of the object library is not the one that
+        was added. UnknownNameError: the library has no such model.
+    """
+    header = _pool_header(file)
+    wanted = []
+    for entry in header.get("additions", ()):
+        model = find_model(f"{entry['category']}/{entry['model']}")
+        if model.sha256 != entry["sha256"]:
+            raise InputError(file, f"was made with another '{model.category}/{model.model}' added", mend=_MEND)
+        wanted.append(f"{model.category}/{model.model}")
+    return load_scene(header["scene"] if scene is None else scene, agents, wanted)
+
+
+def scene_name(file: str | os.PathLike) -> str:
+    """Name of the home that a pool belongs to. Raises InputError: the file is no pool."""
+    return _pool_header(file)["scene"]
 
 
 def load_pool(file: str | os.PathLike, scene: Scene | None = None) -> Pool:
@@ -66,12 +105,12 @@ def load_pool(file: str | os.PathLike, scene: Scene | None = None) -> Pool:
     Raises:
       InputError: the file is missing, broken, of another scene, or of another format.
     """
-    header = read_header(file)
-    mend = "make a pool of this scene with `ig2mj pool`"
-    if header.get("kind") != "pool" or header.get("format_version") != FORMAT_VERSION:
-        raise InputError(file, f"is no pool of format {FORMAT_VERSION}", mend=mend)
+    header = _pool_header(file)
+    mend = _MEND
     if scene is not None and header.get("scene") != scene.name:
         raise InputError(file, f"is a pool of scene '{header.get('scene')}', not of '{scene.name}'", mend=mend)
+    if scene is not None and [a["name"] for a in header.get("additions", ())] != [a.name for a in scene.additions]:
+        raise InputError(file, "was made with other objects added", mend="load the scene with `load_pool_scene`")
     if scene is not None and header.get("digest") != scene.digest:
         raise InputError(file, f"was made before '{scene.name}' was converted as it is now", mend=mend)
     arrays = read_arrays(file, "")
@@ -83,3 +122,10 @@ def load_pool(file: str | os.PathLike, scene: Scene | None = None) -> Pool:
     if not pool.size:
         raise InputError(file, "has no rows", mend=mend)
     return pool
+
+
+def _pool_header(file: str | os.PathLike) -> dict[str, Any]:
+    header = read_header(file)
+    if header.get("kind") != "pool" or header.get("format_version") != FORMAT_VERSION:
+        raise InputError(file, f"is no pool of format {FORMAT_VERSION}", mend=_MEND)
+    return header

@@ -56,7 +56,7 @@ class Worlds:
           engine: an engine's name, or an engine made for this scene with `num_worlds` worlds; None: "warp" where JAX
             has a GPU, else "native".
           goal: evaluated at the end of every step. Without one, nothing is ever reached.
-          pool: what episodes start from (`ig2mj pool` makes one); None: from the scene's initial state.
+          pool: what episodes start from (`ig2mj sample` makes one); None: from the scene's initial state.
           states: how extended states behave.
           options: go to the engine, where it is given by name.
 

@@ -10,7 +10,7 @@ possible in the home's order: the same home, the same binding.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
 from ig2mj.errors import Ig2mjError
 from ig2mj.knowledge import synset
@@ -74,21 +74,29 @@ class _Binder:
         self.synset = {name: s for name, s in activity.synset_of().items() if s != AGENT}
         self.kinds = {s: kinds(s, activity.behavior_1k) for s in dict.fromkeys(self.synset.values())}
         self.needs = activity.needs
+        #: Objects that the start puts somewhere: these must be loose, unless a room of the home has them.
+        self.placed = {
+            a.arguments[0]
+            for a in self.activity.init
+            if isinstance(a, Atom) and len(a.arguments) == 2 and a.arguments[0] not in self.activity.rooms
+        }
         self.entries = {o.name: o for o in manifest.objects if o.part_of is None}
         of_category: dict[str, list[ObjectEntry]] = {}
         for o in self.entries.values():
             of_category.setdefault(o.category, []).append(o)
         #: For every object of the activity the objects of the home that may play it, categories that say it best first.
         self.players = {
-            name: [
-                o for c in self.kinds[s].categories for o in of_category.get(c, ()) if able(o, self.needs.get(name, ()))
-            ]
+            name: [o for c in self.kinds[s].categories for o in of_category.get(c, ()) if self.may_play(o, name)]
             for name, s in self.synset.items()
         }
         self.objects: dict[str, str] = {}
         self.rooms: dict[str, str] = {}
         self.added: dict[str, LibraryModel] = {}
         self.reasons: list[str] = []
+
+    def may_play(self, o: ObjectEntry, name: str) -> bool:
+        """Whether the activity can do with the object what it wants of `name`."""
+        return able(o, self.needs.get(name, ())) and not (o.fixed and name in self.placed)
 
     def bind(self, agents: Sequence[str]) -> Binding:
         for kind in dict.fromkeys(self.activity.rooms.values()):
@@ -153,7 +161,7 @@ class _Binder:
     def from_library(self, name: str) -> LibraryModel | None:
         """The model to add for an object: categories of its synset in turn, so that three fruits are not all apples."""
         synset_name = self.synset[name]
-        models = _library_models(self.kinds[synset_name], synset_name, self.needs.get(name, ()))
+        models = _library_models(self.kinds[synset_name], synset_name, lambda entry: self.may_play(entry, name))
         return models[self.activity.objects[synset_name].index(name) % len(models)] if models else None
 
     def bind_rest(self) -> None:
@@ -216,10 +224,9 @@ def able(o: ObjectEntry, predicates: Iterable[str]) -> bool:
     return True
 
 
-def _library_models(known: Kinds, synset_name: str, needs: Iterable[str]) -> list[LibraryModel]:
+def _library_models(known: Kinds, synset_name: str, fits: Callable[[ObjectEntry], bool]) -> list[LibraryModel]:
     """Models of the library for a synset: of its own categories, else of all below it; halves last."""
-    needs = list(needs)
-    models = [m for c in known.categories for m in library().get(c, {}).values() if able(m.entry, needs)]
+    models = [m for c in known.categories for m in library().get(c, {}).values() if fits(m.entry)]
     for choice in (
         [m for m in models if synset(m.category) == synset_name and not m.category.startswith("half_")],
         [m for m in models if not m.category.startswith("half_")],

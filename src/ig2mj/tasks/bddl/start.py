@@ -13,7 +13,6 @@ from collections.abc import Sequence
 import jax
 import numpy as np
 
-from ig2mj.predicates.compile import CompiledExpression
 from ig2mj.sampling import many
 from ig2mj.sampling.conditions import Condition, read_conditions
 from ig2mj.sampling.many import Progress, Sampled
@@ -21,7 +20,7 @@ from ig2mj.sampling.query import SceneQuery
 from ig2mj.scene.manifest import Manifest
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.states.model import StateModel
-from ig2mj.states.world import WorldState
+from ig2mj.states.world import ExtendedStates, WorldState
 from ig2mj.tasks.bddl.binding import Binding, BindingError, bind
 from ig2mj.tasks.bddl.goal import conditions
 from ig2mj.tasks.bddl.vocabulary import Activity
@@ -52,13 +51,23 @@ def fitting(activity: Activity, homes: Sequence[Manifest]) -> tuple[list[Binding
     return sorted(bound, key=lambda b: len(b.additions)), errors
 
 
-def start_conditions(binding: Binding) -> list[Condition]:
-    """What must hold at the start, of the scene's objects; conditions of absent agents are left out.
+def start_conditions(binding: Binding, scene: Scene) -> list[Condition]:
+    """What must hold at the start, of the scene's objects.
+
+    Left out are conditions of absent agents, and that a fixed object is on the floor of a room in which it was bound:
+    it stands there.
 
     Raises:
       StateError: a condition is neither a predicate nor the negation of one.
     """
-    found = list(dict.fromkeys(read_conditions(conditions(binding).init)))
+    read = dict.fromkeys(read_conditions(conditions(binding).init))
+    standing = {("on_floor", binding.objects[name], room) for name, room in binding.rooms.items()}
+    fixed = scene.tables.object_fixed
+
+    def is_given(c: Condition) -> bool:
+        return (c.predicate, *c.arguments) in standing and c.value and bool(fixed[scene.object_index(c.arguments[0])])
+
+    found = [c for c in read if not is_given(c)]
     placed = {c.arguments[0] for c in found if c.is_placement and c.value}
     wanted = [
         (binding.objects[name], room) for name, room in binding.rooms.items() if binding.objects[name] in binding.added
@@ -86,28 +95,47 @@ def sample_start(
     Args:
       scene: as `load_bound` gives it. The others: as of `ig2mj.sampling.many.sample`, which also says what is raised.
     """
-    wanted = [c.expression for c in start_conditions(binding)]
+    wanted = [c.expression for c in start_conditions(binding, scene)]
     done = many.sample(scene, wanted, count, seed, jobs=jobs, seconds_per_row=seconds_per_row, progress=progress)
     return SampledStart(done, () if done.pool is None else rows_where_goal_holds(binding, scene, done.pool))
+
+
+class GoalCheck:
+    """Whether the goal of a bound activity holds in a sampler's world."""
+
+    def __init__(self, binding: Binding, query: SceneQuery, model: StateModel):
+        self.query = query
+        self.goal = conditions(binding).compile_goal(model)
+
+    def holds(self, states: ExtendedStates) -> bool:
+        """In the world as it is now, with the given extended states."""
+        return bool(np.asarray(self.goal(world_of(self.query, states)))[0])
 
 
 def rows_where_goal_holds(binding: Binding, scene: Scene, pool: Pool) -> tuple[int, ...]:
     """Numbers of the rows in which the activity is done before it begins."""
     query = SceneQuery(scene)
-    model = StateModel.of_manifest(scene.tables, scene.manifest)
-    goal = conditions(binding).compile_goal(model)
-    return tuple(n for n in range(pool.size) if bool(np.asarray(goal(world_of_row(query, pool, n)))[0]))
+    check = GoalCheck(binding, query, StateModel.of_manifest(scene.tables, scene.manifest))
+    return tuple(n for n in range(pool.size) if check.holds(load_row(query, pool, n)))
 
 
-def explain_row(goal: CompiledExpression, scene: Scene, pool: Pool, row: int) -> str:
-    """What of a goal is still missing in a row of a pool, in words."""
-    return goal.explain(world_of_row(SceneQuery(scene), pool, row))
+def explain_row(binding: Binding, scene: Scene, pool: Pool, row: int) -> str:
+    """What of the goal is still missing in a row of a pool, in words."""
+    query = SceneQuery(scene)
+    goal = conditions(binding).compile_goal(StateModel.of_manifest(scene.tables, scene.manifest))
+    states = load_row(query, pool, row)
+    return goal.explain(world_of(query, states))
 
 
-def world_of_row(query: SceneQuery, pool: Pool, row: int) -> WorldState:
-    """A row of a pool as the state of one world."""
+def load_row(query: SceneQuery, pool: Pool, row: int) -> ExtendedStates:
+    """Puts the world into a row of a pool; its extended states."""
     one = pool.rows(np.array([row]))
     query.load(jax.tree.map(lambda a: a[0], one.physics))
+    return one.states
+
+
+def world_of(query: SceneQuery, states: ExtendedStates) -> WorldState:
+    """A sampler's world as predicates read it."""
     nothing = np.zeros(1, np.int32)
     key, time = np.zeros((1, 2), np.uint32), np.zeros(1, np.float32)
-    return WorldState(None, query.view, one.states, key=key, step=nothing, time=time)
+    return WorldState(None, query.view, states, key=key, step=nothing, time=time)

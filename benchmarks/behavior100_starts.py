@@ -1,0 +1,119 @@
+"""The starts of BEHAVIOR-100's activities, sampled: how many seeds succeed in the home that fits best.
+
+    python benchmarks/behavior100_starts.py --seeds 10             every activity; then writes docs/behavior100.md anew
+    python benchmarks/behavior100_starts.py --seeds 10 --resume    only the seeds that no earlier run got to
+    python benchmarks/behavior100_starts.py --activities cleaning_toilet --part 0 2    every second of these activities
+
+A row has 60 s of wall time. The scene is loaded and its predicates are compiled before, once for all seeds
+(`preparing`).
+An activity is one file, benchmarks/results/behavior100/starts/<activity>.json.
+"""
+
+from __future__ import annotations
+
+import argparse
+import collections
+import json
+import pathlib
+import time
+from typing import Any
+
+import jax
+import numpy as np
+from behavior100_page import write_page
+
+from ig2mj.errors import Ig2mjError
+from ig2mj.sampling.many import make_sampler, sample_row
+from ig2mj.sampling.placement import Budget
+from ig2mj.scene.manifest import Manifest, load_manifest
+from ig2mj.scene.paths import scene_folder, shipped_homes
+from ig2mj.tasks.bddl.binding import Binding
+from ig2mj.tasks.bddl.definitions import activity_names, load_activity
+from ig2mj.tasks.bddl.start import GoalCheck, fitting, load_bound, start_conditions
+
+ROOT = pathlib.Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "benchmarks" / "results" / "behavior100"
+PAGE = ROOT / "docs" / "behavior100.md"
+SECONDS = 60.0
+"""Wall time that a seed may take."""
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--activities", nargs="*", help="just these")
+    parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--resume", action="store_true", help="keep the seeds of earlier runs, do the others")
+    parser.add_argument("--part", nargs=2, type=int, metavar=("N", "OF"), default=(0, 1), help="every OF-th activity")
+    parser.add_argument("--out", type=pathlib.Path, default=RESULTS)
+    parser.add_argument("--page", type=pathlib.Path, default=PAGE)
+    args = parser.parse_args()
+    folder = args.out / "starts"
+    folder.mkdir(parents=True, exist_ok=True)
+    homes = [load_manifest(scene_folder(home)) for home in shipped_homes()]
+    for name in (args.activities or activity_names())[args.part[0] :: args.part[1]]:
+        file = folder / f"{name}.json"
+        known = json.loads(file.read_text(encoding="utf-8")) if args.resume and file.is_file() else {}
+        if known.get("seeds", []) and len(known["seeds"]) >= args.seeds:
+            continue
+        row = try_activity(name, homes, args.seeds, known)
+        file.write_text(json.dumps(row) + "\n", encoding="utf-8")
+        good = sum(seed["done"] for seed in row["seeds"])
+        why = row.get("failed") or ", ".join(list(row["reasons"])[:2] if good < len(row["seeds"]) else [])
+        print(f"{name} in {row['home']}: {good} of {len(row['seeds'])} {why}", flush=True)
+        jax.clear_caches()
+    write_page(args.page, args.out)
+
+
+def try_activity(name: str, homes: list[Manifest], seeds: int, known: dict[str, Any]) -> dict[str, Any]:
+    """What came of the seeds; those in `known` are kept if the home and the binding are still the same."""
+    bound, _ = fitting(load_activity(name), homes)
+    if not bound:
+        return {"home": None, "failed": "fits no home", "seeds": [], "reasons": {}}
+    best = bound[0]
+    row: dict[str, Any] = {
+        "home": best.home,
+        "added": list(best.additions),
+        "preparing": 0.0,
+        "seeds": [],
+        "reasons": {},
+    }
+    if known.get("home") == best.home and known.get("added") == row["added"] and "failed" not in known:
+        row |= {key: known[key] for key in ("seeds", "reasons")}
+    try:
+        return {**row, **sample_seeds(best, seeds, row)}
+    except Ig2mjError as e:
+        return {**row, "failed": f"{type(e).__name__}: {e}"}
+
+
+def sample_seeds(binding: Binding, seeds: int, row: dict[str, Any]) -> dict[str, Any]:
+    """Samples the seeds that are not among those of `row` yet."""
+    began = time.monotonic()
+    scene = load_bound(binding)
+    sampler = make_sampler(scene)
+    wanted = start_conditions(binding, scene)
+    check = GoalCheck(binding, sampler.query, sampler.model)
+    sampler.sample(wanted, np.random.default_rng(0), Budget(1), collections.Counter())  # compiles
+    preparing = time.monotonic() - began
+    done, reasons = list(row["seeds"]), collections.Counter(row["reasons"])
+    for seed in range(len(done), seeds):
+        wall, processor = time.monotonic(), time.process_time()
+        made, why = sample_row(sampler, wanted, seed, 0, SECONDS)
+        done.append(
+            {
+                "done": made is not None,
+                "seconds": round(time.monotonic() - wall, 2),
+                "processor": round(time.process_time() - processor, 2),
+                "goal_holds": made is not None and check.holds(made.states),
+            }
+        )
+        reasons.update(why)
+    return {
+        "preparing": round(preparing, 2),
+        "conditions": len(wanted),
+        "seeds": done,
+        "reasons": dict(reasons.most_common()),
+    }
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,144 @@
+"""`ig2mj activity sample` and `show --pool`: initial states of an activity, and what is still to be done in one."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+if TYPE_CHECKING:
+    from ig2mj.tasks.bddl.binding import Binding
+    from ig2mj.tasks.bddl.start import SampledStart
+
+Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
+
+
+def sample(
+    name: Annotated[str, tyro.conf.Positional],
+    scene: Annotated[str | None, tyro.conf.arg(metavar="HOME")] = None,
+    count: int = 16,
+    out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="POOL.npz")] = None,
+    seed: int = 0,
+    jobs: int = 0,
+    behavior1k: Flag = False,
+    json: Flag = False,
+) -> int:
+    """Sample initial states of an activity, and write them as a pool for batched resets.
+
+    Exit status 0 only if all rows were made; else the reasons are counted. Rows in which the goal holds already are
+    named.
+
+    Args:
+      name: of the activity, or a BDDL file of your own.
+      scene: the home; default: the shipped one in which the least has to be added.
+      count: rows.
+      out: the file; default: NAME.npz in the working directory.
+      seed: the same seed gives the same pool.
+      jobs: processes; 0: one per processor.
+      behavior1k: of BEHAVIOR-1K instead of BEHAVIOR-100.
+      json: print the result as JSON.
+    """
+    from ig2mj.cli.activity import binding_as_text, find_homes
+    from ig2mj.cli.files import check_folder_of
+    from ig2mj.cli.printing import add_bar, progress_bar
+    from ig2mj.errors import Ig2mjError
+    from ig2mj.tasks.bddl.definitions import load_activity
+    from ig2mj.tasks.bddl.start import fitting, load_bound, sample_start
+    from ig2mj.worlds.pool import save_pool
+
+    if count < 1:
+        raise Ig2mjError(f"--count {count}: a pool needs at least one row")
+    if jobs < 0:
+        raise Ig2mjError(f"--jobs {jobs}: 0 takes one process per processor, else at least one is needed")
+    activity = load_activity(name, behavior1k)
+    file = out or pathlib.Path(f"{activity.name}.npz")
+    check_folder_of(file)
+    bound, errors = fitting(activity, find_homes(scene))
+    if not bound:
+        raise Ig2mjError(" ".join(line.strip() for line in binding_as_text(None, [], errors)))
+    binding = bound[0]
+    loaded = load_bound(binding, scene)
+    with progress_bar() as bar:
+        report = add_bar(bar, f"sampling in {loaded.name}")
+        done = sample_start(
+            binding,
+            loaded,
+            count,
+            seed,
+            jobs=jobs,
+            progress=lambda made, failed: report(f"{failed} given up" if failed else "", made + failed, count),
+        )
+    if done.sampled.pool is not None:
+        note = {"activity": name, "behavior1k": behavior1k, "seed": seed, "rows": list(done.sampled.rows)}
+        save_pool(done.sampled.pool, file, loaded, note)
+    _tell(done, binding, file, json)
+    return 0 if done.sampled.complete else 1
+
+
+def _tell(done: SampledStart, binding: Binding, file: pathlib.Path, as_json: bool) -> None:
+    import sys
+
+    from ig2mj.cli.printing import make_table, print_json, stdout_console
+
+    sampled = done.sampled
+    if as_json:
+        result: dict[str, Any] = {
+            "activity": binding.activity.name,
+            "home": binding.home,
+            "added": binding.additions,
+            "file": str(file) if sampled.pool is not None else None,
+            "rows": len(sampled.rows),
+            "requested": sampled.requested,
+            "goal_holds_in": done.reached,
+            "seconds": round(sampled.seconds, 3),
+            "rejected": dict(sampled.rejected.most_common()),
+        }
+        print_json(result)
+        return
+    if sampled.pool is not None:
+        print(
+            f"{file}: {len(sampled.rows)} of {sampled.requested} starts of {binding.activity.name} in {binding.home}, "
+            f"{len(binding.additions)} objects added, {sampled.seconds:.1f} s\n"
+            f"look: ig2mj activity show {binding.activity.name} --pool {file} --row 0 --picture row.png"
+        )
+    if done.reached:
+        print(f"the goal holds already in rows {', '.join(map(str, done.reached))}", file=sys.stderr)
+    if not sampled.complete:
+        lacking = sampled.requested - len(sampled.rows)
+        print(f"{lacking} of {sampled.requested} rows could not be sampled in {binding.home}", file=sys.stderr)
+        rows = [(reason, str(n)) for reason, n in sampled.rejected.most_common(12)]
+        stdout_console().print(make_table("why candidates were turned down", ("reason", "times"), rows))
+
+
+def show_row(
+    binding: Binding, pool: pathlib.Path, row: int, picture: pathlib.Path | None, scene: str | None, json: bool
+) -> bool:
+    """Tells what is still false in a row of a pool of the activity; whether that is nothing.
+
+    Raises:
+      InputError: the pool is of another scene, or of another activity's objects. Ig2mjError: it has no such row.
+    """
+    import sys
+
+    from ig2mj.cli.printing import print_json
+    from ig2mj.errors import Ig2mjError, InputError
+    from ig2mj.tasks.bddl.start import row_status
+    from ig2mj.viewer.pool_pages import PoolPages
+    from ig2mj.worlds.pool import load_pool, load_pool_scene
+
+    loaded = load_pool_scene(pool, scene)
+    if [f"{a.category}/{a.model}" for a in loaded.additions] != list(binding.additions):
+        raise InputError(pool, f"was made for another activity than {binding.activity.name}", mend="name that one")
+    rows = load_pool(pool, loaded)
+    if not 0 <= row < rows.size:
+        raise Ig2mjError(f"--row {row}: {pool} has rows 0 to {rows.size - 1}")
+    status = row_status(binding, loaded, rows, row)
+    if json:
+        print_json({"row": row, "holds": status.holds, "fraction": status.fraction, "explanation": status.explanation})
+    else:
+        print(f"row {row} of {rows.size} in {loaded.name}:\n{status.explanation}")
+    if picture is not None:
+        PoolPages(loaded, rows, at=row).picture(picture)
+        print(f"wrote {picture}", file=sys.stderr)
+    return status.holds
