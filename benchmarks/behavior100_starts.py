@@ -36,6 +36,8 @@ RESULTS = ROOT / "benchmarks" / "results" / "behavior100"
 PAGE = ROOT / "docs" / "behavior100.md"
 SECONDS = 60.0
 """Wall time that a seed may take."""
+HOPELESS = 3
+"""An activity whose first seeds all fail, so many of them, is not tried with more."""
 
 
 def main() -> None:
@@ -53,7 +55,8 @@ def main() -> None:
     for name in (args.activities or activity_names())[args.part[0] :: args.part[1]]:
         file = folder / f"{name}.json"
         known = json.loads(file.read_text(encoding="utf-8")) if args.resume and file.is_file() else {}
-        if known.get("seeds", []) and len(known["seeds"]) >= args.seeds:
+        tried = [seed["done"] for seed in known.get("seeds", ())]
+        if len(tried) >= args.seeds or (len(tried) >= HOPELESS and not any(tried)):
             continue
         row = try_activity(name, homes, args.seeds, known)
         file.write_text(json.dumps(row) + "\n", encoding="utf-8")
@@ -96,6 +99,8 @@ def sample_seeds(binding: Binding, seeds: int, row: dict[str, Any]) -> dict[str,
     preparing = time.monotonic() - began
     done, reasons = list(row["seeds"]), collections.Counter(row["reasons"])
     for seed in range(len(done), seeds):
+        if len(done) >= HOPELESS and not any(one["done"] for one in done):
+            break
         wall, processor = time.monotonic(), time.process_time()
         made, why = sample_row(sampler, wanted, seed, 0, SECONDS)
         done.append(

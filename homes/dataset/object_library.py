@@ -17,8 +17,8 @@ ASSETS = "../../.."
 """From a model's folder to the meshes and textures that all homes and models share."""
 
 
-PLACED = ("car", "christmas_tree", "christmas_tree_decorated", "grill", "pool")
-"""Fixed where a home has them, but activities put them anywhere on a floor: free in the library."""
+PLACED = ("car", "christmas_tree", "christmas_tree_decorated", "grill", "painting", "pool")
+"""Fixed where a home has them, but activities put them anywhere: free in the library."""
 
 
 def library_models(dataset: pathlib.Path) -> list[tuple[str, str, pathlib.Path]]:

@@ -98,14 +98,14 @@ def show(
             from ig2mj.cli.files import check_picture
 
             check_picture(picture)
-        found, errors = fitting(activity, findfind_homes(scene or scene_name(pool)))
+        found, errors = fitting(activity, find_homes(scene or scene_name(pool)))
         if not found:
             raise Ig2mjError(" ".join(line.strip() for line in binding_as_text(None, [], errors)))
         show_row(found[0], pool, row, picture, scene, json)
         return 0
     if picture is not None or row:
         raise Ig2mjError("--row and --picture belong to --pool")
-    bound, errors = fitting(activity, findfind_homes(scene))
+    bound, errors = fitting(activity, find_homes(scene))
     best = bound[0] if bound else None
     if json:
         print_json(_as_data(activity, best, errors))
@@ -131,7 +131,7 @@ def find_homes(scene: str | None) -> list[Manifest]:
     from ig2mj.scene.manifest import load_manifest
     from ig2mj.scene.paths import scene_folder, shipped_homes
 
-    return [load_manifest(scene_folder(pathlib.Path(name))) for name in ([scene] if scene else shippedfind_homes())]
+    return [load_manifest(scene_folder(pathlib.Path(name))) for name in ([scene] if scene else shipped_homes())]
 
 
 def _as_text(activity: Activity) -> list[str]:

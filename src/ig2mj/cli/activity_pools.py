@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pathlib
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -135,9 +136,12 @@ def show_row(
         raise Ig2mjError(f"--row {row}: {pool} has rows 0 to {rows.size - 1}")
     status = row_status(binding, loaded, rows, row)
     if json:
-        print_json({"row": row, "holds": status.holds, "fraction": status.fraction, "explanation": status.explanation})
+        print_json({"row": row, **dataclasses.asdict(status)})
     else:
-        print(f"row {row} of {rows.size} in {loaded.name}:\n{status.explanation}")
+        print(
+            f"row {row} of {rows.size} in {loaded.name}: {100 * status.fraction:.0f} % of the goal holds; still false:"
+        )
+        print("\n".join(status.missing or ("nothing",)), status.explanation, sep="\n\n")
     if picture is not None:
         PoolPages(loaded, rows, at=row).picture(picture)
         print(f"wrote {picture}", file=sys.stderr)

@@ -13,6 +13,8 @@ from collections.abc import Sequence
 import jax
 import numpy as np
 
+from ig2mj.predicates.compile import compile_expression
+from ig2mj.predicates.questions import Questions
 from ig2mj.sampling import many
 from ig2mj.sampling.conditions import Condition, read_conditions
 from ig2mj.sampling.many import Progress, Sampled
@@ -24,6 +26,7 @@ from ig2mj.states.world import ExtendedStates, WorldState
 from ig2mj.tasks.bddl.binding import Binding, BindingError, bind
 from ig2mj.tasks.bddl.goal import conditions
 from ig2mj.tasks.bddl.vocabulary import Activity
+from ig2mj.tasks.bddl.words import sentences
 from ig2mj.worlds.pool import Pool
 
 
@@ -37,6 +40,21 @@ class SampledStart:
 
     sampled: Sampled
     reached: tuple[int, ...]
+
+
+@dataclasses.dataclass(frozen=True)
+class RowStatus:
+    """How far the goal of an activity is reached in one state.
+
+    Attributes:
+      holds: it is reached. fraction: share of it. missing: its conditions that are false, in words, over the activity's
+      names. explanation: the same over the scene's names, with the numbers behind.
+    """
+
+    holds: bool
+    fraction: float
+    missing: tuple[str, ...]
+    explanation: str
 
 
 def fitting(activity: Activity, homes: Sequence[Manifest]) -> tuple[list[Binding], dict[str, list[str]]]:
@@ -119,12 +137,21 @@ def rows_where_goal_holds(binding: Binding, scene: Scene, pool: Pool) -> tuple[i
     return tuple(n for n in range(pool.size) if check.holds(load_row(query, pool, n)))
 
 
-def explain_row(binding: Binding, scene: Scene, pool: Pool, row: int) -> str:
-    """What of the goal is still missing in a row of a pool, in words."""
+def row_status(binding: Binding, scene: Scene, pool: Pool, row: int) -> RowStatus:
+    """How far the goal is reached in a row of a pool."""
     query = SceneQuery(scene)
-    goal = conditions(binding).compile_goal(StateModel.of_manifest(scene.tables, scene.manifest))
-    states = load_row(query, pool, row)
-    return goal.explain(world_of(query, states))
+    model = StateModel.of_manifest(scene.tables, scene.manifest)
+    world = world_of(query, load_row(query, pool, row))
+    bound, questions = conditions(binding), Questions.of(model)
+    said = binding.activity.goal
+    true = [compile_expression(model, part, bound.groups, questions=questions)(world)[0] for part in bound.goal]
+    goal = bound.compile_goal(model)
+    return RowStatus(
+        holds=bool(goal(world)[0]),
+        fraction=float(goal.fraction(world)[0]),
+        missing=tuple(sentences([part for part, holds in zip(said, true, strict=True) if not holds])),
+        explanation=goal.explain(world),
+    )
 
 
 def load_row(query: SceneQuery, pool: Pool, row: int) -> ExtendedStates:
