@@ -170,7 +170,8 @@ def test_a_file_that_is_no_pool_of_the_scene_is_named(pool, tiny_home, tmp_path,
 
 def test_the_command_makes_a_pool(tiny_home_folder, tiny_home, pool, tmp_path, capsys):
     file = tmp_path / "some.npz"
-    assert cli.call(["sample", str(tiny_home_folder), "--disturb", "--count", "2", "--out", str(file), "--seed", "3"]) == 0
+    options = ["--disturb", "--count", "2", "--out", str(file), "--seed", "3"]
+    assert cli.call(["sample", str(tiny_home_folder), *options]) == 0
     assert "2 settled states of tiny_home" in capsys.readouterr().out
     assert load_pool(file, tiny_home).size == 2
 

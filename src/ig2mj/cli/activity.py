@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from ig2mj.cli.activity_pools import sample
+from ig2mj.cli.bindings import binding_as_text, find_homes
 
 if TYPE_CHECKING:
-    from ig2mj.scene.manifest import Manifest
     from ig2mj.tasks.bddl.binding import Binding
     from ig2mj.tasks.bddl.vocabulary import Activity
 
@@ -126,14 +126,6 @@ def fetch() -> None:
 SUBCOMMANDS = {"list": list_, "show": show, "sample": sample, "fetch": fetch}
 
 
-def find_homes(scene: str | None) -> list[Manifest]:
-    """Manifests of the home that was named, or of all that ship. Raises InputError."""
-    from ig2mj.scene.manifest import load_manifest
-    from ig2mj.scene.paths import scene_folder, shipped_homes
-
-    return [load_manifest(scene_folder(pathlib.Path(name))) for name in ([scene] if scene else shipped_homes())]
-
-
 def _as_text(activity: Activity) -> list[str]:
     from ig2mj.tasks.bddl.words import INDENT, sentences
 
@@ -148,20 +140,6 @@ def _as_text(activity: Activity) -> list[str]:
         *("", "goal:"),
         *sentences(activity.goal, INDENT),
     ]
-
-
-def binding_as_text(best: Binding | None, fit: list[str], errors: dict[str, list[str]]) -> list[str]:
-    if best is None:
-        near = sorted(errors, key=lambda home: len(errors[home]))[:3]
-        return ["cannot be bound:", *(f"  {home}: {'; '.join(errors[home])}" for home in near)]
-    lines = [f"in {best.home}:"]
-    for name, bound in best.objects.items():
-        room = f", {best.rooms[name]}" if name in best.rooms else ""
-        added = ", added from the object library" if bound in best.added else ""
-        lines.append(f"  {name:<32} {bound}{room}{added}")
-    lines += [f"  {s} is not in the taxonomy: {instead} stands in" for s, instead in best.stand_ins.items()]
-    others = [home for home in fit if home != best.home]
-    return [*lines, *([f"also fits: {', '.join(others)}"] if others else [])]
 
 
 def _as_data(activity: Activity, best: Binding | None, errors: dict[str, list[str]]) -> dict[str, Any]:

@@ -40,7 +40,7 @@ def sample(
       behavior1k: of BEHAVIOR-1K instead of BEHAVIOR-100.
       json: print the result as JSON.
     """
-    from ig2mj.cli.activity import binding_as_text, find_homes
+    from ig2mj.cli.bindings import binding_as_text, find_homes
     from ig2mj.cli.files import check_folder_of
     from ig2mj.cli.printing import add_bar, progress_bar
     from ig2mj.errors import Ig2mjError

@@ -59,7 +59,9 @@ class PoolPages:
 
         interactive.launch(self, overlays=[*default_overlays(self.scene), _RowNumber(self)], paused=True, **options)
 
-    def picture(self, file: str | os.PathLike, camera: Any = None, *, size: tuple[int, int] = (1280, 960), **options):
+    def picture(
+        self, file: str | os.PathLike, camera: Any = None, *, size: tuple[int, int] = (1280, 960), **options: Any
+    ) -> None:
         """Writes the row as a picture.
 
         Args:

@@ -74,11 +74,16 @@ class _Binder:
         self.synset = {name: s for name, s in activity.synset_of().items() if s != AGENT}
         self.kinds = {s: kinds(s, activity.behavior_1k) for s in dict.fromkeys(self.synset.values())}
         self.needs = activity.needs
-        #: Objects that the start puts somewhere: these must be loose, unless a room of the home has them.
+        #: Objects that the start puts on something. Fixed ones cannot be, but may stand on the floor of a room already.
         self.placed = {
             a.arguments[0]
             for a in self.activity.init
-            if isinstance(a, Atom) and len(a.arguments) == 2 and a.arguments[0] not in self.activity.rooms
+            if isinstance(a, Atom) and len(a.arguments) == 2 and a.predicate != "on_floor"
+        } - set(self.activity.rooms)
+        self.floors = {
+            a.arguments[0]: a.arguments[1]
+            for a in self.activity.init
+            if isinstance(a, Atom) and a.predicate == "on_floor" and a.arguments[0] not in self.activity.rooms
         }
         self.entries = {o.name: o for o in manifest.objects if o.part_of is None}
         of_category: dict[str, list[ObjectEntry]] = {}
@@ -97,6 +102,11 @@ class _Binder:
     def may_play(self, o: ObjectEntry, name: str) -> bool:
         """Whether the activity can do with the object what it wants of `name`."""
         return able(o, self.needs.get(name, ())) and not (o.fixed and name in self.placed)
+
+    def may_stand(self, o: ObjectEntry, name: str) -> bool:
+        """Whether the object is loose, or stands in the room on whose floor the activity wants `name`."""
+        room = self.rooms.get(self.floors.get(name, ""))
+        return not o.fixed or name not in self.floors or room is None or room in o.rooms
 
     def bind(self, agents: Sequence[str]) -> Binding:
         for kind in dict.fromkeys(self.activity.rooms.values()):
@@ -168,7 +178,10 @@ class _Binder:
         """Binds the objects that may come from anywhere."""
         rest = [n for n in self.synset if n not in self.activity.rooms]
         taken = set(self.objects.values())
-        free = {n: [o.name for o in self.players[n] if o.name not in taken and not o.parked] for n in rest}
+        free = {
+            n: [o.name for o in self.players[n] if o.name not in taken and not o.parked and self.may_stand(o, n)]
+            for n in rest
+        }
         matched = match(free)
         self.objects |= matched
         lacking: dict[str, list[str]] = {}

@@ -72,18 +72,18 @@ def fitting(activity: Activity, homes: Sequence[Manifest]) -> tuple[list[Binding
 def start_conditions(binding: Binding, scene: Scene) -> list[Condition]:
     """What must hold at the start, of the scene's objects.
 
-    Left out are conditions of absent agents, and that a fixed object is on the floor of a room in which it was bound:
-    it stands there.
+    Left out are conditions of absent agents, and that a fixed object is on the floor of the room where it stands.
 
     Raises:
       StateError: a condition is neither a predicate nor the negation of one.
     """
     read = dict.fromkeys(read_conditions(conditions(binding).init))
-    standing = {("on_floor", binding.objects[name], room) for name, room in binding.rooms.items()}
-    fixed = scene.tables.object_fixed
 
     def is_given(c: Condition) -> bool:
-        return (c.predicate, *c.arguments) in standing and c.value and bool(fixed[scene.object_index(c.arguments[0])])
+        if c.predicate != "on_floor" or not c.value:
+            return False
+        entry = scene.object(c.arguments[0])
+        return entry.fixed and (c.arguments[1] in entry.rooms or c.arguments[1] not in scene.tables.room_names)
 
     found = [c for c in read if not is_given(c)]
     placed = {c.arguments[0] for c in found if c.is_placement and c.value}
