@@ -75,7 +75,8 @@ def _halve(spec: mujoco.MjSpec, geom: mujoco.MjsGeom, model: mujoco.MjModel, num
     points = _points(spec, geom)
     middle, axis = points.mean(axis=0), int(np.ptp(points, axis=0).argmax())
     solid = manifold3d.Manifold.hull_points(points)
-    halves = solid.split_by_plane(tuple(float(v) for v in np.eye(3)[axis]), float(middle[axis]))
+    x, y, z = np.eye(3)[axis]
+    halves = solid.split_by_plane((float(x), float(y), float(z)), float(middle[axis]))
     other = _copy(spec, geom)
     for half, target, letter in zip(halves, (geom, other), "ab", strict=True):
         mesh = half.to_mesh64()

@@ -20,10 +20,10 @@ import mujoco
 import numpy as np
 from ig2mj_converters.base.options import ConvertOptions
 from ig2mj_converters.bodies.assembly import Assembly, BodyPlan, VisualPart
+from ig2mj_converters.bodies.joint_limits import joint_range, unit_axis
 from ig2mj_converters.bodies.joint_rules import FRICTION, FRICTION_BY_CATEGORY
-from ig2mj_converters.model_task import build_model
+from ig2mj_converters.model_task import build_model, decompose_model
 from ig2mj_converters.reading.dataset import Dataset
-from ig2mj_converters.reading.joint_limits import joint_range, unit_axis
 from scipy.spatial.transform import Rotation
 
 from ig2mj.scene.manifest import ObjectEntry
@@ -117,9 +117,9 @@ def _assembly(scene: Scene, dataset: Dataset, entry: ObjectEntry) -> Assembly:
     given = scene.manifest.source.get("options", {})
     budget = {name: given[name] for name in ("seed", "max_hulls", "max_hull_vertices") if name in given}
     hulls = ConvertOptions(**budget).hull_options(building=building)
-    weighed = not building and model.metadata.bbox_size is not None
-    density = dataset.density(entry.category) if weighed else None
-    return build_model(model, np.array(entry.scale), density, hulls, False, igibson_visuals=True).assembly
+    density = None if building else dataset.density(entry.category)
+    found = decompose_model(model, hulls)
+    return build_model(model, found, np.array(entry.scale), density, hulls, False, igibson_visuals=True).assembly
 
 
 def _write_object(

@@ -20,19 +20,18 @@ from .base.options import ConvertOptions
 from .base.output import replaced_folder
 from .base.process_pool import TaskPool
 from .bodies.assembly import Assembly, extent
+from .bodies.joint_limits import clamp
 from .bodies.kinematics import model_bounds
 from .bodies.placements import Placement, make_halves
 from .finish import Outcome, finish, version_record
 from .mjcf.appearance import add_ground, add_setting
-from .mjcf.file import write_model
 from .mjcf.manifest_entries import object_entry
-from .mjcf.model_builder import ModelBuilder
+from .mjcf.model_builder import ModelBuilder, write_model
 from .mjcf.object import add_object
 from .mjcf.parking import CLEARANCE, resting_pose
 from .mjcf.scene import SceneBuild, add_start_key, rest_start
 from .model_task import BuiltModel, build_model, decompose_model
 from .reading.dataset import Dataset
-from .reading.joint_limits import clamp
 from .reading.metadata import read_metadata
 from .reading.scaling import scale_model
 from .reading.urdf import read_urdf

@@ -23,9 +23,8 @@ from .bodies.assembly import has_own_look
 from .bodies.placements import Placement, complete_parts, make_halves, place_instances
 from .finish import Outcome, finish, version_record
 from .hulls.pieces import HullOptions
-from .mjcf.file import write_model
 from .mjcf.manifest_entries import room_entries, task_entry, vec3
-from .mjcf.model_builder import ModelBuilder
+from .mjcf.model_builder import ModelBuilder, write_model
 from .mjcf.scene import SceneBuild, build_scene, fill_states, rest_start
 from .model_task import BuiltModel, forget_datasets, is_quick, model_tasks, run_task
 from .reading.dataset import Dataset

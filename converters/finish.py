@@ -18,10 +18,11 @@ from .base.description import RoomMaps
 from .base.options import ConvertOptions
 from .base.outcome import CheckResult, Outcome
 from .bodies.joint_rules import openable_ends
+from .checks.run import run_checks
+from .checks.still import SourceBox
 from .mjcf.model_builder import ModelBuilder
+from .mjcf.scene import HOVERS
 from .model_task import BuiltModel
-from .report.check_still import SourceBox
-from .report.checks import run_checks
 from .report.page import RENDERED, ReportInput, write_report
 
 FIRST_WARNINGS = 5
@@ -62,6 +63,7 @@ def finish(
     lines = [*warnings, *builder.textures.warnings, *builder.warnings.get("", [])]
     per_object = {name: _object_warnings(name, model_built, builder) for name, model_built in built.items()}
     said = [*lines, *(f"{name}: {line}" for name, found in per_object.items() for line in found)]
+    said.sort(key=lambda line: HOVERS in line)  # common, and harmless: after everything that was lost
     if options.strict and said:
         more = f" (and {len(said) - 1} more warnings)" if len(said) > 1 else ""
         raise InputError(manifest.name, f"{said[0]}{more}", mend="--strict takes warnings for errors")

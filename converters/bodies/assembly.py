@@ -15,7 +15,7 @@ import numpy as np
 from ..base.description import Inertial, Joint, ObjectModel, Shape
 from ..base.transforms import apply
 from ..hulls.pieces import Piece
-from ..reading.joint_limits import clamp, is_locked, motion
+from .joint_limits import clamp, is_locked, motion
 
 #: A body without mass cannot move in MuJoCo: the least mass (kg) and the least radius of gyration (m) we give one.
 MIN_MASS = 1e-3

@@ -6,8 +6,8 @@ import numpy as np
 import trimesh
 
 from ..base.description import Inertial, Link, ObjectModel
-from ..hulls.solids import Solid, combine, hull_volume, joined, shape_solids, signed_volume
 from .kinematics import model_bounds, shape_bounds
+from .solids import Solid, combine, hull_volume, joined, shape_solids, signed_volume
 
 DEFAULT_DENSITY = 67.0
 """kg per m^3 of the bounding box, of a category without a spec (section 6)."""

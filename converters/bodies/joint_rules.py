@@ -6,8 +6,8 @@ import numpy as np
 
 from ..base.description import Joint
 from ..base.transforms import apply
-from ..reading.joint_limits import is_locked, joint_range, mujoco_type, unit_axis
 from .assembly import Assembly
+from .joint_limits import is_locked, joint_range, mujoco_type, unit_axis
 
 #: iGibson holds every joint with a velocity motor of this greatest force: Coulomb friction (dataset_format.md fact
 #: 10), N or N m.

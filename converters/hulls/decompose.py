@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 import trimesh
 
-from ..base import cache
 from . import coacd_process
+from . import piece_cache as cache
 from .budget import Budgeted, Merged, keep_to_budget
 from .convex import Hull, clip_to, hull_of, solid_hull, union_mesh, union_volume
 from .mesh_parts import Part, decimate, signed_volume

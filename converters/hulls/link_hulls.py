@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from ..base import cache
 from ..base.description import Shape
 from ..base.options import Progress, no_progress
 from ..base.process_pool import TaskPool
+from . import piece_cache as cache
 from .budget import drop_contained
 from .convex import Hull, distance_outside, hull_of, reduce_vertices, solid_hull, union_volume
 from .decompose import CutTask, cut_part, effort_for, recut_to_budget

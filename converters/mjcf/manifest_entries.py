@@ -12,8 +12,8 @@ from ig2mj.scene.manifest import JointEntry, ObjectEntry, OpenableEntry, Orienta
 
 from ..base.description import RoomMaps
 from ..bodies.assembly import Assembly, extent
+from ..bodies.joint_limits import joint_range, mujoco_type
 from ..bodies.joint_rules import openable_ends
-from ..reading.joint_limits import joint_range, mujoco_type
 from .object import ObjectElements
 
 _TASK_FILE = re.compile(r"_task_(?P<activity>.+)_(?P<definition>\d+)_(?P<instance>\d+)(_fixed_furniture)?$")

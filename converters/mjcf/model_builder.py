@@ -6,6 +6,8 @@ import pathlib
 
 import mujoco
 
+from ig2mj.errors import InputError, without_lines
+
 from ..base.naming import NamePool
 from .mesh_store import MeshStore
 from .textures import TextureStore
@@ -65,6 +67,20 @@ class ModelBuilder:
     def warn(self, owner: str, text: str) -> None:
         """Notes a warning about an object, or about the whole model for owner ''."""
         self.warnings.setdefault(owner, []).append(text)
+
+
+def write_model(spec: mujoco.MjSpec, file: pathlib.Path) -> mujoco.MjModel:
+    """Compiles the model, writes it, and returns what MuJoCo loads from the written file.
+
+    Raises:
+      InputError: MuJoCo refuses the model.
+    """
+    try:
+        spec.compile()
+        file.write_text(spec.to_xml(), encoding="utf-8")
+        return mujoco.MjModel.from_xml_path(str(file))
+    except (ValueError, mujoco.FatalError) as e:
+        raise InputError(spec.modelname, f"does not compile: {without_lines(e)}") from e
 
 
 def _set_options(option) -> None:

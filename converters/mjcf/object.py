@@ -13,10 +13,10 @@ from ig2mj.scene.manifest import LinkEntry
 from ..base.description import MetaLink
 from ..base.transforms import pose_from, quat_from_rotation
 from ..bodies.assembly import Assembly, BodyPlan, VisualPart
+from ..bodies.joint_limits import joint_range, mujoco_type, unit_axis
 from ..bodies.joint_rules import ARMATURE, DAMPING, friction, reach
 from ..hulls.pieces import Piece
-from ..reading.colours import Rgba, category_colour
-from ..reading.joint_limits import joint_range, mujoco_type, unit_axis
+from .colours import Rgba, category_colour
 from .model_builder import FRICTION, HIDDEN_GROUP, ROLLING_FRICTION, ModelBuilder
 
 #: The annotated links that states know (dataset_format.md 4.2; water_sink is ours, paper table A.3).

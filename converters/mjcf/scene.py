@@ -14,9 +14,9 @@ from ig2mj.scene.manifest import ObjectEntry
 from ..base.description import RoomMaps
 from ..base.transforms import rotation_from_wxyz
 from ..bodies.assembly import Assembly, extent
+from ..bodies.joint_limits import clamp
 from ..bodies.placements import Placement
 from ..reading.cached_states import convert_states
-from ..reading.joint_limits import clamp
 from .appearance import add_setting
 from .manifest_entries import object_entry
 from .model_builder import HIDDEN_GROUP, ModelBuilder
@@ -26,6 +26,9 @@ from .start_state import let_down
 
 #: The start state: joint positions as saved, or 0 brought inside the limits (dataset_format.md section 7).
 START_KEY = "initial"
+
+HOVERS = "above its support in the source"
+"""What the warning about an object in mid-air says."""
 
 
 @dataclasses.dataclass
@@ -219,7 +222,7 @@ def rest_start(build: SceneBuild, model: mujoco.MjModel, *, keep_hovering: bool 
     drops = let_down(model, START_KEY, parked, hovering=not keep_hovering)
     for drop in drops:
         if drop.body not in parked:
-            text = f"hovers {100 * drop.distance:.1f} cm above its support in the source: starts lower by that much"
+            text = f"hovers {100 * drop.distance:.1f} cm {HOVERS}: starts lower by that much"
             build.builder.warn(owners[drop.body], text)
     if drops:
         add_start_key(build.builder.spec, build.start_joints, {d.body: (d.pos, d.quat) for d in drops})

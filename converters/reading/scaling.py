@@ -22,7 +22,7 @@ from ..base.description import Inertial, Instance, Joint, Link, Mesh, Metadata, 
 from ..base.transforms import is_identity, pose_from, rotation_from_wxyz
 from ..bodies.inertia import link_com
 from ..bodies.kinematics import link_poses
-from ..hulls.solids import covariance_of, inertia_of
+from ..bodies.solids import covariance_of, inertia_of
 
 OBLIQUE = 0.01
 """Sine of the angle by which a scale may turn a hinge's axis."""

@@ -15,8 +15,8 @@ from PIL import Image
 from ig2mj.scene.manifest import Manifest, ObjectEntry
 
 from ..base.description import RoomMaps
+from ..checks.still import start_data
 from ..mjcf.model_index import ModelIndex, geom_box
-from .check_still import start_data
 from .drawing import draw
 from .room_plan import draw_plan
 

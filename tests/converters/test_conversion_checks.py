@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 from ig2mj_converters.base.outcome import CheckResult
-from ig2mj_converters.report.checks import run_checks
+from ig2mj_converters.checks.run import run_checks
 
 from ig2mj.scene.manifest import JointEntry, LinkEntry, Manifest, ObjectEntry
 

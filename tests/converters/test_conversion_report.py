@@ -10,8 +10,8 @@ import mujoco
 import numpy as np
 import pytest
 from ig2mj_converters.base.description import RoomMaps, Shape
+from ig2mj_converters.checks.run import run_checks
 from ig2mj_converters.hulls.link_hulls import HullOptions, decompose_link
-from ig2mj_converters.report.checks import run_checks
 from ig2mj_converters.report.drawing import BACKGROUND, draw
 from ig2mj_converters.report.page import ReportInput, write_report
 from PIL import Image

@@ -11,10 +11,10 @@ import trimesh
 from ig2mj_converters.base.description import Inertial, Joint, Link, Metadata, Mimic, ObjectModel
 from ig2mj_converters.base.naming import NamePool, file_slug
 from ig2mj_converters.bodies.assembly import MIN_MASS, assemble, extent, merge_inertials
+from ig2mj_converters.bodies.joint_limits import joint_range
 from ig2mj_converters.hulls.pieces import Piece
 from ig2mj_converters.mjcf.model_builder import ModelBuilder
 from ig2mj_converters.mjcf.object import add_object
-from ig2mj_converters.reading.joint_limits import joint_range
 from scipy.spatial.transform import Rotation
 
 

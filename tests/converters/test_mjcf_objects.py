@@ -7,7 +7,7 @@ import itertools
 import mujoco
 import numpy as np
 import pytest
-from ig2mj_converters.mjcf.file import write_model
+from ig2mj_converters.mjcf.model_builder import write_model
 
 from ig2mj.errors import InputError
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from ig2mj_converters.base.description import Inertial, Joint, Link, Mesh, Metadata, ObjectModel, Shape
 from ig2mj_converters.base.transforms import pose_from
 from ig2mj_converters.bodies.inertia import MIN_MASS, is_possible, link_inertials
-from ig2mj_converters.hulls.solids import shape_solids
+from ig2mj_converters.bodies.solids import shape_solids
 from ig2mj_converters.reading.dataset import Dataset
 from ig2mj_converters.reading.scaling import scale_model
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from ig2mj_converters.base.file_access import FileGuard
-from ig2mj_converters.hulls.solids import hull_volume, joined, signed_volume
+from ig2mj_converters.bodies.solids import hull_volume, joined, signed_volume
 from ig2mj_converters.reading.mesh_files import read_collision, read_visual
 from PIL import Image
 

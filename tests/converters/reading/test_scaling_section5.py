@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from ig2mj_converters.base.description import Instance, Joint, Link, Mesh, Mimic, ObjectModel, Shape
 from ig2mj_converters.base.transforms import apply, pose_from
 from ig2mj_converters.bodies.kinematics import link_poses, model_bounds
-from ig2mj_converters.hulls.solids import joined
+from ig2mj_converters.bodies.solids import joined
 from ig2mj_converters.reading.metadata import read_metadata
 from ig2mj_converters.reading.scaling import instance_scale, scale_model
 

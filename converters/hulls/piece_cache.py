@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from .cache_folder import cache_folder, prune
+from ..base.cache_folder import cache_folder, prune
 
 VERSION = 3
 """Raise it whenever the code that makes the cached results changes what they are."""

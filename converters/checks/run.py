@@ -1,6 +1,6 @@
 """Is the converted scene sound? Measured on the compiled model, listed object by object.
 
-`check_still` looks at what can be seen without moving anything, `check_motion` at what takes steps.
+`still` looks at what can be seen without moving anything, `motion` at what takes steps.
 """
 
 from __future__ import annotations
@@ -14,8 +14,8 @@ from ig2mj.scene.manifest import Manifest
 
 from ..base.outcome import CheckResult
 from ..mjcf.model_index import index_model
-from . import check_motion, check_still
-from .check_still import SourceBox
+from . import motion, still
+from .still import SourceBox
 
 
 def run_checks(
@@ -32,11 +32,11 @@ def run_checks(
     """
     index = index_model(model, manifest)
     checks: list[Callable[[], CheckResult]] = [
-        lambda: check_still.check_compiles(model),
-        lambda: check_still.check_boxes(model, manifest, index, sources or {}),
-        lambda: check_still.check_mass(model, manifest, index),
-        lambda: check_still.check_penetration(model, index, overlaps_allowed),
-        lambda: check_motion.check_settle(model, manifest, index),
+        lambda: still.check_compiles(model),
+        lambda: still.check_boxes(model, manifest, index, sources or {}),
+        lambda: still.check_mass(model, manifest, index),
+        lambda: still.check_penetration(model, index, overlaps_allowed),
+        lambda: motion.check_settle(model, manifest, index),
     ]
     results = []
     for check in checks:
@@ -44,4 +44,4 @@ def run_checks(
         result = check()
         result.seconds = time.perf_counter() - started
         results.append(result)
-    return results + check_motion.check_joints(model, manifest, index)
+    return results + motion.check_joints(model, manifest, index)

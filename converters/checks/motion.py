@@ -12,7 +12,7 @@ from ig2mj.scene.manifest import Manifest
 
 from ..base.outcome import CheckResult
 from ..mjcf.model_index import ModelIndex
-from .check_still import awake_copy, deep_pairs, start_data
+from .still import awake_copy, deep_pairs, start_data
 
 SETTLE_TIME = 1.0
 """Seconds."""

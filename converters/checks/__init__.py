@@ -1,0 +1,1 @@
+"""Checks of a converted model: measured on what was written, listed object by object."""
