@@ -26,9 +26,10 @@ import ig2mj
 from ig2mj.agents import Fetch, Humanoid, TurtleBot
 from ig2mj.engine import make_engine
 from ig2mj.engine.health import CAPACITY
+from ig2mj.engine.warp.profile import EngineProfile
 from ig2mj.sampling.settled import make_pool
 from ig2mj.scene import Scene
-from ig2mj.worlds import Core, Rules
+from ig2mj.worlds import Batch, Core, Rules
 from ig2mj.worlds.worlds import controllers_of
 
 ROBOTS = {"humanoid": Humanoid, "fetch": Fetch, "turtlebot": TurtleBot}
@@ -52,17 +53,17 @@ def freest_place(scene: Scene) -> np.ndarray:
     return (np.array([col, row]) + 0.5 - np.array(distance.shape)[::-1] / 2) * rooms.trav_resolution
 
 
-def run(
-    home: str, robot: str, num_worlds: int, engine_name: str, minutes: float, hold: int, actions: float, what: str
-) -> dict:
+def run(home: str, num_worlds: int, args: argparse.Namespace) -> dict:
     """One row."""
+    robot, engine_name, minutes, hold, actions = args.robot, args.engine, args.minutes, args.hold, args.actions
     bare = ig2mj.load_scene(home)
     place = freest_place(bare)
     start = time.time()
     scene = ig2mj.load_scene(home, agents=[ROBOTS[robot](pos=(*place, ROBOTS[robot]().pos[2]))])
     rules = Rules.of_scene(scene)
     rules = rules.with_goal(ten_literals(rules.model))
-    engine = make_engine(engine_name, scene, num_worlds)
+    options = {"profile": EngineProfile(*args.profile)} if args.profile else {}
+    engine = make_engine(engine_name, scene, num_worlds, **options)
     core = Core(
         engine,
         rules,
@@ -98,7 +99,7 @@ def run(
             key,
         ), 0.0
 
-    if what == "physics":
+    if args.what == "physics":
         agent_step = physics_step
     if engine.pure:
         call = jax.jit(lambda carry: jax.lax.scan(agent_step, carry, None, CALL), donate_argnums=0)
@@ -120,7 +121,9 @@ def run(
     batch = carry[0]
     health = engine.health(batch.world.physics)
     steps = num_worlds * calls * CALL
+    parts = time_parts(core, carry[0], carry[1]) if args.parts else {}
     return {
+        **parts,
         "scene": scene.name,
         "objects": bare.tables.num_objects,
         "robot": robot,
@@ -135,13 +138,35 @@ def run(
         "start": place.round(2).tolist(),
         "non_finite": int((~np.asarray(health.finite)).sum()),
         "troubles": core.metrics(batch),
-        "what": what,
+        "what": args.what,
         "actions": actions,
         "hold": hold,
         "mean_goal": float(np.asarray(seen).mean()),
         **memory(num_worlds),
         **device(),
     }
+
+
+def time_parts(core: Core, batch: Batch, action: jax.Array) -> dict[str, float]:
+    """Milliseconds of the parts of a control step, each compiled and called by itself."""
+    world = batch.world
+    parts = {
+        "control": (lambda a, v, c: core._control_fn(a, v, c), (action, world.view, batch.controllers)),
+        "physics": (lambda p: core.engine.step(p, None)[0], (world.physics,)),
+        "view": (core.engine.view, (world.physics,)),
+        "rules": (core.rules.step, (world.states, world.view)),
+    }
+    found = {}
+    for name, (act, operands) in parts.items():
+        call = jax.jit(act)
+        jax.block_until_ready(call(*operands))
+        times = []
+        for _ in range(3):
+            start = time.time()
+            jax.block_until_ready(call(*operands))
+            times.append(time.time() - start)
+        found[f"{name}_ms"] = round(1e3 * min(times), 2)
+    return found
 
 
 def main() -> None:
@@ -154,11 +179,15 @@ def main() -> None:
     parser.add_argument("--hold", type=int, default=5, help="mean number of agent steps that an action is held")
     parser.add_argument("--actions", type=float, default=1.0, help="share of the action range that is drawn from")
     parser.add_argument("--what", choices=["full", "physics"], default="full", help="physics: without states and goal")
+    parser.add_argument("--parts", action="store_true", help="also time the parts of a control step, each by itself")
+    parser.add_argument(
+        "--profile", type=int, nargs=4, help="buffers: awake dofs, constraints, contacts, convex contacts of a world"
+    )
     parser.add_argument("--rows", type=pathlib.Path, help="rows are added to this file, as JSON lines")
     args = parser.parse_args()
     for home in args.homes:
         for worlds in args.worlds:
-            row = run(home, args.robot, worlds, args.engine, args.minutes, args.hold, args.actions, args.what)
+            row = run(home, worlds, args)
             print(json.dumps(row), flush=True)
             if args.rows:
                 with args.rows.open("a") as file:
