@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from ig2mj.engine.base import Engine, Write
+from ig2mj.engine.model_fields import ModelFields
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.errors import EngineError, UnknownNameError
@@ -90,7 +91,7 @@ def test_the_pose_of_a_weld_is_per_world(small):
     data = np.tile(model.eq_data.astype(np.float32), (2, 1, 1))
     data[0, 0, 3:6], data[1, 0, 3:6] = [-0.3, 0, 0.03], [-0.35, 0, 0.03]
     physics = small.fresh(small.first)
-    physics = small.write(physics, small.switch({"knife/box": [0, 1]}).replace(eq_data=data))
+    physics = small.write(physics, small.switch({"knife/box": [0, 1]}).replace(model_fields=ModelFields(eq_data=data)))
     physics, view = small.run(physics, 30)
     place = np.asarray(view.object_pos)
     apart = place[:, small.index("knife"), 0] - place[:, small.index("box"), 0]

@@ -16,6 +16,7 @@ import ig2mj
 from ig2mj.agents.floating_hand import FloatingHand, add_floating_hand, hand_ctrl
 from ig2mj.engine.base import Engine, Write
 from ig2mj.engine.layout import make_layout
+from ig2mj.engine.model_fields import ModelFields
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.view import SCHEMA, read_field
 from ig2mj.errors import EngineError
@@ -271,7 +272,9 @@ def test_a_switched_weld_is_a_grasp_and_what_is_let_go_falls(tiny_home_folder):
     hand, held = simulation.scene.model.body("hand").id, simulation.scene.model.body("box").id
     offset = simulation.view.body_pos[0, held] - simulation.view.body_pos[0, hand]
     data[0, :10] = [0, 0, 0, *offset, 1, 0, 0, 0]
-    simulation.engine.write(simulation.physics, Write(eq_active=np.ones((1, 1), bool), eq_data=data[None]))
+    simulation.engine.write(
+        simulation.physics, Write(eq_active=np.ones((1, 1), bool), model_fields=ModelFields(eq_data=data[None]))
+    )
     assert awake(simulation) == {"box"}
     assert simulation.view.held[0, 0].nonzero()[0].tolist() == [box]
     before = simulation.object_pose("box")[0]

@@ -11,6 +11,7 @@ import tiny_home as homes
 import ig2mj
 from ig2mj.agents.floating_hand import FloatingHand, add_floating_hand, hand_ctrl
 from ig2mj.engine.base import Write
+from ig2mj.engine.model_fields import ModelFields
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.registry import make_engine
 from ig2mj.engine.view import SCHEMA, PhysicsView, read_field
@@ -153,7 +154,7 @@ def test_equality_parameters_are_each_worlds_own(tiny_home_folder):
     data = np.stack([engine.export(physics, 0).eq_data] * 2)
     data[:, 0, :10] = 0, 0, 0, 0, 0, -0.25, 1, 0, 0, 0
     data[1, 0, 3] = 0.1
-    physics = engine.write(physics, Write(eq_active=np.array([[True], [True]]), eq_data=data))
+    physics = engine.write(physics, Write(eq_active=np.array([[True], [True]]), model_fields=ModelFields(eq_data=data)))
     for _ in range(30):
         physics, view = engine.step(physics)
     box = view.object_pos[:, scene.object_index("box")]

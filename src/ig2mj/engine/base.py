@@ -22,6 +22,7 @@ from flax import struct
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.health import Health
+from ig2mj.engine.model_fields import ModelFields
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
@@ -70,7 +71,9 @@ class Write:
       object_mask, object_pos, object_quat: teleports of objects: frame of the main body, world frame, w-x-y-z. Bodies
         that hang on the object by no joint (split-off floating links) go along rigidly.
       qpos_mask, qpos: single coordinates, at MuJoCo's addresses (joints). Applied after the teleports.
-      eq_active, eq_data: the whole of these two fields.
+      eq_active: the whole of it.
+      model_fields: fields of the model that are the world's own from now on; the whole of each that is given. Where
+        masses or friction change, everything in the world wakes.
       ignored_contacts: contacts between a hand's bodies (its palm and its fingers) and an object are dropped after the
         narrow phase, from now on, until it is written again: they give neither forces nor touch, and wake nothing.
         Contacts of all other pairs stay exactly as they were.
@@ -82,7 +85,7 @@ class Write:
     qpos_mask: Bool[Array, "W nq"] | None = None
     qpos: Float[Array, "W nq"] | None = None
     eq_active: Bool[Array, "W E"] | None = None
-    eq_data: Float[Array, "W E 12"] | None = None
+    model_fields: ModelFields | None = None
     ignored_contacts: Bool[Array, "W H O"] | None = None
 
 

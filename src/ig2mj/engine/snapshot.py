@@ -21,6 +21,7 @@ import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float, Int
 
+from ig2mj.engine.model_fields import ModelFields, given
 from ig2mj.engine.view import Array
 from ig2mj.errors import EngineError
 
@@ -101,11 +102,14 @@ class Snapshot:
 
     Attributes:
       scene, agents: the two parts. time: simulated seconds, of shape () or (W,).
+      model_fields: fields of the model that are the world's own, but for `eq_data`, which is in the parts. Loaded where
+        it has none, a world gets the scene's.
     """
 
     scene: ScenePart
     agents: AgentsPart
     time: Float[Array, "*W"]
+    model_fields: ModelFields = ModelFields()
 
     def whole(self, name: str) -> Array:
         """One of MuJoCo's arrays (`AXIS`), of scene and agents together."""
@@ -128,7 +132,7 @@ class Snapshot:
 
     def without_agents(self) -> Snapshot:
         """The scene's part alone, for a scene with other agents or none (numpy). What slept in one island with a part
-        of an agent wakes."""
+        of an agent wakes. Fields of the model stay behind: they are of all bodies."""
         asleep = np.array(self.scene.tree_asleep)
         count = asleep.shape[-1]
         while True:
@@ -142,7 +146,8 @@ class Snapshot:
             touching=np.asarray(self.agents.touching)[..., :0, :],
             ignored_contacts=np.asarray(self.agents.ignored_contacts)[..., :0, :],
         )
-        return dataclasses.replace(self, scene=dataclasses.replace(self.scene, tree_asleep=asleep), agents=agents)
+        scene = dataclasses.replace(self.scene, tree_asleep=asleep)
+        return dataclasses.replace(self, scene=scene, agents=agents, model_fields=ModelFields())
 
     @property
     def qpos(self) -> Float[Array, "*W nq"]:
@@ -192,12 +197,14 @@ def make_snapshot(
     touching: Any,
     agents_touching: Any,
     ignored_contacts: Any,
+    model_fields: ModelFields,
 ) -> Snapshot:
     """A snapshot of MuJoCo's arrays (`AXIS`).
 
     Args:
       fields: scene and agents together. sizes: how long the scene's part of each is (`ModelLayout.scene_sizes`).
       touching, agents_touching, ignored_contacts: `ScenePart.touching`, and the agents' two.
+      model_fields: but for `eq_data`.
     """
     parts = {name: _split(fields[name], axis, sizes[name]) for name, axis in AXIS.items()}
     return Snapshot(
@@ -208,6 +215,7 @@ def make_snapshot(
             ignored_contacts=ignored_contacts,
         ),
         time=time,
+        model_fields=model_fields,
     )
 
 
@@ -242,7 +250,20 @@ def fitted(snapshot: Snapshot, start: Snapshot, num_worlds: int, scene: str) -> 
                     f"the snapshot does not fit scene '{scene}': {field.name} of its {part} has shape {tuple(found)}, "
                     f"the scene's {tuple(wanted)} ({mend})"
                 )
-    return snapshot
+    return dataclasses.replace(snapshot, model_fields=_fitted_fields(snapshot.model_fields, start.model_fields, batch))
+
+
+def _fitted_fields(fields: ModelFields, start: ModelFields, batch: tuple[int, ...]) -> ModelFields:
+    found, wanted = given(fields), given(start)
+    for name, array in found.items():
+        if name not in wanted:
+            raise EngineError(
+                f"the snapshot has a {name} of its own (make the engine with model_fields=(..., '{name}'))"
+            )
+        if tuple(array.shape) != (*batch, *wanted[name].shape):
+            raise EngineError(f"the snapshot does not fit: its {name} has shape {tuple(array.shape)}")
+    missing = {n: np.broadcast_to(a, (*batch, *a.shape)) for n, a in wanted.items() if n not in found}
+    return dataclasses.replace(fields, **missing)
 
 
 def _split(array: Any, axis: int, count: int) -> tuple[Any, Any]:

@@ -104,7 +104,7 @@ def build(kind: type[Tree], arrays: Mapping[str, np.ndarray], file: str | os.Pat
             fields[field.name] = build(typing.cast(type, hint), arrays, file, f"{name}.")
         elif name in arrays:
             fields[field.name] = arrays[name]
-        else:
+        elif field.default is not None:  # one whose default is None may be left out
             raise InputError(file, "is missing", element=name, mend="make the file again with this version")
     return kind(**fields)
 

@@ -29,6 +29,7 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.agents.base import Robot
 from ig2mj.agents.grasping.candidates import Candidates
 from ig2mj.engine.base import Write
+from ig2mj.engine.model_fields import ModelFields
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.poses import length, quat_rotate, relative_pose
@@ -164,7 +165,7 @@ class Grasping:
             active = active.at[row, at].set(True, mode="drop")
             data = data.at[row, at, :10].set(state.local, mode="drop")
             ignored = jnp.asarray(self._object).T[jnp.maximum(state.body, 0)] & (state.body >= 0)[..., None]
-        return Write(eq_active=active, eq_data=data, ignored_contacts=ignored)
+        return Write(eq_active=active, model_fields=ModelFields(eq_data=data), ignored_contacts=ignored)
 
     def _touched(self, view: PhysicsView) -> Bool[Array, "W H Y"]:
         """What each hand presses on; for a mitten, which of its targets it touches at all."""

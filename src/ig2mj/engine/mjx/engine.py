@@ -9,6 +9,7 @@ from __future__ import annotations
 import abc
 import copy
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import jax
@@ -25,7 +26,8 @@ from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.mjx.contacts import Contacts, finger_forces, link_forces, normal_forces, touching_units
 from ig2mj.engine.mjx.physics import STATE_FIELDS, MjxPhysics, all_units, mujoco_of
 from ig2mj.engine.mjx.view import Moved, ViewPlan, make_view, plan_view
-from ig2mj.engine.mjx.writing import apply_write, reaches
+from ig2mj.engine.mjx.writing import apply_write, reaches, trees_joined
+from ig2mj.engine.model_fields import MOVING, ModelFields, check_names, check_written, given, merged, own_fields
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.native.sleep import FULLY_AWAKE
 from ig2mj.engine.snapshot import Snapshot, fitted, make_snapshot
@@ -56,6 +58,7 @@ class MjxEngine(abc.ABC):
         timestep: float = PHYSICS_TIMESTEP,
         touch_tolerance: float = TOUCH_TOLERANCE,
         boxes: str = "tight",
+        model_fields: Sequence[str] = (),
         initial: Snapshot | None = None,
     ):
         """Makes an engine.
@@ -66,6 +69,7 @@ class MjxEngine(abc.ABC):
           substeps, timestep: physics steps in a control step, and their length in seconds.
           touch_tolerance: metres.
           boxes: rule of the view's world boxes, "tight" or "igibson".
+          model_fields: fields of the model that may differ per world (`ig2mj.engine.model_fields`).
           initial: where `reset` starts every world, without the world axis; None: the scene's initial state.
 
         Raises:
@@ -75,7 +79,7 @@ class MjxEngine(abc.ABC):
         prepare_jax()
         self.scene, self.tables, self.num_worlds = scene, scene.tables, num_worlds
         self.substeps, self.timestep, self.boxes = substeps, timestep, boxes
-        self.touch_tolerance = touch_tolerance
+        self.touch_tolerance, self.model_fields = touch_tolerance, check_names(model_fields)
         self.host_model = self._host_model(scene.model)
         self.layout: ModelLayout = make_layout(self.host_model, self.tables)
         self.plan: ViewPlan = plan_view(self.host_model, self.tables, self.layout, boxes)
@@ -140,7 +144,7 @@ class MjxEngine(abc.ABC):
         def substep(carry: Any, _: Any) -> tuple[Any, None]:
             data, forces, overflow, _ = carry
             awake = self._tree_asleep(data) < 0
-            data = self._mapped(mjx.step, self.model, data, physics.eq_data, physics.ignored)
+            data = self._mapped(mjx.step, self.model, data, physics.fields, physics.ignored)
             forces = jax.tree.map(jnp.maximum, forces, self._forces(data))
             return (data, forces, overflow | self._overflow(data), awake), None
 
@@ -179,19 +183,26 @@ class MjxEngine(abc.ABC):
         asleep = self._tree_asleep(data)
         qpos, qvel, tree_moved = apply_write(self.layout, self.host_model, data.qpos, data.qvel, write)
         eq_active = data.eq_active if write.eq_active is None else jnp.asarray(write.eq_active, data.eq_active.dtype)
-        eq_data = physics.eq_data if write.eq_data is None else jnp.asarray(write.eq_data, jnp.float32)
-        tree_moved |= self._trees_joined(physics, eq_active, eq_data)
+        check_written(write.model_fields, self.model_fields, self.host_model, self.num_worlds)
+        fields = jax.tree.map(lambda a: jnp.asarray(a, jnp.float32), merged(physics.fields, write.model_fields))
+        old, differs = given(physics.fields), jnp.zeros(self.num_worlds, bool)
+        eq_data = given(fields)["eq_data"]
+        tree_moved |= trees_joined(self.layout, (data.eq_active, old["eq_data"]), (eq_active, eq_data))
+        for name, array in given(write.model_fields).items():
+            if name in MOVING[1:]:
+                differs |= (getattr(fields, name) != old[name]).any(tuple(range(1, np.ndim(array))))
+        tree_moved |= differs[:, None]
         ignored = physics.ignored
         if write.ignored_contacts is not None:
             ignored = self._checked_filter(jnp.asarray(write.ignored_contacts, bool))
             tree_moved |= reaches((ignored != physics.ignored).any(1), self.layout.object_trees)
         changed = (ignored != physics.ignored).any()
-        changed |= tree_moved.any() | (eq_active != data.eq_active).any() | (eq_data != physics.eq_data).any()
+        changed |= tree_moved.any() | (eq_active != data.eq_active).any() | (eq_data != old["eq_data"]).any()
         data = data.replace(qpos=qpos, qvel=qvel, eq_active=eq_active)
         data = self._with_sleep(
             data, jnp.where(tree_moved & (asleep < 0), FULLY_AWAKE, asleep), (asleep < 0) | tree_moved
         )
-        physics = dataclasses.replace(physics, data=data, eq_data=eq_data, ignored=ignored)
+        physics = dataclasses.replace(physics, data=data, fields=fields, ignored=ignored)
         return jax.lax.cond(changed, self._refresh, lambda p: p, physics)
 
     def snapshot(self, physics: MjxPhysics) -> Snapshot:
@@ -200,12 +211,13 @@ class MjxEngine(abc.ABC):
         fields = {name: getattr(data, name) for name in STATE_FIELDS}
         fields["eq_active"] = fields["eq_active"].astype(bool)
         return make_snapshot(
-            fields | {"eq_data": physics.eq_data, "tree_asleep": self._tree_asleep(data)},
+            fields | {"eq_data": physics.fields.eq_data, "tree_asleep": self._tree_asleep(data)},
             self.layout.scene_sizes,
             data.time,
             physics.touching[:, :count, :count],
             physics.touching[:, count:, :count],
             physics.ignored,
+            dataclasses.replace(physics.fields, eq_data=None),
         )
 
     def export(self, physics: MjxPhysics, world: int) -> Snapshot:
@@ -233,7 +245,7 @@ class MjxEngine(abc.ABC):
         return dataclasses.replace(
             physics,
             data=self._kinematics(data),
-            eq_data=put(snapshot.eq_data, physics.eq_data),
+            fields=jax.tree.map(put, merged(snapshot.model_fields, ModelFields(snapshot.eq_data)), physics.fields),
             ignored=put(snapshot.agents.ignored_contacts, physics.ignored),
             touching=put(all_units(snapshot), physics.touching),
             link_force=jnp.where(chosen[:, None, None], 0.0, physics.link_force),
@@ -262,7 +274,9 @@ class MjxEngine(abc.ABC):
 
     def _scene_start(self, touch_tolerance: float) -> Snapshot:
         """The scene's initial state, by C MuJoCo: all engines begin alike, and MJX need not compile a forward pass."""
-        native = NativeEngine(self.scene, timestep=self.timestep, touch_tolerance=touch_tolerance)
+        native = NativeEngine(
+            self.scene, timestep=self.timestep, touch_tolerance=touch_tolerance, model_fields=self.model_fields
+        )
         return native.export(native.reset(), 0)
 
     def _start_all(self, template: mjx.Data, initial: Snapshot) -> MjxPhysics:
@@ -272,7 +286,10 @@ class MjxEngine(abc.ABC):
         units = self.layout.num_units
         physics = MjxPhysics(
             data=spread(jnp.tile(template.ctrl, (worlds, 1))),
-            eq_data=jnp.tile(jnp.asarray(self.host_model.eq_data, jnp.float32), (worlds, 1, 1)),
+            fields=jax.tree.map(
+                lambda a: jnp.tile(a, (worlds, *[1] * a.ndim)),
+                own_fields(self.host_model, ("eq_data", *self.model_fields)),
+            ),
             ignored=jnp.zeros((worlds, len(tables.hand_body), tables.num_objects), bool),
             touching=jnp.zeros((worlds, units, units), bool),
             link_force=jnp.zeros((worlds, len(tables.link_object), tables.num_objects), jnp.float32),
@@ -281,17 +298,6 @@ class MjxEngine(abc.ABC):
             wrong_controls=jnp.zeros(worlds, bool),
         )
         return self.load(physics, initial)
-
-    def _trees_joined(
-        self, physics: MjxPhysics, eq_active: Bool[Array, "W E"], eq_data: Float[Array, "W E 12"]
-    ) -> Bool[Array, "W T"]:
-        """Trees at either end of an equality constraint that is being changed: what a hand lets go would hang in the
-        air if it fell asleep."""
-        model = self.host_model
-        changed = eq_active != physics.data.eq_active
-        changed |= (eq_data != physics.eq_data).any(-1) & eq_active.astype(bool)
-        of_tree = (self.layout.equality_tree[..., None] == np.arange(model.ntree)).any(1)
-        return reaches(changed, of_tree)
 
     def _make_view(self, physics: MjxPhysics) -> PhysicsView:
         data = physics.data
@@ -311,7 +317,7 @@ class MjxEngine(abc.ABC):
 
     def _refresh(self, physics: MjxPhysics) -> MjxPhysics:
         """Everything derived, of the present positions; wakes what was marked. No forces are reported."""
-        data = self._mapped(mjx.forward, self.model, physics.data, physics.eq_data, physics.ignored)
+        data = self._mapped(mjx.forward, self.model, physics.data, physics.fields, physics.ignored)
         awake = self._tree_asleep(data) < 0
         return dataclasses.replace(
             physics,
@@ -326,20 +332,18 @@ class MjxEngine(abc.ABC):
         act: Any,
         model: mjx.Model,
         data: mjx.Data,
-        eq_data: Float[Array, "W E 12"],
+        fields: ModelFields,
         ignored: Bool[Array, "W H O"],
     ) -> mjx.Data:
         """A function of MJX on every world. The model comes as an argument, so that a program holds it only once."""
-        of_world: dict[str, Array] = {}
-        if self.host_model.neq:
-            of_world["eq_data"] = eq_data
+        of_world = {name: array for name, array in given(fields).items() if name in MOVING and array.size}
         if ignored.size:
             of_world["ignored"] = ignored
         if not of_world:
             return jax.vmap(lambda d: act(model, d))(data)
 
         def one(fields: dict[str, Array], d: mjx.Data) -> mjx.Data:
-            own = model.replace(eq_data=fields["eq_data"]) if "eq_data" in fields else model
+            own = model.replace(**{name: array for name, array in fields.items() if name != "ignored"})
             return self._act(act, own, d, fields.get("ignored"))
 
         return jax.vmap(one)(of_world, data)

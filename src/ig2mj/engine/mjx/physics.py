@@ -12,6 +12,7 @@ from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.contact_filter import BitLayers
+from ig2mj.engine.model_fields import ModelFields, given
 from ig2mj.engine.native.sleep import restore_sleep
 from ig2mj.engine.snapshot import AXIS, Snapshot
 from ig2mj.engine.view import Array
@@ -27,14 +28,15 @@ class MjxPhysics:
 
     Attributes:
       data: MJX data; arrays begin with the world axis, but for Warp's contact list (design section 2, fact 10).
-      eq_data: parameters of the equality constraints of each world. ignored: contacts of hands with objects dropped.
+      fields: fields of the model that are each world's own, eq_data always.
+      ignored: contacts of hands with objects dropped.
       touching: of units, as of the last step. link_force, finger_force: newtons, of the last control step.
       overflow: or of MJX-Warp's overflow flags since the world was loaded (`ig2mj.worlds.guards`).
       wrong_controls: some control had to be clipped since then.
     """
 
     data: Any
-    eq_data: Float[Array, "W E 12"]
+    fields: ModelFields
     ignored: Bool[Array, "W H O"]
     touching: Bool[Array, "W U U"]
     link_force: Float[Array, "W L O"]
@@ -57,7 +59,8 @@ def all_units(snapshot: Snapshot) -> Bool[Array, "*W U U"]:
 def mujoco_of(row: Snapshot, model: mujoco.MjModel, tables: SceneTables) -> tuple[mujoco.MjModel, mujoco.MjData]:
     """A snapshot without the world axis in MuJoCo's own structures; `model` is copied."""
     model = copy.copy(model)
-    model.eq_data[:] = row.eq_data
+    for name, array in {"eq_data": row.eq_data, **given(row.model_fields)}.items():
+        getattr(model, name)[:] = array
     masks = BitLayers(model, tables).masks(np.asarray(row.agents.ignored_contacts))
     if masks is not None:
         model.geom_contype[:], model.geom_conaffinity[:] = masks

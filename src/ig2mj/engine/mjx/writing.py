@@ -72,6 +72,18 @@ def apply_write(
     return qpos, qvel, moved_tree
 
 
+def trees_joined(
+    layout: ModelLayout,
+    before: tuple[Bool[Array, "W E"], Float[Array, "W E 12"]],
+    after: tuple[Bool[Array, "W E"], Float[Array, "W E 12"]],
+) -> Bool[Array, "W T"]:
+    """Trees at either end of an equality constraint that is being changed: what a hand lets go would hang in the air
+    if it fell asleep. `before`, `after`: eq_active and eq_data."""
+    active = after[0].astype(bool)
+    changed = (before[0].astype(bool) != active) | ((before[1] != after[1]).any(-1) & active)
+    return reaches(changed, (layout.equality_tree[..., None] == np.arange(layout.object_trees.shape[1])).any(1))
+
+
 def _free(qpos: Float[Array, "W nq"], address: np.ndarray) -> tuple[Float[Array, "W X 3"], Float[Array, "W X 4"]]:
     coordinates = qpos[:, address[:, None] + np.arange(7)]
     return coordinates[..., :3], coordinates[..., 3:]

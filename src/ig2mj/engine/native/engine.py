@@ -15,7 +15,7 @@ import copy
 import dataclasses
 import functools
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
@@ -29,6 +29,7 @@ from ig2mj.engine.contact_filter import BitLayers
 from ig2mj.engine.controls import check_shape
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
+from ig2mj.engine.model_fields import check_names, check_written, given
 from ig2mj.engine.native.contacts import FingerForces, ForcePlan
 from ig2mj.engine.native.later import RAW, Agents, LaterPlan, ObjectMotion
 from ig2mj.engine.native.model_slot import ModelSlot
@@ -138,6 +139,7 @@ class NativeEngine:
         timestep: float = PHYSICS_TIMESTEP,
         touch_tolerance: float = TOUCH_TOLERANCE,
         boxes: str = "tight",
+        model_fields: Sequence[str] = (),
         threads: int | None = None,
     ):
         """Makes an engine.
@@ -148,6 +150,7 @@ class NativeEngine:
           substeps, timestep: physics steps in a control step, and their length in seconds.
           touch_tolerance: metres; contacts farther apart than the geoms' `gap` are never seen.
           boxes: rule of the view's world boxes, "tight" or "igibson".
+          model_fields: fields of the model that may differ per world (`ig2mj.engine.model_fields`).
           threads: how many to step worlds on; None: one per processor, and no more than worlds.
 
         Raises:
@@ -184,6 +187,7 @@ class NativeEngine:
                 (len(self.tables.finger_body), len(self.tables.graspable_body)),
             ),
             tolerance=touch_tolerance,
+            own_fields=check_names(model_fields),
             substeps=substeps,
         )
         self._masks = [Masks(self._statics.vicinity, slot.model) for slot in self._slots]
@@ -236,11 +240,10 @@ class NativeEngine:
 
     def write(self, physics: NativePhysics, write: Write) -> NativePhysics:
         """Applies a change in place; see `Engine.write`."""
-        rows = {
-            field.name: np.asarray(value)
-            for field in dataclasses.fields(Write)
-            if (value := getattr(write, field.name)) is not None
-        }
+        check_written(write.model_fields, self._statics.own_fields, self._slots[0].model, self.num_worlds)
+        values = {field.name: getattr(write, field.name) for field in dataclasses.fields(Write)}
+        values |= {"model_fields": None} | given(write.model_fields)
+        rows = {name: np.asarray(value) for name, value in values.items() if value is not None}
 
         def apply(world: World) -> int:
             return apply_write(world, {name: value[world.number] for name, value in rows.items()})

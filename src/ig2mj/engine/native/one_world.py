@@ -10,6 +10,7 @@ import numpy as np
 from ig2mj.engine.contact_filter import BitLayers
 from ig2mj.engine.controls import LARGEST, clip
 from ig2mj.engine.layout import ModelLayout
+from ig2mj.engine.model_fields import ModelFields, given
 from ig2mj.engine.native.contacts import ForcePlan, StepContacts, touching_units
 from ig2mj.engine.native.later import AgentContacts, LaterPlan, agents_touching, of_owners
 from ig2mj.engine.native.model_slot import ModelSlot
@@ -31,6 +32,7 @@ class Statics:
       later: plan of the fields that are made later. has_agents: there is one.
       layers: the contact filter.
       forces: what forces of contacts are of interest.
+      own_fields: fields of the model that each world has for itself besides eq_data.
       See `ig2mj.engine.layout`, `ig2mj.engine.native.view_rows` and `ig2mj.engine.native.vicinity` for the rest.
     """
 
@@ -42,6 +44,7 @@ class Statics:
     vicinity: VicinityTable
     layers: BitLayers
     forces: ForcePlan
+    own_fields: tuple[str, ...]
     tolerance: float
     substeps: int
 
@@ -55,7 +58,7 @@ class World:
       agent_contacts: what tells which objects the agents touch.
       pressing: contacts of fingers in the physics steps of the last control step; a new list where it changes.
       fields: fields of the model that this world has for itself, by name; its engine puts them into the model that the
-        worlds of a thread share before it does anything with the world. Always there: eq_data.
+        worlds of a thread share before it does anything with the world. Always there: eq_data and `own_fields`.
       ignored: [H, O] contacts that are dropped. wrong_controls: some control was clipped since the world was loaded.
     """
 
@@ -71,7 +74,7 @@ class World:
         self.agent_contacts = AgentContacts(nothing, None, *self._no_contacts)
         self._agent_fresh: np.ndarray | None = None
         self._sleeping_agents = np.zeros(0, int)
-        self.fields: dict[str, np.ndarray] = {"eq_data": slot.own("eq_data")}
+        self.fields: dict[str, np.ndarray] = {name: slot.own(name) for name in ("eq_data", *statics.own_fields)}
         self.ignored = np.zeros((len(statics.tables.hand_body), statics.tables.num_objects), bool)
         self._plans: dict[bytes, PosePlan] = {}
         self._fresh = np.zeros_like(self.units)  # [U, U] pairs with an awake unit
@@ -222,6 +225,7 @@ class World:
             self.units.copy(),
             self.agents_touch().copy(),
             self.ignored.copy(),
+            ModelFields(**{name: self.fields[name].copy() for name in self.statics.own_fields}),
         )
 
     def load(self, snapshot: Snapshot) -> int:
@@ -230,7 +234,7 @@ class World:
         self.wrong_controls = False
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
-        self.set_fields(eq_data=np.asarray(snapshot.eq_data))
+        self.set_fields(eq_data=np.asarray(snapshot.eq_data), **given(snapshot.model_fields))
         self.ignore(np.asarray(snapshot.agents.ignored_contacts))
         self._set_state(snapshot)
         wake_trees(model, data, np.arange(model.ntree))

@@ -5,13 +5,14 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
+from ig2mj.engine.model_fields import MOVING, NAMES
 from ig2mj.engine.native.one_world import World
 from ig2mj.engine.native.sleep import wake_trees
 from ig2mj.engine.native.view_rows import Changed
 
 
 def apply_write(world: World, rows: dict[str, np.ndarray]) -> int:
-    """Applies one world's rows of a `Write` (its fields that are not None) and refreshes the world.
+    """Applies one world's rows of a `Write` (its fields, and those of the model, that are not None) and refreshes it.
 
     Without any rows the world is refreshed from what stands in its MjData.
     """
@@ -37,9 +38,13 @@ def apply_write(world: World, rows: dict[str, np.ndarray]) -> int:
     if "eq_active" in rows:
         joined |= data.eq_active.astype(bool) != rows["eq_active"]
         data.eq_active[:] = rows["eq_active"]
-    if "eq_data" in rows:
-        joined |= (world.fields["eq_data"] != rows["eq_data"]).any(1) & data.eq_active.astype(bool)
-        world.set_fields(eq_data=rows["eq_data"])
+    fields = {name: rows[name] for name in NAMES if name in rows}
+    if "eq_data" in fields:
+        joined |= (world.fields["eq_data"] != fields["eq_data"]).any(1) & data.eq_active.astype(bool)
+    if any((world.fields[name] != array).any() for name, array in fields.items() if name in MOVING[1:]):
+        trees[:] = True
+    if fields:
+        world.set_fields(**fields)
     filtered = "ignored_contacts" in rows and bool((world.ignored != rows["ignored_contacts"]).any())
     if filtered:
         trees |= layout.object_trees[(world.ignored != rows["ignored_contacts"]).any(0)].any(0)
