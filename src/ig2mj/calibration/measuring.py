@@ -16,6 +16,7 @@ import msgspec
 import mujoco
 import numpy as np
 
+from ig2mj.calibration.acting import ACTION_STEPS, Acting, act_at_random, robot_of, start_acting
 from ig2mj.calibration.pushing import Pusher, push, start_pushing
 from ig2mj.calibration.reach import Reach
 from ig2mj.engine.health import CAPACITY, SETTING
@@ -67,7 +68,7 @@ def calibrate(
     """Measures a scene.
 
     Args:
-      scene: with or without an agent.
+      scene: with or without an agent; a robot that is its first agent acts at random.
       reach: of the floating hand that is its only agent; it pushes objects about. None: things are only dropped.
       engine: "warp" or "native"; "": warp where JAX has a GPU.
       num_worlds: measured side by side; 0: `WORLDS`.
@@ -119,25 +120,31 @@ def calibrate(
 
 
 class _Disturbance:
-    """What happens to the worlds of a measurement: drops at the start of each round, a hand that pushes, if any."""
+    """What happens to the worlds of a measurement: drops at the start of each round; a hand that pushes, or a robot."""
 
     def __init__(self, scene: Scene, reach: Reach | None, engine: NativeEngine | WarpEngine, seed: int):
         self.scene, self.reach, self.engine, self.seed = scene, reach, engine, seed
         self.loose = loose_objects(scene.tables)
         self.seconds = engine.substeps * engine.timestep
+        self.robot = None if reach else robot_of(scene, ACTION_STEPS * self.seconds)
 
     def key(self, round_number: int | jax.Array) -> jax.Array:
         worlds = jnp.arange(self.engine.num_worlds)
         return jnp.asarray(episode_keys(self.seed, worlds, jnp.full_like(worlds, round_number)))
 
-    def start(self) -> Pusher | None:
+    def start(self) -> Pusher | Acting | None:
+        if self.robot is not None:
+            return start_acting(self.robot, self.engine.num_worlds, self.scene.model.nu)
         return start_pushing(self.reach, self.engine.num_worlds, self.scene.model.nu) if self.reach else None
 
     def drop(self, view, key: jax.Array):  # a Write
         share = max(SHARE, min(1.0, AT_LEAST / max(1, len(self.loose))))
         return perturb(self.scene.tables, self.loose, view, key, share)
 
-    def controls(self, view, pusher: Pusher | None, key: jax.Array, step: jax.Array) -> Pusher | None:
+    def controls(self, view, pusher: Pusher | Acting | None, key: jax.Array, step: jax.Array) -> Pusher | Acting | None:
+        if isinstance(pusher, Acting):
+            assert self.robot is not None
+            return act_at_random(self.robot, pusher, view, key, step)
         if self.reach is None or pusher is None:
             return None
         return push(self.reach, pusher, view.object_com, view.agent.base_pos[:, 0], key, step, self.seconds)

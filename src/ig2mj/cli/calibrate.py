@@ -17,6 +17,7 @@ def run(
     seed: int = 0,
     safety: float = 0.0,
     hand: bool = True,
+    robot: Literal["hand", "humanoid", "fetch", "turtlebot"] = "hand",
     out: pathlib.Path | None = None,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> None:
@@ -30,12 +31,13 @@ def run(
       seed: of the disturbance.
       safety: factor on all sizes; 0: 1 for warp, 1.4 for native.
       hand: let a floating hand push objects about.
+      robot: what disturbs the scene: a hand that pushes, or a robot that acts at random, whose profile has its name.
       out: folder; profiles go to OUT/<scene's name>/ instead of beside the manifests.
       json: print the profiles as JSON, by scene.
     """
     from ig2mj.calibration.measuring import calibrate
     from ig2mj.cli.printing import add_bar, print_json, progress_bar, stdout_console
-    from ig2mj.engine.warp.profile import save_profile
+    from ig2mj.engine.warp.profile import profile_file, save_profile
     from ig2mj.errors import Ig2mjError
 
     if not scenes:
@@ -44,7 +46,7 @@ def run(
         raise Ig2mjError("--worlds and --safety must not be negative, --rounds must be at least 1")
     profiles = {}
     for scene in scenes:
-        loaded, reach = _with_hand(scene, hand)
+        loaded, reach = _with_hand(scene, hand) if robot == "hand" else (_with_robot(scene, robot), None)
         with progress_bar() as bar:
             report = add_bar(bar, f"disturbing {loaded.name}")
             profile = calibrate(
@@ -59,7 +61,7 @@ def run(
             )
         folder = loaded.folder if out is None else out / loaded.folder.name
         folder.mkdir(parents=True, exist_ok=True)
-        file = save_profile(profile, folder)
+        file = save_profile(profile, folder, profile_file(loaded.agents))
         profiles[loaded.name] = profile
         if not json:
             stdout_console().print(_table(f"{loaded.name}: {file}", profile, loaded.model))
@@ -81,6 +83,23 @@ def _with_hand(scene: pathlib.Path, hand: bool):
     except EngineError as e:
         print(f"note: {e}; measured without a hand", file=sys.stderr)
         return loaded, None
+
+
+def _with_robot(scene: pathlib.Path, robot: str):
+    """The scene with a robot on the free place from which a hand reaches most; where there is none, at its start."""
+    from ig2mj.agents import Fetch, Humanoid, TurtleBot
+    from ig2mj.calibration.reach import find_reach
+    from ig2mj.errors import EngineError
+    from ig2mj.scene.scene import load_scene
+
+    kind = {"humanoid": Humanoid, "fetch": Fetch, "turtlebot": TurtleBot}[robot]
+    height = kind().pos[2]
+    try:
+        x, y, _ = find_reach(load_scene(scene)).start
+    except EngineError as e:
+        print(f"note: {e}; the robot stands at its own start", file=sys.stderr)
+        return load_scene(scene, [kind()])
+    return load_scene(scene, [kind(pos=(x, y, height))])
 
 
 def _table(title: str, profile, model):

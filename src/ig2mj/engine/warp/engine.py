@@ -27,7 +27,7 @@ from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.engine.warp import patches
 from ig2mj.engine.warp.patches.ignored import encode
-from ig2mj.engine.warp.profile import EngineProfile, fit, holds_everything, load_profile
+from ig2mj.engine.warp.profile import EngineProfile, fit, holds_everything, profile_of_scene
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_warp
 from ig2mj.scene.scene import Scene
@@ -60,7 +60,7 @@ class WarpEngine(MjxEngine):
         Args:
           scene, num_worlds, initial, options: see `MjxEngine`. Where `initial` is None and the profile does not hold
             everything awake, the scene is settled first with the native engine.
-          profile: buffer sizes; None: the file beside the manifest, else safe sizes.
+          profile: buffer sizes; None: the file beside the manifest for the scene's agents, else safe sizes.
           iterations, ls_iterations: limits of the solver and of its line search; None: the scene's. Lower limits buy
             little: of 16,384 disturbed worlds nearly all converge at once, and 5 against 100 saved 9 % of a step.
           print_overflow: let Warp print a line per overflowing world and step. The flags are kept in any case.
@@ -68,7 +68,7 @@ class WarpEngine(MjxEngine):
         prepare_warp()
         _say_once_if_slow()
         self.own_kernels = patches.for_new_engines()
-        sizes = fit(profile, scene.model) if profile else load_profile(scene.folder, scene.model)
+        sizes = fit(profile, scene.model) if profile else profile_of_scene(scene)
         self.profile = sizes.for_worlds(max(num_worlds, 1))  # a wrong number is told by `MjxEngine`
         self._print_overflow = print_overflow
         self._iterations = iterations or int(scene.model.opt.iterations)

@@ -2,7 +2,10 @@
 
 MJX-Warp allocates per world for the most degrees of freedom awake at once, the most constraint rows and the most
 contacts. What does not fit is lost, and the world is flagged (`ig2mj.worlds.guards`). Sizes that hold everything would
-take far more memory than homes ever use, so they are measured per scene and kept beside its manifest.
+take far more memory than homes ever use, so they are measured per scene and robot and kept beside its manifest:
+`engine_profile.json` for the scene with the floating hand that calibration disturbs it with (which holds it bare, too),
+`engine_profile.humanoid.json` and so on for robots. Where a robot has none, the scene's sizes are widened by the most
+that the robot's own bodies could need.
 """
 
 from __future__ import annotations
@@ -10,13 +13,19 @@ from __future__ import annotations
 import math
 import os
 import pathlib
+from collections.abc import Sequence
 
 import msgspec
 import mujoco
+import numpy as np
 
 from ig2mj.errors import InputError
+from ig2mj.scene.scene import Scene
 
 PROFILE_FILE = "engine_profile.json"
+
+HAND = "floatinghand"
+"""The robot whose sizes are the scene's."""
 
 
 class EngineProfile(msgspec.Struct, omit_defaults=True):
@@ -73,13 +82,60 @@ def holds_everything(profile: EngineProfile, model: mujoco.MjModel) -> bool:
     return all(getattr(profile, name) >= getattr(widest, name) for name in names)
 
 
-def load_profile(folder: str | os.PathLike, model: mujoco.MjModel) -> EngineProfile:
-    """The profile beside a scene's manifest, or the safe default where there is none.
+def profile_file(agents: Sequence[object]) -> str:
+    """Name of the file with the sizes for a scene with these agents: their classes' names in alphabetical order.
+    Floating hands and functions that add bodies are not named."""
+    kinds = sorted({type(agent).__name__.lower() for agent in agents if hasattr(agent, "attach")} - {HAND})
+    stem, ending = PROFILE_FILE.split(".")
+    return ".".join([stem, *kinds, ending])
+
+
+def profile_of_scene(scene: Scene) -> EngineProfile:
+    """The profile of a scene and its agents; without one for these agents, the scene's own, widened by what the agents
+    could need; without any, the safe default.
 
     Raises:
       InputError: the file is broken.
     """
-    file = pathlib.Path(folder) / PROFILE_FILE
+    model, name = scene.model, profile_file(scene.agents)
+    if name == PROFILE_FILE or (scene.folder / name).exists():
+        return load_profile(scene.folder, model, name)
+    if not (scene.folder / PROFILE_FILE).exists():
+        return default_profile(model)
+    profile, agents = load_profile(scene.folder, model), scene.tables.body_agent >= 0
+    colliding = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    contacts = 8 * int((colliding & agents[model.geom_bodyid]).sum())
+    rows = (model.jnt_limited[agents[model.jnt_bodyid]] != 0).sum() + 6 * _equalities(model, agents)
+    rows += (model.dof_frictionloss[agents[model.dof_bodyid]] > 0).sum()
+    wider = msgspec.structs.replace(
+        profile,
+        awake_dofs=profile.awake_dofs + int(agents[model.dof_bodyid].sum()),
+        constraints=profile.constraints + 4 * contacts + int(rows),
+        contacts=profile.contacts + contacts,
+        convex_contacts=profile.convex_contacts + contacts,
+    )
+    return fit(wider, model)
+
+
+def _equalities(model: mujoco.MjModel, agents: np.ndarray) -> int:
+    """The most constraints with agents' bodies that are active at once: those active from the start, and one grasp for
+    each body that has any."""
+    welds = np.isin(model.eq_type, (mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_CONNECT))
+    of_agent = welds & agents[np.where(welds, model.eq_obj1id, 0)]
+    asleep = of_agent & (model.eq_active0 == 0)
+    return int((model.eq_active0 != 0).sum()) + len(set(model.eq_obj1id[asleep]))
+
+
+def load_profile(folder: str | os.PathLike, model: mujoco.MjModel, name: str = PROFILE_FILE) -> EngineProfile:
+    """The profile beside a scene's manifest, or the safe default where there is none.
+
+    Args:
+      name: of the file.
+
+    Raises:
+      InputError: the file is broken.
+    """
+    file = pathlib.Path(folder) / name
     if not file.exists():
         return default_profile(model)
     mend = "run `ig2mj calibrate` again, or delete the file"
@@ -101,8 +157,8 @@ def fit(profile: EngineProfile, model: mujoco.MjModel) -> EngineProfile:
     return msgspec.structs.replace(profile, awake_dofs=min(profile.awake_dofs, int(model.nv)))
 
 
-def save_profile(profile: EngineProfile, folder: str | os.PathLike) -> pathlib.Path:
-    """Writes the profile beside the manifest and says where."""
-    file = pathlib.Path(folder) / PROFILE_FILE
+def save_profile(profile: EngineProfile, folder: str | os.PathLike, name: str = PROFILE_FILE) -> pathlib.Path:
+    """Writes the profile beside the manifest, under a name (`profile_file`), and says where."""
+    file = pathlib.Path(folder) / name
     file.write_bytes(msgspec.json.format(msgspec.json.encode(profile), indent=1) + b"\n")
     return file
