@@ -10,6 +10,7 @@ from typing import Any
 from flax import struct
 from jaxtyping import Int
 
+from ig2mj.agents.grasping import GraspState
 from ig2mj.engine.view import Array
 from ig2mj.states.world import WorldState
 
@@ -21,6 +22,7 @@ class Batch:
     Attributes:
       world: physics, view, states, keys, clocks.
       controllers: the state of each robot's controller; empty where there are none.
+      grasps: what hands hold; None where hands hold by friction alone.
       number: global number of each world; with several devices a batch is a part of all worlds.
       seed: of all random streams. episode: how often each world was reset.
       flags: `guards.Flag` of each world since its reset. troubles: how often each world was flagged, per flag.
@@ -28,6 +30,7 @@ class Batch:
 
     world: WorldState
     controllers: tuple[Any, ...]
+    grasps: GraspState | None
     number: Int[Array, "W"]
     seed: Int[Array, ""]
     episode: Int[Array, "W"]

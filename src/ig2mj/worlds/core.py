@@ -6,10 +6,10 @@
     batch = core.reset(batch, status.holds)
 
 A control step is, in this order: the robots' controllers, physics, the view of it, extended states and the goal, what
-slicing moves, guards, clocks. It is the same for every engine. On a pure engine (see `ig2mj.engine.base`) the methods
-are compiled; on the native one they work on the engine's worlds in place, and states are only computed where something
-can have changed (`ig2mj.worlds.lazy`). Either way a batch that was given to a method is used up: go on with the one
-that it returns.
+slicing moves, what hands take hold of and let go of, guards, clocks. It is the same for every engine. On a pure engine
+(see `ig2mj.engine.base`) the methods are compiled; on the native one they work on the engine's worlds in place, and
+states are only computed where something can have changed (`ig2mj.worlds.lazy`). Either way a batch that was given to a
+method is used up: go on with the one that it returns.
 
 `step_fn`, `reset_fn` and `start_fn` are the same functions, not compiled: call them inside your own `jax.jit` or
 `lax.scan` on a pure engine, or directly on any.
@@ -32,6 +32,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.agents.base import Controller
+from ig2mj.agents.grasping import Grasping, GraspState
 from ig2mj.engine.base import Engine, Physics, Write
 from ig2mj.engine.health import Health
 from ig2mj.engine.snapshot import Snapshot
@@ -54,8 +55,8 @@ class Core:
 
     Attributes:
       advance: see `advance_fn`.
-      engine: physics. rules: states and goal. controllers: of the scene's robots. starts: what
-        episodes start from.
+      engine: physics. rules: states and goal. controllers: of the scene's robots. grasping: how their hands hold.
+      starts: what episodes start from.
       action_low, action_high: [n] limits of an action, of all robots one after the other.
     """
 
@@ -65,6 +66,7 @@ class Core:
         rules: Rules | None = None,
         pool: Pool | None = None,
         controllers: Sequence[Controller] = (),
+        grasping: Grasping | None = None,
     ):
         """Binds an engine to the rules of its scene.
 
@@ -73,13 +75,16 @@ class Core:
           pool: what episodes start from; None: from where the engine's `reset` stands, with `rules.initial`.
           controllers: one for each robot of the scene, in the order of its actuators; actions go through them. Without
             any, an action is MuJoCo's controls.
+          grasping: how hands take hold of objects; None: by friction alone.
         """
         self.engine, self.rules, self.controllers = engine, rules, tuple(controllers)
+        self.grasping = grasping
         self.action_low = np.concatenate([np.zeros(0), *(c.action_low for c in self.controllers)])
         self.action_high = np.concatenate([np.zeros(0), *(c.action_high for c in self.controllers)])
         self.starts = Starts(engine, rules.initial if rules is not None else None, pool)
         self._physics_step = engine.step  # a world at rest steps in under 2 us: even looking up a name counts
-        self._control = jax.jit(self._control_fn)
+        self._control, self._hands = jax.jit(self._control_fn), jax.jit(self._hands_fn)
+        self._constraints = jax.jit(grasping.write) if grasping is not None else None
         self._count, self._chosen = jax.jit(self._count_fn), jax.jit(chosen)
         if engine.pure:
             self.advance = jax.jit(self.advance_fn)
@@ -119,10 +124,13 @@ class Core:
         if self.controllers and action is not None:
             action, controllers = self._control(action, world.view, controllers)
         physics, view, states, status = self.advance_fn(world.physics, world.states, action)
+        physics, view, grasps = self._grasp(physics, view, batch.grasps, controllers)
         clocks = (world.step, world.time, batch.flags, batch.troubles)
         step, time, flags, troubles = self._count(*clocks, self.engine.health(physics), view.object_com)
         world = WorldState(physics=physics, view=view, states=states, key=world.key, step=step, time=time)
-        batch = dataclasses.replace(batch, world=world, controllers=controllers, flags=flags, troubles=troubles)
+        batch = dataclasses.replace(
+            batch, world=world, controllers=controllers, grasps=grasps, flags=flags, troubles=troubles
+        )
         return batch, status
 
     def advance_fn(
@@ -140,7 +148,6 @@ class Core:
         states, swap, status = self._react(states, view)
         if swap is not None:
             physics, view = self.teleport(physics, view, swap)
-        # What hands do to what they hold belongs here: it reads the states, and writes to physics as slicing does.
         return physics, view, states, status
 
     def prepare(self, physics: Physics, states: States) -> None:
@@ -159,6 +166,35 @@ class Core:
             return physics, now if self.engine.num_worlds == 1 else chosen(cut, now, view)
 
         return self._if_any(cut, act, physics, view)
+
+    def _grasp(
+        self, physics: Physics, view: PhysicsView, grasps: GraspState | None, controllers: tuple[Any, ...]
+    ) -> tuple[Physics, PhysicsView, GraspState | None]:
+        """Physics and view after hands took hold or let go; worlds where none did keep their view."""
+        if self._constraints is None or grasps is None:
+            return physics, view, grasps
+        constraints = self._constraints
+        after, changed = self._hands(view, grasps, controllers)
+        if not self.engine.pure and not np.asarray(changed).any():
+            return physics, view, after
+
+        def act(physics: Physics, view: PhysicsView) -> tuple[Physics, PhysicsView]:
+            physics = self.engine.write(physics, constraints(after))
+            now = self.engine.view(physics)
+            return physics, now if self.engine.num_worlds == 1 else chosen(changed, now, view)
+
+        return *self._if_any(changed, act, physics, view), after
+
+    def _hands_fn(
+        self, view: PhysicsView, grasps: GraspState, controllers: tuple[Any, ...]
+    ) -> tuple[GraspState, Bool[Array, "W"]]:
+        """What hands hold after a step, and in which worlds that is another than before."""
+        assert self.grasping is not None
+        each = list(zip(self.controllers, controllers, strict=True))
+        grip = jnp.concatenate([c.grip(state) for c, state in each], axis=1)
+        lag = jnp.concatenate([c.lag(view, state) for c, state in each], axis=1)
+        after = self.grasping.update(view, grasps, grip, lag)
+        return after, self.grasping.changed(grasps, after)
 
     def rollout(self, batch: Batch, carry: Any, policy: Policy, length: int) -> tuple[Batch, Any]:
         """`length` control steps, on a pure engine without leaving the device.
@@ -234,13 +270,16 @@ class Core:
         episode, key, row = self.starts.draw(batch.seed, batch.number, batch.episode, mask)
         rows = self.starts.pool.rows(self._index(row))
         physics = self.engine.load(world.physics, rows.physics, mask)
-        started = (rows.states, key, jnp.zeros_like(world.step), jnp.zeros_like(world.time), self._controllers())
-        going = (world.states, world.key, world.step, world.time, batch.controllers)
-        states, key, step, time, controllers = self._chosen(mask, started, going)
+        zero = jnp.zeros_like(world.step), jnp.zeros_like(world.time)
+        started = (rows.states, key, *zero, self._controllers(), self._empty_hands())
+        going = (world.states, world.key, world.step, world.time, batch.controllers, batch.grasps)
+        states, key, step, time, controllers, grasps = self._chosen(mask, started, going)
         view = self.engine.view(physics)
         world = WorldState(physics=physics, view=view, states=states, key=key, step=step, time=time)
         flags = jnp.where(mask, 0, batch.flags)
-        return dataclasses.replace(batch, world=world, controllers=controllers, episode=episode, flags=flags)
+        return dataclasses.replace(
+            batch, world=world, controllers=controllers, grasps=grasps, episode=episode, flags=flags
+        )
 
     def _episode_0(self, physics: Physics, seed: int | Int[Array, ""], first: int | Int[Array, ""]) -> Batch:
         """The start, from physics in any state."""
@@ -257,6 +296,7 @@ class Core:
         batch = Batch(
             world=world,
             controllers=self._controllers(),
+            grasps=self._empty_hands(),
             number=first + jnp.arange(count, dtype=jnp.int32),
             seed=jnp.asarray(seed, jnp.int32),
             episode=nothing - 1,
@@ -314,6 +354,9 @@ class Core:
 
     def _controllers(self) -> tuple[Any, ...]:
         return tuple(c.initial(self.engine.num_worlds) for c in self.controllers)
+
+    def _empty_hands(self) -> GraspState | None:
+        return None if self.grasping is None else self.grasping.initial(self.engine.num_worlds)
 
     # What went wrong.
 
