@@ -85,5 +85,9 @@ class StateError(Ig2mjError):
     """A state or predicate that cannot be set, or not to this value."""
 
 
+class ActionError(Ig2mjError):
+    """An action that does not fit its environment: another shape, or not of numbers."""
+
+
 class MissingDependencyError(Ig2mjError):
     """An optional package or system library is absent; the message gives the command that installs it."""

@@ -1,0 +1,25 @@
+"""Slicing Fruit: an apple must be cut with a knife that lies on the same table."""
+
+from __future__ import annotations
+
+from ig2mj.tasks.points import At, Hand
+from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, Acts, Near, Task
+
+SLICING_FRUIT = Task(
+    name="SlicingFruit",
+    summary="Cut the apple on the coffee table with the knife.",
+    home="birch",
+    objects=("apple", "carving_knife"),
+    start=("(on_top apple_0 coffee_table_0)", "(on_top carving_knife_0 coffee_table_0)"),
+    near=(
+        Near("apple_0", (2.15, -0.1, 0.85), most=0.95),
+        Near("carving_knife_0", (2.15, -0.1, 0.85), most=0.95),
+    ),
+    goal="(sliced apple_0)",
+    objects_of_interest=("carving_knife_0", "apple_0"),
+    distances=((Hand(0), At("carving_knife_0")), (At("carving_knife_0"), At("apple_0"))),
+    robots={
+        "humanoid": Acts((2.3, 0.05, 0.55), hands=RIGHT, weights=HUMANOID_WEIGHTS),
+        "fetch": Acts((2.3, 0.0, 0.015)),
+    },
+)

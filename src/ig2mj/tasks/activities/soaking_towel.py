@@ -1,0 +1,22 @@
+"""Soaking Towel: a towel on the dishwasher must be held under a tap that runs."""
+
+from __future__ import annotations
+
+from ig2mj.tasks.points import At, Hand, Water
+from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, Acts, Near, Task
+
+SOAKING_TOWEL = Task(
+    name="SoakingTowel",
+    summary="Hold the towel under the running tap until it is soaked.",
+    home="cedar",
+    objects=("bath_towel",),
+    start=("(on_top bath_towel_0 dishwasher_0)", "(toggled_on sink_0)"),
+    near=(Near("bath_towel_0", (2.74, -2.95, 0.85), most=1.05),),
+    goal="(soaked bath_towel_0)",
+    objects_of_interest=("bath_towel_0", "sink_0"),
+    distances=((Hand(0), At("bath_towel_0")), (At("bath_towel_0"), Water("sink_0"))),
+    robots={
+        "humanoid": Acts((2.95, -2.95, 0.55), yaw=-45.0, hands=RIGHT, weights=HUMANOID_WEIGHTS),
+        "fetch": Acts((2.75, -2.9, 0.0), yaw=-30.0),
+    },
+)

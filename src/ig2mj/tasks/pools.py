@@ -1,0 +1,138 @@
+"""Pools of start states of tasks: sampled on first use from fixed seeds, and kept in the user's cache.
+
+Training and held-out pools come from different seeds and have no row in common. A pool is of the household alone, so
+that it serves every robot. What it is made of is part of its file's name: a pool of another scene, object library,
+condition or version of the sampler's rules is another file.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import pathlib
+import sys
+from collections.abc import Callable
+
+import jax
+import numpy as np
+from jaxtyping import Bool
+
+from ig2mj.engine.registry import make_engine
+from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.process.compilation import cache_folder
+from ig2mj.sampling.many import sample
+from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.tasks.task import Task
+from ig2mj.worlds.pool import Pool, load_pool, save_pool, stack
+
+VERSION = 1
+"""Of the rules by which pools of tasks are made. Raise it when the sampler's results change."""
+
+SEEDS = {"train": 1_000_003, "held_out": 2_000_003}
+"""First seed of each split; further ones follow where rows are turned down."""
+
+COUNT = {"train": 512, "held_out": 1000}
+"""Rows unless another number is asked for."""
+
+CHUNK = 32
+"""Rows that are sampled from one seed, at least."""
+
+MAX_CHUNKS = 400
+"""Seeds after which too many rows were turned down."""
+
+Progress = Callable[[int, int], None]
+"""Called with the number of rows made and wanted."""
+
+
+def bare_scene(task: Task) -> Scene:
+    """The task's household without a robot."""
+    return load_scene(task.home, objects=task.objects)
+
+
+def pool_of(
+    task: Task,
+    split: str = "train",
+    count: int | None = None,
+    *,
+    jobs: int = 1,
+    progress: Progress = lambda made, wanted: None,
+) -> Pool:
+    """The pool, read from the cache or made now.
+
+    Args:
+      split: "train" or "held_out". count: rows; None: `COUNT`.
+      jobs: processes; 0: one per processor. More than one needs a script that may be imported (the guard
+        `if __name__ == "__main__"`).
+
+    Raises:
+      UnknownNameError: no such split. EngineError: its start states cannot be sampled.
+    """
+    scene = bare_scene(task)
+    file = pool_file(task, scene, split, count)
+    if file.exists():
+        return load_pool(file, scene)
+    print(
+        f"sampling {count or COUNT[split]} start states of {task.name}, once (on all processors: ig2mj sample-task "
+        f"{task.name})",
+        file=sys.stderr,
+    )
+    pool = make_pool(task, split, count, scene=scene, jobs=jobs, progress=progress)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    beside = file.with_name(f".{os.getpid()}-{file.name}")
+    save_pool(pool, beside, scene, {"task": task.name, "split": split, "conditions": list(task.start)})
+    beside.replace(file)  # never half a file, even if two processes make it
+    return pool
+
+
+def pool_file(task: Task, scene: Scene, split: str = "train", count: int | None = None) -> pathlib.Path:
+    """Where the pool is kept. Raises UnknownNameError."""
+    if split not in SEEDS:
+        raise UnknownNameError("split", split, SEEDS)
+    near = [[n.object, *n.pos, n.least, n.most] for n in task.near]
+    made_of = json.dumps([VERSION, scene.digest, task.objects, task.start, near])
+    mark = hashlib.blake2b(made_of.encode(), digest_size=6).hexdigest()
+    return cache_folder() / "pools" / f"{task.name}-{split}-{count or COUNT[split]}-{mark}.npz"
+
+
+def make_pool(
+    task: Task,
+    split: str = "train",
+    count: int | None = None,
+    *,
+    scene: Scene | None = None,
+    jobs: int = 1,
+    progress: Progress = lambda made, wanted: None,
+) -> Pool:
+    """Samples the pool anew: the same rows for any number of processes. Arguments and errors as `pool_of`."""
+    if split not in SEEDS:
+        raise UnknownNameError("split", split, SEEDS)
+    scene = bare_scene(task) if scene is None else scene
+    wanted, made, pools = count or COUNT[split], 0, []
+    for k in range(MAX_CHUNKS):
+        drawn = sample(scene, task.start, CHUNK, SEEDS[split] + k, jobs=jobs).pool
+        if drawn is not None:
+            good = np.flatnonzero(_near(task, scene, drawn))
+            if len(good):
+                pools.append(drawn.rows(good))
+                made += len(good)
+        progress(min(made, wanted), wanted)
+        if made >= wanted:
+            return stack(pools).rows(np.arange(wanted))
+        if k == 7 and not made:
+            break
+    raise EngineError(f"{task.name}: of {(k + 1) * CHUNK} start states only {made} of {wanted} have all within reach")
+
+
+def _near(task: Task, scene: Scene, pool: Pool) -> Bool[np.ndarray, "P"]:
+    """Rows in which every object is where the task wants it."""
+    engine = make_engine("native", scene, 1)
+    physics, good = engine.reset(), np.ones(pool.size, bool)
+    for row in range(pool.size):
+        snapshot = jax.tree.map(lambda a, r=row: np.asarray(np.asarray(a)[r]), pool.physics)
+        physics = engine.load(physics, snapshot)
+        com = np.asarray(engine.view(physics).object_com)[0]
+        for near in task.near:
+            distance = np.linalg.norm(com[scene.object_index(near.object)] - near.pos)
+            good[row] &= near.least <= distance <= near.most
+    return good

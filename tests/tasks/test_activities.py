@@ -1,0 +1,40 @@
+"""The six activities fit their homes: names, goals, points, robots in free floor, all within reach."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ig2mj.engine.registry import make_engine
+from ig2mj.envs.names import NAMES
+from ig2mj.errors import UnknownNameError
+from ig2mj.scene.scene import load_scene
+from ig2mj.tasks.activities import ACTIVITIES
+from ig2mj.tasks.reward import Reward
+from ig2mj.tasks.task import make_robot
+from ig2mj.worlds.rules import Rules
+
+FLOOR = ("floors", "carpet")
+
+
+def test_names_are_known_without_loading_tasks():
+    assert tuple(ACTIVITIES) == NAMES
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_home_of_at_least_sixty_objects_has_all_that_the_activity_is_about(name):
+    task = ACTIVITIES[name]
+    for robot in task.robots:
+        scene = load_scene(task.home, agents=[make_robot(task, robot)], objects=task.objects)
+        rules = Rules.of_scene(scene).with_goal(task.goal)
+        Reward(task, robot, scene, rules.model)
+        assert len(load_scene(task.home).object_names) >= 60
+        engine = make_engine("native", scene, 1)
+        touched = np.flatnonzero(engine.view(engine.reset()).agent.touching[0, 0])
+        assert {scene.tables.object_categories[o] for o in touched} <= set(FLOOR), f"{robot} starts in something"
+
+
+def test_one_arm_does_not_lift_the_cauldron():
+    """Paper, appendix A.3: five of the six activities were learned by Fetch."""
+    with pytest.raises(UnknownNameError, match="humanoid"):
+        make_robot(ACTIVITIES["BimanualPickAndPlace"], "fetch")

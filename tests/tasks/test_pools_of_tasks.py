@@ -1,0 +1,40 @@
+"""Pools of tasks: the same bytes from the same seeds, other states held out, everything within reach."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from ig2mj.errors import UnknownNameError
+from ig2mj.tasks.activities import ACTIVITIES
+from ig2mj.tasks.pools import bare_scene, make_pool, pool_file, pool_of
+
+TASK = ACTIVITIES["GraspingBook"]
+
+
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("IG2MJ_CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+def test_a_pool_is_made_once_and_again_byte_for_byte(cache):
+    scene = bare_scene(TASK)
+    pool = pool_of(TASK, count=3)
+    file = pool_file(TASK, scene, count=3)
+    first = file.read_bytes()
+    written = file.stat().st_mtime_ns
+    assert pool.size == pool_of(TASK, count=3).size == 3
+    assert file.stat().st_mtime_ns == written  # read, not made
+    file.unlink()
+    pool_of(TASK, count=3)
+    assert file.read_bytes() == first
+
+    held_out = make_pool(TASK, "held_out", 3, scene=scene)
+    rows = [np.asarray(p.physics.qpos) for p in (pool, held_out)]
+    assert not any((a == b).all() for a in rows[0] for b in rows[1])
+
+
+def test_an_unknown_split_is_named(cache):
+    with pytest.raises(UnknownNameError, match="held_out"):
+        pool_of(TASK, "test")
