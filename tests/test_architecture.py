@@ -31,6 +31,7 @@ LAYERS = [
     "sensors",
     "tasks",
     "envs",
+    "testing",
     "learn",
     "demos",
     "viewer",

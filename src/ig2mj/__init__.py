@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import importlib
+import sys
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ig2mj.envs.registry import list_envs, make
     from ig2mj.scene.scene import Scene, load_scene
     from ig2mj.simulation import Simulation
     from ig2mj.worlds import Worlds
 
-__all__ = ["Scene", "Simulation", "Worlds", "load_scene"]
+__all__ = ["Scene", "Simulation", "Worlds", "list_envs", "load_scene", "make"]
 
 _HOME = {
     "Scene": "ig2mj.scene.scene",
+    "list_envs": "ig2mj.envs.registry",
     "load_scene": "ig2mj.scene.scene",
+    "make": "ig2mj.envs.registry",
     "Simulation": "ig2mj.simulation",
     "Worlds": "ig2mj.worlds",
 }
@@ -29,3 +33,9 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *_HOME})
+
+
+if "gymnasium" in sys.modules:
+    from ig2mj.envs import names
+
+    names.register(sys.modules["gymnasium"])

@@ -47,7 +47,8 @@ from typing import Any
 from ig2mj.errors import Ig2mjError
 from ig2mj.install_hint import pip_install_module
 
-#: Sub-command -> what it does, in the order of `ig2mj --help`. The module is `ig2mj.cli.<sub-command>`.
+#: Sub-command -> what it does, in the order of `ig2mj --help`. The module is `ig2mj.cli.<sub-command>`, a
+#: hyphen in it an underscore.
 COMMANDS: dict[str, str] = {
     "demo": "convert the small home, run it, tell what stands where, cook a fish in it",
     "convert": "turn an iGibson scene or a URDF object into MJCF",
@@ -58,6 +59,9 @@ COMMANDS: dict[str, str] = {
     "calibrate": "measure the batched engine's buffers for a scene",
     "sample": "sample initial states in which conditions hold, as a pool for batched resets",
     "activity": "list BEHAVIOR's activities, what each asks for in a home, and sample its starts",
+    "list-envs": "list the environments, and which robots can do what in them",
+    "rollout": "play episodes of an environment, and tell how they ended",
+    "sample-task": "sample an environment's start states, and keep them in the cache",
     "homes": "build our own dataset of household objects and homes",
     "doctor": "tell what this machine can run, and how to mend what it cannot",
 }
@@ -136,7 +140,7 @@ def _dispatch(args: list[str]) -> int:
     name, rest = args[0], args[1:]
     if name not in COMMANDS:
         return _unknown("command", name, COMMANDS, "ig2mj --help")
-    module = importlib.import_module(f"ig2mj.cli.{name}")
+    module = importlib.import_module(f"ig2mj.cli.{name.replace('-', '_')}")
     subcommands: Mapping[str, Callable[..., Any]] | None = getattr(module, "SUBCOMMANDS", None)
     if subcommands is None:
         return _run(module.run, f"ig2mj {name}", rest)

@@ -1,0 +1,38 @@
+"""`ig2mj list-envs`: the environments, and which robots can do what in them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import tyro
+
+
+def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
+    """List the environments: what is to be done, in which home, by which robots.
+
+    Args:
+      json: print JSON instead of a table.
+    """
+    import json as form
+
+    from ig2mj.cli.printing import make_table, stdout_console
+    from ig2mj.envs.names import NAMESPACE, VERSION
+    from ig2mj.tasks.activities import ACTIVITIES
+
+    if json:
+        rows = [
+            {
+                "name": t.name,
+                "id": f"{NAMESPACE}/{t.name}-v{VERSION}",
+                "home": t.home,
+                "robots": list(t.robots),
+                "goal": t.goal,
+                "summary": t.summary,
+            }
+            for t in ACTIVITIES.values()
+        ]
+        print(form.dumps(rows))
+        return 0
+    rows = [(t.name, t.home, ", ".join(t.robots), t.summary) for t in ACTIVITIES.values()]
+    stdout_console().print(make_table("environments", ("name", "home", "robots", "what is to be done"), rows))
+    return 0

@@ -1,0 +1,338 @@
+"""`Environment`: a task in a batch of worlds, functional and batch-first.
+
+    env = ig2mj.make("CookingMeat", robot="humanoid", worlds=16)
+    state = env.reset(0)
+    state = env.step(state, action)              # action: [W, n], -1..1
+    state = env.reset(state, state.terminated | state.truncated)
+
+An agent step is 1/10 s: three control steps of the core, the action held in all of them. What the core can compile is
+compiled, and so is this: on a pure engine `step_fn` and `reset_fn` may be part of a program of your own. A state that
+was given to a method is used up; go on with the one that it returns.
+
+Success ends an episode (`terminated`). The horizon truncates it, and so do guards: what a world says whose numbers were
+lost is not to be believed (`ig2mj.worlds.guards`).
+
+Axes: W worlds, n numbers of an action.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.envs.observations import Observer, Space
+from ig2mj.errors import ActionError, EngineError
+from ig2mj.predicates.compile import GoalStatus
+from ig2mj.scene.scene import Scene
+from ig2mj.states.world import ExtendedStates
+from ig2mj.tasks.actions import ActionMap
+from ig2mj.tasks.reward import TERMS, Measures, Reward
+from ig2mj.tasks.task import Task
+from ig2mj.worlds.batch import Batch
+from ig2mj.worlds.core import Core
+
+Seed = int | np.integer | Array
+"""A whole number, or a key of JAX."""
+
+
+@struct.dataclass
+class EnvState:
+    """All worlds of an environment.
+
+    Attributes:
+      batch: of the core. obs: observations by name. reward: of the last step.
+      terminated: success ended the episode. truncated: the horizon or a guard did; never both.
+      info: "success"; "success_in_hand" (success while the first object is in all acting hands); "goal_progress" (share
+        of the goal's literals); "held" (the first object is in an acting hand); "steps" of the episode; "reward/..." of
+        each term; "bad_actions" (numbers of the last action that were not finite); "flags" (`guards.Flag`).
+      measures: what the reward is made of, for the next step's difference.
+      bad_actions: numbers that were not finite and were taken for 0, since the first reset.
+    """
+
+    batch: Batch
+    obs: dict[str, Array]
+    reward: Float[Array, "W"]
+    terminated: Bool[Array, "W"]
+    truncated: Bool[Array, "W"]
+    info: dict[str, Any]
+    measures: Measures
+    bad_actions: Int[Array, "W"]
+
+    @property
+    def done(self) -> Bool[Array, "W"]:
+        """The episode is over."""
+        return self.terminated | self.truncated
+
+
+@struct.dataclass
+class _Seen:
+    """What is computed after physics, in one program."""
+
+    obs: dict[str, Array]
+    reward: Float[Array, "W"]
+    terminated: Bool[Array, "W"]
+    truncated: Bool[Array, "W"]
+    info: dict[str, Array]
+    measures: Measures
+
+
+class Environment:
+    """See the module's text; `ig2mj.make` makes one.
+
+    Attributes:
+      task, robot, grasping: what is done by whom, and how hands hold (`ig2mj.agents.grasping.MODES`).
+      scene, core: the household with its robot, and what steps it.
+      num_worlds: W. action_names: [n]. observation_spaces: of each observation, without the world axis.
+    """
+
+    def __init__(
+        self,
+        task: Task,
+        robot: str,
+        scene: Scene,
+        core: Core,
+        action_map: ActionMap,
+        observations: Callable[[Reward], Observer],
+        grasping: str,
+    ):
+        """Binds a core, whose rules have the task's goal, to rewards and observations."""
+        if core.rules is None or core.rules.goal is None:
+            raise EngineError("an environment needs a core whose rules have a goal")
+        self.task, self.robot, self.grasping = task, robot, grasping
+        self.scene, self.core, self.num_worlds = scene, core, core.engine.num_worlds
+        self._goal, self._map = core.rules.goal, action_map
+        self._reward = Reward(task, robot, scene, core.rules.model)
+        self._observations, self._observer = observations, observations(self._reward)
+        self.action_names, self.observation_spaces = action_map.names, self._observer.spaces
+        self.privileged_names = self._observer.privileged_names
+        self._substeps = round(ACTION_PERIOD / (core.engine.substeps * core.engine.timestep))
+        self._clean = jax.jit(self._clean_fn)
+        self._see, self._see_first = jax.jit(self._after_step), jax.jit(self._after_reset)
+        if core.engine.pure:
+            self._step = jax.jit(self.step_fn, donate_argnums=0)
+            self._reset = jax.jit(self.reset_fn, donate_argnums=0)
+            self._autoreset = jax.jit(self.step_autoreset_fn, donate_argnums=0)
+            self._start = jax.jit(self._start_fn)
+        else:
+            self._step, self._reset, self._start = self.step_fn, self.reset_fn, self._start_fn
+            self._autoreset = self.step_autoreset_fn
+
+    @property
+    def action_space(self) -> Space:
+        """Of one world."""
+        return Space((self._map.size,), np.float32, -1.0, 1.0)
+
+    def with_horizon(self, horizon: int) -> Environment:
+        """The same environment, on the same core, with longer or shorter episodes."""
+        task = dataclasses.replace(self.task, horizon=horizon)
+        return Environment(task, self.robot, self.scene, self.core, self._map, self._observations, self.grasping)
+
+    # Steps.
+
+    def step(self, state: EnvState, action: Array) -> EnvState:
+        """One agent step of every world, the finished ones included.
+
+        Args:
+          action: [W, n], -1..1; clipped. Numbers that are not finite are counted and taken for 0.
+
+        Raises:
+          ActionError: the action has another shape, or is not of numbers.
+        """
+        return self._step(state, self._checked(action))
+
+    def step_fn(self, state: EnvState, action: Float[Array, "W n"]) -> EnvState:
+        """`step`, neither checked nor compiled."""
+        robots, bad = self._clean(action)
+        batch, status = self.core.step_fn(state.batch, robots)
+        for _ in range(self._substeps - 1):
+            batch, status = self.core.step_fn(batch)
+        world = batch.world
+        seen = self._see(
+            world.view, world.states, status, batch.controllers, batch.flags, world.step, state.measures, bad
+        )
+        return self._state(batch, seen, state.bad_actions + bad)
+
+    def step_autoreset(self, state: EnvState, action: Array) -> EnvState:
+        """`step`, and a new episode at once where one is over (Gymnasium's SAME_STEP).
+
+        Observations of worlds that are done are those of their new episodes; what was seen last is `info["final_obs"]`,
+        by name. Reward, `terminated`, `truncated` and the rest of `info` are of the episode that ended. Do not change
+        between this and `step` in a compiled loop: here `info` has one key more.
+        """
+        return self._autoreset(state, self._checked(action))
+
+    def step_autoreset_fn(self, state: EnvState, action: Float[Array, "W n"]) -> EnvState:
+        """`step_autoreset`, neither checked nor compiled."""
+        after = self.step_fn(state, action)
+        done = after.done
+        if self.core.engine.pure:
+            new = jax.lax.cond(done.any(), self.reset_fn, lambda same, mask: same, after, done)
+        else:
+            new = self.reset_fn(after, done) if np.asarray(done).any() else after
+        info = {**after.info, "final_obs": after.obs}
+        return dataclasses.replace(
+            new, reward=after.reward, terminated=after.terminated, truncated=after.truncated, info=info
+        )
+
+    # Episodes.
+
+    def reset(self, seed: Seed | EnvState = 0, mask: Bool[Array, "W"] | None = None) -> EnvState:
+        """All worlds at the start of their first episode; or a new episode in some worlds.
+
+        Args:
+          seed: of everything random, a number or a key of JAX; or a state, of which the masked worlds are reset.
+          mask: with a state: which worlds; None: all. Each new episode begins with a random row of the pool, which
+            belongs to seed, world and episode.
+        """
+        if isinstance(seed, EnvState):
+            return self._reset(seed, np.ones(self.num_worlds, bool) if mask is None else mask)
+        return self._start(as_seed(seed))
+
+    def _start_fn(self, seed: int | Int[Array, ""]) -> EnvState:
+        batch = self.core.start_fn(seed)
+        return self._begun(batch, jnp.ones(self.num_worlds, bool), None)
+
+    def reset_fn(self, state: EnvState, mask: Bool[Array, "W"]) -> EnvState:
+        """`reset` of the masked worlds, not compiled."""
+        mask = jnp.asarray(mask)
+        state = dataclasses.replace(state, info={k: v for k, v in state.info.items() if k != "final_obs"})
+        return self._begun(self.core.reset_fn(state.batch, mask), mask, state)
+
+    def _begun(self, batch: Batch, mask: Bool[Array, "W"], before: EnvState | None) -> EnvState:
+        """After a reset of the masked worlds; the others are as before."""
+        world = batch.world
+        old = None if before is None else _Seen(**{f.name: getattr(before, f.name) for f in dataclasses.fields(_Seen)})
+        seen = self._see_first(world.view, world.states, batch.controllers, world.step, mask, old)
+        count = jnp.zeros(self.num_worlds, jnp.int32) if before is None else before.bad_actions
+        return self._state(batch, seen, count, None if before is None else (before, mask))
+
+    def _state(
+        self, batch: Batch, seen: _Seen, bad: Int[Array, "W"], kept: tuple[EnvState, Bool[Array, "W"]] | None = None
+    ) -> EnvState:
+        """A state with its pictures. `kept`: a state whose unmasked worlds keep theirs."""
+        world = batch.world
+        pictures = self._observer.pictures(world.physics, world.view, world.states)
+        if kept is not None:
+            pictures = {name: _chosen(kept[1], new, kept[0].obs[name]) for name, new in pictures.items()}
+        obs = {name: {**seen.obs, **pictures}[name] for name in self.observation_spaces}
+        return EnvState(
+            batch, obs, seen.reward, seen.terminated, seen.truncated, seen.info, seen.measures, bad.astype(jnp.int32)
+        )
+
+    # What is computed after physics. Pure.
+
+    def _clean_fn(self, action: Float[Array, "W n"]) -> tuple[Float[Array, "W m"], Int[Array, "W"]]:
+        action = jnp.asarray(action, jnp.float32)
+        fine = jnp.isfinite(action)
+        return self._map(jnp.where(fine, action, 0.0)), (~fine).sum(1).astype(jnp.int32)
+
+    def _after_step(
+        self,
+        view: PhysicsView,
+        states: ExtendedStates,
+        status: GoalStatus,
+        controllers: tuple[Any, ...],
+        flags: Int[Array, "W"],
+        control_steps: Int[Array, "W"],
+        before: Measures,
+        bad: Int[Array, "W"],
+    ) -> _Seen:
+        now = self._reward.measure(view, states, status, before)
+        sound = flags == 0
+        terms = {
+            name: jnp.where(sound, jnp.nan_to_num(term), 0.0) for name, term in self._reward.terms(before, now).items()
+        }
+        steps = control_steps // self._substeps
+        terminated = jnp.asarray(status.holds) & sound
+        truncated = ~terminated & (~sound | (steps >= self.task.horizon))
+        return self._seen(
+            view, states, status.fraction, controllers, steps, now, terms, terminated, truncated, flags, bad
+        )
+
+    def _after_reset(
+        self,
+        view: PhysicsView,
+        states: ExtendedStates,
+        controllers: tuple[Any, ...],
+        control_steps: Int[Array, "W"],
+        mask: Bool[Array, "W"],
+        before: _Seen | None,
+    ) -> _Seen:
+        status = self._goal.status(states, view)
+        now = self._reward.measure(view, states, status)
+        zero = jnp.zeros(self.num_worlds, jnp.int32)
+        none, terms = zero.astype(bool), {name: zero.astype(jnp.float32) for name in TERMS}
+        steps = control_steps // self._substeps
+        new = self._seen(view, states, status.fraction, controllers, steps, now, terms, none, none, zero, zero)
+        if before is None:
+            return new
+        old = dataclasses.replace(before, obs={name: before.obs[name] for name in new.obs})
+        return jax.tree.map(lambda a, b: _chosen(mask, a, b), new, old)
+
+    def _seen(
+        self,
+        view: PhysicsView,
+        states: ExtendedStates,
+        progress: Float[Array, "W"],
+        controllers: tuple[Any, ...],
+        steps: Int[Array, "W"],
+        measures: Measures,
+        terms: Mapping[str, Array],
+        terminated: Bool[Array, "W"],
+        truncated: Bool[Array, "W"],
+        flags: Int[Array, "W"],
+        bad: Int[Array, "W"],
+    ) -> _Seen:
+        progress = jnp.asarray(progress, jnp.float32)
+        info = {
+            "success": terminated,
+            "success_in_hand": terminated & self._reward.holding(view).all(1),
+            "goal_progress": progress,
+            "held": measures.held,
+            "steps": steps,
+            "bad_actions": bad,
+            "flags": flags,
+            **{f"reward/{name}": term for name, term in terms.items()},
+        }
+        obs = self._observer.vectors(view, states, controllers[0], measures, progress, steps)
+        total = jnp.stack([terms[name] for name in TERMS]).sum(0)
+        return _Seen(obs, total, terminated, truncated, info, measures)
+
+    # Bad input.
+
+    def _checked(self, action: Array) -> Float[Array, "W n"]:
+        wanted = (self.num_worlds, self._map.size)
+        if np.shape(action) != wanted:
+            raise ActionError(f"an action of {self.task.name} has shape {wanted}, not {np.shape(action)}")
+        if not isinstance(action, jax.Array):
+            action = np.asarray(action)
+        if not (jnp.issubdtype(action.dtype, jnp.floating) or jnp.issubdtype(action.dtype, jnp.integer)):
+            raise ActionError(f"an action is of real numbers, not of {action.dtype}")
+        return action.astype(np.float32)
+
+    def metrics(self, state: EnvState) -> dict[str, int]:
+        """Episodes begun, worlds flagged by `guards.Flag`, and numbers of actions that were not finite. On the host."""
+        return {**self.core.metrics(state.batch), "bad_actions": int(np.asarray(state.bad_actions).sum())}
+
+    def close(self) -> None:
+        """Nothing is left open; may be called twice."""
+
+
+def as_seed(seed: Seed) -> int | Int[Array, ""]:
+    """A seed of 31 bits from a number or a key of JAX."""
+    if isinstance(seed, jax.Array) and (jnp.issubdtype(seed.dtype, jax.dtypes.prng_key) or seed.ndim == 1):
+        return (jax.random.bits(seed, (), jnp.uint32) >> 1).astype(jnp.int32)
+    return int(seed) % 2**31 if isinstance(seed, int | np.integer) else jnp.asarray(seed, jnp.int32)
+
+
+def _chosen(mask: Bool[Array, "W"], new: Array, old: Array) -> Array:
+    return jnp.where(mask.reshape(-1, *[1] * (new.ndim - 1)), new, old)

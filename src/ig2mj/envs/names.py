@@ -1,0 +1,43 @@
+"""Names of all environments, for Gymnasium and for the shell; nothing else is imported for them."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+NAMESPACE, VERSION = "ig2mj", 0
+"""Of the names that Gymnasium knows: ig2mj/CookingMeat-v0."""
+
+NAMES = (
+    "GraspingBook",
+    "SoakingTowel",
+    "CleaningStainedShelf",
+    "CookingMeat",
+    "SlicingFruit",
+    "BimanualPickAndPlace",
+)
+
+_NAME = re.compile(rf"(?:{NAMESPACE}/)?(?P<name>[^/]+?)(?:-v(?P<version>\d+))?")
+
+
+def short_name(name: str) -> str | None:
+    """CookingMeat of CookingMeat, ig2mj/CookingMeat and ig2mj/CookingMeat-v0; None where there is no such one."""
+    match = _NAME.fullmatch(name)
+    if match is None or match["name"] not in NAMES or int(match["version"] or VERSION) != VERSION:
+        return None
+    return match["name"]
+
+
+def register(gymnasium: Any) -> None:
+    """Makes all environments known to Gymnasium (the module); may be called twice. Imports nothing."""
+    face = "ig2mj.envs.gymnasium"
+    for name in NAMES:
+        full = f"{NAMESPACE}/{name}-v{VERSION}"
+        if full not in gymnasium.registry:
+            gymnasium.register(
+                full,
+                entry_point=f"{face}:GymEnv",
+                vector_entry_point=f"{face}:GymVectorEnv",
+                kwargs={"task": name},
+                disable_env_checker=True,  # it would reset and step once more than is needed; a test runs it
+            )

@@ -1,0 +1,153 @@
+"""`api_test`: what every environment promises, checked by random play.
+
+    ig2mj.testing.api_test(ig2mj.make("CookingMeat", worlds=3))
+
+Use it on environments of your own, too. It takes an environment with at least two worlds and some dozens of steps.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.envs.environment import Environment, EnvState
+from ig2mj.errors import ActionError
+
+SOON = 3
+"""Steps of the short episodes in which the end of an episode is looked at."""
+
+
+def api_test(env: Environment, seed: int = 0, steps: int = 4) -> None:
+    """Raises AssertionError, with what is wrong, where an environment breaks a promise.
+
+    - observations, rewards and flags have the stated shapes, types and ranges; info has the same keys in every step;
+    - the same seed and actions give the same worlds;
+    - a reset of some worlds leaves the others bitwise alone;
+    - the horizon truncates and does not terminate; nothing is both;
+    - `final_obs` is what was seen before the reset;
+    - numbers of an action that are not finite are counted and taken for 0; a wrong shape is refused;
+    - nothing is compiled again at the second reset and the second step; closing twice is harmless.
+
+    Args:
+      seed: of resets and actions. steps: of each piece of random play.
+    """
+    assert env.num_worlds >= 2, "api_test needs an environment with at least two worlds"
+    rng = np.random.default_rng(seed)
+    actions = [rng.uniform(-1, 1, (env.num_worlds, *env.action_space.shape)).astype(np.float32) for _ in range(steps)]
+
+    first = _play(env, seed, actions)
+    programs = _programs(env)
+    again = _play(env, seed, actions)
+    assert _programs(env) == programs, "the second reset and the second step compiled something again"
+    for k, (a, b) in enumerate(zip(first, again, strict=True)):
+        _same(a, b, f"step {k} of the same seed")
+        assert set(a["info"]) == set(first[0]["info"]), f"step {k}: info has other keys than after the reset"
+    _spaces_hold(env, first)
+    _partial_reset(env, seed, actions)
+    _ends(env, seed, actions[0])
+    _bad_actions(env, seed)
+    env.close()
+    env.close()
+
+
+def _play(env: Environment, seed: int, actions: list[np.ndarray]) -> list[dict[str, Any]]:
+    """What is seen after the reset and after every step, on the host."""
+    state = env.reset(seed)
+    found = [_host(state)]
+    for action in actions:
+        state = env.step(state, action)
+        found.append(_host(state))
+    return found
+
+
+def _host(state: EnvState) -> dict[str, Any]:
+    seen = {n: getattr(state, n) for n in ("obs", "reward", "terminated", "truncated", "info")}
+    return jax.tree.map(lambda a: np.array(a), seen)
+
+
+def _same(a: Any, b: Any, what: str) -> None:
+    for (path, x), (_, y) in zip(
+        jax.tree_util.tree_leaves_with_path(a), jax.tree_util.tree_leaves_with_path(b), strict=True
+    ):
+        assert np.array_equal(x, y), f"{what}: {jax.tree_util.keystr(path)} differs"
+
+
+def _of(worlds: np.ndarray, seen: Any) -> Any:
+    return jax.tree.map(lambda a: a[worlds], seen)
+
+
+def _programs(env: Environment) -> int:
+    """How many programs the environment's own functions were compiled to."""
+    jitted = [f for f in vars(env).values() if hasattr(f, "_cache_size")]
+    return sum(f._cache_size() for f in jitted)
+
+
+def _spaces_hold(env: Environment, seen: list[dict[str, Any]]) -> None:
+    for k, step in enumerate(seen):
+        assert set(step["obs"]) == set(env.observation_spaces), f"step {k}: other observations than spaces"
+        for name, space in env.observation_spaces.items():
+            array = step["obs"][name]
+            assert array.shape == (env.num_worlds, *space.shape), f"step {k}: {name} has shape {array.shape}"
+            assert array.dtype == space.dtype, f"step {k}: {name} is of {array.dtype}"
+            assert np.isfinite(array).all(), f"step {k}: {name} has numbers that are not finite"
+            assert (array >= space.low).all() and (array <= space.high).all(), f"step {k}: {name} is out of range"
+        for name, kind in (("reward", np.float32), ("terminated", np.bool_), ("truncated", np.bool_)):
+            assert step[name].shape == (env.num_worlds,), f"step {k}: {name} has shape {step[name].shape}"
+            assert step[name].dtype == kind, f"step {k}: {name} is of {step[name].dtype}"
+        assert np.isfinite(step["reward"]).all(), f"step {k}: a reward is not finite"
+        assert not (step["terminated"] & step["truncated"]).any(), f"step {k}: a world is terminated and truncated"
+        terms = [array for name, array in step["info"].items() if name.startswith("reward/")]
+        assert np.allclose(np.sum(terms, axis=0), step["reward"], atol=1e-5), f"step {k}: terms are not the reward"
+
+
+def _partial_reset(env: Environment, seed: int, actions: list[np.ndarray]) -> None:
+    state = env.reset(seed)
+    for action in actions:
+        state = env.step(state, action)
+    before, mask = _host(state), np.arange(env.num_worlds) % 2 == 0
+    state = env.reset(state, mask)
+    after = _host(state)
+    _same(_of(~mask, before), _of(~mask, after), "worlds that were not reset")
+    assert (after["info"]["steps"][mask] == 0).all(), "a world that was reset does not count its steps from 0"
+    assert (after["info"]["steps"][~mask] == len(actions)).all(), "a reset changed the steps of other worlds"
+    for action in actions:
+        state = env.step(state, action)
+    alone = _play(env, seed, actions + actions)[-1]
+    _same(_of(~mask, _host(state)), _of(~mask, alone), "worlds beside others that were reset")
+
+
+def _ends(env: Environment, seed: int, action: Float[np.ndarray, "W n"]) -> None:
+    """Short episodes: the horizon truncates, and `final_obs` is what was seen before."""
+    short = env.with_horizon(SOON)
+    state = short.reset(seed)
+    for _ in range(SOON):
+        state = short.step(state, action)
+    last = _host(state)
+    state = short.reset(seed)
+    for _ in range(SOON):
+        state = short.step_autoreset(state, action)
+    over = last["terminated"] | last["truncated"]
+    assert over.all(), "episodes do not end at the horizon"
+    assert (last["truncated"] == ~last["terminated"]).all(), "the horizon terminates instead of truncating"
+    _same(last["obs"], jax.tree.map(np.array, state.info["final_obs"]), "final_obs")
+    assert (np.asarray(state.batch.world.step) == 0).all(), "autoreset did not start a new episode"
+
+
+def _bad_actions(env: Environment, seed: int) -> None:
+    shape = (env.num_worlds, *env.action_space.shape)
+    nan = np.zeros(shape, np.float32)
+    nan[0, 0] = np.nan
+    state = env.step(env.reset(seed), nan)
+    assert np.asarray(state.info["bad_actions"]).tolist() == [1] + [0] * (env.num_worlds - 1), "NaN is not counted"
+    bad = _host(state)
+    fine = _host(env.step(env.reset(seed), np.zeros(shape, np.float32)))
+    _same(bad["obs"], fine["obs"], "NaN in place of 0")
+    for wrong in (np.zeros(shape[1:], np.float32), np.zeros((shape[0], shape[1] + 1), np.float32)):
+        try:
+            env.step(env.reset(seed), wrong)
+        except ActionError:
+            continue
+        raise AssertionError(f"an action of shape {wrong.shape} was taken")

@@ -1,0 +1,72 @@
+"""Gymnasium's face: its own checker, and the three autoreset modes of vector environments."""
+
+from __future__ import annotations
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+import ig2mj.envs.gymnasium  # noqa: F401  makes the environments known
+from ig2mj.envs.registry import find_task
+from ig2mj.errors import UnknownNameError
+
+ID = "ig2mj/GraspingBook-v0"
+ROWS = 4
+NOTHING = np.zeros((2, 6), np.float32)
+
+
+def short(mode: str) -> gymnasium.vector.VectorEnv:
+    """Two worlds of episodes of three steps."""
+    env = gymnasium.make_vec(
+        ID, num_envs=2, vectorization_mode="vector_entry_point", autoreset_mode=mode, pool_size=ROWS
+    )
+    env.env = env.env.with_horizon(3)
+    return env
+
+
+def time_left(obs):
+    return obs["privileged_state"][:, -1].tolist()
+
+
+def test_gymnasium_s_checker_is_content():
+    env = gymnasium.make(ID, pool_size=ROWS)
+    check_env(env.unwrapped, skip_render_check=True)
+    env.close()
+    env.close()
+
+
+def test_same_step_gives_the_last_observation_beside_the_new_one():
+    env = short("same_step")
+    env.reset(seed=0)
+    for _ in range(3):
+        obs, _, terminated, truncated, info = env.step(NOTHING)
+    assert (terminated | truncated).all()
+    assert info["_final_obs"].all()
+    assert time_left(info["final_obs"]) == [0.0, 0.0]
+    assert time_left(obs) == [1.0, 1.0]
+
+
+def test_next_step_resets_in_the_step_after():
+    env = short("next_step")
+    env.reset(seed=0)
+    for _ in range(3):
+        obs, _, _, truncated, _ = env.step(NOTHING)
+    assert truncated.all() and time_left(obs) == [0.0, 0.0]
+    obs, reward, terminated, truncated, _ = env.step(NOTHING)
+    assert not (terminated | truncated).any() and not reward.any()
+    assert time_left(obs) == [1.0, 1.0]
+
+
+def test_disabled_leaves_resets_to_a_mask():
+    env = short("disabled")
+    env.reset(seed=0)
+    for _ in range(3):
+        env.step(NOTHING)
+    obs, _ = env.reset(options={"reset_mask": np.array([True, False])})
+    assert time_left(obs) == [1.0, 0.0]
+
+
+def test_a_version_that_does_not_exist_is_unknown():
+    with pytest.raises(UnknownNameError):
+        find_task("ig2mj/GraspingBook-v7")
