@@ -50,13 +50,17 @@ def test_every_scaled_object_has_the_box_it_asked_for(house, scene):
             assert not scaled.warnings
 
 
-def test_masses_follow_the_categories(house, scene):
+def test_masses_are_the_urdfs_own_and_else_follow_the_categories(house, scene):
     for instance in scene.instances[:30]:
         model = house.instance_model(scene, instance)
         scaled = scale_model(model, instance_scale(instance, model))
         if instance.kind == "building":
             assert link_inertials(scaled, None)["base_link"].mass == 10000
             continue
+        own = scaled.links["base_link"].inertial
+        assert own is not None
+        assert link_inertials(scaled, house.density(instance.category))["base_link"].mass == own.mass
+        scaled.links["base_link"].inertial = None
         found = link_inertials(scaled, house.density(instance.category))["base_link"]
         assert found.mass == pytest.approx(house.specs[instance.category].density * np.prod(instance.bounding_box))
         assert is_possible(found.inertia)
