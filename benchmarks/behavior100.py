@@ -5,6 +5,8 @@
     python benchmarks/behavior100.py --resume              only the homes that an earlier run did not get to
     python benchmarks/behavior100.py --homes birch         just this home, in place of what is known of it
 
+The starts of BEHAVIOR-100 are sampled by benchmarks/behavior100_starts.py, whose results the page shows, too.
+
 A home is one file, benchmarks/results/behavior100/<suite>/<home>.json, written when the home is done. It is loaded
 once, with all that any of its activities adds: names of additions go on by category, so that every activity finds the
 names it would have alone. Start and goal of each activity are then compiled against it.

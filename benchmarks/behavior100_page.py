@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pathlib
+import statistics
 from typing import Any
 
 TITLES = {"behavior100": "BEHAVIOR-100", "behavior1k": "BEHAVIOR-1K"}
@@ -27,10 +28,59 @@ def write_page(page: pathlib.Path, results: pathlib.Path) -> None:
     ]
     for suite, title in TITLES.items():
         files = sorted((results / suite).glob("*.json"))
-        if files:
-            homes = [json.loads(file.read_text(encoding="utf-8")) for file in files]
-            lines += _suite(title, {home["home"]: home["activities"] for home in homes})
+        if not files:
+            continue
+        homes = [json.loads(file.read_text(encoding="utf-8")) for file in files]
+        lines += _suite(title, {home["home"]: home["activities"] for home in homes})
+        if suite == "behavior100":
+            lines += _starts(results / "starts")
     page.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
+
+
+def _starts(folder: pathlib.Path) -> list[str]:
+    """What came of sampling the starts."""
+    rows = {f.stem: json.loads(f.read_text(encoding="utf-8")) for f in sorted(folder.glob("*.json"))}
+    if not rows:
+        return []
+    tried = {name: len(row["seeds"]) for name, row in rows.items()}
+    done = {name: sum(seed["done"] for seed in row["seeds"]) for name, row in rows.items()}
+    full = [name for name in rows if tried[name] >= 10]
+    good = [name for name in full if done[name] >= 8]
+    never = sum(done[name] == 0 for name in rows)
+    lines = [
+        "### Starts, sampled",
+        "",
+        "`python benchmarks/behavior100_starts.py --seeds 10 --resume`: the start of each activity was sampled in the",
+        "home that fits best, 60 s of wall time a seed (one whose first three seeds fail is not tried with more).",
+        f"{len(rows)} of 100 activities have been run so far: {len(full)} of them with 10 seeds, the others with fewer",
+        f"(the column says how many). **{len(good)} of the {len(full)} succeed with at least 8**; of all",
+        f"{sum(tried.values())} seeds {sum(done.values())} succeeded, {never} activities never did.",
+        "*processor*: seconds of processor time of a seed, the median (wall time on the machine of the benchmark,",
+        "which did other work, was several times that); *first*: of the first seed, in which predicates are compiled.",
+        "*done before*: rows in which the goal holds already.",
+        "",
+        "| activity | home | added | conditions | seeds | processor | first | done before | why others fail |",
+        "|---|---|--:|--:|--:|--:|--:|--:|---|",
+    ]
+    for name, row in rows.items():
+        spent = [seed["processor"] for seed in row["seeds"]] or [float("nan")]
+        why = row.get("failed", "")
+        if not why and done[name] < tried[name]:
+            why = "; ".join(f"{reason} ({n})" for reason, n in list(row["reasons"].items())[:3])
+        already = sum(seed["goal_holds"] for seed in row["seeds"])
+        cells = (
+            name,
+            row["home"],
+            len(row.get("added", ())),
+            row.get("conditions", "-"),
+            f"{done[name]} of {tried[name]}",
+            f"{statistics.median(spent[1:] or spent):.2f}",
+            f"{spent[0]:.1f}",
+            already or "",
+            why,
+        )
+        lines.append("| " + " | ".join(map(str, cells)) + " |")
+    return [*lines, ""]
 
 
 def _suite(title: str, found: dict[str, dict[str, Row]]) -> list[str]:

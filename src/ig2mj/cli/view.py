@@ -27,6 +27,8 @@ def run(
     paused: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     dump: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     video: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    pool: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="POOL.npz")] = None,
+    row: int = 0,
 ) -> None:
     """Open a scene in MuJoCo's viewer, or write a picture of it.
 
@@ -45,6 +47,9 @@ def run(
       dump: replay the last steps of a world that went wrong, from the file that debug mode wrote; with --picture, the
         last of them whose numbers are finite.
       video: write the dump as a video (.mp4 or .gif) instead of opening a window.
+      pool: page through the rows of a pool of this scene, with the objects that were added to it: the right arrow turns
+        the page; with --picture, one row.
+      row: the row to begin with.
     """
     _check(picture or video, camera, eye, target, size, seconds)
     if dump is not None:
@@ -52,6 +57,13 @@ def run(
         return
     if video is not None:
         raise Ig2mjError("--video belongs to --dump")
+    if pool is not None:
+        if seconds > 0:
+            raise Ig2mjError("--pool shows rows as they are: without --seconds")
+        _page_through(scene, pool, row, picture, camera, eye, target, size, collision)
+        return
+    if row:
+        raise Ig2mjError("--row belongs to --pool")
     if picture is not None:
         _write_picture(scene, picture, camera, eye, target, size, seconds, collision)
         return
@@ -138,6 +150,26 @@ def _replay(scene, dump, picture, video, camera, eye, target, size, seconds, col
     image = render(replay.scene.model, replay.data, view, width=size[0], height=size[1], groups=groups)
     Image.fromarray(image).save(picture)
     print(f"wrote {picture} (step {step + 1} of {len(replay)})", file=sys.stderr)
+
+
+def _page_through(scene, pool, row, picture, camera, eye, target, size, collision) -> None:
+    import sys
+
+    from ig2mj.viewer.offscreen import VISIBLE_GROUPS
+    from ig2mj.viewer.pool_pages import PoolPages
+    from ig2mj.worlds.pool import load_pool, load_pool_scene
+
+    loaded = load_pool_scene(pool, scene)
+    rows = load_pool(pool, loaded)
+    if not 0 <= row < rows.size:
+        raise Ig2mjError(f"--row {row}: {pool} has rows 0 to {rows.size - 1}")
+    pages = PoolPages(loaded, rows, at=row)
+    if picture is None:
+        pages.launch()
+        return
+    groups = (3,) if collision else VISIBLE_GROUPS
+    pages.picture(picture, _view(loaded, pages.data, camera, eye, target), size=size, groups=groups)
+    print(f"wrote {picture} (row {row} of {rows.size})", file=sys.stderr)
 
 
 def _write_picture(scene, file, camera, eye, target, size, seconds, collision) -> None:

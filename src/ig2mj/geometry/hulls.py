@@ -19,7 +19,7 @@ def signed_depth(
     size: Float[AnyArray, "*#b 3"],
     planes: Float[AnyArray, "*#b N 4"],
     point: Float[AnyArray, "*#b 3"],
-) -> Float[Array, "*b"]:
+) -> Float[AnyArray, "*b"]:
     """How deep a point lies in a piece, in the piece's frame: positive inside, negative outside.
 
     Inside it is the distance to the surface. Outside it is exact (the negative distance) for round pieces; for
@@ -50,7 +50,7 @@ def point_in_piece(
     planes: Float[AnyArray, "*#b N 4"],
     point: Float[AnyArray, "*#b 3"],
     tolerance: float = 0.0,
-) -> Bool[Array, "*b"]:
+) -> Bool[AnyArray, "*b"]:
     """Whether a point, in the piece's frame, lies in the piece or at most `tolerance` outside. False for NaN.
 
     With a tolerance polyhedra grow by moving their faces outwards.

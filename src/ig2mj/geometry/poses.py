@@ -33,7 +33,7 @@ def normalize(v: Float[AnyArray, "*b d"]) -> Float[Array, "*b d"]:
     return jnp.where(usable, v / jnp.sqrt(jnp.where(usable, square, 1.0)), 0.0)
 
 
-def length(v: Float[AnyArray, "*b d"]) -> Float[Array, "*b"]:
+def length(v: Float[AnyArray, "*b d"]) -> Float[AnyArray, "*b"]:
     """Euclidean length; its gradient at zero is zero rather than NaN."""
     xp = namespace(v)
     square = xp.sum(xp.square(v), axis=-1)
