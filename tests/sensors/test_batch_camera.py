@@ -10,6 +10,7 @@ import jax
 import mujoco
 import numpy as np
 import pytest
+from bench_scene import TOP
 
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.warp.engine import WarpEngine
@@ -220,13 +221,26 @@ def test_cameras_ride_on_their_bodies(shoot, model, engine):
     states = initial_states(model, 2)
     snapshot = jax.tree.map(np.array, engine.snapshot(engine.reset()))
     address = engine.scene.model.joint("hand_z").qposadr[0]
-    snapshot.qpos[1, address] = 0.15
+    qpos = snapshot.qpos
+    qpos[1, address] = 0.15
+    snapshot = snapshot.with_whole(qpos=qpos)
     moved = jax.jit(engine.load)(engine.reset(), jax.tree.map(jnp.asarray, snapshot))
     before, after = shoot(states), shoot(states, moved)
     np.testing.assert_array_equal(before.depth[0], after.depth[0])
     np.testing.assert_array_equal(before.depth[1, 0], after.depth[1, 0])
     middle = (HEIGHT // 2, WIDTH // 3)
     assert after.depth[1, 1][middle] - before.depth[1, 1][middle] == pytest.approx(0.15, abs=2e-3)
+
+
+@pytest.mark.slow
+def test_an_eye_that_its_controller_moves_is_where_it_says(engine, model, physics):
+    """The hand's eye looks down on the table from 0.3 m above it in world 0 and from 0.5 m in world 1."""
+    camera = BatchCamera(engine, model, ["hand/eye"], width=9, height=9, rgb=False, depth=True, particles=0)
+    pos = np.array([[0.45, 0.25, TOP + 0.3], [0.45, 0.25, TOP + 0.5]], np.float32)
+    quat = np.tile(np.array([1, 0, 0, 0], np.float32), (2, 1))
+    eyes = {"hand/eye": (pos, quat)}
+    images = jax.jit(camera)(physics, engine.view(physics), initial_states(model, 2), eyes)
+    assert np.asarray(images.depth)[:, 0, 4, 4] == pytest.approx([0.3, 0.5], abs=2e-3)
 
 
 @pytest.mark.parametrize(

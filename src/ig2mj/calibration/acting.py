@@ -5,6 +5,8 @@ Pure JAX. Axes: W worlds, n numbers of an action.
 
 from __future__ import annotations
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 from flax import struct
@@ -66,4 +68,4 @@ def act_at_random(
         ctrl, state = controller.control(action, view, acting.state)
         return Acting(jnp.asarray(ctrl, acting.ctrl.dtype), action, state)
 
-    return jax.lax.cond(step[0] % ACTION_STEPS == 0, another, lambda: acting.replace(action=action))
+    return jax.lax.cond(step[0] % ACTION_STEPS == 0, another, lambda: dataclasses.replace(acting, action=action))

@@ -1,7 +1,7 @@
 """`ModelFields`: fields of MuJoCo's model that may differ between the worlds of a batch.
 
     engine = make_engine("warp", scene, 1024, model_fields=(*MASSES, "geom_friction"))
-    fields = with_masses(scene.model, mass).replace(geom_friction=friction)
+    fields = dataclasses.replace(with_masses(scene.model, mass), geom_friction=friction)
     physics = engine.write(engine.reset(), Write(model_fields=fields))
 
 An engine is told when it is made which fields these are, since they become part of its physics; worlds then have the

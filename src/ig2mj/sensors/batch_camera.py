@@ -11,7 +11,7 @@ Axes: W worlds, C cameras, Y rows, X columns, G geoms of the scene, S slots.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
@@ -52,7 +52,8 @@ class Images:
 
 
 class BatchCamera:
-    """A pure function from worlds to pictures, for the Warp engine. Cameras ride on their bodies ("fixed" mode)."""
+    """A pure function from worlds to pictures, for the Warp engine. Cameras ride on their bodies ("fixed" mode), at the
+    poses of each world's `ModelFields`, but for those whose poses are given with each call."""
 
     def __init__(
         self,
@@ -92,7 +93,7 @@ class BatchCamera:
         self.engine, self.model = engine, model
         self.width, self.height, self.slots = width, height, particles
         self._wants = (rgb, depth, segmentation)
-        host = make_render_model(engine.scene, particles)
+        self._host = host = make_render_model(engine.scene, particles)
         self.cameras = [_camera_id(host, name) for name in cameras]
         self._plan(host)
         self._model = mjx.put_model(host, impl="warp")
@@ -115,10 +116,24 @@ class BatchCamera:
         self._handle = self._context.pytree()
         self._check_addresses()
 
-    def __call__(self, physics: MjxPhysics, view: PhysicsView, states: ExtendedStates) -> Images:
-        """Pictures of the present state of every world. Pure: to be jitted, alone or with a step."""
+    def __call__(
+        self,
+        physics: MjxPhysics,
+        view: PhysicsView,
+        states: ExtendedStates,
+        eyes: Mapping[str, tuple[Float[Array, "W 3"], Float[Array, "W 4"]]] | None = None,
+    ) -> Images:
+        """Pictures of the present state of every world. Pure: to be jitted, alone or with a step.
+
+        Args:
+          eyes: poses in the world (m, w-x-y-z) of cameras that do not ride on their bodies, by name: what
+            `Controller.eye` of an agent gives that moves its eye without joints.
+
+        Raises:
+          UnknownNameError: there is no such camera.
+        """
         slots = fill_slots(self.model, states, view, self.slots)
-        moved = self._moved(physics, slots)
+        moved = self._moved(physics, slots, eyes or {})
         look = self._look(states, slots)
 
         def cast(data: Any, look: dict[str, Array]) -> tuple[Array, Array, Array]:
@@ -154,11 +169,17 @@ class BatchCamera:
         self._camera_in_body = (host.cam_bodyid, _f32(host.cam_pos), _f32(host.cam_quat))
         self._light_in_body = (host.light_bodyid, _f32(host.light_pos), _f32(host.light_dir))
 
-    def _moved(self, physics: MjxPhysics, slots: Slots) -> Any:
+    def _moved(self, physics: MjxPhysics, slots: Slots, eyes: Mapping[str, tuple[Array, Array]]) -> Any:
         """Render data [W] with everything where physics has it."""
         data, worlds = physics.data, self.engine.num_worlds
         body, pos, quat = self._camera_in_body
-        camera_pos, camera_quat = compose(data.xpos[:, body], data.xquat[:, body], jnp.asarray(pos), jnp.asarray(quat))
+        own = physics.fields
+        pos = jnp.asarray(pos if own.cam_pos is None else own.cam_pos)
+        quat = jnp.asarray(quat if own.cam_quat is None else own.cam_quat)
+        camera_pos, camera_quat = compose(data.xpos[:, body], data.xquat[:, body], pos, quat)
+        for name, (eye_pos, eye_quat) in eyes.items():
+            camera = _camera_id(self._host, name)
+            camera_pos, camera_quat = camera_pos.at[:, camera].set(eye_pos), camera_quat.at[:, camera].set(eye_quat)
         body, pos, direction = self._light_in_body
         light_quat = data.xquat[:, body]
         light_pos = data.xpos[:, body] + quat_rotate(light_quat, jnp.asarray(pos))
