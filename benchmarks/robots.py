@@ -63,6 +63,8 @@ def run(home: str, num_worlds: int, args: argparse.Namespace) -> dict:
     rules = Rules.of_scene(scene)
     rules = rules.with_goal(ten_literals(rules.model))
     options = {"profile": EngineProfile(*args.profile)} if args.profile else {}
+    if engine_name == "warp":
+        options["graph_mode"] = args.graph_mode
     engine = make_engine(engine_name, scene, num_worlds, **options)
     core = Core(
         engine,
@@ -113,9 +115,11 @@ def run(home: str, num_worlds: int, args: argparse.Namespace) -> dict:
     carry = (core.start(0), jnp.zeros((num_worlds, len(low))), jax.random.key(1))
     carry, seen = jax.block_until_ready(call(carry))
     ready = time.time() - start
-    began, calls = time.time(), 0
+    began, calls, times = time.time(), 0, []
     while calls < 2 or time.time() - began < 60 * minutes:
+        call_began = time.time()
         carry, seen = jax.block_until_ready(call(carry))
+        times.append(time.time() - call_began)
         calls += 1
     seconds = time.time() - began
     batch = carry[0]
@@ -139,6 +143,8 @@ def run(home: str, num_worlds: int, args: argparse.Namespace) -> dict:
         "non_finite": int((~np.asarray(health.finite)).sum()),
         "troubles": core.metrics(batch),
         "what": args.what,
+        "graph_mode": args.graph_mode,
+        "seconds_of_calls": [round(t, 2) for t in times],
         "actions": actions,
         "hold": hold,
         "mean_goal": float(np.asarray(seen).mean()),
@@ -179,6 +185,7 @@ def main() -> None:
     parser.add_argument("--hold", type=int, default=5, help="mean number of agent steps that an action is held")
     parser.add_argument("--actions", type=float, default=1.0, help="share of the action range that is drawn from")
     parser.add_argument("--what", choices=["full", "physics"], default="full", help="physics: without states and goal")
+    parser.add_argument("--graph-mode", default="WARP", help="of the Warp engine")
     parser.add_argument("--parts", action="store_true", help="also time the parts of a control step, each by itself")
     parser.add_argument(
         "--profile", type=int, nargs=4, help="buffers: awake dofs, constraints, contacts, convex contacts of a world"

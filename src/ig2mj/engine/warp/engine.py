@@ -53,6 +53,7 @@ class WarpEngine(MjxEngine):
         iterations: int | None = None,
         ls_iterations: int | None = None,
         print_overflow: bool = False,
+        graph_mode: str = "WARP",
         **options: Any,
     ):
         """Makes an engine.
@@ -63,6 +64,8 @@ class WarpEngine(MjxEngine):
           profile: buffer sizes; None: the file beside the manifest for the scene's agents, else safe sizes.
           iterations, ls_iterations: limits of the solver and of its line search; None: the scene's. Lower limits buy
             little: of 16,384 disturbed worlds nearly all converge at once, and 5 against 100 saved 9 % of a step.
+          graph_mode: how CUDA graphs of a step are kept, a name of `warp.JaxCallableGraphMode`: "WARP" captures a step
+            anew wherever its buffers have other addresses, "WARP_STAGED" copies them to addresses that stay.
           print_overflow: let Warp print a line per overflowing world and step. The flags are kept in any case.
         """
         prepare_warp()
@@ -71,6 +74,7 @@ class WarpEngine(MjxEngine):
         sizes = fit(profile, scene.model) if profile else profile_of_scene(scene)
         self.profile = sizes.for_worlds(max(num_worlds, 1))  # a wrong number is told by `MjxEngine`
         self._print_overflow = print_overflow
+        self._graph_mode = wp.JaxCallableGraphMode[graph_mode]
         self._iterations = iterations or int(scene.model.opt.iterations)
         self._ls_iterations = ls_iterations or int(scene.model.opt.ls_iterations)
         self._worlds_of_buffers = num_worlds
@@ -112,7 +116,7 @@ class WarpEngine(MjxEngine):
         return ignored
 
     def _put_model(self, model: mujoco.MjModel) -> mjx.Model:
-        put = mjx.put_model(model, impl="warp")
+        put = mjx.put_model(model, impl="warp", graph_mode=self._graph_mode)
         if len(self.tables.hand_body) and self._filters:
             code = encode(geom_hands(model, self.tables), self.tables.geom_object, self.tables.num_objects)
             put = put.tree_replace({"_impl.geom_adhesion": jnp.asarray(code)})
