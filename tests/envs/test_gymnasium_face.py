@@ -6,6 +6,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import AutoresetMode
 
 import ig2mj.envs.gymnasium  # noqa: F401  makes the environments known
 from ig2mj.envs.registry import find_task
@@ -16,19 +17,29 @@ ROWS = 4
 NOTHING = np.zeros((2, 6), np.float32)
 
 
-def short(mode: str) -> gymnasium.vector.VectorEnv:
-    """Two worlds of episodes of three steps."""
-    env = gymnasium.make_vec(
-        ID, num_envs=2, vectorization_mode="vector_entry_point", autoreset_mode=mode, pool_size=ROWS
-    )
+@pytest.fixture(scope="module")
+def made():
+    env = gymnasium.make_vec(ID, num_envs=2, vectorization_mode="vector_entry_point", pool_size=ROWS)
     env.env = env.env.with_horizon(3)
     return env
+
+
+@pytest.fixture
+def short(made):
+    """Two worlds of episodes of three steps, in an autoreset mode; compiled once for all of them."""
+
+    def of(mode: AutoresetMode) -> gymnasium.vector.VectorEnv:
+        made.autoreset_mode = mode
+        return made
+
+    return of
 
 
 def time_left(obs):
     return obs["privileged_state"][:, -1].tolist()
 
 
+@pytest.mark.filterwarnings("ignore:.*Box observation space:UserWarning")  # vectors have no bounds
 def test_gymnasium_s_checker_is_content():
     env = gymnasium.make(ID, pool_size=ROWS)
     check_env(env.unwrapped, skip_render_check=True)
@@ -36,8 +47,8 @@ def test_gymnasium_s_checker_is_content():
     env.close()
 
 
-def test_same_step_gives_the_last_observation_beside_the_new_one():
-    env = short("same_step")
+def test_same_step_gives_the_last_observation_beside_the_new_one(short):
+    env = short(AutoresetMode.SAME_STEP)
     env.reset(seed=0)
     for _ in range(3):
         obs, _, terminated, truncated, info = env.step(NOTHING)
@@ -47,8 +58,8 @@ def test_same_step_gives_the_last_observation_beside_the_new_one():
     assert time_left(obs) == [1.0, 1.0]
 
 
-def test_next_step_resets_in_the_step_after():
-    env = short("next_step")
+def test_next_step_resets_in_the_step_after(short):
+    env = short(AutoresetMode.NEXT_STEP)
     env.reset(seed=0)
     for _ in range(3):
         obs, _, _, truncated, _ = env.step(NOTHING)
@@ -58,8 +69,8 @@ def test_next_step_resets_in_the_step_after():
     assert time_left(obs) == [1.0, 1.0]
 
 
-def test_disabled_leaves_resets_to_a_mask():
-    env = short("disabled")
+def test_disabled_leaves_resets_to_a_mask(short):
+    env = short(AutoresetMode.DISABLED)
     env.reset(seed=0)
     for _ in range(3):
         env.step(NOTHING)

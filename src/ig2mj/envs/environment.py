@@ -101,7 +101,7 @@ class Environment:
         scene: Scene,
         core: Core,
         action_map: ActionMap,
-        observations: Callable[[Reward], Observer],
+        observations: Callable[[Task, Reward], Observer],
         grasping: str,
     ):
         """Binds a core, whose rules have the task's goal, to rewards and observations."""
@@ -111,7 +111,7 @@ class Environment:
         self.scene, self.core, self.num_worlds = scene, core, core.engine.num_worlds
         self._goal, self._map = core.rules.goal, action_map
         self._reward = Reward(task, robot, scene, core.rules.model)
-        self._observations, self._observer = observations, observations(self._reward)
+        self._observations, self._observer = observations, observations(task, self._reward)
         self.action_names, self.observation_spaces = action_map.names, self._observer.spaces
         self.privileged_names = self._observer.privileged_names
         self._substeps = round(ACTION_PERIOD / (core.engine.substeps * core.engine.timestep))

@@ -24,6 +24,7 @@ from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.tasks.actions import hand_actions
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.pools import pool_of
+from ig2mj.tasks.reward import Reward
 from ig2mj.tasks.task import ROBOTS, Task, make_robot
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.pool import Pool
@@ -103,7 +104,7 @@ def make(
     core = Core(physics, rules, rows, [controller], hands)
     closing = grasping != "mitten"
 
-    def observer(reward: Any) -> Observer:
+    def observer(task: Task, reward: Reward) -> Observer:
         return Observer(observations, task, robot, scene, rules.model, controller, reward, physics, image_size)
 
     actions = hand_actions(controller.action_names, task.acts(robot).hands, closing)
