@@ -42,7 +42,7 @@ class PoolPages:
     def show(self, row: int) -> None:
         """Turns to a row; beyond the last one, the first comes again."""
         self.at = row % len(self)
-        one = jax.tree.map(lambda a: np.asarray(a)[self.at], self.pool.physics)
+        one = jax.tree.map(lambda a: np.asarray(a[self.at]), self.pool.physics)
         self._physics = self._engine.load(self._physics, one)
 
     def step(self) -> None:

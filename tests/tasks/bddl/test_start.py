@@ -53,7 +53,7 @@ def test_every_condition_holds_in_every_row_and_the_goal_in_none(sampled):
 def _physics(pool, row: int):
     import jax
 
-    return jax.tree.map(lambda a: np.asarray(a)[row], pool.physics)
+    return jax.tree.map(lambda a: np.asarray(a[row]), pool.physics)
 
 
 def test_the_scene_of_a_pool_is_built_again_with_its_additions(sampled, tmp_path, monkeypatch):

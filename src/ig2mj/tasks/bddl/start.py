@@ -157,7 +157,7 @@ def row_status(binding: Binding, scene: Scene, pool: Pool, row: int) -> RowStatu
 def load_row(query: SceneQuery, pool: Pool, row: int) -> ExtendedStates:
     """Puts the world into a row of a pool; its extended states."""
     one = pool.rows(np.array([row]))
-    query.load(jax.tree.map(lambda a: a[0], one.physics))
+    query.load(jax.tree.map(lambda a: np.asarray(a[0]), one.physics))
     return one.states
 
 
