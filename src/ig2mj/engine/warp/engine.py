@@ -15,6 +15,7 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+import warp as wp
 from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 
