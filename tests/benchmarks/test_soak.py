@@ -32,10 +32,11 @@ def thrown(watch, world: int, velocity=(0.0, 0.0, 0.0), pos=None):
     engine, scene = watch.engine, watch.engine.scene
     rows = jax.tree.map(np.array, engine.snapshot(engine.reset()))
     number = scene.object_index("box")
-    rows.qvel[world, engine.layout.object_dofadr[number] :][:3] = velocity
+    qpos, qvel, asleep = np.array(rows.qpos), np.array(rows.qvel), np.array(rows.tree_asleep)
+    qvel[world, engine.layout.object_dofadr[number] :][:3] = velocity
     if pos is not None:
-        rows.qpos[world, engine.layout.object_qposadr[number] :][:3] = pos
-    rows.tree_asleep[:] = FULLY_AWAKE
+        qpos[world, engine.layout.object_qposadr[number] :][:3] = pos
+    rows = rows.with_whole(qpos=qpos, qvel=qvel, tree_asleep=np.full_like(asleep, FULLY_AWAKE))
     return engine.load(engine.reset(), rows), rows
 
 

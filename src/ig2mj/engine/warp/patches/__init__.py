@@ -57,8 +57,9 @@ def fit() -> bool:
         _fill()
         return True
     if warn:
-        more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
-        warnings.warn(f"MuJoCo Warp's own, slower kernels run: {wrong[0]}{more}", stacklevel=3)
+        first, *others = wrong
+        more = f" (and {len(others)} more)" if others else ""
+        warnings.warn(f"MuJoCo Warp's own, slower kernels run: {first}{more}", stacklevel=3)
     return False
 
 
