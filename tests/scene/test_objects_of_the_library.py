@@ -1,4 +1,4 @@
-"""Objects of the library that are added to a home when it is loaded (issue 11, part 5)."""
+"""Objects of the library that are added to a home when it is loaded."""
 
 import mujoco
 import numpy as np

@@ -1,4 +1,4 @@
-"""Activities bound to homes, and compiled to goals (issue 11, parts 6 and 7)."""
+"""Activities bound to homes, and compiled to goals."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""BDDL definitions: what they mean, and errors that name line and word (issue 11, part 6)."""
+"""BDDL definitions: what they mean, and errors that name line and word."""
 
 import sys
 

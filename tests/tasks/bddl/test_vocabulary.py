@@ -1,4 +1,4 @@
-"""Definitions in both vocabularies of BDDL, lowered to our predicates (issue 11, part 6)."""
+"""Definitions in both vocabularies of BDDL, lowered to our predicates."""
 
 import pytest
 
