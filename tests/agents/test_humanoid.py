@@ -8,6 +8,7 @@ import pytest
 from robot_world import RobotWorld
 from scipy.spatial.transform import Rotation
 
+import ig2mj
 from ig2mj.agents.base import Controller, Robot
 from ig2mj.agents.humanoid import Humanoid, HumanoidController
 from ig2mj.agents.humanoid.frames import FINGER_CLOSED, HAND_POS, THUMB_CLOSED
@@ -191,3 +192,10 @@ def test_two_humanoids_stand_in_one_home(tiny_home_folder):
 def test_an_unknown_preset_is_named():
     with pytest.raises(UnknownNameError, match="paper"):
         Humanoid(compat="papers")
+
+
+def test_without_any_control_the_humanoid_stays_at_its_start():
+    """Keyframes of a scene without actuators know no controls; the robot's start is what its servos are told first."""
+    simulation = ig2mj.Simulation(ig2mj.load_scene("small_home", agents=[Humanoid(pos=(1.65, 0.95, 1.0))]))
+    view = simulation.step(count=15)
+    assert np.asarray(view.agent.base_pos)[0, 0] == pytest.approx([1.65, 0.95, 1.0], abs=0.02)

@@ -159,11 +159,16 @@ def add_pulled_joints(
 
 
 def extend_keyframes(spec: mujoco.MjSpec, qpos: Vector, dofs: int, controls: Vector) -> None:
-    """Keyframes of a scene know nothing of what was attached: its joints and actuators come last in them."""
+    """Keyframes of a scene know nothing of what was attached: its joints and actuators come last in them.
+
+    To be called when the robot's actuators have been added.
+    """
     for key in spec.keys:
         for field, values in (("qpos", qpos), ("qvel", [0.0] * dofs), ("ctrl", controls)):
             present = list(getattr(key, field))
-            if present:
+            if field == "ctrl" and not present:  # a scene without actuators has none in its keyframes
+                present = [0.0] * (len(spec.actuators) - len(values))
+            if present or field == "ctrl":
                 setattr(key, field, [*present, *values])
 
 

@@ -55,7 +55,8 @@ def point_in_piece(
 
     With a tolerance polyhedra grow by moving their faces outwards.
     """
-    return signed_depth(kind, size, planes, point) >= -tolerance
+    inside = signed_depth(kind, size, planes, point) >= -tolerance
+    return np.asarray(inside) if isinstance(inside, np.bool_) else inside  # NumPy's scalars are no arrays
 
 
 def support_point(
