@@ -66,14 +66,17 @@ def test_columns_of_turned_primitives_agree_with_rays(home, kind, quat, place):
     xs, ys = found.window.centres()
     for row in range(0, found.window.rows, 5):
         for col in range(0, found.window.cols, 5):
-            point = np.array([xs[col], ys[row], 5.0])
-            distance = mujoco.mju_rayGeom(
-                np.array(place), rotation, model.geom_size[0], point, np.array([0, 0, -1.0]), model.geom_type[0], None
-            )
-            if distance < 0:
+            down, around = np.array([0.0, 0.0, -1.0]), []
+            for dx, dy in ((0, 0), (1e-5, 1e-5), (-1e-5, 1e-5), (1e-5, -1e-5), (-1e-5, -1e-5)):
+                point = np.array([xs[col] + dx, ys[row] + dy, 5.0])
+                pose = np.array(place), rotation
+                around.append(mujoco.mju_rayGeom(*pose, model.geom_size[0], point, down, model.geom_type[0], None))
+            if np.ptp(around) > 1e-3:
+                continue  # a ray that grazes: rounding decides
+            if around[0] < 0:
                 assert np.isnan(found.high[row, col])
             else:
-                assert found.high[row, col] == pytest.approx(5.0 - distance, abs=1e-6)
+                assert found.high[row, col] == pytest.approx(5.0 - around[0], abs=1e-4)
 
 
 def one_geom(tables: SceneTables, kind: str, size: str) -> tuple[SceneTables, mujoco.MjModel]:
