@@ -21,7 +21,6 @@ from jaxtyping import Array, Bool, Float, Int
 from ig2mj.geometry.hulls import core_radius, core_support
 from ig2mj.geometry.poses import (
     AnyArray,
-    compose,
     length,
     normalize,
     quat_normalize,
@@ -29,7 +28,7 @@ from ig2mj.geometry.poses import (
     quat_rotate_inverse,
     relative_pose,
 )
-from ig2mj.scene.tables import PieceKind, SceneTables
+from ig2mj.scene.tables import PieceKind
 
 MAX_STEPS = 40
 """Polyhedra need about ten steps, cylinders up to thirty."""
@@ -73,29 +72,6 @@ class Nearest:
     point_a: Float[Array, "*b 3"]
     point_b: Float[Array, "*b 3"]
     overlap: Bool[Array, "*b"]
-
-
-def pose_pieces(
-    tables: SceneTables,
-    body_pos: Float[AnyArray, "W B 3"],
-    body_quat: Float[AnyArray, "W B 4"],
-    pieces: Int[np.ndarray, "M"],
-) -> PosedPieces:
-    """The scene's pieces with the given indices, posed in every world: [W, M]."""
-    body = tables.piece_body[pieces]
-    pos, quat = compose(
-        jnp.asarray(body_pos)[:, body],
-        jnp.asarray(body_quat)[:, body],
-        np.asarray(tables.piece_pos[pieces], np.float32),
-        np.asarray(tables.piece_quat[pieces], np.float32),
-    )
-    return PosedPieces(
-        kind=tables.piece_kind[pieces],
-        size=np.asarray(tables.piece_size[pieces], np.float32),
-        vertices=np.asarray(tables.piece_vertices[pieces], np.float32),
-        pos=pos,
-        quat=quat,
-    )
 
 
 def piece_distance(a: PosedPieces, b: PosedPieces) -> Nearest:

@@ -16,6 +16,7 @@ from collections.abc import Collection
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.scene.tables import PieceKind, SceneTables
 
 CELL = 0.01
@@ -174,7 +175,7 @@ class ColumnMap:
         self._low = np.zeros((len(tables.piece_geom), 3))
         self._high = np.zeros((len(tables.piece_geom), 3))
         self._columns: dict[int, PieceColumns] = {}
-        self._local = _rotations(tables.piece_quat)
+        self._local = matrices_on_host(tables.piece_quat)
 
     def update(self, body_pos: Float[np.ndarray, "B 3"], body_rotation: Float[np.ndarray, "B 3 3"]) -> None:
         """Takes over where the bodies are; forgets the columns of pieces that moved."""
@@ -235,14 +236,3 @@ class ColumnMap:
         if without:
             near &= ~np.isin(self.tables.piece_object, list(without))
         return np.flatnonzero(near).tolist()
-
-
-def _rotations(quat: Float[np.ndarray, "K 4"]) -> Float[np.ndarray, "K 3 3"]:
-    """Rotation matrices of unit quaternions, w-x-y-z."""
-    w, x, y, z = np.moveaxis(np.asarray(quat, float), -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.moveaxis(np.array(rows), -1, 0)

@@ -153,7 +153,6 @@ class Placer:
     def __init__(self, query: SceneQuery):
         """Binds a world."""
         self.query = query
-        self.tables = query.scene.tables
         self._orientations = [_orientations(entry.orientations) for entry in query.scene.manifest.objects]
 
     def place(

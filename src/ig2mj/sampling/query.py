@@ -6,12 +6,11 @@ rest (`settle`)? Samplers ask; nothing above this package touches MuJoCo's data 
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Collection
 
 import mujoco
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 from ig2mj.engine.base import Write
 from ig2mj.engine.native.engine import NativeEngine, NativePhysics
@@ -24,20 +23,6 @@ from ig2mj.scene.scene import Scene
 
 SETTLE_SECONDS = 3.0
 """Simulated seconds within which what was placed must come to rest."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Ray:
-    """Where a ray first meets collision geometry.
-
-    Attributes:
-      distance: metres, inf where it meets nothing. object: its number, -1 for none. normal: of the surface, in
-        the world frame.
-    """
-
-    distance: float
-    object: int
-    normal: Float[np.ndarray, "3"]
 
 
 class SceneQuery:
@@ -146,10 +131,6 @@ class SceneQuery:
                     best, vector = float(distance), between[3:] - between[:3]
         return best, vector
 
-    def touched_by(self, object_index: int) -> Bool[np.ndarray, "O"]:
-        """Objects that an object touches now."""
-        return np.asarray(self.view.touching)[0, object_index]
-
     def settle(self, seconds: float = SETTLE_SECONDS) -> bool:
         """Steps until everything sleeps, or for some simulated time; whether everything sleeps."""
         view = self.view
@@ -158,16 +139,6 @@ class SceneQuery:
             if not np.asarray(view.awake).any():
                 return True
         return not np.asarray(view.awake).any()
-
-    def ray(self, start: Float[np.ndarray, "3"], direction: Float[np.ndarray, "3"]) -> Ray:
-        """The first collision geometry that a ray meets."""
-        model, data = self.engine.to_mujoco(self.physics, 0)
-        geom, normal = np.array([-1], np.int32), np.zeros(3)
-        groups = np.array([0, 0, 0, 1, 0, 0], np.uint8)
-        distance = mujoco.mj_ray(model, data, start, direction, groups, 1, -1, geom, normal)
-        if geom[0] < 0:
-            return Ray(float("inf"), -1, normal)
-        return Ray(float(distance), int(self._geom_object[geom[0]]), normal)
 
 
 def _object_masses(scene: Scene) -> list[tuple[np.ndarray, np.ndarray]]:
