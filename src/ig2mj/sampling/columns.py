@@ -94,6 +94,8 @@ def piece_columns(
         else:
             low, high = _cylinder(rotation[:, 2], size[0], size[1], x, y)
             if kind == PieceKind.CAPSULE:
+                between = low < high  # the line passes between the two ends
+                low, high = np.where(between, low, np.nan), np.where(between, high, np.nan)
                 for end in (-1, 1):
                     ball = _sphere(end * size[1] * rotation[:, 2], size[0], x, y)
                     low, high = np.fmin(low, ball[0]), np.fmax(high, ball[1])
