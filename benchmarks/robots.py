@@ -79,9 +79,12 @@ def run(home: str, num_worlds: int, args: argparse.Namespace) -> dict:
         key, draw, change = jax.random.split(key, 3)
         new = jax.random.uniform(draw, action.shape, minval=low * actions, maxval=high * actions)
         action = jnp.where(jax.random.bernoulli(change, 1 / hold, (num_worlds, 1)), new, action)
-        batch, _ = core.step_fn(batch, action)
-        for _ in range(CONTROL_STEPS - 1):
-            batch, status = core.step_fn(batch, None)
+        if args.written_out:
+            batch, _ = core.step_fn(batch, action)
+            for _ in range(CONTROL_STEPS - 1):
+                batch, status = core.step_fn(batch, None)
+        else:
+            batch, status = core.hold_fn(batch, action, CONTROL_STEPS)
         return (batch, action, key), status.fraction.mean()
 
     def physics_step(carry, _):
@@ -122,6 +125,9 @@ def run(home: str, num_worlds: int, args: argparse.Namespace) -> dict:
         times.append(time.time() - call_began)
         calls += 1
     seconds = time.time() - began
+    if args.trace:
+        with jax.profiler.trace(str(args.trace)):
+            carry, seen = jax.block_until_ready(call(carry))
     batch = carry[0]
     health = engine.health(batch.world.physics)
     steps = num_worlds * calls * CALL
@@ -185,7 +191,9 @@ def main() -> None:
     parser.add_argument("--hold", type=int, default=5, help="mean number of agent steps that an action is held")
     parser.add_argument("--actions", type=float, default=1.0, help="share of the action range that is drawn from")
     parser.add_argument("--what", choices=["full", "physics"], default="full", help="physics: without states and goal")
-    parser.add_argument("--graph-mode", default="WARP", help="of the Warp engine")
+    parser.add_argument("--graph-mode", help="of the Warp engine")
+    parser.add_argument("--written-out", action="store_true", help="control steps one after the other, not as a loop")
+    parser.add_argument("--trace", type=pathlib.Path, help="one more call under JAX's profiler, kept in this folder")
     parser.add_argument("--parts", action="store_true", help="also time the parts of a control step, each by itself")
     parser.add_argument(
         "--profile", type=int, nargs=4, help="buffers: awake dofs, constraints, contacts, convex contacts of a world"

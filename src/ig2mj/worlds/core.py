@@ -120,18 +120,37 @@ class Core:
 
     def step_fn(self, batch: Batch, action: Float[Array, "W n"] | None = None) -> tuple[Batch, GoalStatus]:
         """`step`, not compiled."""
-        world, controllers = batch.world, batch.controllers
         if self.controllers and action is not None:
-            action, controllers = self._control(action, world.view, controllers)
-        physics, view, states, status = self.advance_fn(world.physics, world.states, action)
+            action, controllers = self._control(action, batch.world.view, batch.controllers)
+            batch = dataclasses.replace(batch, controllers=controllers)
+        return self._control_step(batch, action)
+
+    def hold_fn(self, batch: Batch, action: Float[Array, "W n"], steps: int) -> tuple[Batch, GoalStatus]:
+        """`steps` control steps of one action, not compiled: controllers act once, what they ask for stays.
+
+        On a pure engine this is a loop of the program, which calls a physics step in 4 places; written out, a program
+        calls it in 4 times `steps`, and MJX keeps a CUDA graph of each.
+        """
+        if self.controllers:
+            action, controllers = self._control(action, batch.world.view, batch.controllers)
+            batch = dataclasses.replace(batch, controllers=controllers)
+        if not self.engine.pure:
+            for _ in range(steps):
+                batch, status = self._control_step(batch, action)
+            return batch, status
+
+        batch, each = jax.lax.scan(lambda batch, _: self._control_step(batch, action), batch, None, steps)
+        return batch, jax.tree.map(lambda a: a[-1], each)
+
+    def _control_step(self, batch: Batch, ctrl: Float[Array, "W nu"] | None) -> tuple[Batch, GoalStatus]:
+        """One control step of MuJoCo's controls."""
+        world, controllers = batch.world, batch.controllers
+        physics, view, states, status = self.advance_fn(world.physics, world.states, ctrl)
         physics, view, grasps = self._grasp(physics, view, batch.grasps, controllers)
         clocks = (world.step, world.time, batch.flags, batch.troubles)
         step, time, flags, troubles = self._count(*clocks, self.engine.health(physics), view.object_com)
         world = WorldState(physics=physics, view=view, states=states, key=world.key, step=step, time=time)
-        batch = dataclasses.replace(
-            batch, world=world, controllers=controllers, grasps=grasps, flags=flags, troubles=troubles
-        )
-        return batch, status
+        return dataclasses.replace(batch, world=world, grasps=grasps, flags=flags, troubles=troubles), status
 
     def advance_fn(
         self, physics: Physics, states: States, ctrl: Float[Array, "W nu"] | None = None

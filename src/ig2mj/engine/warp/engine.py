@@ -54,7 +54,7 @@ class WarpEngine(MjxEngine):
         iterations: int | None = None,
         ls_iterations: int | None = None,
         print_overflow: bool = False,
-        graph_mode: str = "WARP",
+        graph_mode: str | None = None,
         **options: Any,
     ):
         """Makes an engine.
@@ -66,7 +66,8 @@ class WarpEngine(MjxEngine):
           iterations, ls_iterations: limits of the solver and of its line search; None: the scene's. Lower limits buy
             little: of 16,384 disturbed worlds nearly all converge at once, and 5 against 100 saved 9 % of a step.
           graph_mode: how CUDA graphs of a step are kept, a name of `warp.JaxCallableGraphMode`: "WARP" captures a step
-            anew wherever its buffers have other addresses, "WARP_STAGED" copies them to addresses that stay.
+            anew wherever its buffers have other addresses, "WARP_STAGED" copies them to addresses that stay. None:
+            MJX's choice, which is "WARP" on a GPU.
           print_overflow: let Warp print a line per overflowing world and step. The flags are kept in any case.
         """
         prepare_warp()
@@ -75,7 +76,7 @@ class WarpEngine(MjxEngine):
         sizes = fit(profile, scene.model) if profile else profile_of_scene(scene)
         self.profile = sizes.for_worlds(max(num_worlds, 1))  # a wrong number is told by `MjxEngine`
         self._print_overflow = print_overflow
-        self._graph_mode = wp.JaxCallableGraphMode[graph_mode]
+        self._graph_mode = wp.JaxCallableGraphMode[graph_mode] if graph_mode else None
         self._iterations = iterations or int(scene.model.opt.iterations)
         self._ls_iterations = ls_iterations or int(scene.model.opt.ls_iterations)
         self._worlds_of_buffers = num_worlds
