@@ -9,8 +9,8 @@ An agent step is 1/10 s: three control steps of the core, the action held in all
 compiled, and so is this: on a pure engine `step_fn` and `reset_fn` may be part of a program of your own. A state that
 was given to a method is used up; go on with the one that it returns.
 
-Success ends an episode (`terminated`). The horizon truncates it, and so do guards: what a world says whose numbers were
-lost is not to be believed (`ig2mj.worlds.guards`).
+Success ends an episode, and so does what a task calls failure (`terminated`). The horizon truncates it, and so do
+guards: what a world says whose numbers were lost is not to be believed (`ig2mj.worlds.guards`).
 
 Axes: W worlds, n numbers of an action.
 """
@@ -18,14 +18,14 @@ Axes: W worlds, n numbers of an action.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import struct
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, UInt
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.engine.view import Array, PhysicsView
@@ -35,8 +35,8 @@ from ig2mj.predicates.compile import GoalStatus
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.actions import ActionMap
-from ig2mj.tasks.reward import TERMS, Measures, Reward
-from ig2mj.tasks.task import Task
+from ig2mj.tasks.objective import Measures, Objective
+from ig2mj.tasks.task import TaskLike
 from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.core import Core
 
@@ -50,10 +50,11 @@ class EnvState:
 
     Attributes:
       batch: of the core. obs: observations by name. reward: of the last step.
-      terminated: success ended the episode. truncated: the horizon or a guard did; never both.
-      info: "success"; "success_in_hand" (success while the first object is in all acting hands); "goal_progress" (share
-        of the goal's literals); "held" (the first object is in an acting hand); "steps" of the episode; "reward/..." of
-        each term; "bad_actions" (numbers of the last action that were not finite); "flags" (`guards.Flag`).
+      terminated: success or failure ended the episode. truncated: the horizon or a guard did; never both.
+      info: "success"; "steps" of the episode; "reward/..." of each term; "bad_actions" (numbers of the last action that
+        were not finite); "flags" (`guards.Flag`); and the task's own. Of activities: "goal_progress" (share of the
+        goal's literals), "held" (the first object is in an acting hand), "success_in_hand" (success while the first
+        object is in all acting hands).
       measures: what the reward is made of, for the next step's difference.
       bad_actions: numbers that were not finite and were taken for 0, since the first reset.
     """
@@ -90,30 +91,29 @@ class Environment:
 
     Attributes:
       task, robot, grasping: what is done by whom, and how hands hold (`ig2mj.agents.grasping.MODES`).
-      scene, core: the household with its robot, and what steps it.
+      scene, core: the household with its robot, and what steps it. objective: what is measured, rewarded and observed.
       num_worlds: W. action_names: [n]. observation_spaces: of each observation, without the world axis.
     """
 
     def __init__(
         self,
-        task: Task,
+        task: TaskLike,
         robot: str,
         scene: Scene,
         core: Core,
         action_map: ActionMap,
-        observations: Callable[[Task, Reward], Observer],
+        objective: Objective,
+        observer: Observer,
         grasping: str,
     ):
-        """Binds a core, whose rules have the task's goal, to rewards and observations."""
-        if core.rules is None or core.rules.goal is None:
-            raise EngineError("an environment needs a core whose rules have a goal")
+        """Binds a core, whose rules have the task's goal if it has one, to rewards and observations."""
+        if core.rules is None:
+            raise EngineError("an environment needs a core with rules")
         self.task, self.robot, self.grasping = task, robot, grasping
         self.scene, self.core, self.num_worlds = scene, core, core.engine.num_worlds
-        self._goal, self._map = core.rules.goal, action_map
-        self._reward = Reward(task, robot, scene, core.rules.model)
-        self._observations, self._observer = observations, observations(task, self._reward)
-        self.action_names, self.observation_spaces = action_map.names, self._observer.spaces
-        self.privileged_names = self._observer.privileged_names
+        self.objective, self._goal, self._map, self._observer = objective, core.rules.goal, action_map, observer
+        self.action_names, self.observation_spaces = action_map.names, observer.spaces
+        self.privileged_names = objective.vectors["privileged_state"]
         self._substeps = round(ACTION_PERIOD / (core.engine.substeps * core.engine.timestep))
         self._clean = jax.jit(self._clean_fn)
         self._see, self._see_first = jax.jit(self._after_step), jax.jit(self._after_reset)
@@ -134,7 +134,9 @@ class Environment:
     def with_horizon(self, horizon: int) -> Environment:
         """The same environment, on the same core, with longer or shorter episodes."""
         task = dataclasses.replace(self.task, horizon=horizon)
-        return Environment(task, self.robot, self.scene, self.core, self._map, self._observations, self.grasping)
+        return Environment(
+            task, self.robot, self.scene, self.core, self._map, self.objective, self._observer, self.grasping
+        )
 
     # Steps.
 
@@ -152,12 +154,18 @@ class Environment:
     def step_fn(self, state: EnvState, action: Float[Array, "W n"]) -> EnvState:
         """`step`, neither checked nor compiled."""
         robots, bad = self._clean(action)
-        batch, status = self.core.step_fn(state.batch, robots)
-        for _ in range(self._substeps - 1):
-            batch, status = self.core.step_fn(batch)
+        batch, status = self.core.hold_fn(state.batch, robots, self._substeps)
         world = batch.world
         seen = self._see(
-            world.view, world.states, status, batch.controllers, batch.flags, world.step, state.measures, bad
+            world.view,
+            world.states,
+            status,
+            batch.controllers,
+            batch.flags,
+            world.step,
+            world.key,
+            state.measures,
+            bad,
         )
         return self._state(batch, seen, state.bad_actions + bad)
 
@@ -211,7 +219,7 @@ class Environment:
         """After a reset of the masked worlds; the others are as before."""
         world = batch.world
         old = None if before is None else _Seen(**{f.name: getattr(before, f.name) for f in dataclasses.fields(_Seen)})
-        seen = self._see_first(world.view, world.states, batch.controllers, world.step, mask, old)
+        seen = self._see_first(world.view, world.states, batch.controllers, world.step, world.key, mask, old)
         count = jnp.zeros(self.num_worlds, jnp.int32) if before is None else before.bad_actions
         return self._state(batch, seen, count, None if before is None else (before, mask))
 
@@ -243,19 +251,22 @@ class Environment:
         controllers: tuple[Any, ...],
         flags: Int[Array, "W"],
         control_steps: Int[Array, "W"],
+        key: UInt[Array, "W 2"],
         before: Measures,
         bad: Int[Array, "W"],
     ) -> _Seen:
-        now = self._reward.measure(view, states, status, before)
+        now = self.objective.measure(view, states, status, key, before)
         sound = flags == 0
         terms = {
-            name: jnp.where(sound, jnp.nan_to_num(term), 0.0) for name, term in self._reward.terms(before, now).items()
+            name: jnp.where(sound, jnp.nan_to_num(term), 0.0)
+            for name, term in self.objective.rewards(before, now).items()
         }
-        steps = control_steps // self._substeps
-        terminated = jnp.asarray(status.holds) & sound
+        success, failure = self.objective.ended(now, status)
+        success, steps = success & sound, control_steps // self._substeps
+        terminated = success | (failure & sound)
         truncated = ~terminated & (~sound | (steps >= self.task.horizon))
         return self._seen(
-            view, states, status.fraction, controllers, steps, now, terms, terminated, truncated, flags, bad
+            view, states, status, controllers, steps, now, terms, success, terminated, truncated, flags, bad
         )
 
     def _after_reset(
@@ -264,15 +275,16 @@ class Environment:
         states: ExtendedStates,
         controllers: tuple[Any, ...],
         control_steps: Int[Array, "W"],
+        key: UInt[Array, "W 2"],
         mask: Bool[Array, "W"],
         before: _Seen | None,
     ) -> _Seen:
-        status = self._goal.status(states, view)
-        now = self._reward.measure(view, states, status)
+        status = self._goal.status(states, view) if self._goal is not None else GoalStatus.empty(self.num_worlds)
+        now = self.objective.measure(view, states, status, key)
         zero = jnp.zeros(self.num_worlds, jnp.int32)
-        none, terms = zero.astype(bool), {name: zero.astype(jnp.float32) for name in TERMS}
+        none, terms = zero.astype(bool), {name: zero.astype(jnp.float32) for name in self.objective.terms}
         steps = control_steps // self._substeps
-        new = self._seen(view, states, status.fraction, controllers, steps, now, terms, none, none, zero, zero)
+        new = self._seen(view, states, status, controllers, steps, now, terms, none, none, none, zero, zero)
         if before is None:
             return new
         old = dataclasses.replace(before, obs={name: before.obs[name] for name in new.obs})
@@ -282,29 +294,28 @@ class Environment:
         self,
         view: PhysicsView,
         states: ExtendedStates,
-        progress: Float[Array, "W"],
+        status: GoalStatus,
         controllers: tuple[Any, ...],
         steps: Int[Array, "W"],
         measures: Measures,
         terms: Mapping[str, Array],
+        success: Bool[Array, "W"],
         terminated: Bool[Array, "W"],
         truncated: Bool[Array, "W"],
         flags: Int[Array, "W"],
         bad: Int[Array, "W"],
     ) -> _Seen:
-        progress = jnp.asarray(progress, jnp.float32)
         info = {
-            "success": terminated,
-            "success_in_hand": terminated & self._reward.holding(view).all(1),
-            "goal_progress": progress,
-            "held": measures.held,
+            "success": success,
+            **self.objective.info(view, measures, status),
             "steps": steps,
             "bad_actions": bad,
             "flags": flags,
             **{f"reward/{name}": term for name, term in terms.items()},
         }
-        obs = self._observer.vectors(view, states, controllers[0], measures, progress, steps)
-        total = jnp.stack([terms[name] for name in TERMS]).sum(0)
+        time_left = 1.0 - steps.astype(jnp.float32) / self.task.horizon
+        obs = self._observer.vectors(view, states, controllers[0], measures, status, time_left)
+        total = jnp.stack([terms[name] for name in self.objective.terms]).sum(0)
         return _Seen(obs, total, terminated, truncated, info, measures)
 
     # Bad input.

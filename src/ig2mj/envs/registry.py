@@ -23,8 +23,8 @@ from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.tasks.actions import hand_actions
 from ig2mj.tasks.activities import ACTIVITIES
+from ig2mj.tasks.activity_objective import ActivityObjective
 from ig2mj.tasks.pools import pool_of
-from ig2mj.tasks.reward import Reward
 from ig2mj.tasks.task import ROBOTS, Task, make_robot
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.pool import Pool
@@ -103,12 +103,10 @@ def make(
     hands = Grasping(scene, grasping, task.objects_of_interest[:1])
     core = Core(physics, rules, rows, [controller], hands)
     closing = grasping != "mitten"
-
-    def observer(task: Task, reward: Reward) -> Observer:
-        return Observer(observations, task, robot, scene, rules.model, controller, reward, physics, image_size)
-
+    objective = ActivityObjective(task, robot, scene, rules.model)
+    observer = Observer(observations, objective, scene, rules.model, controller, physics, image_size)
     actions = hand_actions(controller.action_names, task.acts(robot).hands, closing)
-    return Environment(task, robot, scene, core, actions, observer, grasping)
+    return Environment(task, robot, scene, core, actions, objective, observer, grasping)
 
 
 def rules_of(task: Task, scene: Scene, paper_rl: bool = False) -> Rules:

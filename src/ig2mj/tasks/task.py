@@ -7,7 +7,8 @@ them), a goal, what the reward is made of, and for each robot where it starts an
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 from ig2mj.agents.base import Robot
 from ig2mj.agents.fetch import Fetch
@@ -59,6 +60,33 @@ class Acts:
     yaw: float = 0.0
     hands: tuple[int, ...] = (0,)
     weights: Weights = FETCH_WEIGHTS
+
+
+@runtime_checkable
+class TaskLike(Protocol):
+    """What environments of all kinds of tasks have in common.
+
+    Attributes:
+      name: as `ig2mj.make` takes it. summary: one sentence. home: a shipped home. horizon: agent steps of an episode.
+      robots: names of those that can do it.
+    """
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def summary(self) -> str: ...
+
+    @property
+    def home(self) -> str: ...
+
+    @property
+    def horizon(self) -> int: ...
+
+    @property
+    def robots(self) -> Collection[str]: ...
 
 
 @dataclasses.dataclass(frozen=True)

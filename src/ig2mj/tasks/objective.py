@@ -1,0 +1,74 @@
+"""`Objective`: what a task asks of its worlds, computed after physics: measures, rewards, ends, observations.
+
+Axes: W worlds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Protocol, runtime_checkable
+
+from jaxtyping import Bool, Float, UInt
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.predicates.compile import GoalStatus
+from ig2mj.states.world import ExtendedStates
+
+Measures = Any
+"""What an objective must know of the step before: a pytree of arrays that begin with the world axis."""
+
+
+@runtime_checkable
+class Objective(Protocol):
+    """The objective of one task for one robot in one scene. Constants only; all methods are pure.
+
+    Attributes:
+      terms: names of the terms that the reward is the sum of.
+      vectors: observations that it makes, such as "privileged_state", and what each of their numbers means.
+    """
+
+    @property
+    def terms(self) -> tuple[str, ...]: ...
+
+    @property
+    def vectors(self) -> Mapping[str, tuple[str, ...]]: ...
+
+    def measure(
+        self,
+        view: PhysicsView,
+        states: ExtendedStates,
+        status: GoalStatus,
+        key: UInt[Array, "W 2"],
+        before: Measures | None = None,
+    ) -> Measures:
+        """What is measured now.
+
+        Args:
+          status: of the task's goal; empty for a task without a goal expression.
+          key: of the world's episode: what is drawn at random for an episode follows from it.
+          before: of the step before; None at the start of an episode.
+        """
+        ...
+
+    def rewards(self, before: Measures, now: Measures) -> dict[str, Float[Array, "W"]]:
+        """The step's reward by `terms`."""
+        ...
+
+    def ended(self, now: Measures, status: GoalStatus) -> tuple[Bool[Array, "W"], Bool[Array, "W"]]:
+        """Whether the episode ends with success, and whether it ends with failure; never both."""
+        ...
+
+    def info(self, view: PhysicsView, now: Measures, status: GoalStatus) -> dict[str, Array]:
+        """What is reported of every step besides; "goal_progress" (0..1) among it. Always the same keys."""
+        ...
+
+    def observe(
+        self,
+        view: PhysicsView,
+        states: ExtendedStates,
+        now: Measures,
+        status: GoalStatus,
+        time_left: Float[Array, "W"],
+    ) -> dict[str, Float[Array, "W n"]]:
+        """All of `vectors`. `time_left`: share of the episode, 1..0."""
+        ...
