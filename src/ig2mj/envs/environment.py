@@ -209,6 +209,20 @@ class Environment:
         batch = self.core.start_fn(seed)
         return self._begun(batch, jnp.ones(self.num_worlds, bool), None)
 
+    def start_from(self, rows: Int[np.ndarray, "W"], seed: Seed = 0) -> EnvState:
+        """All worlds at the start of an episode from these rows of the pool, so that each can be played once.
+
+        Raises:
+          EngineError: not one row for each world, or a row that the pool has not.
+        """
+        size = self.core.starts.pool.size
+        rows = np.asarray(rows)
+        if rows.shape != (self.num_worlds,) or rows.min() < 0 or rows.max() >= size:
+            raise EngineError(f"start_from takes {self.num_worlds} rows, each from 0 to {size - 1}")
+        chosen = self.core.starts.pool.rows(rows)
+        batch = self.core.load(self.core.start(as_seed(seed)), chosen.physics, chosen.states)
+        return self._begun(batch, jnp.ones(self.num_worlds, bool), None)
+
     def reset_fn(self, state: EnvState, mask: Bool[Array, "W"]) -> EnvState:
         """`reset` of the masked worlds, not compiled."""
         mask = jnp.asarray(mask)

@@ -1,0 +1,83 @@
+"""`Expert`: from the plan of an activity's hands to the actions of the task's own action space.
+
+Axes: W worlds, n numbers of an action.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.agents.base import ACTION_PERIOD, Robot
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.errors import UnknownNameError
+from ig2mj.geometry.poses import quat_rotate_inverse
+from ig2mj.scene.scene import Scene
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import ExtendedStates
+from ig2mj.tasks.actions import SPEED, TURN_SPEED
+from ig2mj.tasks.experts import cooking_meat, grasping_book
+from ig2mj.tasks.experts.motion import Wish
+from ig2mj.tasks.experts.sight import Sight
+from ig2mj.tasks.task import Task
+
+Plan = Callable[[Sight], list[Wish]]
+
+PLANS: dict[str, Plan] = {
+    "GraspingBook": grasping_book.plan,
+    "CookingMeat": cooking_meat.plan,
+}
+"""Plans by the task's name: what each acting hand should do now."""
+
+STEP = {"humanoid": SPEED * ACTION_PERIOD, "fetch": 0.04}
+"""m that a hand moves in an action of 1 (`ig2mj.tasks.actions`)."""
+
+TURN_STEP = TURN_SPEED * ACTION_PERIOD
+"""rad."""
+
+
+class Expert:
+    """An expert of one task for one robot. Calling it is pure and may be traced.
+
+    Attributes:
+      task, robot: what is done by whom. closing: actions have a number for each hand that closes it.
+    """
+
+    def __init__(self, task: Task, robot: str, scene: Scene, model: StateModel, closing: bool = False):
+        """
+        Args:
+          scene: with the robot. model: of the scene's states.
+
+        Raises:
+          UnknownNameError: the task has no expert, or the robot has no part in it.
+        """
+        if task.name not in PLANS:
+            raise UnknownNameError("task with an expert", task.name, PLANS)
+        self.task, self.robot, self.closing = task, robot, closing
+        self._plan, self._scene, self._model = PLANS[task.name], scene, model
+        own = np.flatnonzero(scene.tables.hand_agent == 0)
+        self._hands = tuple(int(own[h]) for h in task.acts(robot).hands)
+        rays = [hand for agent in scene.agents if isinstance(agent, Robot) for hand in agent.hand_rays()]
+        self._grips = np.stack([hand.grasp_point for hand in rays]).astype(np.float32)
+
+    def __call__(self, view: PhysicsView, states: ExtendedStates) -> Float[Array, "W n"]:
+        """The action of every world, -1 to 1."""
+        see = Sight(view, states, self._scene, self._model, self.robot, self._hands, self._grips)
+        base = jnp.asarray(view.agent.base_quat)[:, 0]
+        return jnp.concatenate([self._action(base, wish) for wish in self._plan(see)], axis=1)
+
+    def _action(self, base: Float[Array, "W 4"], wish: Wish) -> Float[Array, "W k"]:
+        """Of one hand: in the base's frame, slowed down evenly where a number would be beyond 1."""
+        parts = [_limited(quat_rotate_inverse(base, wish.move) / STEP[self.robot])]
+        parts.append(_limited(quat_rotate_inverse(base, wish.turn) / TURN_STEP))
+        if self.closing:
+            opens = -1.0 if self.robot == "humanoid" else 1.0
+            parts.append(jnp.where(wish.close, -opens, opens)[:, None])
+        return jnp.concatenate(parts, axis=1)
+
+
+def _limited(v: Float[Array, "W 3"]) -> Float[Array, "W 3"]:
+    return v / jnp.maximum(1.0, jnp.max(jnp.abs(v), axis=1, keepdims=True))

@@ -1,0 +1,68 @@
+"""How hands move: displacements towards goals that keep above what stands around, without any memory.
+
+Axes: W worlds.
+"""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+from flax import struct
+from jaxtyping import Bool, Float
+
+from ig2mj.engine.view import Array
+from ig2mj.geometry.poses import length, quat_conjugate, quat_multiply, quat_to_rotation_vector
+
+NEAR, BLEND = 0.03, 0.06
+"""m: horizontal distance to a goal within which a hand goes straight down, and over which it comes down to that."""
+
+RISE = 0.06
+"""m below the height of travel at which a hand does not move sideways yet."""
+
+
+@struct.dataclass
+class Wish:
+    """What one hand should do now; world frame.
+
+    Attributes:
+      move: m that the palm should be displaced by. turn: rotation vector by which it should be turned.
+      close: the hand should be closed.
+    """
+
+    move: Float[Array, "W 3"]
+    turn: Float[Array, "W 3"]
+    close: Bool[Array, "W"]
+
+
+def wish(move: Float[Array, "W 3"], turn: Float[Array, "W 3"] | None = None, close: Array | bool = False) -> Wish:
+    """A wish; without a turn the hand keeps its orientation."""
+    return Wish(move, jnp.zeros_like(move) if turn is None else turn, jnp.broadcast_to(close, move.shape[:1]))
+
+
+def over(
+    pos: Float[Array, "W 3"], goal: Float[Array, "W 3"], height: Float[Array, "W"] | float, near: float = NEAR
+) -> Float[Array, "W 3"]:
+    """From `pos` to `goal`: up to `height` first, then across, at last straight to the goal.
+
+    Args:
+      height: z of the way across, m; not below the goal. near: horizontal distance from which it goes straight down.
+    """
+    offset = goal - pos
+    share = jnp.clip((length(offset[:, :2]) - near) / BLEND, 0.0, 1.0)
+    level = goal[:, 2] + (jnp.maximum(height, goal[:, 2]) - goal[:, 2]) * share
+    rise = level - pos[:, 2]
+    across = jnp.clip(1.0 - rise / RISE, 0.0, 1.0)[:, None] * offset[:, :2]
+    return jnp.concatenate([across, rise[:, None]], axis=1)
+
+
+def turn_to(quat: Float[Array, "W 4"], goal: Float[Array, "W 4"]) -> Float[Array, "W 3"]:
+    """The rotation vector, world frame, that turns one orientation into another."""
+    return quat_to_rotation_vector(quat_multiply(goal, quat_conjugate(quat)))
+
+
+def where(condition: Bool[Array, "W"], then: Wish, otherwise: Wish) -> Wish:
+    """One wish where the condition holds, else the other."""
+
+    def pick(a: Array, b: Array) -> Array:
+        return jnp.where(condition.reshape(-1, *[1] * (a.ndim - 1)), a, b)
+
+    return Wish(pick(then.move, otherwise.move), pick(then.turn, otherwise.turn), pick(then.close, otherwise.close))

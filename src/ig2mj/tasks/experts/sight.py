@@ -1,0 +1,75 @@
+"""What a scripted expert sees of a scene: positions of hands and objects by name, and what is held.
+
+Axes: W worlds.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.poses import quat_rotate
+from ig2mj.scene.scene import Scene
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import ExtendedStates
+from ig2mj.tasks.points import Located, Point, locator
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Sight:
+    """All worlds of a scene as they are now; positions in the world frame, m.
+
+    Attributes:
+      robot: name of the robot that acts. hands: numbers of the acting hands among all hands of the scene.
+      grips: [H, 3] grasp point of every hand in the hand's frame.
+    """
+
+    view: PhysicsView
+    states: ExtendedStates
+    scene: Scene
+    model: StateModel
+    robot: str
+    hands: tuple[int, ...]
+    grips: Float[np.ndarray, "H 3"]
+
+    def hand_pos(self, hand: int = 0) -> Float[Array, "W 3"]:
+        """Palm or end effector; `hand` counts the acting hands."""
+        return jnp.asarray(self.view.agent.hand_pos)[:, self.hands[hand]]
+
+    def hand_quat(self, hand: int = 0) -> Float[Array, "W 4"]:
+        """Its orientation."""
+        return jnp.asarray(self.view.agent.hand_quat)[:, self.hands[hand]]
+
+    def grip(self, hand: int = 0) -> Float[Array, "W 3"]:
+        """The point of the hand with which it takes hold: the middle of the palm, or between two fingers."""
+        return self.hand_pos(hand) + quat_rotate(self.hand_quat(hand), jnp.asarray(self.grips[self.hands[hand]]))
+
+    def holds(self, name: str, hand: int = 0) -> Bool[Array, "W"]:
+        """Whether an acting hand holds an object."""
+        return jnp.asarray(self.view.held)[:, self.hands[hand], self.scene.object_index(name)]
+
+    def com(self, name: str) -> Float[Array, "W 3"]:
+        """An object's centre of mass."""
+        return jnp.asarray(self.view.object_com)[:, self.scene.object_index(name)]
+
+    def quat(self, name: str) -> Float[Array, "W 4"]:
+        """An object's orientation."""
+        return jnp.asarray(self.view.object_quat)[:, self.scene.object_index(name)]
+
+    def box(self, name: str) -> tuple[Float[Array, "W 3"], Float[Array, "W 3"]]:
+        """An object's lowest and highest corner."""
+        index = self.scene.object_index(name)
+        return jnp.asarray(self.view.aabb_low)[:, index], jnp.asarray(self.view.aabb_high)[:, index]
+
+    def point(self, point: Point) -> Located:
+        """A point of a task, and whether it exists."""
+        return locator(point, self.scene, self.model)(self.view, self.states)
+
+    def goal(self, point: Point, above: float = 0.0) -> jax.Array:
+        """A point that always exists, [W, 3], `above` metres higher."""
+        return jnp.asarray(self.point(point)[0]).at[:, 2].add(above)

@@ -1,0 +1,68 @@
+"""Scripted experts solve the six activities through the action space of their environments."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import ig2mj
+from ig2mj.envs.experts import expert_of
+from ig2mj.errors import EngineError
+from ig2mj.tasks.activities import ACTIVITIES
+from ig2mj.tasks.experts.expert import PLANS, Expert
+
+
+def played(name: str, robot: str, rows: int, grasping: str = "mitten", worlds: int = 4) -> float:
+    """Share of the first held-out states that the expert solves, each played once."""
+    env = ig2mj.make(name, robot, worlds, "native", grasping, split="held_out", pool_size=rows)
+    expert, solved = expert_of(env), 0
+    for first in range(0, rows, worlds):
+        state, done = env.start_from(np.arange(first, first + worlds)), np.zeros(worlds, bool)
+        for _ in range(env.task.horizon):
+            state = env.step(state, expert(state))
+            done |= np.asarray(state.terminated)
+            if done.all():
+                break
+        solved += int(done.sum())
+    return solved / rows
+
+
+@pytest.mark.parametrize("name", PLANS)
+def test_the_humanoid_solves_held_out_states(name):
+    assert played(name, "humanoid", 4) == 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", PLANS)
+@pytest.mark.parametrize("robot", ["humanoid", "fetch"])
+def test_nineteen_of_twenty_held_out_states_are_solved(name, robot):
+    if robot in ACTIVITIES[name].robots:
+        assert played(name, robot, 48, worlds=16) >= 0.95
+
+
+def test_an_expert_is_a_pure_function_of_each_world():
+    """It may be traced, and what it does in a world does not depend on other worlds or on what it saw before."""
+    env = ig2mj.make("CookingMeat", worlds=4, engine="native", split="held_out", pool_size=4)
+    assert env.core.rules is not None
+    expert = Expert(env.task, env.robot, env.scene, env.core.rules.model)
+    state = env.start_from(np.arange(4))
+    for _ in range(5):
+        state = env.step(state, expert_of(env)(state))
+    seen = jax.tree.map(lambda a: jnp.array(a), (state.batch.world.view, state.batch.world.states))
+    compiled = jax.jit(expert)
+    first = np.asarray(compiled(*seen))
+    assert first.shape == (4, 6) and np.isfinite(first).all() and np.abs(first).max() <= 1.0
+    other_way_round = jax.tree.map(lambda a: a[::-1], seen)
+    np.testing.assert_allclose(np.asarray(compiled(*other_way_round))[::-1], first, atol=1e-6)
+    np.testing.assert_allclose(np.asarray(expert(*seen)), first, atol=1e-5)
+    assert np.array_equal(np.asarray(compiled(*seen)), first)
+
+
+def test_rows_that_a_pool_has_not_are_refused():
+    env = ig2mj.make("CookingMeat", worlds=4, engine="native", split="held_out", pool_size=4)
+    with pytest.raises(EngineError, match="from 0 to 3"):
+        env.start_from(np.arange(1, 5))
+    with pytest.raises(EngineError, match="4 rows"):
+        env.start_from(np.arange(3))
