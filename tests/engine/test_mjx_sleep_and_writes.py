@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import bench_scene
 import engine_bench
 import jax
@@ -211,6 +213,33 @@ def test_a_weld_wakes_what_it_holds_and_lifts_it(full, asleep):
     _, view = full.run(physics, 30)
     assert full.z(view, "box")[0] > 0.6 and full.z(view, "box")[1] < 0.46
     assert np.asarray(view.held)[:, 0, full.index("box")].tolist() == [True, False]
+
+
+def test_a_weld_wakes_all_that_sleeps_in_one_island(full):
+    """The knife sleeps on the box: to take hold of it wakes both at once, in that world."""
+    physics = full.write(full.fresh(), full.teleport("knife", [0, 0, bench_scene.TOP + 0.1205]))
+    physics, view = full.run(physics, 90)
+    assert not np.asarray(view.awake).any()
+    view = full.view(full.write(physics, full.switch({"hand/knife": [1]})))
+    for name in ("knife", "box"):
+        assert full.awake(view, name).tolist() == [False, True]
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) for n in ("warp", "jax")])
+def test_constraints_alone_cost_no_forward_pass(name, bench_folder, monkeypatch):
+    """In a batch of thousands some hand takes hold nearly every step."""
+    bench = engine_bench.bench(bench_folder, name, 2, False)
+    engine: Any = bench.engine
+    monkeypatch.setattr(engine, "_refresh", lambda physics: pytest.fail("a forward pass"))
+    model, count = bench.scene.model, len(bench.scene.object_names)
+    data = np.tile(model.eq_data.astype(np.float32), (2, 1, 1))
+    taken = bench.switch({"hand/box": [1]}).replace(
+        model_fields=ModelFields(eq_data=data), ignored_contacts=np.ones((2, 1, count), bool)
+    )
+    view = bench.view(jax.jit(engine.write)(bench.fresh(), taken))
+    assert np.asarray(view.held)[:, 0, bench.index("box")].tolist() == [False, True]
+    with pytest.raises(pytest.fail.Exception):
+        jax.eval_shape(engine.write, bench.fresh(), bench.teleport("box", [0, 0, 1]))
 
 
 def test_what_is_let_go_falls(full, asleep):

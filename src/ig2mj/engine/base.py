@@ -76,7 +76,11 @@ class Write:
         masses or friction change, everything in the world wakes.
       ignored_contacts: contacts between a hand's bodies (its palm and its fingers) and an object are dropped after the
         narrow phase, from now on, until it is written again: they give neither forces nor touch, and wake nothing.
-        Contacts of all other pairs stay exactly as they were.
+        Contacts of all other pairs stay exactly as they were. What is ignored no more is touched again from the next
+        step on (natively at once).
+
+    A write of constraints (`eq_active`, `eq_data`) and `ignored_contacts` alone moves nothing, and MJX engines do it
+    without a forward pass.
     """
 
     object_mask: Bool[Array, "W O"] | None = None

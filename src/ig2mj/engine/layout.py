@@ -33,6 +33,7 @@ class ModelLayout:
       body_unit, geom_unit: unit of each body and geom; -1: nobody's (the world).
       collides: [G] the geom takes part in contacts and belongs to an object or an agent.
       link_of_geom: [G] annotated link whose geom it is, -1 none.
+      hand_of_geom: [G] hand that the geom is part of, -1 none.
       finger_of_geom, graspable_of_geom: [G] finger link, and graspable body, whose geom it is, -1 none. What is welded
         to a graspable body is part of it.
       link_tree: [L] tree of the link's body, -1: static.
@@ -56,6 +57,7 @@ class ModelLayout:
     geom_unit: Int[np.ndarray, "G"]
     collides: Bool[np.ndarray, "G"]
     link_of_geom: Int[np.ndarray, "G"]
+    hand_of_geom: Int[np.ndarray, "G"]
     finger_of_geom: Int[np.ndarray, "G"]
     graspable_of_geom: Int[np.ndarray, "G"]
     link_tree: Int[np.ndarray, "L"]
@@ -134,6 +136,7 @@ def make_layout(model: mujoco.MjModel, tables: SceneTables) -> ModelLayout:
         geom_unit=body_unit[geom_body],
         collides=collides,
         link_of_geom=link_of_geom,
+        hand_of_geom=tables.body_hand[geom_body],
         finger_of_geom=finger_of_body[geom_body],
         graspable_of_geom=graspable_of_body[geom_body],
         link_tree=body_tree[tables.link_body],

@@ -176,6 +176,10 @@ def replace_fields(view: PhysicsView, fields: Mapping[str, Any]) -> PhysicsView:
     return assemble({name: fields[name] if name in fields else read_field(view, name) for name in SCHEMA})
 
 
+OF_CONSTRAINTS = ("touching", "link_force", "awake", "held", "agent.finger_force", "agent.touching")
+"""What of a view changes with constraints and ignored contacts where nothing moves."""
+
+
 def blank_view(sizes: Mapping[str, int]) -> PhysicsView:
     """A view of zeros and falses (numpy)."""
     return assemble({name: np.zeros(field.shape(sizes), field.dtype) for name, field in SCHEMA.items()})

@@ -36,7 +36,7 @@ from ig2mj.agents.grasping import Grasping, GraspState
 from ig2mj.engine.base import Engine, Physics, Write
 from ig2mj.engine.health import Health
 from ig2mj.engine.snapshot import Snapshot
-from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.engine.view import OF_CONSTRAINTS, Array, PhysicsView, read_field, replace_fields
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
 from ig2mj.worlds import guards
@@ -84,7 +84,7 @@ class Core:
         self.starts = Starts(engine, rules.initial if rules is not None else None, pool)
         self._physics_step = engine.step  # a world at rest steps in under 2 us: even looking up a name counts
         self._control, self._hands = jax.jit(self._control_fn), jax.jit(self._hands_fn)
-        self._constraints = jax.jit(grasping.write) if grasping is not None else None
+        self._constraints = jax.jit(grasping.write) if grasping is not None and grasping.active else None
         self._count, self._chosen = jax.jit(self._count_fn), jax.jit(chosen)
         if engine.pure:
             self.advance = jax.jit(self.advance_fn)
@@ -192,17 +192,14 @@ class Core:
         """Physics and view after hands took hold or let go; worlds where none did keep their view."""
         if self._constraints is None or grasps is None:
             return physics, view, grasps
-        constraints = self._constraints
         after, changed = self._hands(view, grasps, controllers)
-        if not self.engine.pure and not np.asarray(changed).any():
-            return physics, view, after
-
-        def act(physics: Physics, view: PhysicsView) -> tuple[Physics, PhysicsView]:
-            physics = self.engine.write(physics, constraints(after))
-            now = self.engine.view(physics)
-            return physics, now if self.engine.num_worlds == 1 else chosen(changed, now, view)
-
-        return *self._if_any(changed, act, physics, view), after
+        if not self.engine.pure:
+            if np.asarray(changed).any():
+                physics = self.engine.write(physics, self._constraints(after))
+            return physics, self.engine.view(physics), after
+        physics = self.engine.write(physics, self._constraints(after))
+        now = self.engine.view(physics)  # what is not read of it is never computed
+        return physics, replace_fields(view, {name: read_field(now, name) for name in OF_CONSTRAINTS}), after
 
     def _hands_fn(
         self, view: PhysicsView, grasps: GraspState, controllers: tuple[Any, ...]

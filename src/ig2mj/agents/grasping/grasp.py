@@ -72,7 +72,11 @@ class GraspState:
 
 
 class Grasping:
-    """The rule for all hands of a scene. All methods but the constructor are pure and batched."""
+    """The rule for all hands of a scene. All methods but the constructor are pure and batched.
+
+    Attributes:
+      mode: one of `MODES`. active: something can be held at all.
+    """
 
     def __init__(self, scene: Scene, mode: str = "assisted", targets: Sequence[str] = ()):
         """
@@ -94,8 +98,8 @@ class Grasping:
         missing = [n for n in names if n not in by_palm]
         if missing and mode != "physical":
             raise EngineError(f"hand '{missing[0]}' cannot take part in {mode} grasping: its robot has no `hand_rays`")
-        self._active = mode != "physical" and bool(names) and len(tables.graspable_body) > 0
-        if not self._active:
+        self.active = mode != "physical" and bool(names) and len(tables.graspable_body) > 0
+        if not self.active:
             return
         hands = [by_palm[n] for n in names]
         parts = {b for h in hands for b in (h.palm, *h.start_bodies, *h.end_bodies)}
@@ -124,7 +128,7 @@ class Grasping:
           grip: how far each hand is asked to close (`Controller.grip`), of all robots.
           lag: m by which each hand is behind its target (`Controller.lag`).
         """
-        if not self._active:
+        if not self.active:
             return state
         held, strain = state.held, jnp.where(state.held & (lag > MAX_DISTANCE), state.strain + 1, 0)
         if self.mode == "mitten":
@@ -158,7 +162,7 @@ class Grasping:
         active = jnp.tile(jnp.asarray(model.eq_active0, bool), (worlds, 1))
         data = jnp.tile(jnp.asarray(model.eq_data[:, :12], jnp.float32), (worlds, 1, 1))
         ignored = jnp.zeros((worlds, state.body.shape[1], self.scene.tables.num_objects), bool)
-        if self._active:
+        if self.active:
             row = jnp.arange(worlds)[:, None]
             equality = jnp.asarray(self._equality)[np.arange(state.body.shape[1])[None], jnp.maximum(state.body, 0)]
             at = jnp.where(state.held, equality, model.neq)  # out of range: dropped

@@ -92,12 +92,78 @@ def touching_units(
     return jnp.where(fresh, now | now.swapaxes(1, 2), remembered)
 
 
+def without_ignored(
+    contacts: Contacts,
+    layout: ModelLayout,
+    tables: SceneTables,
+    tolerance: float,
+    touching: Bool[Array, "W U U"],
+    before: Bool[Array, "W H O"],
+    after: Bool[Array, "W H O"],
+) -> Bool[Array, "W U U"]:
+    """Touching of units where hands begin to ignore objects, without another collision detection.
+
+    An agent goes on touching an object that one of its hands ignores from now on where the last step has a contact of
+    it with another part of the agent. What is ignored no more is seen by the next step.
+
+    Args:
+      contacts: of the last physics step. touching: after it. tolerance: metres.
+      before, after: contacts of hands with objects dropped before and after the change.
+    """
+    if not after.size:
+        return touching
+    count = layout.num_object_units  # units of agents come after those of objects
+    agent, thing = layout.unit_agent[count:], layout.unit_object[:count]
+    of_agent = jnp.asarray(tables.hand_agent[:, None] == np.arange(len(tables.agent_names)), jnp.float32)
+    begins = jnp.einsum("who,ha->wao", (after & ~before).astype(jnp.float32), of_agent) > 0
+    begins = begins[:, agent][:, :, thing]  # [W, units of agents, units of objects]
+
+    geom = jnp.maximum(contacts.geom, 0)
+    unit, hand = jnp.asarray(layout.geom_unit)[geom], jnp.asarray(layout.hand_of_geom)[geom]
+    owner = jnp.asarray(tables.geom_object)[geom]
+    first = unit[:, 0] >= count  # the agent's geom is the contact's first
+    one, other = jnp.where(first, unit[:, 0], unit[:, 1]) - count, jnp.where(first, unit[:, 1], unit[:, 0])
+    hand, owner = jnp.where(first, hand[:, 0], hand[:, 1]), jnp.where(first, owner[:, 1], owner[:, 0])
+    known = jnp.clip(contacts.world, 0, len(after) - 1)
+    dropped = (hand >= 0) & after[known, jnp.maximum(hand, 0), jnp.maximum(owner, 0)]
+    there = contacts.valid & (contacts.dist <= tolerance) & (one >= 0) & (other >= 0) & (other < count)
+    world = jnp.where(there & (owner >= 0) & ~dropped, contacts.world, len(after))  # out of range: dropped
+    still = jnp.zeros(begins.shape, bool).at[world, one, other].set(True, mode="drop")
+
+    seen = touching[:, count:, :count]
+    seen = jnp.where(begins, seen & still, seen)
+    return touching.at[:, count:, :count].set(seen).at[:, :count, count:].set(seen.swapaxes(1, 2))
+
+
 def normal_forces(contacts: Contacts, efc_force: Float[Array, "W N"], pyramidal: bool) -> Float[Array, "C"]:
     """Normal force (N) of every contact; what stands in rows without a contact means nothing."""
     address = contacts.efc_address
     rows = efc_force[jnp.clip(contacts.world, 0, efc_force.shape[0] - 1)[:, None], jnp.maximum(address, 0)]
     rows = jnp.where((address >= 0) & (address < efc_force.shape[1]), rows, 0.0)
     return rows.sum(-1) if pyramidal else rows[:, 0]
+
+
+def no_forces(tables: SceneTables, num_worlds: int) -> tuple[Float[Array, "W L O"], Float[Array, "W F Y"]]:
+    """Forces of links and fingers of a step without any."""
+    link = jnp.zeros((num_worlds, len(tables.link_object), tables.num_objects), jnp.float32)
+    return link, jnp.zeros((num_worlds, len(tables.finger_body), len(tables.graspable_body)), jnp.float32)
+
+
+def step_forces(
+    contacts: Contacts, efc_force: Float[Array, "W N"], layout: ModelLayout, tables: SceneTables, pyramidal: bool
+) -> tuple[Float[Array, "W L O"], Float[Array, "W F Y"]]:
+    """Forces of the physics step that made the contacts: of annotated links on objects, of fingers on graspable bodies.
+    What the scene lacks costs nothing."""
+    link, finger = no_forces(tables, efc_force.shape[0])
+    has_links, has_fingers = (tables.link_geom >= 0).any(), finger.size > 0
+    if not has_links and not has_fingers:
+        return link, finger
+    normal = normal_forces(contacts, efc_force, pyramidal)
+    if has_links:
+        link = link_forces(contacts, layout, tables, normal, efc_force.shape[0])
+    if has_fingers:
+        finger = finger_forces(contacts, layout, tables, normal, efc_force.shape[0])
+    return link, finger
 
 
 def link_forces(
@@ -107,7 +173,7 @@ def link_forces(
     geom = jnp.maximum(contacts.geom, 0)
     link = jnp.asarray(layout.link_of_geom)[geom]
     thing = jnp.asarray(tables.geom_object)[geom]
-    force = jnp.zeros((num_worlds, len(tables.link_object), tables.num_objects), jnp.float32)
+    force, _ = no_forces(tables, num_worlds)
     for side in (0, 1):
         usable = contacts.valid & (link[:, side] >= 0) & (thing[:, 1 - side] >= 0)
         world = jnp.where(usable, contacts.world, num_worlds)
@@ -126,5 +192,5 @@ def finger_forces(
     one, other = jnp.where(first, finger[:, 0], finger[:, 1]), jnp.where(first, body[:, 1], body[:, 0])
     usable = contacts.valid & (one >= 0) & (other >= 0)
     world = jnp.where(usable, contacts.world, num_worlds)  # out of range: dropped
-    force = jnp.zeros((num_worlds, len(tables.finger_body), len(tables.graspable_body)), jnp.float32)
+    _, force = no_forces(tables, num_worlds)
     return force.at[world, one, other].add(normal, mode="drop")

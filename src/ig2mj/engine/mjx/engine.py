@@ -23,10 +23,10 @@ from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Write
 from ig2mj.engine.controls import check_shape, clip
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
-from ig2mj.engine.mjx.contacts import Contacts, finger_forces, link_forces, normal_forces, touching_units
+from ig2mj.engine.mjx.contacts import Contacts, no_forces, step_forces, touching_units, without_ignored
 from ig2mj.engine.mjx.physics import STATE_FIELDS, MjxPhysics, all_units, mujoco_of
 from ig2mj.engine.mjx.view import Moved, ViewPlan, make_view, plan_view
-from ig2mj.engine.mjx.writing import apply_write, reaches, trees_joined
+from ig2mj.engine.mjx.writing import apply_write, reaches, trees_joined, with_islands
 from ig2mj.engine.model_fields import MOVING, ModelFields, check_names, check_written, given, merged, own_fields
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.native.sleep import FULLY_AWAKE
@@ -86,8 +86,6 @@ class MjxEngine(abc.ABC):
         start = self._scene_start(touch_tolerance)
         self._initial = fitted(initial, start, 1, scene.name) if initial is not None else start
         self._pyramidal = self.host_model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
-        self._has_blades = bool((self.tables.link_geom >= 0).any())
-        self._can_grasp = bool(len(self.tables.finger_body) and len(self.tables.graspable_body))
         try:
             self.model = self._put_model(self.host_model)
             self._template = self._put_data(self.host_model, self._host_data())
@@ -145,10 +143,11 @@ class MjxEngine(abc.ABC):
             data, forces, overflow, _ = carry
             awake = self._tree_asleep(data) < 0
             data = self._mapped(mjx.step, self.model, data, physics.fields, physics.ignored)
-            forces = jax.tree.map(jnp.maximum, forces, self._forces(data))
+            now = step_forces(self._contacts(data), self._efc_force(data), self.layout, self.tables, self._pyramidal)
+            forces = jax.tree.map(jnp.maximum, forces, now)
             return (data, forces, overflow | self._overflow(data), awake), None
 
-        none = jax.tree.map(jnp.zeros_like, (physics.link_force, physics.finger_force))
+        none = no_forces(self.tables, self.num_worlds)
         carry = (data, none, physics.overflow, self._tree_asleep(data) < 0)
         if self.unrolled:
             for _ in range(self.substeps):
@@ -178,32 +177,56 @@ class MjxEngine(abc.ABC):
         return physics.data.time
 
     def write(self, physics: MjxPhysics, write: Write) -> MjxPhysics:
-        """Applies a change; see `Engine.write`. Costs a forward pass of all worlds where any world is written to."""
-        data = physics.data
+        """Applies a change; see `Engine.write`.
+
+        Changes of constraints and of ignored contacts alone cost next to nothing, since no position depends on them.
+        Everything else costs a forward pass of all worlds where any world is written to.
+        """
+        data, old = physics.data, given(physics.fields)
         asleep = self._tree_asleep(data)
-        qpos, qvel, tree_moved = apply_write(self.layout, self.host_model, data.qpos, data.qvel, write)
+        qpos, qvel, woken = apply_write(self.layout, self.host_model, data.qpos, data.qvel, write)
         eq_active = data.eq_active if write.eq_active is None else jnp.asarray(write.eq_active, data.eq_active.dtype)
         check_written(write.model_fields, self.model_fields, self.host_model, self.num_worlds)
         fields = jax.tree.map(lambda a: jnp.asarray(a, jnp.float32), merged(physics.fields, write.model_fields))
-        old, differs = given(physics.fields), jnp.zeros(self.num_worlds, bool)
-        eq_data = given(fields)["eq_data"]
-        tree_moved |= trees_joined(self.layout, (data.eq_active, old["eq_data"]), (eq_active, eq_data))
-        for name, array in given(write.model_fields).items():
+        eq_data, written = given(fields)["eq_data"], given(write.model_fields)
+        woken |= trees_joined(self.layout, (data.eq_active, old["eq_data"]), (eq_active, eq_data))
+        for name, array in written.items():
             if name in MOVING[1:]:
-                differs |= (getattr(fields, name) != old[name]).any(tuple(range(1, np.ndim(array))))
-        tree_moved |= differs[:, None]
-        ignored = physics.ignored
+                woken |= (getattr(fields, name) != old[name]).any(tuple(range(1, np.ndim(array))))[:, None]
+        changed = woken.any(1) | (eq_active != data.eq_active).any(1) | (eq_data != old["eq_data"]).any((1, 2))
+        ignored, touching = physics.ignored, physics.touching
         if write.ignored_contacts is not None:
             ignored = self._checked_filter(jnp.asarray(write.ignored_contacts, bool))
-            tree_moved |= reaches((ignored != physics.ignored).any(1), self.layout.object_trees)
-        changed = (ignored != physics.ignored).any()
-        changed |= tree_moved.any() | (eq_active != data.eq_active).any() | (eq_data != old["eq_data"]).any()
-        data = data.replace(qpos=qpos, qvel=qvel, eq_active=eq_active)
+            woken |= reaches((ignored != physics.ignored).any(1), self.layout.object_trees)
+            changed |= (ignored != physics.ignored).any((1, 2))
+            touching = without_ignored(
+                self._contacts(data),
+                self.layout,
+                self.tables,
+                self.touch_tolerance,
+                touching,
+                physics.ignored,
+                ignored,
+            )
+        woken = with_islands(asleep, woken)
         data = self._with_sleep(
-            data, jnp.where(tree_moved & (asleep < 0), FULLY_AWAKE, asleep), (asleep < 0) | tree_moved
+            data.replace(qpos=qpos, qvel=qvel, eq_active=eq_active),
+            jnp.where(woken, FULLY_AWAKE, asleep),
+            (asleep < 0) | woken,
         )
-        physics = dataclasses.replace(physics, data=data, fields=fields, ignored=ignored)
-        return jax.lax.cond(changed, self._refresh, lambda p: p, physics)
+        physics = dataclasses.replace(
+            physics,
+            data=data,
+            fields=fields,
+            ignored=ignored,
+            touching=touching,
+            link_force=jnp.where(changed[:, None, None], 0.0, physics.link_force),
+            finger_force=jnp.where(changed[:, None, None], 0.0, physics.finger_force),
+        )
+        moves = write.object_mask is not None or write.qpos_mask is not None or not {*MOVING[1:]}.isdisjoint(written)
+        if not moves:
+            return physics
+        return jax.lax.cond(changed.any(), self._refresh, lambda p: p, physics)
 
     def snapshot(self, physics: MjxPhysics) -> Snapshot:
         """All worlds as a snapshot with the world axis."""
@@ -282,6 +305,7 @@ class MjxEngine(abc.ABC):
     def _start_all(self, template: mjx.Data, initial: Snapshot) -> MjxPhysics:
         """Every world at `initial`, which has no world axis; the rest of the data is the template's."""
         worlds, tables = self.num_worlds, self.tables
+        link_force, finger_force = no_forces(tables, worlds)
         spread = jax.vmap(lambda ctrl: template.replace(ctrl=ctrl))
         units = self.layout.num_units
         physics = MjxPhysics(
@@ -292,8 +316,8 @@ class MjxEngine(abc.ABC):
             ),
             ignored=jnp.zeros((worlds, len(tables.hand_body), tables.num_objects), bool),
             touching=jnp.zeros((worlds, units, units), bool),
-            link_force=jnp.zeros((worlds, len(tables.link_object), tables.num_objects), jnp.float32),
-            finger_force=jnp.zeros((worlds, len(tables.finger_body), len(tables.graspable_body)), jnp.float32),
+            link_force=link_force,
+            finger_force=finger_force,
             overflow=jnp.zeros(worlds, jnp.int32),
             wrong_controls=jnp.zeros(worlds, bool),
         )
@@ -316,16 +340,10 @@ class MjxEngine(abc.ABC):
         return jax.vmap(lambda d: mjx.kinematics(self.model, d))(data)
 
     def _refresh(self, physics: MjxPhysics) -> MjxPhysics:
-        """Everything derived, of the present positions; wakes what was marked. No forces are reported."""
+        """Everything derived, of the present positions."""
         data = self._mapped(mjx.forward, self.model, physics.data, physics.fields, physics.ignored)
-        awake = self._tree_asleep(data) < 0
-        return dataclasses.replace(
-            physics,
-            data=data,
-            touching=self._touching(data, physics.touching, awake),
-            link_force=jnp.zeros_like(physics.link_force),
-            finger_force=jnp.zeros_like(physics.finger_force),
-        )
+        touching = self._touching(data, physics.touching, self._tree_asleep(data) < 0)
+        return dataclasses.replace(physics, data=data, touching=touching)
 
     def _map(
         self,
@@ -364,21 +382,6 @@ class MjxEngine(abc.ABC):
             else jnp.zeros((remembered.shape[0], len(tree)), bool)
         )
         return touching_units(self._contacts(data), self.layout, self.touch_tolerance, remembered, fresh)
-
-    def _forces(self, data: mjx.Data) -> tuple[Float[Array, "W L O"], Float[Array, "W F Y"]]:
-        """Forces of the physics step just taken, of annotated links and of fingers."""
-        tables, worlds = self.tables, self.num_worlds
-        link = jnp.zeros((worlds, len(tables.link_object), tables.num_objects), jnp.float32)
-        finger = jnp.zeros((worlds, len(tables.finger_body), len(tables.graspable_body)), jnp.float32)
-        if not self._has_blades and not self._can_grasp:
-            return link, finger
-        contacts = self._contacts(data)
-        normal = normal_forces(contacts, self._efc_force(data), self._pyramidal)
-        if self._has_blades:
-            link = link_forces(contacts, self.layout, tables, normal, worlds)
-        if self._can_grasp:
-            finger = finger_forces(contacts, self.layout, tables, normal, worlds)
-        return link, finger
 
     def _host_model(self, model: mujoco.MjModel) -> mujoco.MjModel:
         own = copy.copy(model)

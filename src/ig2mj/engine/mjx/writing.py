@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
 from ig2mj.engine.base import Write
 from ig2mj.engine.layout import ModelLayout
@@ -82,6 +82,20 @@ def trees_joined(
     active = after[0].astype(bool)
     changed = (before[0].astype(bool) != active) | ((before[1] != after[1]).any(-1) & active)
     return reaches(changed, (layout.equality_tree[..., None] == np.arange(layout.object_trees.shape[1])).any(1))
+
+
+def with_islands(asleep: Int[Array, "W T"], trees: Bool[Array, "W T"]) -> Bool[Array, "W T"]:
+    """The trees, and those that sleep in one island with one of them.
+
+    Args:
+      asleep: MuJoCo's `tree_asleep`: negative where a tree is awake, else the next tree of its island, in a circle.
+    """
+    count = asleep.shape[1]
+    following = jnp.where(asleep >= 0, asleep, np.arange(count))
+    for _ in range(max(count - 1, 0).bit_length()):  # after k rounds, a tree knows of the 2^k that follow it
+        trees = trees | jnp.take_along_axis(trees, following, axis=1)
+        following = jnp.take_along_axis(following, following, axis=1)
+    return trees
 
 
 def _free(qpos: Float[Array, "W nq"], address: np.ndarray) -> tuple[Float[Array, "W X 3"], Float[Array, "W X 4"]]:
