@@ -8,6 +8,7 @@ Axes: C contacts, U units, W worlds, L links, O objects, F finger links, Y grasp
 
 from __future__ import annotations
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from flax import struct
@@ -132,7 +133,7 @@ def without_ignored(
 
     seen = touching[:, count:, :count]
     seen = jnp.where(begins, seen & still, seen)
-    return touching.at[:, count:, :count].set(seen).at[:, :count, count:].set(seen.swapaxes(1, 2))
+    return jnp.asarray(touching).at[:, count:, :count].set(seen).at[:, :count, count:].set(seen.swapaxes(1, 2))
 
 
 def normal_forces(contacts: Contacts, efc_force: Float[Array, "W N"], pyramidal: bool) -> Float[Array, "C"]:
@@ -143,7 +144,7 @@ def normal_forces(contacts: Contacts, efc_force: Float[Array, "W N"], pyramidal:
     return rows.sum(-1) if pyramidal else rows[:, 0]
 
 
-def no_forces(tables: SceneTables, num_worlds: int) -> tuple[Float[Array, "W L O"], Float[Array, "W F Y"]]:
+def no_forces(tables: SceneTables, num_worlds: int) -> tuple[Float[jax.Array, "W L O"], Float[jax.Array, "W F Y"]]:
     """Forces of links and fingers of a step without any."""
     link = jnp.zeros((num_worlds, len(tables.link_object), tables.num_objects), jnp.float32)
     return link, jnp.zeros((num_worlds, len(tables.finger_body), len(tables.graspable_body)), jnp.float32)

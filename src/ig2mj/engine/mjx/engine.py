@@ -183,7 +183,7 @@ class MjxEngine(abc.ABC):
         Everything else costs a forward pass of all worlds where any world is written to.
         """
         data, old = physics.data, given(physics.fields)
-        asleep = self._tree_asleep(data)
+        asleep = jnp.asarray(self._tree_asleep(data))
         qpos, qvel, woken = apply_write(self.layout, self.host_model, data.qpos, data.qvel, write)
         eq_active = data.eq_active if write.eq_active is None else jnp.asarray(write.eq_active, data.eq_active.dtype)
         check_written(write.model_fields, self.model_fields, self.host_model, self.num_worlds)
