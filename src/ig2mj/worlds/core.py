@@ -135,8 +135,9 @@ class Core:
             action, controllers = self._control(action, batch.world.view, batch.controllers)
             batch = dataclasses.replace(batch, controllers=controllers)
         if not self.engine.pure:
-            for _ in range(steps):
-                batch, status = self._control_step(batch, action)
+            batch, status = self._control_step(batch, action)
+            for _ in range(steps - 1):
+                batch, status = self._control_step(batch, None)
             return batch, status
 
         batch, each = jax.lax.scan(lambda batch, _: self._control_step(batch, action), batch, None, steps)

@@ -24,7 +24,7 @@ from ig2mj.engine.controls import check_shape, clip
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.mjx.contacts import Contacts, no_forces, step_forces, touching_units, without_ignored
-from ig2mj.engine.mjx.physics import STATE_FIELDS, MjxPhysics, all_units, mujoco_of
+from ig2mj.engine.mjx.physics import STATE_FIELDS, MjxPhysics, all_units, mujoco_of, uncommitted
 from ig2mj.engine.mjx.view import Moved, ViewPlan, make_view, plan_view
 from ig2mj.engine.mjx.writing import apply_write, reaches, trees_joined, with_islands
 from ig2mj.engine.model_fields import MOVING, ModelFields, check_names, check_written, given, merged, own_fields
@@ -87,8 +87,8 @@ class MjxEngine(abc.ABC):
         self._initial = fitted(initial, start, 1, scene.name) if initial is not None else start
         self._pyramidal = self.host_model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
         try:
-            self.model = self._put_model(self.host_model)
-            self._template = self._put_data(self.host_model, self._host_data())
+            self.model = uncommitted(self._put_model(self.host_model))
+            self._template = uncommitted(self._put_data(self.host_model, self._host_data()))
         except (NotImplementedError, ValueError) as e:
             raise EngineError(f"MJX ({self.name}) cannot run scene '{scene.name}': {e}") from e
         # One program each, not hundreds of little ones; and what several programs contain is traced once.

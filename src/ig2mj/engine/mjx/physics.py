@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
@@ -71,3 +72,12 @@ def mujoco_of(row: Snapshot, model: mujoco.MjModel, tables: SceneTables) -> tupl
     mujoco.mj_forward(model, data)  # of all bodies: nothing sleeps in new data
     restore_sleep(model, data, np.asarray(row.tree_asleep))
     return model, data
+
+
+def uncommitted(tree: Any) -> Any:
+    """The same arrays without the device that MJX commits them to.
+
+    A program's outputs are committed as soon as one of its inputs is, and JAX compiles anew for arguments that are: a
+    loop whose carry begins with arrays of the caller's own would compile its program twice.
+    """
+    return jax.tree.map(lambda a: jnp.asarray(np.asarray(a)) if isinstance(a, jax.Array) else a, tree)
