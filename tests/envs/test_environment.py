@@ -90,7 +90,7 @@ def test_pictures_are_refused_where_the_engine_draws_none():
 
 def test_the_paper_s_runs_had_easier_thresholds():
     """Any force cuts, and three quarters of the stains may stay (spec 0.1)."""
-    from ig2mj.envs.registry import rules_of
+    from ig2mj.envs.setups import rules_of
 
     task = ACTIVITIES["SlicingFruit"]
     scene = load_scene(task.home, objects=task.objects)

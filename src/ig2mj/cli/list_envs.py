@@ -17,7 +17,7 @@ def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
 
     from ig2mj.cli.printing import make_table, stdout_console
     from ig2mj.envs.names import NAMESPACE, VERSION
-    from ig2mj.tasks.activities import ACTIVITIES
+    from ig2mj.envs.registry import TASKS
 
     if json:
         rows = [
@@ -29,10 +29,10 @@ def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
                 "goal": t.goal,
                 "summary": t.summary,
             }
-            for t in ACTIVITIES.values()
+            for t in TASKS.values()
         ]
         print(form.dumps(rows))
         return 0
-    rows = [(t.name, t.home, ", ".join(t.robots), t.summary) for t in ACTIVITIES.values()]
+    rows = [(t.name, t.home, ", ".join(t.robots), t.summary) for t in TASKS.values()]
     stdout_console().print(make_table("environments", ("name", "home", "robots", "what is to be done"), rows))
     return 0

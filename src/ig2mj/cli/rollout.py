@@ -12,8 +12,8 @@ AGENTS = ("zero", "random")
 def run(
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")],
     agent: str = "random",
-    robot: str = "humanoid",
-    grasping: str = "mitten",
+    robot: str | None = None,
+    grasping: str | None = None,
     engine: str | None = None,
     worlds: int = 1,
     episodes: int = 1,
@@ -28,8 +28,8 @@ def run(
     Args:
       env: CookingMeat, or ig2mj/CookingMeat-v0 (`ig2mj list-envs`).
       agent: who acts: zero (nothing moves) or random.
-      robot: humanoid or fetch.
-      grasping: mitten, assisted, sticky or physical.
+      robot: humanoid, fetch or turtlebot; default: the first that `ig2mj list-envs` names.
+      grasping: mitten, assisted, sticky or physical; default: the task's own.
       engine: native, warp or jax; default: warp on a GPU, else native.
       worlds: how many play at once.
       episodes: how many are played, in all worlds together.
@@ -66,14 +66,14 @@ def run(
         steps += worlds
         for world in np.flatnonzero(np.asarray(state.done))[: episodes - len(returns)]:
             returns.append(float(running[world]))
-            successes += int(np.asarray(state.terminated)[world])
-            in_hand += int(np.asarray(state.info["success_in_hand"])[world])
+            successes += int(np.asarray(state.info["success"])[world])
+            in_hand += int(np.asarray(state.info.get("success_in_hand", state.terminated))[world])
         running[np.asarray(state.done)] = 0.0
     metrics = played.metrics(state)
     result = {
         "env": played.task.name,
-        "robot": robot,
-        "grasping": grasping,
+        "robot": played.robot,
+        "grasping": played.grasping,
         "agent": agent,
         "paper_rl": paper_rl,
         "engine": played.core.engine.name,
@@ -90,7 +90,7 @@ def run(
         print(form.dumps(result))
     else:
         print(
-            f"{played.task.name}, {robot}, {agent}: {successes} of {episodes} episodes succeed, mean return "
+            f"{played.task.name}, {played.robot}, {agent}: {successes} of {episodes} episodes succeed, mean return "
             f"{result['mean_return']:.3f}, {result['steps_per_second']} agent steps/s"
         )
     played.close()

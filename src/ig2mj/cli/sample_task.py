@@ -31,10 +31,13 @@ def run(
     from ig2mj.envs.registry import find_task
     from ig2mj.errors import Ig2mjError
     from ig2mj.tasks.pools import bare_scene, pool_file, pool_of
+    from ig2mj.tasks.task import Task
 
     if count < 0 or jobs < 0:
         raise Ig2mjError(f"--count {count}, --jobs {jobs}: neither can be negative")
     found = find_task(task)
+    if not isinstance(found, Task):
+        raise Ig2mjError(f"{found.name} makes its start states anew each time: there is nothing to keep")
     file = pool_file(found, bare_scene(found), split, count or None)
     if anew:
         file.unlink(missing_ok=True)

@@ -18,7 +18,7 @@ Axes: W worlds, n numbers of an action.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import jax
@@ -42,6 +42,9 @@ from ig2mj.worlds.core import Core
 
 Seed = int | np.integer | Array
 """A whole number, or a key of JAX."""
+
+Companions = Callable[[UInt[Array, "W 2"], Int[Array, "W"]], Float[Array, "W m"]]
+"""Actions of the other robots, from the episode's key and the number of the agent step. Pure."""
 
 
 @struct.dataclass
@@ -105,13 +108,19 @@ class Environment:
         objective: Objective,
         observer: Observer,
         grasping: str,
+        companions: Companions | None = None,
     ):
-        """Binds a core, whose rules have the task's goal if it has one, to rewards and observations."""
+        """Binds a core, whose rules have the task's goal if it has one, to rewards and observations.
+
+        Args:
+          companions: what the scene's other robots do; None: there are none.
+        """
         if core.rules is None:
             raise EngineError("an environment needs a core with rules")
         self.task, self.robot, self.grasping = task, robot, grasping
         self.scene, self.core, self.num_worlds = scene, core, core.engine.num_worlds
         self.objective, self._goal, self._map, self._observer = objective, core.rules.goal, action_map, observer
+        self._companions = companions
         self.action_names, self.observation_spaces = action_map.names, observer.spaces
         self.privileged_names = objective.vectors["privileged_state"]
         self._substeps = round(ACTION_PERIOD / (core.engine.substeps * core.engine.timestep))
@@ -135,7 +144,15 @@ class Environment:
         """The same environment, on the same core, with longer or shorter episodes."""
         task = dataclasses.replace(self.task, horizon=horizon)
         return Environment(
-            task, self.robot, self.scene, self.core, self._map, self.objective, self._observer, self.grasping
+            task,
+            self.robot,
+            self.scene,
+            self.core,
+            self._map,
+            self.objective,
+            self._observer,
+            self.grasping,
+            self._companions,
         )
 
     # Steps.
@@ -153,7 +170,8 @@ class Environment:
 
     def step_fn(self, state: EnvState, action: Float[Array, "W n"]) -> EnvState:
         """`step`, neither checked nor compiled."""
-        robots, bad = self._clean(action)
+        world = state.batch.world
+        robots, bad = self._clean(action, world.key, world.step)
         batch, status = self.core.hold_fn(state.batch, robots, self._substeps)
         world = batch.world
         seen = self._see(
@@ -252,10 +270,17 @@ class Environment:
 
     # What is computed after physics. Pure.
 
-    def _clean_fn(self, action: Float[Array, "W n"]) -> tuple[Float[Array, "W m"], Int[Array, "W"]]:
+    def _clean_fn(
+        self, action: Float[Array, "W n"], key: UInt[Array, "W 2"], control_steps: Int[Array, "W"]
+    ) -> tuple[Float[Array, "W m"], Int[Array, "W"]]:
+        """All robots' actions, and how many numbers of the given one were not finite."""
         action = jnp.asarray(action, jnp.float32)
         fine = jnp.isfinite(action)
-        return self._map(jnp.where(fine, action, 0.0)), (~fine).sum(1).astype(jnp.int32)
+        robots = self._map(jnp.where(fine, action, 0.0))
+        if self._companions is not None:
+            others = self._companions(jnp.asarray(key), jnp.asarray(control_steps) // self._substeps)
+            robots = jnp.concatenate([robots, others], axis=1)
+        return robots, (~fine).sum(1).astype(jnp.int32)
 
     def _after_step(
         self,

@@ -17,6 +17,7 @@ from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.errors import EngineError
 from ig2mj.tasks.experts import Expert
+from ig2mj.tasks.task import Task
 
 
 def expert_of(env: Environment) -> Callable[[EnvState], Float[Array, "W n"]]:
@@ -25,8 +26,8 @@ def expert_of(env: Environment) -> Callable[[EnvState], Float[Array, "W n"]]:
     Raises:
       UnknownNameError: the task has no expert.
     """
-    rules = env.core.rules
-    if rules is None:
-        raise EngineError("an expert needs a core with rules")
-    acts = jax.jit(Expert(env.task, env.robot, env.scene, rules.model, closing=env.grasping != "mitten"))
+    rules, task = env.core.rules, env.task
+    if rules is None or not isinstance(task, Task):
+        raise EngineError(f"{task.name} has no scripted expert")
+    acts = jax.jit(Expert(task, env.robot, env.scene, rules.model, closing=env.grasping != "mitten"))
     return lambda state: acts(state.batch.world.view, state.batch.world.states)

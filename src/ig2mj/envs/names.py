@@ -15,6 +15,11 @@ NAMES = (
     "CookingMeat",
     "SlicingFruit",
     "BimanualPickAndPlace",
+    "PointNavigation",
+    "InteractiveNavigation",
+    "DynamicNavigation",
+    "Reaching",
+    "RoomRearrangement",
 )
 
 _NAME = re.compile(rf"(?:{NAMESPACE}/)?(?P<name>[^/]+?)(?:-v(?P<version>\d+))?")

@@ -86,3 +86,28 @@ def hand_actions(names: Sequence[str], hands: tuple[int, ...], closing: bool) ->
     chosen = [name for hand in wanted for name in hand]
     places = np.array([names.index(name) for name in chosen])
     return ActionMap(tuple(chosen), places, np.array(scale * len(hands), np.float32), rest)
+
+
+DRIVE = ("forward", "turn_left")
+ARM = tuple(f"eef_{n}" for n in _ROTATION)
+
+
+def robot_actions(names: Sequence[str], arm: bool = False, gripper: bool = False) -> ActionMap:
+    """The robot's own numbers, -1 to 1, of its drive, and where they are wanted of its arm and gripper.
+
+    Args:
+      names: of the robot's action (`Controller.action_names`). What is not wanted stays as it is, the gripper open.
+
+    Raises:
+      EngineError: the robot does not drive, or has no arm.
+    """
+    names = tuple(names)
+    wanted = (*DRIVE, *(ARM if arm else ()), *(("gripper",) if gripper else ()))
+    missing = [name for name in wanted if name not in names]
+    if missing:
+        raise EngineError(f"a robot with the actions {', '.join(names[:6])} lacks {', '.join(missing)}")
+    rest = np.zeros(len(names), np.float32)
+    if "gripper" in names:
+        rest[names.index("gripper")] = 1.0
+    places = np.array([names.index(name) for name in wanted])
+    return ActionMap(wanted, places, np.ones(len(wanted), np.float32), rest)

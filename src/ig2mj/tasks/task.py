@@ -113,7 +113,7 @@ class Task:
       stains_of: object whose stains are counted in the reward, or None.
       robots: name of each robot that can do it, and how it takes part.
       held_when_done: success while the first object is in a hand, or in both of several, is reported by itself.
-      horizon: agent steps until an episode is truncated.
+      horizon: agent steps until an episode is truncated. grasping: mode unless another is asked for.
     """
 
     name: str
@@ -129,6 +129,7 @@ class Task:
     stains_of: str | None = None
     held_when_done: bool = False
     horizon: int = HORIZON
+    grasping: str = "mitten"
 
     def acts(self, robot: str) -> Acts:
         """How a robot takes part. Raises UnknownNameError."""

@@ -1,0 +1,111 @@
+"""What an environment of each kind of task is made of: household with robots, start states, objective, actions."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from ig2mj.agents.base import Controller, Robot
+from ig2mj.agents.fetch import Fetch
+from ig2mj.agents.turtlebot import TurtleBot
+from ig2mj.envs.environment import Companions
+from ig2mj.errors import UnknownNameError
+from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.tasks.actions import ActionMap, hand_actions, robot_actions
+from ig2mj.tasks.activity_objective import ActivityObjective
+from ig2mj.tasks.navigation.companions import wanderers
+from ig2mj.tasks.navigation.objective import NavigationObjective
+from ig2mj.tasks.navigation.starts import make_starts
+from ig2mj.tasks.navigation.task import NavigationTask
+from ig2mj.tasks.objective import Objective
+from ig2mj.tasks.pools import pool_of
+from ig2mj.tasks.task import ROBOTS, Task, make_robot
+from ig2mj.worlds.pool import Pool
+from ig2mj.worlds.rules import Rules
+
+PAPER_RL_STAINS = 0.75
+"""Share of the stains that may stay in the paper's runs (spec/robots_tasks_sensors.md section 0.1)."""
+
+DRIVERS: dict[str, Any] = {"turtlebot": TurtleBot, "fetch": Fetch}
+"""Robots of navigation tasks by name."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Setup:
+    """See the module's text.
+
+    Attributes:
+      scene: with its robots; the first is the one that acts. rules: with the task's goal, if it has one.
+      pool: start states. controllers: of all robots. mittens: what mittens stick to. companions: see `Environment`.
+    """
+
+    scene: Scene
+    rules: Rules
+    pool: Pool
+    controllers: tuple[Controller, ...]
+    objective: Objective
+    actions: ActionMap
+    mittens: tuple[str, ...] = ()
+    companions: Companions | None = None
+
+
+def setup_activity(
+    task: Task, robot: str, grasping: str, pool: Pool | None, split: str, count: int | None, paper_rl: bool
+) -> Setup:
+    """Of an activity. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
+    if robot not in ROBOTS:
+        raise UnknownNameError("robot", robot, ROBOTS)
+    body = make_robot(task, robot)
+    scene = load_scene(task.home, agents=[body], objects=task.objects)
+    rules = rules_of(task, scene, paper_rl)
+    controller = body.controller(scene.tables, 0)
+    return Setup(
+        scene,
+        rules,
+        pool if pool is not None else pool_of(task, split, count),
+        (controller,),
+        ActivityObjective(task, robot, scene, rules.model),
+        hand_actions(controller.action_names, task.acts(robot).hands, closing=grasping != "mitten"),
+        task.objects_of_interest[:1],
+    )
+
+
+def setup_navigation(task: NavigationTask, robot: str, split: str, count: int | None) -> Setup:
+    """Of a navigation task. Arguments as of `ig2mj.make`; `count`: start states."""
+    if robot not in task.robots:
+        raise UnknownNameError(f"robot that can do {task.name}", robot, task.robots)
+    others = [TurtleBot(name=f"other_{k}") for k in range(task.others)]
+    robots: list[Robot] = [DRIVERS[robot](), *others]
+    scene = load_scene(task.home, agents=robots, objects=task.objects)
+    rules = Rules.of_scene(scene)
+    starts = make_starts(task, load_scene(task.home, objects=task.objects), scene, rules.initial, split, count)
+    controllers = tuple(r.controller(scene.tables, k) for k, r in enumerate(robots))
+    arm = task.goal in ("reach", "close")
+    companions = None
+    if others:
+        low = np.concatenate([c.action_low for c in controllers[1:]])
+        high = np.concatenate([c.action_high for c in controllers[1:]])
+        companions = wanderers(low.astype(np.float32), high.astype(np.float32))
+    return Setup(
+        scene,
+        rules,
+        starts.pool,
+        controllers,
+        NavigationObjective(task, scene, starts),
+        robot_actions(controllers[0].action_names, arm=arm, gripper=task.goal == "close"),
+        companions=companions,
+    )
+
+
+def rules_of(task: Task, scene: Scene, paper_rl: bool = False) -> Rules:
+    """The states' rules with the task's goal; `paper_rl`: see `ig2mj.make`."""
+    rules = Rules.of_scene(scene)
+    if paper_rl:
+        p = rules.model.parameters
+        force = np.where(np.isfinite(p.slice_force), 0.0, p.slice_force).astype(p.slice_force.dtype)
+        stains = np.where(np.isfinite(p.stained_threshold), PAPER_RL_STAINS, p.stained_threshold)
+        eased = dataclasses.replace(p, slice_force=force, stained_threshold=stains.astype(p.stained_threshold.dtype))
+        rules = Rules(dataclasses.replace(rules.model, parameters=eased), initial=rules.initial)
+    return rules.with_goal(task.goal)

@@ -1,0 +1,278 @@
+"""Start states of navigation tasks: a settled household, the robot anywhere on free floor, a goal.
+
+As in iGibson: start and goal are free places of one floor, `target_dist` apart along it, the robot is turned at random,
+and what is put or opened at random has come to rest. All doors between rooms stand open.
+
+Axes: P rows.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import jax
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.engine.base import Write
+from ig2mj.engine.native.engine import NativeEngine
+from ig2mj.engine.snapshot import Snapshot, fitted
+from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.scene.scene import Scene
+from ig2mj.states.world import ExtendedStates
+from ig2mj.tasks.navigation.floor import FloorMap
+from ig2mj.tasks.navigation.task import NavigationTask
+from ig2mj.tasks.pools import COUNT, SEEDS
+from ig2mj.worlds.pool import Pool
+
+GROUND = ("floors", "carpet", "mat", "rug")
+"""Categories that a robot drives on: touching them is no collision."""
+
+DOORS = ("door",)
+"""Categories that stand wide open."""
+
+OPEN_CHANCE = 0.5
+"""Of each joint of furniture (spec/robots_tasks_sensors.md section 2.3)."""
+
+SETTLE_SECONDS = 5.0
+TRIES = 100
+"""Places tried for a goal, a start or a loose thing (spec section 2.3)."""
+
+YAWS = 4
+"""Directions in which a robot is tried in every cell; it can stand where it can in one of them."""
+
+APART = 0.8
+"""m between robots at the start, and from loose things to the robot."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Starts:
+    """What episodes begin with.
+
+    Attributes:
+      pool: physics and states. floor: where the robot can stand.
+      goals: m, world frame. fields: distance of each cell of the floor to the row's goal. shortest: m, from the start.
+    """
+
+    pool: Pool
+    floor: FloorMap
+    goals: Float[np.ndarray, "P 3"]
+    fields: Float[np.ndarray, "P h w"]
+    shortest: Float[np.ndarray, "P"]
+
+
+def make_starts(
+    task: NavigationTask, bare: Scene, scene: Scene, states: ExtendedStates, split: str, count: int | None = None
+) -> Starts:
+    """Start states of a task, the same for the same split.
+
+    Args:
+      bare: the household without robots; scene: the same with the task's robots. states: extended states of one world.
+      split: "train" or "held_out". count: P; None: as many as pools of that split have.
+
+    Raises:
+      UnknownNameError: no such split. EngineError: the robot finds no place, or no goal at the distance.
+    """
+    if split not in SEEDS:
+        raise UnknownNameError("split", split, SEEDS)
+    rng, count = np.random.default_rng(SEEDS[split]), count or COUNT[split]
+    households = _Households(task, bare)
+    base = fitted(households.still, NativeEngine(scene, 1)._start, 1, scene.name)
+    places = _Places(scene, np.asarray(base.whole("qpos")))
+    floor = places.floor()
+    cells = floor.cells
+    goals, fields, shortest = np.zeros((count, 3)), [], np.zeros(count)
+    rows = []
+    for begin in range(0, count, 64):  # fields of one chunk at a time
+        picked = cells[rng.integers(len(cells), size=min(64, count - begin))]
+        fields.append(floor.distances(picked))
+        goals[begin : begin + len(picked), :2] = floor.centres(picked)
+    fields = np.concatenate(fields)
+    goals[:, 2] = rng.uniform(*task.target_height, size=count)
+    for k in range(count):
+        away = fields[k][floor.free]
+        fit = np.flatnonzero((away >= task.target_dist[0]) & (away <= task.target_dist[1]))
+        if not len(fit):
+            raise EngineError(f"{task.name}: no free floor of '{scene.name}' is {task.target_dist} m from a goal")
+        chosen = _place(places, floor, cells[fit], rng)
+        shortest[k] = away[fit[chosen.cell]]
+        robots = [chosen.pose]
+        for _ in range(task.others):
+            other = _place(places, floor, cells, rng, robots)
+            robots.append(other.pose)
+        keep_off = np.array([pose[:2] for pose in robots])
+        household = households.draw(rng, floor, cells, keep_off)
+        rows.append((household, robots))
+    physics = _snapshots(base, rows, places)
+    one = jax.tree.map(np.asarray, states)
+    worn = jax.tree.map(lambda a: np.broadcast_to(a[0], (count, *a.shape[1:])), one)
+    return Starts(Pool(physics, worn), floor, goals.astype(np.float32), fields, shortest.astype(np.float32))
+
+
+@dataclasses.dataclass(frozen=True)
+class _Placed:
+    cell: int
+    pose: tuple[float, float, float]  # x, y, yaw
+
+
+def _place(
+    places: _Places,
+    floor: FloorMap,
+    cells: np.ndarray,
+    rng: np.random.Generator,
+    others: Sequence[tuple[float, float, float]] = (),
+) -> _Placed:
+    """A place in one of the cells, turned at random, where robot number `len(others)` touches nothing."""
+    taken = np.array([pose[:2] for pose in others]).reshape(-1, 2)
+    for _ in range(TRIES):
+        cell = int(rng.integers(len(cells)))
+        xy = floor.centres(cells[cell][None])[0]
+        pose = float(xy[0]), float(xy[1]), float(rng.uniform(-np.pi, np.pi))
+        if len(taken) and np.linalg.norm(taken - xy, axis=1).min() < APART:
+            continue
+        if places.stands(len(others), pose):
+            return _Placed(cell, pose)
+    raise EngineError(f"in {TRIES} places of '{places.scene.name}' a robot of the task collides with something")
+
+
+def _snapshots(base: Snapshot, rows: list, places: _Places) -> Snapshot:
+    """One row for each pair of a household (None: the base's) and poses of the robots."""
+    whole = [base if household is None else _with_household(base, household) for household, _ in rows]
+    if all(household is None for household, _ in rows):
+        physics = jax.tree.map(lambda a: np.broadcast_to(a, (len(rows), *np.shape(a))), base)
+    else:
+        physics = jax.tree.map(lambda *a: np.stack(a), *whole)
+    qpos = np.array(physics.whole("qpos"))
+    for k, (_, robots) in enumerate(rows):
+        for number, pose in enumerate(robots):
+            qpos[k, places.address[number] : places.address[number] + 7] = places.free_joint(number, pose)
+    return physics.with_whole(qpos=qpos)
+
+
+def _with_household(base: Snapshot, household: Snapshot) -> Snapshot:
+    return dataclasses.replace(base, scene=household.scene, time=household.time)
+
+
+class _Places:
+    """Where the robots of a scene can stand in its settled household."""
+
+    def __init__(self, scene: Scene, qpos: Float[np.ndarray, "nq"]):
+        self.scene, tables, model = scene, scene.tables, scene.model
+        joints = [int(model.body_jntadr[b]) for b in tables.agent_body]
+        self.address = [int(model.jnt_qposadr[j]) for j in joints]
+        self._data, self._start = mujoco.MjData(model), np.array(qpos, float)
+        agent = tables.body_agent[model.geom_bodyid]
+        self._agent = agent
+        ground = np.isin(np.array(tables.object_categories), GROUND)
+        self._ground = (tables.geom_object >= 0) & ground[tables.geom_object]
+        self._away = np.array([1000.0, 1000.0, 0.0])
+        self._data.qpos[:] = self._start
+        for number in range(len(joints)):
+            self._hide(number)
+
+    def _hide(self, number: int) -> None:
+        at = self.address[number]
+        self._data.qpos[at : at + 3] = self._away + np.array([10.0 * number, 0.0, 0.0])
+
+    def free_joint(self, number: int, pose: tuple[float, float, float]) -> Float[np.ndarray, "7"]:
+        """Coordinates of a robot's free joint at x, y (m) and yaw (rad), at its start's height."""
+        x, y, yaw = pose
+        height = self._start[self.address[number] + 2]
+        return np.array([x, y, height, np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)])
+
+    def stands(self, number: int, pose: tuple[float, float, float]) -> bool:
+        """Whether a robot touches nothing but the ground there."""
+        model, data = self.scene.model, self._data
+        at = self.address[number]
+        data.qpos[at : at + 7] = self.free_joint(number, pose)
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_collision(model, data)
+        geom, apart = data.contact.geom, data.contact.dist
+        own = self._agent[geom] == number
+        other = geom[own.any(1) & ~own.all(1) & (apart <= 0)]
+        self._hide(number)
+        return bool((self._ground[other] | (self._agent[other] == number)).all())
+
+    def floor(self) -> FloorMap:
+        """Where the first robot can stand."""
+        rooms = self.scene.rooms
+        if rooms is None or rooms.traversable is None:
+            raise EngineError(f"'{self.scene.name}' has no map of its free floor (rooms.npz)")
+        size, resolution = len(rooms.traversable), rooms.trav_resolution
+        free = np.zeros((size, size), bool)
+        for row, column in np.argwhere(rooms.traversable):
+            x, y = (np.array([column, row]) + 0.5 - size / 2) * resolution
+            free[row, column] = any(self.stands(0, (x, y, 2 * np.pi * k / YAWS)) for k in range(YAWS))
+        try:
+            return FloorMap.of_cells(free, resolution)
+        except ValueError:
+            raise EngineError(f"the robot can stand nowhere in '{self.scene.name}'") from None
+
+
+class _Households:
+    """The household of a task, at rest with its doors open; `still`: with nothing put about or opened."""
+
+    def __init__(self, task: NavigationTask, bare: Scene):
+        self._task, self._scene = task, bare
+        self._engine = NativeEngine(bare, 1)
+        tables = bare.tables
+        categories = np.array(tables.object_categories)[tables.openable_object]
+        doors = np.flatnonzero(np.isin(categories, DOORS))
+        self._joints = np.flatnonzero(np.isin(categories, task.opened))
+        self.still = self._settled(doors, tables.openable_open[doors], {})
+
+    def draw(
+        self, rng: np.random.Generator, floor: FloorMap, cells: np.ndarray, keep_off: Float[np.ndarray, "n 2"]
+    ) -> Snapshot | None:
+        """The household of a row; None: the still one. `keep_off`: where the robots stand."""
+        task, tables = self._task, self._scene.tables
+        if not len(self._joints) and not task.objects:
+            return None
+        opened = self._joints[rng.random(len(self._joints)) < OPEN_CHANCE]
+        closed, end = tables.openable_closed[opened], tables.openable_open[opened]
+        spots: dict[str, np.ndarray] = {}
+        taken = keep_off
+        for addition in self._scene.additions:
+            for _ in range(TRIES):
+                xy = floor.centres(cells[rng.integers(len(cells), size=1)])[0]
+                if np.linalg.norm(taken - xy, axis=1).min() >= APART:
+                    break
+            else:
+                raise EngineError(f"{task.name}: no free floor is left for '{addition.name}'")
+            taken = np.concatenate([taken, xy[None]])
+            spots[addition.name] = np.array([*xy, rng.uniform(-np.pi, np.pi)])
+        return self._settled(opened, closed + rng.random(len(opened)) * (end - closed), spots, self.still)
+
+    def _settled(
+        self, joints: np.ndarray, values: np.ndarray, spots: dict[str, np.ndarray], start: Snapshot | None = None
+    ) -> Snapshot:
+        """The household after joints were opened and things were put down, at rest."""
+        engine, tables = self._engine, self._scene.tables
+        physics = engine.reset() if start is None else engine.load(engine.reset(), start)
+        model = self._scene.model
+        mask, qpos = np.zeros((1, model.nq), bool), np.zeros((1, model.nq))
+        address = tables.openable_qposadr[joints]
+        mask[0, address], qpos[0, address] = True, values
+        moved = np.zeros((1, tables.num_objects), bool)
+        view = engine.view(physics)
+        pos, quat = np.array(view.object_pos), np.array(view.object_quat)
+        for name, (x, y, yaw) in spots.items():
+            k = self._scene.object_index(name)
+            lift = float(view.object_pos[0, k, 2] - view.aabb_low[0, k, 2])
+            moved[0, k], pos[0, k], quat[0, k] = True, (x, y, lift + 0.005), _turned(yaw, quat[0, k])
+        write = Write(object_mask=moved, object_pos=pos, object_quat=quat, qpos_mask=mask, qpos=qpos)
+        physics = engine.write(physics, write)
+        for _ in range(round(SETTLE_SECONDS / (engine.substeps * engine.timestep))):
+            physics, view = engine.step(physics)
+            if not np.asarray(view.awake).any():
+                break
+        return engine.export(physics, 0)
+
+
+def _turned(yaw: float, quat: Float[np.ndarray, "4"]) -> Float[np.ndarray, "4"]:
+    out = np.zeros(4)
+    mujoco.mju_mulQuat(out, np.array([np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)]), quat.astype(float))
+    return out

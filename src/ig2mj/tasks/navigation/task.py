@@ -1,0 +1,106 @@
+"""`NavigationTask`: where a robot is to go, or to reach, or what it is to close, as data.
+
+The rules and their figures are iGibson's (spec/robots_tasks_sensors.md sections 2.2 to 2.4).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+GOALS = ("point", "reach", "close")
+"""Kinds of goals: the base at a point of the floor; the first hand at a point in the air; furniture closed."""
+
+
+@dataclasses.dataclass(frozen=True)
+class NavigationTask:
+    """See the module's text.
+
+    Attributes:
+      name: as `ig2mj.make` takes it. summary: one sentence. home: a shipped home.
+      robots: names of those that can do it; the first is the usual one.
+      goal: one of `GOALS`.
+      objects: of the object library, put on free floor at random in every episode.
+      others: how many TurtleBots drive about at random.
+      opened: categories of furniture whose joints are opened at random.
+      target_dist: m along the floor from the start to the target, least and most.
+      target_height: m above the floor, least and most, of a target to reach.
+      tolerance: m from the target at which it is reached.
+      geodesic: the potential is the length of the shortest way on the floor, not of the straight line.
+      success_reward, potential_weight, collision_reward: of the reward's terms.
+      prismatic_weight, revolute_weight: of the opening of drawers (1 / m) and doors (1 / rad) in the potential.
+      max_collisions: agent steps with a collision after which an episode fails.
+      fall: m below its start at which the robot has fallen off.
+      horizon: agent steps until an episode is truncated. grasping: mode unless another is asked for.
+    """
+
+    name: str
+    summary: str
+    robots: tuple[str, ...]
+    goal: str = "point"
+    home: str = "birch"
+    objects: tuple[str, ...] = ()
+    others: int = 0
+    opened: tuple[str, ...] = ()
+    target_dist: tuple[float, float] = (1.0, 10.0)
+    target_height: tuple[float, float] = (0.0, 0.0)
+    tolerance: float = 0.36
+    geodesic: bool = True
+    success_reward: float = 10.0
+    potential_weight: float = 1.0
+    collision_reward: float = -0.1
+    prismatic_weight: float = 1.0
+    revolute_weight: float = 1.0
+    max_collisions: int = 500
+    fall: float = 0.03
+    horizon: int = 500
+    grasping: str = "physical"
+
+
+_LOOSE = ("canned_food", "cracker_box", "sugar_jar", "soup", "mayonnaise")
+"""In place of the YCB data set's coffee can, crackers, sugar, tomato soup and mustard, which iGibson takes."""
+
+_FURNITURE = (
+    *("bottom_cabinet", "bottom_cabinet_no_top", "top_cabinet", "dishwasher", "fridge", "microwave", "oven"),
+    *("washer", "dryer"),
+)
+"""iGibson's list. A forgotten comma joins its last two names to `washerdryer`, so that it never opens either."""
+
+NAVIGATION: dict[str, NavigationTask] = {
+    task.name: task
+    for task in (
+        NavigationTask("PointNavigation", "Drive to a point of the floor.", ("turtlebot", "fetch")),
+        NavigationTask(
+            "InteractiveNavigation",
+            "Drive to a point of the floor on which five things lie about.",
+            ("turtlebot", "fetch"),
+            objects=_LOOSE,
+        ),
+        NavigationTask(
+            "DynamicNavigation",
+            "Drive to a point of the floor on which another robot drives about.",
+            ("turtlebot", "fetch"),
+            others=1,
+        ),
+        NavigationTask(
+            "Reaching",
+            "Bring the gripper to a point in the air.",
+            ("fetch",),
+            goal="reach",
+            target_dist=(1.0, 3.0),
+            target_height=(0.0, 1.0),
+            tolerance=0.1,
+            geodesic=False,
+        ),
+        NavigationTask(
+            "RoomRearrangement",
+            "Close the doors and drawers that stand open.",
+            ("fetch",),
+            goal="close",
+            opened=_FURNITURE,
+            prismatic_weight=3.0,
+            collision_reward=0.0,
+        ),
+    )
+}
+"""Tasks by name. Targets of `Reaching` are at most 3 m away, where iGibson's are up to 10: its potential is the
+straight line, which leads through walls. The tolerance of navigation is that of iGibson's TurtleBot, 0.36 m."""
