@@ -136,6 +136,11 @@ class Environment:
             self._autoreset = self.step_autoreset_fn
 
     @property
+    def pure(self) -> bool:
+        """`step_fn`, `step_autoreset_fn` and `reset_fn` may be part of a compiled program."""
+        return self.core.engine.pure
+
+    @property
     def action_space(self) -> Space:
         """Of one world."""
         return Space((self._map.size,), np.float32, -1.0, 1.0)

@@ -1,0 +1,126 @@
+"""Updates a second of the learners alone: no environment, a rollout of made-up numbers.
+
+    python benchmarks/learner.py --algo sac --batch 1024 [--obs rgbd] [--set updates=64]
+
+An iteration is what `ig2mj train` does after the worlds have stepped: the rollout goes into the replay buffer and all
+updates of the iteration are made, in one program. The buffer holds `--capacity` steps.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import pathlib
+import time
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ig2mj.envs.observations import Space
+from ig2mj.learn.collect import Transition
+from ig2mj.learn.options import configured
+from ig2mj.learn.perception import Perception, Seen
+from ig2mj.learn.ppo import PPO, PPOConfig
+from ig2mj.learn.sac import SAC, SACConfig
+
+PROPRIOCEPTION, PRIVILEGED, ACTIONS = 40, 60, 6
+"""Numbers of a humanoid with one hand in CookingMeat, about."""
+
+
+def spaces(obs: str) -> dict[str, Space]:
+    """Observations of the size of an activity's."""
+    found = {
+        "proprioception": Space((PROPRIOCEPTION,), np.float32, -np.inf, np.inf),
+        "privileged_state": Space((PRIVILEGED,), np.float32, -np.inf, np.inf),
+    }
+    if obs == "rgbd":
+        found["rgb"] = Space((128, 128, 3), np.uint8, 0.0, 255.0)
+        found["depth"] = Space((128, 128, 1), np.float32, 0.0, 10.0)
+    return found
+
+
+def made_up(algorithm: SAC | PPO, worlds: int) -> Transition:
+    """A rollout of random numbers, in which one episode of two hundred ends at each step."""
+    perception, length, rng = algorithm.perception, algorithm.length, np.random.default_rng(0)
+    shape = perception.picture_shape
+    size = 0 if shape is None else int(np.prod(shape))
+
+    def normal(*tail: int) -> jax.Array:
+        return jnp.asarray(rng.standard_normal((length, worlds, *tail)), jnp.float32)
+
+    def seen() -> Seen:
+        pictures = rng.integers(0, 256, (length, worlds, size), np.uint8)
+        return Seen(normal(perception.vector_size), jnp.asarray(pictures))
+
+    ends = rng.random((length, worlds)) < 0.005
+    raw = normal(ACTIONS)
+    extra = {"raw": raw, "chance": normal()} if algorithm.name == "ppo" else {}
+    terminated = jnp.asarray(ends & (rng.random((length, worlds)) < 0.5))
+    return Transition(seen(), jnp.tanh(raw), extra, normal(), terminated, jnp.asarray(ends) & ~terminated, seen())
+
+
+def main() -> None:
+    """Measures one setting, and prints one line of JSON."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--algo", default="sac", choices=("sac", "ppo"))
+    parser.add_argument("--obs", default="state", choices=("state", "rgbd"))
+    parser.add_argument("--worlds", type=int, default=2048)
+    parser.add_argument("--batch", type=int, default=0, help="SAC's samples of an update")
+    parser.add_argument("--capacity", type=int, default=0, help="SAC's replay buffer, steps of all worlds together")
+    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--set", nargs="*", default=[], metavar="NAME=VALUE")
+    parser.add_argument("--out", type=pathlib.Path)
+    args = parser.parse_args()
+    perception = Perception(spaces(args.obs), args.obs)
+    changes = list(args.set)
+    changes += [f"batch={args.batch}"] * bool(args.batch) + [f"capacity={args.capacity}"] * bool(args.capacity)
+    if args.algo == "sac":
+        algorithm = SAC(perception, ACTIONS, configured(SACConfig(), changes))
+    else:
+        algorithm = PPO(perception, ACTIONS, configured(PPOConfig(), changes))
+    learner, memory = algorithm.init(jax.random.PRNGKey(0)), algorithm.memory(args.worlds)
+    rollout = made_up(algorithm, args.worlds)
+    learn = jax.jit(algorithm.learn, donate_argnums=(0, 1))
+
+    def iteration(learner, memory, key, ready):  # type: ignore[no-untyped-def]
+        return learn(learner, memory, rollout, key, jnp.float32(0), jnp.bool_(ready))
+
+    began = time.perf_counter()
+    key = jax.random.PRNGKey(1)
+    learner, memory, losses = jax.block_until_ready(iteration(learner, memory, key, False))
+    compile_s = time.perf_counter() - began
+    # the buffer is filled before the clock starts
+    rows = memory.replay.capacity // algorithm.length if args.algo == "sac" else 1
+    for _ in range(rows):
+        learner, memory, losses = iteration(learner, memory, key, False)
+    learner, memory, losses = jax.block_until_ready(iteration(learner, memory, key, True))
+    times, began = [], time.perf_counter()
+    while time.perf_counter() - began < args.seconds:
+        key, now = jax.random.split(key)
+        start = time.perf_counter()
+        learner, memory, losses = jax.block_until_ready(iteration(learner, memory, now, True))
+        times.append(time.perf_counter() - start)
+    seconds = float(np.median(times))
+    weights = sum(a.size for a in jax.tree.leaves(learner.actor))
+    row = {
+        "algo": args.algo,
+        "obs": args.obs,
+        "worlds": args.worlds,
+        "batch": algorithm.config.batch if args.algo == "sac" else algorithm.length * args.worlds // algorithm.config.parts,
+        "updates_per_iteration": algorithm.samples,
+        "updates_per_second": round(algorithm.samples / seconds, 1),
+        "iteration_ms": round(1e3 * seconds, 3),
+        "compile_s": round(compile_s, 1),
+        "actor_weights": weights,
+        "device": jax.devices()[0].device_kind,
+        "settings": changes,
+    }  # fmt: skip
+    print(json.dumps(row))
+    if args.out:
+        with args.out.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(row) + "\n")
+
+
+if __name__ == "__main__":
+    main()

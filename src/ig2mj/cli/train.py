@@ -1,0 +1,114 @@
+"""`ig2mj train ENV`: trains a policy, with reports, checkpoints and a policy file in a folder of its own."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import Annotated
+
+import tyro
+
+ALGORITHMS = ("sac", "ppo")
+
+WORLDS = {"native": 16}
+"""So many worlds unless another number is asked for; `PURE_WORLDS` on the others."""
+
+PURE_WORLDS = 2048
+
+
+def run(
+    env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")],
+    algo: str = "sac",
+    robot: str = "humanoid",
+    grasping: str = "mitten",
+    obs: str = "state",
+    engine: str | None = None,
+    worlds: int = 0,
+    minutes: float = 10.0,
+    seed: int = 0,
+    out: pathlib.Path | None = None,
+    resume: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    save_buffer: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    until: float | None = None,
+    paper_rl: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    pool_size: int = 0,
+    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = (),
+) -> int:
+    """Train a policy.
+
+    Args:
+      env: CookingMeat, or ig2mj/CookingMeat-v0 (`ig2mj list-envs`).
+      algo: sac or ppo.
+      robot: humanoid or fetch.
+      grasping: mitten, assisted, sticky or physical.
+      obs: state (proprioception and privileged state) or rgbd (what the paper's agents see; needs the warp engine).
+      engine: native, warp or jax; default: warp on a GPU, else native.
+      worlds: how many play at once; 0: 2048, natively 16.
+      minutes: of training; compiling is not counted.
+      seed: of everything random.
+      out: folder of the run; default: runs/ENV-ROBOT-GRASPING-ALGO-OBS-SEED.
+      resume: go on from the newest checkpoint in the folder.
+      save_buffer: checkpoints hold the replay buffer, too; without it a resumed run first plays it full again.
+      until: stop once so large a share of the last episodes succeeds (0.98).
+      paper_rl: the thresholds that the paper's runs had.
+      pool_size: start states; 0: as many as the split has.
+      set: settings of the algorithm, as updates=16 or actor=128,128.
+    """
+    import dataclasses
+    import platform
+    import shlex
+    import sys
+
+    import jax
+
+    from ig2mj.envs.registry import VECTORS, make
+    from ig2mj.errors import Ig2mjError, UnknownNameError
+    from ig2mj.learn.options import configured
+    from ig2mj.learn.perception import MODES, Perception
+    from ig2mj.learn.policies import Policy, depends_on
+    from ig2mj.learn.ppo import PPO, PPOConfig
+    from ig2mj.learn.sac import SAC, SACConfig
+    from ig2mj.learn.train import Run, train
+
+    if algo not in ALGORITHMS:
+        raise UnknownNameError("algorithm", algo, ALGORITHMS)
+    if obs not in MODES:
+        raise UnknownNameError("kind of observation", obs, MODES)
+    if minutes <= 0:
+        raise Ig2mjError(f"--minutes {minutes}: more than 0 is needed")
+    config = configured({"sac": SACConfig(), "ppo": PPOConfig()}[algo], set)
+    if engine is None:
+        engine = "warp" if jax.default_backend() == "gpu" else "native"
+    names = VECTORS if obs == "state" else (*VECTORS, "rgb", "depth")
+    count = worlds or WORLDS.get(engine, PURE_WORLDS)
+    world = make(
+        env, robot, count, engine, grasping, observations=names, paper_rl=paper_rl, pool_size=pool_size or None
+    )  # fmt: skip
+    perception = Perception(world.observation_spaces, obs)
+    size = world.action_space.shape[0]
+    algorithm = SAC(perception, size, config) if isinstance(config, SACConfig) else PPO(perception, size, config)
+    if out is None:
+        out = pathlib.Path("runs") / "-".join([world.task.name, robot, grasping, algo, obs, str(seed)])
+    depends = {**depends_on(world, perception), "paper_rl": paper_rl}
+    settings = Run(minutes, None, seed, out, resume, save_buffer, until=until)
+    result = train(world, algorithm, settings, depends)
+    device = jax.devices()[0]
+    made = {
+        "command": shlex.join(["ig2mj", *sys.argv[1:]]),
+        "algorithm": algo,
+        "settings": dataclasses.asdict(config),
+        "seed": seed,
+        "worlds": count,
+        "engine": engine,
+        "device": f"{device.device_kind} ({platform.machine()})",
+        "minutes": round(result.row["seconds"] / 60, 2),
+        "compile_s": round(result.compile_s, 1),
+        "env_steps": result.row["env_steps"],
+        "training_success": result.row.get("success"),
+        "scene": world.scene.digest,
+        "paper_rl": paper_rl,
+    }
+    file = out / "policy.npz"
+    Policy.of(algorithm, result.learner, depends_on(world, perception), made).save(file)
+    print(file)
+    print(f"how good it is on states it has not seen: ig2mj evaluate {file}", file=sys.stderr)
+    return 0

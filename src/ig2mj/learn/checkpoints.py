@@ -1,0 +1,120 @@
+"""Checkpoints of a run: what was learned, written so that a kill at any moment leaves the one before.
+
+A folder `checkpoints/<iteration>` holds the arrays (orbax) and `meta.json`. It is written under another name and then
+renamed; the newest three are kept. A broken one is passed over for the one before, with a line that says so.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+import shutil
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+import jax
+import numpy as np
+
+from ig2mj.errors import InputError
+
+KEPT = 3
+"""Checkpoints of a run that stay."""
+
+
+class Checkpoints:
+    """Those of one run's folder."""
+
+    def __init__(self, run: str | os.PathLike):
+        """`run`: the run's folder; made when something is saved."""
+        self.folder = pathlib.Path(run).absolute() / "checkpoints"
+
+    def numbers(self) -> list[int]:
+        """Iterations of which there is a checkpoint, oldest first."""
+        if not self.folder.is_dir():
+            return []
+        return sorted(int(f.name) for f in self.folder.iterdir() if f.name.isdigit())
+
+    def save(self, number: int, tree: Any, meta: Mapping[str, Any]) -> pathlib.Path:
+        """Writes a checkpoint, and removes the oldest.
+
+        Args:
+          number: of the iteration. tree: arrays. meta: for JSON; counters, and what the run depends on.
+        """
+        import orbax.checkpoint as ocp
+
+        self.folder.mkdir(parents=True, exist_ok=True)
+        target, beside = self.folder / str(number), self.folder / f".{os.getpid()}-{number}"
+        shutil.rmtree(beside, ignore_errors=True)
+        beside.mkdir()
+        with ocp.StandardCheckpointer() as writer:
+            writer.save(beside / "arrays", _leaves(tree))
+        (beside / "meta.json").write_text(json.dumps(meta, indent=1), encoding="utf-8")
+        if target.exists():
+            shutil.rmtree(target)
+        beside.replace(target)
+        for old in self.numbers()[:-KEPT]:
+            shutil.rmtree(self.folder / str(old), ignore_errors=True)
+        for left in self.folder.glob(".*-*"):  # of a process that was killed while it wrote
+            shutil.rmtree(left, ignore_errors=True)
+        return target
+
+    def meta(self, number: int) -> dict[str, Any]:
+        """Of one checkpoint. Raises InputError."""
+        file = self.folder / str(number) / "meta.json"
+        try:
+            return json.loads(file.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as e:
+            raise InputError(file, f"cannot be read: {e}") from e
+
+    def newest(self, like: Any, depends: Mapping[str, Any]) -> tuple[Any, dict[str, Any]] | None:
+        """The newest checkpoint that can be read; None where there is none.
+
+        Args:
+          like: arrays of the shapes that are expected. depends: what the run depends on; `meta["depends"]` must be the
+            same.
+
+        Raises:
+          InputError: a checkpoint is of another run: the message names the setting that differs.
+        """
+        import orbax.checkpoint as ocp
+
+        for number in reversed(self.numbers()):
+            folder = self.folder / str(number)
+            try:
+                meta = self.meta(number)
+            except InputError as e:
+                print(f"{e}; the checkpoint before it is taken", file=sys.stderr)
+                continue
+            refuse_difference(folder, meta["depends"], depends)
+            try:
+                with ocp.StandardCheckpointer() as reader:
+                    leaves = reader.restore(folder / "arrays", _leaves(like))
+            except Exception as e:  # what orbax raises for half a file has no type of its own
+                why = " ".join(str(e).split())[:120]
+                print(f"{folder}: broken ({why}); the checkpoint before it is taken", file=sys.stderr)
+                continue
+            arrays = [jax.numpy.asarray(leaves[name]) for name in _leaves(like)]
+            return jax.tree.unflatten(jax.tree.structure(like), arrays), meta
+        return None
+
+
+def _leaves(tree: Any) -> dict[str, np.ndarray]:
+    """Arrays by their path in a tree."""
+    return {jax.tree_util.keystr(path): np.asarray(a) for path, a in jax.tree_util.tree_leaves_with_path(tree)}
+
+
+def refuse_difference(file: object, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
+    """Raises InputError for the first setting that differs, with both values."""
+    as_read = json.loads(json.dumps(dict(wanted)))
+    for name in [*as_read, *(n for n in found if n not in as_read)]:
+        if found.get(name) != as_read.get(name):
+            raise InputError(
+                file, f"is for {name} = {_short(found.get(name))}, and here it is {_short(as_read.get(name))}"
+            )
+
+
+def _short(value: Any) -> str:
+    text = json.dumps(value)
+    return text if len(text) < 100 else f"{text[:90]} ..."

@@ -1,0 +1,93 @@
+"""What a run reports: a line on the terminal, `progress.csv`, and TensorBoard's file."""
+
+from __future__ import annotations
+
+import csv
+import os
+import pathlib
+import sys
+from collections.abc import Mapping
+from typing import Any
+
+
+class Log:
+    """Writes rows of numbers to a run's folder."""
+
+    def __init__(self, run: str | os.PathLike | None, *, tensorboard: bool = True, quiet: bool = False):
+        """
+        Args:
+          run: the folder; None: only the terminal. tensorboard: also for TensorBoard, where tensorboardX is installed.
+          quiet: nothing on the terminal.
+        """
+        self._folder = None if run is None else pathlib.Path(run)
+        self._quiet, self._board = quiet, None
+        if self._folder is not None:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            if tensorboard:
+                try:
+                    from tensorboardX import SummaryWriter
+                except ModuleNotFoundError:
+                    print("no TensorBoard file: the package tensorboardX is not installed", file=sys.stderr)
+                else:
+                    self._board = SummaryWriter(str(self._folder), flush_secs=10)
+
+    def forget_after(self, seconds: float) -> None:
+        """Drops rows that a resumed run will write anew: those after its checkpoint."""
+        file = self._file
+        if file is None or not file.exists():
+            return
+        with file.open(newline="", encoding="utf-8") as f:
+            rows = [r for r in csv.DictReader(f) if r.get("seconds") and float(r["seconds"]) <= seconds]
+        file.unlink()
+        for row in rows:
+            self._append(file, row)
+
+    def row(self, values: Mapping[str, float | int | None]) -> None:
+        """One row: a line on the terminal, a line of the CSV, a point of every curve."""
+        if self._file is not None:
+            self._append(self._file, {k: _number(v) for k, v in values.items()})
+        if self._board is not None:
+            for name, value in values.items():
+                if value is not None and name != "env_steps":
+                    self._board.add_scalar(name, value, int(values["env_steps"] or 0))
+        if not self._quiet:
+            print(_line(values), file=sys.stderr, flush=True)
+
+    def close(self) -> None:
+        """Ends TensorBoard's file."""
+        if self._board is not None:
+            self._board.close()
+
+    @property
+    def _file(self) -> pathlib.Path | None:
+        return None if self._folder is None else self._folder / "progress.csv"
+
+    def _append(self, file: pathlib.Path, row: Mapping[str, Any]) -> None:
+        new = not file.exists()
+        names = list(row)
+        if not new:
+            with file.open(newline="", encoding="utf-8") as f:
+                names = next(csv.reader(f), names)
+        with file.open("a", newline="", encoding="utf-8") as f:
+            writer = csv.DictWriter(f, names, restval="", extrasaction="ignore")
+            if new:
+                writer.writeheader()
+            writer.writerow(row)
+
+
+def _number(value: float | int | None) -> str:
+    if value is None:
+        return ""
+    return f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def _line(v: Mapping[str, Any]) -> str:
+    def told(name: str, form: str) -> str:
+        return "-" if v.get(name) is None else format(v[name], form)
+
+    return (
+        f"{v['seconds']:7.1f} s  {v['env_steps'] / 1e6:7.3f} M steps  return {told('return', '.3f')}  "
+        f"success {told('success', '.1%')}  {v['steps_per_second']:,.0f} steps/s  "
+        f"{v['updates_per_second']:,.0f} updates/s  learner {told('learner_share', '.0%')}  "
+        f"simulator {told('simulator_share', '.0%')}"
+    )

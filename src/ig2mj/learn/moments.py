@@ -1,0 +1,95 @@
+"""Running means, deviations and scales. With `axis`, over all devices of that axis of a `shard_map`.
+
+Axes: W worlds, T steps, v numbers.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from flax import struct
+from jaxtyping import Bool, Float
+
+from ig2mj.engine.view import Array
+
+LIMIT = 10.0
+"""Normalized numbers are clipped to this."""
+
+
+@struct.dataclass
+class Moments:
+    """Mean and variance of every number of a vector. `count`: how many samples they are of."""
+
+    mean: Float[Array, "v"]
+    var: Float[Array, "v"]
+    count: Float[Array, ""]
+
+    @classmethod
+    def initial(cls, size: int) -> Moments:
+        """Of nothing yet: `normal` changes nothing."""
+        return cls(jnp.zeros(size), jnp.ones(size), jnp.float32(0))
+
+    def update(self, values: Float[Array, "*b v"], axis: str | None = None) -> Moments:
+        """With more samples."""
+        flat = values.reshape(-1, values.shape[-1])
+        mean, square, count = flat.mean(0), jnp.square(flat - self.mean).mean(0), jnp.float32(flat.shape[0])
+        mean, square = average((mean, square), axis)
+        if axis is not None:
+            count = jax.lax.psum(count, axis)
+        total = self.count + count
+        change = mean - self.mean
+        new = (self.var * self.count + square * count) / total - jnp.square(change * count / total)
+        return Moments(self.mean + change * count / total, jnp.maximum(new, 0.0), total)
+
+    def normal(self, values: Float[Array, "*b x"]) -> Float[Array, "*b x"]:
+        """The first x numbers of a vector with mean 0 and deviation 1; those that never change are 0."""
+        size = values.shape[-1]
+        deviation = jnp.sqrt(self.var[:size] + 1e-4)
+        return jnp.clip((values - self.mean[:size]) / deviation, -LIMIT, LIMIT)
+
+
+@struct.dataclass
+class RewardScale:
+    """How large discounted returns are, for rewards of a common size.
+
+    Attributes:
+      running: return of each world so far, discounted forwards. var: of it. largest: its largest absolute value.
+    """
+
+    running: Float[Array, "W"]
+    var: Float[Array, ""]
+    largest: Float[Array, ""]
+    count: Float[Array, ""]
+
+    @classmethod
+    def initial(cls, num_worlds: int) -> RewardScale:
+        """Before the first reward."""
+        return cls(jnp.zeros(num_worlds), jnp.float32(0), jnp.float32(0), jnp.float32(0))
+
+    def update(
+        self, reward: Float[Array, "T W"], done: Bool[Array, "T W"], gamma: float, axis: str | None = None
+    ) -> RewardScale:
+        """After more steps."""
+
+        def step(running: Array, now: tuple[Array, Array]) -> tuple[Array, Array]:
+            running = running * gamma + now[0]
+            return jnp.where(now[1], 0.0, running), running
+
+        running, returns = jax.lax.scan(step, self.running, (reward, done))
+        square, largest = average(jnp.square(returns).mean(), axis), jnp.abs(returns).max()
+        if axis is not None:
+            largest = jax.lax.pmax(largest, axis)
+        share = reward.shape[0] / (self.count + reward.shape[0])
+        var = self.var + jnp.maximum(share, 1e-3) * (square - self.var)
+        return RewardScale(running, var, jnp.maximum(self.largest, largest), self.count + reward.shape[0])
+
+    def factor(self, largest: float) -> Float[Array, ""]:
+        """What rewards are multiplied with: returns then have deviation 1 at most, and at most the size `largest`."""
+        return 1.0 / jnp.maximum(jnp.maximum(jnp.sqrt(self.var), self.largest / largest), 1e-3)
+
+
+def average(tree: Any, axis: str | None) -> Any:
+    """Over the devices of an axis; without one, as it is."""
+    return tree if axis is None else jax.lax.pmean(tree, axis)

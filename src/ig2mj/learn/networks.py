@@ -1,0 +1,125 @@
+"""Networks: an actor with or without an encoder of pictures, two distributional critics, and a value.
+
+Axes: B samples, n numbers of an action, K atoms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import flax.linen as nn
+import jax
+import jax.numpy as jnp
+from jaxtyping import Float, UInt8
+
+from ig2mj.engine.view import Array
+
+LOG_STD = (-5.0, 0.0)
+"""Limits of the logarithm of an actor's standard deviation, before tanh (FlashSAC's recommendation)."""
+
+FIRST_STD = 0.3
+"""Standard deviation of an untrained actor."""
+
+NETS = ("small", "paper")
+
+
+class Trunk(nn.Module):
+    """Dense layers, each with layer normalization and SiLU."""
+
+    sizes: Sequence[int]
+
+    @nn.compact
+    def __call__(self, x: Float[Array, "B x"]) -> Float[Array, "B y"]:
+        for size in self.sizes:
+            x = nn.silu(nn.LayerNorm()(nn.Dense(size, kernel_init=nn.initializers.orthogonal(2**0.5))(x)))
+        return x
+
+
+class Encoder(nn.Module):
+    """Features of pictures.
+
+    `small`: three convolutions (32, 64, 64) of stride 2 and 50 numbers between -1 and 1, as in Squint. `paper`: three
+    convolutions and 256 numbers (iGibson 2.0, appendix A.3).
+    """
+
+    shape: tuple[int, int, int]
+    net: str = "small"
+
+    @nn.compact
+    def __call__(self, picture: UInt8[Array, "B q"]) -> Float[Array, "B f"]:
+        x = picture.reshape(-1, *self.shape).astype(jnp.float32) / 255.0 - 0.5
+        for channels in (32, 64, 64):
+            x = nn.relu(nn.Conv(channels, (3, 3), strides=2, padding="SAME")(x))
+        x = x.reshape(x.shape[0], -1)
+        if self.net == "paper":
+            return nn.relu(nn.Dense(256)(x))
+        return jnp.tanh(nn.LayerNorm()(nn.Dense(50)(x)))
+
+
+class Actor(nn.Module):
+    """Mean and logarithm of the standard deviation of a Gaussian; its tanh is the action.
+
+    With `guess`, a linear guess of that many hidden numbers is made from the picture's features, for an auxiliary loss.
+    """
+
+    action_size: int
+    sizes: Sequence[int] = (256, 256, 256)
+    picture_shape: tuple[int, int, int] | None = None
+    net: str = "small"
+    guess: int = 0
+
+    @nn.compact
+    def __call__(
+        self, vector: Float[Array, "B x"], picture: UInt8[Array, "B q"]
+    ) -> tuple[Float[Array, "B n"], Float[Array, "B n"], Float[Array, "B g"]]:
+        guessed = jnp.zeros((vector.shape[0], self.guess))
+        if self.picture_shape is not None:
+            features = Encoder(self.picture_shape, self.net, name="encoder")(picture)
+            if self.guess:
+                guessed = nn.Dense(self.guess, name="guess")(jnp.concatenate([features, vector], axis=-1))
+            vector = jnp.concatenate([vector, features], axis=-1)
+        x = Trunk((256,) if self.net == "paper" else self.sizes, name="trunk")(vector)
+        small = nn.initializers.orthogonal(0.01)
+        mean = nn.Dense(self.action_size, kernel_init=small, name="mean")(x)
+        low, high = LOG_STD
+        start = jnp.arctanh(2 * (jnp.log(FIRST_STD) - low) / (high - low) - 1)
+        raw = nn.Dense(self.action_size, kernel_init=small, bias_init=nn.initializers.constant(start), name="std")(x)
+        return mean, low + (high - low) * (jnp.tanh(raw) + 1) / 2, guessed
+
+
+class Critic(nn.Module):
+    """Logits of the distribution of the return over K atoms."""
+
+    atoms: int
+    sizes: Sequence[int] = (512, 512, 512)
+
+    @nn.compact
+    def __call__(self, vector: Float[Array, "B v"], action: Float[Array, "B n"]) -> Float[Array, "B K"]:
+        x = Trunk(self.sizes)(jnp.concatenate([vector, action], axis=-1))
+        return nn.Dense(self.atoms, kernel_init=nn.initializers.zeros)(x)
+
+
+def twins(atoms: int, sizes: Sequence[int]) -> nn.Module:
+    """Two critics in one module: logits [2, B, K]."""
+    both = {"in_axes": None, "out_axes": 0, "axis_size": 2}
+    pair = nn.vmap(Critic, variable_axes={"params": 0}, split_rngs={"params": True}, **both)
+    return pair(atoms, tuple(sizes))
+
+
+class Value(nn.Module):
+    """The expected return."""
+
+    sizes: Sequence[int] = (256, 256, 256)
+
+    @nn.compact
+    def __call__(self, vector: Float[Array, "B v"]) -> Float[Array, "B"]:
+        return nn.Dense(1)(Trunk(self.sizes)(vector))[:, 0]
+
+
+def shifted(picture: UInt8[Array, "B q"], shape: tuple[int, int, int], key: Array, by: int = 2) -> UInt8[Array, "B q"]:
+    """Each picture moved by at most so many pixels, its border repeated (DrQ's augmentation)."""
+    count = picture.shape[0]
+    padded = jnp.pad(picture.reshape(count, *shape), ((0, 0), (by, by), (by, by), (0, 0)), mode="edge")
+    start = jax.random.randint(key, (count, 2), 0, 2 * by + 1)
+    moved = jax.vmap(lambda p, s: jax.lax.dynamic_slice(p, (s[0], s[1], 0), shape))(padded, start)
+    return moved.reshape(count, -1)

@@ -1,0 +1,158 @@
+"""Policies as files: an actor's weights in half precision, and a card that says what it is for.
+
+A file is an npz archive: one array for each weight, the mean and deviation of what the actor sees, and the card as
+JSON. A policy belongs to a task, a robot, a way of grasping, the names of the actions and the observations; with
+others it is refused, and the message names what differs. The version of this package is of no account.
+
+Axes: W worlds, n numbers of an action.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import os
+import pathlib
+from collections.abc import Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.engine.view import Array
+from ig2mj.errors import InputError
+from ig2mj.learn.checkpoints import refuse_difference
+from ig2mj.learn.moments import Moments
+from ig2mj.learn.networks import Actor
+from ig2mj.learn.perception import Perception
+
+FORMAT_VERSION = 1
+
+CARD = "card.json"
+
+
+def depends_on(env: Any, perception: Perception) -> dict[str, Any]:
+    """What a policy for this environment depends on, for JSON.
+
+    Of environments that have no task (those of tests), only shapes.
+    """
+    seen = perception.vector_names if perception.mode == "state" else perception.vector_names[:-1]
+    sizes = dict(zip(perception.vector_names, perception.sizes, strict=True))
+    found: dict[str, Any] = {
+        "task": getattr(getattr(env, "task", None), "name", type(env).__name__),
+        "robot": getattr(env, "robot", ""),
+        "grasping": getattr(env, "grasping", ""),
+        "actions": list(getattr(env, "action_names", range(env.action_space.shape[0]))),
+        "mode": perception.mode,
+        "vector": {name: sizes[name] for name in seen},
+        "picture": perception.picture_shape and list(perception.picture_shape),
+    }
+    if perception.mode == "state" and hasattr(env, "privileged_names"):
+        found["privileged"] = list(env.privileged_names)
+    return found
+
+
+def digest(depends: Mapping[str, Any]) -> str:
+    """Of what a policy depends on: 12 hexadecimal digits."""
+    return hashlib.blake2b(json.dumps(depends, sort_keys=True).encode(), digest_size=6).hexdigest()
+
+
+@dataclasses.dataclass(frozen=True)
+class Policy:
+    """A trained actor.
+
+    Attributes:
+      card: "depends", "digest", "net", and how it was made ("command", "seed", "minutes", "device", "success", ...).
+      weights: by the path of the layer. mean, deviation: of what the actor sees.
+    """
+
+    card: dict[str, Any]
+    weights: dict[str, Float[np.ndarray, "..."]]
+    mean: Float[np.ndarray, "x"]
+    deviation: Float[np.ndarray, "x"]
+
+    @classmethod
+    def of(cls, algorithm: Any, learner: Any, depends: Mapping[str, Any], made: Mapping[str, Any]) -> Policy:
+        """The actor of an algorithm.
+
+        Args:
+          depends: see `depends_on`. made: for the card.
+        """
+        config, size = algorithm.config, algorithm.perception.actor_size
+        net = {"net": config.net, "sizes": list(config.actor)}
+        own = dict(depends)
+        card = {"format": FORMAT_VERSION, "depends": own, "digest": digest(own), "net": net, **made}
+        weights = {k: np.asarray(v) for k, v in _flat(learner.actor).items() if not k.startswith("guess/")}
+        moments: Moments = jax.device_get(learner.moments)
+        deviation = np.sqrt(moments.var[:size] + 1e-4)
+        return cls(card, weights, np.asarray(moments.mean[:size]), np.asarray(deviation))
+
+    def save(self, file: str | os.PathLike) -> None:
+        """Writes it. Raises OSError."""
+        half = {f"weights/{name}": np.asarray(w, np.float16) for name, w in self.weights.items()}
+        path = pathlib.Path(file)
+        beside = path.with_name(f".{os.getpid()}-{path.name}")
+        with beside.open("wb") as f:
+            card = np.frombuffer(json.dumps(self.card).encode(), np.uint8)
+            np.savez_compressed(
+                f, **{CARD: card, "mean": self.mean, "deviation": self.deviation, **half}  # pyright: ignore[reportArgumentType]
+            )  # fmt: skip
+        beside.replace(path)
+
+    @classmethod
+    def load(cls, file: str | os.PathLike) -> Policy:
+        """Reads it. Raises InputError."""
+        try:
+            with np.load(file, allow_pickle=False) as archive:
+                card = json.loads(bytes(archive[CARD]).decode())
+                weights = {n[8:]: archive[n].astype(np.float32) for n in archive.files if n.startswith("weights/")}
+                mean, deviation = archive["mean"], archive["deviation"]
+        except FileNotFoundError as e:
+            raise InputError(file, "there is no such file") from e
+        except Exception as e:  # numpy raises whatever a broken archive makes it stumble over
+            mend = "`ig2mj train` writes policies"
+            raise InputError(file, f"is no policy ({type(e).__name__})", mend=mend) from e
+        if card.get("format") != FORMAT_VERSION:
+            raise InputError(file, f"has format {card.get('format')}, and {FORMAT_VERSION} is what can be read")
+        return cls(card, weights, mean, deviation)
+
+    def check(self, env: Any, perception: Perception, file: object = "the policy") -> None:
+        """Raises InputError where the policy is for something else, with the pair that differs."""
+        refuse_difference(file, self.card["depends"], depends_on(env, perception))
+
+    def actor(self, perception: Perception) -> Any:
+        """A pure function from what is seen to actions [W, n], without noise."""
+        depends, net = self.card["depends"], self.card["net"]
+        shape = depends["picture"] and tuple(depends["picture"])
+        network = Actor(len(depends["actions"]), tuple(net["sizes"]), shape, net["net"])
+        params = jax.tree.map(jnp.asarray, _nested(self.weights))
+        mean, deviation = jnp.asarray(self.mean), jnp.asarray(self.deviation)
+        size = perception.actor_size
+
+        def act(obs: Mapping[str, Array]) -> Array:
+            seen = perception(obs)
+            own = jnp.clip((seen.vector[:, :size] - mean) / deviation, -10.0, 10.0)
+            return jnp.tanh(network.apply({"params": params}, own, seen.picture)[0])
+
+        return act
+
+
+def _flat(tree: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    found = {}
+    for name, value in tree.items():
+        found |= _flat(value, f"{before}{name}/") if isinstance(value, Mapping) else {f"{before}{name}": value}
+    return found
+
+
+def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+    tree: dict[str, Any] = {}
+    for path, value in flat.items():
+        *folders, name = path.split("/")
+        place = tree
+        for folder in folders:
+            place = place.setdefault(folder, {})
+        place[name] = value
+    return tree

@@ -1,0 +1,257 @@
+"""Proximal policy optimization for many worlds, from state or from pixels.
+
+The value sees the whole vector, `privileged_state` included; the actor sees what `perception` shows it. An action is
+tanh of a Gaussian's sample. Time limits do not end the value: where an episode was cut off, the value of what was seen
+last is added to the reward; where it succeeded, nothing comes after.
+
+An iteration is `length` steps of all worlds, then `epochs` passes over them in `parts` minibatches.
+
+Axes: W worlds, T steps, B samples, n numbers of an action, v of a vector.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import optax
+from flax import struct
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.view import Array
+from ig2mj.learn.collect import Transition, if_ready
+from ig2mj.learn.moments import Moments, RewardScale, average
+from ig2mj.learn.networks import Actor, Value, shifted
+from ig2mj.learn.perception import Perception, Seen, blank
+
+
+@dataclasses.dataclass(frozen=True)
+class PPOConfig:
+    """Settings; `ig2mj train --set name=value` changes them.
+
+    Attributes:
+      length: steps of the worlds in an iteration. epochs: passes over them. parts: minibatches of a pass.
+      gamma: discount of a step (1/10 s). smooth: lambda of the advantages (GAE).
+      clip: how far the ratio of new and old chances counts. value: weight of the value's loss.
+      entropy: weight of the entropy. guess: of the actor's guess of the privileged state, from pixels.
+      lr: learning rate, falling to `last_lr` linearly over the run.
+      actor, critic: sizes of the layers. net: encoder ("small" or "paper").
+    """
+
+    length: int = 32
+    epochs: int = 4
+    parts: int = 16
+    gamma: float = 0.97
+    smooth: float = 0.95
+    clip: float = 0.2
+    value: float = 0.5
+    entropy: float = 1e-3
+    guess: float = 0.5
+    lr: float = 5e-4
+    last_lr: float = 1e-4
+    actor: tuple[int, ...] = (256, 256, 256)
+    critic: tuple[int, ...] = (256, 256, 256)
+    net: str = "small"
+
+
+@struct.dataclass
+class PPOLearner:
+    """All that is learned. `updates`: gradient steps so far."""
+
+    actor: Any
+    value: Any
+    opt: Any
+    moments: Moments
+    updates: Int[Array, ""]
+
+
+@struct.dataclass
+class PPOMemory:
+    """What belongs to the worlds of a device."""
+
+    scale: RewardScale
+
+
+@struct.dataclass
+class Minibatch:
+    """Samples of a rollout. `raw`: actions before tanh. `chance`: logarithm of their density when they were chosen."""
+
+    seen: Seen
+    raw: Float[Array, "*b n"]
+    chance: Float[Array, "*b"]
+    advantage: Float[Array, "*b"]
+    wanted: Float[Array, "*b"]
+
+
+class PPO:
+    """See the module's text. All methods are pure."""
+
+    name = "ppo"
+
+    def __init__(
+        self, perception: Perception, action_size: int, config: PPOConfig | None = None, axis: str | None = None
+    ):
+        """`axis`: the name of an axis of devices over which gradients are averaged."""
+        self.perception, self.action_size, self.axis = perception, action_size, axis
+        self.config = c = config or PPOConfig()
+        guess = perception.vector_size - perception.actor_size if perception.picture_shape and c.guess else 0
+        self.actor = Actor(action_size, c.actor, perception.picture_shape, c.net, guess)
+        self.value = Value(c.critic)
+        self._adam = optax.chain(optax.clip_by_global_norm(1.0), optax.flatten(optax.scale_by_adam(eps=1e-5)))
+
+    @property
+    def length(self) -> int:
+        """Steps of an iteration."""
+        return self.config.length
+
+    def warm_up(self, resumed: bool) -> int:
+        """Iterations without updates: the means of observations are those of a policy that does not change."""
+        return 2 if resumed else 3
+
+    @property
+    def samples(self) -> int:
+        """Updates of an iteration."""
+        return self.config.epochs * self.config.parts
+
+    # What there is at first.
+
+    def init(self, key: Array) -> PPOLearner:
+        """Untrained."""
+        seen, p = blank(self.perception, 1), self.perception
+        actor_key, value_key = jax.random.split(key)
+        actor = self.actor.init(actor_key, seen.vector[:, : p.actor_size], seen.picture)["params"]
+        value = self.value.init(value_key, seen.vector)["params"]
+        return PPOLearner(actor, value, self._adam.init((actor, value)), Moments.initial(p.vector_size), jnp.int32(0))
+
+    def memory(self, num_worlds: int) -> PPOMemory:
+        """Nothing is replayed."""
+        return PPOMemory(RewardScale.initial(num_worlds))
+
+    def noise(self, num_worlds: int) -> None:
+        """Noise of a step has nothing to do with that of the one before."""
+
+    # How it acts.
+
+    def act(
+        self, learner: PPOLearner, noise: None, seen: Seen, key: Array, state: Any = None
+    ) -> tuple[Float[Array, "W n"], dict[str, Array], None]:
+        """Actions, with what is needed to learn from them."""
+        mean, log_std, _ = self._look(learner.actor, learner.moments, seen)
+        raw = mean + jnp.exp(log_std) * jax.random.normal(key, mean.shape)
+        return jnp.tanh(raw), {"raw": raw, "chance": chance(raw, mean, log_std)}, None
+
+    def _look(self, actor: Any, moments: Moments, seen: Seen) -> tuple[Array, Array, Array]:
+        own = moments.normal(seen.vector[..., : self.perception.actor_size])
+        return self.actor.apply({"params": actor}, own, seen.picture)  # pyright: ignore[reportReturnType]
+
+    def _worth(self, value: Any, moments: Moments, vector: Float[Array, "T W v"]) -> Float[Array, "T W"]:
+        found = self.value.apply({"params": value}, moments.normal(vector).reshape(-1, vector.shape[-1]))
+        return found.reshape(vector.shape[:-1])  # pyright: ignore[reportAttributeAccessIssue]
+
+    # How it learns.
+
+    def learn(
+        self,
+        learner: PPOLearner,
+        memory: PPOMemory,
+        rollout: Transition,
+        key: Array,
+        progress: Float[Array, ""],
+        ready: Bool[Array, ""],
+    ) -> tuple[PPOLearner, PPOMemory, dict[str, Array]]:
+        """All epochs over a rollout.
+
+        Args:
+          progress: share of the run that is over. ready: without it only the observations' means are updated.
+        """
+        c = self.config
+        memory = PPOMemory(memory.scale.update(rollout.reward, rollout.done, c.gamma, self.axis))
+        factor = memory.scale.factor(jnp.inf)
+        worth = self._worth(learner.value, learner.moments, rollout.seen.vector)
+        after = self._worth(learner.value, learner.moments, rollout.after.vector)
+        advantage = advantages(
+            rollout.reward * factor, worth, after, rollout.terminated, rollout.done, c.gamma, c.smooth
+        )
+        mean, square = average((advantage.mean(), jnp.square(advantage).mean()), self.axis)
+        even = (advantage - mean) / jnp.sqrt(jnp.maximum(square - mean**2, 0.0) + 1e-8)
+        rows = Minibatch(rollout.seen, rollout.extra["raw"], rollout.extra["chance"], even, advantage + worth)
+        count = rollout.reward.size
+        rows = jax.tree.map(lambda a: a.reshape(count, *a.shape[2:]), rows)
+        rate = c.lr + (c.last_lr - c.lr) * jnp.clip(progress, 0, 1)
+        size = max(count // c.parts, 1)
+
+        def epoch(learner: PPOLearner, key: Array) -> tuple[PPOLearner, dict[str, Array]]:
+            order_key, part_key = jax.random.split(key)
+            order = jax.random.permutation(order_key, count)[: c.parts * size].reshape(-1, size)
+
+            def part(learner: PPOLearner, drawn: tuple[Array, Array]) -> tuple[PPOLearner, dict[str, Array]]:
+                return self._update(learner, jax.tree.map(lambda a: a[drawn[0]], rows), drawn[1], rate)
+
+            return jax.lax.scan(part, learner, (order, jax.random.split(part_key, order.shape[0])))
+
+        def epochs(learner: PPOLearner) -> tuple[PPOLearner, dict[str, Array]]:
+            learner, losses = jax.lax.scan(epoch, learner, jax.random.split(key, c.epochs))
+            return learner, jax.tree.map(jnp.mean, losses)
+
+        learner, losses = if_ready(ready, epochs, learner)
+        learner = dataclasses.replace(learner, moments=learner.moments.update(rollout.seen.vector, self.axis))
+        extra = {"reward_scale": factor, "updates": ready * jnp.float32(self.samples)}
+        return learner, memory, {**losses, **extra}
+
+    def _update(
+        self, learner: PPOLearner, batch: Minibatch, key: Array, rate: Array
+    ) -> tuple[PPOLearner, dict[str, Array]]:
+        c, p = self.config, self.perception
+        seen, normal = batch.seen, learner.moments.normal(batch.seen.vector)
+        if p.picture_shape is not None:
+            seen = Seen(seen.vector, shifted(seen.picture, p.picture_shape, key))
+
+        def loss(params: tuple[Any, Any]) -> tuple[Array, dict[str, Array]]:
+            mean, log_std, guess = self._look(params[0], learner.moments, seen)
+            change = chance(batch.raw, mean, log_std) - batch.chance
+            ratio = jnp.exp(change)
+            kept = jnp.clip(ratio, 1 - c.clip, 1 + c.clip)
+            actor = -jnp.minimum(ratio * batch.advantage, kept * batch.advantage).mean()
+            worth = self.value.apply({"params": params[1]}, normal)
+            value = jnp.square(worth - batch.wanted).mean()  # pyright: ignore[reportOperatorIssue]
+            entropy = (log_std + 0.5 * math.log(2 * math.pi * math.e)).sum(-1).mean()
+            total = actor + c.value * value - c.entropy * entropy
+            found = {"actor_loss": actor, "critic_loss": value, "entropy": entropy}
+            found["divergence"] = (ratio - 1 - change).mean()
+            if guess.shape[-1]:
+                found["guess_loss"] = jnp.square(guess - normal[:, p.actor_size :]).mean()
+                total += c.guess * found["guess_loss"]
+            return total, found
+
+        params = learner.actor, learner.value
+        slope, found = jax.grad(loss, has_aux=True)(params)
+        step, opt = self._adam.update(average(slope, self.axis), learner.opt)
+        actor, value = jax.tree.map(lambda a, s: a - rate * s, params, step)
+        return dataclasses.replace(learner, actor=actor, value=value, opt=opt, updates=learner.updates + 1), found
+
+
+def chance(raw: Float[Array, "*b n"], mean: Float[Array, "*b n"], log_std: Float[Array, "*b n"]) -> Float[Array, "*b"]:
+    """Logarithm of the density before tanh: in a ratio of two chances of one action, tanh has no part."""
+    return (-0.5 * jnp.square((raw - mean) / jnp.exp(log_std)) - log_std - 0.5 * math.log(2 * math.pi)).sum(-1)
+
+
+def advantages(
+    reward: Float[Array, "T W"],
+    worth: Float[Array, "T W"],
+    after: Float[Array, "T W"],
+    terminated: Bool[Array, "T W"],
+    done: Bool[Array, "T W"],
+    gamma: float,
+    smooth: float,
+) -> Float[Array, "T W"]:
+    """Generalized advantage estimates. Of an episode that was cut off, what was seen last counts (`after`)."""
+    error = reward + gamma * jnp.where(terminated, 0.0, after) - worth
+
+    def back(later: Array, now: tuple[Array, Array]) -> tuple[Array, Array]:
+        found = now[0] + gamma * smooth * jnp.where(now[1], 0.0, later)
+        return found, found
+
+    return jax.lax.scan(back, jnp.zeros_like(reward[0]), (error, done), reverse=True)[1]

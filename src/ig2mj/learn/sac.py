@@ -1,0 +1,334 @@
+"""Soft actor-critic for many worlds, from state or from pixels.
+
+Two critics give distributions of the return over K atoms (C51). They see `privileged_state`; the actor sees what
+`perception` shows it, so that pictures cost gradients only where the actor learns, every fourth update. The recipe is
+that of Squint (arXiv 2602.21203) and FlashSAC (arXiv 2604.04539): many updates for each step of the worlds, layer
+normalization, returns over three steps, rewards scaled to the atoms' range, a target entropy that belongs to a standard
+deviation of 0.15, exploration noise that is held for a random number of steps.
+
+An iteration is `length` steps of all worlds, then `updates` updates for each of them. Time limits do not end the value:
+where an episode was cut off, what was seen last is evaluated; where it succeeded, nothing comes after.
+
+Axes: W worlds, T steps, B samples, K atoms, n numbers of an action, v of a vector.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import optax
+from flax import struct
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.view import Array
+from ig2mj.learn.collect import Transition, if_ready
+from ig2mj.learn.moments import Moments, RewardScale, average
+from ig2mj.learn.networks import Actor, shifted, twins
+from ig2mj.learn.perception import Perception, Seen, blank
+from ig2mj.learn.replay import Replay, Sample
+
+
+@dataclasses.dataclass(frozen=True)
+class SACConfig:
+    """Settings; `ig2mj train --set name=value` changes them.
+
+    Attributes:
+      length: steps of the worlds in an iteration. updates: for each of them. batch: samples of an update.
+      capacity: steps that are replayed, of all worlds together. warm_up: steps of each world before the first update.
+      refill: the same after a resume, where the policy plays the buffer full again.
+      horizon: steps of a return before the critics' value. gamma: discount of a step (1/10 s).
+      atoms, largest: of the critics' distribution, from -largest to largest.
+      tau: share of the critics that goes into the targets at an update. every: updates per update of the actor.
+      alpha: weight of the entropy at first. std: standard deviation of actions that the target entropy belongs to.
+      held: longest time that exploration noise is held, in steps.
+      guess: weight of the actor's guess of the privileged state from its features, from pixels.
+      lr: learning rate, falling to `last_lr` along a cosine over the run.
+      actor, critic: sizes of the layers. net: encoder ("small" or "paper").
+    """
+
+    length: int = 2
+    updates: int = 32
+    batch: int = 1024
+    capacity: int = 1_000_000
+    warm_up: int = 10
+    refill: int = 100
+    horizon: int = 3
+    gamma: float = 0.97
+    atoms: int = 101
+    largest: float = 5.0
+    tau: float = 0.01
+    every: int = 4
+    alpha: float = 0.01
+    std: float = 0.15
+    held: int = 16
+    guess: float = 1.0
+    lr: float = 3e-4
+    last_lr: float = 1e-4
+    actor: tuple[int, ...] = (256, 256, 256)
+    critic: tuple[int, ...] = (512, 512, 512)
+    net: str = "small"
+
+
+@struct.dataclass
+class SACLearner:
+    """All that is learned. `updates`: of the critics so far."""
+
+    actor: Any
+    critic: Any
+    target: Any
+    log_alpha: Float[Array, ""]
+    actor_opt: Any
+    critic_opt: Any
+    alpha_opt: Any
+    moments: Moments
+    updates: Int[Array, ""]
+
+
+@struct.dataclass
+class SACMemory:
+    """What belongs to the worlds of a device, and is not kept by checkpoints unless asked for."""
+
+    replay: Replay
+    scale: RewardScale
+
+
+@struct.dataclass
+class Noise:
+    """Exploration noise of every world, and for how many more steps it is held."""
+
+    value: Float[Array, "W n"]
+    left: Int[Array, "W"]
+
+
+class SAC:
+    """See the module's text. All methods are pure."""
+
+    name = "sac"
+
+    def __init__(
+        self, perception: Perception, action_size: int, config: SACConfig | None = None, axis: str | None = None
+    ):
+        """`axis`: the name of an axis of devices over which gradients are averaged."""
+        self.perception, self.action_size, self.axis = perception, action_size, axis
+        self.config = c = config or SACConfig()
+        guess = perception.vector_size - perception.actor_size if perception.picture_shape and c.guess else 0
+        self.actor = Actor(action_size, c.actor, perception.picture_shape, c.net, guess)
+        self.critic = twins(c.atoms, c.critic)
+        self._support = jnp.linspace(-c.largest, c.largest, c.atoms)
+        self._entropy = 0.5 * action_size * math.log(2 * math.pi * math.e * c.std**2)
+        # Adam over one long list of numbers: one kernel of a GPU instead of one for every layer
+        self._adam = optax.chain(optax.clip_by_global_norm(10.0), optax.flatten(optax.scale_by_adam()))
+
+    @property
+    def length(self) -> int:
+        """Steps of an iteration."""
+        return self.config.length
+
+    def warm_up(self, resumed: bool) -> int:
+        """Iterations without updates: the buffer fills. After a resume without the buffer, a good part of it."""
+        c = self.config
+        steps = max(c.refill if resumed else c.warm_up, c.horizon + 1, 3 * c.length)
+        return -(-steps // c.length)
+
+    @property
+    def samples(self) -> int:
+        """Updates of an iteration."""
+        groups = max(1, self.config.length * self.config.updates // self.config.every)
+        return groups * self.config.every
+
+    # What there is at first.
+
+    def init(self, key: Array) -> SACLearner:
+        """Untrained."""
+        seen, p = blank(self.perception, 1), self.perception
+        actor_key, critic_key = jax.random.split(key)
+        actor = self.actor.init(actor_key, seen.vector[:, : p.actor_size], seen.picture)["params"]
+        critic = self.critic.init(critic_key, seen.vector, jnp.zeros((1, self.action_size)))["params"]
+        log_alpha = jnp.log(jnp.float32(self.config.alpha))
+        return SACLearner(
+            actor=actor,
+            critic=critic,
+            target=jax.tree.map(jnp.copy, critic),
+            log_alpha=log_alpha,
+            actor_opt=self._adam.init(actor),
+            critic_opt=self._adam.init(critic),
+            alpha_opt=self._adam.init(log_alpha),
+            moments=Moments.initial(p.vector_size),
+            updates=jnp.int32(0),
+        )
+
+    def memory(self, num_worlds: int) -> SACMemory:
+        """An empty replay buffer."""
+        c = self.config
+        rows = max(c.capacity // (num_worlds * c.length), 1) * c.length
+        rows = max(rows, -(-(c.horizon + 1) // c.length) * c.length)
+        replay = Replay.empty(rows, num_worlds, self.perception, self.action_size)
+        return SACMemory(replay, RewardScale.initial(num_worlds))
+
+    def noise(self, num_worlds: int) -> Noise:
+        """Before the first step."""
+        return Noise(jnp.zeros((num_worlds, self.action_size)), jnp.zeros(num_worlds, jnp.int32))
+
+    # How it acts.
+
+    def act(
+        self, learner: SACLearner, noise: Noise, seen: Seen, key: Array, state: Any = None
+    ) -> tuple[Float[Array, "W n"], dict[str, Array], Noise]:
+        """Actions with noise, each number's held for a time that is drawn from a zeta(2) distribution."""
+        noise_key, time_key = jax.random.split(key)
+        fresh = jax.random.normal(noise_key, noise.value.shape)
+        # the largest k with u < 1 / k has about zeta(2)'s tail: P(at least k) = 1 / k
+        uniform = jax.random.uniform(time_key, noise.left.shape, minval=1e-6)
+        held = jnp.minimum(jnp.floor(1.0 / uniform).astype(jnp.int32), self.config.held)
+        over = noise.left <= 0
+        noise = Noise(jnp.where(over[:, None], fresh, noise.value), jnp.where(over, held, noise.left) - 1)
+        mean, log_std, _ = self._look(learner.actor, learner.moments, seen)
+        return jnp.tanh(mean + jnp.exp(log_std) * noise.value), {}, noise
+
+    def _look(self, actor: Any, moments: Moments, seen: Seen) -> tuple[Array, Array, Array]:
+        own = moments.normal(seen.vector[:, : self.perception.actor_size])
+        return self.actor.apply({"params": actor}, own, seen.picture)  # pyright: ignore[reportReturnType]
+
+    def _draw(self, actor: Any, moments: Moments, seen: Seen, key: Array) -> tuple[Array, Array, Array]:
+        """Actions, the logarithm of their density, and the guess."""
+        mean, log_std, guess = self._look(actor, moments, seen)
+        eps = jax.random.normal(key, mean.shape)
+        raw = mean + jnp.exp(log_std) * eps
+        density = -0.5 * jnp.square(eps) - log_std - 0.5 * math.log(2 * math.pi)
+        stretch = 2 * (math.log(2.0) - raw - jax.nn.softplus(-2 * raw))  # log of tanh's slope
+        return jnp.tanh(raw), (density - stretch).sum(-1), guess
+
+    # How it learns.
+
+    def learn(
+        self,
+        learner: SACLearner,
+        memory: SACMemory,
+        rollout: Transition,
+        key: Array,
+        progress: Float[Array, ""],
+        ready: Bool[Array, ""],
+    ) -> tuple[SACLearner, SACMemory, dict[str, Array]]:
+        """Stores a rollout, and makes an iteration's updates.
+
+        Args:
+          progress: share of the run that is over. ready: without it nothing is updated: the buffer fills.
+        """
+        c = self.config
+        scale = memory.scale.update(rollout.reward, rollout.done, c.gamma, self.axis)
+        memory = SACMemory(memory.replay.insert(rollout), scale)
+        learner = dataclasses.replace(learner, moments=learner.moments.update(rollout.seen.vector, self.axis))
+        rate = c.last_lr + (c.lr - c.last_lr) * 0.5 * (1 + jnp.cos(jnp.pi * jnp.clip(progress, 0, 1)))
+
+        def many(learner: SACLearner) -> tuple[SACLearner, dict[str, Array]]:
+            def group(learner: SACLearner, key: Array) -> tuple[SACLearner, dict[str, Array]]:
+                return self._group(learner, memory, key, rate)
+
+            keys = jax.random.split(key, self.samples // c.every)
+            learner, losses = jax.lax.scan(group, learner, keys)
+            return learner, jax.tree.map(jnp.mean, losses)
+
+        learner, losses = if_ready(ready, many, learner)
+        extra = {"alpha": jnp.exp(learner.log_alpha), "reward_scale": scale.factor(c.largest)}
+        return learner, memory, {**losses, **extra, "updates": ready * jnp.float32(self.samples)}
+
+    def _group(
+        self, learner: SACLearner, memory: SACMemory, key: Array, rate: Array
+    ) -> tuple[SACLearner, dict[str, Array]]:
+        """Updates of the critics, and one of the actor."""
+        c = self.config
+        sample_key, target_key, actor_key = jax.random.split(key, 3)
+        batch = memory.replay.sample(sample_key, c.every * c.batch, c.horizon, c.gamma)
+        batch = dataclasses.replace(batch, reward=batch.reward * memory.scale.factor(c.largest))
+        action, density, _ = self._draw(learner.actor, learner.moments, batch.after, target_key)  # of all at once
+        alpha = jnp.exp(learner.log_alpha)
+        parts = jax.tree.map(lambda a: a.reshape(c.every, c.batch, *a.shape[1:]), (batch, action, density))
+
+        def critic(carry: tuple, part: tuple[Sample, Array, Array]) -> tuple[tuple, dict[str, Array]]:
+            params, target, opt = carry
+            (loss, q), slope = jax.value_and_grad(self._critic_loss, has_aux=True)(
+                params, target, learner.moments, alpha, *part
+            )
+            step, opt = self._adam.update(average(slope, self.axis), opt)
+            params = jax.tree.map(lambda p, s: p - rate * s, params, step)
+            target = jax.tree.map(lambda t, p: t + c.tau * (p - t), target, params)
+            return (params, target, opt), {"critic_loss": loss, "q": q}
+
+        start = (learner.critic, learner.target, learner.critic_opt)
+        (params, target, opt), losses = jax.lax.scan(critic, start, parts)
+        last = jax.tree.map(lambda a: a[-1], parts[0])
+        learner = dataclasses.replace(
+            learner, critic=params, target=target, critic_opt=opt, updates=learner.updates + c.every
+        )
+        learner, of_actor = self._update_actor(learner, last, actor_key, rate)
+        return learner, {**jax.tree.map(jnp.mean, losses), **of_actor}
+
+    def _critic_loss(
+        self,
+        params: Any,
+        target: Any,
+        moments: Moments,
+        alpha: Array,
+        batch: Sample,
+        action: Float[Array, "B n"],
+        density: Float[Array, "B"],
+    ) -> tuple[Array, Array]:
+        """Cross entropy between the critics' distributions and that of the reward and the more careful target."""
+        after = self.critic.apply({"params": target}, moments.normal(batch.after.vector), action)
+        chances = jax.nn.softmax(after)  # pyright: ignore[reportArgumentType]
+        careful = jnp.argmin(chances @ self._support, axis=0)
+        chance = jnp.where(careful[:, None] == 0, chances[0], chances[1])
+        soft = self._support - alpha * density[:, None]
+        wanted = projected(chance, batch.reward[:, None] + batch.discount[:, None] * soft, self._support)
+        logits = self.critic.apply({"params": params}, moments.normal(batch.seen.vector), batch.action)
+        logs = jax.nn.log_softmax(logits)  # pyright: ignore[reportArgumentType]
+        loss = -(jax.lax.stop_gradient(wanted) * logs).sum(-1).mean(-1).sum()
+        return loss, (jnp.exp(logs) @ self._support).mean()
+
+    def _update_actor(
+        self, learner: SACLearner, batch: Sample, key: Array, rate: Array
+    ) -> tuple[SACLearner, dict[str, Array]]:
+        c, p = self.config, self.perception
+        shift_key, draw_key = jax.random.split(key)
+        seen, normal = batch.seen, learner.moments.normal(batch.seen.vector)
+        if p.picture_shape is not None:
+            seen = Seen(seen.vector, shifted(seen.picture, p.picture_shape, shift_key))
+        alpha = jnp.exp(learner.log_alpha)
+
+        def loss(actor: Any) -> tuple[Array, tuple[Array, Array]]:
+            action, density, guess = self._draw(actor, learner.moments, seen, draw_key)
+            logits = self.critic.apply({"params": learner.critic}, normal, action)
+            q = (jax.nn.softmax(logits) @ self._support).mean(0)  # pyright: ignore[reportArgumentType]
+            wrong = jnp.float32(0)
+            if guess.shape[-1]:
+                wrong = jnp.square(guess - normal[:, p.actor_size :]).mean()
+            return (alpha * density - q).mean() + c.guess * wrong, (density.mean(), wrong)
+
+        (value, (density, wrong)), slope = jax.value_and_grad(loss, has_aux=True)(learner.actor)
+        step, actor_opt = self._adam.update(average(slope, self.axis), learner.actor_opt)
+        actor = jax.tree.map(lambda a, s: a - rate * s, learner.actor, step)
+        lack = average(-density - self._entropy, self.axis)  # more entropy than wanted lowers its weight
+        step, alpha_opt = self._adam.update(lack, learner.alpha_opt)
+        learner = dataclasses.replace(
+            learner,
+            actor=actor,
+            actor_opt=actor_opt,
+            log_alpha=learner.log_alpha - rate * step,  # pyright: ignore[reportOperatorIssue]
+            alpha_opt=alpha_opt,
+        )
+        losses = {"actor_loss": value, "entropy": -density}
+        return learner, losses | ({"guess_loss": wrong} if self.actor.guess else {})
+
+
+def projected(
+    chance: Float[Array, "B K"], places: Float[Array, "B K"], support: Float[Array, "K"]
+) -> Float[Array, "B K"]:
+    """A distribution over places, shared out to the nearest atoms of an even support."""
+    gap = support[1] - support[0]
+    inside = jnp.clip(places, support[0], support[-1])
+    share = jnp.clip(1.0 - jnp.abs(inside[:, :, None] - support) / gap, 0.0, 1.0)
+    return (chance[:, :, None] * share).sum(1)

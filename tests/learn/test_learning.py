@@ -1,0 +1,66 @@
+"""Learning on small environments, where what is right is known."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from small_envs import FarReward, FarRewardThatEnds, PointMass
+
+from ig2mj.learn.perception import Perception
+from ig2mj.learn.policies import Policy, depends_on
+from ig2mj.learn.ppo import PPO, PPOConfig
+from ig2mj.learn.sac import SAC, SACConfig
+from ig2mj.learn.train import Run, train
+
+SMALL_SAC = SACConfig(
+    updates=8, batch=128, capacity=20_000, actor=(64, 64), critic=(64, 64), atoms=51, tau=0.02, lr=1e-3
+)
+SMALL_PPO = PPOConfig(length=16, parts=4, actor=(64, 64), critic=(64, 64), lr=1e-3)
+
+
+def made(env, kind, mode="state", **changes):
+    config = dataclasses.replace(SMALL_SAC if kind is SAC else SMALL_PPO, **changes)
+    return kind(Perception(env.observation_spaces, mode), env.action_space.shape[0], config)
+
+
+def quiet(**settings):
+    return Run(**{"minutes": 3.0, "quiet": True, "until": 0.95, **settings})
+
+
+@pytest.mark.parametrize(("kind", "iterations"), [(SAC, 150), (PPO, 150)])
+def test_a_point_learns_to_reach_its_goal(kind, iterations):
+    """Sixteen thousand steps are enough for SAC, about nine thousand were seen; PPO takes ten times as many."""
+    env = PointMass(64)
+    result = train(env, made(env, kind), quiet(iterations=iterations))
+    assert result.stopped == "solved"
+    assert result.row["success"] >= 0.95
+
+
+def test_an_environment_that_cannot_be_compiled_is_learned_by_the_same_loop():
+    env = PointMass(64, pure=False)
+    result = train(env, made(env, PPO), quiet(iterations=150))
+    assert result.stopped == "solved"
+    assert 0 < result.row["simulator_share"] < 1
+
+
+@pytest.mark.parametrize("kind", [SAC, PPO])
+@pytest.mark.parametrize("env_kind", [FarReward, FarRewardThatEnds])
+def test_a_time_limit_is_no_end(kind, env_kind):
+    """What lies beyond the limit counts: the point goes right. Where the limit is called an end, it goes left."""
+    env = env_kind(64)
+    algorithm = made(env, kind, gamma=0.9)
+    result = train(env, algorithm, quiet(iterations=120 if kind is SAC else 60, until=None))
+    policy = Policy.of(algorithm, result.learner, depends_on(env, algorithm.perception), {})
+    places = np.linspace(0.05, 0.25, 5, dtype=np.float32)[:, None]
+    action = np.asarray(policy.actor(algorithm.perception)({"proprioception": places}))
+    if env_kind is FarReward:
+        assert (action > 0.2).all()
+    else:
+        assert (action < -0.2).all()
