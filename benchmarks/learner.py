@@ -88,26 +88,27 @@ def main() -> None:
 
     began = time.perf_counter()
     key = jax.random.PRNGKey(1)
-    learner, memory, losses = jax.block_until_ready(iteration(learner, memory, key, False))
+    learner, memory, _ = jax.block_until_ready(iteration(learner, memory, key, False))
     compile_s = time.perf_counter() - began
     # the buffer is filled before the clock starts
     rows = memory.replay.capacity // algorithm.length if args.algo == "sac" else 1
     for _ in range(rows):
-        learner, memory, losses = iteration(learner, memory, key, False)
-    learner, memory, losses = jax.block_until_ready(iteration(learner, memory, key, True))
+        learner, memory, _ = iteration(learner, memory, key, False)
+    learner, memory, _ = jax.block_until_ready(iteration(learner, memory, key, True))
     times, began = [], time.perf_counter()
     while time.perf_counter() - began < args.seconds:
         key, now = jax.random.split(key)
         start = time.perf_counter()
-        learner, memory, losses = jax.block_until_ready(iteration(learner, memory, now, True))
+        learner, memory, _ = jax.block_until_ready(iteration(learner, memory, now, True))
         times.append(time.perf_counter() - start)
     seconds = float(np.median(times))
+    batch = algorithm.config.batch if args.algo == "sac" else rollout.reward.size // algorithm.config.parts
     weights = sum(a.size for a in jax.tree.leaves(learner.actor))
     row = {
         "algo": args.algo,
         "obs": args.obs,
         "worlds": args.worlds,
-        "batch": algorithm.config.batch if args.algo == "sac" else algorithm.length * args.worlds // algorithm.config.parts,
+        "batch": batch,
         "updates_per_iteration": algorithm.samples,
         "updates_per_second": round(algorithm.samples / seconds, 1),
         "iteration_ms": round(1e3 * seconds, 3),

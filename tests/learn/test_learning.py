@@ -34,7 +34,7 @@ def quiet(**settings):
     return Run(**{"minutes": 3.0, "quiet": True, "until": 0.95, **settings})
 
 
-@pytest.mark.parametrize(("kind", "iterations"), [(SAC, 150), (PPO, 150)])
+@pytest.mark.parametrize(("kind", "iterations"), [pytest.param(SAC, 150, marks=pytest.mark.slow), (PPO, 150)])
 def test_a_point_learns_to_reach_its_goal(kind, iterations):
     """Sixteen thousand steps are enough for SAC, about nine thousand were seen; PPO takes ten times as many."""
     env = PointMass(64)
@@ -50,13 +50,14 @@ def test_an_environment_that_cannot_be_compiled_is_learned_by_the_same_loop():
     assert 0 < result.row["simulator_share"] < 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [SAC, PPO])
 @pytest.mark.parametrize("env_kind", [FarReward, FarRewardThatEnds])
 def test_a_time_limit_is_no_end(kind, env_kind):
     """What lies beyond the limit counts: the point goes right. Where the limit is called an end, it goes left."""
     env = env_kind(64)
     algorithm = made(env, kind, gamma=0.9)
-    result = train(env, algorithm, quiet(iterations=120 if kind is SAC else 60, until=None))
+    result = train(env, algorithm, quiet(iterations=120 if kind is SAC else 150, until=None))
     policy = Policy.of(algorithm, result.learner, depends_on(env, algorithm.perception), {})
     places = np.linspace(0.05, 0.25, 5, dtype=np.float32)[:, None]
     action = np.asarray(policy.actor(algorithm.perception)({"proprioception": places}))
