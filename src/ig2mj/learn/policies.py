@@ -106,7 +106,7 @@ class Policy:
     def load(cls, file: str | os.PathLike) -> Policy:
         """Reads it. Raises InputError."""
         try:
-            with np.load(file, allow_pickle=False) as archive:
+            with pathlib.Path(file).open("rb") as opened, np.load(opened, allow_pickle=False) as archive:
                 card = json.loads(bytes(archive[CARD]).decode())
                 weights = {n[8:]: archive[n].astype(np.float32) for n in archive.files if n.startswith("weights/")}
                 mean, deviation = archive["mean"], archive["deviation"]

@@ -1,0 +1,176 @@
+"""Runs: what survives a kill, what is refused, and what is said when numbers are lost."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import jax
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from small_envs import PointMass
+
+from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
+from ig2mj.learn.checkpoints import Checkpoints
+from ig2mj.learn.options import configured
+from ig2mj.learn.perception import Perception
+from ig2mj.learn.policies import Policy, depends_on
+from ig2mj.learn.ppo import PPO, PPOConfig
+from ig2mj.learn.sac import SACConfig
+from ig2mj.learn.train import Run, train
+
+CONFIG = PPOConfig(length=4, parts=1, epochs=1, actor=(16,), critic=(16,))
+
+KILLED = """
+import sys
+sys.path.insert(0, {folder!r})
+from small_envs import PointMass
+from ig2mj.learn.perception import Perception
+from ig2mj.learn.ppo import PPO, PPOConfig
+from ig2mj.learn.train import Run, train
+env = PointMass(8)
+config = PPOConfig(length=4, parts=1, epochs=1, actor=(16,), critic=(16,))
+train(env, PPO(Perception(env.observation_spaces), 2, config), Run(5.0, out={out!r}, checkpoint_every=0.2, quiet=True))
+"""
+
+
+def algorithm(env, **changes):
+    return PPO(Perception(env.observation_spaces), 2, dataclasses.replace(CONFIG, **changes))
+
+
+def same(a, b):
+    return all(np.array_equal(x, y) for x, y in zip(jax.tree.leaves(a), jax.tree.leaves(b), strict=True))
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """A run of twelve iterations."""
+    out, env = tmp_path_factory.mktemp("run"), PointMass(8)
+    result = train(env, algorithm(env), Run(iterations=12, out=out, quiet=True))
+    return env, out, result
+
+
+def rows(out):
+    with (out / "progress.csv").open(newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def test_a_resumed_run_goes_on_with_what_was_learned(done, tmp_path):
+    env, out, result = done
+    like = {"learner": algorithm(env).init(jax.random.PRNGKey(7)), "key": jax.random.PRNGKey(0)}
+    checkpoints = Checkpoints(out)
+    tree, meta = checkpoints.newest(like, checkpoints.meta(12)["depends"])
+    assert same(tree["learner"], result.learner)
+    assert meta["env_steps"] == 12 * 4 * 8
+    more = train(env, algorithm(env), Run(iterations=20, out=out, resume=True, quiet=True))
+    assert more.iteration == 20
+    assert more.row["env_steps"] == 20 * 4 * 8
+    assert int(more.learner.updates) > int(result.learner.updates)
+    assert [int(r["iteration"]) for r in rows(out)] == sorted({int(r["iteration"]) for r in rows(out)})
+    assert list(out.glob("events.out.tfevents.*"))
+
+
+def test_a_broken_checkpoint_is_passed_over(tmp_path, capsys):
+    env, like = PointMass(8), {"a": np.arange(4.0), "b": np.zeros(2)}
+    checkpoints = Checkpoints(tmp_path)
+    for k in (1, 2, 3, 4, 5):
+        checkpoints.save(k, {"a": like["a"] * k, "b": like["b"]}, {"depends": {"env": type(env).__name__}})
+    assert checkpoints.numbers() == [3, 4, 5]
+    (tmp_path / "checkpoints" / "5" / "meta.json").write_text("{")
+    for file in (tmp_path / "checkpoints" / "4" / "arrays").rglob("*"):
+        if file.is_file():
+            file.write_bytes(b"")
+    tree, _ = checkpoints.newest(like, {"env": "PointMass"})
+    assert np.array_equal(tree["a"], like["a"] * 3)
+    assert capsys.readouterr().err.count("the checkpoint before it is taken") == 2
+
+
+def test_another_runs_checkpoint_is_refused_with_what_differs(done):
+    env, out, _ = done
+    with pytest.raises(InputError, match="settings"):
+        train(env, algorithm(env, gamma=0.5), Run(iterations=30, out=out, resume=True, quiet=True))
+    with pytest.raises(Ig2mjError, match="holds a run already"):
+        train(env, algorithm(env), Run(iterations=30, out=out, quiet=True))
+
+
+def test_numbers_that_are_lost_stop_the_run_with_the_last_good_checkpoint(tmp_path):
+    class Lost(PointMass):
+        def judge(self, state, pos):
+            reward, success = super().judge(state, pos)
+            return reward + jax.numpy.where(state.key[0] % 64 == 0, np.nan, 0.0), success
+
+    env = Lost(8)
+    with pytest.raises(Ig2mjError, match=r"the loss \w+ is nan"):
+        train(env, algorithm(env), Run(iterations=400, out=tmp_path, checkpoint_every=0.0, quiet=True))
+    newest = Checkpoints(tmp_path).numbers()[-1]
+    like = {"learner": algorithm(env).init(jax.random.PRNGKey(7)), "key": jax.random.PRNGKey(0)}
+    tree, _ = Checkpoints(tmp_path).newest(like, Checkpoints(tmp_path).meta(newest)["depends"])
+    floats = [a for a in jax.tree.leaves(tree) if a.dtype == np.float32]
+    assert all(np.isfinite(a).all() for a in floats)
+
+
+@pytest.mark.slow
+def test_a_killed_run_goes_on(tmp_path):
+    """SIGKILL at any moment costs what came after the last checkpoint."""
+    code = KILLED.format(folder=str(Path(__file__).parent), out=str(tmp_path))
+    process = subprocess.Popen([sys.executable, "-c", code], env={**os.environ, "JAX_PLATFORMS": "cpu"})
+    try:
+        deadline = time.monotonic() + 200
+        while len(Checkpoints(tmp_path).numbers()) < 3 and time.monotonic() < deadline:
+            assert process.poll() is None
+            time.sleep(0.05)  # until there is something to kill
+    finally:
+        process.send_signal(signal.SIGKILL)
+        process.wait()
+    newest = Checkpoints(tmp_path).numbers()[-1]
+    assert newest > 0
+    env = PointMass(8)
+    result = train(env, algorithm(env), Run(5.0, iterations=newest + 5, out=tmp_path, resume=True, quiet=True))
+    assert result.iteration == newest + 5
+    assert result.row["env_steps"] == (newest + 5) * 4 * 8
+    seconds = [float(r["seconds"]) for r in rows(tmp_path)]
+    assert seconds == sorted(seconds)
+
+
+def test_a_policy_file_acts_as_what_was_trained(done, tmp_path):
+    env, _, result = done
+    trained = algorithm(env)
+    depends = depends_on(env, trained.perception)
+    policy = Policy.of(trained, result.learner, depends, {"seed": 0})
+    policy.save(tmp_path / "policy.npz")
+    loaded = Policy.load(tmp_path / "policy.npz")
+    assert loaded.card["depends"] == depends
+    obs = env.reset(3).obs
+    action = np.asarray(loaded.actor(trained.perception)(obs))
+    mean, _, _ = trained._look(result.learner.actor, result.learner.moments, trained.perception(obs))
+    assert np.abs(action - np.tanh(np.asarray(mean))).max() < 5e-3  # half precision
+    loaded.check(env, trained.perception)
+
+
+def test_a_policy_for_something_else_is_refused_with_the_pair_that_differs(done, tmp_path):
+    env, _, result = done
+    trained = algorithm(env)
+    depends = {**depends_on(env, trained.perception), "grasping": "sticky"}
+    policy = Policy.of(trained, result.learner, depends, {})
+    with pytest.raises(InputError, match='grasping = "sticky", and here it is ""'):
+        policy.check(env, trained.perception)
+    (tmp_path / "broken.npz").write_bytes(b"PK\x03\x04nothing")
+    with pytest.raises(InputError, match="is no policy"):
+        Policy.load(tmp_path / "broken.npz")
+
+
+def test_settings_are_known_by_name_and_type():
+    assert configured(SACConfig(), ["updates=4", "actor=64,32", "lr=0.1"]).actor == (64, 32)
+    with pytest.raises(UnknownNameError, match="gamma"):
+        configured(SACConfig(), ["gama=0.9"])
+    with pytest.raises(Ig2mjError, match="updates=32"):
+        configured(SACConfig(), ["updates=many"])
