@@ -62,6 +62,7 @@ COMMANDS: dict[str, str] = {
     "list-envs": "list the environments, and which robots can do what in them",
     "rollout": "play episodes of an environment, and tell how they ended",
     "train": "train a policy in an environment",
+    "evaluate": "tell how often a policy succeeds from states it has not seen",
     "sample-task": "sample an environment's start states, and keep them in the cache",
     "homes": "build our own dataset of household objects and homes",
     "doctor": "tell what this machine can run, and how to mend what it cannot",

@@ -18,8 +18,8 @@ PURE_WORLDS = 2048
 def run(
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")],
     algo: str = "sac",
-    robot: str = "humanoid",
-    grasping: str = "mitten",
+    robot: str | None = None,
+    grasping: str | None = None,
     obs: str = "state",
     engine: str | None = None,
     worlds: int = 0,
@@ -38,8 +38,8 @@ def run(
     Args:
       env: CookingMeat, or ig2mj/CookingMeat-v0 (`ig2mj list-envs`).
       algo: sac or ppo.
-      robot: humanoid or fetch.
-      grasping: mitten, assisted, sticky or physical.
+      robot: humanoid, fetch or turtlebot; default: the first that the task lists.
+      grasping: mitten, assisted, sticky or physical; default: mitten for activities.
       obs: state (proprioception and privileged state) or rgbd (what the paper's agents see; needs the warp engine).
       engine: native, warp or jax; default: warp on a GPU, else native.
       worlds: how many play at once; 0: 2048, natively 16.
@@ -87,7 +87,7 @@ def run(
     size = world.action_space.shape[0]
     algorithm = SAC(perception, size, config) if isinstance(config, SACConfig) else PPO(perception, size, config)
     if out is None:
-        out = pathlib.Path("runs") / "-".join([world.task.name, robot, grasping, algo, obs, str(seed)])
+        out = pathlib.Path("runs") / "-".join([world.task.name, world.robot, world.grasping, algo, obs, str(seed)])
     depends = {**depends_on(world, perception), "paper_rl": paper_rl}
     settings = Run(minutes, None, seed, out, resume, save_buffer, until=until)
     result = train(world, algorithm, settings, depends)

@@ -23,13 +23,15 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.engine.view import Array
-from ig2mj.errors import InputError
+from ig2mj.errors import InputError, UnknownNameError
 from ig2mj.learn.checkpoints import refuse_difference
 from ig2mj.learn.moments import Moments
 from ig2mj.learn.networks import Actor
 from ig2mj.learn.perception import Perception
 
 FORMAT_VERSION = 1
+
+_HERE = pathlib.Path(__file__).resolve()
 
 CARD = "card.json"
 
@@ -156,3 +158,31 @@ def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
             place = place.setdefault(folder, {})
         place[name] = value
     return tree
+
+
+def find_policy(name: str | os.PathLike) -> pathlib.Path:
+    """The file of a policy.
+
+    Args:
+      name: a file; or the name of a policy that ships (`shipped`).
+
+    Raises:
+      UnknownNameError: neither a file nor the name of a shipped policy, with near matches.
+    """
+    file = pathlib.Path(name)
+    if file.is_file():
+        return file
+    if file.is_dir() and (file / "policy.npz").is_file():
+        return file / "policy.npz"
+    if file.suffix == ".npz" or len(file.parts) > 1:
+        raise InputError(file, "there is no such file", mend="`ig2mj train` writes policies")
+    known = shipped()
+    if str(name) not in known:
+        raise UnknownNameError("policy", str(name), known)
+    return known[str(name)]
+
+
+def shipped() -> dict[str, pathlib.Path]:
+    """Files of the policies that ship, by name: the task's name alone is the humanoid's from pixels."""
+    folders = [_HERE.parents[3] / "policies", _HERE.parents[2] / "ig2mj_policies"]
+    return {file.stem: file for folder in folders if folder.is_dir() for file in sorted(folder.glob("*.npz"))}
