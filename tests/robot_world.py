@@ -52,40 +52,38 @@ class RobotWorld:
 
 
 class GraspingWorld(RobotWorld):
-    """A robot whose grasps are assisted; one control step after the other, as the core does it."""
+    """A robot whose grasps are assisted, in a `Simulation`, on any engine; an action is 1/10 s."""
 
-    def __init__(self, home: str | os.PathLike, robot: Robot, mode: str = "assisted", targets=(), period: float = 0.1):
-        super().__init__(home, robot, period)
+    def __init__(
+        self,
+        home: str | os.PathLike,
+        robot: Robot,
+        mode: str = "assisted",
+        targets=(),
+        others: tuple[Robot, ...] = (),
+        engine: str = "native",
+        **options,
+    ):
+        self.scene = ig2mj.load_scene(home, agents=[robot, *others])
         self.grasping = Grasping(self.scene, mode, targets)
-        self.grasps = self.grasping.initial(1)
-        self._update = jax.jit(self.grasping.update)
-        self._lag, self._write = jax.jit(self.controller.lag), jax.jit(self.grasping.write)
+        self.simulation = ig2mj.Simulation(self.scene, engine, grasping=self.grasping, **options)
+        self.controller = self.simulation.core.controllers[0]
+
+    @property
+    def state(self):
+        return self.simulation.robots.controllers[0]
+
+    @property
+    def grasps(self):
+        return self.simulation.robots.held
 
     @property
     def held(self) -> list[str | None]:
         """Object in each hand."""
-        bodies, tables = np.asarray(self.grasps.body)[0], self.scene.tables
-        held = np.asarray(self.grasps.held)[0]
-        return [
-            tables.object_names[tables.graspable_object[b]] if on else None for b, on in zip(bodies, held, strict=True)
-        ]
+        return list(self.simulation.robots.holding.values())
 
     def step(self) -> None:
-        self.simulation.step(self._ctrl)
-        grip, lag = self.controller.grip(self.state), self._lag(self.view, self.state)
-        after = self._update(self.view, self.grasps, grip, lag)
-        if np.asarray(self.grasping.changed(self.grasps, after)).any():
-            engine = self.simulation.engine
-            engine.write(self.simulation.physics, jax.tree.map(np.asarray, self._write(after)))
-        self.grasps = after
+        self.simulation.step()
 
     def act(self, action: np.ndarray | None = None, times: int = 1, **named: float) -> None:
-        if action is None:
-            action = np.zeros(self.controller.action_size)
-            for name, value in named.items():
-                action[self.controller.action_names.index(name)] = value
-        for _ in range(times):
-            ctrl, self.state = self._control(np.asarray(action, np.float32)[None], self.view, self.state)
-            self._ctrl[self._own] = np.asarray(ctrl)[0]
-            for _ in range(self.steps):
-                self.step()
+        self.simulation.robots.act(action, times, **named)

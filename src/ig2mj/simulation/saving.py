@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jax
 import numpy as np
@@ -14,6 +14,10 @@ from ig2mj.errors import InputError
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
 from ig2mj.worlds.archive import load_tree, save_tree
+from ig2mj.worlds.hands import Held
+
+if TYPE_CHECKING:
+    from ig2mj.simulation.simulation import Simulation
 
 VERSION = 1
 """Of the files that `save_world` writes."""
@@ -25,12 +29,28 @@ class SavedWorld:
 
     Attributes:
       physics, states: of the world. key: raw data of the random key. step: control steps since the reset.
+      controllers: what each robot's controller remembers. held: what hands hold, None where by friction alone.
     """
 
     physics: Snapshot
     states: ExtendedStates
     key: np.ndarray
     step: np.ndarray
+    controllers: tuple[Any, ...]
+    held: Held
+
+
+def everything(simulation: Simulation) -> SavedWorld:
+    """What is to be saved of a simulation."""
+    world = simulation.world
+    return SavedWorld(
+        physics=jax.tree.map(lambda leaf: np.asarray(leaf)[None], simulation.engine.export(simulation.physics, 0)),
+        states=world.states,
+        key=np.asarray(world.key)[0],
+        step=np.asarray(world.step, int),
+        controllers=simulation.robots.controllers,
+        held=simulation.robots.held,
+    )
 
 
 def save_world(world: SavedWorld, file: str | os.PathLike, scene: Scene, engine: str) -> None:

@@ -19,6 +19,8 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 
+from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.agents.grasping import Grasping
 from ig2mj.engine.base import Engine, Write
 from ig2mj.engine.registry import make_engine
 from ig2mj.engine.snapshot import Snapshot
@@ -33,15 +35,18 @@ from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.setters import lacks, set_by_name
 from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.simulation import pictures
 from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_openables, write_of_pose
+from ig2mj.simulation.robots import RobotsOfWorld
 from ig2mj.simulation.sampling import WorldSampler
-from ig2mj.simulation.saving import SavedWorld, load_world, save_world
+from ig2mj.simulation.saving import everything, load_world, save_world
 from ig2mj.states import registry
 from ig2mj.states.model import DEFAULTS, StateModel
 from ig2mj.states.options import StateOptions
 from ig2mj.states.world import ExtendedStates, WorldState
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.rules import Rules
+from ig2mj.worlds.worlds import controllers_of, grasping_of
 
 
 class Simulation:
@@ -60,6 +65,7 @@ class Simulation:
         *,
         states: StateOptions | None = DEFAULTS,
         seed: int = 0,
+        grasping: str | Grasping = "physical",
         **options: Any,
     ):
         """Starts at the scene's initial state.
@@ -69,6 +75,7 @@ class Simulation:
           engine: an engine's name, or an engine made for this scene with one world.
           states: how extended states behave; None: physics only.
           seed: of what `set_state` draws at random.
+          grasping: how the robots' hands hold (see `ig2mj.Worlds`).
           options: go to the engine, where it is given by name, e.g. `boxes="igibson"`.
         """
         run_programs_inline()
@@ -80,12 +87,14 @@ class Simulation:
         self.physics = self.engine.reset()
         self._initial = self.engine.export(self.physics, 0)
         self.last_sampling: dict[str, int] = {}
+        self._grasping = grasping_of(self.scene, grasping)
         self._begin()
 
     def _begin(self) -> None:
         """States, clock and random key at their start; states are made at the first question about them."""
         self._states: ExtendedStates | None = None
         self._key, self._steps = jax.random.key(self._seed), 0
+        self._robots: RobotsOfWorld | None = None
 
     @classmethod
     def from_snapshot(
@@ -134,7 +143,14 @@ class Simulation:
     def core(self) -> Core:
         """What steps this world."""
         rules = None if self.state_options is None else Rules.of_scene(self.scene, self.state_options)
-        return Core(self.engine, rules)
+        return Core(self.engine, rules, None, controllers_of(self.scene, ACTION_PERIOD), self._grasping)
+
+    @property
+    def robots(self) -> RobotsOfWorld:
+        """The scene's robots: `simulation.robots.act(action)` lets them act, `.holding` is what is in their hands."""
+        if self._robots is None:
+            self._robots = RobotsOfWorld(self)
+        return self._robots
 
     @property
     def _rules(self) -> Rules:
@@ -199,9 +215,12 @@ class Simulation:
             )
         row, view = None if row is None else row[None], self.view
         advance, physics, states, done = self.core.advance, self.physics, self._states_or_none, 0
+        robots = self.robots if self._grasping is not None else None
         try:
             for done in range(1, count + 1):  # noqa: B007 (counted below, also where a step raises)
                 physics, view, states, _ = advance(physics, states, row)
+                if robots is not None:
+                    physics, view = robots.grasp(physics, view)
                 row = None
         finally:
             self.physics, self._states = physics, states
@@ -310,7 +329,7 @@ class Simulation:
         self.last_sampling = dict(self._sampler.rejected)
         if row is None:
             return False
-        self.physics, self._states = self.engine.load(self.physics, row.physics), row.states
+        self.physics, self._states, self._robots = self.engine.load(self.physics, row.physics), row.states, None
         return True
 
     @functools.cached_property
@@ -343,24 +362,17 @@ class Simulation:
 
     def save(self, path: str | os.PathLike) -> None:
         """Writes the whole world, physics and states, to one `.npz` (arrays only, no pickle). Raises InputError."""
-        save_world(self._everything(), path, self.scene, self.engine.name)
+        save_world(everything(self), path, self.scene, self.engine.name)
 
     def restore(self, path: str | os.PathLike) -> PhysicsView:
         """Goes back to a world that `save` wrote, of this scene. Raises InputError."""
-        found = load_world(path, self._everything(), self.scene)
+        found = load_world(path, everything(self), self.scene)
         self.physics = self.engine.load(self.physics, found.physics)
         self._states = jax.tree.map(jnp.asarray, found.states)
         self._key = jax.random.wrap_key_data(jnp.asarray(found.key))
         self._steps = int(found.step[0])
+        self.robots.controllers, self.robots.held = found.controllers, found.held
         return self.view
-
-    def _everything(self) -> SavedWorld:
-        return SavedWorld(
-            physics=jax.tree.map(lambda leaf: np.asarray(leaf)[None], self.engine.export(self.physics, 0)),
-            states=self.states,
-            key=np.asarray(jax.random.key_data(self._key)),
-            step=np.array([self._steps]),
-        )
 
     # Pictures.
 
@@ -371,16 +383,7 @@ class Simulation:
           camera: a camera's name or number, an `ig2mj.viewer.offscreen.FreeView`, or None for an overview.
           options: see `ig2mj.viewer.offscreen.render`.
         """
-        from ig2mj.viewer import offscreen, state_marks
-
-        model, data = self.engine.to_mujoco(self.physics, 0)
-        if self.state_options is None or options.get("segmentation"):
-            return offscreen.render(model, data, camera, width=width, height=height, **options)
-        found = state_marks.marks(self.state_model, self.states, self.view)
-        options.setdefault("decorate", lambda scene: state_marks.draw_marks(scene, found))
-        tint = state_marks.tint_of_objects(self.state_model, self.states)
-        with state_marks.Tinter(model, self.scene.tables).shown(tint):
-            return offscreen.render(model, data, camera, width=width, height=height, **options)
+        return pictures.render(self, camera, width, height, **options)
 
     def launch_viewer(self, **options: Any) -> None:
         """Opens MuJoCo's viewer on this world and steps it until the window is closed.
@@ -391,10 +394,4 @@ class Simulation:
         Raises:
           MissingDependencyError: there is no display.
         """
-        from ig2mj.viewer import interactive, overlays, states_overlay
-
-        if self.state_options is not None:
-            shown = [*overlays.default_overlays(self.scene), states_overlay.StatesOverlay(self, self.model)]
-            options.setdefault("overlays", shown)
-        options.setdefault("step_time", self.engine.substeps * self.engine.timestep)
-        interactive.launch(self, **options)
+        pictures.launch_viewer(self, **options)

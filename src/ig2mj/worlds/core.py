@@ -32,15 +32,16 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.agents.base import Controller
-from ig2mj.agents.grasping import Grasping, GraspState
+from ig2mj.agents.grasping import Grasping
 from ig2mj.engine.base import Engine, Physics, Write
 from ig2mj.engine.health import Health
 from ig2mj.engine.snapshot import Snapshot
-from ig2mj.engine.view import OF_CONSTRAINTS, Array, PhysicsView, read_field, replace_fields
+from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
 from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Batch
+from ig2mj.worlds.hands import Hands
 from ig2mj.worlds.lazy.stepper import StateStepper
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.rules import Outcome, Rules, States
@@ -54,7 +55,7 @@ class Core:
     """Start, step and reset of the worlds of one engine.
 
     Attributes:
-      advance: see `advance_fn`.
+      advance: see `advance_fn`. hands: what they hold. grasp: `hands.act`, compiled where that helps.
       engine: physics. rules: states and goal. controllers: of the scene's robots. grasping: how their hands hold.
       starts: what episodes start from.
       action_low, action_high: [n] limits of an action, of all robots one after the other.
@@ -78,16 +79,15 @@ class Core:
           grasping: how hands take hold of objects; None: by friction alone.
         """
         self.engine, self.rules, self.controllers = engine, rules, tuple(controllers)
-        self.grasping = grasping
+        self.grasping, self.hands = grasping, Hands(engine, grasping, self.controllers)
         self.action_low = np.concatenate([np.zeros(0), *(c.action_low for c in self.controllers)])
         self.action_high = np.concatenate([np.zeros(0), *(c.action_high for c in self.controllers)])
         self.starts = Starts(engine, rules.initial if rules is not None else None, pool)
         self._physics_step = engine.step  # a world at rest steps in under 2 us: even looking up a name counts
-        self._control, self._hands = jax.jit(self._control_fn), jax.jit(self._hands_fn)
-        self._constraints = jax.jit(grasping.write) if grasping is not None and grasping.active else None
+        self._control = jax.jit(self._control_fn)
         self._count, self._chosen = jax.jit(self._count_fn), jax.jit(chosen)
         if engine.pure:
-            self.advance = jax.jit(self.advance_fn)
+            self.advance, self.grasp = jax.jit(self.advance_fn), jax.jit(self.hands.act)
             self._step = jax.jit(self.step_fn, donate_argnums=0)
             self._reset = jax.jit(self.reset_fn, donate_argnums=0)
             self._rollout = jax.jit(self._scanned, static_argnums=(2, 3), donate_argnums=(0, 1))
@@ -96,7 +96,8 @@ class Core:
             self._react = rules.step if rules is not None else self._no_rules
             self._if_any, self._index = _cond_any, jnp.asarray
         else:
-            self.advance, self._step, self._reset = self.advance_fn, self.step_fn, self.reset_fn
+            self.advance, self.grasp = self.advance_fn, self.hands.act
+            self._step, self._reset = self.step_fn, self.reset_fn
             self._rollout, self._begin = self._looped, self._episode_0
             self._write, self._load = self.write_fn, self.load_fn
             self._react = StateStepper.of(rules, engine.num_worlds).step if rules is not None else self._no_rules
@@ -147,7 +148,7 @@ class Core:
         """One control step of MuJoCo's controls."""
         world, controllers = batch.world, batch.controllers
         physics, view, states, status = self.advance_fn(world.physics, world.states, ctrl)
-        physics, view, grasps = self._grasp(physics, view, batch.grasps, controllers)
+        physics, view, grasps = self.hands.act(physics, view, batch.grasps, controllers)
         clocks = (world.step, world.time, batch.flags, batch.troubles)
         step, time, flags, troubles = self._count(*clocks, self.engine.health(physics), view.object_com)
         world = WorldState(physics=physics, view=view, states=states, key=world.key, step=step, time=time)
@@ -187,32 +188,6 @@ class Core:
 
         return self._if_any(cut, act, physics, view)
 
-    def _grasp(
-        self, physics: Physics, view: PhysicsView, grasps: GraspState | None, controllers: tuple[Any, ...]
-    ) -> tuple[Physics, PhysicsView, GraspState | None]:
-        """Physics and view after hands took hold or let go; worlds where none did keep their view."""
-        if self._constraints is None or grasps is None:
-            return physics, view, grasps
-        after, changed = self._hands(view, grasps, controllers)
-        if not self.engine.pure:
-            if np.asarray(changed).any():
-                physics = self.engine.write(physics, self._constraints(after))
-            return physics, self.engine.view(physics), after
-        physics = self.engine.write(physics, self._constraints(after))
-        now = self.engine.view(physics)  # what is not read of it is never computed
-        return physics, replace_fields(view, {name: read_field(now, name) for name in OF_CONSTRAINTS}), after
-
-    def _hands_fn(
-        self, view: PhysicsView, grasps: GraspState, controllers: tuple[Any, ...]
-    ) -> tuple[GraspState, Bool[Array, "W"]]:
-        """What hands hold after a step, and in which worlds that is another than before."""
-        assert self.grasping is not None
-        each = list(zip(self.controllers, controllers, strict=True))
-        grip = jnp.concatenate([c.grip(state) for c, state in each], axis=1)
-        lag = jnp.concatenate([c.lag(view, state) for c, state in each], axis=1)
-        after = self.grasping.update(view, grasps, grip, lag)
-        return after, self.grasping.changed(grasps, after)
-
     def rollout(self, batch: Batch, carry: Any, policy: Policy, length: int) -> tuple[Batch, Any]:
         """`length` control steps, on a pure engine without leaving the device.
 
@@ -222,10 +197,15 @@ class Core:
         """
         return self._rollout(batch, carry, policy, length)
 
+    def control(
+        self, action: Float[Array, "W n"], view: PhysicsView, controllers: tuple[Any, ...]
+    ) -> tuple[Float[Array, "W nu"], tuple[Any, ...]]:
+        """MuJoCo's controls for an action of the robots, and what their controllers remember now."""
+        return self._control(action, view, controllers)
+
     def _control_fn(
         self, action: Float[Array, "W n"], view: PhysicsView, states: tuple[Any, ...]
     ) -> tuple[Float[Array, "W nu"], tuple[Any, ...]]:
-        """All robots' controllers: MuJoCo's controls, and what the controllers remember."""
         action = jnp.clip(jnp.asarray(action), self.action_low, self.action_high)
         sizes = np.cumsum([c.action_size for c in self.controllers])[:-1]
         asked = jnp.split(action, sizes, axis=-1)
@@ -288,7 +268,7 @@ class Core:
         rows = self.starts.pool.rows(self._index(row))
         physics = self.engine.load(world.physics, rows.physics, mask)
         zero = jnp.zeros_like(world.step), jnp.zeros_like(world.time)
-        started = (rows.states, key, *zero, self._controllers(), self._empty_hands())
+        started = (rows.states, key, *zero, self.first_controllers(), self.hands.read(physics))
         going = (world.states, world.key, world.step, world.time, batch.controllers, batch.grasps)
         states, key, step, time, controllers, grasps = self._chosen(mask, started, going)
         view = self.engine.view(physics)
@@ -312,8 +292,8 @@ class Core:
         )
         batch = Batch(
             world=world,
-            controllers=self._controllers(),
-            grasps=self._empty_hands(),
+            controllers=self.first_controllers(),
+            grasps=self.hands.read(physics),
             number=first + jnp.arange(count, dtype=jnp.int32),
             seed=jnp.asarray(seed, jnp.int32),
             episode=nothing - 1,
@@ -366,14 +346,14 @@ class Core:
     def _with(self, batch: Batch, physics: Physics, states: ExtendedStates) -> Batch:
         view = self.engine.view(physics)
         return dataclasses.replace(
-            batch, world=dataclasses.replace(batch.world, physics=physics, view=view, states=states)
+            batch,
+            world=dataclasses.replace(batch.world, physics=physics, view=view, states=states),
+            grasps=self.hands.read(physics),
         )
 
-    def _controllers(self) -> tuple[Any, ...]:
+    def first_controllers(self) -> tuple[Any, ...]:
+        """What the robots' controllers remember at the start."""
         return tuple(c.initial(self.engine.num_worlds) for c in self.controllers)
-
-    def _empty_hands(self) -> GraspState | None:
-        return None if self.grasping is None else self.grasping.initial(self.engine.num_worlds)
 
     # What went wrong.
 

@@ -17,6 +17,7 @@ import jax
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.agents.base import Controller, Robot
+from ig2mj.agents.grasping import Grasping
 from ig2mj.engine.base import Engine
 from ig2mj.engine.registry import make_engine
 from ig2mj.engine.view import Array
@@ -47,6 +48,7 @@ class Worlds:
         goal: CompiledExpression | Expression | str | None = None,
         pool: Pool | None = None,
         states: StateOptions = DEFAULTS,
+        grasping: str | Grasping = "physical",
         **options: Any,
     ):
         """Makes the worlds; `start` puts them at their start.
@@ -58,10 +60,13 @@ class Worlds:
           goal: evaluated at the end of every step. Without one, nothing is ever reached.
           pool: what episodes start from (`ig2mj sample` makes one); None: from the scene's initial state.
           states: how extended states behave.
+          grasping: how the robots' hands hold, a name of `ig2mj.agents.grasping.MODES`: "physical" (by friction alone),
+            "assisted" or "sticky"; or a `Grasping` of this scene, which "mitten" needs with its targets.
           options: go to the engine, where it is given by name.
 
         Raises:
-          EngineError: the engine cannot run this scene. Others: as `load_scene` and `compile_expression`.
+          EngineError: the engine cannot run this scene. UnknownNameError: no such mode of grasping. Others: as
+          `load_scene` and `compile_expression`.
         """
         self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
         if engine is None:
@@ -69,7 +74,8 @@ class Worlds:
         if isinstance(engine, str):
             engine = make_engine(engine, self.scene, num_worlds, **options)
         rules = Rules.of_scene(self.scene, states).with_goal(goal)
-        self.core = Core(engine, rules, pool, controllers_of(self.scene, engine.substeps * engine.timestep))
+        controllers = controllers_of(self.scene, engine.substeps * engine.timestep)
+        self.core = Core(engine, rules, pool, controllers, grasping_of(self.scene, grasping))
 
     @property
     def engine(self) -> Engine:
@@ -97,3 +103,13 @@ def controllers_of(scene: Scene, period: float) -> list[Controller]:
     """The controllers of the scene's robots, in the order of its agents; `period`: seconds between two actions."""
     robots = [(k, agent) for k, agent in enumerate(scene.agents) if isinstance(agent, Robot)]
     return [robot.controller(scene.tables, k, period) for k, robot in robots]
+
+
+def grasping_of(scene: Scene, grasping: str | Grasping) -> Grasping | None:
+    """The rule of grasping of that name, or that was made; None: by friction alone.
+
+    Raises:
+      UnknownNameError: there is no such mode.
+    """
+    made = Grasping(scene, grasping) if isinstance(grasping, str) else grasping
+    return made if made.active else None

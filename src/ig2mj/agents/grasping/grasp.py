@@ -86,10 +86,13 @@ class Grasping:
           targets: objects that mittens stick to.
 
         Raises:
-          UnknownNameError: there is no such mode or object. EngineError: a robot has hands, but no rays.
+          UnknownNameError: there is no such mode or object. EngineError: a robot's hands have no rays, or mittens no
+            targets.
         """
         if mode not in MODES:
             raise UnknownNameError("grasping mode", mode, MODES)
+        if mode == "mitten" and not targets:
+            raise EngineError("mittens stick to objects that are named: Grasping(scene, 'mitten', targets=[...])")
         self.mode, self.scene = mode, scene
         tables, model = scene.tables, scene.model
         hands = [h for a in scene.agents if isinstance(a, Robot) for h in a.hand_rays()]
@@ -170,6 +173,23 @@ class Grasping:
             data = data.at[row, at, :10].set(state.local, mode="drop")
             ignored = jnp.asarray(self._object).T[jnp.maximum(state.body, 0)] & (state.body >= 0)[..., None]
         return Write(eq_active=active, model_fields=ModelFields(eq_data=data), ignored_contacts=ignored)
+
+    def read(self, eq_active: Bool[Array, "W E"], eq_data: Float[Array, "W E 12"]) -> GraspState:
+        """What hands hold in a world that was loaded or changed by hand: the constraints that are on.
+
+        Args:
+          eq_active, eq_data: of a `Snapshot` with the world axis.
+        """
+        state = self.initial(eq_active.shape[0])
+        if not self.active:
+            return state
+        on = jnp.asarray(eq_active)[:, self._equality]  # [W, H, Y]
+        held, body = on.any(-1), jnp.argmax(on, axis=-1).astype(jnp.int32)
+        equality = jnp.asarray(self._equality)[np.arange(body.shape[1])[None], body]
+        local = jnp.take_along_axis(jnp.asarray(eq_data, jnp.float32)[..., :10], equality[..., None], axis=1)
+        return state.replace(
+            body=jnp.where(held, body, NOTHING), held=held, local=jnp.where(held[..., None], local, 0.0)
+        )
 
     def _touched(self, view: PhysicsView) -> Bool[Array, "W H Y"]:
         """What each hand presses on; for a mitten, which of its targets it touches at all."""

@@ -1,0 +1,38 @@
+"""Pictures and windows of a `Simulation`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from ig2mj.simulation.simulation import Simulation
+
+
+def render(simulation: Simulation, camera: Any, width: int, height: int, **options: Any) -> np.ndarray:
+    """See `Simulation.render`."""
+    from ig2mj.viewer import offscreen, state_marks
+
+    model, data = simulation.engine.to_mujoco(simulation.physics, 0)
+    if simulation.state_options is None or options.get("segmentation"):
+        return offscreen.render(model, data, camera, width=width, height=height, **options)
+    found = state_marks.marks(simulation.state_model, simulation.states, simulation.view)
+    options.setdefault("decorate", lambda scene: state_marks.draw_marks(scene, found))
+    tint = state_marks.tint_of_objects(simulation.state_model, simulation.states)
+    with state_marks.Tinter(model, simulation.scene.tables).shown(tint):
+        return offscreen.render(model, data, camera, width=width, height=height, **options)
+
+
+def launch_viewer(simulation: Simulation, **options: Any) -> None:
+    """See `Simulation.launch_viewer`."""
+    from ig2mj.viewer import interactive, overlays, states_overlay
+
+    if simulation.state_options is not None:
+        shown = [
+            *overlays.default_overlays(simulation.scene),
+            states_overlay.StatesOverlay(simulation, simulation.model),
+        ]
+        options.setdefault("overlays", shown)
+    options.setdefault("step_time", simulation.engine.substeps * simulation.engine.timestep)
+    interactive.launch(simulation, **options)

@@ -1,0 +1,85 @@
+"""`RobotsOfWorld`: the robots of a `Simulation`, with what their controllers remember and what their hands hold."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.engine.base import Physics
+from ig2mj.engine.view import PhysicsView
+from ig2mj.errors import ActionError, EngineError
+from ig2mj.worlds.hands import Held
+
+if TYPE_CHECKING:
+    from ig2mj.simulation.simulation import Simulation
+
+
+class RobotsOfWorld:
+    """Robots of one world.
+
+    Attributes:
+      controllers: what each controller remembers. held: what hands hold, None where by friction alone.
+    """
+
+    def __init__(self, simulation: Simulation):
+        """Controllers at their start; hands hold what the world's constraints say."""
+        self._simulation, self._core = simulation, simulation.core
+        engine = simulation.engine
+        self._steps = max(1, round(ACTION_PERIOD / (engine.substeps * engine.timestep)))
+        self.controllers: tuple[Any, ...] = self._core.first_controllers()
+        self.held: Held = self._core.hands.read(simulation.physics)
+
+    @property
+    def action_names(self) -> tuple[str, ...]:
+        """What each number of an action means, all robots one after the other."""
+        return tuple(name for c in self._core.controllers for name in c.action_names)
+
+    def act(self, action: Any = None, count: int = 1, **named: float | int) -> PhysicsView:
+        """Lets the robots act for 1/10 s, `count` times.
+
+            simulation.robots.act(right_hand_z=0.05)
+
+        Args:
+          action: [n] of all robots one after the other, clipped to the controllers' limits; None: zeros.
+          named: numbers of the action by name, put into it.
+
+        Returns:
+          The view afterwards.
+
+        Raises:
+          EngineError: the scene has no robots. ActionError: another shape or name, or a number that is not finite.
+        """
+        names = self.action_names
+        if not names:
+            raise EngineError("the scene was loaded without robots: load_scene(..., agents=[...]) adds them")
+        row = np.zeros(len(names), np.float32) if action is None else np.array(action, np.float32)
+        if row.shape != (len(names),):
+            raise ActionError(f"an action of this scene's robots has shape {(len(names),)}, not {row.shape}")
+        for name, number in named.items():
+            if name not in names:
+                raise ActionError(f"no number of an action is named '{name}' (names: {', '.join(names)})")
+            row[names.index(name)] = number
+        if not np.isfinite(row).all():
+            raise ActionError("an action is of finite numbers")
+        view = self._simulation.view
+        for _ in range(count):
+            ctrl, self.controllers = self._core.control(row[None], view, self.controllers)
+            view = self._simulation.step(np.asarray(ctrl, np.float64)[0], self._steps)
+        return view
+
+    def grasp(self, physics: Physics, view: PhysicsView) -> tuple[Physics, PhysicsView]:
+        """Physics and view after hands took hold or let go."""
+        physics, view, self.held = self._core.grasp(physics, view, self.held, self.controllers)
+        return physics, view
+
+    @property
+    def holding(self) -> dict[str, str | None]:
+        """Object that each hand holds by a constraint, by the name of the hand's body."""
+        tables, model = self._simulation.scene.tables, self._simulation.scene.model
+        hands: dict[str, str | None] = {model.body(int(b)).name: None for b in tables.hand_body}
+        if self.held is not None:
+            for hand, body, on in zip(hands, np.asarray(self.held.body)[0], np.asarray(self.held.held)[0], strict=True):
+                hands[hand] = tables.object_names[tables.graspable_object[body]] if on else None
+        return hands

@@ -1,0 +1,69 @@
+"""`Hands`: grasping as a part of the core. What hands of all worlds take hold of and let go of after a control step.
+
+Axes: W worlds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool
+
+from ig2mj.agents.base import Controller
+from ig2mj.agents.grasping import Grasping, GraspState
+from ig2mj.engine.base import Engine, Physics
+from ig2mj.engine.view import OF_CONSTRAINTS, Array, PhysicsView, read_field, replace_fields
+
+Held = GraspState | None
+"""What hands hold; None where they hold by friction alone."""
+
+
+class Hands:
+    """The hands of an engine's worlds. `act` and `read` may be part of a compiled program on a pure engine."""
+
+    def __init__(self, engine: Engine, grasping: Grasping | None, controllers: Sequence[Controller]):
+        """Binds a rule of grasping to an engine and to the controllers that ask hands to close."""
+        self._engine, self._grasping, self._controllers = engine, grasping, tuple(controllers)
+        self._holds = grasping is not None and grasping.active
+        self._update = jax.jit(self._updated)
+        if grasping is not None:
+            self._constraints, self._read = jax.jit(grasping.write), jax.jit(grasping.read)
+
+    def act(
+        self, physics: Physics, view: PhysicsView, held: Held, controllers: tuple[Any, ...]
+    ) -> tuple[Physics, PhysicsView, Held]:
+        """Physics and view after hands took hold or let go, as after every control step. Uses up `physics`."""
+        if not self._holds or held is None:
+            return physics, view, held
+        after, changed = self._update(view, held, controllers)
+        if not self._engine.pure:
+            if np.asarray(changed).any():
+                physics = self._engine.write(physics, self._constraints(after))
+            return physics, self._engine.view(physics), after
+        physics = self._engine.write(physics, self._constraints(after))
+        now = self._engine.view(physics)  # what is not read of it is never computed
+        return physics, replace_fields(view, {name: read_field(now, name) for name in OF_CONSTRAINTS}), after
+
+    def read(self, physics: Physics) -> Held:
+        """What hands hold in worlds that were loaded, or changed from outside: the constraints that are on."""
+        if self._grasping is None:
+            return None
+        if not self._holds:
+            return self._grasping.initial(self._engine.num_worlds)
+        now = self._engine.snapshot(physics)
+        return self._read(now.whole("eq_active"), now.whole("eq_data"))
+
+    def _updated(
+        self, view: PhysicsView, held: GraspState, controllers: tuple[Any, ...]
+    ) -> tuple[GraspState, Bool[Array, "W"]]:
+        """What hands hold after a step, and in which worlds that is another than before."""
+        assert self._grasping is not None
+        each = list(zip(self._controllers, controllers, strict=True))
+        grip = jnp.concatenate([c.grip(state) for c, state in each], axis=1)
+        lag = jnp.concatenate([c.lag(view, state) for c, state in each], axis=1)
+        after = self._grasping.update(view, held, grip, lag)
+        return after, self._grasping.changed(held, after)
