@@ -23,7 +23,8 @@ from ig2mj.states import particles
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 
-WIDTH, HEIGHT = 48, 36
+WIDTH, HEIGHT = 48, 40
+"""Whole tiles of rays."""
 
 
 @pytest.fixture(scope="session")

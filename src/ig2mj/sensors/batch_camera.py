@@ -37,6 +37,10 @@ NOTHING = -1
 """In a segmentation: no object there (sky, agents, the world's own geoms)."""
 
 
+TILE = 8
+"""Pixels a side of what a block of 64 threads sees: a third faster than rows of 64 pixels."""
+
+
 @struct.dataclass
 class Images:
     """Pictures of all worlds; what was not asked for is None.
@@ -69,6 +73,7 @@ class BatchCamera:
         particles: int = 64,
         groups: Sequence[int] = (0, 1, 2),
         shadows: bool = False,
+        cull_backfaces: bool = False,
         devices: Sequence[str] | None = None,
     ):
         """Compiles the render model.
@@ -81,6 +86,8 @@ class BatchCamera:
           particles: S, the most particles drawn in a world.
           groups: geom groups that are seen.
           shadows: cast them; about twice the time.
+          cull_backfaces: surfaces seen from behind are not there, so that a camera inside a geom sees through it; a
+            third more time.
           devices: Warp's names ("cuda:0", ...) where worlds are shared out over several devices; None: the default one.
 
         Raises:
@@ -112,9 +119,11 @@ class BatchCamera:
             cam_active=self.cameras,
             background_color=BACKGROUND,
             use_shadows=shadows,
+            enable_backface_culling=cull_backfaces,
         )
         self._handle = self._context.pytree()
         self._check_addresses()
+        self._tiled = self._order_rays()
 
     def __call__(
         self,
@@ -145,12 +154,32 @@ class BatchCamera:
             return packed, depth, jnp.zeros((0, 2), jnp.int32)
 
         packed, depth, seen = jax.vmap(cast)(moved, look)
-        shape = (self.engine.num_worlds, len(self.cameras), self.height, self.width)
         return Images(
-            rgb=_unpack(packed).reshape(*shape, 3) if self._wants[0] else None,
-            depth=depth.reshape(shape) if self._wants[1] else None,
-            segmentation=self._objects(seen[..., 0], slots).reshape(shape) if self._wants[2] else None,
+            rgb=_unpack(self._rows(packed)) if self._wants[0] else None,
+            depth=self._rows(depth) if self._wants[1] else None,
+            segmentation=self._rows(self._objects(seen[..., 0], slots)) if self._wants[2] else None,
         )
+
+    def _order_rays(self) -> bool:
+        """Lets each block of threads cast the rays of a tile, which meet the same geoms; says whether it can."""
+        contexts, pixels = list(self._context._contexts.values()), self.height * self.width
+        if self.height % TILE or self.width % TILE or any(len(c.ray) != pixels * len(self.cameras) for c in contexts):
+            return False
+        tiles = np.arange(pixels).reshape(self.height // TILE, TILE, self.width // TILE, TILE).swapaxes(1, 2).ravel()
+        order = (np.arange(len(self.cameras))[:, None] * pixels + tiles).ravel()
+        for context in contexts:
+            for rays in (context.ray, context.ray_offset):
+                if len(rays) == len(order):
+                    rays.assign(rays.numpy()[order])
+        return True
+
+    def _rows(self, pixels: Array) -> Array:
+        """Pictures [W, C, Y, X] of what the rays saw, in the order in which they are cast."""
+        shape = (self.engine.num_worlds, len(self.cameras))
+        if not self._tiled:
+            return pixels.reshape(*shape, self.height, self.width)
+        tiles = pixels.reshape(*shape, self.height // TILE, self.width // TILE, TILE, TILE)
+        return tiles.swapaxes(3, 4).reshape(*shape, self.height, self.width)
 
     def _check_addresses(self) -> None:
         """Pictures lie one after the other in the ray caster's buffers."""
