@@ -108,6 +108,30 @@ def test_base_head_and_gripper(tiny_home_folder):
     assert upright[2] > 0.999
 
 
-def test_an_unknown_pose_is_named():
+def test_the_experiments_proprioception_is_49_numbers_with_the_servos_torques(tiny_home_folder):
+    """Spec 2.6: gripper's position and Euler angles in the base's frame, has grasped, (q, qd, torque) of 14 joints."""
+    world = RobotWorld(tiny_home_folder, Fetch(pos=START, proprioception="experiments"))
+    world.act(times=4, forward=0.2, eef_z=-1, eef_rx=0.5, gripper=1)
+    felt = world.proprioception()
+    assert len(felt) == 49 and list(felt)[:8][-2:] == ["has_grasped", "r_wheel_position"]
+    turned = Rotation.from_quat(np.roll(world.quat("fetch"), -1)).inv()
+    gripper = turned * Rotation.from_quat(np.roll(world.quat("fetch_gripper_link"), -1))
+    assert list(felt.values())[:3] == pytest.approx(
+        turned.apply(world.body("fetch_gripper_link") - world.body("fetch")), abs=2e-3
+    )
+    told = Rotation.from_euler("xyz", list(felt.values())[3:6])
+    assert (told.inv() * gripper).magnitude() < 1e-2
+    model, data = world.simulation.engine.to_mujoco(world.simulation.physics, 0)
+    mujoco.mj_forward(model, data)
+    for joint in JOINTS:
+        name = joint.name.removesuffix("_joint")
+        assert felt[f"{name}_position"] == pytest.approx(data.joint(f"fetch_{joint.name}").qpos[0], abs=1e-4)
+        assert felt[f"{name}_velocity"] == pytest.approx(data.joint(f"fetch_{joint.name}").qvel[0], abs=1e-4)
+        assert felt[f"{name}_torque"] == pytest.approx(data.actuator(f"fetch_{name}").force[0], rel=1e-2, abs=0.02)
+
+
+def test_an_unknown_pose_or_list_is_named():
     with pytest.raises(UnknownNameError, match="diagonal30"):
         Fetch(pose="diagonal31")
+    with pytest.raises(UnknownNameError, match="experiments"):
+        Fetch(proprioception="experiment")

@@ -161,4 +161,5 @@ def make_robot(task: Task, robot: str) -> Robot:
 
     acts = task.acts(robot)
     half = math.radians(acts.yaw) / 2
-    return ROBOTS[robot](pos=acts.pos, quat=(math.cos(half), 0.0, 0.0, math.sin(half)))
+    options = {"proprioception": "experiments"} if robot == "fetch" else {}
+    return ROBOTS[robot](pos=acts.pos, quat=(math.cos(half), 0.0, 0.0, math.sin(half)), **options)

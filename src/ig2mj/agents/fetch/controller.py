@@ -26,12 +26,9 @@ from ig2mj.agents.controllers import (
     differential_drive,
     drive_limits,
     scale_command,
-    sines_and_cosines,
     two_finger_grip,
-    wheel_odometry,
 )
 from ig2mj.agents.fetch.figures import (
-    ARM,
     AXLE,
     CAMERA_JOINTS,
     CHAIN,
@@ -39,15 +36,14 @@ from ig2mj.agents.fetch.figures import (
     FINGERS,
     LOWER,
     MAX_WHEEL,
-    TRUNK,
     UPPER,
     VELOCITY,
     WHEEL_RADIUS,
-    WHEELS,
 )
+from ig2mj.agents.fetch.proprioception import JOINT_NAMES, LISTS, feel
 from ig2mj.agents.kinematics import forward, inverse
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.poses import length, quat_multiply, quat_rotate_inverse, rotation_vector_to_quat
+from ig2mj.geometry.poses import length, quat_multiply, rotation_vector_to_quat
 from ig2mj.scene.tables import SceneTables
 
 GAIN = 2.0
@@ -59,24 +55,19 @@ STRETCH = np.array([0.2, 0.2, 0.2, 0.5, 0.5, 0.5])
 LEASH = 0.15
 """rad or m that a servo's target may be ahead of its joint: a blocked arm does not push ever harder."""
 
-JOINT_NAMES = (
-    *("r_wheel", "l_wheel", "torso_lift", "head_pan", "head_tilt"),
-    *("shoulder_pan", "shoulder_lift", "upperarm_roll", "elbow_flex", "forearm_roll", "wrist_flex", "wrist_roll"),
-    *("r_gripper_finger", "l_gripper_finger"),
-)
-
 
 @struct.dataclass
 class FetchState:
     """What the controller remembers.
 
     Attributes:
-      target: positions that the servos are at, of the joints from the trunk on.
+      target: positions that the servos are at, of the joints from the trunk on. wheels: rad/s of the wheels'.
       solution: of the inverse kinematics at the last action, which is averaged with the next; known: there was one.
       closed: the gripper was told to close. held: it held something at the last action.
     """
 
     target: Float[Array, "W 12"]
+    wheels: Float[Array, "W 2"]
     solution: Float[Array, "W 8"]
     known: Bool[Array, "W"]
     closed: Bool[Array, "W"]
@@ -93,20 +84,17 @@ class FetchController:
     action_low: np.ndarray = -np.ones(11)
     action_high: np.ndarray = np.ones(11)
 
-    proprioception_names: tuple[str, ...] = (
-        *(f"camera_qpos_{f}_{n}" for f in ("sin", "cos") for n in ("pan", "tilt")),
-        *(f"base_qpos_{f}_{n}" for f in ("sin", "cos") for n in ("r_wheel", "l_wheel")),
-        *(f"robot_lin_vel_{n}" for n in "xyz"),
-        *(f"robot_ang_vel_{n}" for n in "xyz"),
-        *("dd_base_lin_vel", "dd_base_ang_vel"),
-        *(f"arm_0_qpos_{f}_{JOINT_NAMES[j]}" for f in ("sin", "cos") for j in ARM),
-        *(f"eef_0_pos_{n}" for n in "xyz"),
-        *(f"eef_0_quat_{n}" for n in "wxyz"),
-        *("gripper_0_qpos_right", "gripper_0_qpos_left", "grasp_0", "trunk_qpos"),
-    )
-
-    def __init__(self, tables: SceneTables, agent: int, period: float, start: Float[np.ndarray, "14"]):
+    def __init__(
+        self,
+        tables: SceneTables,
+        agent: int,
+        period: float,
+        start: Float[np.ndarray, "14"],
+        proprioception: str = "default",
+    ):
+        """Args: start: positions of the joints. proprioception: one of `ig2mj.agents.fetch.proprioception.LISTS`."""
         self._agent, self._period, self._start = agent, period, np.asarray(start)
+        self._list, self.proprioception_names = proprioception, LISTS[proprioception]
         name = tables.agent_names[agent]
         self._joints = np.array([tables.agent_joint_names.index(f"{name}_{n}_joint") for n in JOINT_NAMES])
         self._hand = np.flatnonzero(tables.hand_agent == agent)
@@ -119,7 +107,8 @@ class FetchController:
     def initial(self, num_worlds: int) -> FetchState:
         no = jnp.zeros(num_worlds, bool)
         target = jnp.tile(jnp.asarray(self._start[2:], jnp.float32), (num_worlds, 1))
-        return FetchState(target, jnp.zeros((num_worlds, 8), jnp.float32), no, no, no)
+        wheels, solution = jnp.zeros((num_worlds, 2), jnp.float32), jnp.zeros((num_worlds, 8), jnp.float32)
+        return FetchState(target, wheels, solution, no, no, no)
 
     def control(
         self, action: Float[Array, "W 11"], view: PhysicsView, state: FetchState
@@ -142,7 +131,7 @@ class FetchController:
         fingers = jnp.where(held[:, None], fingers, two_finger_grip(command, LOWER[12], UPPER[12]))
 
         target = jnp.concatenate([chain[:, :1], camera, chain[:, 1:], fingers], axis=1)
-        new = FetchState(target, solution, jnp.ones_like(state.known), command[:, 0] < 0, held)
+        new = FetchState(target, wheels, solution, jnp.ones_like(state.known), command[:, 0] < 0, held)
         return jnp.concatenate([wheels, target], axis=1), new
 
     def _solve(self, command: Float[Array, "W 6"], q: Float[Array, "W 14"]) -> Float[Array, "W 8"]:
@@ -178,26 +167,9 @@ class FetchController:
         return jnp.asarray(view.agent.eye_pos)[:, self._agent], jnp.asarray(view.agent.eye_quat)[:, self._agent]
 
     def proprioception(self, view: PhysicsView, state: FetchState) -> Float[Array, "W m"]:
-        """iGibson's default list: sines and cosines of joints, velocities of the base in its own frame (m/s, rad/s),
-        the gripper's pose in the base's frame (m, w-x-y-z), fingers and trunk (m); grasp is 1 or -1."""
+        """See `ig2mj.agents.fetch.proprioception`."""
         agent = view.agent
         q, speed = jnp.asarray(agent.joint_pos)[:, self._joints], jnp.asarray(agent.joint_vel)[:, self._joints]
-        pos, quat, _ = forward(CHAIN, q[:, np.array(CHAIN_JOINTS)])
-        base = agent.base_quat[:, self._agent]
         held = jnp.asarray(view.held)[:, self._hand].any((1, 2))
-        return jnp.concatenate(
-            [
-                sines_and_cosines(q[:, np.array(CAMERA_JOINTS)]),
-                sines_and_cosines(q[:, np.array(WHEELS)]),
-                quat_rotate_inverse(base, agent.base_linvel[:, self._agent]),
-                quat_rotate_inverse(base, agent.base_angvel[:, self._agent]),
-                wheel_odometry(speed[:, np.array(WHEELS[::-1])], WHEEL_RADIUS, AXLE),
-                sines_and_cosines(q[:, np.array(ARM)]),
-                pos,
-                quat,
-                q[:, np.array(FINGERS)],
-                jnp.where(held, 1.0, -1.0)[:, None],
-                q[:, np.array(TRUNK)],
-            ],
-            axis=1,
-        )
+        asked = jnp.concatenate([state.wheels, state.target], axis=1)
+        return feel(self._list, view, self._agent, q, speed, asked, held)

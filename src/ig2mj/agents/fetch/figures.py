@@ -120,7 +120,17 @@ def _limits(joint: Joint) -> tuple[float, float]:
 
 
 LOWER, UPPER = np.array([_limits(j) for j in JOINTS]).T
-VELOCITY = np.array([j.velocity for j in JOINTS])
+VELOCITY, EFFORT = np.array([(j.velocity, j.effort) for j in JOINTS]).T
+
+SERVO_RATE = 30.0
+"""1/s: natural frequency of the critically damped servos of trunk, head and arm."""
+
+WHEEL_GAIN = 20.0
+"""N m s of the wheels' velocity servos."""
+
+STIFFNESS = np.array([0.0 if "wheel" in j.name else j.moved * SERVO_RATE**2 for j in JOINTS])
+DAMPING = np.array([WHEEL_GAIN if "wheel" in j.name else 2 * j.moved * SERVO_RATE for j in JOINTS])
+"""N m/rad and N m s/rad (N/m and N s/m) of the servos; without stiffness one follows velocities."""
 
 CHAIN = Chain(
     origin=np.array([JOINTS[k].origin for k in CHAIN_JOINTS]),

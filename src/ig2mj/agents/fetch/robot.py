@@ -18,13 +18,16 @@ from ig2mj.agents.fetch.figures import (
     ARM_POSES,
     BASE,
     CAMERA,
+    DAMPING,
     GRIPPER,
     GRIPPER_INERTIA,
     JOINTS,
+    STIFFNESS,
     TORSO,
     Joint,
     start_positions,
 )
+from ig2mj.agents.fetch.proprioception import LISTS
 from ig2mj.agents.hand_rays import HandRays
 from ig2mj.agents.parts import (
     GEOM,
@@ -40,14 +43,8 @@ from ig2mj.errors import UnknownNameError
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.tables import SceneTables
 
-SERVO_RATE = 30.0
-"""1/s: natural frequency of the critically damped servos of trunk, head and arm."""
-
 ROTOR_SHARE = 0.3
 """Inertia of motor and gear, as a share of what a servo is made for: the servo is stable in any pose of the arm."""
-
-WHEEL_GAIN = 20.0
-"""N m s of the wheels' velocity servos."""
 
 WHEEL_CONTACT = 0.0613
 """m: radius of the sphere with which a wheel meets the floor."""
@@ -70,16 +67,20 @@ class Fetch:
     Attributes:
       pos, quat: of its base on the floor.
       pose: of the arm at the start, which inverse kinematics keeps near; iGibson's names (`figures.ARM_POSES`).
+      proprioception: "default", iGibson's 41 numbers, or "experiments", the 49 of its activities.
     """
 
     name: str = "fetch"
     pos: Vector = (0, 0, 0)
     quat: Vector = (1, 0, 0, 0)
     pose: str = "diagonal30"
+    proprioception: str = "default"
 
     def __post_init__(self) -> None:
         if self.pose not in ARM_POSES:
             raise UnknownNameError("pose of Fetch's arm", self.pose, ARM_POSES)
+        if self.proprioception not in LISTS:
+            raise UnknownNameError("proprioception of Fetch", self.proprioception, LISTS)
 
     def attach(self, spec: mujoco.MjSpec, pos: Vector | None = None, quat: Vector | None = None) -> AgentEntry:
         pos, quat = self.pos if pos is None else pos, normalized(self.quat if quat is None else quat)
@@ -143,12 +144,10 @@ class Fetch:
             damping=joint.damping if "head" not in joint.name else 0.0,
         )
         short = name.removesuffix("_joint")
+        number = JOINTS.index(joint)
+        servo(spec, name, float(STIFFNESS[number]), float(DAMPING[number]), joint.effort, name=short)
         if wheel:
-            servo(spec, name, 0.0, WHEEL_GAIN, joint.effort, name=short)
             collision(body, GEOM.mjGEOM_SPHERE, (WHEEL_CONTACT,), friction=1.0)
-        else:
-            stiffness, damping = joint.moved * SERVO_RATE**2, 2 * joint.moved * SERVO_RATE
-            servo(spec, name, stiffness, damping, joint.effort, name=short)
         draw_link(body, joint.link, look)
         return body
 
@@ -169,7 +168,7 @@ class Fetch:
         )
 
     def controller(self, tables: SceneTables, agent: int, period: float = ACTION_PERIOD) -> FetchController:
-        return FetchController(tables, agent, period, start_positions(self.pose))
+        return FetchController(tables, agent, period, start_positions(self.pose), self.proprioception)
 
 
 Inertia = tuple[float, tuple[float, ...], tuple[float, ...]]

@@ -187,9 +187,8 @@ class Grasping:
         held, body = on.any(-1), jnp.argmax(on, axis=-1).astype(jnp.int32)
         equality = jnp.asarray(self._equality)[np.arange(body.shape[1])[None], body]
         local = jnp.take_along_axis(jnp.asarray(eq_data, jnp.float32)[..., :10], equality[..., None], axis=1)
-        return state.replace(
-            body=jnp.where(held, body, NOTHING), held=held, local=jnp.where(held[..., None], local, 0.0)
-        )
+        body, local = jnp.where(held, body, NOTHING), jnp.where(held[..., None], local, 0.0)
+        return GraspState(body, held, local, state.window, state.strain)
 
     def _touched(self, view: PhysicsView) -> Bool[Array, "W H Y"]:
         """What each hand presses on; for a mitten, which of its targets it touches at all."""
