@@ -6,6 +6,7 @@ import dataclasses
 import sys
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -13,6 +14,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from small_envs import FarReward, FarRewardThatEnds, PointMass
 
+from ig2mj.learn.dagger import Dagger, DaggerConfig
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy, depends_on
 from ig2mj.learn.ppo import PPO, PPOConfig
@@ -65,3 +67,18 @@ def test_a_time_limit_is_no_end(kind, env_kind):
         assert (action > 0.2).all()
     else:
         assert (action < -0.2).all()
+
+
+@pytest.mark.parametrize("pure", [True, False])
+def test_an_expert_that_answers_in_any_state_is_imitated(pure):
+    """Also by a loop in which the expert is asked outside of compiled programs."""
+    env = PointMass(32, pure=pure)
+    config = DaggerConfig(updates=4, batch=64, capacity=4000, actor=(64, 64), alone=0.5)
+
+    def expert(state):
+        return jnp.clip(10 * (state.goal - state.pos), -1, 1)
+
+    algorithm = Dagger(Perception(env.observation_spaces), 2, expert, config)
+    result = train(env, algorithm, quiet(iterations=40, until=None))
+    assert result.row["actor_loss"] < 0.05
+    assert result.row["success"] > 0.9  # the expert itself acts no more since half of the run

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import tyro
 
-ALGORITHMS = ("sac", "ppo")
+ALGORITHMS = ("sac", "ppo", "dagger")
 
 WORLDS = {"native": 16}
 """So many worlds unless another number is asked for; `PURE_WORLDS` on the others."""
@@ -37,7 +37,7 @@ def run(
 
     Args:
       env: CookingMeat, or ig2mj/CookingMeat-v0 (`ig2mj list-envs`).
-      algo: sac or ppo.
+      algo: sac, ppo, or dagger (a scripted expert corrects the policy; `ig2mj list-envs`).
       robot: humanoid, fetch or turtlebot; default: the first that the task lists.
       grasping: mitten, assisted, sticky or physical; default: mitten for activities.
       obs: state (proprioception and privileged state) or rgbd (what the paper's agents see; needs the warp engine).
@@ -62,11 +62,10 @@ def run(
 
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.errors import Ig2mjError, UnknownNameError
+    from ig2mj.learn.algorithms import config_of, made
     from ig2mj.learn.options import configured
     from ig2mj.learn.perception import MODES, Perception
     from ig2mj.learn.policies import Policy, depends_on
-    from ig2mj.learn.ppo import PPO, PPOConfig
-    from ig2mj.learn.sac import SAC, SACConfig
     from ig2mj.learn.train import Run, train
 
     if algo not in ALGORITHMS:
@@ -75,24 +74,23 @@ def run(
         raise UnknownNameError("kind of observation", obs, MODES)
     if minutes <= 0:
         raise Ig2mjError(f"--minutes {minutes}: more than 0 is needed")
-    config = configured({"sac": SACConfig(), "ppo": PPOConfig()}[algo], set)
     if engine is None:
         engine = "warp" if jax.default_backend() == "gpu" else "native"
+    config = configured(config_of(algo, small=engine == "native"), set)
     names = VECTORS if obs == "state" else (*VECTORS, "rgb", "depth")
     count = worlds or WORLDS.get(engine, PURE_WORLDS)
     world = make(
         env, robot, count, engine, grasping, observations=names, paper_rl=paper_rl, pool_size=pool_size or None
     )  # fmt: skip
     perception = Perception(world.observation_spaces, obs)
-    size = world.action_space.shape[0]
-    algorithm = SAC(perception, size, config) if isinstance(config, SACConfig) else PPO(perception, size, config)
+    algorithm = made(config, perception, world)
     if out is None:
         out = pathlib.Path("runs") / "-".join([world.task.name, world.robot, world.grasping, algo, obs, str(seed)])
     depends = {**depends_on(world, perception), "paper_rl": paper_rl}
     settings = Run(minutes, None, seed, out, resume, save_buffer, until=until)
     result = train(world, algorithm, settings, depends)
     device = jax.devices()[0]
-    made = {
+    card = {
         "command": shlex.join(["ig2mj", *sys.argv[1:]]),
         "algorithm": algo,
         "settings": dataclasses.asdict(config),
@@ -108,7 +106,7 @@ def run(
         "paper_rl": paper_rl,
     }
     file = out / "policy.npz"
-    Policy.of(algorithm, result.learner, depends_on(world, perception), made).save(file)
+    Policy.of(algorithm, result.learner, depends_on(world, perception), card).save(file)
     print(file)
     print(f"how good it is on states it has not seen: ig2mj evaluate {file}", file=sys.stderr)
     return 0

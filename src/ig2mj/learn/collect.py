@@ -91,7 +91,10 @@ class Play:
 
 
 Act = Callable[[Any, Any, Seen, Array, Any], tuple[Array, dict[str, Array], Any]]
-"""(what was learned, memory, seen, key, state) -> (action, extra, memory)"""
+"""(what was learned, memory, seen, key, what an expert would do or None) -> (action, extra, memory)"""
+
+Hint = Callable[[Any], Array] | None
+"""An expert: from the environment's state to actions [W, n] (`ig2mj.envs.experts.expert_of`)."""
 
 
 def begin(env: TrainingEnv, memory: Any, seed: int) -> Play:
@@ -102,7 +105,7 @@ def begin(env: TrainingEnv, memory: Any, seed: int) -> Play:
 
 
 def collect_fn(
-    env: TrainingEnv, perception: Perception, act: Act, learned: Any, play: Play, key: Array, length: int
+    env: TrainingEnv, perception: Perception, act: Act, hint: Hint, learned: Any, play: Play, key: Array, length: int
 ) -> tuple[Play, Transition, dict[str, Array]]:
     """`length` steps of every world of a pure environment, as one scan.
 
@@ -112,7 +115,8 @@ def collect_fn(
 
     def step(play: Play, key: Array) -> tuple[Play, tuple[Transition, dict[str, Array]]]:
         seen = perception(play.state.obs)
-        action, extra, memory = act(learned, play.memory, seen, key, play.state)
+        told = None if hint is None else hint(play.state)
+        action, extra, memory = act(learned, play.memory, seen, key, told)
         state = env.step_autoreset_fn(play.state, action)
         new, kept = _stepped(perception, play, seen, action, extra, memory, state)
         return dataclasses.replace(new, state=_kept(state)), kept
@@ -124,17 +128,17 @@ def collect_fn(
 class NativeCollector:
     """`collect_fn` for an environment that cannot be compiled: the policy is, the environment is called."""
 
-    def __init__(self, env: TrainingEnv, perception: Perception, act: Act):
+    def __init__(self, env: TrainingEnv, perception: Perception, act: Act, hint: Hint = None):
         """Compiles nothing yet."""
         self._env = env
         self._before, self._after = jax.jit(self._choose), jax.jit(functools.partial(_stepped, perception))
-        self._perception, self._act = perception, act
+        self._perception, self._act, self._hint = perception, act, hint
 
     def _choose(
-        self, learned: Any, memory: Any, obs: Mapping[str, Array], key: Array
+        self, learned: Any, memory: Any, obs: Mapping[str, Array], key: Array, told: Array | None
     ) -> tuple[Seen, Array, dict[str, Array], Any]:
         seen = self._perception(obs)
-        return seen, *self._act(learned, memory, seen, key, None)
+        return seen, *self._act(learned, memory, seen, key, told)
 
     def __call__(
         self, learned: Any, play: Play, key: Array, length: int
@@ -142,7 +146,8 @@ class NativeCollector:
         """As `collect_fn`; also the seconds that were spent in the environment."""
         rollout, sums, spent = [], [], 0.0
         for k in np.asarray(jax.random.split(key, length)):
-            seen, action, extra, memory = self._before(learned, play.memory, play.state.obs, k)
+            told = None if self._hint is None else self._hint(play.state)
+            seen, action, extra, memory = self._before(learned, play.memory, play.state.obs, k, told)
             action = np.asarray(action)
             began = time.perf_counter()
             state = self._env.step_autoreset(play.state, action)

@@ -89,7 +89,7 @@ class Minibatch:
 class PPO:
     """See the module's text. All methods are pure."""
 
-    name = "ppo"
+    name, hint = "ppo", None
 
     def __init__(
         self, perception: Perception, action_size: int, config: PPOConfig | None = None, axis: str | None = None
@@ -136,7 +136,7 @@ class PPO:
     # How it acts.
 
     def act(
-        self, learner: PPOLearner, noise: None, seen: Seen, key: Array, state: Any = None
+        self, learner: PPOLearner, noise: None, seen: Seen, key: Array, told: Array | None = None
     ) -> tuple[Float[Array, "W n"], dict[str, Array], None]:
         """Actions, with what is needed to learn from them."""
         mean, log_std, _ = self._look(learner.actor, learner.moments, seen)
@@ -145,11 +145,13 @@ class PPO:
 
     def _look(self, actor: Any, moments: Moments, seen: Seen) -> tuple[Array, Array, Array]:
         own = moments.normal(seen.vector[..., : self.perception.actor_size])
-        return self.actor.apply({"params": actor}, own, seen.picture)  # pyright: ignore[reportReturnType]
+        looked: Any = self.actor.apply({"params": actor}, own, seen.picture)
+        return looked
 
     def _worth(self, value: Any, moments: Moments, vector: Float[Array, "T W v"]) -> Float[Array, "T W"]:
-        found = self.value.apply({"params": value}, moments.normal(vector).reshape(-1, vector.shape[-1]))
-        return found.reshape(vector.shape[:-1])  # pyright: ignore[reportAttributeAccessIssue]
+        flat = moments.normal(vector).reshape(math.prod(vector.shape[:-1]), vector.shape[-1])
+        found: Any = self.value.apply({"params": value}, flat)
+        return found.reshape(vector.shape[:-1])
 
     # How it learns.
 
@@ -215,8 +217,8 @@ class PPO:
             ratio = jnp.exp(change)
             kept = jnp.clip(ratio, 1 - c.clip, 1 + c.clip)
             actor = -jnp.minimum(ratio * batch.advantage, kept * batch.advantage).mean()
-            worth = self.value.apply({"params": params[1]}, normal)
-            value = jnp.square(worth - batch.wanted).mean()  # pyright: ignore[reportOperatorIssue]
+            worth: Any = self.value.apply({"params": params[1]}, normal)
+            value = jnp.square(worth - batch.wanted).mean()
             entropy = (log_std + 0.5 * math.log(2 * math.pi * math.e)).sum(-1).mean()
             total = actor + c.value * value - c.entropy * entropy
             found = {"actor_loss": actor, "critic_loss": value, "entropy": entropy}

@@ -107,7 +107,7 @@ class Noise:
 class SAC:
     """See the module's text. All methods are pure."""
 
-    name = "sac"
+    name, hint = "sac", None
 
     def __init__(
         self, perception: Perception, action_size: int, config: SACConfig | None = None, axis: str | None = None
@@ -176,7 +176,7 @@ class SAC:
     # How it acts.
 
     def act(
-        self, learner: SACLearner, noise: Noise, seen: Seen, key: Array, state: Any = None
+        self, learner: SACLearner, noise: Noise, seen: Seen, key: Array, told: Array | None = None
     ) -> tuple[Float[Array, "W n"], dict[str, Array], Noise]:
         """Actions with noise, each number's held for a time that is drawn from a zeta(2) distribution."""
         noise_key, time_key = jax.random.split(key)
@@ -191,7 +191,8 @@ class SAC:
 
     def _look(self, actor: Any, moments: Moments, seen: Seen) -> tuple[Array, Array, Array]:
         own = moments.normal(seen.vector[:, : self.perception.actor_size])
-        return self.actor.apply({"params": actor}, own, seen.picture)  # pyright: ignore[reportReturnType]
+        looked: Any = self.actor.apply({"params": actor}, own, seen.picture)
+        return looked
 
     def _draw(self, actor: Any, moments: Moments, seen: Seen, key: Array) -> tuple[Array, Array, Array]:
         """Actions, the logarithm of their density, and the guess."""
@@ -278,14 +279,14 @@ class SAC:
         density: Float[Array, "B"],
     ) -> tuple[Array, Array]:
         """Cross entropy between the critics' distributions and that of the reward and the more careful target."""
-        after = self.critic.apply({"params": target}, moments.normal(batch.after.vector), action)
-        chances = jax.nn.softmax(after)  # pyright: ignore[reportArgumentType]
+        after: Any = self.critic.apply({"params": target}, moments.normal(batch.after.vector), action)
+        chances = jax.nn.softmax(after)
         careful = jnp.argmin(chances @ self._support, axis=0)
         chance = jnp.where(careful[:, None] == 0, chances[0], chances[1])
         soft = self._support - alpha * density[:, None]
         wanted = projected(chance, batch.reward[:, None] + batch.discount[:, None] * soft, self._support)
-        logits = self.critic.apply({"params": params}, moments.normal(batch.seen.vector), batch.action)
-        logs = jax.nn.log_softmax(logits)  # pyright: ignore[reportArgumentType]
+        logits: Any = self.critic.apply({"params": params}, moments.normal(batch.seen.vector), batch.action)
+        logs = jax.nn.log_softmax(logits)
         loss = -(jax.lax.stop_gradient(wanted) * logs).sum(-1).mean(-1).sum()
         return loss, (jnp.exp(logs) @ self._support).mean()
 
@@ -301,8 +302,8 @@ class SAC:
 
         def loss(actor: Any) -> tuple[Array, tuple[Array, Array]]:
             action, density, guess = self._draw(actor, learner.moments, seen, draw_key)
-            logits = self.critic.apply({"params": learner.critic}, normal, action)
-            q = (jax.nn.softmax(logits) @ self._support).mean(0)  # pyright: ignore[reportArgumentType]
+            logits: Any = self.critic.apply({"params": learner.critic}, normal, action)
+            q = (jax.nn.softmax(logits) @ self._support).mean(0)
             wrong = jnp.float32(0)
             if guess.shape[-1]:
                 wrong = jnp.square(guess - normal[:, p.actor_size :]).mean()

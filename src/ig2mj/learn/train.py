@@ -42,6 +42,7 @@ class Algorithm(Protocol):
     action_size: int
     config: Any
     actor: Any
+    hint: Any
 
     @property
     def length(self) -> int: ...
@@ -54,7 +55,7 @@ class Algorithm(Protocol):
 
     def noise(self, num_worlds: int) -> Any: ...
 
-    def act(self, learner: Any, noise: Any, seen: Any, key: Array, state: Any = None) -> tuple[Array, Any, Any]: ...
+    def act(self, learner: Any, noise: Any, seen: Any, key: Array, told: Any = None) -> tuple[Array, Any, Any]: ...
 
     def learn(
         self, learner: Any, memory: Any, rollout: Any, key: Array, progress: Array, ready: Array
@@ -225,7 +226,7 @@ class _Iteration:
             def whole(learner: Any, memory: Any, play: Play, key: Array, progress: Array, ready: Array) -> Any:
                 play_key, learn_key = jax.random.split(key)
                 play, rollout, sums = collect_fn(
-                    env, algorithm.perception, algorithm.act, learner, play, play_key, algorithm.length
+                    env, algorithm.perception, algorithm.act, algorithm.hint, learner, play, play_key, algorithm.length
                 )
                 learner, memory, losses = algorithm.learn(learner, memory, rollout, learn_key, progress, ready)
                 return learner, memory, play, sums, {**losses, "all_finite": _finite(learner)}
@@ -237,7 +238,7 @@ class _Iteration:
                 learner, memory, losses = algorithm.learn(learner, memory, rollout, key, progress, ready)
                 return learner, memory, {**losses, "all_finite": _finite(learner)}
 
-            self._collect = NativeCollector(env, algorithm.perception, algorithm.act)
+            self._collect = NativeCollector(env, algorithm.perception, algorithm.act, algorithm.hint)
             self._learn = jax.jit(learn, donate_argnums=(0, 1))
 
     def __call__(

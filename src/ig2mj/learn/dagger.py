@@ -1,0 +1,187 @@
+"""DAgger: a policy acts, an expert says what it would have done, and the policy learns that.
+
+The experts of `ig2mj.tasks.experts` answer in any state, so labels cost nothing, and the policy learns in the states
+that it comes to itself (Ross, Gordon and Bagnell 2011). At first the expert acts in a share of the worlds that falls
+to none over the first part of the run; the expert's own actions are disturbed, so that ways back are seen as well.
+
+What is learned is the mean of the same actor as SAC's and PPO's. An iteration is `length` steps of all worlds, then
+`updates` updates for each of them, on samples of all steps that are kept.
+
+Axes: W worlds, T steps, B samples, n numbers of an action.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import optax
+from flax import struct
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.view import Array
+from ig2mj.learn.collect import Hint, Transition, if_ready
+from ig2mj.learn.labels import Labels, imitation_loss
+from ig2mj.learn.moments import Moments, average
+from ig2mj.learn.networks import Actor
+from ig2mj.learn.perception import Perception, Seen, blank
+
+
+@dataclasses.dataclass(frozen=True)
+class DaggerConfig:
+    """Settings; `ig2mj train --set name=value` changes them.
+
+    Attributes:
+      length: steps of the worlds in an iteration. updates: for each of them. batch: samples of an update.
+      capacity: labels that are kept, of all worlds together. warm_up: steps of each world before the first update.
+      alone: share of the run after which the expert acts no more. noise: deviation of what is added to actions.
+      disturbed: share of the expert's steps in which its action is replaced by a random one.
+      guess: weight of the actor's guess of the privileged state from its features, from pixels.
+      lr: learning rate, falling to `last_lr` along a cosine over the run.
+      actor: sizes of the layers. net: encoder ("small" or "paper").
+    """
+
+    length: int = 4
+    updates: int = 16
+    batch: int = 1024
+    capacity: int = 1_000_000
+    warm_up: int = 12
+    alone: float = 0.2
+    noise: float = 0.1
+    disturbed: float = 0.1
+    guess: float = 1.0
+    lr: float = 1e-3
+    last_lr: float = 1e-4
+    actor: tuple[int, ...] = (256, 256, 256)
+    net: str = "small"
+
+
+@struct.dataclass
+class DaggerLearner:
+    """All that is learned. `progress`: share of the run that was over at the last iteration."""
+
+    actor: Any
+    opt: Any
+    moments: Moments
+    progress: Float[Array, ""]
+    updates: Int[Array, ""]
+
+
+@struct.dataclass
+class Turns:
+    """Who acts in each world: a number from 0 to 1; the expert, where its share is larger."""
+
+    draw: Float[Array, "W"]
+    left: Int[Array, "W"]
+
+
+class Dagger:
+    """See the module's text. All methods are pure."""
+
+    name = "dagger"
+
+    def __init__(
+        self,
+        perception: Perception,
+        action_size: int,
+        expert: Hint,
+        config: DaggerConfig | None = None,
+        axis: str | None = None,
+    ):
+        """`expert`: see `collect.Hint`. `axis`: the name of an axis of devices over which gradients are averaged."""
+        self.perception, self.action_size, self.hint, self.axis = perception, action_size, expert, axis
+        self.config = c = config or DaggerConfig()
+        guess = perception.vector_size - perception.actor_size if perception.picture_shape and c.guess else 0
+        self.actor = Actor(action_size, c.actor, perception.picture_shape, c.net, guess)
+        self._adam = optax.chain(optax.clip_by_global_norm(10.0), optax.flatten(optax.scale_by_adam()))
+
+    @property
+    def length(self) -> int:
+        """Steps of an iteration."""
+        return self.config.length
+
+    @property
+    def samples(self) -> int:
+        """Updates of an iteration."""
+        return self.config.length * self.config.updates
+
+    def warm_up(self, resumed: bool) -> int:
+        """Iterations without updates: labels are gathered."""
+        return -(-max(self.config.warm_up, 3 * self.config.length) // self.config.length)
+
+    def init(self, key: Array) -> DaggerLearner:
+        """Untrained."""
+        seen, size = blank(self.perception, 1), self.perception.actor_size
+        actor = self.actor.init(jnp.asarray(key), seen.vector[:, :size], seen.picture)["params"]
+        moments = Moments.initial(self.perception.vector_size)
+        return DaggerLearner(actor, self._adam.init(actor), moments, jnp.float32(0), jnp.int32(0))
+
+    def memory(self, num_worlds: int) -> Labels:
+        """No labels yet."""
+        rows = max(self.config.capacity // (num_worlds * self.length), 1) * self.length
+        return Labels.empty(rows, num_worlds, self.perception, self.action_size)
+
+    def noise(self, num_worlds: int) -> Turns:
+        """Before the first step."""
+        return Turns(jnp.zeros(num_worlds), jnp.zeros(num_worlds, jnp.int32))
+
+    def act(
+        self, learner: DaggerLearner, turns: Turns, seen: Seen, key: Array, told: Array | None = None
+    ) -> tuple[Float[Array, "W n"], dict[str, Array], Turns]:
+        """The expert's action in its worlds, the policy's in the others; a world's turn is up to 50 steps long."""
+        assert told is not None, "DAgger needs an expert"
+        c = self.config
+        draw_key, time_key, noise_key, any_key, which_key = jax.random.split(key, 5)
+        over = turns.left <= 0
+        draw = jnp.where(over, jax.random.uniform(draw_key, over.shape), turns.draw)
+        left = jnp.where(over, jax.random.randint(time_key, over.shape, 1, 51), turns.left) - 1
+        own = learner.moments.normal(seen.vector[:, : self.perception.actor_size])
+        looked: Any = self.actor.apply({"params": learner.actor}, own, seen.picture)
+        mean = looked[0]
+        share = jnp.where(learner.updates == 0, 1.0, 1.0 - learner.progress / max(c.alone, 1e-6))
+        expert = draw < share
+        label = jnp.clip(told, -1.0, 1.0)
+        wild = (jax.random.uniform(which_key, expert.shape) < c.disturbed) & expert
+        action = jnp.where(expert[:, None], label, jnp.tanh(mean))
+        action = action + c.noise * jax.random.normal(noise_key, action.shape)
+        action = jnp.where(wild[:, None], jax.random.uniform(any_key, action.shape, minval=-1.0), action)
+        return jnp.clip(action, -1.0, 1.0), {"label": label}, Turns(draw, left)
+
+    def learn(
+        self,
+        learner: DaggerLearner,
+        memory: Labels,
+        rollout: Transition,
+        key: Array,
+        progress: Float[Array, ""],
+        ready: Bool[Array, ""],
+    ) -> tuple[DaggerLearner, Labels, dict[str, Array]]:
+        """Keeps a rollout's labels, and makes an iteration's updates.
+
+        Args:
+          progress: share of the run that is over. ready: without it nothing is updated: labels are gathered.
+        """
+        c = self.config
+        memory = memory.insert(rollout.seen, rollout.extra["label"])
+        moments = learner.moments.update(rollout.seen.vector, self.axis)
+        learner = dataclasses.replace(learner, moments=moments, progress=progress)
+        rate = c.last_lr + (c.lr - c.last_lr) * 0.5 * (1 + jnp.cos(jnp.pi * jnp.clip(progress, 0, 1)))
+
+        def many(learner: DaggerLearner) -> tuple[DaggerLearner, dict[str, Array]]:
+            def update(learner: DaggerLearner, key: Array) -> tuple[DaggerLearner, dict[str, Array]]:
+                sample_key, shift_key = jax.random.split(key)
+                seen, label = memory.sample(sample_key, c.batch)
+                slope, found = jax.grad(imitation_loss, has_aux=True)(
+                    learner.actor, self.actor, self.perception, learner.moments, seen, label, shift_key, c.guess
+                )
+                step, opt = self._adam.update(average(slope, self.axis), learner.opt)
+                actor = jax.tree.map(lambda a, s: a - rate * s, learner.actor, step)
+                return dataclasses.replace(learner, actor=actor, opt=opt, updates=learner.updates + 1), found
+
+            learner, found = jax.lax.scan(update, learner, jax.random.split(key, self.samples))
+            return learner, jax.tree.map(jnp.mean, found)
+
+        learner, losses = if_ready(ready, many, learner)
+        return learner, memory, {**losses, "updates": ready * jnp.float32(self.samples)}

@@ -1,0 +1,93 @@
+"""What was seen and what should be done there: the data of imitation, and its loss.
+
+Axes: T steps, W worlds, B samples, n numbers of an action, v of a vector, q bytes of a picture.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from flax import struct
+from jaxtyping import Float, Int, UInt8
+
+from ig2mj.engine.view import Array
+from ig2mj.learn.moments import Moments
+from ig2mj.learn.networks import Actor, shifted
+from ig2mj.learn.perception import Perception, Seen
+
+
+@struct.dataclass
+class Labels:
+    """The last T steps of W worlds. `head`: row that is written next. `size`: rows that are full."""
+
+    vector: Float[Array, "T W v"]
+    picture: UInt8[Array, "T W q"]
+    label: Float[Array, "T W n"]
+    head: Int[Array, ""]
+    size: Int[Array, ""]
+
+    @classmethod
+    def empty(cls, steps: int, worlds: int, perception: Perception, action_size: int) -> Labels:
+        """Room for so many steps of so many worlds."""
+        shape = perception.picture_shape
+        pixels = 0 if shape is None else shape[0] * shape[1] * shape[2]
+        return cls(
+            vector=jnp.zeros((steps, worlds, perception.vector_size)),
+            picture=jnp.zeros((steps, worlds, pixels), jnp.uint8),
+            label=jnp.zeros((steps, worlds, action_size)),
+            head=jnp.int32(0),
+            size=jnp.int32(0),
+        )
+
+    def insert(self, seen: Seen, label: Float[Array, "t W n"]) -> Labels:
+        """With more steps in place of the oldest; their number must divide T."""
+        count, capacity = label.shape[0], self.label.shape[0]
+        assert capacity % count == 0, "steps are written without a seam"
+
+        def put(ring: Array, new: Array) -> Array:
+            return jax.lax.dynamic_update_slice_in_dim(ring, new.astype(ring.dtype), self.head, 0)
+
+        return dataclasses.replace(
+            self,
+            vector=put(self.vector, seen.vector),
+            picture=put(self.picture, seen.picture),
+            label=put(self.label, label),
+            head=(self.head + count) % capacity,
+            size=jnp.minimum(self.size + count, capacity),
+        )
+
+    def sample(self, key: Array, count: int) -> tuple[Seen, Float[Array, "B n"]]:
+        """So many steps, all equally likely."""
+        row_key, world_key = jax.random.split(key)
+        row = jax.random.randint(row_key, (count,), 0, jnp.maximum(self.size, 1))
+        world = jax.random.randint(world_key, (count,), 0, self.label.shape[1])
+        return Seen(self.vector[row, world], self.picture[row, world]), self.label[row, world]
+
+
+def imitation_loss(
+    params: Any,
+    actor: Actor,
+    perception: Perception,
+    moments: Moments,
+    seen: Seen,
+    label: Float[Array, "B n"],
+    key: Array,
+    guess_weight: float,
+) -> tuple[Array, dict[str, Array]]:
+    """Mean squared difference of the actor's action from the label; with pictures, also of its guess of what it cannot
+    see from the truth."""
+    normal = moments.normal(seen.vector)
+    picture = seen.picture
+    if perception.picture_shape is not None:
+        picture = shifted(picture, perception.picture_shape, key)
+    looked: Any = actor.apply({"params": params}, normal[:, : perception.actor_size], picture)
+    mean, _, guess = looked
+    loss = jnp.square(jnp.tanh(mean) - label).mean()
+    found: dict[str, Array] = {"actor_loss": loss}
+    if guess.shape[-1]:
+        found["guess_loss"] = jnp.square(guess - normal[:, perception.actor_size :]).mean()
+        loss += guess_weight * found["guess_loss"]
+    return loss, found
