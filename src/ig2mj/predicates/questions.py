@@ -32,8 +32,10 @@ from ig2mj.states.world import ExtendedStates
 ROWS = 64
 """Rows of arguments that a program takes at a time; rows in use cost time, the others do not."""
 
-COMPILED_FAST = {"xla_backend_optimization_level": 0, "xla_cpu_use_fusion_emitters": False}
+COMPILED_FAST: dict[str, int | bool] = {"xla_backend_optimization_level": 0}
 """XLA's options on a CPU: ready in 40 % of the time; a call takes tenths of a millisecond all the same."""
+if jax.__version_info__ < (0, 11):  # later versions have no such option
+    COMPILED_FAST["xla_cpu_use_fusion_emitters"] = False
 
 SCENES = 8
 """Scenes whose programs are kept: those asked about last."""

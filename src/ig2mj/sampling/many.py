@@ -93,11 +93,12 @@ def sample(
     rows: list[Row | None] = []
     rejected: Rejections = collections.Counter()
     numbers = range(count)
-    for row, reasons in _run(scene, wanted, numbers, seed, jobs or os.cpu_count() or 1, seconds_per_row):
-        rows.append(row)
-        rejected.update(reasons)
-        made = sum(r is not None for r in rows)
-        progress(made, len(rows) - made)
+    with jax.default_device(jax.local_devices(backend="cpu")[0]):  # one world, and the same rows with and without a GPU
+        for row, reasons in _run(scene, wanted, numbers, seed, jobs or os.cpu_count() or 1, seconds_per_row):
+            rows.append(row)
+            rejected.update(reasons)
+            made = sum(r is not None for r in rows)
+            progress(made, len(rows) - made)
     good = [n for n, row in zip(numbers, rows, strict=True) if row is not None]
     pools = [_as_pool(row) for row in rows if row is not None]
     return Sampled(
@@ -131,6 +132,7 @@ _here: list[RowSampler] = []
 
 
 def _load(folder: str, objects: tuple[str, ...]) -> None:
+    jax.config.update("jax_platforms", "cpu")  # many processes would fill a GPU's memory
     _here.append(make_sampler(load_scene(folder, objects=objects)))
 
 
