@@ -8,6 +8,7 @@ import pytest
 import ig2mj
 from ig2mj.errors import ActionError, EngineError, UnknownNameError
 from ig2mj.scene.scene import load_scene
+from ig2mj.sensors.base import SensorOptions
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.testing import api_test
 
@@ -83,9 +84,29 @@ def test_what_cannot_be_done_is_refused_by_name(env):
         env.step(env.reset(0), np.zeros((2, 7)))
 
 
-def test_pictures_are_refused_where_the_engine_draws_none():
-    with pytest.raises(EngineError, match="warp"):
-        ig2mj.make("CookingMeat", engine="native", observations=("rgb",), pool_size=ROWS)
+def test_any_sensor_is_an_observation():
+    """The paper's RGB-D from the head, flow that begins anew with an episode, noise that belongs to world and step."""
+    names = ("privileged_state", "rgb", "depth", "scan", "optical_flow")
+    options = SensorOptions(width=24, height=16, scan_rays=9, depth_noise_rate=0.3)
+    env = ig2mj.make("CookingMeat", worlds=2, pool_size=ROWS, observations=names, sensors=options)
+    assert tuple(env.observation_spaces) == names
+    assert env.observation_spaces["rgb"].shape == (16, 24, 3)
+    first = env.reset(0)
+    assert np.abs(first.obs["optical_flow"]).max() < 1e-5
+    again = env.reset(0)
+    assert np.array_equal(first.obs["depth"], again.obs["depth"])
+    state = env.step(again, np.ones((2, 6), np.float32))
+    flow, rgb = np.asarray(state.obs["optical_flow"]), np.asarray(state.obs["rgb"])
+    assert (np.abs(flow).max((1, 2, 3)) > 0.1).all(), "the hand moves through the picture"
+    state = env.reset(state, np.array([True, False]))
+    after = np.asarray(state.obs["optical_flow"])
+    assert np.abs(after[0]).max() < 1e-5
+    assert np.array_equal(after[1], flow[1]) and np.array_equal(state.obs["rgb"][1], rgb[1])
+
+
+def test_unknown_observations_are_refused_with_near_matches():
+    with pytest.raises(UnknownNameError, match="near matches: depth"):
+        ig2mj.make("CookingMeat", observations=("dept",), pool_size=ROWS)
 
 
 def test_the_paper_s_runs_had_easier_thresholds():

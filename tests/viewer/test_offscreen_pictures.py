@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from ig2mj.errors import MissingDependencyError, UnknownNameError
+from ig2mj.process import opengl
 from ig2mj.viewer import offscreen
 
 XML = """<mujoco><worldbody><light pos="0 0 3"/><camera name="above" pos="0 0 3"/>
@@ -99,14 +100,19 @@ def test_an_unknown_camera_is_named_with_what_there_is(scene):
 
 
 def test_a_backend_that_kills_its_process_is_only_reported(monkeypatch):
-    offscreen.probe.cache_clear()
-    monkeypatch.setattr(offscreen, "_PROBE", "import os; os.abort()")
+    monkeypatch.setattr(opengl, "_PROBE", "import os; os.abort()")
+    _forget_probes()
     try:
         assert "killed by signal 6" in str(offscreen.probe("egl"))
-        monkeypatch.setattr(offscreen, "_PROBE", "import time; time.sleep(60)")
+        monkeypatch.setattr(opengl, "_PROBE", "import time; time.sleep(60)")
         assert "did not draw" in str(offscreen.probe("osmesa", timeout_s=0.2))
     finally:
-        offscreen.probe.cache_clear()
+        _forget_probes()
+
+
+def _forget_probes() -> None:
+    offscreen.probe.cache_clear()
+    opengl.probe_gl.cache_clear()
 
 
 def test_where_nothing_draws_the_error_says_what_to_install(monkeypatch):

@@ -61,6 +61,9 @@ PLATES = ((0.10, 0.150), (0.168, 0.150), (0.377, 0.150))
 FIELD_OF_VIEW, EYE_POS = 90.0, (0.06, 0.0, 0.445)
 """Degrees, vertical; m."""
 
+LASER = (0.16, 0.0, 0.36)
+"""m: height of iGibson's scan link; before the poles of the plates, so that nothing stands in its 240 degrees."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class TurtleBot:
@@ -99,7 +102,7 @@ class TurtleBot:
             servo(spec, f"{wheel.name}_joint", 0.0, WHEEL_DAMPING, WHEEL_TORQUE, name=wheel.name)
             spec.add_exclude(bodyname1=self.name, bodyname2=wheel.name)
         extend_keyframes(spec, [*map(float, pos), *quat, 0.0, 0.0], 8, [0.0, 0.0])
-        return AgentEntry(name=self.name, body=self.name, camera=f"{self.name}/eye")
+        return AgentEntry(name=self.name, body=self.name, camera=f"{self.name}/eye", laser=LASER)
 
     def hand_rays(self) -> tuple[HandRays, ...]:
         return ()

@@ -221,7 +221,7 @@ def sheet(
 
     from ig2mj.cli.files import check_picture
     from ig2mj.errors import Ig2mjError
-    from ig2mj.viewer.offscreen import use_opengl
+    from ig2mj.process.opengl import use_opengl
 
     if models < 1:
         raise Ig2mjError(f"--models {models}: at least one is needed")

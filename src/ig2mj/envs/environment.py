@@ -33,6 +33,8 @@ from ig2mj.envs.observations import Observer, Space
 from ig2mj.errors import ActionError, EngineError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.scene.scene import Scene
+from ig2mj.sensors.base import Memory
+from ig2mj.sensors.suite import chosen_memory
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.actions import ActionMap
 from ig2mj.tasks.objective import Measures, Objective
@@ -60,6 +62,7 @@ class EnvState:
         object is in all acting hands).
       measures: what the reward is made of, for the next step's difference.
       bad_actions: numbers that were not finite and were taken for 0, since the first reset.
+      memory: what sensors know of the last reading; None where none of them asks.
     """
 
     batch: Batch
@@ -70,6 +73,7 @@ class EnvState:
     info: dict[str, Any]
     measures: Measures
     bad_actions: Int[Array, "W"]
+    memory: Memory | None = None
 
     @property
     def done(self) -> Bool[Array, "W"]:
@@ -190,7 +194,7 @@ class Environment:
             state.measures,
             bad,
         )
-        return self._state(batch, seen, state.bad_actions + bad)
+        return self._state(batch, seen, state.bad_actions + bad, state.memory)
 
     def step_autoreset(self, state: EnvState, action: Array) -> EnvState:
         """`step`, and a new episode at once where one is over (Gymnasium's SAME_STEP).
@@ -258,19 +262,40 @@ class Environment:
         old = None if before is None else _Seen(**{f.name: getattr(before, f.name) for f in dataclasses.fields(_Seen)})
         seen = self._see_first(world.view, world.states, batch.controllers, world.step, world.key, mask, old)
         count = jnp.zeros(self.num_worlds, jnp.int32) if before is None else before.bad_actions
-        return self._state(batch, seen, count, None if before is None else (before, mask))
+        memory = None if before is None else before.memory
+        return self._state(batch, seen, count, memory, None if before is None else (before, mask))
 
     def _state(
-        self, batch: Batch, seen: _Seen, bad: Int[Array, "W"], kept: tuple[EnvState, Bool[Array, "W"]] | None = None
+        self,
+        batch: Batch,
+        seen: _Seen,
+        bad: Int[Array, "W"],
+        before: Memory | None,
+        kept: tuple[EnvState, Bool[Array, "W"]] | None = None,
     ) -> EnvState:
-        """A state with its pictures. `kept`: a state whose unmasked worlds keep theirs."""
-        world = batch.world
-        pictures = self._observer.pictures(world.physics, world.view, world.states)
+        """A state with its pictures.
+
+        Args:
+          before: what sensors know of the last reading. kept: a state, and which worlds have begun since; the others
+            keep its pictures.
+        """
+        world, controller = batch.world, batch.controllers[0]
+        if kept is not None:
+            before = chosen_memory(kept[1], self._observer.memory(world.view, controller), before)
+        pictures, memory = self._observer.pictures(world, controller, before)
         if kept is not None:
             pictures = {name: _chosen(kept[1], new, kept[0].obs[name]) for name, new in pictures.items()}
         obs = {name: {**seen.obs, **pictures}[name] for name in self.observation_spaces}
         return EnvState(
-            batch, obs, seen.reward, seen.terminated, seen.truncated, seen.info, seen.measures, bad.astype(jnp.int32)
+            batch,
+            obs,
+            seen.reward,
+            seen.terminated,
+            seen.truncated,
+            seen.info,
+            seen.measures,
+            bad.astype(jnp.int32),
+            memory,
         )
 
     # What is computed after physics. Pure.

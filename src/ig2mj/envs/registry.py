@@ -8,6 +8,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
@@ -17,9 +18,11 @@ from ig2mj.agents.grasping import MODES, Grasping
 from ig2mj.engine.registry import make_engine
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.names import NAMES, NAMESPACE, short_name
-from ig2mj.envs.observations import Observer
+from ig2mj.envs.observations import Observer, check_names
 from ig2mj.envs.setups import setup_activity, setup_navigation
 from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.sensors.base import SensorOptions
+from ig2mj.sensors.suite import SensorSuite
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.navigation.task import NAVIGATION, NavigationTask
 from ig2mj.tasks.task import Task
@@ -58,7 +61,8 @@ def make(
     pool: Pool | None = None,
     split: str = "train",
     pool_size: int | None = None,
-    image_size: int = 128,
+    image_size: int | None = None,
+    sensors: SensorOptions | None = None,
     **options: Any,
 ) -> Environment:
     """Makes an environment.
@@ -71,11 +75,13 @@ def make(
       grasping: "mitten" (sticks to the task's first object at the first touch, as in the paper's experiments),
         "assisted", "sticky" or "physical"; with the last three an action of an activity closes hands, too. None:
         "mitten" for activities, "physical" for navigation.
-      observations: see `ig2mj.envs.observations`; pictures need the warp engine.
+      observations: names of sensors and of the task's own vectors, see `ig2mj.envs.observations`; pictures and laser
+        scans need the native or the warp engine.
       paper_rl: the thresholds that the paper's runs had: any force cuts, and three quarters of the stains may stay.
       pool: start states of an activity; None: the task's own, of which `split` is "train" or "held_out" and `pool_size`
         the number of rows; sampled on first use and kept (`ig2mj sample-task`). Navigation makes its own each time.
-      image_size: pixels, height and width of pictures.
+      image_size: pixels, height and width of pictures; None: those of `sensors`, by default 128.
+      sensors: settings of the sensors.
       options: go to the engine.
 
     Raises:
@@ -99,7 +105,12 @@ def make(
     physics = make_engine(engine, scene, worlds, **options)
     hands = None if mode == "physical" else Grasping(scene, mode, setup.mittens)
     core = Core(physics, rules, setup.pool, controllers, hands)
-    observer = Observer(observations, setup.objective, scene, rules.model, controllers[0], physics, image_size)
+    settings = sensors or SensorOptions()
+    if image_size is not None:
+        settings = dataclasses.replace(settings, width=image_size, height=image_size)
+    chosen = check_names(observations, setup.objective)
+    perceived = SensorSuite(physics, scene, rules.model, controllers[0], chosen, settings)
+    observer = Observer(observations, setup.objective, perceived)
     return Environment(
         task, robot, scene, core, setup.actions, setup.objective, observer, mode, companions=setup.companions
     )

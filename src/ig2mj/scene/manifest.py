@@ -115,6 +115,7 @@ class RoomsEntry(msgspec.Struct, omit_defaults=True):
 class AgentEntry(msgspec.Struct, omit_defaults=True):
     """An agent compiled into the scene: its base body, its camera, the finger bodies that press buttons, its hands.
 
+    `laser` is where its scanner stands, m in the frame of the base (x forward, z up), None where it has none.
     `no_contact` names, for bodies of the agent, categories of objects that they pass through. For hands of `assisted`
     agents equality constraints to everything graspable are compiled (`ig2mj.scene.grasp_equalities`).
     """
@@ -126,6 +127,7 @@ class AgentEntry(msgspec.Struct, omit_defaults=True):
     hands: list[str] = []
     no_contact: dict[str, list[str]] = {}
     assisted: bool = False
+    laser: tuple[float, float, float] | None = None
 
 
 class Manifest(msgspec.Struct, omit_defaults=True):

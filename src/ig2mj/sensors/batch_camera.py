@@ -1,4 +1,4 @@
-"""`BatchCamera`: RGB, depth and segmentation of every world's cameras, by MJX-Warp's ray caster.
+"""`BatchCamera`: RGB, depth, segmentation and rays of every world, by MJX-Warp's ray caster.
 
     camera = BatchCamera(engine, model, ["hand/eye"], width=128, height=128)
     step = jax.jit(lambda batch: camera(batch.world.physics, batch.world.view, batch.world.states))
@@ -18,8 +18,7 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-from flax import struct
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Float, Int
 from mujoco import mjx
 
 from ig2mj.engine.base import Engine
@@ -27,32 +26,16 @@ from ig2mj.engine.mjx.engine import MjxEngine, MjxPhysics
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
+from ig2mj.sensors.images import NOTHING, VISIBLE_GROUPS, Images, Pose, RayPattern, check_request
 from ig2mj.sensors.particle_slots import Slots, fill_slots
+from ig2mj.sensors.ray_cameras import sectors_of, set_rays
 from ig2mj.sensors.render_model import BACKGROUND, make_render_model, mean_colours
 from ig2mj.sensors.tints import UNTINTED, tinted, tints, tints_of_geoms
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 
-NOTHING = -1
-"""In a segmentation: no object there (sky, agents, the world's own geoms)."""
-
-
 TILE = 8
 """Pixels a side of what a block of 64 threads sees: a third faster than rows of 64 pixels."""
-
-
-@struct.dataclass
-class Images:
-    """Pictures of all worlds; what was not asked for is None.
-
-    Attributes:
-      rgb: 0..255, row 0 on top. depth: metres along the optical axis, 0 where nothing is hit.
-      segmentation: index of the object seen, `NOTHING` where there is none; a particle counts as its object.
-    """
-
-    rgb: UInt8[Array, "W C Y X 3"] | None
-    depth: Float[Array, "W C Y X"] | None
-    segmentation: Int[Array, "W C Y X"] | None
 
 
 class BatchCamera:
@@ -71,10 +54,11 @@ class BatchCamera:
         depth: bool = False,
         segmentation: bool = False,
         particles: int = 64,
-        groups: Sequence[int] = (0, 1, 2),
+        groups: Sequence[int] = VISIBLE_GROUPS,
         shadows: bool = False,
         cull_backfaces: bool = False,
         devices: Sequence[str] | None = None,
+        rays: Sequence[RayPattern] = (),
     ):
         """Compiles the render model.
 
@@ -88,6 +72,7 @@ class BatchCamera:
           shadows: cast them; about twice the time.
           cull_backfaces: surfaces seen from behind are not there, so that a camera inside a geom sees through it; a
             third more time.
+          rays: patterns to cast besides; each call gives the pose of each.
           devices: Warp's names ("cuda:0", ...) where worlds are shared out over several devices; None: the default one.
 
         Raises:
@@ -95,12 +80,13 @@ class BatchCamera:
         """
         if not isinstance(engine, MjxEngine) or engine.name != "warp":
             raise EngineError(f"the {engine.name} engine has no batched cameras (take the warp engine)")
-        if not (rgb or depth or segmentation) or not cameras or min(width, height) < 1:
-            raise EngineError("a camera must have pixels and make at least one of rgb, depth and segmentation")
+        check_request(cameras, rays, (rgb, depth, segmentation), width, height)
         self.engine, self.model = engine, model
         self.width, self.height, self.slots = width, height, particles
         self._wants = (rgb, depth, segmentation)
-        self._host = host = make_render_model(engine.scene, particles)
+        self._sectors = sectors_of(rays)
+        self._patterns = {pattern.name: len(pattern.directions) for pattern in rays}
+        self._host = host = make_render_model(engine.scene, particles, [s.camera for s in self._sectors])
         self.cameras = [_camera_id(host, name) for name in cameras]
         self._plan(host)
         self._model = mjx.put_model(host, impl="warp")
@@ -111,16 +97,18 @@ class BatchCamera:
             host,
             nworld=engine.num_worlds,
             devices=list(devices) if devices else None,
-            cam_res=(width, height),
-            render_rgb=rgb,
-            render_depth=depth,
-            render_seg=segmentation,
+            cam_res=[(width, height)] * len(cameras) + [(len(s.rays), 1) for s in self._sectors],
+            render_rgb=self._for_each(rgb, False),
+            render_depth=self._for_each(depth, True),
+            render_seg=self._for_each(segmentation, False),
             enabled_geom_groups=list(groups),
-            cam_active=self.cameras,
+            cam_active=[*self.cameras, *(_camera_id(host, s.camera) for s in self._sectors)],
             background_color=BACKGROUND,
             use_shadows=shadows,
             enable_backface_culling=cull_backfaces,
         )
+        if self._sectors:
+            set_rays(self._context, self._sectors, len(cameras) * width * height)
         self._handle = self._context.pytree()
         self._check_addresses()
         self._tiled = self._order_rays()
@@ -130,20 +118,20 @@ class BatchCamera:
         physics: MjxPhysics,
         view: PhysicsView,
         states: ExtendedStates,
-        eyes: Mapping[str, tuple[Float[Array, "W 3"], Float[Array, "W 4"]]] | None = None,
+        eyes: Mapping[str, Pose] | None = None,
     ) -> Images:
         """Pictures of the present state of every world. Pure: to be jitted, alone or with a step.
 
         Args:
-          eyes: poses in the world (m, w-x-y-z) of cameras that do not ride on their bodies, by name: what
-            `Controller.eye` of an agent gives that moves its eye without joints.
+          eyes: poses in the world of cameras that do not ride on their bodies, by name: what `Controller.eye` of an
+            agent gives that moves its eye without joints. Poses of all ray patterns, by their names.
 
         Raises:
           UnknownNameError: there is no such camera.
         """
         slots = fill_slots(self.model, states, view, self.slots)
         moved = self._moved(physics, slots, eyes or {})
-        look = self._look(states, slots)
+        look = self._look(physics, states, slots)
 
         def cast(data: Any, look: dict[str, Array]) -> tuple[Array, Array, Array]:
             model = self._model.replace(**look)
@@ -154,23 +142,48 @@ class BatchCamera:
             return packed, depth, jnp.zeros((0, 2), jnp.int32)
 
         packed, depth, seen = jax.vmap(cast)(moved, look)
+        pixels = self._pixels if self._wants[1] else 0
+        geom = seen[..., 0]
         return Images(
             rgb=_unpack(self._rows(packed)) if self._wants[0] else None,
-            depth=self._rows(depth) if self._wants[1] else None,
-            segmentation=self._rows(self._objects(seen[..., 0], slots)) if self._wants[2] else None,
+            depth=self._rows(depth[:, :pixels]) if self._wants[1] else None,
+            segmentation=self._rows(self._objects(geom, slots)) if self._wants[2] else None,
+            geom=self._rows(geom) if self._wants[2] else None,
+            slots=slots,
+            rays=self._distances(depth[:, pixels:]),
         )
+
+    @property
+    def _pixels(self) -> int:
+        """Of all pictures of a world."""
+        return len(self.cameras) * self.width * self.height
+
+    def _for_each(self, of_pictures: bool, of_rays: bool) -> list[bool]:
+        return [of_pictures] * len(self.cameras) + [of_rays] * len(self._sectors)
+
+    def _distances(self, depth: Float[Array, "W n"]) -> Mapping[str, Float[Array, "W N"]]:
+        """Along the rays of each pattern, from the depths of all sectors."""
+        found = {name: jnp.full((depth.shape[0], count), jnp.inf) for name, count in self._patterns.items()}
+        at = 0
+        for sector in self._sectors:
+            rows = slice(at, at + len(sector.rays))
+            of_sector = sector.distances(depth[:, rows])
+            found[sector.pattern] = found[sector.pattern].at[:, sector.rays].set(of_sector)
+            at = rows.stop
+        return found
 
     def _order_rays(self) -> bool:
         """Lets each block of threads cast the rays of a tile, which meet the same geoms; says whether it can."""
         contexts, pixels = list(self._context._contexts.values()), self.height * self.width
-        if self.height % TILE or self.width % TILE or any(len(c.ray) != pixels * len(self.cameras) for c in contexts):
+        if self.height % TILE or self.width % TILE:
             return False
         tiles = np.arange(pixels).reshape(self.height // TILE, TILE, self.width // TILE, TILE).swapaxes(1, 2).ravel()
         order = (np.arange(len(self.cameras))[:, None] * pixels + tiles).ravel()
         for context in contexts:
             for rays in (context.ray, context.ray_offset):
-                if len(rays) == len(order):
-                    rays.assign(rays.numpy()[order])
+                if len(rays) >= len(order):  # behind those of pictures are those of patterns
+                    old = rays.numpy()
+                    rays.assign(np.concatenate([old[order], old[len(order) :]]))
         return True
 
     def _rows(self, pixels: Array) -> Array:
@@ -182,23 +195,25 @@ class BatchCamera:
         return tiles.swapaxes(3, 4).reshape(*shape, self.height, self.width)
 
     def _check_addresses(self) -> None:
-        """Pictures lie one after the other in the ray caster's buffers."""
-        context, wanted = self._context, np.arange(len(self.cameras)) * self.width * self.height
-        addresses = (context.rgb_adr, context.depth_adr, context.seg_adr)
-        for address, made in zip(addresses, self._wants, strict=True):
-            assert not made or (address.numpy() == wanted).all()
+        """Pictures, and then rays, lie one after the other in the ray caster's buffers."""
+        context = self._context
+        sizes = np.array([self.width * self.height] * len(self.cameras) + [len(s.rays) for s in self._sectors])
+        made = [np.array(self._for_each(w, r)) for w, r in zip(self._wants, (False, True, False), strict=True)]
+        for address, which in zip((context.rgb_adr, context.depth_adr, context.seg_adr), made, strict=True):
+            expected = np.cumsum(np.where(which, sizes, 0)) - sizes
+            assert (address.numpy()[which] == expected[which]).all()
 
     def _plan(self, host: mujoco.MjModel) -> None:
         """Constants of the model, on the host."""
         slots = self.slots
         self._owner = np.concatenate([self.model.tables.geom_object, np.full(slots, -1)])
-        self._plain = mean_colours(host, np.arange(host.ngeom))
+        self._rgba, self._mean = _f32(host.geom_rgba), mean_colours(host, np.arange(host.ngeom))
         self._material = np.array(host.geom_matid, np.int32)
         self._size = np.array(host.geom_size, np.float32)
         self._camera_in_body = (host.cam_bodyid, _f32(host.cam_pos), _f32(host.cam_quat))
         self._light_in_body = (host.light_bodyid, _f32(host.light_pos), _f32(host.light_dir))
 
-    def _moved(self, physics: MjxPhysics, slots: Slots, eyes: Mapping[str, tuple[Array, Array]]) -> Any:
+    def _moved(self, physics: MjxPhysics, slots: Slots, eyes: Mapping[str, Pose]) -> Any:
         """Render data [W] with everything where physics has it."""
         data, worlds = physics.data, self.engine.num_worlds
         body, pos, quat = self._camera_in_body
@@ -206,7 +221,9 @@ class BatchCamera:
         pos = jnp.asarray(pos if own.cam_pos is None else own.cam_pos)
         quat = jnp.asarray(quat if own.cam_quat is None else own.cam_quat)
         camera_pos, camera_quat = compose(data.xpos[:, body], data.xquat[:, body], pos, quat)
-        for name, (eye_pos, eye_quat) in eyes.items():
+        of_cameras = {name: pose for name, pose in eyes.items() if name not in self._patterns}
+        of_sectors = {sector.camera: sector.pose(dict(eyes)) for sector in self._sectors}
+        for name, (eye_pos, eye_quat) in {**of_cameras, **of_sectors}.items():
             camera = _camera_id(self._host, name)
             camera_pos, camera_quat = camera_pos.at[:, camera].set(eye_pos), camera_quat.at[:, camera].set(eye_quat)
         body, pos, direction = self._light_in_body
@@ -225,23 +242,28 @@ class BatchCamera:
             }
         )
 
-    def _look(self, states: ExtendedStates, slots: Slots) -> dict[str, Array]:
+    def _look(self, physics: MjxPhysics, states: ExtendedStates, slots: Slots) -> dict[str, Array]:
         """Fields of the model that differ per world: colour and material of tinted geoms, size and colour of slots."""
-        worlds, geoms = self.engine.num_worlds, len(self._plain) - self.slots
-        tint = tints_of_geoms(tints(self.model, states), self._owner)
-        plain = jnp.asarray(self._plain)
-        colour = jnp.concatenate([tinted(plain[:, :3], tint)[:, :geoms], slots.colour], axis=1)
-        alpha = jnp.broadcast_to(plain[:, 3:], (worlds, len(self._plain), 1))
+        worlds, geoms = self.engine.num_worlds, len(self._mean) - self.slots
+        tint = tints_of_geoms(tints(self.model, states), self._owner[:geoms])
+        own = physics.fields.geom_rgba
+        rgba = jnp.broadcast_to(jnp.asarray(self._rgba[:geoms] if own is None else own), (worlds, geoms, 4))
+        mean = jnp.asarray(self._mean[:geoms])
+        in_tint = jnp.concatenate([tinted(mean[:, :3], tint), jnp.broadcast_to(mean[:, 3:], (*tint.shape, 1))], axis=-1)
+        rgba = jnp.where((tint == UNTINTED)[..., None], rgba, in_tint)
+        of_slots = jnp.concatenate([slots.colour, jnp.ones_like(slots.colour[..., :1])], axis=-1)
+        material = jnp.where(tint == UNTINTED, jnp.asarray(self._material[:geoms]), -1)
+        plain = jnp.full((worlds, self.slots), -1, material.dtype)
         size = jnp.broadcast_to(jnp.asarray(self._size[:geoms]), (worlds, geoms, 3))
         return {
-            "geom_rgba": jnp.concatenate([colour, alpha], axis=-1),
-            "geom_matid": jnp.where(tint == UNTINTED, jnp.asarray(self._material), -1),
+            "geom_rgba": jnp.concatenate([rgba, of_slots], axis=1),
+            "geom_matid": jnp.concatenate([material, plain], axis=1),
             "geom_size": jnp.concatenate([size, slots.size], axis=1),
         }
 
     def _objects(self, geom: Int[Array, "W N"], slots: Slots) -> Int[Array, "W N"]:
         """Objects of the geoms that are seen."""
-        geoms = len(self._plain) - self.slots
+        geoms = len(self._mean) - self.slots
         owner = jnp.asarray(self._owner, jnp.int32)[jnp.clip(geom, 0, geoms - 1)]
         if self.slots:
             particle = jnp.take_along_axis(slots.owner, jnp.clip(geom - geoms, 0, self.slots - 1), axis=1)

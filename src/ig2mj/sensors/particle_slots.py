@@ -26,16 +26,26 @@ from ig2mj.states.particles import (
 )
 from ig2mj.states.world import ExtendedStates
 
+DUST, STAIN, WATER = range(3)
+
 
 @struct.dataclass
 class Slots:
-    """Ellipsoids to draw. `size`: half axes, m; `pos`, `rotation`: world frame; `owner`: the dirty object, -1 none."""
+    """Ellipsoids to draw.
+
+    Attributes:
+      pos, rotation: world frame. size: half axes, m. colour: rgb, 0..1.
+      owner: the object that is dirty, -1 none. kind: one of `DUST`, `STAIN`, `WATER`, or -1 where the slot is free.
+      body: that the particle sticks to; 0, the world, for water.
+    """
 
     pos: Float[Array, "W S 3"]
     rotation: Float[Array, "W S 3 3"]
     size: Float[Array, "W S 3"]
     colour: Float[Array, "W S 3"]
     owner: Int[Array, "W S"]
+    kind: Int[Array, "W S"]
+    body: Int[Array, "W S"]
 
 
 def fill_slots(model: StateModel, states: ExtendedStates, view: PhysicsView, count: int) -> Slots:
@@ -62,11 +72,16 @@ def fill_slots(model: StateModel, states: ExtendedStates, view: PhysicsView, cou
             np.full(sources * NUM_DROPS, -1),
         ]
     ).astype(np.int32)
+    kinds = np.repeat(
+        np.array([DUST, STAIN, WATER], np.int32),
+        [dust_rows * NUM_PARTICLES, stain_rows * NUM_PARTICLES, sources * NUM_DROPS],
+    )
     upright = jnp.broadcast_to(jnp.array([0.0, 0.0, 1.0]), (worlds, sources * NUM_DROPS, 3))
 
     def rows(dust: Array, stain: Array, water: Array, width: int) -> Array:
         return jnp.concatenate([a.reshape(worlds, -1, width) for a in (dust, stain, water)], axis=1)
 
+    no_body = jnp.zeros((worlds, sources * NUM_DROPS), jnp.int32)
     there = rows(states.dust.alive, states.stain.alive, states.water.active, 1)[..., 0]
     pos = rows(world_positions(states.dust, view), world_positions(states.stain, view), states.water.pos, 3)
     normal = rows(world_normals(states.dust, view), world_normals(states.stain, view), upright, 3)
@@ -84,6 +99,8 @@ def fill_slots(model: StateModel, states: ExtendedStates, view: PhysicsView, cou
         size=put(jnp.full(3, 1e-4, jnp.float32), jnp.broadcast_to(sizes, (*shape, 3))),
         colour=put(jnp.zeros(3, jnp.float32), jnp.broadcast_to(colours, (*shape, 3))),
         owner=put(jnp.array(-1, jnp.int32), jnp.broadcast_to(owners, shape)),
+        kind=put(jnp.array(-1, jnp.int32), jnp.broadcast_to(kinds, shape)),
+        body=put(jnp.array(0, jnp.int32), rows(states.dust.body, states.stain.body, no_body, 1)[..., 0]),
     )
 
 

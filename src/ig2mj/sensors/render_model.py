@@ -6,6 +6,8 @@ geom a number of free *slots*: small ellipsoids that become particles.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import mujoco
 import numpy as np
 from jaxtyping import Float, Int
@@ -20,8 +22,11 @@ NOWHERE = (0.0, 0.0, -50.0)
 """Metres, world frame: where slots are that show nothing."""
 
 
-def make_render_model(scene: Scene, slots: int) -> mujoco.MjModel:
+def make_render_model(scene: Scene, slots: int, cameras: Sequence[str] = ()) -> mujoco.MjModel:
     """Compiles the render model; geom ids from `scene.model.ngeom` on are the slots.
+
+    Args:
+      cameras: names of cameras that are added behind the scene's own, for poses that are given with each picture.
 
     Raises:
       EngineError: the scene on disk is no longer the one that was loaded.
@@ -43,6 +48,8 @@ def make_render_model(scene: Scene, slots: int) -> mujoco.MjModel:
             conaffinity=0,
             group=0,
         )
+    for name in cameras:
+        body.add_camera(name=name)
     model = spec.compile()
     known = scene.model
     if model.ngeom != known.ngeom + slots or (model.geom_bodyid[: known.ngeom] != known.geom_bodyid).any():

@@ -15,7 +15,6 @@ import collections
 import dataclasses
 import functools
 import os
-import subprocess
 import sys
 from collections.abc import Callable, Sequence
 
@@ -23,18 +22,17 @@ import mujoco
 import numpy as np
 
 from ig2mj.errors import MissingDependencyError, UnknownNameError
+from ig2mj.process.opengl import GL_BACKENDS, PROBE_XML, fault_of_probe, probe_gl, run_probe
 from ig2mj.process.settings import GL_INSTALL_HINT, use_gl, used_gl
 
-BACKENDS = ("egl", "osmesa", "warp")
+BACKENDS = (*GL_BACKENDS, "warp")
 """In the order in which they are tried."""
 
 VISIBLE_GROUPS = (0, 1, 2)
 """Geom groups drawn unless asked otherwise, as in MuJoCo's viewer: visual geoms yes, collision geoms (3) no."""
 
 
-_PROBE = "import sys; from ig2mj.viewer import offscreen; offscreen._probe_main(sys.argv[1])"
-_PROBE_XML = """<mujoco><visual><headlight ambient="1 1 1"/></visual><worldbody>
-<geom type="box" size=".5 .5 .5" rgba="1 0 0 1"/></worldbody></mujoco>"""
+_WARP_PROBE = "from ig2mj.viewer import offscreen; offscreen.draw_warp_probe()"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -115,19 +113,6 @@ def default_backend() -> str:
     raise MissingDependencyError(f"no way to draw pictures works here; for OpenGL without a display: {GL_INSTALL_HINT}")
 
 
-def use_opengl() -> str:
-    """Makes every `mujoco.Renderer` of this process draw with OpenGL that works without a display; says with which.
-
-    Raises:
-      MissingDependencyError: none works here.
-    """
-    name = next((b for b in ("egl", "osmesa") if b == used_gl() or (used_gl() is None and probe(b) is None)), None)
-    if name is None:
-        raise MissingDependencyError(f"no OpenGL without a display works here; try: {GL_INSTALL_HINT}")
-    use_gl(name)
-    return name
-
-
 def available_backends() -> dict[str, str | None]:
     """Tries every backend in a process of its own. Value None: it drew; else one line that says what went wrong."""
     return {name: probe(name) for name in BACKENDS}
@@ -138,37 +123,17 @@ def probe(backend: str, timeout_s: float = 120.0) -> str | None:
     """None if `backend` draws a small picture in a fresh process; else the reason. Remembered for this process."""
     if backend not in BACKENDS:
         raise UnknownNameError("rendering backend", backend, BACKENDS)
-    environment = os.environ | {"MUJOCO_GL": "disable" if backend == "warp" else backend}
-    environment.pop("PYOPENGL_PLATFORM", None)
-    try:
-        done = subprocess.run(
-            [sys.executable, "-c", _PROBE, backend],
-            env=environment,
-            capture_output=True,
-            text=True,
-            timeout=timeout_s,
-            check=False,
-        )
-    except subprocess.TimeoutExpired:
-        return f"did not draw within {timeout_s:.0f} s"
-    if done.returncode == 0:
-        return None
-    if done.returncode < 0:
-        return f"was killed by signal {-done.returncode} while drawing"
-    lines = [line.strip() for line in done.stderr.splitlines() if line.strip()]
-    return lines[-1] if lines else f"failed with status {done.returncode}"
+    return probe_gl(backend, timeout_s) if backend in GL_BACKENDS else run_probe(_WARP_PROBE, backend, timeout_s)
 
 
-def _probe_main(backend: str) -> None:
-    """What the process of `probe` does; exits 0 only if the box is really in the picture."""
-    model = mujoco.MjModel.from_xml_string(_PROBE_XML)
+def draw_warp_probe() -> None:
+    """What the process of `probe("warp")` does; exits with 0 only if the box really is in the picture."""
+    model = mujoco.MjModel.from_xml_string(PROBE_XML)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
-    image = render(model, data, FreeView((0, 0, 0), 3.0), width=32, height=32, backend=backend)
-    close()
-    red = image[16, 16]
-    if not (red[0] > 60 and red[0] > 2 * red[1]):
-        sys.exit(f"drew a wrong picture (middle pixel {red.tolist()}, not red)")
+    image = render(model, data, FreeView((0, 0, 0), 3.0), width=32, height=32, backend="warp")
+    if (fault := fault_of_probe(image[16, 16].tolist())) is not None:
+        sys.exit(fault)
 
 
 def _resolve_camera(model: mujoco.MjModel, camera: int | str | FreeView | None) -> int | FreeView:

@@ -59,6 +59,9 @@ CASTERS = ((0.16, 0.11), (0.16, -0.11), (-0.21, 0.11), (-0.21, -0.11))
 FIELD_OF_VIEW = 90.0
 """Degrees, vertical."""
 
+LASER = (0.30, 0.0, 0.2878)
+"""m: before the shell. The maker's laser_link is at 0.235, in a slot that our shell has not, and sees 220 degrees."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Fetch:
@@ -112,6 +115,7 @@ class Fetch:
             fingers=[f"{self.name}_{side}_gripper_finger_link" for side in "rl"],
             hands=[f"{self.name}_gripper_link"],
             assisted=True,
+            laser=LASER,
         )
 
     def _add_link(

@@ -60,6 +60,9 @@ SHELL = {"grey": (0.90, 0.90, 0.92), "blue": (0.62, 0.74, 0.90)}
 FIELD_OF_VIEW = 120.0
 """Degrees, vertical: that of the paper's experiments (spec section 2.6)."""
 
+LASER = (0.07, 0.0, -0.25)
+"""m: before the column, 0.3 m above the floor while the body stands; iGibson's humanoid has no scanner."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Humanoid:
@@ -131,6 +134,7 @@ class Humanoid:
             hands=[parts.palm for parts in hands],
             no_contact={self.name: list(NO_CONTACT)},
             assisted=True,
+            laser=LASER,
         )
 
     def hand_rays(self) -> tuple[HandRays, ...]:

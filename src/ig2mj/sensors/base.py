@@ -1,0 +1,187 @@
+"""What a sensor is: a name, the space of its readings, and a pure function that makes them.
+
+Axes: W worlds, B bodies, N rays of a pattern.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from flax import struct
+from jaxtyping import Float, UInt32
+
+from ig2mj.agents.base import Controller
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.errors import EngineError
+from ig2mj.scene.scene import Scene
+from ig2mj.sensors.images import Images, Pose, RayPattern
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import ExtendedStates
+
+
+@dataclasses.dataclass(frozen=True)
+class Space:
+    """Shape (without the world axis), type and range of an observation or an action."""
+
+    shape: tuple[int, ...]
+    dtype: type
+    low: float
+    high: float
+
+
+@dataclasses.dataclass(frozen=True)
+class SensorOptions:
+    """Settings of all sensors; the defaults are the paper's camera and iGibson's laser (spec robots_tasks_sensors 2.2).
+
+    Attributes:
+      width, height: pixels of all pictures.
+      depth_low, depth_high: m; depths outside read 0.
+      depth_noise_rate, scan_noise_rate: probability that a reading drops out: depths become 0, a scan's rays 1.
+      scan_rays: of the laser scan, over `scan_angle` degrees. scan_near, scan_far: m, its range.
+      grid_size: cells of the occupancy grid along an edge, which is `grid_range` metres long.
+      footprint: m, radius of the robot in the occupancy grid.
+      lidar_beams: of the lidar, from 15 degrees below its horizon to 15 above. lidar_columns: rays of a beam in a
+        quarter turn. lidar_near, lidar_far: m, its range; nearer is the robot's own head.
+      particles: the most particles of dust, stains and water that a picture shows.
+      shadows: whether pictures have them; they cost six times the rest natively, twice on a GPU.
+    """
+
+    width: int = 128
+    height: int = 128
+    depth_low: float | int = 0.0
+    depth_high: float | int = 10.0
+    depth_noise_rate: float | int = 0.0
+    scan_noise_rate: float | int = 0.0
+    scan_rays: int = 128
+    scan_angle: float | int = 180.0
+    scan_near: float | int = 0.05
+    scan_far: float | int = 10.0
+    grid_size: int = 128
+    grid_range: float | int = 5.0
+    footprint: float | int = 0.32
+    lidar_beams: int = 16
+    lidar_columns: int = 468
+    lidar_near: float | int = 0.25
+    lidar_far: float | int = 100.0
+    particles: int = 64
+    shadows: bool = False
+
+    def __post_init__(self) -> None:
+        """Raises EngineError where a setting is out of range."""
+        counts = ("width", "height", "scan_rays", "grid_size", "lidar_beams", "lidar_columns")
+        small = [name for name in counts if getattr(self, name) < 1]
+        if small:
+            raise EngineError(f"{small[0]} = {getattr(self, small[0])}: at least 1 is needed")
+        for low, high in (("depth_low", "depth_high"), ("scan_near", "scan_far"), ("lidar_near", "lidar_far")):
+            if not 0 <= getattr(self, low) < getattr(self, high):
+                raise EngineError(f"{low} must be 0 or more, and less than {high}")
+        for name in ("depth_noise_rate", "scan_noise_rate"):
+            if not 0 <= getattr(self, name) <= 1:
+                raise EngineError(f"{name} = {getattr(self, name)}: a probability is between 0 and 1")
+        if not 0 < self.scan_angle <= 360:
+            raise EngineError(f"scan_angle = {self.scan_angle}: between 0 and 360 degrees")
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Setup:
+    """Constants of an agent's sensors.
+
+    Attributes:
+      scene: with the agent. model: constants of the states. controller: of the agent, whose number is `agent`.
+    """
+
+    scene: Scene
+    model: StateModel
+    controller: Controller
+    options: SensorOptions
+    agent: int = 0
+
+    @property
+    def camera(self) -> str:
+        """Name of the agent's camera. Raises EngineError where it has none."""
+        entry = self.scene.manifest.agents[self.agent]
+        if not entry.camera:
+            raise EngineError(f"the robot '{entry.name}' has no camera")
+        return entry.camera
+
+    @property
+    def laser(self) -> tuple[float, float, float]:
+        """Where the agent's laser is in the frame of its base, m. Raises EngineError where it has none."""
+        entry = self.scene.manifest.agents[self.agent]
+        if entry.laser is None:
+            raise EngineError(f"the robot '{entry.name}' has no laser scanner")
+        return entry.laser
+
+    @functools.cached_property
+    def slopes(self) -> tuple[float, float]:
+        """Half width and half height of the camera's view at distance 1."""
+        up = float(np.tan(self.scene.tables.agent_fovy[self.agent] / 2))
+        return up * self.options.width / self.options.height, up
+
+
+@struct.dataclass
+class Memory:
+    """What was where at the last reading: what flow is reckoned from. World frame."""
+
+    eye_pos: Float[Array, "W 3"]
+    eye_quat: Float[Array, "W 4"]
+    body_pos: Float[Array, "W B 3"]
+    body_quat: Float[Array, "W B 4"]
+
+
+@struct.dataclass
+class Percept:
+    """What a reading is made of.
+
+    Attributes:
+      view, states, controller: of the present (the last is what the controller remembers).
+      eye: pose of the agent's camera. images: None where no sensor asked for any.
+      before: None where no sensor asked for it. keys: of the randomness of each world's reading.
+    """
+
+    view: PhysicsView
+    states: ExtendedStates
+    controller: Any
+    eye: Pose | None = None
+    images: Images | None = None
+    before: Memory | None = None
+    keys: UInt32[Array, "W 2"] | None = None
+
+
+Read = Callable[[Setup, Percept], Array]
+
+
+@dataclasses.dataclass(frozen=True)
+class Sensor:
+    """One kind of reading; made by the sensor's own file in `definitions`, listed in `registry`.
+
+    Attributes:
+      name: of the observation. summary: one line. frame: that its numbers are in.
+      space: of its readings. read: makes them, [W, ...]; pure.
+      pictures: what it needs of "rgb", "depth" and "segmentation".
+      rays: the pattern it needs, if any. ray_pose: where that pattern is.
+      remembers: it needs `Percept.before`.
+    """
+
+    name: str
+    summary: str
+    frame: str
+    space: Callable[[Setup], Space]
+    read: Read
+    pictures: frozenset[str] = frozenset()
+    rays: Callable[[Setup], RayPattern] | None = None
+    ray_pose: Callable[[Setup, PhysicsView, Pose | None], Pose] | None = None
+    remembers: bool = False
+
+    @property
+    def looks(self) -> bool:
+        """It needs the engine itself, not only the view: pictures or rays."""
+        return bool(self.pictures) or self.rays is not None
+
+    @property
+    def needs_eye(self) -> bool:
+        return bool(self.pictures) or self.remembers

@@ -1,0 +1,83 @@
+"""`Images`: what cameras and rays of any engine deliver, before sensors make readings of it.
+
+Axes: W worlds, C cameras, Y rows, X columns, N rays of a pattern.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from flax import struct
+from jaxtyping import Float, Int, UInt8
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.errors import EngineError
+from ig2mj.sensors.particle_slots import Slots
+from ig2mj.states.world import ExtendedStates
+
+NOTHING = -1
+"""In a segmentation: no object there (sky, agents, the world's own geoms). In `geom`: nothing was hit."""
+
+VISIBLE_GROUPS = (0, 1, 2)
+"""Geom groups that sensors see, as in MuJoCo's viewer: visual geoms yes, collision geoms (3) no."""
+
+Pose = tuple[Float[Array, "W 3"], Float[Array, "W 4"]]
+"""World frame: m, w-x-y-z."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class RayPattern:
+    """Rays that leave one point.
+
+    Attributes:
+      name: of their pose among those that a camera is called with.
+      directions: unit length, in the sensor's frame (x forward, y left, z up).
+      near, far: m from the point; nothing nearer or farther is seen.
+    """
+
+    name: str
+    directions: Float[np.ndarray, "N 3"]
+    near: float
+    far: float
+
+
+@struct.dataclass
+class Images:
+    """Pictures of all worlds; what was not requested is None.
+
+    Attributes:
+      rgb: 0..255, row 0 on top. depth: metres along the optical axis, 0 where nothing is hit.
+      segmentation: index of the object seen, `NOTHING` where there is none; a particle counts as its object.
+      geom: id of the geom seen, `NOTHING` where there is none; those from the model's number of geoms on are slots.
+      slots: the particles that were drawn.
+      rays: distances along the rays of each pattern, m; infinite where nothing is hit.
+    """
+
+    rgb: UInt8[Array, "W C Y X 3"] | None
+    depth: Float[Array, "W C Y X"] | None
+    segmentation: Int[Array, "W C Y X"] | None
+    geom: Int[Array, "W C Y X"] | None = None
+    slots: Slots | None = None
+    rays: Mapping[str, Float[Array, "W N"]] = dataclasses.field(default_factory=dict)
+
+
+@runtime_checkable
+class Camera(Protocol):
+    """`BatchCamera` or `NativeCamera`."""
+
+    def __call__(
+        self, physics: Any, view: PhysicsView, states: ExtendedStates, eyes: Mapping[str, Pose] | None = None
+    ) -> Images:
+        """Pictures of the present state of every world."""
+        ...
+
+
+def check_request(
+    cameras: Sequence[str], rays: Sequence[RayPattern], wanted: Sequence[bool], width: int, height: int
+) -> None:
+    """Raises EngineError where there is nothing to make pictures of, or with."""
+    if (cameras and (not any(wanted) or min(width, height) < 1)) or not (cameras or rays):
+        raise EngineError("a camera must have pixels and make at least one of rgb, depth and segmentation")

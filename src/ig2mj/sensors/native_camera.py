@@ -1,0 +1,202 @@
+"""`NativeCamera`: what `BatchCamera` delivers, natively: pictures by MuJoCo's renderer, rays by `mj_multiRay`.
+
+Colour and depth are one pass of OpenGL, segmentation is another. Shadows, reflections, multisampling and the sky are
+off, as in the ray caster: with OpenGL in software shadows alone cost six times what everything else does.
+
+Axes: W worlds, C cameras, Y rows, X columns, S slots, N rays of a pattern, O objects.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import jax
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+
+from ig2mj.engine.base import Engine
+from ig2mj.engine.native.engine import NativeEngine
+from ig2mj.engine.view import PhysicsView
+from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.geometry.poses import matrices_on_host
+from ig2mj.sensors.gl_canvas import Canvas
+from ig2mj.sensors.images import NOTHING, VISIBLE_GROUPS, Images, Pose, RayPattern, check_request
+from ig2mj.sensors.particle_slots import Slots, fill_slots
+from ig2mj.sensors.render_model import mean_colours
+from ig2mj.sensors.tints import UNTINTED, tinted, tints, tints_of_geoms
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import ExtendedStates
+
+_HIDDEN = mujoco.mjNGROUP - 1
+"""A geom group that rays do not see, whatever groups are visible."""
+
+
+class NativeCamera:
+    """Pictures and rays of worlds of the native engine; arguments and results as of `BatchCamera`, in NumPy."""
+
+    def __init__(
+        self,
+        engine: Engine,
+        model: StateModel,
+        cameras: Sequence[str],
+        *,
+        width: int = 128,
+        height: int = 128,
+        rgb: bool = True,
+        depth: bool = False,
+        segmentation: bool = False,
+        particles: int = 64,
+        groups: Sequence[int] = VISIBLE_GROUPS,
+        shadows: bool = False,
+        rays: Sequence[RayPattern] = (),
+    ):
+        """See `BatchCamera`. OpenGL is started by the first picture; rays need none.
+
+        Raises:
+          EngineError: not the native engine, or nothing is to be made. UnknownNameError: no such camera.
+        """
+        if not isinstance(engine, NativeEngine):
+            raise EngineError(f"the {engine.name} engine's worlds are not drawn by MuJoCo's renderer")
+        check_request(cameras, rays, (rgb, depth, segmentation), width, height)
+        self.engine, self.model = engine, model
+        self.width, self.height, self.slots = width, height, particles
+        self._wants, self._shadows, self._patterns = (rgb, depth, segmentation), shadows, tuple(rays)
+        self._drawn = copy.copy(engine.scene.model)  # its colours change with the states
+        self.cameras = {name: _camera_id(self._drawn, name) for name in cameras}
+        self._visible = np.isin(np.arange(mujoco.mjNGROUP), list(groups)).astype(np.uint8)
+        if self._visible[_HIDDEN]:
+            raise EngineError(f"geom group {_HIDDEN} is never seen (take the groups 0 to {_HIDDEN - 1})")
+        self._owner = np.concatenate([engine.tables.geom_object, np.full(particles, NOTHING)]).astype(np.int32)
+        self._plain = mean_colours(self._drawn, np.arange(self._drawn.ngeom))
+        self._material, self._group = self._drawn.geom_matid.copy(), self._drawn.geom_group.copy()
+        self._canvas: Canvas | None = None
+        self._look = jax.jit(self._look_fn)
+
+    def __call__(
+        self,
+        physics: Any,
+        view: PhysicsView,
+        states: ExtendedStates,
+        eyes: Mapping[str, Pose] | None = None,
+    ) -> Images:
+        """Pictures of the present state of every world; see `BatchCamera`."""
+        eyes = {name: (np.asarray(pos), np.asarray(quat)) for name, (pos, quat) in (eyes or {}).items()}
+        count, (rgb, depth, segmentation) = self.engine.num_worlds, self._wants
+        shape = (count, len(self.cameras), self.height, self.width)
+        colour = np.zeros((*shape, 3), np.uint8) if rgb and self.cameras else None
+        far = np.zeros(shape, np.float32) if depth and self.cameras else None
+        geom = np.full(shape, NOTHING, np.int32) if segmentation and self.cameras else None
+        rays = {p.name: np.full((count, len(p.directions)), np.inf, np.float32) for p in self._patterns}
+        slots = None
+        if self.cameras:
+            tint, slots = jax.tree.map(np.asarray, self._look(states, view.body_pos, view.body_quat))
+        for w in range(count):
+            live, data = self.engine.to_mujoco(physics, w)
+            for colours, own in ((self._drawn.geom_rgba, live.geom_rgba), (self._drawn.mat_rgba, live.mat_rgba)):
+                colours[:] = own
+                colours[:, 3] = colours[:, 3] > 0  # glass is opaque, as to the ray caster; OpenGL gives it no depth
+            self._drawn.geom_matid[:] = self._material
+            for pattern in self._patterns:
+                pos, quat = eyes[pattern.name]
+                rays[pattern.name][w] = self._cast(data, pattern, pos[w], quat[w])
+            if slots is None:
+                continue
+            self._tint(tint[w])
+            for c, (name, number) in enumerate(self.cameras.items()):
+                pose = tuple(part[w] for part in eyes[name]) if name in eyes else None
+                one = self._draw(data, number, pose, slots, w)
+                for images, image in zip((colour, far, geom), one, strict=True):
+                    if images is not None and image is not None:
+                        images[w, c] = image
+        return Images(
+            rgb=colour,
+            depth=far,
+            segmentation=None if geom is None or slots is None else self._objects(geom, slots),
+            geom=geom,
+            slots=slots,
+            rays=rays,
+        )
+
+    def close(self) -> None:
+        """Frees the OpenGL context; the next picture makes a new one."""
+        if self._canvas is not None:
+            self._canvas.close()
+            self._canvas = None
+
+    def _look_fn(self, states: ExtendedStates, body_pos: Any, body_quat: Any) -> tuple[Any, Slots]:
+        """Tints of objects, and particles. Of the view only bodies are read; the rest is not made for this."""
+        view = object.__new__(PhysicsView)
+        view.__dict__.update(body_pos=body_pos, body_quat=body_quat)
+        return tints(self.model, states), fill_slots(self.model, states, view, self.slots)
+
+    def _tint(self, tint: Int[np.ndarray, "O"]) -> None:
+        """Gives geoms of objects whose state shows their mean colours, tinted, in place of texture and material."""
+        if (tint == UNTINTED).all():
+            return
+        of_geoms = np.asarray(tints_of_geoms(tint[None], self.engine.tables.geom_object))[0]
+        geoms = np.flatnonzero(of_geoms != UNTINTED)
+        self._drawn.geom_rgba[geoms, :3] = np.asarray(tinted(self._plain[geoms, :3], of_geoms[None, geoms]))[0]
+        self._drawn.geom_rgba[geoms, 3] = self._plain[geoms, 3] > 0
+        self._drawn.geom_matid[geoms] = -1
+
+    def _draw(
+        self, data: mujoco.MjData, camera: int, pose: tuple[np.ndarray, ...] | None, slots: Slots, world: int
+    ) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
+        if self._canvas is None:
+            self._canvas = Canvas(self._drawn, self.width, self.height, self._visible, self.slots, self._shadows)
+        keep = data.cam_xpos[camera].copy(), data.cam_xmat[camera].copy()
+        try:
+            if pose is not None:
+                data.cam_xpos[camera], data.cam_xmat[camera] = pose[0], matrices_on_host(pose[1][None])[0].ravel()
+            self._canvas.update(data, camera, slots, world)
+        finally:
+            data.cam_xpos[camera], data.cam_xmat[camera] = keep
+        return self._canvas.draw(*self._wants)
+
+    def _cast(
+        self, data: mujoco.MjData, pattern: RayPattern, pos: Float[np.ndarray, "3"], quat: Float[np.ndarray, "4"]
+    ) -> Float[np.ndarray, "N"]:
+        """Distances along the rays of a pattern from the pose of its point, m; infinite where nothing is hit."""
+        count, origin = len(pattern.directions), pos.astype(np.float64)
+        directions = pattern.directions @ matrices_on_host(quat[None].astype(np.float64))[0].T
+        found, distance = np.zeros(count, np.int32), np.zeros(count)
+        reach = np.linalg.norm(data.geom_xpos - origin, axis=1) + self._drawn.geom_rbound
+        hidden = (reach <= pattern.near) & (self._drawn.geom_rbound > 0)  # wholly too near, such as the robot's head
+        self._drawn.geom_group[:] = np.where(hidden, _HIDDEN, self._group)
+        mujoco.mj_multiRay(
+            self._drawn,
+            data,
+            origin,
+            directions.ravel(),
+            self._visible,
+            1,
+            -1,
+            found,
+            distance,
+            None,
+            count,
+            pattern.far + 1.0,  # nearest distances of boxes are compared with it, not those of surfaces
+        )
+        for ray in np.flatnonzero((distance >= 0) & (distance < pattern.near)):  # rays begin at the nearest range
+            start = origin + pattern.near * directions[ray]
+            beyond = mujoco.mj_ray(self._drawn, data, start, directions[ray], self._visible, 1, -1, found[:1])
+            distance[ray] = -1.0 if beyond < 0 else pattern.near + beyond
+        self._drawn.geom_group[:] = self._group
+        return np.where((distance >= 0) & (distance <= pattern.far), distance, np.inf).astype(np.float32)
+
+    def _objects(self, geom: Int[np.ndarray, "W C Y X"], slots: Slots) -> Int[np.ndarray, "W C Y X"]:
+        """Objects of the geoms that are seen."""
+        owner = np.tile(self._owner, (len(geom), 1))
+        owner[:, len(self._owner) - self.slots :] = slots.owner
+        world = np.arange(len(geom))[:, None, None, None]
+        return np.where(geom >= 0, owner[world, np.maximum(geom, 0)], NOTHING).astype(np.int32)
+
+
+def _camera_id(model: mujoco.MjModel, name: str) -> int:
+    number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_CAMERA, name)
+    if number < 0:
+        raise UnknownNameError("camera", name, [model.camera(c).name for c in range(model.ncam)])
+    return number

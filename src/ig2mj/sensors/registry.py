@@ -1,0 +1,47 @@
+"""All sensors, one line each. Names are iGibson's where it has the sensor (spec robots_tasks_sensors section 2.1)."""
+
+from __future__ import annotations
+
+from ig2mj.errors import UnknownNameError
+from ig2mj.sensors.base import Sensor
+from ig2mj.sensors.definitions.bump import BUMP
+from ig2mj.sensors.definitions.colour import RGB
+from ig2mj.sensors.definitions.depth import DEPTH
+from ig2mj.sensors.definitions.flow import OPTICAL_FLOW, SCENE_FLOW
+from ig2mj.sensors.definitions.ground_truth import BASE_POSE, EYE_POSE, OBJECT_POSES
+from ig2mj.sensors.definitions.lidar import LIDAR
+from ig2mj.sensors.definitions.normals import NORMAL
+from ig2mj.sensors.definitions.occupancy_grid import OCCUPANCY_GRID
+from ig2mj.sensors.definitions.point_cloud import POINT_CLOUD
+from ig2mj.sensors.definitions.proprioception import PROPRIOCEPTION
+from ig2mj.sensors.definitions.scan import SCAN
+from ig2mj.sensors.definitions.segmentation import INS_SEG, SEG
+
+SENSORS: dict[str, Sensor] = {
+    sensor.name: sensor
+    for sensor in (
+        RGB,
+        DEPTH,
+        NORMAL,
+        SEG,
+        INS_SEG,
+        OPTICAL_FLOW,
+        SCENE_FLOW,
+        POINT_CLOUD,
+        SCAN,
+        LIDAR,
+        OCCUPANCY_GRID,
+        BUMP,
+        PROPRIOCEPTION,
+        OBJECT_POSES,
+        BASE_POSE,
+        EYE_POSE,
+    )
+}
+
+
+def find_sensor(name: str) -> Sensor:
+    """The sensor of a name. Raises UnknownNameError, with near matches."""
+    if name not in SENSORS:
+        raise UnknownNameError("sensor", name, SENSORS)
+    return SENSORS[name]

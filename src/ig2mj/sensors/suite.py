@@ -1,0 +1,240 @@
+"""`SensorSuite`: some sensors of one agent, on any engine.
+
+    sensors = SensorSuite(engine, scene, rules.model, controller, ["rgb", "depth", "scan"])
+    readings, memory = sensors.read(physics, view, states, controller_state)
+
+One camera is made for all of them, which draws what they need and nothing else. On a pure engine `read_fn` may be part
+of a compiled program.
+
+Axes: W worlds.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Bool, UInt32
+
+from ig2mj.agents.base import Controller
+from ig2mj.engine.base import Engine, Physics
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.errors import EngineError
+from ig2mj.scene.scene import Scene
+from ig2mj.sensors.base import Memory, Percept, SensorOptions, Setup, Space
+from ig2mj.sensors.images import Camera, Images, Pose
+from ig2mj.sensors.registry import find_sensor
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import ExtendedStates
+
+Readings = dict[str, Array]
+
+
+class SensorSuite:
+    """See the module's text.
+
+    Attributes:
+      spaces: of each sensor, without the world axis.
+    """
+
+    def __init__(
+        self,
+        engine: Engine,
+        scene: Scene,
+        model: StateModel,
+        controller: Controller,
+        names: Sequence[str],
+        options: SensorOptions | None = None,
+        agent: int = 0,
+    ):
+        """Makes the camera that the sensors need.
+
+        Args:
+          engine: whose worlds are perceived. scene: theirs. model: constants of the states.
+          controller: of the agent, which is number `agent` of the scene.
+          names: of sensors (`ig2mj.sensors.registry.SENSORS`).
+
+        Raises:
+          UnknownNameError: no such sensor. EngineError: the robot lacks what a sensor needs, or the engine cannot make
+            pictures (only "native" and "warp" can).
+        """
+        self._sensors = [find_sensor(name) for name in names]
+        self._setup = Setup(scene, model, controller, options or SensorOptions(), agent)
+        self.spaces: dict[str, Space] = {s.name: s.space(self._setup) for s in self._sensors}
+        self._felt = [s for s in self._sensors if not s.looks]
+        self._seen = [s for s in self._sensors if s.looks]
+        self._pure = engine.pure
+        self._patterns = {}
+        for sensor in self._seen:
+            if sensor.rays is not None:
+                pattern = sensor.rays(self._setup)
+                self._patterns[pattern.name] = (pattern, sensor.ray_pose)
+        if "scan" in self._patterns:
+            _ = self._setup.laser  # raises where there is none
+        self._camera = self._make_camera(engine) if self._seen else None
+        self._remembers = any(s.remembers for s in self._seen)
+        self._poses, self._finish = jax.jit(self._poses_fn), jax.jit(self._finish_fn)
+        self._feel, self._remember = jax.jit(self.feel_fn), jax.jit(self._memory)
+        self._whole = jax.jit(self.read_fn) if engine.pure else self._stages
+
+    def _make_camera(self, engine: Engine) -> Camera:
+        wanted = frozenset().union(*(s.pictures for s in self._seen))
+        options = self._setup.options
+        settings: dict[str, Any] = {
+            "width": options.width,
+            "height": options.height,
+            "particles": options.particles,
+            "shadows": options.shadows,
+            "rays": [pattern for pattern, _ in self._patterns.values()],
+            **{name: name in wanted for name in ("rgb", "depth", "segmentation")},
+        }
+        cameras = [self._setup.camera] if wanted else []
+        if engine.name == "native":
+            from ig2mj.sensors.native_camera import NativeCamera
+
+            return NativeCamera(engine, self._setup.model, cameras, **settings)
+        if engine.name == "warp":
+            from ig2mj.sensors.batch_camera import BatchCamera  # MJX-Warp is only loaded where pictures are made
+
+            return BatchCamera(engine, self._setup.model, cameras, **settings)
+        raise EngineError(f"the {engine.name} engine makes no pictures and casts no rays (take 'native' or 'warp')")
+
+    @property
+    def noisy(self) -> bool:
+        """Readings need keys."""
+        return self._setup.options.depth_noise_rate > 0 or self._setup.options.scan_noise_rate > 0
+
+    @property
+    def looks(self) -> bool:
+        """Some sensor needs pictures or rays; the others are read from the view alone (`feel_fn`)."""
+        return self._camera is not None
+
+    # Readings.
+
+    def read(
+        self,
+        physics: Physics,
+        view: PhysicsView,
+        states: ExtendedStates,
+        controller: Any,
+        memory: Memory | None = None,
+        keys: UInt32[Array, "W 2"] | None = None,
+    ) -> tuple[Readings, Memory | None]:
+        """Readings of all sensors, compiled where that helps.
+
+        Args:
+          controller: what the agent's controller remembers.
+          memory: as returned by the last call; None at the first reading of all worlds.
+          keys: of the noise of this reading, of each world; only needed where there is noise.
+
+        Returns:
+          Readings by name, [W, ...] each; and what the next reading needs to know of this one.
+        """
+        return self._whole(physics, view, states, controller, memory, keys)
+
+    def read_fn(
+        self,
+        physics: Physics,
+        view: PhysicsView,
+        states: ExtendedStates,
+        controller: Any,
+        memory: Memory | None = None,
+        keys: UInt32[Array, "W 2"] | None = None,
+    ) -> tuple[Readings, Memory | None]:
+        """`read`, not compiled."""
+        seen, memory = self.look_fn(physics, view, states, controller, memory, keys)
+        return self._ordered({**self.feel_fn(view, states, controller), **seen}), memory
+
+    def feel_fn(self, view: PhysicsView, states: ExtendedStates, controller: Any) -> Readings:
+        """Readings of the sensors that need the view only. Pure on every engine, not compiled."""
+        percept = Percept(view, states, controller)
+        return {s.name: s.read(self._setup, percept) for s in self._felt}
+
+    def look_fn(
+        self,
+        physics: Physics,
+        view: PhysicsView,
+        states: ExtendedStates,
+        controller: Any,
+        memory: Memory | None = None,
+        keys: UInt32[Array, "W 2"] | None = None,
+    ) -> tuple[Readings, Memory | None]:
+        """Readings of the sensors that need pictures or rays; see `read`. On a pure engine not compiled."""
+        if self._camera is None:
+            return {}, None
+        if self._pure:
+            eye, poses = self._poses_fn(view, controller)
+            images = self._camera(physics, view, states, poses)
+            return self._finish_fn(view, states, controller, eye, images, memory, keys)
+        eye, poses = self._poses(view, controller)
+        images = self._camera(physics, view, states, poses)
+        return self._finish(view, states, controller, eye, images, memory, keys)
+
+    def _stages(self, *arguments: Any) -> tuple[Readings, Memory | None]:
+        """`read` on an engine whose pictures cannot be part of a program."""
+        seen, memory = self.look_fn(*arguments)
+        _, view, states, controller, *_ = arguments
+        felt = self._feel(view, states, controller) if self._felt else {}
+        return self._ordered({**felt, **seen}), memory
+
+    def _ordered(self, readings: Readings) -> Readings:
+        return {name: readings[name] for name in self.spaces}
+
+    # Memory.
+
+    def memory(self, view: PhysicsView, controller: Any) -> Memory | None:
+        """As after a reading of these worlds; None where no sensor needs one."""
+        return self._remember(view, controller) if self._remembers else None
+
+    def _memory(self, view: PhysicsView, controller: Any) -> Memory:
+        pos, quat = self._setup.controller.eye(view, controller)
+        return Memory(pos, quat, jnp.asarray(view.body_pos), jnp.asarray(view.body_quat))
+
+    def _poses_fn(self, view: PhysicsView, controller: Any) -> tuple[Pose | None, dict[str, Pose]]:
+        """Of the eye, and of everything that the camera is to be called with."""
+        eye, poses = None, {}
+        if self._setup.scene.manifest.agents[self._setup.agent].camera:
+            pos, quat = self._setup.controller.eye(view, controller)
+            eye = (jnp.asarray(pos), jnp.asarray(quat))
+            if any(s.pictures for s in self._seen):
+                poses[self._setup.camera] = eye
+        for name, (_, pose) in self._patterns.items():
+            poses[name] = pose(self._setup, view, eye)
+        return eye, poses
+
+    def _finish_fn(
+        self,
+        view: PhysicsView,
+        states: ExtendedStates,
+        controller: Any,
+        eye: Pose | None,
+        images: Images,
+        memory: Memory | None,
+        keys: UInt32[Array, "W 2"] | None,
+    ) -> tuple[Readings, Memory | None]:
+        """Readings from pictures."""
+        now = self._memory(view, controller) if self._remembers else None
+        before = now if memory is None else memory
+        percept = Percept(view, states, controller, eye, images, before, keys)
+        return {s.name: _finite(s.read(self._setup, percept)) for s in self._seen}, now
+
+
+def _finite(reading: Array) -> Array:
+    """A reading in which numbers that are not finite, of worlds that broke, are 0."""
+    reading = jnp.asarray(reading)
+    if not jnp.issubdtype(reading.dtype, jnp.floating):
+        return reading
+    return jnp.where(jnp.isfinite(reading), reading, 0.0)
+
+
+def chosen_memory(mask: Bool[Array, "W"], new: Memory | None, old: Memory | None) -> Memory | None:
+    """The new memory in masked worlds."""
+    if new is None or old is None:
+        return new
+
+    def choose(a: Array, b: Array) -> Array:
+        return jnp.where(jnp.asarray(mask).reshape(-1, *[1] * (a.ndim - 1)), a, b)
+
+    return jax.tree.map(choose, new, old)

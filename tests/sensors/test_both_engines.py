@@ -1,0 +1,83 @@
+"""Sensors of the native and of the Warp engine, from the same place: the same numbers but for edges and rounding."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from perceiving import Perceiving
+
+from ig2mj.agents.humanoid import Humanoid
+from ig2mj.process.opengl import GL_BACKENDS, probe_gl
+from ig2mj.sensors.registry import SENSORS
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(all(probe_gl(b) for b in GL_BACKENDS), reason="no OpenGL draws on this machine"),
+]
+
+OPTIONS = {"width": 64, "height": 48, "scan_rays": 61, "lidar_columns": 20, "scan_angle": 360.0}
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """All sensors in birch, whose objects have textures and glass, with the head moved by the controller."""
+    found = {}
+    for engine in ("native", "warp"):
+        world = Perceiving("birch", Humanoid(pos=(1.2, -1.2, 0.55), quat=(0.92388, 0, 0, 0.382683)), engine)
+        suite = world.suite(*SENSORS, **OPTIONS)
+        _, memory = world.read(suite)
+        pos = np.array(world.state.eye_pos)
+        pos[0] += (0.1, 0.0, 0.05)
+        world.state = dataclasses.replace(world.state, eye_pos=pos)
+        found[engine] = world.read(suite, memory)[0]
+        found["spaces"] = suite.spaces
+    return found
+
+
+def apart(seen, name):
+    return np.abs(seen["native"][name].astype(float) - seen["warp"][name].astype(float))
+
+
+@pytest.mark.parametrize("name", SENSORS)
+def test_names_shapes_types_and_ranges_are_the_same(seen, name):
+    space = seen["spaces"][name]
+    for engine in ("native", "warp"):
+        array = seen[engine][name]
+        assert array.shape == (1, *space.shape) and array.dtype == space.dtype
+        assert space.low <= array.min() and array.max() <= space.high
+
+
+@pytest.mark.parametrize(
+    ("name", "close", "share"),
+    [
+        ("depth", 3e-3, 0.985),
+        ("pc", 3e-3, 0.985),
+        ("normal", 0.02, 0.93),
+        ("optical_flow", 3e-3, 0.985),
+        ("scene_flow", 3e-3, 0.985),
+        ("seg", 0.5, 0.985),
+        ("ins_seg", 0.5, 0.985),
+        ("scan", 1e-3, 0.98),
+        ("lidar", 5e-3, 0.99),
+        ("occupancy_grid", 0.1, 0.99),
+        ("bump", 0, 1),
+        ("proprioception", 1e-3, 1),
+        ("object_poses", 2e-2, 1),
+        ("eye_pose", 1e-4, 1),
+    ],
+)
+def test_readings_are_the_same_but_for_edges(seen, name, close, share):
+    assert (apart(seen, name) <= close).mean() >= share
+
+
+def test_colours_of_objects_are_the_same(seen):
+    """Textures, lights and glass: the mean colour of everything that covers 30 pixels or more."""
+    instance = seen["native"]["ins_seg"][..., 0]
+    same = instance == seen["warp"]["ins_seg"][..., 0]
+    for number in np.unique(instance):
+        pixels = same & (instance == number)
+        if pixels.sum() >= 30:
+            native, warp = (seen[e]["rgb"][pixels].astype(float).mean(0) for e in ("native", "warp"))
+            np.testing.assert_allclose(native, warp, atol=8, err_msg=f"instance {number}")
