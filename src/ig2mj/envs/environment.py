@@ -34,7 +34,6 @@ from ig2mj.errors import ActionError, EngineError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.scene.scene import Scene
 from ig2mj.sensors.base import Memory
-from ig2mj.sensors.suite import chosen_memory
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.actions import ActionMap
 from ig2mj.tasks.objective import Measures, Objective
@@ -194,7 +193,7 @@ class Environment:
             state.measures,
             bad,
         )
-        return self._state(batch, seen, state.bad_actions + bad, state.memory)
+        return self._state(batch, seen, state.bad_actions + bad, state)
 
     def step_autoreset(self, state: EnvState, action: Array) -> EnvState:
         """`step`, and a new episode at once where one is over (Gymnasium's SAME_STEP).
@@ -262,41 +261,17 @@ class Environment:
         old = None if before is None else _Seen(**{f.name: getattr(before, f.name) for f in dataclasses.fields(_Seen)})
         seen = self._see_first(world.view, world.states, batch.controllers, world.step, world.key, mask, old)
         count = jnp.zeros(self.num_worlds, jnp.int32) if before is None else before.bad_actions
-        memory = None if before is None else before.memory
-        return self._state(batch, seen, count, memory, None if before is None else (before, mask))
+        return self._state(batch, seen, count, before, mask)
 
     def _state(
-        self,
-        batch: Batch,
-        seen: _Seen,
-        bad: Int[Array, "W"],
-        before: Memory | None,
-        kept: tuple[EnvState, Bool[Array, "W"]] | None = None,
+        self, batch: Batch, seen: _Seen, bad: Int[Array, "W"], before: EnvState | None, begun: Array | None = None
     ) -> EnvState:
-        """A state with its pictures.
-
-        Args:
-          before: what sensors know of the last reading. kept: a state, and which worlds have begun since; the others
-            keep its pictures.
-        """
-        world, controller = batch.world, batch.controllers[0]
-        if kept is not None:
-            before = chosen_memory(kept[1], self._observer.memory(world.view, controller), before)
-        pictures, memory = self._observer.pictures(world, controller, before)
-        if kept is not None:
-            pictures = {name: _chosen(kept[1], new, kept[0].obs[name]) for name, new in pictures.items()}
+        """A state with its pictures. `begun`: worlds that were reset since `before`; the others keep its pictures."""
+        last = None if before is None else (before.obs, before.memory)
+        pictures, memory = self._observer.pictures(batch.world, batch.controllers[0], last, begun)
         obs = {name: {**seen.obs, **pictures}[name] for name in self.observation_spaces}
-        return EnvState(
-            batch,
-            obs,
-            seen.reward,
-            seen.terminated,
-            seen.truncated,
-            seen.info,
-            seen.measures,
-            bad.astype(jnp.int32),
-            memory,
-        )
+        of_step = (seen.reward, seen.terminated, seen.truncated, seen.info, seen.measures)
+        return EnvState(batch, obs, *of_step, bad.astype(jnp.int32), memory)
 
     # What is computed after physics. Pure.
 

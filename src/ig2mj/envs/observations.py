@@ -11,13 +11,13 @@ Every array has the world axis W before that.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import UnknownNameError
@@ -76,14 +76,33 @@ class Observer:
         return {name: jnp.nan_to_num(jnp.asarray(a, jnp.float32), posinf=0.0, neginf=0.0) for name, a in found.items()}
 
     def pictures(
-        self, world: WorldState, controller_state: Any, memory: Memory | None
+        self,
+        world: WorldState,
+        controller_state: Any,
+        last: tuple[Mapping[str, Array], Memory | None] | None,
+        begun: Bool[Array, "W"] | None = None,
     ) -> tuple[dict[str, Array], Memory | None]:
-        """Readings of cameras and lasers, and what those of the next step need to know (`SensorSuite.look_fn`)."""
+        """Readings of cameras and lasers, and what those of the next step need to know (`SensorSuite.look_fn`).
+
+        Args:
+          last: observations and memory of the last step, or of before a reset; None at the start.
+          begun: worlds that have just been reset; the others keep the readings of `last`. None: there was no reset.
+        """
         if not self._sensors.looks:
             return {}, None
+        memory = None if last is None else last[1]
+        if begun is not None:
+            memory = chosen(begun, self._sensors.memory(world.view, controller_state), memory)
         keys = self._keys(world.key, world.step) if self._sensors.noisy else None
-        return self._sensors.look_fn(world.physics, world.view, world.states, controller_state, memory, keys)
+        found, memory = self._sensors.look_fn(world.physics, world.view, world.states, controller_state, memory, keys)
+        if begun is not None and last is not None:
+            found = chosen(begun, found, {name: last[0][name] for name in found})
+        return found, memory
 
-    def memory(self, view: PhysicsView, controller_state: Any) -> Memory | None:
-        """Of worlds that have just begun."""
-        return self._sensors.memory(view, controller_state)
+
+def chosen(mask: Bool[Array, "W"], new: Any, old: Any) -> Any:
+    """The new arrays of a pytree in masked worlds; all of them where there are no old ones."""
+    if old is None:
+        return new
+    mask = jnp.asarray(mask)
+    return jax.tree.map(lambda a, b: jnp.where(mask.reshape(-1, *[1] * (a.ndim - 1)), a, b), new, old)

@@ -16,7 +16,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Bool, UInt32
+from jaxtyping import UInt32
 
 from ig2mj.agents.base import Controller
 from ig2mj.engine.base import Engine, Physics
@@ -227,14 +227,3 @@ def _finite(reading: Array) -> Array:
     if not jnp.issubdtype(reading.dtype, jnp.floating):
         return reading
     return jnp.where(jnp.isfinite(reading), reading, 0.0)
-
-
-def chosen_memory(mask: Bool[Array, "W"], new: Memory | None, old: Memory | None) -> Memory | None:
-    """The new memory in masked worlds."""
-    if new is None or old is None:
-        return new
-
-    def choose(a: Array, b: Array) -> Array:
-        return jnp.where(jnp.asarray(mask).reshape(-1, *[1] * (a.ndim - 1)), a, b)
-
-    return jax.tree.map(choose, new, old)
