@@ -21,9 +21,10 @@ def run(
     robot: str | None = None,
     grasping: str | None = None,
     pool_size: int = 0,
+    drawn: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
-    """Tell how often a policy succeeds, each start state played once and without noise.
+    """Tell how often a policy succeeds, each start state played once.
 
     Args:
       policy: a file that `ig2mj train` wrote, or the name of one that ships.
@@ -34,6 +35,7 @@ def run(
       robot: only for a policy of this robot (its card says which).
       grasping: only for a policy of this way of grasping.
       pool_size: start states; 0: as many as the split has.
+      drawn: actions are drawn from the policy's distribution, as in training, instead of its middle.
       json: print one JSON object.
     """
     import json as form
@@ -73,7 +75,7 @@ def run(
     def progress(done: int, of: int) -> None:
         print(f"{done} of {of} episodes", file=sys.stderr)
 
-    found = evaluate(env, loaded.actor(perception), episodes, progress).summary()
+    found = evaluate(env, loaded.actor(perception, drawn=drawn), episodes, progress).summary()
     result = {
         "env": env.task.name,
         "robot": env.robot,
@@ -81,6 +83,7 @@ def run(
         "agent": str(policy),
         "paper_rl": loaded.card.get("paper_rl", False),
         "split": split,
+        "drawn": drawn,
         "engine": engine,
         "worlds": count,
         **found,

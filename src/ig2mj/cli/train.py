@@ -7,7 +7,7 @@ from typing import Annotated
 
 import tyro
 
-ALGORITHMS = ("sac", "ppo", "dagger")
+ALGORITHMS = ("sac", "ppo", "bc", "dagger")
 
 WORLDS = {"native": 16}
 """So many worlds unless another number is asked for; `PURE_WORLDS` on the others."""
@@ -27,8 +27,10 @@ def run(
     seed: int = 0,
     out: pathlib.Path | None = None,
     resume: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    demos: pathlib.Path | None = None,
     save_buffer: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     until: float | None = None,
+    programs: int = 1,
     paper_rl: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     pool_size: int = 0,
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = (),
@@ -37,7 +39,7 @@ def run(
 
     Args:
       env: CookingMeat, or ig2mj/CookingMeat-v0 (`ig2mj list-envs`).
-      algo: sac, ppo, or dagger (a scripted expert corrects the policy; `ig2mj list-envs`).
+      algo: sac, ppo, bc (from --demos alone), or dagger (a scripted expert corrects the policy).
       robot: humanoid, fetch or turtlebot; default: the first that the task lists.
       grasping: mitten, assisted, sticky or physical; default: mitten for activities.
       obs: state (proprioception and privileged state) or rgbd (what the paper's agents see; needs the warp engine).
@@ -47,8 +49,10 @@ def run(
       seed: of everything random.
       out: folder of the run; default: runs/ENV-ROBOT-GRASPING-ALGO-OBS-SEED.
       resume: go on from the newest checkpoint in the folder.
+      demos: demonstrations (`ig2mj demos collect`), for bc.
       save_buffer: checkpoints hold the replay buffer, too; without it a resumed run first plays it full again.
       until: stop once so large a share of the last episodes succeeds (0.98).
+      programs: of an iteration: 1, or 2 (the worlds' and the learner's, so that both are timed).
       paper_rl: the thresholds that the paper's runs had.
       pool_size: start states; 0: as many as the split has.
       set: settings of the algorithm, as updates=16 or actor=128,128.
@@ -74,6 +78,12 @@ def run(
         raise UnknownNameError("kind of observation", obs, MODES)
     if minutes <= 0:
         raise Ig2mjError(f"--minutes {minutes}: more than 0 is needed")
+    if algo == "bc":
+        from ig2mj.cli.clone import train_from_demos
+
+        return train_from_demos(env, demos, robot, grasping, obs, minutes, seed, out, resume, set)
+    if demos is not None:
+        raise Ig2mjError(f"--demos: {algo} takes none (bc does)")
     if engine is None:
         engine = "warp" if jax.default_backend() == "gpu" else "native"
     config = configured(config_of(algo, small=engine == "native"), set)
@@ -87,7 +97,7 @@ def run(
     if out is None:
         out = pathlib.Path("runs") / "-".join([world.task.name, world.robot, world.grasping, algo, obs, str(seed)])
     depends = {**depends_on(world, perception), "paper_rl": paper_rl}
-    settings = Run(minutes, None, seed, out, resume, save_buffer, until=until)
+    settings = Run(minutes, None, seed, out, resume, save_buffer, until=until, programs=programs)
     result = train(world, algorithm, settings, depends)
     device = jax.devices()[0]
     card = {

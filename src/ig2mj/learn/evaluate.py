@@ -1,4 +1,4 @@
-"""How good a policy is: episodes without noise, each from a start state of its own.
+"""How good a policy is: episodes that each begin with a start state of their own.
 
 Axes: W worlds, n numbers of an action.
 """
@@ -18,8 +18,8 @@ from jaxtyping import Bool, Float
 from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment
 
-Acting = Callable[[Mapping[str, Array]], Array]
-"""From observations by name to actions [W, n]."""
+Acting = Callable[[Mapping[str, Array], Array], Array]
+"""From observations by name, and a key, to actions [W, n]."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,6 +59,7 @@ def evaluate(
       act: a policy (`Policy.actor`), pure. progress: called with the episodes that were played.
     """
     choose, worlds, size = jax.jit(act), env.num_worlds, env.core.starts.pool.size
+    keys = iter(np.asarray(jax.random.split(jax.random.PRNGKey(0), -(-episodes // worlds) * env.task.horizon)))
     found: list[tuple[np.ndarray, ...]] = []
     began, steps = time.monotonic(), 0
     for first in range(0, episodes, worlds):
@@ -68,7 +69,7 @@ def evaluate(
         success, in_hand, flagged = none.copy(), none.copy(), none.copy()
         total, length = np.zeros(worlds), np.zeros(worlds)
         for _ in range(env.task.horizon):
-            state = env.step(state, np.asarray(choose(state.obs)))
+            state = env.step(state, np.asarray(choose(state.obs, next(keys))))
             info, going = state.info, ~over
             total += going * np.asarray(state.reward)
             length += going

@@ -80,6 +80,11 @@ class Perception:
         elif not self.vector_size:
             raise Ig2mjError("the environment has no observation that is a list of numbers")
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The observations that are looked at."""
+        return (*self.vector_names, *self._pictures)
+
     def __call__(self, obs: Mapping[str, Array]) -> Seen:
         """What is seen of observations by name. Pure."""
         vectors = [jnp.asarray(obs[name], jnp.float32) for name in self.vector_names]

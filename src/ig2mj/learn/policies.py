@@ -36,25 +36,33 @@ _HERE = pathlib.Path(__file__).resolve()
 CARD = "card.json"
 
 
-def depends_on(env: Any, perception: Perception) -> dict[str, Any]:
-    """What a policy for this environment depends on, for JSON.
-
-    Of environments that have no task (those of tests), only shapes.
-    """
-    seen = perception.vector_names if perception.mode == "state" else perception.vector_names[:-1]
-    sizes = dict(zip(perception.vector_names, perception.sizes, strict=True))
-    found: dict[str, Any] = {
+def world_of(env: Any) -> dict[str, Any]:
+    """What an environment is, apart from what is seen of it, for JSON; of tests' environments there is less to say."""
+    return {
         "task": getattr(getattr(env, "task", None), "name", type(env).__name__),
         "robot": getattr(env, "robot", ""),
         "grasping": getattr(env, "grasping", ""),
         "actions": list(getattr(env, "action_names", range(env.action_space.shape[0]))),
-        "mode": perception.mode,
-        "vector": {name: sizes[name] for name in seen},
-        "picture": perception.picture_shape and list(perception.picture_shape),
+        "privileged": list(getattr(env, "privileged_names", ())),
     }
-    if perception.mode == "state" and hasattr(env, "privileged_names"):
-        found["privileged"] = list(env.privileged_names)
+
+
+def depends_of(world: Mapping[str, Any], perception: Perception) -> dict[str, Any]:
+    """What a policy depends on, for JSON: the environment (`world_of`), and what the actor sees of it."""
+    sizes = dict(zip(perception.vector_names, perception.sizes, strict=True))
+    sees_all = perception.actor_size == perception.vector_size
+    seen = perception.vector_names if sees_all else perception.vector_names[:-1]
+    found = {name: world[name] for name in ("task", "robot", "grasping", "actions")}
+    found["mode"] = perception.mode
+    found["vector"] = {name: sizes[name] for name in seen}
+    found["picture"] = perception.picture_shape and list(perception.picture_shape)
+    found["privileged"] = list(world["privileged"]) if perception.mode == "state" else []
     return found
+
+
+def depends_on(env: Any, perception: Perception) -> dict[str, Any]:
+    """What a policy for this environment depends on."""
+    return depends_of(world_of(env), perception)
 
 
 def digest(depends: Mapping[str, Any]) -> str:
@@ -125,8 +133,13 @@ class Policy:
         """Raises InputError where the policy is for something else, with the pair that differs."""
         refuse_difference(file, self.card["depends"], depends_on(env, perception))
 
-    def actor(self, perception: Perception) -> Any:
-        """A pure function from what is seen to actions [W, n], without noise."""
+    def actor(self, perception: Perception, *, drawn: bool = False) -> Any:
+        """A pure function from observations by name to actions [W, n].
+
+        Args:
+          drawn: actions are drawn from the policy's distribution, as in training, and the function takes a key, too;
+            else they are the middle of it.
+        """
         depends, net = self.card["depends"], self.card["net"]
         shape = depends["picture"] and tuple(depends["picture"])
         network = Actor(len(depends["actions"]), tuple(net["sizes"]), shape, net["net"])
@@ -134,10 +147,15 @@ class Policy:
         mean, deviation = jnp.asarray(self.mean), jnp.asarray(self.deviation)
         size = perception.actor_size
 
-        def act(obs: Mapping[str, Array]) -> Array:
+        def act(obs: Mapping[str, Array], key: Array | None = None) -> Array:
             seen = perception(obs)
             own = jnp.clip((seen.vector[:, :size] - mean) / deviation, -10.0, 10.0)
-            return jnp.tanh(network.apply({"params": params}, own, seen.picture)[0])
+            found: Any = network.apply({"params": params}, own, seen.picture)
+            middle, log_std, _ = found
+            if drawn:
+                assert key is not None, "a drawn action needs a key"
+                middle = middle + jnp.exp(log_std) * jax.random.normal(key, middle.shape)
+            return jnp.tanh(middle)
 
         return act
 

@@ -1,11 +1,11 @@
 """`train`: the loop around an algorithm: iterations until the time is over, checkpoints, reports, a guard.
 
-On a pure engine an iteration (a rollout, and all updates on it) is one compiled program. On the native engine the same
-loop calls the compiled policy, the environment and the compiled learner in turn.
+On a pure engine an iteration (a rollout, and all updates on it) is one compiled program, or two where that is asked
+for. On the native engine the same loop calls the compiled policy, the environment and the compiled learner in turn.
 
 The clock of a run is wall time without the first iteration, which is stated as `compile_s`; a resumed run goes on with
 the clock of its checkpoint. The first iterations only play (`warm_up`): what they take is the simulator's share later
-on, since inside one program the two cannot be told apart.
+on, since inside one program the two cannot be told apart; with two programs both are measured.
 """
 
 from __future__ import annotations
@@ -71,6 +71,7 @@ class Run:
       seed: of everything random. out: folder of reports and checkpoints; None: nothing is kept.
       resume: go on from the newest checkpoint in `out`. save_buffer: checkpoints hold the replay buffer, too.
       checkpoint_every, log_every: seconds. until: stop once so large a share of the last episodes succeeds.
+      programs: 1 or 2: of an iteration on a pure engine.
       quiet: nothing on the terminal.
     """
 
@@ -83,6 +84,7 @@ class Run:
     checkpoint_every: float = 60.0
     log_every: float = 5.0
     until: float | None = None
+    programs: int = 1
     quiet: bool = False
 
 
@@ -160,7 +162,7 @@ def train(
     elif checkpoints is not None and checkpoints.numbers():
         raise Ig2mjError(f"{run.out} holds a run already: take --resume to go on with it, or another --out")
 
-    step = _Iteration(env, algorithm)
+    step = _Iteration(env, algorithm, run.programs)
     waiting = 2 if resumed and run.save_buffer else algorithm.warm_up(resumed)
     window, budget = _Window(time.monotonic(), int(np.clip(env.num_worlds, *EPISODES))), run.minutes * 60
     logged = saved = time.monotonic()
@@ -219,9 +221,9 @@ def train(
 class _Iteration:
     """A rollout and what is learned from it: one program on a pure engine, else the parts in turn."""
 
-    def __init__(self, env: TrainingEnv, algorithm: Algorithm):
-        self._pure, self._length = env.pure, algorithm.length
-        if env.pure:
+    def __init__(self, env: TrainingEnv, algorithm: Algorithm, programs: int):
+        self._whole = None
+        if env.pure and programs == 1:
 
             def whole(learner: Any, memory: Any, play: Play, key: Array, progress: Array, ready: Array) -> Any:
                 play_key, learn_key = jax.random.split(key)
@@ -232,25 +234,41 @@ class _Iteration:
                 return learner, memory, play, sums, {**losses, "all_finite": _finite(learner)}
 
             self._whole = jax.jit(whole, donate_argnums=(0, 1, 2))
+            return
+
+        def learn(learner: Any, memory: Any, rollout: Any, key: Array, progress: Array, ready: Array) -> Any:
+            learner, memory, losses = algorithm.learn(learner, memory, rollout, key, progress, ready)
+            return learner, memory, {**losses, "all_finite": _finite(learner)}
+
+        def collect(learner: Any, play: Play, key: Array) -> Any:
+            return collect_fn(
+                env, algorithm.perception, algorithm.act, algorithm.hint, learner, play, key, algorithm.length
+            )
+
+        self._learn = jax.jit(learn, donate_argnums=(0, 1))
+        if env.pure:
+            program = jax.jit(collect, donate_argnums=1)
+
+            def timed(learner: Any, play: Play, key: Array) -> Any:
+                began = time.perf_counter()
+                found = jax.block_until_ready(program(learner, play, key))
+                return *found, time.perf_counter() - began
+
+            self._collect = timed
         else:
-
-            def learn(learner: Any, memory: Any, rollout: Any, key: Array, progress: Array, ready: Array) -> Any:
-                learner, memory, losses = algorithm.learn(learner, memory, rollout, key, progress, ready)
-                return learner, memory, {**losses, "all_finite": _finite(learner)}
-
-            self._collect = NativeCollector(env, algorithm.perception, algorithm.act, algorithm.hint)
-            self._learn = jax.jit(learn, donate_argnums=(0, 1))
+            native = NativeCollector(env, algorithm.perception, algorithm.act, algorithm.hint)
+            self._collect = lambda learner, play, key: native(learner, play, key, algorithm.length)
 
     def __call__(
         self, learner: Any, memory: Any, play: Play, key: Array, progress: float, ready: bool
     ) -> tuple[Any, Any, Play, dict[str, float], dict[str, float], float | None]:
         share, go = jnp.float32(progress), jnp.bool_(ready)
-        if self._pure:
+        if self._whole is not None:
             learner, memory, play, sums, losses = self._whole(learner, memory, play, key, share, go)
             spent = None
         else:
             play_key, learn_key = jax.random.split(key)
-            play, rollout, sums, spent = self._collect(learner, play, play_key, self._length)
+            play, rollout, sums, spent = self._collect(learner, play, play_key)
             learner, memory, losses = self._learn(learner, memory, rollout, learn_key, share, go)
         sums, losses = jax.device_get((sums, losses))
         return learner, memory, play, _floats(sums), _floats(losses), spent

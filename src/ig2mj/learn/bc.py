@@ -1,0 +1,180 @@
+"""Behaviour cloning: an actor learns what an expert did, from a file of demonstrations alone.
+
+One in ten runs' steps is kept apart: the loss on those says whether more training helps. No environment is stepped;
+`ig2mj evaluate` tells how good the policy is.
+
+Axes: N steps of all demonstrations, B samples, n numbers of an action.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optax
+from flax import struct
+from jaxtyping import Int
+
+from ig2mj.engine.view import Array
+from ig2mj.errors import Ig2mjError
+from ig2mj.learn.checkpoints import Checkpoints
+from ig2mj.learn.demos import Demos
+from ig2mj.learn.labels import imitation_loss
+from ig2mj.learn.log import Log
+from ig2mj.learn.moments import Moments
+from ig2mj.learn.networks import Actor
+from ig2mj.learn.perception import Perception, Seen, blank
+from ig2mj.learn.train import Run
+
+APART = 10
+"""One in so many steps, in stretches of `STRETCH`, is kept apart."""
+
+STRETCH = 50
+CALL = 100
+"""Updates of one call."""
+
+
+@dataclasses.dataclass(frozen=True)
+class BCConfig:
+    """Settings; `ig2mj train --set name=value` changes them.
+
+    Attributes:
+      steps: updates. batch: samples of an update. noise: deviation of what is added to normalized numbers that are
+        seen, against copying what was done before.
+      guess: weight of the actor's guess of the privileged state from its features, from pixels.
+      lr: learning rate, falling to `last_lr` along a cosine. actor: sizes of the layers. net: encoder.
+    """
+
+    steps: int = 20_000
+    batch: int = 1024
+    noise: float = 0.0
+    guess: float = 1.0
+    lr: float = 1e-3
+    last_lr: float = 1e-5
+    actor: tuple[int, ...] = (256, 256, 256)
+    net: str = "small"
+
+
+@struct.dataclass
+class BCLearner:
+    """All that is learned."""
+
+    actor: Any
+    opt: Any
+    moments: Moments
+    updates: Int[Array, ""]
+
+
+class BC:
+    """See the module's text."""
+
+    name = "bc"
+
+    def __init__(self, perception: Perception, action_size: int, config: BCConfig | None = None):
+        """Compiles nothing yet."""
+        self.perception, self.action_size = perception, action_size
+        self.config = c = config or BCConfig()
+        guess = perception.vector_size - perception.actor_size if perception.picture_shape and c.guess else 0
+        self.actor = Actor(action_size, c.actor, perception.picture_shape, c.net, guess)
+        self._adam = optax.chain(optax.clip_by_global_norm(10.0), optax.flatten(optax.scale_by_adam()))
+        self.learn = jax.jit(self.learn_fn, donate_argnums=0)
+        self.judge = jax.jit(self.judge_fn)
+
+    def init(self, key: Array, demos: Demos) -> BCLearner:
+        """Untrained, with the means of the demonstrations."""
+        seen, size = blank(self.perception, 1), self.perception.actor_size
+        actor = self.actor.init(jnp.asarray(key), seen.vector[:, :size], seen.picture)["params"]
+        moments = Moments.initial(self.perception.vector_size).update(demos.seen.vector)
+        return BCLearner(actor, self._adam.init(actor), moments, jnp.int32(0))
+
+    def learn_fn(
+        self, learner: BCLearner, demos: Demos, rows: Int[Array, "k"], key: Array
+    ) -> tuple[BCLearner, dict[str, Array]]:
+        """`CALL` updates on these rows of the demonstrations."""
+        c = self.config
+
+        def update(learner: BCLearner, key: Array) -> tuple[BCLearner, dict[str, Array]]:
+            row_key, noise_key, shift_key = jax.random.split(key, 3)
+            row = rows[jax.random.randint(row_key, (c.batch,), 0, rows.shape[0])]
+            vector = demos.seen.vector[row]
+            deviation = jnp.sqrt(learner.moments.var + 1e-4)
+            vector += c.noise * deviation * jax.random.normal(noise_key, vector.shape)
+            seen = Seen(vector, demos.seen.picture[row])
+            slope, found = jax.grad(imitation_loss, has_aux=True)(
+                learner.actor,
+                self.actor,
+                self.perception,
+                learner.moments,
+                seen,
+                demos.label[row],
+                shift_key,
+                c.guess,
+            )
+            share = jnp.clip(learner.updates / c.steps, 0, 1)
+            rate = c.last_lr + (c.lr - c.last_lr) * 0.5 * (1 + jnp.cos(jnp.pi * share))
+            step, opt = self._adam.update(slope, learner.opt)
+            actor = jax.tree.map(lambda a, s: a - rate * s, learner.actor, step)
+            return dataclasses.replace(learner, actor=actor, opt=opt, updates=learner.updates + 1), found
+
+        learner, found = jax.lax.scan(update, learner, jax.random.split(key, CALL))
+        return learner, jax.tree.map(jnp.mean, found)
+
+    def judge_fn(self, learner: BCLearner, demos: Demos, rows: Int[Array, "k"], key: Array) -> Array:
+        """The loss on these rows, 4,096 of them at most."""
+        row = rows[: 4 * 1024]
+        seen = Seen(demos.seen.vector[row], demos.seen.picture[row])
+        _, found = imitation_loss(
+            learner.actor, self.actor, self.perception, learner.moments, seen, demos.label[row], key, 0.0
+        )
+        return found["actor_loss"]
+
+
+def clone(algorithm: BC, demos: Demos, run: Run, depends: Mapping[str, Any] | None = None) -> tuple[Any, dict]:
+    """Trains on demonstrations until the configured number of updates, or the run's minutes, are over.
+
+    Returns:
+      What was learned, and the last row of the report.
+
+    Raises:
+      Ig2mjError: the loss is not finite.
+    """
+    depends = {**(depends or {}), "algorithm": "bc", "settings": dataclasses.asdict(algorithm.config)}
+    key = jax.random.PRNGKey(run.seed)
+    learner = algorithm.init(key, demos)
+    checkpoints, log = (Checkpoints(run.out) if run.out is not None else None), Log(run.out, quiet=run.quiet)
+    if run.resume and checkpoints is not None:
+        found = checkpoints.newest({"learner": learner}, depends)
+        learner = found[0]["learner"] if found is not None else learner
+    rows = np.arange(demos.reward.shape[0])
+    apart = (rows // STRETCH) % APART == APART - 1 if len(rows) >= STRETCH * APART else rows % APART == 0
+    training, testing = jnp.asarray(rows[~apart]), jnp.asarray(rows[apart])
+    began = logged = saved = time.monotonic()
+    row: dict[str, Any] = {}
+    while True:
+        key, now = jax.random.split(key)
+        learner, losses = algorithm.learn(learner, demos, training, now)
+        losses = {name: float(value) for name, value in losses.items()}
+        updates, clock = int(learner.updates), time.monotonic()
+        if not all(np.isfinite(v) for v in losses.values()):
+            raise Ig2mjError(f"training stopped: a loss is not finite ({losses})")
+        over = updates >= algorithm.config.steps or clock - began > run.minutes * 60
+        if over or clock - logged > run.log_every:
+            kept_apart = float(algorithm.judge(learner, demos, testing, now))
+            seconds = clock - began
+            row = {"seconds": seconds, "iteration": updates // CALL, "env_steps": updates, "success": None}
+            row |= {"steps_per_second": 0.0, "updates_per_second": updates / seconds, **losses}
+            row["loss_apart"] = kept_apart
+            log.row(row)
+            logged = clock
+        if checkpoints is not None and (over or clock - saved > run.checkpoint_every):
+            meta = {"seconds": clock - began, "iteration": updates // CALL, "depends": depends}
+            checkpoints.save(updates // CALL, {"learner": learner}, meta)
+            saved = time.monotonic()
+        if over:
+            log.close()
+            return learner, row

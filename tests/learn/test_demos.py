@@ -1,0 +1,89 @@
+"""Demonstrations: written as they end, read as networks see them, cloned; what is broken is refused."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from small_envs import PointMass
+
+from ig2mj.errors import InputError
+from ig2mj.learn.bc import BC, BCConfig, clone
+from ig2mj.learn.demos import DemoWriter, about, collect_demos, load_demos
+from ig2mj.learn.perception import Perception
+from ig2mj.learn.policies import Policy, depends_of, world_of
+from ig2mj.learn.train import Run
+
+
+def expert(state):
+    return np.clip(10 * (np.asarray(state.goal) - np.asarray(state.pos)), -1, 1)
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    env, file = PointMass(8, pure=False), tmp_path_factory.mktemp("demos") / "runs.h5"
+    with DemoWriter(file, env) as writer:
+        found = collect_demos(env, expert, writer, 30, noise=0.1, disturbed=0.02)
+    assert found["kept"] == 30
+    return env, file
+
+
+def test_runs_are_whole_episodes_that_end_with_success(recorded):
+    env, file = recorded
+    demos = load_demos(file, Perception(env.observation_spaces), world_of(env))
+    assert int(demos.terminated.sum()) == 30
+    assert not np.asarray(demos.truncated).any()
+    inside = ~np.asarray(demos.terminated)[:-1]
+    before, after = np.asarray(demos.seen.vector)[1:], np.asarray(demos.after.vector)[:-1]
+    assert np.array_equal(before[inside], after[inside])
+    assert not np.array_equal(before[~inside], after[~inside])  # a new episode begins
+    vector = np.asarray(demos.seen.vector)
+    assert np.asarray(demos.label) == pytest.approx(np.clip(10 * (vector[:, 2:] - vector[:, :2]), -1, 1), abs=1e-5)
+    assert not np.allclose(demos.label, demos.action)
+
+
+def test_a_clone_does_what_the_expert_does(recorded):
+    env, file = recorded
+    world, spaces = about(file)
+    perception = Perception(spaces)
+    algorithm = BC(perception, 2, BCConfig(steps=400, batch=64, lr=3e-3, actor=(32, 32)))
+    learner, row = clone(algorithm, load_demos(file, perception), Run(quiet=True))
+    assert row["loss_apart"] < 0.1
+    policy = Policy.of(algorithm, learner, depends_of(world, perception), {})
+    policy.check(env, perception)
+    act, state, success = policy.actor(perception), env.reset(9), 0
+    episodes = 0
+    for _ in range(60):
+        state = env.step_autoreset(state, np.asarray(act(state.obs)))
+        episodes += int(np.asarray(state.terminated | state.truncated).sum())
+        success += int(np.asarray(state.terminated).sum())
+    assert success > 0.9 * episodes > 10
+
+
+def test_broken_and_foreign_files_are_refused_with_run_and_field(recorded, tmp_path):
+    env, file = recorded
+    perception = Perception(env.observation_spaces)
+    with pytest.raises(InputError, match=r'is for robot = "", and here it is "fetch"'):
+        load_demos(file, perception, {**world_of(env), "robot": "fetch"})
+    (tmp_path / "no.h5").write_bytes(b"nothing")
+    with pytest.raises(InputError, match="no HDF5 file"):
+        load_demos(tmp_path / "no.h5", perception)
+    copy = tmp_path / "cut.h5"
+    copy.write_bytes(file.read_bytes())
+    with h5py.File(copy, "a") as opened:
+        values = np.asarray(opened["run_000003/reward"])[:-1]
+        del opened["run_000003/reward"]
+        opened["run_000003/reward"] = values
+    with pytest.raises(InputError, match=r"run_000003: cannot be read: reward has \d+ steps"):
+        load_demos(copy, perception)
+    with h5py.File(copy, "a") as opened:
+        del opened["run_000000/action"]
+        opened.create_dataset("run_000000/action", (10**9, 2), np.float32)  # claimed, and not there
+    with pytest.raises(InputError, match="run_000000: cannot be read: action has 1000000000 steps"):
+        load_demos(copy, perception)
