@@ -6,10 +6,15 @@ import os
 
 import jax
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 import ig2mj
+from ig2mj.agents import Humanoid
 from ig2mj.agents.base import Robot
 from ig2mj.agents.grasping import Grasping
+
+FACING_TABLE = {"pos": (0.3, 0.62, 0.62), "quat": (np.sqrt(0.5), 0, 0, -np.sqrt(0.5))}
+"""Where the humanoid stands before the tiny home's can."""
 
 
 class RobotWorld:
@@ -85,5 +90,37 @@ class GraspingWorld(RobotWorld):
     def step(self) -> None:
         self.simulation.step()
 
+    def gripper_to(self, place: np.ndarray, times: int, **named: float) -> None:
+        """Actions of Fetch that bring its gripper's frame to a place in the world."""
+        for _ in range(times):
+            local = Rotation.from_quat(np.roll(self.quat("fetch"), -1)).inv()
+            left = local.apply(np.asarray(place) - self.body("fetch_gripper_link"))
+            moves = np.clip(left / 0.04, -1, 1)
+            self.act(eef_x=float(moves[0]), eef_y=float(moves[1]), eef_z=float(moves[2]), **named)
+
     def act(self, action: np.ndarray | None = None, times: int = 1, **named: float) -> None:
         self.simulation.robots.act(action, times, **named)
+
+
+def can(world: RobotWorld) -> np.ndarray:
+    """Position of the tiny home's can."""
+    return np.array(world.simulation.object_pose("can")[0])
+
+
+def reach(world: GraspingWorld, place: np.ndarray, offset: tuple, times: int, hand: int = 1) -> None:
+    """Actions of at most 8 cm that bring a hand to a place in the world, or beside it."""
+    place = np.array(place) + offset
+    name = ("left_hand", "right_hand")[hand]
+    for _ in range(times):
+        turned = Rotation.from_quat(np.roll(world.quat("humanoid"), -1)).inv()
+        local = turned.apply(place - world.body("humanoid")) - np.asarray(world.state.hand_pos)[0, hand]
+        world.act(**{f"{name}_{axis}": d for axis, d in zip("xyz", np.clip(local, -0.08, 0.08), strict=True)})
+
+
+def over_the_can(home: pathlib.Path, **options) -> GraspingWorld:
+    """The right palm lies over the can, fingers before it."""
+    world = GraspingWorld(home, Humanoid(**FACING_TABLE), **options)
+    world.act(times=2)
+    reach(world, can(world), (0, 0.045, 0.2), 5)
+    reach(world, can(world), (0, 0.045, 0.085), 3)
+    return world

@@ -7,8 +7,7 @@ import pathlib
 import jax
 import numpy as np
 import pytest
-from robot_world import GraspingWorld
-from scipy.spatial.transform import Rotation
+from robot_world import FACING_TABLE, GraspingWorld, can, over_the_can, reach
 from tiny_home import write_tiny_home
 
 import ig2mj
@@ -19,8 +18,6 @@ from ig2mj.errors import EngineError, UnknownNameError
 CAN_VOLUME = np.pi * 0.03**2 * 0.12
 """m^3 of the home's can."""
 
-FACING_TABLE = {"pos": (0.3, 0.62, 0.62), "quat": (np.sqrt(0.5), 0, 0, -np.sqrt(0.5))}
-
 
 def home_with_can(folder: pathlib.Path, kilograms: float) -> pathlib.Path:
     write_tiny_home(folder)
@@ -29,29 +26,6 @@ def home_with_can(folder: pathlib.Path, kilograms: float) -> pathlib.Path:
     assert old in text
     (folder / "scene.xml").write_text(text.replace(old, old.replace("300", f"{kilograms / CAN_VOLUME:.1f}")))
     return folder
-
-
-def can(world: GraspingWorld) -> np.ndarray:
-    return np.array(world.simulation.object_pose("can")[0])
-
-
-def reach(world: GraspingWorld, place: np.ndarray, offset: tuple, times: int, hand: int = 1) -> None:
-    """Actions of at most 8 cm that bring a hand to a place in the world, or beside it."""
-    place = np.array(place) + offset
-    name = ("left_hand", "right_hand")[hand]
-    for _ in range(times):
-        turned = Rotation.from_quat(np.roll(world.quat("humanoid"), -1)).inv()
-        local = turned.apply(place - world.body("humanoid")) - np.asarray(world.state.hand_pos)[0, hand]
-        world.act(**{f"{name}_{axis}": d for axis, d in zip("xyz", np.clip(local, -0.08, 0.08), strict=True)})
-
-
-def over_the_can(home: pathlib.Path, **options) -> GraspingWorld:
-    """The right palm lies over the can, fingers before it."""
-    world = GraspingWorld(home, Humanoid(**FACING_TABLE), **options)
-    world.act(times=2)
-    reach(world, can(world), (0, 0.045, 0.2), 5)
-    reach(world, can(world), (0, 0.045, 0.085), 3)
-    return world
 
 
 def energy(world: GraspingWorld, name: str) -> float:
