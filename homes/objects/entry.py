@@ -29,6 +29,7 @@ class Entry:
       rest: "any" (put down on any stable side), "standing" (mostly as built) or "upright" (only as built).
       vary: each edge is multiplied by a random factor of 1 +- vary; uniform: all three by the same.
       flesh: material of the cut faces; given for sliceable categories, whose models then come with halves.
+      two_hands: may be held by assisted grasping although it is heavier than `AG_MASS`: two hands carry it.
       options: further keyword arguments of `build`.
     """
 
@@ -42,8 +43,9 @@ class Entry:
     vary: float = 0.08
     uniform: bool = False
     flesh: Callable[[random.Random], Material] | None = None
+    two_hands: bool = False
     options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
     @property
     def enable_ag(self) -> bool:
-        return not self.fixed and self.mass <= AG_MASS
+        return not self.fixed and (self.mass <= AG_MASS or self.two_hands)

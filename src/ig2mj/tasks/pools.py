@@ -41,6 +41,9 @@ CHUNK = 32
 MAX_CHUNKS = 400
 """Seeds after which too many rows were turned down."""
 
+FLAT = 0.98
+"""Cosine of the angle between an object's z axis and the vertical from which it lies flat: 11 degrees."""
+
 Progress = Callable[[int, int], None]
 """Called with the number of rows made and wanted."""
 
@@ -90,7 +93,7 @@ def pool_file(task: Task, scene: Scene, split: str = "train", count: int | None 
     if split not in SEEDS:
         raise UnknownNameError("split", split, SEEDS)
     near = [[n.object, *n.pos, n.least, n.most] for n in task.near]
-    made_of = json.dumps([VERSION, scene.digest, task.objects, task.start, near])
+    made_of = json.dumps([VERSION, scene.digest, task.objects, task.start, near, task.flat])
     mark = hashlib.blake2b(made_of.encode(), digest_size=6).hexdigest()
     return cache_folder() / "pools" / f"{task.name}-{split}-{count or COUNT[split]}-{mark}.npz"
 
@@ -131,8 +134,12 @@ def _near(task: Task, scene: Scene, pool: Pool) -> Bool[np.ndarray, "P"]:
     for row in range(pool.size):
         snapshot = jax.tree.map(lambda a, r=row: np.asarray(np.asarray(a)[r]), pool.physics)
         physics = engine.load(physics, snapshot)
-        com = np.asarray(engine.view(physics).object_com)[0]
+        view = engine.view(physics)
+        com, quat = np.asarray(view.object_com)[0], np.asarray(view.object_quat)[0]
         for near in task.near:
             distance = np.linalg.norm(com[scene.object_index(near.object)] - near.pos)
             good[row] &= near.least <= distance <= near.most
+        for name in task.flat:
+            _, x, y, _ = quat[scene.object_index(name)]
+            good[row] &= abs(1.0 - 2.0 * (x * x + y * y)) >= FLAT
     return good

@@ -107,6 +107,7 @@ class Task:
       name: as `ig2mj.make` takes it. summary: one sentence.
       home: a shipped home. objects: what is added to it from the object library.
       start: conditions of the start states. near: restrictions of where objects may be at the start.
+      flat: objects that lie flat at the start, either way up: their own z axis is vertical.
       goal: expression; an episode ends with success when it holds.
       objects_of_interest: the objects that the task is about; the first is what mittens take hold of.
       distances: pairs of points whose distances the reward is made of, in the order of the stages.
@@ -127,6 +128,7 @@ class Task:
     distances: tuple[tuple[Point, Point], ...]
     robots: Mapping[str, Acts]
     stains_of: str | None = None
+    flat: tuple[str, ...] = ()
     held_when_done: bool = False
     horizon: int = HORIZON
     grasping: str = "mitten"

@@ -12,6 +12,7 @@ CLEANING_STAINED_SHELF = Task(
     objects=("bath_towel",),
     start=("(on_top bath_towel_0 shelf_1)", "(soaked bath_towel_0)", "(stained shelf_1)"),
     near=(Near("bath_towel_0", (0.0, 3.25, 0.85), most=1.0),),
+    flat=("bath_towel_0",),
     goal="(not (stained shelf_1))",
     objects_of_interest=("bath_towel_0", "shelf_1"),
     distances=((Hand(0), At("bath_towel_0")), (At("bath_towel_0"), NearestStain("shelf_1", "bath_towel_0"))),

@@ -15,6 +15,7 @@ SLICING_FRUIT = Task(
         Near("apple_0", (2.15, -0.1, 0.85), most=0.95),
         Near("carving_knife_0", (2.15, -0.1, 0.85), most=0.95),
     ),
+    flat=("carving_knife_0",),
     goal="(sliced apple_0)",
     objects_of_interest=("carving_knife_0", "apple_0"),
     distances=((Hand(0), At("carving_knife_0")), (At("carving_knife_0"), At("apple_0"))),

@@ -12,6 +12,7 @@ SOAKING_TOWEL = Task(
     objects=("bath_towel",),
     start=("(on_top bath_towel_0 dishwasher_0)", "(toggled_on sink_0)"),
     near=(Near("bath_towel_0", (2.74, -2.95, 0.85), most=1.05),),
+    flat=("bath_towel_0",),
     goal="(soaked bath_towel_0)",
     objects_of_interest=("bath_towel_0", "sink_0"),
     distances=((Hand(0), At("bath_towel_0")), (At("bath_towel_0"), Water("sink_0"))),

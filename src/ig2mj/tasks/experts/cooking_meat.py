@@ -12,7 +12,7 @@ MEAT, STOVE = "steak_0", "stove_0"
 ABOVE = 0.10
 """m above the burner at which the steak cooks; its reach is 0.2 m."""
 
-CARRY = 0.15
+CARRY = 0.05
 """m higher on the way."""
 
 

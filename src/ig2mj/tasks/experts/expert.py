@@ -19,7 +19,13 @@ from ig2mj.scene.scene import Scene
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.actions import SPEED, TURN_SPEED
-from ig2mj.tasks.experts import cooking_meat, grasping_book
+from ig2mj.tasks.experts import (
+    bimanual_pick_and_place,
+    cooking_meat,
+    grasping_book,
+    slicing_fruit,
+    soaking_towel,
+)
 from ig2mj.tasks.experts.motion import Wish
 from ig2mj.tasks.experts.sight import Sight
 from ig2mj.tasks.task import Task
@@ -28,7 +34,10 @@ Plan = Callable[[Sight], list[Wish]]
 
 PLANS: dict[str, Plan] = {
     "GraspingBook": grasping_book.plan,
+    "SoakingTowel": soaking_towel.plan,
     "CookingMeat": cooking_meat.plan,
+    "SlicingFruit": slicing_fruit.plan,
+    "BimanualPickAndPlace": bimanual_pick_and_place.plan,
 }
 """Plans by the task's name: what each acting hand should do now."""
 

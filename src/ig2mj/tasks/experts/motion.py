@@ -50,8 +50,25 @@ def over(
     share = jnp.clip((length(offset[:, :2]) - near) / BLEND, 0.0, 1.0)
     level = goal[:, 2] + (jnp.maximum(height, goal[:, 2]) - goal[:, 2]) * share
     rise = level - pos[:, 2]
-    across = jnp.clip(1.0 - rise / RISE, 0.0, 1.0)[:, None] * offset[:, :2]
+    across = jnp.clip(1.5 - rise / RISE, 0.0, 1.0)[:, None] * offset[:, :2]
     return jnp.concatenate([across, rise[:, None]], axis=1)
+
+
+def around(
+    pos: Float[Array, "W 3"], move: Float[Array, "W 3"], base: Float[Array, "W 3"], radius: float
+) -> Float[Array, "W 3"]:
+    """A displacement that does not lead nearer to the robot's own body than `radius`, and out of it where it is nearer.
+
+    Args:
+      base: of the robot; distances are horizontal.
+    """
+    offset = pos[:, :2] - base[:, :2]
+    apart = length(offset)[:, None]
+    out = offset / jnp.maximum(apart, 1e-6)
+    along = jnp.sum(move[:, :2] * out, axis=1, keepdims=True)
+    wanted = jnp.maximum(along, radius - apart)
+    flat = move[:, :2] + (wanted - along) * out
+    return jnp.concatenate([flat, move[:, 2:]], axis=1)
 
 
 def turn_to(quat: Float[Array, "W 4"], goal: Float[Array, "W 4"]) -> Float[Array, "W 3"]:

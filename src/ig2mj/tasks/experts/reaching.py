@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import jax.numpy as jnp
+from jaxtyping import Float
 
+from ig2mj.engine.view import Array
 from ig2mj.tasks.experts.motion import Wish, over, wish
 from ig2mj.tasks.experts.sight import Sight
 
@@ -14,10 +16,14 @@ BELOW = 0.03
 """m below its top that the hand goes for: what lies there stops it."""
 
 
-def take(see: Sight, name: str, hand: int = 0, clearance: float = CLEARANCE) -> Wish:
+def take(see: Sight, name: str, hand: int = 0) -> Wish:
     """From above onto the middle of an object, until it is touched."""
     low, high = see.box(name)
-    middle, top = 0.5 * (low + high), high[:, 2]
-    height = jnp.maximum(top - BELOW, middle[:, 2])
-    goal = jnp.concatenate([middle[:, :2], height[:, None]], axis=1)
-    return wish(over(see.grip(hand), goal, top + clearance))
+    middle, top = 0.5 * (low + high), high[:, 2:]
+    return take_at(see, jnp.concatenate([middle[:, :2], jnp.maximum(top, middle[:, 2:] + BELOW)], axis=1), hand)
+
+
+def take_at(see: Sight, place: Float[Array, "W 3"], hand: int = 0) -> Wish:
+    """From above onto a point of an object's surface, until it is touched."""
+    down = jnp.array([0.0, 0.0, BELOW], jnp.float32)
+    return wish(over(see.grip(hand), place - down, place[:, 2] + CLEARANCE))

@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import quat_rotate
 from ig2mj.scene.scene import Scene
+from ig2mj.scene.tables import LinkKind
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.points import Located, Point, locator
@@ -52,6 +53,24 @@ class Sight:
     def holds(self, name: str, hand: int = 0) -> Bool[Array, "W"]:
         """Whether an acting hand holds an object."""
         return jnp.asarray(self.view.held)[:, self.hands[hand], self.scene.object_index(name)]
+
+    def base_quat(self) -> Float[Array, "W 4"]:
+        """Orientation of the robot's base."""
+        return jnp.asarray(self.view.agent.base_quat)[:, 0]
+
+    def base_pos(self) -> Float[Array, "W 3"]:
+        """Where the robot's base is."""
+        return jnp.asarray(self.view.agent.base_pos)[:, 0]
+
+    def link(self, name: str, kind: LinkKind) -> Float[Array, "W 3"]:
+        """Where an object's first annotated link of a kind is."""
+        tables = self.model.tables
+        found = np.flatnonzero((tables.link_object == self.scene.object_index(name)) & (tables.link_kind == kind))
+        return jnp.asarray(self.view.link_pos)[:, int(found[0])]
+
+    def pos(self, name: str) -> Float[Array, "W 3"]:
+        """Origin of an object's frame."""
+        return jnp.asarray(self.view.object_pos)[:, self.scene.object_index(name)]
 
     def com(self, name: str) -> Float[Array, "W 3"]:
         """An object's centre of mass."""

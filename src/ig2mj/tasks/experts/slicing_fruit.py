@@ -1,0 +1,52 @@
+"""Slicing Fruit: take the knife by its handle, turn its edge down, and press it onto the apple."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.engine.view import Array
+from ig2mj.geometry.poses import length, quat_rotate
+from ig2mj.scene.tables import LinkKind
+from ig2mj.tasks.experts.motion import Wish, over, where, wish
+from ig2mj.tasks.experts.reaching import take_at
+from ig2mj.tasks.experts.sight import Sight
+
+KNIFE, FRUIT = "carving_knife_0", "apple_0"
+
+HANDLE, EDGE = (-0.09, 0.007, 0.011), (0.0, -1.0, 0.0)
+"""Middle of the handle, m, and the direction in which the blade cuts; the knife's frame."""
+
+STEEP = 0.8
+"""rad between the edge's direction and straight down that are steep enough."""
+
+CLEARANCE = 0.07
+"""m above the fruit at which the blade comes over it."""
+
+PRESS = 0.03
+"""m below the fruit's top that the blade goes for."""
+
+
+def plan(see: Sight) -> list[Wish]:
+    """One hand."""
+    quat = see.quat(KNIFE)
+    handle = see.pos(KNIFE) + quat_rotate(quat, jnp.asarray(HANDLE, jnp.float32))
+    blade = see.link(KNIFE, LinkKind.SLICER)
+    _, high = see.box(FRUIT)
+    fruit, top = see.com(FRUIT), high[:, 2]
+    turn, left = _edge_down(quat_rotate(quat, jnp.asarray(EDGE, jnp.float32)))
+    depth = jnp.where(left < 0.2, top - PRESS, top + CLEARANCE)
+    goal = jnp.concatenate([fruit[:, :2], depth[:, None]], axis=1)
+    cut = wish(over(blade, goal, top + CLEARANCE, near=0.012), turn, close=True)
+    done = jnp.asarray(see.states.sliced)[:, see.scene.object_index(FRUIT)]
+    still = wish(jnp.zeros_like(handle), close=True)
+    return [where(done, still, where(see.holds(KNIFE), cut, take_at(see, handle)))]
+
+
+def _edge_down(edge: Float[Array, "W 3"]) -> tuple[Float[Array, "W 3"], Float[Array, "W"]]:
+    """The turn that is left until the edge is steep, and its angle."""
+    axis = jnp.cross(edge, np.array([0.0, 0.0, -1.0], np.float32))
+    angle = jnp.arccos(jnp.clip(-edge[:, 2], -1.0, 1.0))
+    left = jnp.maximum(angle - STEEP, 0.0)
+    return axis / jnp.maximum(length(axis), 1e-6)[:, None] * left[:, None], left
