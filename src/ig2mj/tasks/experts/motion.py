@@ -10,7 +10,7 @@ from flax import struct
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array
-from ig2mj.geometry.poses import length, quat_conjugate, quat_multiply, quat_to_rotation_vector
+from ig2mj.geometry.poses import length, quat_conjugate, quat_multiply, quat_rotate, quat_to_rotation_vector
 
 NEAR, BLEND = 0.03, 0.06
 """m: horizontal distance to a goal within which a hand goes straight down, and over which it comes down to that."""
@@ -39,15 +39,20 @@ def wish(move: Float[Array, "W 3"], turn: Float[Array, "W 3"] | None = None, clo
 
 
 def over(
-    pos: Float[Array, "W 3"], goal: Float[Array, "W 3"], height: Float[Array, "W"] | float, near: float = NEAR
+    pos: Float[Array, "W 3"],
+    goal: Float[Array, "W 3"],
+    height: Float[Array, "W"] | float,
+    near: float = NEAR,
+    blend: float = BLEND,
 ) -> Float[Array, "W 3"]:
     """From `pos` to `goal`: up to `height` first, then across, at last straight to the goal.
 
     Args:
       height: z of the way across, m; not below the goal. near: horizontal distance from which it goes straight down.
+      blend: further distance over which it comes down to that.
     """
     offset = goal - pos
-    share = jnp.clip((length(offset[:, :2]) - near) / BLEND, 0.0, 1.0)
+    share = jnp.clip((length(offset[:, :2]) - near) / blend, 0.0, 1.0)
     level = goal[:, 2] + (jnp.maximum(height, goal[:, 2]) - goal[:, 2]) * share
     rise = level - pos[:, 2]
     across = jnp.clip(1.5 - rise / RISE, 0.0, 1.0)[:, None] * offset[:, :2]
@@ -74,6 +79,19 @@ def around(
 def turn_to(quat: Float[Array, "W 4"], goal: Float[Array, "W 4"]) -> Float[Array, "W 3"]:
     """The rotation vector, world frame, that turns one orientation into another."""
     return quat_to_rotation_vector(quat_multiply(goal, quat_conjugate(quat)))
+
+
+def levelled(quat: Float[Array, "W 4"]) -> Float[Array, "W 3"]:
+    """The rotation vector, world frame, that makes an object's z axis vertical again, up or down as it nearly is."""
+    axis = quat_rotate(quat, jnp.array([0.0, 0.0, 1.0]))
+    up = jnp.zeros_like(axis).at[:, 2].set(jnp.where(axis[:, 2] < 0, -1.0, 1.0))
+    return jnp.cross(axis, up)  # its length is the angle's sine: right for what is nearly level
+
+
+def horizontal(direction: Float[Array, "W 3"]) -> Float[Array, "W 3"]:
+    """The rotation vector that brings a direction of the world, which is nearly horizontal, to horizontal."""
+    flat = direction * jnp.array([1.0, 1.0, 0.0])
+    return jnp.cross(direction, flat / jnp.maximum(length(flat), 1e-6)[:, None])
 
 
 def where(condition: Bool[Array, "W"], then: Wish, otherwise: Wish) -> Wish:

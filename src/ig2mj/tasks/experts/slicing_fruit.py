@@ -9,20 +9,26 @@ from jaxtyping import Float
 from ig2mj.engine.view import Array
 from ig2mj.geometry.poses import length, quat_rotate
 from ig2mj.scene.tables import LinkKind
-from ig2mj.tasks.experts.motion import Wish, over, where, wish
+from ig2mj.tasks.experts.motion import Wish, horizontal, over, where, wish
 from ig2mj.tasks.experts.reaching import take_at
 from ig2mj.tasks.experts.sight import Sight
 
 KNIFE, FRUIT = "carving_knife_0", "apple_0"
 
-HANDLE, EDGE = (-0.09, 0.007, 0.011), (0.0, -1.0, 0.0)
-"""Middle of the handle, m, and the direction in which the blade cuts; the knife's frame."""
+HANDLE, ALONG, EDGE = (-0.105, 0.007, 0.011), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0)
+"""Where the hand takes the handle, m: far back, so that fingers stay clear of the fruit; and the directions in which the blade points and cuts; the knife's frame."""
 
-STEEP = 0.8
+TIPWARD = -0.01
+"""m from the middle of the edge to the point that cuts."""
+
+STEEP = 1.25
 """rad between the edge's direction and straight down that are steep enough."""
 
 CLEARANCE = 0.07
 """m above the fruit at which the blade comes over it."""
+
+EXACT = 0.008
+"""m beside the fruit's middle at which the blade comes down: farther out the fruit rolls away."""
 
 PRESS = 0.03
 """m below the fruit's top that the blade goes for."""
@@ -32,13 +38,15 @@ def plan(see: Sight) -> list[Wish]:
     """One hand."""
     quat = see.quat(KNIFE)
     handle = see.pos(KNIFE) + quat_rotate(quat, jnp.asarray(HANDLE, jnp.float32))
-    blade = see.link(KNIFE, LinkKind.SLICER)
+    along = quat_rotate(quat, jnp.asarray(ALONG, jnp.float32))
+    blade = see.link(KNIFE, LinkKind.SLICER) + TIPWARD * along
     _, high = see.box(FRUIT)
     fruit, top = see.com(FRUIT), high[:, 2]
     turn, left = _edge_down(quat_rotate(quat, jnp.asarray(EDGE, jnp.float32)))
+    turn += horizontal(along)
     depth = jnp.where(left < 0.2, top - PRESS, top + CLEARANCE)
     goal = jnp.concatenate([fruit[:, :2], depth[:, None]], axis=1)
-    cut = wish(over(blade, goal, top + CLEARANCE, near=0.012), turn, close=True)
+    cut = wish(over(blade, goal, top + CLEARANCE, near=EXACT, blend=EXACT), turn, close=True)
     done = jnp.asarray(see.states.sliced)[:, see.scene.object_index(FRUIT)]
     still = wish(jnp.zeros_like(handle), close=True)
     return [where(done, still, where(see.holds(KNIFE), cut, take_at(see, handle)))]

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import jax.numpy as jnp
+from jaxtyping import Float
 
-from ig2mj.tasks.experts.motion import Wish, around, over, where, wish
+from ig2mj.engine.view import Array
+from ig2mj.tasks.experts.motion import RISE, Wish, around, levelled, where, wish
 from ig2mj.tasks.experts.reaching import take
 from ig2mj.tasks.experts.sight import Sight
-from ig2mj.tasks.points import Water
+from ig2mj.tasks.points import WATER_BELOW, Water
 
 TOWEL, SINK = "bath_towel_0", "sink_0"
 
@@ -18,26 +20,33 @@ AHEAD = 0.11
 """m of the towel's middle in front of the opening, so that the hand is not below the spout."""
 
 RUN_UP = 0.25
-"""m in front of that where the towel is brought to the right height."""
+"""m in front of that where the towel comes down to the height at which it is slid in."""
 
-EXACT = 0.03
-"""m beside or above the way in at which the towel is slid in."""
+EXACT, BLEND = 0.03, 0.06
+"""m off the way in up to which the towel counts as on it, and over which it becomes wholly off it."""
 
-CARRY = 0.05
-"""m above the height of the way in, on the way there."""
+CARRY = 0.18
+"""m above that height on the way there."""
 
-OUTSIDE = 0.48
+OUTSIDE = 0.42
 """m from the middle of the robot's body that the towel passes it."""
 
 
 def plan(see: Sight) -> list[Wish]:
     """One hand. The tap's front is where the robot stands: +y in its home."""
-    opening = see.goal(Water(SINK), 0.1)
+    opening = see.goal(Water(SINK), WATER_BELOW)
     towel, (_, high) = see.com(TOWEL), see.box(TOWEL)
     height = opening[:, 2] - TOP - (high[:, 2] - towel[:, 2])
-    inside = jnp.stack([opening[:, 0], opening[:, 1] + AHEAD, height], axis=1)
-    beside = jnp.abs(towel[:, 0] - inside[:, 0]) + jnp.abs(towel[:, 2] - height)
-    goal = inside.at[:, 1].add(RUN_UP * jnp.clip((beside - EXACT) / EXACT, 0.0, 1.0))
-    move = around(towel, over(towel, goal, height + CARRY), see.base_pos(), OUTSIDE)
-    slide = wish(move, close=True)
-    return [where(see.holds(TOWEL), slide, take(see, TOWEL))]
+    beside, ahead = towel[:, 0] - opening[:, 0], towel[:, 1] - opening[:, 1] - AHEAD
+    off = jnp.maximum(_share(jnp.abs(beside)), _share(ahead - RUN_UP))
+    rise = height + CARRY * off - towel[:, 2]
+    back = RUN_UP * jnp.maximum(off, _share(jnp.abs(towel[:, 2] - height)))
+    go = jnp.clip(1.5 - rise / RISE, 0.0, 1.0)
+    move = jnp.stack([-beside * go, (back - ahead) * go, rise], axis=1)
+    move = around(towel, move, see.base_pos(), OUTSIDE)
+    return [where(see.holds(TOWEL), wish(move, levelled(see.quat(TOWEL)), close=True), take(see, TOWEL))]
+
+
+def _share(off: Float[Array, "W"]) -> Float[Array, "W"]:
+    """0 on the way in, 1 wholly off it."""
+    return jnp.clip((off - EXACT) / BLEND, 0.0, 1.0)
