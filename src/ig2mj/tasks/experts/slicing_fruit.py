@@ -16,13 +16,14 @@ from ig2mj.tasks.experts.sight import Sight
 KNIFE, FRUIT = "carving_knife_0", "apple_0"
 
 HANDLE, ALONG, EDGE = (-0.105, 0.007, 0.011), (1.0, 0.0, 0.0), (0.0, -1.0, 0.0)
-"""Where the hand takes the handle, m: far back, so that fingers stay clear of the fruit; and the directions in which the blade points and cuts; the knife's frame."""
+"""Where the hand takes the handle, m: so far back that fingers stay clear of the fruit. Where the blade points, and the
+direction in which it cuts. The knife's frame."""
 
 TIPWARD = -0.01
 """m from the middle of the edge to the point that cuts."""
 
 STEEP = 1.25
-"""rad between the edge's direction and straight down that are steep enough."""
+"""rad between the edge's direction and straight down that are steep enough. Steeper, fingers would meet the table."""
 
 CLEARANCE = 0.07
 """m above the fruit at which the blade comes over it."""
