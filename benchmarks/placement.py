@@ -1,25 +1,29 @@
 """How well kinematic predicates are sampled: success, time, penetration, and whether states stay true.
 
-    python benchmarks/placement.py [--homes birch spruce] [--requests 50] [--seeds 20]
+    python benchmarks/placement.py                 60 pairs per predicate, 20 seeds each, in birch and spruce
+    python benchmarks/placement.py --resume        only the pairs that no earlier run got to
 
 For each predicate, pairs of a loose object and something to place it at are drawn at random among those of fitting
 size, and each is requested with several seeds. What succeeded is woken, stepped for five seconds, and asked again; the
 deepest penetration is that of the state as it was sampled. Impossible pairs stay in: a share of success below one is
-partly theirs, and how long they take to be given up is told.
+partly theirs, and how long they take to be given up is reported. Times are processor time of one core.
+
+A pair is one line of benchmarks/results/placement/<predicate>_<home>.jsonl, written when its seeds are done, so that a
+run can be stopped at any time. The table is made of all lines that there are.
 """
 
 from __future__ import annotations
 
 import collections
 import dataclasses
+import json
 import pathlib
 import time
-from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import tyro
 from results import RESULTS, save, table
-from rich.progress import track
 
 import ig2mj
 from ig2mj.sampling.conditions import read_conditions
@@ -30,6 +34,7 @@ from ig2mj.sampling.row import RowSampler
 PREDICATES = ("on_top", "inside", "under", "on_floor", "next_to", "in_contact_with")
 SECONDS = 5.0
 BUDGET = 250
+"""Units of work of a request: those of `Simulation.set_predicate`."""
 
 
 @dataclasses.dataclass
@@ -38,13 +43,14 @@ class Args:
 
     Attributes:
       homes: where requests are drawn, in turn. requests: pairs per predicate. seeds: times that each is requested.
-      predicates: which ones. out: folder for results.
+      predicates: which ones. resume: keep the pairs of earlier runs. out: folder for results.
     """
 
     homes: tuple[str, ...] = ("birch", "spruce")
-    requests: int = 50
+    requests: int = 60
     seeds: int = 20
     predicates: tuple[str, ...] = PREDICATES
+    resume: bool = False
     out: pathlib.Path = RESULTS
 
 
@@ -78,103 +84,123 @@ def requests(sampler: RowSampler, predicate: str, count: int, rng: np.random.Gen
     return list(found)
 
 
-@dataclasses.dataclass
-class Tally:
-    """Counts of one predicate."""
-
-    requests: int = 0
-    tried: int = 0
-    possible: int = 0
-    succeeded: int = 0
-    stayed: int = 0
-    deepest: float = 0.0
-    seconds: float = 0.0
-    seconds_of_failures: float = 0.0
-    longest_failure: float = 0.0
-    reasons: collections.Counter = dataclasses.field(default_factory=collections.Counter)
-
-
-def measure(sampler: RowSampler, predicate: str, pairs: Sequence[tuple[str, str]], seeds: int, tally: Tally) -> None:
-    """Requests every pair with every seed."""
+def request(sampler: RowSampler, predicate: str, first: str, second: str, seeds: int) -> dict[str, Any]:
+    """Requests a pair with every seed; what came of it."""
     tables, query = sampler.model.tables, sampler.query
-    for first, second in track(pairs, f"{predicate} in {query.scene.name}"):
-        conditions = read_conditions([f"({predicate} {first} {second})"])
-        index = tables.object_names.index(first)
-        sampler.sample(conditions, np.random.default_rng(0), Budget(1), collections.Counter())  # compiles
-        successes = 0
-        for seed in range(seeds):
-            reasons: collections.Counter = collections.Counter()
-            began = time.process_time()
-            row = sampler.sample(conditions, np.random.default_rng([1, seed]), Budget(BUDGET), reasons)
-            spent = time.process_time() - began
-            tally.tried += 1
-            tally.reasons.update({r.partition(": ")[2] or r: n for r, n in reasons.items()})
-            if row is None:
-                tally.seconds_of_failures += spent
-                tally.longest_failure = max(tally.longest_failure, spent)
-                continue
-            successes += 1
-            tally.seconds += spent
-            tally.deepest = max(tally.deepest, float(query.penetrations()[index]))
-            view = query.view
-            query.place(index, np.array(view.object_pos[0, index], float), np.array(view.object_quat[0, index], float))
-            for _ in range(round(SECONDS / (query.engine.substeps * query.engine.timestep))):
-                query.physics, _ = query.engine.step(query.physics)
-            tally.stayed += sampler.holds(conditions, row.states)
-        tally.requests += 1
-        tally.possible += successes > 0
-        tally.succeeded += successes
+    conditions = read_conditions([f"({predicate} {first} {second})"])
+    index = tables.object_names.index(first)
+    sampler.sample(conditions, np.random.default_rng(0), Budget(1), collections.Counter())  # compiles
+    made, failed, stayed, deepest = [], [], 0, 0.0
+    reasons: collections.Counter[str] = collections.Counter()
+    for seed in range(seeds):
+        why: collections.Counter[str] = collections.Counter()
+        began = time.process_time()
+        row = sampler.sample(conditions, np.random.default_rng([1, seed]), Budget(BUDGET), why)
+        spent = round(time.process_time() - began, 4)
+        reasons.update({r.partition(": ")[2] or r: n for r, n in why.items()})
+        if row is None:
+            failed.append(spent)
+            continue
+        made.append(spent)
+        deepest = max(deepest, float(query.penetrations()[index]))
+        view = query.view
+        query.place(index, np.array(view.object_pos[0, index], float), np.array(view.object_quat[0, index], float))
+        for _ in range(round(SECONDS / (query.engine.substeps * query.engine.timestep))):
+            query.physics, _ = query.engine.step(query.physics)
+        stayed += sampler.holds(conditions, row.states)
+    return {
+        "pair": [first, second],
+        "made_s": made,
+        "failed_s": failed,
+        "stayed": stayed,
+        "deepest_mm": round(1000 * deepest, 3),
+        "reasons": dict(reasons.most_common()),
+    }
+
+
+def measure(args: Args, folder: pathlib.Path) -> None:
+    """Requests all pairs that are not on file yet."""
+    for k, home in enumerate(args.homes):
+        sampler = make_sampler(ig2mj.load_scene(home))
+        count = args.requests // len(args.homes) + (k < args.requests % len(args.homes))
+        for predicate in args.predicates:
+            file = folder / f"{predicate}_{home}.jsonl"
+            if not args.resume:
+                file.unlink(missing_ok=True)
+            known = {tuple(line["pair"]) for line in _lines(file)}
+            pairs = requests(sampler, predicate, count, np.random.default_rng([7, k]))
+            for first, second in pairs:
+                if (first, second) in known:
+                    continue
+                found = request(sampler, predicate, first, second, args.seeds)
+                with file.open("a", encoding="utf-8") as out:
+                    out.write(json.dumps(found) + "\n")
+            print(f"{predicate} in {home}: {len(pairs)} pairs", flush=True)
+
+
+def _lines(file: pathlib.Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()] if file.is_file() else []
+
+
+def summary(predicate: str, lines: list[dict[str, Any]]) -> dict[str, Any]:
+    """A predicate's row of the table."""
+    made = [s for line in lines for s in line["made_s"]]
+    failed = [s for line in lines for s in line["failed_s"]]
+    reasons: collections.Counter[str] = collections.Counter()
+    for line in lines:
+        reasons.update(line["reasons"])
+    return {
+        "predicate": predicate,
+        "pairs": len(lines),
+        "pairs_that_succeeded": sum(bool(line["made_s"]) for line in lines),
+        "requests": len(made) + len(failed),
+        "samples": len(made),
+        "success": len(made) / max(len(made) + len(failed), 1),
+        "true_after_5_s": sum(line["stayed"] for line in lines) / max(len(made), 1),
+        "deepest_mm": max((line["deepest_mm"] for line in lines), default=0.0),
+        "ms_per_sample": 1000 * float(np.mean(made or [np.nan])),
+        "median_ms": 1000 * float(np.median(made or [np.nan])),
+        "seconds_to_give_up": float(np.mean(failed or [0.0])),
+        "longest_to_give_up": max(failed, default=0.0),
+        "reasons": dict(reasons.most_common()),
+    }
 
 
 def main(args: Args) -> None:
-    samplers = [make_sampler(ig2mj.load_scene(home)) for home in args.homes]
+    folder = args.out / "placement"
+    folder.mkdir(parents=True, exist_ok=True)
+    measure(args, folder)
     rows = []
-    for predicate in args.predicates:
-        tally = Tally()
-        for k, sampler in enumerate(samplers):
-            count = args.requests // len(samplers) + (k < args.requests % len(samplers))
-            pairs = requests(sampler, predicate, count, np.random.default_rng([7, k]))
-            measure(sampler, predicate, pairs, args.seeds, tally)
-        failures = tally.tried - tally.succeeded
-        rows.append(
-            {
-                "predicate": predicate,
-                "requests": tally.requests,
-                "tried": tally.tried,
-                "pairs that succeeded at least once": tally.possible,
-                "success": tally.succeeded / max(tally.tried, 1),
-                "true after 5 s": tally.stayed / max(tally.succeeded, 1),
-                "deepest_mm": tally.deepest * 1000,
-                "ms_per_sample": 1000 * tally.seconds / max(tally.succeeded, 1),
-                "seconds_to_give_up": tally.seconds_of_failures / max(failures, 1),
-                "longest_to_give_up": tally.longest_failure,
-                "reasons": dict(tally.reasons.most_common()),
-            }
-        )
+    for predicate in PREDICATES:
+        lines = [line for file in sorted(folder.glob(f"{predicate}_*.jsonl")) for line in _lines(file)]
+        if lines:
+            rows.append(summary(predicate, lines))
     columns = (
         "predicate",
-        "tried",
+        "requests",
         "success",
         "pairs possible",
+        "success of these",
         "true after 5 s",
         "deepest mm",
-        "ms a sample",
-        "s to give up",
+        "ms a sample (median)",
+        "s to give up (most)",
     )
     cells = [
         (
             r["predicate"],
-            f"{r['tried']:,}",
+            f"{r['requests']:,}",
             f"{r['success']:.3f}",
-            f"{r['pairs that succeeded at least once']} of {r['requests']}",
-            f"{r['true after 5 s']:.4f}",
+            f"{r['pairs_that_succeeded']} of {r['pairs']}",
+            f"{r['success'] * r['pairs'] / max(r['pairs_that_succeeded'], 1):.3f}",
+            f"{r['true_after_5_s']:.4f}",
             f"{r['deepest_mm']:.2f}",
-            f"{r['ms_per_sample']:.1f}",
-            f"{r['seconds_to_give_up']:.1f} (at most {r['longest_to_give_up']:.1f})",
+            f"{r['ms_per_sample']:.0f} ({r['median_ms']:.0f})",
+            f"{r['seconds_to_give_up']:.1f} ({r['longest_to_give_up']:.1f})",
         )
         for r in rows
     ]
-    tables = [table(f"Sampled placements in {', '.join(args.homes)}, one core", columns, cells)]
+    tables = [table(f"Sampled placements in {', '.join(args.homes)}", columns, cells)]
     save("placement", 0, {**dataclasses.asdict(args), "out": args.out.name}, rows, tables, args.out)
 
 

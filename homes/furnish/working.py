@@ -35,6 +35,10 @@ def home_office(kit: RoomKit) -> Iterator[Placed | None]:
     yield kit.at_wall("briefcase", place="corner")
 
 
+LONG_GARAGE = 5.8  # m
+TO_END = (1.2, -1.2, 1.1, -1.1, 1.0, -1.0, 0.9, -0.9)  # m, of the car from the middle of a long garage
+
+
 def garage(kit: RoomKit) -> Iterator[Placed | None]:
     """A car where it fits, shelves with tools, a ladder, boxes."""
     yield _car(kit)
@@ -50,13 +54,14 @@ def garage(kit: RoomKit) -> Iterator[Placed | None]:
 
 
 def _car(kit: RoomKit) -> Placed | None:
-    """A car along the room's long side, where its doors can open."""
+    """A car along the room's long side, where its doors can open; in a long garage at one end of it."""
     x0, y0, x1, y1 = kit.rect
     cx, cy = (x0 + x1) / 2, (y0 + y1) / 2
     along_y = y1 - y0 > x1 - x0
+    to_end = TO_END if max(x1 - x0, y1 - y0) >= LONG_GARAGE else ()
     for index in range(kit.home.models):
         for aside in (0.0, 0.1, -0.1, 0.2, -0.2, 0.3, -0.3):
-            for shift in (0.0, 0.2, -0.2, 0.3, -0.3):
+            for shift in (*to_end, 0.0, 0.2, -0.2, 0.3, -0.3):
                 spot = (cx + aside, cy + shift) if along_y else (cx + shift, cy + aside)
                 car = kit.at("car", spot, 90.0 if along_y else 0.0, index=index)
                 if car is not None:

@@ -117,7 +117,7 @@ def shower(b: ObjectBuilder) -> None:
 
 
 def pool(b: ObjectBuilder) -> None:
-    """A round garden pool: a ring wall and a floor, hollow."""
+    """A round paddling pool: a ring wall and a floor, hollow."""
     x, _, z = b.size
     r = x / 2
     look = materials.plain(b.pick(("blue", "teal", "sky")), "plastic", 0.5)
@@ -142,6 +142,6 @@ CATEGORIES = [
     Entry("bathtub", bathtub, (1.650, 0.750, 0.680), 75.0, 6, fixed=True, rest="upright", vary=0.06),
     Entry("toilet", toilet, (0.660, 0.380, 0.780), 32.0, 6, fixed=True, rest="upright", vary=0.04),
     Entry("shower", shower, (0.900, 0.900, 2.050), 60.0, 5, fixed=True, rest="upright", vary=0.06),
-    Entry("pool", pool, (2.400, 2.400, 0.550), 30.0, 3, fixed=True, rest="upright", uniform=True),
+    Entry("pool", pool, (1.800, 1.800, 0.450), 18.0, 3, fixed=True, rest="upright", uniform=True),
     Entry("mirror", mirror, (0.025, 0.600, 0.900), 8.0, 4, fixed=True, rest="upright", vary=0.15),
 ]

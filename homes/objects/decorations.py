@@ -312,7 +312,7 @@ CATEGORIES = [
     Entry("christmas_tree_decorated", christmas_tree, (0.950, 0.950, 1.700), 11.0, 3, rest="upright", fixed=True,
                   uniform=True,
           options={"decorated": True}),
-    Entry("wreath", wreath, (0.420, 0.420, 0.070), 0.6, 3, uniform=True),
+    Entry("wreath", wreath, (0.300, 0.300, 0.055), 0.4, 3, uniform=True),
     Entry("tinsel", tinsel, (0.500, 0.160, 0.040), 0.08, 2),
     Entry("baseboard", baseboard, (0.016, 2.000, 0.090), 2.0, 2, rest="upright", fixed=True),
     Entry("wall_socket", wall_socket, (0.014, 0.080, 0.080), 0.08, 2, rest="upright", fixed=True),

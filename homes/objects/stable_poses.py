@@ -26,13 +26,25 @@ class Orientation:
 
 
 def centre_of_mass(model: HouseholdObject) -> np.ndarray:
-    """Of all collision hulls at equal density, joints at 0, in the base frame."""
+    """Where a simulator that reads the collision meshes puts it; joints at 0, in the base frame, metres.
+
+    Hulls count at equal density. Where those of a link share vertices, so that its mesh is not watertight, iGibson's
+    rule takes the centre of the surface (`link_com` of the converter): that decides what is stable there.
+    """
     total, moment = 0.0, np.zeros(3)
     for link in model.links:
-        for points in link.hulls:
-            mesh = hull_mesh(points)
-            total += mesh.volume
-            moment += mesh.volume * (np.asarray(mesh.center_mass) + link.origin)
+        hulls = [hull_mesh(points) for points in link.hulls]
+        volumes = np.array([mesh.volume for mesh in hulls])
+        written = trimesh.util.concatenate([hull_mesh(np.asarray(points).round(6)) for points in link.hulls])
+        written.merge_vertices()
+        if written.is_watertight:
+            first = sum(
+                v * (np.asarray(mesh.center_mass) + link.origin) for v, mesh in zip(volumes, hulls, strict=True)
+            )
+        else:
+            first = volumes.sum() * (np.asarray(written.centroid) + link.origin)
+        total += volumes.sum()
+        moment += first
     return moment / total
 
 

@@ -76,7 +76,7 @@ DRAWINGS: dict[str, Drawing] = {
     ),
     "sequoia": Drawing(
         150,
-        (5.0, 2.4, 3.9, 3.2, 5.4),
+        (6.2, 2.4, 3.9, 3.2, 5.4),
         (3.8, 1.5, 4.8),
         "B T O N S / C C C C C / G W L D K",
         (),

@@ -112,8 +112,8 @@ class Plan:
 
     Attributes:
       joints: conditions about open, done first: what is in a drawer is put there when it stands as it shall.
-      placements: (object, conditions on where it is), supports before what they bear; the first condition that holds is
-        the rule that proposes places.
+      placements: (object, conditions on where it is), supports before what they bear; the first condition is the rule
+        that proposes places, a floor only where nothing says more.
       states: all others; cuts come last.
     """
 
@@ -141,7 +141,9 @@ def order(conditions: Sequence[Condition]) -> Plan:
     except networkx.NetworkXUnfeasible:
         circle = " -> ".join(a for a, _ in networkx.find_cycle(graph))
         raise StateError(f"objects cannot be placed on each other in a circle: {circle}") from None
-    placements = tuple((n, tuple(sorted(where[n], key=lambda c: not c.value))) for n in names)
+    placements = tuple(
+        (n, tuple(sorted(where[n], key=lambda c: (not c.value, c.predicate == "on_floor")))) for n in names
+    )
     rest = [c for c in conditions if not c.is_placement]
     return Plan(
         joints=tuple(c for c in rest if c.predicate == "open"),

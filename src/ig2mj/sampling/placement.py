@@ -22,6 +22,7 @@ from ig2mj.engine.snapshot import Snapshot
 from ig2mj.sampling.columns import CELL, Window
 from ig2mj.sampling.drop import Rest, origin, rest_at
 from ig2mj.sampling.footprint import Footprint
+from ig2mj.sampling.possible import possible_origins
 from ig2mj.sampling.query import SceneQuery
 
 LIFT = 0.002
@@ -214,20 +215,26 @@ class Placer:
         if area.allowed is not None:
             every = every[area.allowed(cells.row + every // cells.cols, cells.col + every % cells.cols)]
         many = MANY_CELLS // max(int(shape.covered.sum()), 1)
-        if len(every) > many:
-            every = task.rng.choice(every, many, replace=False)
-        some = every if len(every) <= RANDOM_CELLS else task.rng.choice(every, RANDOM_CELLS, replace=False)
+        few = len(every) <= RANDOM_CELLS
+        wanted = "balanced" if support == "loose" and not area.loose else support
         rest, good = _none(), np.zeros(0, bool)
-        for chosen in (some, every):
+        for first in (True, False):
+            if first and not few:
+                chosen = task.rng.choice(every, RANDOM_CELLS, replace=False)
+            else:
+                chosen = every
+                if len(chosen) > many:
+                    possible = possible_origins(level, shape, area.supports, cells.rows, cells.cols, wanted == "full")
+                    chosen = chosen[possible.ravel()[chosen]]
+                if len(chosen) > many:
+                    chosen = task.rng.choice(chosen, many, replace=False)
             row, col = cells.row + chosen // cells.cols, cells.col + chosen % cells.cols
-            rest = rest_at(level, shape, row, col, area.supports)
-            good = {"full": rest.full, "balanced": rest.balanced, "loose": rest.clear}[support]
-            if support == "loose" and not area.loose:
-                good = rest.balanced
-            if good.any() or len(chosen) == len(every):
+            rest = rest_at(level, shape, row, col, area.supports, wanted)
+            good = {"full": rest.full, "balanced": rest.balanced, "loose": rest.clear}[wanted]
+            if good.any() or few:
                 break
         if not good.any():
-            if not len(rest.row) or not np.isin(level.owner, area.supports).any():
+            if not len(every) or not np.isin(level.owner, area.supports).any():
                 task.rejected["no surface"] += 1
             elif not rest.clear.any():
                 task.rejected["no room"] += 1

@@ -1,8 +1,8 @@
 """One initial state that fulfils a set of conditions: objects are placed one after another, with backtracking.
 
-Joints first, then placements from supports to what they bear, then states that need no place. What is settled is kept;
-where an object finds no place, the one before it is placed anew. At the end everything is checked together: all
-conditions hold, everything sleeps, nothing stands in anything.
+Joints first (those of an object that is to be placed, once it stands), then placements from supports to what they bear,
+then states that need no place. What is settled is kept; where an object finds no place, the one before it is placed
+anew. At the end everything is checked together: all conditions hold, everything sleeps, no object penetrates another.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from ig2mj.predicates.literals import object_index, room_index
 from ig2mj.sampling.conditions import Condition, order
 from ig2mj.sampling.placement import RESTING_PENETRATION, Areas, Budget, Placer, Rejections
 from ig2mj.sampling.query import SceneQuery
-from ig2mj.sampling.rules import PLACEMENTS, elsewhere
+from ig2mj.sampling.rules import PLACEMENTS, elsewhere, on_floor
 from ig2mj.sampling.setters import Change, set_by_name
 from ig2mj.sampling.truths import Truths
 from ig2mj.states.model import StateModel
@@ -29,6 +29,9 @@ from ig2mj.states.world import ExtendedStates, Swap
 
 SHARE = 3
 """An object may use up one part in so many of what is left of the row's budget before the one before it is moved."""
+
+OPENINGS = 12
+"""Positions drawn for an object's joints until it rests with them: a lid that is half open may fall shut."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -72,10 +75,11 @@ class RowSampler:
         self._truth = self._truths_of(tuple(conditions))
         self.query.load(self._start)
         self._states = self._initial
+        placed = {name for name, wanted in plan.placements if wanted[0].value}
+        self._joints = [c for c in plan.joints if c.arguments[0] in placed]
         for condition in plan.joints:
-            self._set(condition, rng)
-        if plan.joints:
-            self.query.settle()
+            if condition not in self._joints and not self._open(condition, rng, rejected):
+                return None
         if not self._place_all(plan.placements, rng, budget, rejected):
             return None
         for condition in plan.states:
@@ -145,7 +149,29 @@ class RowSampler:
             raise StateError(f"'{name}' is fixed: it cannot be moved so that {rule} becomes true")
         if not rule.value and self._holds(wanted):
             return True
-        return self._placer.place(index, self._areas(index, rule), lambda: self._holds(wanted), rng, budget, rejected)
+        areas = self._areas(index, rule)
+        for other in wanted[1:]:
+            if other.value and other.predicate == "on_floor":
+                areas = on_floor.within(areas, self.query, room_index(self.model, other.arguments[1]))
+        before = self.query.save()
+        if not self._placer.place(index, areas, lambda: self._holds(wanted), rng, budget, rejected):
+            return False
+        opened = [c for c in self._joints if c.arguments[0] == name]
+        if all(self._open(c, rng, rejected) for c in opened) and (not opened or self._holds(wanted)):
+            return True
+        self.query.load(before)
+        return False
+
+    def _open(self, condition: Condition, rng: np.random.Generator, rejected: Rejections) -> bool:
+        """Moves an object's joints so that a condition about `open` holds when everything has come to rest."""
+        before = self.query.save()
+        for _ in range(OPENINGS):
+            self._set(condition, rng)
+            if self.query.settle() and self._holds((condition,)):
+                return True
+            rejected[f"{condition.arguments[0]}: joints do not rest"] += 1
+            self.query.load(before)
+        return False
 
     def _areas(self, index: int, rule: Condition) -> Areas:
         if rule.predicate == "on_floor":

@@ -73,6 +73,22 @@ def areas(query: SceneQuery, _: int, room: int) -> Areas:
     return on_floor
 
 
+def within(areas: Areas, query: SceneQuery, room: int) -> Areas:
+    """Another rule's areas, but only where the object's origin is in `room` (an index, or `ANY_ROOM`)."""
+    tables = query.scene.tables
+
+    def narrowed(shape: Footprint, rng: np.random.Generator) -> Iterator[Area]:
+        for area in areas(shape, rng):
+
+            def allowed(row: np.ndarray, col: np.ndarray, area: Area = area) -> np.ndarray:
+                here = _in_room(tables, row, col, room)
+                return here if area.allowed is None else here & area.allowed(row, col)
+
+            yield dataclasses.replace(area, allowed=allowed)
+
+    return narrowed
+
+
 def _in_room(tables: SceneTables, row: np.ndarray, col: np.ndarray, room: int) -> np.ndarray:
     """Whether the middles of cells are in the room."""
     size = np.array(tables.room_map.shape)
