@@ -50,6 +50,17 @@ def test_a_robot_gets_its_own_sizes_else_the_scenes_and_room_for_itself_else_saf
     assert profile_of_scene(robot) == own and profile_of_scene(bare) == PROFILE
 
 
+def test_added_objects_get_room_for_themselves(home):
+    bare, added = ig2mj.load_scene(home), ig2mj.load_scene(home, objects=["apple", "jar"])
+    assert profile_of_scene(added) == default_profile(added.model)
+    save_profile(PROFILE, home)
+    wider = profile_of_scene(added)
+    assert wider.awake_dofs == PROFILE.awake_dofs + added.model.nv - bare.model.nv
+    assert wider.contacts > PROFILE.contacts and wider.convex_contacts > PROFILE.convex_contacts
+    assert wider.constraints > PROFILE.constraints + 4 * (wider.contacts - PROFILE.contacts), "a lid has a limit"
+    assert profile_of_scene(bare) == PROFILE
+
+
 def test_a_robot_that_acts_is_measured(home):
     scene = ig2mj.load_scene(home, agents=[TurtleBot()])
     profile = calibrate(scene, engine="native", num_worlds=2, rounds=1)

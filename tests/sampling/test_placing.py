@@ -69,6 +69,25 @@ def test_conditions_are_sampled_together_from_the_support_upwards(sampler):
     assert row.states.temperature[0, fish] <= 0.0
 
 
+def test_joints_of_what_is_placed_are_drawn_until_they_rest():
+    """A lid that is half open falls shut; an open jar is one whose lid leans back."""
+    jars = make_sampler(load_scene("small_home", objects=["jar"]))
+    for seed in range(4):
+        row, reasons = sampled(jars, "(open jar)", "(on_top jar breakfast_table_0)", seed=seed)
+        assert row is not None, reasons
+        assert not np.asarray(jars.query.view.awake).any()
+        assert jars.holds(read_conditions(["(open jar_0)"]), row.states)
+
+
+def test_a_floor_narrows_another_rule(sampler):
+    """Under a table and on the floor of a room: the first rule proposes, the second says where."""
+    room = sampler.query.scene.object("breakfast_table_0").rooms[0]
+    texts = [f"(on_floor apple_0 {room})", "(under apple_0 breakfast_table_0)"]
+    assert [c.predicate for c in order(read_conditions(texts)).placements[0][1]] == ["under", "on_floor"]
+    row, reasons = sampled(sampler, *texts)
+    assert row is not None, reasons
+
+
 def test_an_impossible_request_ends_within_its_budget_and_says_why(sampler):
     row, reasons = sampled(sampler, "(inside plate_0 mug_0)")
     assert row is None

@@ -21,11 +21,11 @@ from scipy import sparse
 from scipy.sparse import csgraph
 
 from ig2mj.agents.floating_hand import add_floating_hand
-from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.native.settle import settle
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.errors import EngineError
 from ig2mj.sampling.perturbation import loose_objects
+from ig2mj.sampling.query import SceneQuery
 from ig2mj.scene.scene import Scene
 from ig2mj.scene.tables import SceneTables
 
@@ -171,46 +171,22 @@ class _Search:
 
     def __init__(self, scene: Scene, settled: Snapshot):
         tables = scene.tables
-        engine = NativeEngine(scene)
-        view = engine.view(engine.load(engine.reset(), settled))
+        query = SceneQuery(scene)
+        query.load(settled)
+        view = query.view
         self.com = np.array(view.object_com[0], np.float64)
         self.low, self.high = np.array(view.aabb_low[0], np.float64), np.array(view.aabb_high[0], np.float64)
         self.hand_low, self.hand_high = hand_box()
         self._fingers = hand_box(thumb=False)
         clear = np.minimum(OVER_SUPPORT, (self.high - self.low)[:, 2] / 2)
         self.over = np.maximum(-FINGER_DEPTH, self.low[:, 2] + clear - self.com[:, 2]) - self.hand_low[2]
-
         self._middle = (self.hand_high + self.hand_low) / 2
-        spec = scene.spec()
-        for key in list(spec.keys):
-            spec.delete(key)  # they would be too short for the probe's joint
-        probe = spec.worldbody.add_body(name="probe")  # moved by a joint: what is welded to the world never hits walls
-        probe.add_freejoint()
-        probe.explicitinertial, probe.mass, probe.inertia = True, 1.0, [1.0, 1.0, 1.0]
-        half = (self.hand_high - self.hand_low) / 2
-        probe.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=half.tolist())
-        self._model = spec.compile()
-        self._model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
-        self._probe = int(self._model.body("probe").id)
-        self._data = mujoco.MjData(self._model)
-        self._data.qpos[:-7] = settled.qpos
-        mujoco.mj_forward(self._model, self._data)
-        light = np.zeros(tables.num_objects + 1, bool)
-        light[loose_objects(tables)] = True
-        light[:-1] &= tables.object_mass <= HEAVY
-        body_light = light[np.append(tables.body_object, -1)]
-        self._light = body_light[self._model.geom_bodyid]
-        self._contype, self._conaffinity = self._model.geom_contype.copy(), self._model.geom_conaffinity.copy()
+        self._probe = query.probe((self.hand_high - self.hand_low) / 2)
+        self._light = np.isin(np.arange(tables.num_objects), loose_objects(tables)) & (tables.object_mass <= HEAVY)
 
     def hits(self, place: np.ndarray, light_too: bool = False) -> bool:
         """Whether the hand's box, palm at `place`, touches what is in the way (or a light loose object)."""
-        model, data = self._model, self._data
-        stays = np.ones_like(self._light) if light_too else ~self._light
-        model.geom_contype[:], model.geom_conaffinity[:] = self._contype * stays, self._conaffinity * stays
-        data.qpos[-7:-4] = place + self._middle
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_collision(model, data)
-        return bool((model.geom_bodyid[data.contact.geom] == self._probe).any())
+        return self._probe.touches(place + self._middle, None if light_too else self._light)
 
     def leads(self, start: np.ndarray, end: np.ndarray, thing: int | None = None) -> bool:
         """Whether the straight way is free to its end, or to where the fingers have reached into an object's box."""
@@ -227,14 +203,8 @@ class _Search:
 
     def enclosed(self, place: np.ndarray) -> bool:
         """Whether nearly all there is to see from a place is close, as in a closed cabinet."""
-        rng = np.random.default_rng(0)
-        rays = rng.normal(size=(60, 3))
-        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-        geom, distance = np.zeros(len(rays), np.int32), np.zeros(len(rays))
-        mujoco.mj_multiRay(
-            self._model, self._data, place, rays.ravel(), None, 1, self._probe, geom, distance, None, len(rays), 100.0
-        )
-        return bool(((distance < 0) | (distance > OPEN)).mean() < 0.1)
+        distance, _ = self._probe.rays(place, np.random.default_rng(0).normal(size=(60, 3)))
+        return bool((distance > OPEN).mean() < 0.1)
 
 
 def _station(search: _Search, thing: int, place: np.ndarray) -> np.ndarray | None:

@@ -32,7 +32,7 @@ def sample(
 
     Args:
       name: of the activity, or a BDDL file of your own.
-      scene: the home; default: the shipped one in which the least has to be added.
+      scene: the home; default: the shipped one in which the least has to be added, and a start can be sampled.
       count: rows.
       out: the file; default: NAME.npz in the working directory.
       seed: the same seed gives the same pool.
@@ -45,7 +45,7 @@ def sample(
     from ig2mj.cli.printing import add_bar, progress_bar
     from ig2mj.errors import Ig2mjError
     from ig2mj.tasks.bddl.definitions import load_activity
-    from ig2mj.tasks.bddl.start import fitting, load_bound, sample_start
+    from ig2mj.tasks.bddl.start import first_that_works, fitting, sample_start
     from ig2mj.worlds.pool import save_pool
 
     if count < 1:
@@ -58,8 +58,7 @@ def sample(
     bound, errors = fitting(activity, find_homes(scene))
     if not bound:
         raise Ig2mjError(" ".join(line.strip() for line in binding_as_text(None, [], errors)))
-    binding = bound[0]
-    loaded = load_bound(binding, scene)
+    binding, loaded = first_that_works(bound, seed, scene)
     with progress_bar() as bar:
         report = add_bar(bar, f"sampling in {loaded.name}")
         done = sample_start(

@@ -1,7 +1,10 @@
 """`SceneQuery`: questions about one scene that need physics or collision geometry, answered by the native engine.
 
-Where are surfaces (`level`), how deep would objects stand in others (`penetration`), where does everything come to
-rest (`settle`)? Samplers ask; nothing above this package touches MuJoCo's data for them.
+Where are surfaces (`level`), what does a ray meet (`rays`), how deep do objects penetrate others, or would they at
+another pose (`penetration`, `penetration_at`), where does everything come to rest (`settle`)? Samplers and calibration
+ask; nothing above this package touches MuJoCo's data for them.
+
+Axes: W worlds, N candidates or rays, O objects.
 """
 
 from __future__ import annotations
@@ -10,7 +13,7 @@ from collections.abc import Collection
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.base import Write
 from ig2mj.engine.native.engine import NativeEngine, NativePhysics
@@ -19,6 +22,7 @@ from ig2mj.engine.view import PhysicsView
 from ig2mj.sampling.columns import ColumnMap, Level, Window
 from ig2mj.sampling.footprint import Footprint, footprint
 from ig2mj.sampling.overlap import Overlaps
+from ig2mj.sampling.probe import Probe, cast_rays
 from ig2mj.scene.scene import Scene
 
 SETTLE_SECONDS = 3.0
@@ -114,6 +118,39 @@ class SceneQuery:
         """How deep each object stands in anything that is no part of it, metres, whether it sleeps or not."""
         return self._overlaps.deepest(np.array(self._data.qpos))
 
+    def penetration_at(
+        self, object_index: int, pos: Float[np.ndarray, "N 3"], quat: Float[np.ndarray, "N 4"]
+    ) -> Float[np.ndarray, "N"]:
+        """How deep a movable object would stand in others if its main body were at each of these poses, metres.
+
+        World frame, w-x-y-z. The world stays as it is.
+
+        Raises:
+          ValueError: the object is fixed.
+        """
+        model = self.scene.model
+        joint = int(model.body_jntadr[self.scene.tables.object_root[object_index]])
+        if joint < 0 or model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_FREE:
+            raise ValueError(f"'{self.scene.object_names[object_index]}' is fixed")
+        address = int(model.jnt_qposadr[joint])
+        qpos = np.array(self._data.qpos)
+        found = np.zeros(len(pos))
+        for n, (place, turn) in enumerate(zip(pos, quat, strict=True)):
+            qpos[address : address + 3], qpos[address + 3 : address + 7] = place, turn
+            found[n] = self._overlaps.deepest(qpos)[object_index]
+        return found
+
+    def rays(
+        self, origin: Float[np.ndarray, "3"], directions: Float[np.ndarray, "N 3"]
+    ) -> tuple[Float[np.ndarray, "N"], Int[np.ndarray, "N"]]:
+        """Distances (metres, inf: none) at which rays from a point meet collision geometry, and the objects hit."""
+        model, data = self.engine.to_mujoco(self.physics, 0)
+        return cast_rays(model, data, self._geom_object, origin, directions)
+
+    def probe(self, half: Float[np.ndarray, "3"]) -> Probe:
+        """A box with these half edges that can be put anywhere in the present state."""
+        return Probe(self.scene, np.array(self._data.qpos), half)
+
     def clearance(self, object_index: int, other: int, farthest: float = 1.0) -> tuple[float, Float[np.ndarray, "3"]]:
         """Distance of two objects' collision geometry, metres, and the vector from the first to the second.
 
@@ -133,12 +170,24 @@ class SceneQuery:
 
     def settle(self, seconds: float = SETTLE_SECONDS) -> bool:
         """Steps until everything sleeps, or for some simulated time; whether everything sleeps."""
-        view = self.view
-        for _ in range(round(seconds / (self.engine.substeps * self.engine.timestep))):
-            self.physics, view = self.engine.step(self.physics)
-            if not np.asarray(view.awake).any():
-                return True
-        return not np.asarray(view.awake).any()
+        self.physics, asleep = settle_worlds(self.engine, self.physics, seconds)
+        return bool(asleep.all())
+
+
+def settle_worlds(
+    engine: NativeEngine, physics: NativePhysics, seconds: float = SETTLE_SECONDS
+) -> tuple[NativePhysics, Bool[np.ndarray, "W"]]:
+    """Steps all worlds of an engine until every object of each sleeps, or for some simulated time.
+
+    Returns:
+      Physics, and in which worlds everything sleeps.
+    """
+    view = engine.view(physics)
+    for _ in range(round(seconds / (engine.substeps * engine.timestep))):
+        physics, view = engine.step(physics)
+        if not np.asarray(view.awake).any():
+            break
+    return physics, ~np.asarray(view.awake).any(1)
 
 
 def _object_masses(scene: Scene) -> list[tuple[np.ndarray, np.ndarray]]:

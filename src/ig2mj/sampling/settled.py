@@ -15,10 +15,10 @@ from jaxtyping import Float
 from ig2mj.engine.base import Write
 from ig2mj.engine.native.engine import NativeEngine, NativePhysics
 from ig2mj.engine.snapshot import Snapshot
-from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import EngineError
 from ig2mj.sampling.overlap import Overlaps
 from ig2mj.sampling.perturbation import loose_objects, perturb
+from ig2mj.sampling.query import settle_worlds
 from ig2mj.scene.scene import Scene
 from ig2mj.states.initial import states_of_manifest
 from ig2mj.states.model import StateModel
@@ -68,7 +68,8 @@ def make_pool(
     width = min(count, 16)
     engine = NativeEngine(scene, width, threads=threads)
     physics = engine.reset()
-    physics, view = _rest(engine, physics)
+    physics, _ = settle_worlds(engine, physics, SECONDS)
+    view = engine.view(physics)
     start = engine.export(physics, 0)
     floor = lowest_support(view, scene.tables.object_fixed)
     loose = loose_objects(scene.tables)
@@ -89,8 +90,8 @@ def make_pool(
         key = episode_keys(seed, world, jnp.zeros_like(world))
         write = jax.device_get(perturb(scene.tables, loose, engine.view(physics), key, share))
         physics = _disturbed(engine, physics, write, overlaps, usual)
-        physics, view = _rest(engine, physics)
-        asleep = ~np.asarray(view.awake).any(1)
+        physics, asleep = settle_worlds(engine, physics, SECONDS)
+        view = engine.view(physics)
         inside = (np.asarray(view.object_com)[..., 2] >= floor).all(1)
         for w in np.flatnonzero(asleep & inside):
             row = engine.export(physics, int(w))
@@ -119,13 +120,3 @@ def _disturbed(
         physics = engine.write(physics, Write(object_mask=deep, object_pos=place, object_quat=turn))
         moved &= ~deep
     return physics
-
-
-def _rest(engine: NativeEngine, physics: NativePhysics) -> tuple[NativePhysics, PhysicsView]:
-    """Steps until every object of every world sleeps, or the time is over."""
-    view = engine.view(physics)
-    for _ in range(round(SECONDS / (engine.substeps * engine.timestep))):
-        physics, view = engine.step(physics)
-        if not np.asarray(view.awake).any():
-            break
-    return physics, view

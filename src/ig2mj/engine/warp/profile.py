@@ -5,7 +5,8 @@ contacts. What does not fit is lost, and the world is flagged (`ig2mj.worlds.gua
 take far more memory than homes ever use, so they are measured per scene and robot and kept beside its manifest:
 `engine_profile.json` for the scene with the floating hand that calibration disturbs it with (which holds it bare, too),
 `engine_profile.humanoid.json` and so on for robots. Where a robot has none, the scene's sizes are widened by the most
-that the robot's own bodies could need.
+that the robot's own bodies could need. Objects that were added to the scene from the library are in no file: for them
+the sizes grow by a rule of thumb.
 """
 
 from __future__ import annotations
@@ -23,6 +24,9 @@ from ig2mj.errors import InputError
 from ig2mj.scene.scene import Scene
 
 PROFILE_FILE = "engine_profile.json"
+
+ADDED_CONTACTS = 8
+"""Contacts of an object that was added from the library. One that lies on a table or in a basket has four to six."""
 
 HAND = "floatinghand"
 """The robot whose sizes are the scene's."""
@@ -92,29 +96,55 @@ def profile_file(agents: Sequence[object]) -> str:
 
 def profile_of_scene(scene: Scene) -> EngineProfile:
     """The profile of a scene and its agents; without one for these agents, the scene's own, widened by what the agents
-    could need; without any, the safe default.
+    could need; without any, the safe default. Objects that were added make it larger (`_with_additions`).
 
     Raises:
       InputError: the file is broken.
     """
     model, name = scene.model, profile_file(scene.agents)
+    if not (scene.folder / name).exists() and not (scene.folder / PROFILE_FILE).exists():
+        return default_profile(model)
+    return fit(_with_additions(_measured_or_widened(scene, name), scene), model)
+
+
+def _measured_or_widened(scene: Scene, name: str) -> EngineProfile:
+    model = scene.model
     if name == PROFILE_FILE or (scene.folder / name).exists():
         return load_profile(scene.folder, model, name)
-    if not (scene.folder / PROFILE_FILE).exists():
-        return default_profile(model)
     profile, agents = load_profile(scene.folder, model), scene.tables.body_agent >= 0
     colliding = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
     contacts = 8 * int((colliding & agents[model.geom_bodyid]).sum())
     rows = (model.jnt_limited[agents[model.jnt_bodyid]] != 0).sum() + 6 * _equalities(model, agents)
     rows += (model.dof_frictionloss[agents[model.dof_bodyid]] > 0).sum()
-    wider = msgspec.structs.replace(
+    return _wider(profile, int(agents[model.dof_bodyid].sum()), int(rows), contacts, contacts)
+
+
+def _with_additions(profile: EngineProfile, scene: Scene) -> EngineProfile:
+    """Sizes for a scene with objects of the library, of which its files know nothing.
+
+    A task is about what was added, so all of it may be awake at once: all its degrees of freedom, its joints' limits
+    and friction, and `ADDED_CONTACTS` for each object, a whole counting for the halves that it can be cut into.
+    """
+    if not scene.additions:
+        return profile
+    model, tables = scene.model, scene.tables
+    first = tables.object_names.index(scene.additions[0].name)  # they come last on the O axis
+    body = tables.body_object >= first
+    joints = model.jnt_limited[body[model.jnt_bodyid]] != 0
+    friction = model.dof_frictionloss[body[model.dof_bodyid]] > 0
+    contacts = ADDED_CONTACTS * len(scene.additions)
+    return _wider(profile, int(body[model.dof_bodyid].sum()), int(joints.sum() + friction.sum()), contacts, contacts)
+
+
+def _wider(profile: EngineProfile, dofs: int, rows: int, contacts: int, convex_contacts: int) -> EngineProfile:
+    """Sizes with room for more: degrees of freedom, constraint rows beside those of contacts, contacts."""
+    return msgspec.structs.replace(
         profile,
-        awake_dofs=profile.awake_dofs + int(agents[model.dof_bodyid].sum()),
-        constraints=profile.constraints + 4 * contacts + int(rows),
+        awake_dofs=profile.awake_dofs + dofs,
+        constraints=profile.constraints + 4 * contacts + rows,
         contacts=profile.contacts + contacts,
-        convex_contacts=profile.convex_contacts + contacts,
+        convex_contacts=profile.convex_contacts + convex_contacts,
     )
-    return fit(wider, model)
 
 
 def _equalities(model: mujoco.MjModel, agents: np.ndarray) -> int:

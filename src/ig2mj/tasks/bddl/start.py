@@ -98,6 +98,29 @@ def load_bound(binding: Binding, home: str | os.PathLike | None = None) -> Scene
     return load_scene(binding.home if home is None else home, objects=binding.additions)
 
 
+HOMES = 3
+"""Homes that are tried in turn, those that add least first: what is added may find no room in the first."""
+
+
+def first_that_works(
+    bound: Sequence[Binding], seed: int = 0, home: str | os.PathLike | None = None, seconds: float = float("inf")
+) -> tuple[Binding, Scene]:
+    """Of bindings in several homes the first of which one initial state can be sampled; the very first where none can.
+
+    Args:
+      bound: at least one, the best first. seed: of the state. home: see `load_bound`. seconds: wall time for each home.
+    """
+    first: tuple[Binding, Scene] | None = None
+    for binding in bound[:HOMES]:
+        scene = load_bound(binding, home)
+        first = first or (binding, scene)
+        if len(bound) == 1 or sample_start(binding, scene, 1, seed, seconds_per_row=seconds).sampled.complete:
+            return binding, scene
+    if first is None:
+        raise ValueError("no binding")
+    return first
+
+
 def sample_start(
     binding: Binding,
     scene: Scene,
