@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 from pathlib import Path
 
@@ -14,11 +15,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 from small_envs import PointMass
 
 from ig2mj.errors import InputError
-from ig2mj.learn.bc import BC, BCConfig, clone
+from ig2mj.learn.bc import BC, BCConfig, begin_as_clone, clone
 from ig2mj.learn.demos import DemoWriter, about, collect_demos, load_demos
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy, depends_of, world_of
-from ig2mj.learn.train import Run
+from ig2mj.learn.sac import SAC, SACConfig
+from ig2mj.learn.train import Run, train
 
 
 def expert(state):
@@ -87,3 +89,17 @@ def test_broken_and_foreign_files_are_refused_with_run_and_field(recorded, tmp_p
         opened.create_dataset("run_000000/action", (10**9, 2), np.float32)  # claimed, and not there
     with pytest.raises(InputError, match="run_000000: cannot be read: action has 1000000000 steps"):
         load_demos(copy, perception)
+
+
+@pytest.mark.slow
+def test_sac_that_begins_as_a_clone_is_better_at_once(recorded):
+    env, file = recorded
+    perception = Perception(env.observation_spaces)
+    demos = load_demos(file, perception)
+    config = SACConfig(updates=8, batch=128, capacity=8000, actor=(32, 32), critic=(64, 64), atoms=51, head_start=300)
+    config = dataclasses.replace(config, tau=0.02, lr=1e-3, last_lr=3e-4)
+    algorithm = SAC(perception, 2, config, demos=demos)
+    learner = begin_as_clone(algorithm, demos, 0, steps=400)
+    result = train(PointMass(32), algorithm, Run(iterations=60, quiet=True), learner=learner)
+    assert result.row["success"] > 0.85  # without demonstrations: a third
+    assert int(result.learner.updates) > 600  # the actor learned, too

@@ -49,7 +49,8 @@ def run(
       seed: of everything random.
       out: folder of the run; default: runs/ENV-ROBOT-GRASPING-ALGO-OBS-SEED.
       resume: go on from the newest checkpoint in the folder.
-      demos: demonstrations (`ig2mj demos collect`), for bc.
+      demos: demonstrations (`ig2mj demos collect`): all that bc learns from; sac begins as their clone and replays
+        them.
       save_buffer: checkpoints hold the replay buffer, too; without it a resumed run first plays it full again.
       until: stop once so large a share of the last episodes succeeds (0.98).
       programs: of an iteration: 1, or 2 (the worlds' and the learner's, so that both are timed).
@@ -67,9 +68,11 @@ def run(
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.errors import Ig2mjError, UnknownNameError
     from ig2mj.learn.algorithms import config_of, made
+    from ig2mj.learn.bc import begin_as_clone
+    from ig2mj.learn.demos import load_demos
     from ig2mj.learn.options import configured
     from ig2mj.learn.perception import MODES, Perception
-    from ig2mj.learn.policies import Policy, depends_on
+    from ig2mj.learn.policies import Policy, depends_on, world_of
     from ig2mj.learn.train import Run, train
 
     if algo not in ALGORITHMS:
@@ -82,8 +85,8 @@ def run(
         from ig2mj.cli.clone import train_from_demos
 
         return train_from_demos(env, demos, robot, grasping, obs, minutes, seed, out, resume, set)
-    if demos is not None:
-        raise Ig2mjError(f"--demos: {algo} takes none (bc does)")
+    if demos is not None and algo != "sac":
+        raise Ig2mjError(f"--demos: {algo} takes none (bc and sac do)")
     if engine is None:
         engine = "warp" if jax.default_backend() == "gpu" else "native"
     config = configured(config_of(algo, small=engine == "native"), set)
@@ -93,12 +96,17 @@ def run(
         env, robot, count, engine, grasping, observations=names, paper_rl=paper_rl, pool_size=pool_size or None
     )  # fmt: skip
     perception = Perception(world.observation_spaces, obs)
-    algorithm = made(config, perception, world)
+    shown = load_demos(demos, perception, world_of(world)) if demos is not None else None
+    algorithm = made(config, perception, world, shown)
     if out is None:
         out = pathlib.Path("runs") / "-".join([world.task.name, world.robot, world.grasping, algo, obs, str(seed)])
     depends = {**depends_on(world, perception), "paper_rl": paper_rl}
     settings = Run(minutes, None, seed, out, resume, save_buffer, until=until, programs=programs)
-    result = train(world, algorithm, settings, depends)
+    learner = None
+    if shown is not None:
+        depends["demos"] = int(shown.reward.shape[0])
+        learner = begin_as_clone(algorithm, shown, seed)
+    result = train(world, algorithm, settings, depends, learner)
     device = jax.devices()[0]
     card = {
         "command": shlex.join(["ig2mj", *sys.argv[1:]]),

@@ -8,6 +8,7 @@ from ig2mj.envs.environment import Environment
 from ig2mj.envs.experts import expert_of
 from ig2mj.errors import UnknownNameError
 from ig2mj.learn.dagger import Dagger, DaggerConfig
+from ig2mj.learn.demos import Demos
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.ppo import PPO, PPOConfig
 from ig2mj.learn.sac import SAC, SACConfig
@@ -43,15 +44,15 @@ def config_of(name: str, small: bool = False) -> Config:
     return (SMALL if small else CONFIGS)[name]
 
 
-def made(config: Config, perception: Perception, env: Environment) -> Any:
-    """The algorithm of these settings for an environment.
+def made(config: Config, perception: Perception, env: Environment, demos: Demos | None = None) -> Any:
+    """The algorithm of these settings for an environment. `demos`: for SAC.
 
     Raises:
       UnknownNameError, EngineError: DAgger needs an expert, and the task has none.
     """
     size = env.action_space.shape[0]
     if isinstance(config, SACConfig):
-        return SAC(perception, size, config)
+        return SAC(perception, size, config, demos=demos)
     if isinstance(config, PPOConfig):
         return PPO(perception, size, config)
     return Dagger(perception, size, expert_of(env), config)

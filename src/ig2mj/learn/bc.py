@@ -178,3 +178,12 @@ def clone(algorithm: BC, demos: Demos, run: Run, depends: Mapping[str, Any] | No
         if over:
             log.close()
             return learner, row
+
+
+def begin_as_clone(algorithm: Any, demos: Demos, seed: int, steps: int = 2000) -> Any:
+    """What another algorithm learns from, where its actor begins as a clone of demonstrations (SAC's `cloned`)."""
+    c = algorithm.config
+    config = BCConfig(steps=steps, batch=min(c.batch, 1024), guess=c.guess, actor=c.actor, net=c.net)
+    cloner = BC(algorithm.perception, algorithm.action_size, config)
+    learner, _ = clone(cloner, demos, Run(minutes=60.0, seed=seed, quiet=True))
+    return algorithm.cloned(algorithm.init(jax.random.PRNGKey(seed)), learner.actor, learner.moments)

@@ -17,6 +17,7 @@ from jaxtyping import Bool, Float, Int, UInt8
 
 from ig2mj.engine.view import Array
 from ig2mj.learn.collect import Transition
+from ig2mj.learn.demos import Demos
 from ig2mj.learn.perception import Perception, Seen
 
 
@@ -71,6 +72,23 @@ class Replay:
             head=jnp.int32(0),
             size=jnp.int32(0),
         )
+
+    @classmethod
+    def of_demos(cls, demos: Demos) -> Replay:
+        """A full ring of demonstrations, as if one world had made them one after the other."""
+        count = demos.reward.shape[0]
+        columns = {
+            "vector": demos.seen.vector,
+            "picture": demos.seen.picture,
+            "action": demos.action,
+            "reward": demos.reward,
+            "terminated": demos.terminated,
+            "truncated": demos.truncated,
+            "after_vector": demos.after.vector,
+            "after_picture": demos.after.picture,
+        }
+        one = {name: a.reshape(count, 1, *a.shape[1:]) for name, a in columns.items()}
+        return cls(**one, head=jnp.int32(0), size=jnp.int32(count))
 
     @property
     def capacity(self) -> int:

@@ -6,6 +6,9 @@ that of Squint (arXiv 2602.21203) and FlashSAC (arXiv 2604.04539): many updates 
 normalization, returns over three steps, rewards scaled to the atoms' range, a target entropy that belongs to a standard
 deviation of 0.15, exploration noise that is held for a random number of steps.
 
+With demonstrations the actor begins as their clone, the critics learn alone for a while, and up to half of a batch is
+of demonstrations: a share that falls to nothing along the run.
+
 An iteration is `length` steps of all worlds, then `updates` updates for each of them. Time limits do not end the value:
 where an episode was cut off, what was seen last is evaluated; where it succeeded, nothing comes after.
 
@@ -26,6 +29,7 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
 from ig2mj.learn.collect import Transition, if_ready
+from ig2mj.learn.demos import Demos
 from ig2mj.learn.moments import Moments, RewardScale, average
 from ig2mj.learn.networks import Actor, shifted, twins
 from ig2mj.learn.perception import Perception, Seen, blank
@@ -45,6 +49,7 @@ class SACConfig:
       tau: share of the critics that goes into the targets at an update. every: updates per update of the actor.
       alpha: weight of the entropy at first. std: standard deviation of actions that the target entropy belongs to.
       held: longest time that exploration noise is held, in steps.
+      head_start: updates of the critics before the actor learns, where it begins as a clone of demonstrations.
       guess: weight of the actor's guess of the privileged state from its features, from pixels.
       lr: learning rate, falling to `last_lr` along a cosine over the run.
       actor, critic: sizes of the layers. net: encoder ("small" or "paper").
@@ -65,6 +70,7 @@ class SACConfig:
     alpha: float = 0.01
     std: float = 0.15
     held: int = 16
+    head_start: int = 2000
     guess: float = 1.0
     lr: float = 3e-4
     last_lr: float = 1e-4
@@ -90,10 +96,14 @@ class SACLearner:
 
 @struct.dataclass
 class SACMemory:
-    """What belongs to the worlds of a device, and is not kept by checkpoints unless asked for."""
+    """What belongs to the worlds of a device, and is not kept by checkpoints unless asked for.
+
+    `demos`: the steps of demonstrations, as of one world; None without any.
+    """
 
     replay: Replay
     scale: RewardScale
+    demos: Replay | None
 
 
 @struct.dataclass
@@ -110,10 +120,18 @@ class SAC:
     name, hint = "sac", None
 
     def __init__(
-        self, perception: Perception, action_size: int, config: SACConfig | None = None, axis: str | None = None
+        self,
+        perception: Perception,
+        action_size: int,
+        config: SACConfig | None = None,
+        axis: str | None = None,
+        demos: Demos | None = None,
     ):
-        """`axis`: the name of an axis of devices over which gradients are averaged."""
-        self.perception, self.action_size, self.axis = perception, action_size, axis
+        """
+        Args:
+          axis: the name of an axis of devices over which gradients are averaged. demos: see the module's text.
+        """
+        self.perception, self.action_size, self.axis, self._demos = perception, action_size, axis, demos
         self.config = c = config or SACConfig()
         guess = perception.vector_size - perception.actor_size if perception.picture_shape and c.guess else 0
         self.actor = Actor(action_size, c.actor, perception.picture_shape, c.net, guess)
@@ -167,7 +185,12 @@ class SAC:
         rows = max(c.capacity // (num_worlds * c.length), 1) * c.length
         rows = max(rows, -(-(c.horizon + 1) // c.length) * c.length)
         replay = Replay.empty(rows, num_worlds, self.perception, self.action_size)
-        return SACMemory(replay, RewardScale.initial(num_worlds))
+        demos = Replay.of_demos(self._demos) if self._demos is not None else None
+        return SACMemory(replay, RewardScale.initial(num_worlds), demos)
+
+    def cloned(self, learner: SACLearner, actor: Any, moments: Moments) -> SACLearner:
+        """With an actor that was cloned, and the means that it was cloned with."""
+        return dataclasses.replace(learner, actor=actor, moments=moments)
 
     def noise(self, num_worlds: int) -> Noise:
         """Before the first step."""
@@ -221,13 +244,13 @@ class SAC:
         """
         c = self.config
         scale = memory.scale.update(rollout.reward, rollout.done, c.gamma, self.axis)
-        memory = SACMemory(memory.replay.insert(rollout), scale)
+        memory = SACMemory(memory.replay.insert(rollout), scale, memory.demos)
         learner = dataclasses.replace(learner, moments=learner.moments.update(rollout.seen.vector, self.axis))
         rate = c.last_lr + (c.lr - c.last_lr) * 0.5 * (1 + jnp.cos(jnp.pi * jnp.clip(progress, 0, 1)))
 
         def many(learner: SACLearner) -> tuple[SACLearner, dict[str, Array]]:
             def group(learner: SACLearner, key: Array) -> tuple[SACLearner, dict[str, Array]]:
-                return self._group(learner, memory, key, rate)
+                return self._group(learner, memory, key, rate, progress)
 
             keys = jax.random.split(key, self.samples // c.every)
             learner, losses = jax.lax.scan(group, learner, keys)
@@ -238,12 +261,17 @@ class SAC:
         return learner, memory, {**losses, **extra, "updates": ready * jnp.float32(self.samples)}
 
     def _group(
-        self, learner: SACLearner, memory: SACMemory, key: Array, rate: Array
+        self, learner: SACLearner, memory: SACMemory, key: Array, rate: Array, progress: Array
     ) -> tuple[SACLearner, dict[str, Array]]:
         """Updates of the critics, and one of the actor."""
         c = self.config
         sample_key, target_key, actor_key = jax.random.split(key, 3)
         batch = memory.replay.sample(sample_key, c.every * c.batch, c.horizon, c.gamma)
+        if memory.demos is not None:
+            batch = self._with_demos(batch, memory.demos, sample_key, progress)
+            late = learner.updates >= c.head_start
+        else:
+            late = True
         batch = dataclasses.replace(batch, reward=batch.reward * memory.scale.factor(c.largest))
         action, density, _ = self._draw(learner.actor, learner.moments, batch.after, target_key)  # of all at once
         alpha = jnp.exp(learner.log_alpha)
@@ -265,8 +293,17 @@ class SAC:
         learner = dataclasses.replace(
             learner, critic=params, target=target, critic_opt=opt, updates=learner.updates + c.every
         )
-        learner, of_actor = self._update_actor(learner, last, actor_key, rate)
+        learner, of_actor = self._update_actor(learner, last, actor_key, rate * late)
         return learner, {**jax.tree.map(jnp.mean, losses), **of_actor}
+
+    def _with_demos(self, batch: Sample, demos: Replay, key: Array, progress: Array) -> Sample:
+        """Every second sample is of a demonstration at first, none at the end of the run."""
+        c = self.config
+        count = batch.reward.shape[0]
+        demo_key, which_key = jax.random.split(jax.random.fold_in(key, 1))
+        shown = demos.sample(demo_key, count, c.horizon, c.gamma)
+        use = jax.random.uniform(which_key, (count,)) < 0.5 * (1.0 - jnp.clip(progress, 0, 1))
+        return jax.tree.map(lambda a, b: jnp.where(use.reshape(-1, *[1] * (a.ndim - 1)), a, b), shown, batch)
 
     def _critic_loss(
         self,
