@@ -1,13 +1,13 @@
-"""Table A.6: a body of a TurtleBot's size idles in a home; steps of 1/30 s per second, with and without 512x512 RGB-D.
+"""Table A.6: a TurtleBot idles in a home; steps of 1/30 s per second, with and without 512x512 RGB-D.
 
     python benchmarks/idle_a6.py [HOME ...] [--steps 2000] [--no-pictures] [--out DIR]
 
 Protocol (spec robots_tasks_sensors.md 6.5): four physics steps of 1/120 s in a step, zero action, all extended states
 on, 2000 steps; a home's value is the mean over its last 100 steps, by when most objects are asleep. The table gives
-mean, largest and smallest value over the homes. With pictures, every step of the last 100 also draws colour and depth
-from the robot's eye (the steps before them do not, which changes nothing but the time this takes). The last 100 are
-taken several times, all kinds in turn, and the median given, by processor time. HOME is the name of a shipped home or a
-converted folder; without any, all shipped homes, or where there are none those made for benchmarks.
+mean, largest and smallest value over the homes. With pictures, every step of the last 100 also reads the sensors
+`rgb` and `depth` of the robot's eye (the steps before them do not, which changes nothing but the time this takes). The
+last 100 are taken several times, all kinds in turn, and the median given, by processor time. HOME is the name of a
+shipped home or a converted folder; without any, all shipped homes, or where there are none those made for benchmarks.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ if __name__ == "__main__":
 else:
     CORE = -1
 
-import contextlib
 import dataclasses
+import math
 import pathlib
 import time
 from typing import Any
@@ -29,14 +29,17 @@ import numpy as np
 import plots
 import results
 import tyro
-from camera import Camera, gl_backend
+from camera import gl_backend
 from homes_at_hand import WORK, Home, made_homes, named_homes, shipped_homes
-from idle_robot import NAME
 from one_world import OneWorld
 from rich.console import Console
 from rich.progress import track
 from timing import interleave, timed
 
+import ig2mj
+from ig2mj.agents.turtlebot import TurtleBot
+from ig2mj.sensors.base import SensorOptions
+from ig2mj.sensors.suite import SensorSuite
 from ig2mj.states.model import StateModel
 
 SIZE = 512
@@ -71,7 +74,9 @@ def measure(home: Home, args: Args, backend: str | None) -> dict[str, Any]:
     """One home: rates over its last steps, and the rate of every 20 steps on the way there."""
     place = home.robot_place()
     start = time.perf_counter()
-    scene = home.load(place)
+    pos, yaw = place
+    robot = TurtleBot(pos=pos, quat=(math.cos(yaw / 2), 0.0, 0.0, math.sin(yaw / 2)))
+    scene = ig2mj.load_scene(home.folder, [robot])
     load_seconds = time.perf_counter() - start
     world = OneWorld(scene, StateModel.of_manifest(scene.tables, scene.manifest))
     start = time.perf_counter()
@@ -85,20 +90,21 @@ def measure(home: Home, args: Args, backend: str | None) -> dict[str, Any]:
         "load_s": round(load_seconds, 2),
         "compile_s": round(compile_seconds, 2),
         "course": [round(v, 1) for v in course],
-        "awake": [name for name in world.awake() if name != NAME],
+        "awake": [name for name in world.awake() if name != robot.name],
     }
     blocks = {"mujoco": timed(world.bare().step), "ig2mj": timed(world.step)}
-    with contextlib.ExitStack() as stack:
-        if backend is not None:
-            model, data = world.mujoco
-            camera = stack.enter_context(Camera(model, f"{NAME}/eye", SIZE, backend))
+    if backend is not None:
+        controller = robot.controller(scene.tables, 0)
+        options = SensorOptions(width=SIZE, height=SIZE)
+        sensors = SensorSuite(world.engine, scene, world.model, controller, ["rgb", "depth"], options)
+        state = controller.initial(1)
 
-            def with_picture() -> None:
-                world.step()
-                camera.take(data, depth=True)
+        def with_picture() -> None:
+            world.step()
+            sensors.read(world.physics, world.view, world.states, state)
 
-            blocks["ig2mj_rgbd"] = timed(with_picture)
-        rates = interleave(blocks, 0.0, args.repeats, steps=LAST)
+        blocks["ig2mj_rgbd"] = timed(with_picture)
+    rates = interleave(blocks, 0.0, args.repeats, steps=LAST)
     return row | {"rates": {name: dataclasses.asdict(rate) for name, rate in rates.items()}}
 
 
