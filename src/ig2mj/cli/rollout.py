@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import pathlib
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-AGENTS = ("zero", "random")
+if TYPE_CHECKING:
+    from ig2mj.envs.environment import Environment
+    from ig2mj.envs.rollout import Act
+
+AGENTS = ("zero", "random", "expert")
 
 
 def run(
@@ -19,7 +24,9 @@ def run(
     episodes: int = 1,
     seed: int = 0,
     split: str = "train",
+    held_out: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     pool_size: int = 0,
+    video: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     paper_rl: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
@@ -27,7 +34,7 @@ def run(
 
     Args:
       env: CookingMeat, or ig2mj/CookingMeat-v0 (`ig2mj list-envs`).
-      agent: who acts: zero (nothing moves) or random.
+      agent: who acts: zero (nothing moves), random, or expert (a script; the six activities have one).
       robot: humanoid, fetch or turtlebot; default: the first that `ig2mj list-envs` names.
       grasping: mitten, assisted, sticky or physical; default: the task's own.
       engine: native, warp or jax; default: warp on a GPU, else native.
@@ -35,41 +42,44 @@ def run(
       episodes: how many are played, in all worlds together.
       seed: of start states and actions.
       split: start states: train or held_out.
+      held_out: held-out start states, the first EPISODES of them, each played once.
       pool_size: start states; 0: as many as the split has.
+      video: film of the first episode of the first world (.mp4, .gif); needs OpenGL and the native engine.
       paper_rl: the thresholds that the paper's runs had.
       json: the last line is one JSON object.
     """
     import json as form
-    import time
 
     import numpy as np
 
     from ig2mj.envs.registry import make
+    from ig2mj.envs.rollout import play
     from ig2mj.errors import Ig2mjError, UnknownNameError
 
     if agent not in AGENTS:
         raise UnknownNameError("agent", agent, AGENTS)
     if episodes < 1 or worlds < 1:
         raise Ig2mjError(f"--episodes {episodes}, --worlds {worlds}: at least one of each is needed")
+    if video is not None:
+        engine = engine or "native"
+    split = "held_out" if held_out else split
     played = make(
         env, robot, worlds, engine, grasping, paper_rl=paper_rl, split=split, pool_size=pool_size or None
     )  # fmt: skip
-    rng, shape = np.random.default_rng(seed), (worlds, *played.action_space.shape)
-    state = played.reset(seed)
-    returns, running = [], np.zeros(worlds)
-    successes = in_hand = steps = 0
-    began = time.monotonic()
-    while len(returns) < episodes:
-        action = rng.uniform(-1, 1, shape) if agent == "random" else np.zeros(shape)
-        state = played.step_autoreset(state, action.astype(np.float32))
-        running += np.asarray(state.reward)
-        steps += worlds
-        for world in np.flatnonzero(np.asarray(state.done))[: episodes - len(returns)]:
-            returns.append(float(running[world]))
-            successes += int(np.asarray(state.info["success"])[world])
-            in_hand += int(np.asarray(state.info.get("success_in_hand", state.terminated))[world])
-        running[np.asarray(state.done)] = 0.0
-    metrics = played.metrics(state)
+    film = None
+    if video is not None:
+        from ig2mj.showcase.episode_film import EpisodeFilm
+
+        film = EpisodeFilm(video, played)
+    try:
+        outcome = play(
+            played, _acting(agent, played, seed), episodes, seed, held_out, film.see if film is not None else None
+        )
+    finally:
+        if film is not None:
+            film.close()
+    successes, in_hand = sum(outcome.success), sum(outcome.success_in_hand)
+    metrics = played.metrics(outcome.state)
     result = {
         "env": played.task.name,
         "robot": played.robot,
@@ -81,11 +91,13 @@ def run(
         "episodes": episodes,
         "success_rate": successes / episodes,
         "success_in_hand_rate": in_hand / episodes,
-        "mean_return": float(np.mean(returns)),
-        "steps_per_second": round(steps / (time.monotonic() - began), 1),
+        "mean_return": float(np.mean(outcome.total)),
+        "steps_per_second": round(outcome.steps / outcome.seconds, 1),
         "overflow": metrics["overflow"],
         "non_finite": metrics["not_finite"],
     }
+    if film is not None and not json:
+        print(f"film: {video}")
     if json:
         print(form.dumps(result))
     else:
@@ -95,3 +107,17 @@ def run(
         )
     played.close()
     return 0
+
+
+def _acting(agent: str, env: Environment, seed: int) -> Act:
+    """Who acts. Raises UnknownNameError: the task has no expert."""
+    import numpy as np
+
+    if agent == "expert":
+        from ig2mj.envs.experts import expert_of
+
+        return expert_of(env)
+    rng, shape = np.random.default_rng(seed), (env.num_worlds, *env.action_space.shape)
+    if agent == "random":
+        return lambda state: rng.uniform(-1, 1, shape).astype(np.float32)
+    return lambda state: np.zeros(shape, np.float32)

@@ -15,9 +15,19 @@ from jaxtyping import Float
 
 from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment, EnvState
-from ig2mj.errors import EngineError
+from ig2mj.errors import UnknownNameError
 from ig2mj.tasks.experts import Expert
+from ig2mj.tasks.experts.expert import PLANS
 from ig2mj.tasks.task import Task
+
+
+def make_expert(env: Environment) -> Expert:
+    """The expert of an environment's task and robot, not compiled: from view and states to actions. Raises as
+    `expert_of`."""
+    rules = env.core.rules
+    if not isinstance(env.task, Task) or rules is None:
+        raise UnknownNameError("task with an expert", env.task.name, PLANS)
+    return Expert(env.task, env.robot, env.scene, rules.model, closing=env.grasping != "mitten")
 
 
 def expert_of(env: Environment) -> Callable[[EnvState], Float[Array, "W n"]]:
@@ -26,8 +36,5 @@ def expert_of(env: Environment) -> Callable[[EnvState], Float[Array, "W n"]]:
     Raises:
       UnknownNameError: the task has no expert.
     """
-    rules, task = env.core.rules, env.task
-    if rules is None or not isinstance(task, Task):
-        raise EngineError(f"{task.name} has no scripted expert")
-    acts = jax.jit(Expert(task, env.robot, env.scene, rules.model, closing=env.grasping != "mitten"))
+    acts = jax.jit(make_expert(env))
     return lambda state: acts(state.batch.world.view, state.batch.world.states)

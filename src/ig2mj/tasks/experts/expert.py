@@ -89,4 +89,4 @@ class Expert:
 
 
 def _limited(v: Float[Array, "W 3"]) -> Float[Array, "W 3"]:
-    return v / jnp.maximum(1.0, jnp.max(jnp.abs(v), axis=1, keepdims=True))
+    return jnp.clip(v / jnp.maximum(1.0, jnp.max(jnp.abs(v), axis=1, keepdims=True)), -1.0, 1.0)

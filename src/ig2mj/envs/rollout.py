@@ -1,0 +1,103 @@
+"""`play`: episodes of an environment, and how they ended.
+
+Axis: W worlds.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+
+import jax
+import numpy as np
+
+from ig2mj.engine.view import Array
+from ig2mj.envs.environment import Environment, EnvState
+
+Act = Callable[[EnvState], Array]
+"""Actions [W, n] from the state of all worlds."""
+
+Watch = Callable[[EnvState], None]
+"""Called with the state at the start of episodes and after every step."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Played:
+    """Of every episode, in the order in which they ended (or of the pool's rows, where those were played in order).
+
+    Attributes:
+      success, success_in_hand: how it ended. total: its return.
+      steps: agent steps that were taken in all worlds together. seconds: wall time of that, compilation included.
+      state: of all worlds at the end.
+    """
+
+    success: list[bool]
+    success_in_hand: list[bool]
+    total: list[float]
+    steps: int
+    seconds: float
+    state: EnvState
+
+
+def play(
+    env: Environment, act: Act, episodes: int, seed: int = 0, in_order: bool = False, watch: Watch | None = None
+) -> Played:
+    """Plays episodes.
+
+    Args:
+      act: who acts. seed: of the start states that are drawn.
+      in_order: begin with the rows of the environment's pool, each once; again from the first where there are fewer.
+    """
+    return _in_order(env, act, episodes, seed, watch) if in_order else _drawn(env, act, episodes, seed, watch)
+
+
+def _drawn(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None) -> Played:
+    state = env.reset(seed)
+    _look(watch, state)
+    success, in_hand, total = [], [], []
+    running, steps, began = np.zeros(env.num_worlds), 0, time.monotonic()
+    while len(total) < episodes:
+        state = env.step_autoreset(state, act(state))
+        _look(watch, state)
+        running += np.asarray(state.reward)
+        steps += env.num_worlds
+        done, won = np.asarray(state.done), np.asarray(state.info["success"])
+        for world in np.flatnonzero(done)[: episodes - len(total)]:
+            total.append(float(running[world]))
+            success.append(bool(won[world]))
+            in_hand.append(bool(np.asarray(state.info.get("success_in_hand", won))[world]))
+        running[done] = 0.0
+    return Played(success, in_hand, total, steps, time.monotonic() - began, state)
+
+
+def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None) -> Played:
+    size, worlds = env.core.starts.pool.size, env.num_worlds
+    success, in_hand, total = [], [], []
+    steps, began, state = 0, time.monotonic(), None
+    for first in range(0, episodes, worlds):
+        state = env.start_from(np.arange(first, first + worlds) % size, seed)
+        _look(watch, state)
+        going, won, holding = np.ones(worlds, bool), np.zeros(worlds, bool), np.zeros(worlds, bool)
+        running = np.zeros(worlds)
+        while going.any():
+            state = env.step(state, act(state))
+            _look(watch, state)
+            steps += worlds
+            running += np.where(going, np.asarray(state.reward), 0.0)
+            ends = going & np.asarray(state.done)
+            won |= ends & np.asarray(state.info["success"])
+            holding |= ends & np.asarray(state.info.get("success_in_hand", state.info["success"]))
+            going &= ~ends
+        count = min(worlds, episodes - first)
+        success += won[:count].tolist()
+        in_hand += holding[:count].tolist()
+        total += running[:count].tolist()
+    assert state is not None
+    jax.block_until_ready(state.reward)
+    return Played(success, in_hand, total, steps, time.monotonic() - began, state)
+
+
+def _look(watch: Watch | None, state: EnvState) -> None:
+    if watch is not None:
+        watch(state)
