@@ -65,13 +65,13 @@ class EpisodeFilm:
             return
         model, data = self._env.core.engine.to_mujoco(state.batch.world.physics, self._world)
         now = data.qpos.copy()
-        if self._drawn is None:
+        drawn = self._drawn
+        if drawn is None:
             drawn = self._drawn = mujoco.MjData(model)
             drawn.qpos[:] = now
             mujoco.mj_forward(model, drawn)
             self._camera = self._best_view(model, drawn, state)
             self._tinter = Tinter(model, self._env.scene.tables)
-        drawn = self._drawn
         before = drawn.qpos.copy()
         self._over = bool(np.asarray(state.done)[self._world])
         if self._over and "final_obs" in state.info:  # the world is in its next episode already
