@@ -31,6 +31,7 @@ def run(
     save_buffer: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     until: float | None = None,
     programs: int = 1,
+    devices: int = 1,
     paper_rl: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     pool_size: int = 0,
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = (),
@@ -54,6 +55,7 @@ def run(
       save_buffer: checkpoints hold the replay buffer, too; without it a resumed run first plays it full again.
       until: stop once so large a share of the last episodes succeeds (0.98).
       programs: of an iteration: 1, or 2 (the worlds' and the learner's, so that both are timed).
+      devices: that share the worlds and the learning; 0: all of this machine.
       paper_rl: the thresholds that the paper's runs had.
       pool_size: start states; 0: as many as the split has.
       set: settings of the algorithm, as updates=16 or actor=128,128.
@@ -70,6 +72,7 @@ def run(
     from ig2mj.learn.algorithms import config_of, made
     from ig2mj.learn.bc import begin_as_clone
     from ig2mj.learn.demos import load_demos
+    from ig2mj.learn.iteration import AXIS
     from ig2mj.learn.options import configured
     from ig2mj.learn.perception import MODES, Perception
     from ig2mj.learn.policies import Policy, depends_on, world_of
@@ -92,12 +95,16 @@ def run(
     config = configured(config_of(algo, small=engine == "native"), set)
     names = VECTORS if obs == "state" else (*VECTORS, "rgb", "depth")
     count = worlds or WORLDS.get(engine, PURE_WORLDS)
+    shared = jax.local_devices()[: devices or None] if devices != 1 else []
+    if (devices > 1 and len(shared) < devices) or devices < 0 or count % max(len(shared), 1):
+        have = f"{len(jax.local_devices())} devices are here, and they share worlds evenly"
+        raise Ig2mjError(f"--devices {devices} --worlds {count}: {have}")
     world = make(
-        env, robot, count, engine, grasping, observations=names, paper_rl=paper_rl, pool_size=pool_size or None
+        env, robot, count // max(len(shared), 1), engine, grasping, observations=names, paper_rl=paper_rl, pool_size=pool_size or None
     )  # fmt: skip
     perception = Perception(world.observation_spaces, obs)
     shown = load_demos(demos, perception, world_of(world)) if demos is not None else None
-    algorithm = made(config, perception, world, shown)
+    algorithm = made(config, perception, world, shown, AXIS if shared else None)
     if out is None:
         out = pathlib.Path("runs") / "-".join([world.task.name, world.robot, world.grasping, algo, obs, str(seed)])
     depends = {**depends_on(world, perception), "paper_rl": paper_rl}
@@ -106,7 +113,7 @@ def run(
     if shown is not None:
         depends["demos"] = int(shown.reward.shape[0])
         learner = begin_as_clone(algorithm, shown, seed)
-    result = train(world, algorithm, settings, depends, learner)
+    result = train(world, algorithm, settings, depends, learner, shared)
     device = jax.devices()[0]
     card = {
         "command": shlex.join(["ig2mj", *sys.argv[1:]]),
@@ -115,6 +122,7 @@ def run(
         "seed": seed,
         "worlds": count,
         "engine": engine,
+        "devices": max(len(shared), 1),
         "device": f"{device.device_kind} ({platform.machine()})",
         "minutes": round(result.row["seconds"] / 60, 2),
         "compile_s": round(result.compile_s, 1),

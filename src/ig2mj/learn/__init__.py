@@ -10,6 +10,8 @@
 | `networks`, `moments`, `replay` | actors and critics; running means and scales; past steps on the device |
 | `sac`, `ppo`, `bc`, `dagger` | the algorithms |
 | `collect` | steps of an environment under a policy: one scan on a pure engine, a loop on the native one |
+| `iteration` | a rollout and what is learned from it, on one device or on several |
 | `train`, `checkpoints`, `log` | the loop around an algorithm; what survives a kill; CSV and TensorBoard |
+| `labels`, `demos` | what should be done in a state; demonstrations as HDF5 |
 | `policies`, `evaluate` | policy files, and how good they are |
 """

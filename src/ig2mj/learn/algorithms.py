@@ -44,15 +44,17 @@ def config_of(name: str, small: bool = False) -> Config:
     return (SMALL if small else CONFIGS)[name]
 
 
-def made(config: Config, perception: Perception, env: Environment, demos: Demos | None = None) -> Any:
-    """The algorithm of these settings for an environment. `demos`: for SAC.
+def made(
+    config: Config, perception: Perception, env: Environment, demos: Demos | None = None, axis: str | None = None
+) -> Any:
+    """The algorithm of these settings for an environment. `demos`: for SAC. `axis`: of several devices.
 
     Raises:
       UnknownNameError, EngineError: DAgger needs an expert, and the task has none.
     """
     size = env.action_space.shape[0]
     if isinstance(config, SACConfig):
-        return SAC(perception, size, config, demos=demos)
+        return SAC(perception, size, config, axis, demos)
     if isinstance(config, PPOConfig):
-        return PPO(perception, size, config)
-    return Dagger(perception, size, expert_of(env), config)
+        return PPO(perception, size, config, axis)
+    return Dagger(perception, size, expert_of(env), config, axis)

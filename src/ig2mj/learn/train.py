@@ -15,51 +15,20 @@ import math
 import pathlib
 import time
 from collections import deque
-from collections.abc import Mapping
-from typing import Any, Protocol, runtime_checkable
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 
-from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.checkpoints import Checkpoints
-from ig2mj.learn.collect import NativeCollector, Play, TrainingEnv, begin, collect_fn
+from ig2mj.learn.collect import TrainingEnv
+from ig2mj.learn.iteration import Algorithm, ManyDevices, OneDevice
 from ig2mj.learn.log import Log
-from ig2mj.learn.perception import Perception
 
 EPISODES = (100, 2000)
 """Return and success are told of so many of the last episodes: of as many as there are worlds, within these limits."""
-
-
-@runtime_checkable
-class Algorithm(Protocol):
-    """What the loop asks of an algorithm; all methods but the properties are pure."""
-
-    name: str
-    perception: Perception
-    action_size: int
-    config: Any
-    actor: Any
-    hint: Any
-
-    @property
-    def length(self) -> int: ...
-
-    def warm_up(self, resumed: bool) -> int: ...
-
-    def init(self, key: Array) -> Any: ...
-
-    def memory(self, num_worlds: int) -> Any: ...
-
-    def noise(self, num_worlds: int) -> Any: ...
-
-    def act(self, learner: Any, noise: Any, seen: Any, key: Array, told: Any = None) -> tuple[Array, Any, Any]: ...
-
-    def learn(
-        self, learner: Any, memory: Any, rollout: Any, key: Array, progress: Array, ready: Array
-    ) -> tuple[Any, Any, dict[str, Array]]: ...
 
 
 @dataclasses.dataclass(frozen=True)
@@ -128,13 +97,20 @@ class _Window:
 
 
 def train(
-    env: TrainingEnv, algorithm: Algorithm, run: Run, depends: Mapping[str, Any] | None = None, learner: Any = None
+    env: TrainingEnv,
+    algorithm: Algorithm,
+    run: Run,
+    depends: Mapping[str, Any] | None = None,
+    learner: Any = None,
+    devices: Sequence[Any] = (),
 ) -> Result:
     """Trains.
 
     Args:
       depends: what makes the run what it is; a checkpoint of another is refused.
       learner: what to begin with; None: untrained.
+      devices: where several are to share the work; `env` is then one device's part of the worlds, and the algorithm
+        knows the axis (`iteration.ManyDevices`).
 
     Raises:
       Ig2mjError: a loss is not finite, or nothing can be resumed.
@@ -143,7 +119,8 @@ def train(
     key = jax.random.PRNGKey(run.seed)
     first_key, key = jax.random.split(key)
     learner = algorithm.init(first_key) if learner is None else learner
-    memory, play = algorithm.memory(env.num_worlds), begin(env, algorithm.noise(env.num_worlds), run.seed)
+    step: Any = ManyDevices(env, algorithm, devices) if devices else OneDevice(env, algorithm, run.programs)
+    memory = step.memory()
     checkpoints = Checkpoints(run.out) if run.out is not None else None
     log = Log(run.out, quiet=run.quiet)
     clock, iteration, env_steps, resumed = 0.0, 0, 0, False
@@ -156,15 +133,15 @@ def train(
             tree, meta = found
             learner, key, memory = tree["learner"], tree["key"], tree.get("memory", memory)
             clock, iteration, env_steps = meta["seconds"], meta["iteration"], meta["env_steps"]
-            play = begin(env, algorithm.noise(env.num_worlds), run.seed + iteration)  # not the same starts again
             resumed = True
             log.forget_after(clock)
     elif checkpoints is not None and checkpoints.numbers():
         raise Ig2mjError(f"{run.out} holds a run already: take --resume to go on with it, or another --out")
 
-    step = _Iteration(env, algorithm, run.programs)
+    learner, memory = step.place(learner, memory)
+    play = step.begin(run.seed + iteration)  # a resumed run has other starts
     waiting = 2 if resumed and run.save_buffer else algorithm.warm_up(resumed)
-    window, budget = _Window(time.monotonic(), int(np.clip(env.num_worlds, *EPISODES))), run.minutes * 60
+    window, budget = _Window(time.monotonic(), int(np.clip(step.num_worlds, *EPISODES))), run.minutes * 60
     logged = saved = time.monotonic()
     compile_s = simulator = math.nan
     zero = logged  # when the clock was 0
@@ -216,71 +193,6 @@ def train(
             log.close()
             return Result(learner, row, iteration, compile_s, stopped)
     raise AssertionError
-
-
-class _Iteration:
-    """A rollout and what is learned from it: one program on a pure engine, else the parts in turn."""
-
-    def __init__(self, env: TrainingEnv, algorithm: Algorithm, programs: int):
-        self._whole = None
-        if env.pure and programs == 1:
-
-            def whole(learner: Any, memory: Any, play: Play, key: Array, progress: Array, ready: Array) -> Any:
-                play_key, learn_key = jax.random.split(key)
-                play, rollout, sums = collect_fn(
-                    env, algorithm.perception, algorithm.act, algorithm.hint, learner, play, play_key, algorithm.length
-                )
-                learner, memory, losses = algorithm.learn(learner, memory, rollout, learn_key, progress, ready)
-                return learner, memory, play, sums, {**losses, "all_finite": _finite(learner)}
-
-            self._whole = jax.jit(whole, donate_argnums=(0, 1, 2))
-            return
-
-        def learn(learner: Any, memory: Any, rollout: Any, key: Array, progress: Array, ready: Array) -> Any:
-            learner, memory, losses = algorithm.learn(learner, memory, rollout, key, progress, ready)
-            return learner, memory, {**losses, "all_finite": _finite(learner)}
-
-        def collect(learner: Any, play: Play, key: Array) -> Any:
-            return collect_fn(
-                env, algorithm.perception, algorithm.act, algorithm.hint, learner, play, key, algorithm.length
-            )
-
-        self._learn = jax.jit(learn, donate_argnums=(0, 1))
-        if env.pure:
-            program = jax.jit(collect, donate_argnums=1)
-
-            def timed(learner: Any, play: Play, key: Array) -> Any:
-                began = time.perf_counter()
-                found = jax.block_until_ready(program(learner, play, key))
-                return *found, time.perf_counter() - began
-
-            self._collect = timed
-        else:
-            native = NativeCollector(env, algorithm.perception, algorithm.act, algorithm.hint)
-            self._collect = lambda learner, play, key: native(learner, play, key, algorithm.length)
-
-    def __call__(
-        self, learner: Any, memory: Any, play: Play, key: Array, progress: float, ready: bool
-    ) -> tuple[Any, Any, Play, dict[str, float], dict[str, float], float | None]:
-        share, go = jnp.float32(progress), jnp.bool_(ready)
-        if self._whole is not None:
-            learner, memory, play, sums, losses = self._whole(learner, memory, play, key, share, go)
-            spent = None
-        else:
-            play_key, learn_key = jax.random.split(key)
-            play, rollout, sums, spent = self._collect(learner, play, play_key)
-            learner, memory, losses = self._learn(learner, memory, rollout, learn_key, share, go)
-        sums, losses = jax.device_get((sums, losses))
-        return learner, memory, play, _floats(sums), _floats(losses), spent
-
-
-def _finite(tree: Any) -> Array:
-    floats = [a for a in jax.tree.leaves(tree) if jnp.issubdtype(a.dtype, jnp.floating)]
-    return jnp.stack([jnp.isfinite(a).all() for a in floats]).all()
-
-
-def _floats(tree: Mapping[str, Any]) -> dict[str, float]:
-    return {name: float(np.asarray(value)) for name, value in tree.items()}
 
 
 def _guard(losses: dict[str, float], checkpoints: Checkpoints | None) -> None:
