@@ -97,11 +97,18 @@ def run(
     count = worlds or WORLDS.get(engine, PURE_WORLDS)
     shared = jax.local_devices()[: devices or None] if devices != 1 else []
     if (devices > 1 and len(shared) < devices) or devices < 0 or count % max(len(shared), 1):
-        have = f"{len(jax.local_devices())} devices are here, and they share worlds evenly"
+        have = f"there are {len(jax.local_devices())} devices, and worlds are shared evenly"
         raise Ig2mjError(f"--devices {devices} --worlds {count}: {have}")
     world = make(
-        env, robot, count // max(len(shared), 1), engine, grasping, observations=names, paper_rl=paper_rl, pool_size=pool_size or None
-    )  # fmt: skip
+        env,
+        robot,
+        count // max(len(shared), 1),
+        engine,
+        grasping,
+        observations=names,
+        paper_rl=paper_rl,
+        pool_size=pool_size or None,
+    )
     perception = Perception(world.observation_spaces, obs)
     shown = load_demos(demos, perception, world_of(world)) if demos is not None else None
     algorithm = made(config, perception, world, shown, AXIS if shared else None)
