@@ -120,6 +120,23 @@ def test_dust_is_of_its_class_and_of_the_instance_it_lies_on(world):
     assert (seen["ins_seg"][dirty] == table + 1).all()
 
 
+@pytest.mark.parametrize("yaw", [0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
+def test_leaving_out_what_is_out_of_view_changes_no_pixel(tiny_home_folder, yaw, monkeypatch):
+    robot = Humanoid(pos=(0.6, -0.6, 0.55), quat=(np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)))
+    world = Perceiving(tiny_home_folder, robot)
+    suite = world.suite("rgb", "depth", "ins_seg", width=48, height=24)
+    hidden = []
+    original = NativeCamera._out_of_view
+    with monkeypatch.context() as patch:
+        patch.setattr(NativeCamera, "_out_of_view", lambda *a: hidden.append(original(*a)) or hidden[-1])
+        culled, _ = world.read(suite)
+    assert hidden[0].any() and not hidden[0].all()
+    monkeypatch.setattr(NativeCamera, "_out_of_view", lambda self, *_: np.zeros(self._drawn.ngeom, bool))
+    whole, _ = world.read(suite)
+    for name, image in whole.items():
+        np.testing.assert_array_equal(culled[name], image)
+
+
 def test_classes_are_the_same_in_every_home():
     known = class_of_category()
     assert sorted(known, key=known.__getitem__) == sorted(known)
