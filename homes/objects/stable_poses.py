@@ -35,16 +35,20 @@ def centre_of_mass(model: HouseholdObject) -> np.ndarray:
     for link in model.links:
         hulls = [hull_mesh(points) for points in link.hulls]
         volumes = np.array([mesh.volume for mesh in hulls])
-        written = trimesh.util.concatenate([hull_mesh(np.asarray(points).round(6)) for points in link.hulls])
-        written.merge_vertices()
+        meshes = [hull_mesh(np.asarray(points).round(6)) for points in link.hulls]
+        offsets = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+        written = trimesh.Trimesh(
+            np.concatenate([mesh.vertices for mesh in meshes]),
+            np.concatenate([mesh.faces + k for mesh, k in zip(meshes, offsets, strict=False)]),
+        )
         if written.is_watertight:
-            first = sum(
-                v * (np.asarray(mesh.center_mass) + link.origin) for v, mesh in zip(volumes, hulls, strict=True)
-            )
+            share = np.zeros(3)
+            for volume, mesh in zip(volumes, hulls, strict=True):
+                share += volume * (np.asarray(mesh.center_mass) + link.origin)
         else:
-            first = volumes.sum() * (np.asarray(written.centroid) + link.origin)
+            share = volumes.sum() * (np.asarray(written.centroid) + link.origin)
         total += volumes.sum()
-        moment += first
+        moment += share
     return moment / total
 
 

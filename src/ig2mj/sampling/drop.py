@@ -110,7 +110,7 @@ def rest_at(
         gap = height[places, None] + under - surface[at]
         contact, bears = gap <= TOUCH, allowed[at]
         sound = np.where(contact, bears, True).all(1)
-        level_base = ((gap <= LEVEL_BASE) & bears)[:, base].all(1)
+        level_base = np.all(bears[:, base] & (gap[:, base] <= LEVEL_BASE), axis=1)
         if support == "full":
             sound &= level_base
         stays = _balanced(contact[sound], place)

@@ -164,11 +164,14 @@ class Placer:
         rng: np.random.Generator,
         budget: Budget,
         rejected: Rejections,
+        along: int = -1,
     ) -> bool:
         """Puts an object into an area so that `truth` holds afterwards; leaves the world as it was where it cannot.
 
         Args:
           areas: see `Areas`. truth: asked after the object has settled. rejected: counts are added to it.
+          along: an object with whose sides every second orientation is aligned, so that a pillow finds its place in a
+            cabinet that it all but fills; -1: all are turned by any angle.
         """
         task = _Task(object_index, truth, rng, budget, rejected, self.query.save())
         for draw in range(DRAWS):
@@ -176,7 +179,8 @@ class Placer:
                 rejected["budget spent"] += 1
                 break
             support = SUPPORT[min(draw * len(SUPPORT) // FIRST_DRAWS, len(SUPPORT) - 1)]
-            quat, shift = self._orientation(object_index, rng), rng.uniform(-CELL / 2, CELL / 2, 2)
+            aligned = along if draw % 2 else -1
+            quat, shift = self._orientation(object_index, rng, aligned), rng.uniform(-CELL / 2, CELL / 2, 2)
             shape = self.query.footprint(object_index, quat, shift)
             for area in itertools.islice(areas(shape, rng), AREAS):
                 if self._try_area(task, quat, shape, area, support):
@@ -290,16 +294,19 @@ class Placer:
             self.query.place(object_index, pos, quat)
         return pos
 
-    def _orientation(self, object_index: int, rng: np.random.Generator) -> Float[np.ndarray, "4"]:
-        """A stable orientation drawn by its probability, turned about the vertical by any angle."""
+    def _orientation(self, object_index: int, rng: np.random.Generator, along: int) -> Float[np.ndarray, "4"]:
+        """A stable orientation drawn by its probability, turned about the vertical: by any angle, or as `along` is."""
         quats, prob = self._orientations[object_index]
         if quats is None:
             quat = np.array(self.query.view.object_quat[0, object_index], float)
         else:
             quat = quats[rng.choice(len(prob), p=prob)]
-        half = rng.uniform(-np.pi, np.pi) / 2
+        angle = rng.uniform(-np.pi, np.pi)
+        if along >= 0:
+            w, x, y, z = np.asarray(self.query.view.object_quat[0, along], float)
+            angle = np.arctan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)) + rng.integers(4) * np.pi / 2
         w, x, y, z = quat
-        c, s = np.cos(half), np.sin(half)
+        c, s = np.cos(angle / 2), np.sin(angle / 2)
         turned = np.array([c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w])
         return turned / np.linalg.norm(turned)
 

@@ -187,7 +187,7 @@ def settle_worlds(
         physics, view = engine.step(physics)
         if not np.asarray(view.awake).any():
             break
-    return physics, ~np.asarray(view.awake).any(1)
+    return physics, np.logical_not(np.asarray(view.awake).any(1))
 
 
 def _object_masses(scene: Scene) -> list[tuple[np.ndarray, np.ndarray]]:

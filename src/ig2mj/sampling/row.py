@@ -154,7 +154,10 @@ class RowSampler:
             if other.value and other.predicate == "on_floor":
                 areas = on_floor.within(areas, self.query, room_index(self.model, other.arguments[1]))
         before = self.query.save()
-        if not self._placer.place(index, areas, lambda: self._holds(wanted), rng, budget, rejected):
+        along = -1
+        if rule.value and rule.predicate != "on_floor":
+            along = object_index(self.model, rule.arguments[1])
+        if not self._placer.place(index, areas, lambda: self._holds(wanted), rng, budget, rejected, along):
             return False
         opened = [c for c in self._joints if c.arguments[0] == name]
         if all(self._open(c, rng, rejected) for c in opened) and (not opened or self._holds(wanted)):
