@@ -19,6 +19,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.engine.snapshot import Snapshot
+from ig2mj.engine.view import PhysicsView
 from ig2mj.sampling.columns import CELL, Window
 from ig2mj.sampling.drop import Rest, origin, rest_at
 from ig2mj.sampling.footprint import Footprint
@@ -60,6 +61,9 @@ LOOSE_SPREAD = 0.01
 
 FIRST_DRAWS = 9
 """Orientations over which the demand goes down from full support to the least."""
+
+STEPS = 30
+"""Control steps of settling that count as one more unit of work."""
 
 AREAS = 8
 """Areas of a rule that are looked at for one orientation."""
@@ -107,7 +111,8 @@ class Budget:
     """How much may still be tried. Work is counted, not timed, so that a seed gives the same state on any machine.
 
     Attributes:
-      work: candidates that may be let go, and searches for candidates; each is one unit, some 5 to 20 ms.
+      work: candidates that may be let go, and searches for candidates; each is one unit, some 5 to 20 ms, and those
+        that take long to settle are more.
       seconds: wall time after which nothing is begun any more; infinite unless somebody is waiting.
     """
 
@@ -266,15 +271,27 @@ class Placer:
         if area.holds_at_once and not loose and not task.truth():
             return "predicate false"
         start = np.array(query.view.object_com[0, placed])
-        asleep = query.settle()
-        now = np.asarray(query.view.object_com[0])
-        moved = now[placed] - start
-        if not loose and (np.linalg.norm(moved[:2]) > SLIPPED[0] or moved[2] < -SLIPPED[1]):
-            return "fell"
-        others = np.linalg.norm(now - com, axis=1) > MOVED
-        others[placed] = False
-        if (others & ~on_top_of_it).any():
-            return "moves others"
+
+        def moved(view: PhysicsView) -> str:
+            now = np.asarray(view.object_com[0])
+            way = now[placed] - start
+            if not loose and (np.linalg.norm(way[:2]) > SLIPPED[0] or way[2] < -SLIPPED[1]):
+                return "fell"
+            others = np.linalg.norm(now - com, axis=1) > MOVED
+            others[placed] = False
+            return "moves others" if (others & ~on_top_of_it).any() else ""
+
+        steps = 0
+
+        def stop(view: PhysicsView) -> bool:
+            nonlocal steps
+            steps += 1
+            return bool(moved(view))
+
+        asleep = query.settle(stop=stop)
+        task.budget.work -= steps // STEPS
+        if reason := moved(query.view):
+            return reason
         if not asleep:
             return "not at rest"
         if query.penetration(placed) > RESTING_PENETRATION:

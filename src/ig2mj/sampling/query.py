@@ -9,7 +9,7 @@ Axes: W worlds, N candidates or rays, O objects.
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 
 import mujoco
 import numpy as np
@@ -168,14 +168,20 @@ class SceneQuery:
                     best, vector = float(distance), between[3:] - between[:3]
         return best, vector
 
-    def settle(self, seconds: float = SETTLE_SECONDS) -> bool:
-        """Steps until everything sleeps, or for some simulated time; whether everything sleeps."""
-        self.physics, asleep = settle_worlds(self.engine, self.physics, seconds)
+    def settle(self, seconds: float = SETTLE_SECONDS, stop: Callable[[PhysicsView], bool] = lambda view: False) -> bool:
+        """Steps until everything sleeps, or for some simulated time; whether everything sleeps.
+
+        `stop`: asked after every control step; True ends it at once, where going on is pointless.
+        """
+        self.physics, asleep = settle_worlds(self.engine, self.physics, seconds, stop)
         return bool(asleep.all())
 
 
 def settle_worlds(
-    engine: NativeEngine, physics: NativePhysics, seconds: float = SETTLE_SECONDS
+    engine: NativeEngine,
+    physics: NativePhysics,
+    seconds: float = SETTLE_SECONDS,
+    stop: Callable[[PhysicsView], bool] = lambda view: False,
 ) -> tuple[NativePhysics, Bool[np.ndarray, "W"]]:
     """Steps all worlds of an engine until every object of each sleeps, or for some simulated time.
 
@@ -185,7 +191,7 @@ def settle_worlds(
     view = engine.view(physics)
     for _ in range(round(seconds / (engine.substeps * engine.timestep))):
         physics, view = engine.step(physics)
-        if not np.asarray(view.awake).any():
+        if not np.asarray(view.awake).any() or stop(view):
             break
     return physics, np.logical_not(np.asarray(view.awake).any(1))
 
