@@ -8,6 +8,7 @@ import statistics
 from typing import Any
 
 TITLES = {"behavior100": "BEHAVIOR-100", "behavior1k": "BEHAVIOR-1K"}
+STARTS = {"behavior100": "starts", "behavior1k": "starts1k"}
 FEW = 4
 """Homes that are named in a row; of more only their number is told."""
 Row = dict[str, Any]
@@ -32,32 +33,38 @@ def write_page(page: pathlib.Path, results: pathlib.Path) -> None:
             continue
         homes = [json.loads(file.read_text(encoding="utf-8")) for file in files]
         lines += _suite(title, {home["home"]: home["activities"] for home in homes})
-        if suite == "behavior100":
-            lines += _starts(results / "starts")
+        lines += _starts(results / STARTS[suite], suite)
     page.write_text("\n".join(lines).rstrip() + "\n", encoding="utf-8")
 
 
-def _starts(folder: pathlib.Path) -> list[str]:
+def _starts(folder: pathlib.Path, suite: str) -> list[str]:
     """What came of sampling the starts."""
     rows = {f.stem: json.loads(f.read_text(encoding="utf-8")) for f in sorted(folder.glob("*.json"))}
     if not rows:
         return []
     tried = {name: len(row["seeds"]) for name, row in rows.items()}
     done = {name: sum(seed["done"] for seed in row["seeds"]) for name, row in rows.items()}
-    full = [name for name in rows if tried[name] >= 10]
-    good = [name for name in full if done[name] >= 8]
-    never = sum(done[name] == 0 for name in rows)
+    most = max(tried.values())
+    enough = sum(10 * done[name] >= 8 * most for name in rows)
+    option = "" if suite == "behavior100" else f" --suite {suite}"
+    ten = [
+        _median(row) for row in rows.values() if row.get("conditions") == 10 and any(s["done"] for s in row["seeds"])
+    ]
     lines = [
         "### Starts, sampled",
         "",
-        "`python benchmarks/behavior100_starts.py --seeds 10 --resume`: the start of each activity was sampled in the",
-        "home that fits best, 60 s of wall time a seed (one whose first three seeds fail is not tried with more).",
-        f"{len(rows)} of 100 activities have been run so far: {len(full)} of them with 10 seeds, the others with fewer",
-        f"(the column says how many). **{len(good)} of the {len(full)} succeed with at least 8**; of all",
-        f"{sum(tried.values())} seeds {sum(done.values())} succeeded, {never} activities never did.",
+        f"`python benchmarks/behavior100_starts.py{option} --seeds {most} --resume`: the start of each activity, sampled",
+        "in the home to which least is added, or the next one where that fails; 60 s of wall time a seed (one whose first",
+        "three seeds fail is not tried with more).",
+        f"**Of {len(rows)} activities {enough} succeed with at least 8 of 10 seeds** ({most} were tried); of all",
+        f"{sum(tried.values())} seeds {sum(done.values())} succeeded, {sum(n == 0 for n in done.values())} activities never did.",
         "*processor*: seconds of processor time of a seed, the median (wall time on the machine of the benchmark,",
         "which did other work, was several times that); *first*: of the first seed, in which predicates are compiled.",
         "*done before*: rows in which the goal holds already.",
+    ]
+    if ten:
+        lines += [f"An activity with ten conditions takes {statistics.median(ten):.2f} s (median of {len(ten)})."]
+    lines += [
         "",
         "| activity | home | added | conditions | seeds | processor | first | done before | why others fail |",
         "|---|---|--:|--:|--:|--:|--:|--:|---|",
@@ -74,13 +81,19 @@ def _starts(folder: pathlib.Path) -> list[str]:
             len(row.get("added", ())),
             row.get("conditions", "-"),
             f"{done[name]} of {tried[name]}",
-            f"{statistics.median(spent[1:] or spent):.2f}",
+            f"{_median(row):.2f}",
             f"{spent[0]:.1f}",
             already or "",
             why,
         )
         lines.append("| " + " | ".join(map(str, cells)) + " |")
     return [*lines, ""]
+
+
+def _median(row: Row) -> float:
+    """Processor time of a seed, the first left out where there are more."""
+    spent = [seed["processor"] for seed in row["seeds"]] or [float("nan")]
+    return statistics.median(spent[1:] or spent)
 
 
 def _suite(title: str, found: dict[str, dict[str, Row]]) -> list[str]:

@@ -3,11 +3,12 @@
     python benchmarks/behavior100_starts.py --seeds 10             every activity; then writes docs/behavior100.md anew
     python benchmarks/behavior100_starts.py --seeds 10 --resume    only the seeds that no earlier run got to
     python benchmarks/behavior100_starts.py --activities cleaning_toilet --part 0 2    every second of these activities
+    python benchmarks/behavior100_starts.py --suite behavior1k --seeds 3 --resume    those of BEHAVIOR-1K that fit a home
 
 A row has 60 s of wall time. Homes are tried in turn, those to which least is added first, until in one of them a start
 can be sampled (at most three). The scene is loaded and its predicates are compiled before, once for all seeds
 (`preparing`).
-An activity is one file, benchmarks/results/behavior100/starts/<activity>.json.
+An activity is one file, benchmarks/results/behavior100/starts/<activity>.json (BEHAVIOR-1K: starts1k).
 """
 
 from __future__ import annotations
@@ -21,15 +22,16 @@ from typing import Any
 
 import jax
 import numpy as np
+from behavior100 import expressible
 from behavior100_page import write_page
 
 from ig2mj.errors import Ig2mjError
 from ig2mj.sampling.many import make_sampler, sample_row
 from ig2mj.sampling.placement import Budget
-from ig2mj.scene.manifest import Manifest, load_manifest
+from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.paths import scene_folder, shipped_homes
 from ig2mj.tasks.bddl.binding import Binding
-from ig2mj.tasks.bddl.definitions import activity_names, load_activity
+from ig2mj.tasks.bddl.definitions import load_activity
 from ig2mj.tasks.bddl.start import HOMES, GoalCheck, fitting, load_bound, start_conditions
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
@@ -43,6 +45,7 @@ HOPELESS = 3
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--suite", choices=("behavior100", "behavior1k"), default="behavior100")
     parser.add_argument("--activities", nargs="*", help="just these")
     parser.add_argument("--seeds", type=int, default=10)
     parser.add_argument("--resume", action="store_true", help="keep the seeds of earlier runs, do the others")
@@ -50,16 +53,21 @@ def main() -> None:
     parser.add_argument("--out", type=pathlib.Path, default=RESULTS)
     parser.add_argument("--page", type=pathlib.Path, default=PAGE)
     args = parser.parse_args()
-    folder = args.out / "starts"
+    behavior_1k = args.suite == "behavior1k"
+    folder = args.out / ("starts1k" if behavior_1k else "starts")
     folder.mkdir(parents=True, exist_ok=True)
     homes = [load_manifest(scene_folder(home)) for home in shipped_homes()]
-    for name in (args.activities or activity_names())[args.part[0] :: args.part[1]]:
+    names = args.activities or [activity.name for activity in expressible(behavior_1k)]
+    for name in names[args.part[0] :: args.part[1]]:
+        bound, _ = fitting(load_activity(name, behavior_1k), homes)
+        if behavior_1k and not bound:
+            continue  # the page says what it lacks
         file = folder / f"{name}.json"
         known = json.loads(file.read_text(encoding="utf-8")) if args.resume and file.is_file() else {}
         tried = [seed["done"] for seed in known.get("seeds", ())]
         if len(tried) >= args.seeds or (len(tried) >= HOPELESS and not any(tried)):
             continue
-        row = try_activity(name, homes, args.seeds, known)
+        row = try_activity(bound, args.seeds, known)
         file.write_text(json.dumps(row) + "\n", encoding="utf-8")
         good = sum(seed["done"] for seed in row["seeds"])
         why = row.get("failed") or ", ".join(list(row["reasons"])[:2] if good < len(row["seeds"]) else [])
@@ -68,9 +76,8 @@ def main() -> None:
     write_page(args.page, args.out)
 
 
-def try_activity(name: str, homes: list[Manifest], seeds: int, known: dict[str, Any]) -> dict[str, Any]:
+def try_activity(bound: list[Binding], seeds: int, known: dict[str, Any]) -> dict[str, Any]:
     """What came of the seeds; those in `known` are kept if the home and the binding are still the same."""
-    bound, _ = fitting(load_activity(name), homes)
     if not bound:
         return {"home": None, "failed": "fits no home", "seeds": [], "reasons": {}}
     if any(seed["done"] for seed in known.get("seeds", ())):
