@@ -3,7 +3,7 @@
     python benchmarks/behavior100_starts.py --seeds 10             every activity; then writes docs/behavior100.md anew
     python benchmarks/behavior100_starts.py --seeds 10 --resume    only the seeds that no earlier run got to
     python benchmarks/behavior100_starts.py --activities cleaning_toilet --part 0 2    every second of these activities
-    python benchmarks/behavior100_starts.py --suite behavior1k --seeds 3 --resume    those of BEHAVIOR-1K that fit a home
+    python benchmarks/behavior100_starts.py --suite behavior1k --seeds 3 --resume    those of BEHAVIOR-1K that fit
 
 A row has 60 s of wall time. Homes are tried in turn, those to which least is added first, until in one of them a start
 can be sampled (at most three). The scene is loaded and its predicates are compiled before, once for all seeds
