@@ -39,14 +39,13 @@ def run(
       json: print one JSON object.
     """
     import json as form
-    import sys
 
     import jax
 
-    from ig2mj.envs.registry import VECTORS, make
+    from ig2mj.envs.registry import make
+    from ig2mj.envs.rollout import play
     from ig2mj.errors import Ig2mjError
-    from ig2mj.learn.evaluate import evaluate
-    from ig2mj.learn.perception import Perception
+    from ig2mj.learn.evaluate import acting, summary
     from ig2mj.learn.policies import Policy, find_policy
 
     if episodes < 1:
@@ -57,25 +56,19 @@ def run(
     if engine is None:
         engine = "warp" if jax.default_backend() == "gpu" else "native"
     count = worlds or min(episodes, WORLDS.get(engine, PURE_WORLDS))
-    names = VECTORS if depends["mode"] == "state" else (*VECTORS, "rgb", "depth")
     env = make(
         depends["task"],
         robot or depends["robot"],
         count,
         engine,
         grasping or depends["grasping"],
-        observations=tuple(dict.fromkeys((*names, *depends["vector"]))),
+        observations=loaded.observations,
         paper_rl=loaded.card.get("paper_rl", False),
         split=split,
         pool_size=pool_size or None,
     )
-    perception = Perception(env.observation_spaces, depends["mode"])
-    loaded.check(env, perception, file)
-
-    def progress(done: int, of: int) -> None:
-        print(f"{done} of {of} episodes", file=sys.stderr)
-
-    found = evaluate(env, loaded.actor(perception, drawn=drawn), episodes, progress).summary()
+    played = play(env, acting(loaded, env, file, drawn=drawn), episodes, in_order=True)
+    found, metrics = summary(played), env.metrics(played.state)
     result = {
         "env": env.task.name,
         "robot": env.robot,
@@ -87,6 +80,8 @@ def run(
         "engine": engine,
         "worlds": count,
         **found,
+        "overflow": metrics["overflow"],
+        "non_finite": metrics["not_finite"],
     }
     if json:
         print(form.dumps(result))

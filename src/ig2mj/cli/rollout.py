@@ -10,6 +10,7 @@ import tyro
 if TYPE_CHECKING:
     from ig2mj.envs.environment import Environment
     from ig2mj.envs.rollout import Act
+    from ig2mj.learn.policies import Policy
 
 AGENTS = ("zero", "random", "expert")
 
@@ -34,7 +35,8 @@ def run(
 
     Args:
       env: CookingMeat, or ig2mj/CookingMeat-v0 (`ig2mj list-envs`).
-      agent: who acts: zero (nothing moves), random, or expert (a script; the six activities have one).
+      agent: who acts: zero (nothing moves), random, expert (a script; the six activities have one), or a policy: a file
+        that `ig2mj train` wrote, or the name of one that ships.
       robot: humanoid, fetch or turtlebot; default: the first that `ig2mj list-envs` names.
       grasping: mitten, assisted, sticky or physical; default: the task's own.
       engine: native, warp or jax; default: warp on a GPU, else native.
@@ -52,20 +54,27 @@ def run(
 
     import numpy as np
 
-    from ig2mj.envs.registry import make
+    from ig2mj.envs.registry import VECTORS, make
     from ig2mj.envs.rollout import play
-    from ig2mj.errors import Ig2mjError, UnknownNameError
+    from ig2mj.errors import Ig2mjError
 
-    if agent not in AGENTS:
-        raise UnknownNameError("agent", agent, AGENTS)
+    policy = None if agent in AGENTS else _policy(agent)
     if episodes < 1 or worlds < 1:
         raise Ig2mjError(f"--episodes {episodes}, --worlds {worlds}: at least one of each is needed")
     if video is not None:
         engine = engine or "native"
     split = "held_out" if held_out else split
     played = make(
-        env, robot, worlds, engine, grasping, paper_rl=paper_rl, split=split, pool_size=pool_size or None
-    )  # fmt: skip
+        env,
+        robot,
+        worlds,
+        engine,
+        grasping,
+        observations=VECTORS if policy is None else policy.observations,
+        paper_rl=paper_rl,
+        split=split,
+        pool_size=pool_size or None,
+    )
     film = None
     if video is not None:
         from ig2mj.showcase.episode_film import EpisodeFilm
@@ -73,7 +82,12 @@ def run(
         film = EpisodeFilm(video, played)
     try:
         outcome = play(
-            played, _acting(agent, played, seed), episodes, seed, held_out, film.see if film is not None else None
+            played,
+            _acting(agent, policy, played, seed),
+            episodes,
+            seed,
+            held_out,
+            film.see if film is not None else None,
         )
     finally:
         if film is not None:
@@ -109,9 +123,25 @@ def run(
     return 0
 
 
-def _acting(agent: str, env: Environment, seed: int) -> Act:
-    """Who acts. Raises UnknownNameError: the task has no expert."""
+def _policy(name: str) -> Policy:
+    """Raises UnknownNameError: neither an agent nor a policy. InputError: it cannot be read."""
+    from ig2mj.errors import UnknownNameError
+    from ig2mj.learn.policies import Policy, find_policy, shipped
+
+    try:
+        return Policy.load(find_policy(name))
+    except UnknownNameError:
+        raise UnknownNameError("agent", name, (*AGENTS, *shipped())) from None
+
+
+def _acting(agent: str, policy: Policy | None, env: Environment, seed: int) -> Act:
+    """Who acts. Raises UnknownNameError: the task has no expert. InputError: the policy is for something else."""
     import numpy as np
+
+    if policy is not None:
+        from ig2mj.learn.evaluate import acting
+
+        return acting(policy, env, agent)
 
     if agent == "expert":
         from ig2mj.envs.experts import expert_of

@@ -129,6 +129,12 @@ class Policy:
             raise InputError(file, f"has format {card.get('format')}, and {FORMAT_VERSION} is what can be read")
         return cls(card, weights, mean, deviation)
 
+    @property
+    def observations(self) -> tuple[str, ...]:
+        """What an environment must observe for it (`ig2mj.make`)."""
+        depends = self.card["depends"]
+        return (*depends["vector"], *(("rgb", "depth") if depends["mode"] == "rgbd" else ()))
+
     def check(self, env: Any, perception: Perception, file: object = "the policy") -> None:
         """Raises InputError where the policy is for something else, with the pair that differs."""
         refuse_difference(file, self.card["depends"], depends_on(env, perception))
