@@ -115,7 +115,7 @@ def _drive_and_kick(step: int, data: mujoco.MjData, rng: np.random.Generator) ->
 @pytest.fixture(autouse=True)
 def _looks_often(monkeypatch):
     """Small scenes, too, and whatever moves in them."""
-    for name, value in (("PATIENCE", 8), ("WORTHWHILE", 1), ("LASTING", 0)):
+    for name, value in (("PATIENCE", 8), ("WORTHWHILE", 1), ("LASTING", 0), ("PAYS", 0)):
         monkeypatch.setattr(vicinity, name, value)
 
 
@@ -195,7 +195,7 @@ def test_a_tower_far_away_is_kept_out_and_one_in_reach_is_let_in_whole():
 
 
 def test_where_masks_do_not_last_everything_stays_in(monkeypatch):
-    monkeypatch.setattr(vicinity, "LASTING", 6)
+    monkeypatch.setattr(vicinity, "PAYS", 500)
     model = _home(np.random.default_rng(0))
     assert 0 < _assert_same(model, 240, _drive) < _masked_always(model, monkeypatch)
     monkeypatch.setattr(vicinity, "WORTHWHILE", 10_000)
@@ -204,7 +204,7 @@ def test_where_masks_do_not_last_everything_stays_in(monkeypatch):
 
 def _masked_always(model: mujoco.MjModel, monkeypatch) -> int:
     with monkeypatch.context() as within:
-        within.setattr(vicinity, "LASTING", 0)
+        within.setattr(vicinity, "PAYS", 0)
         return _run(model, 240, True, _drive)[1]
 
 

@@ -10,7 +10,7 @@ everything, stay bitwise the same:
 - after each physics step, before the next collision, the speeds tell how far any body can have moved at most
   (positions are integrated from just these speeds). When that comes to `SPHERE_MARGIN`, neighbours are looked for anew.
 
-A mask is only used where it saves more than it costs (`WORTHWHILE`, `LASTING`).
+A mask is only used where it saves more than it costs (`WORTHWHILE`, `PAYS`).
 
 Whoever changes a world by another way than a step must tell (`forget`).
 
@@ -34,8 +34,12 @@ ROUNDING = 1e-6
 WORTHWHILE = 100
 """Geoms that a mask must keep out to be worth its time: each saves 0.04 us of a physics step, looking costs 300."""
 
+PAYS = 2500
+"""Geoms kept out, times control steps, that a mask must have come to to be followed by another one at once: what it has
+saved is what the next look costs."""
+
 LASTING = 6
-"""Control steps that a mask must have lasted to be followed by another one at once."""
+"""Control steps for which everything stays in after something was changed by another way than a step."""
 
 PATIENCE = 30
 """Control steps until it is tried again, where it was not worth it or fewer trees are awake than when last tried."""
@@ -56,7 +60,7 @@ class VicinityTable:
       contype, conaffinity: [B] of the model, everything in. always: [B] bodies that stay in.
       bodies: [b] those with geoms that collide. tree: [b] theirs, -1 static. geoms: [b] how many.
       centre, half: [b, 3, 1] box of their geoms and margins in the body's frame. radius: [b, 1] of the sphere about it.
-      dof_tree: [V].
+      dof_tree: [V]. tree_dof: [T] first degree of freedom of each tree.
       driven: [T] trees with actuators. equality, linked: [e], [e, 2] constraints that join two trees, and these trees.
       levers: what turns with what.
     """
@@ -73,6 +77,7 @@ class VicinityTable:
     geoms: np.ndarray
     always: np.ndarray
     dof_tree: np.ndarray
+    tree_dof: np.ndarray
     driven: np.ndarray
     equality: np.ndarray
     linked: np.ndarray
@@ -120,6 +125,7 @@ class VicinityTable:
             geoms=count,
             always=always,
             dof_tree=np.array(model.dof_treeid),
+            tree_dof=np.array(model.tree_dofadr),
             driven=driven,
             equality=np.flatnonzero(between),
             linked=equality_tree[between],
@@ -153,12 +159,14 @@ class Levers:
         joint, point, slack = [], [], []
         for k, own in enumerate(own_body.tolist()):
             for body in np.flatnonzero(below[own]).tolist():
-                # The joint's own body keeps its distance to the anchor, where no other joint lies between.
-                rigid = body == own and int(model.body_jntnum[own]) == 1
-                joint, point, slack = [*joint, k], [*point, body], [*slack, 0.0 if rigid else 2 * SPHERE_MARGIN]
+                fixed = _keeps_distance(model, own, body, int(model.body_jntnum[body]))
+                joint, point, slack = [*joint, k], [*point, body], [*slack, 0.0 if fixed else 2 * SPHERE_MARGIN]
             for other in np.flatnonzero(below[own, own_body]).tolist():
                 if other != k:
-                    joint, point, slack = [*joint, k], [*point, model.nbody + other], [*slack, 2 * SPHERE_MARGIN]
+                    body = int(own_body[other])
+                    fixed = _keeps_distance(model, own, body, other - int(model.body_jntadr[body]))
+                    joint, point = [*joint, k], [*point, model.nbody + other]
+                    slack = [*slack, 0.0 if fixed else 2 * SPHERE_MARGIN]
         dof_joint = np.array(model.dof_jntid)
         kind, first = np.asarray(model.jnt_type)[dof_joint], np.asarray(model.jnt_dofadr)[dof_joint]
         free = (kind == int(mujoco.mjtJoint.mjJNT_FREE)) & (np.arange(model.nv) < first + 3)
@@ -215,7 +223,7 @@ class Vicinity:
         self._left = 0.0  # metres that a body may still move
         self._loose = 0.0  # metres per unit of the speeds' norm
         self._looked_at = b"", b""  # trees awake, equalities active
-        self._wait = 0
+        self._wait = self._out = 0  # control steps until the next look; geoms kept out
         self._let_in()
 
     @property
@@ -253,9 +261,11 @@ class Vicinity:
             self._look((self._tree_awake.tobytes(), self._eq_active.tobytes()))
 
     def _travel(self) -> float:
-        """Metres, at least what any body moved in the last physics step; infinite where that is unknown."""
+        """Metres, at least what any body moved in the last physics step; infinite where that is unknown. A body moves
+        with the joints of its own tree only."""
         np.abs(self._qvel, out=self._speeds)
-        return float(self._speeds @ self._weights) * self.table.timestep
+        self._speeds *= self._weights
+        return float(np.add.reduceat(self._speeds, self.table.tree_dof).max()) * self.table.timestep
 
     def _reckons_with(self, now: tuple[bytes, bytes]) -> bool:
         """Whether the trees that are awake were reckoned with when neighbours were looked for."""
@@ -269,11 +279,12 @@ class Vicinity:
         """Finds what stays in. Positions may be those before the last integration: that step counts as moved."""
         table, lasted = self.table, PATIENCE - self._wait
         self._looked_at, self._wait = now, PATIENCE
-        if not self.open and lasted < LASTING:
+        if not self.open and lasted * self._out < PAYS:
             self._wait = 4 * PATIENCE  # too much moves, or too fast
             return self._let_in()
         kept, self._trees = self._neighbours()
-        if table.geoms @ ~kept[table.bodies] < WORTHWHILE:
+        self._out = int(table.geoms @ ~kept[table.bodies])
+        if self._out < WORTHWHILE:
             return self._let_in()
         sure = self._trees[table.dof_tree]
         self._weights = np.where(sure, table.levers.weights(self._data), _NEVER)
@@ -317,6 +328,28 @@ class Vicinity:
                 trees[mate] = True
                 mate = int(asleep[mate])
         return trees
+
+
+def _keeps_distance(model: mujoco.MjModel, own: int, body: int, count: int) -> bool:
+    """Whether a point keeps its distance to the anchor of a joint of `own`.
+
+    Args:
+      body: on whose chain the point is, `own` or below: its frame, or the anchor of one of its joints. count: how many
+        of its joints, the first ones, may move the point.
+    """
+    if body == own:
+        return int(model.body_jntnum[own]) == 1  # where no other joint lies between
+    turns = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_BALL))
+    first = int(model.body_jntadr[body])
+    # joints that turn the body about its own frame leave that where it is
+    if any(int(model.jnt_type[j]) not in turns or model.jnt_pos[j].any() for j in range(first, first + count)):
+        return False
+    between = int(model.body_parentid[body])
+    while between != own:
+        if model.body_jntnum[between]:
+            return False
+        between = int(model.body_parentid[between])
+    return int(model.body_jntnum[own]) == 1
 
 
 def _matrix(quat: np.ndarray) -> np.ndarray:
