@@ -24,72 +24,29 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from flax import struct
 from jaxtyping import Bool, Float, Int, UInt
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.envs.observations import Observer, Space
+from ig2mj.envs.state import EnvState, Seen
 from ig2mj.errors import ActionError, EngineError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.scene.scene import Scene
-from ig2mj.sensors.base import Memory
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.actions import ActionMap
 from ig2mj.tasks.objective import Measures, Objective
 from ig2mj.tasks.task import TaskLike
 from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.core import Core
+from ig2mj.worlds.lazy.of_view import OfView
+from ig2mj.worlds.random_streams import pick_rows
 
 Seed = int | np.integer | Array
 """A whole number, or a key of JAX."""
 
 Companions = Callable[[UInt[Array, "W 2"], Int[Array, "W"]], Float[Array, "W m"]]
 """Actions of the other robots, from the episode's key and the number of the agent step. Pure."""
-
-
-@struct.dataclass
-class EnvState:
-    """All worlds of an environment.
-
-    Attributes:
-      batch: of the core. obs: observations by name. reward: of the last step.
-      terminated: success or failure ended the episode. truncated: the horizon or a guard did; never both.
-      info: "success"; "steps" of the episode; "reward/..." of each term; "bad_actions" (numbers of the last action that
-        were not finite); "flags" (`guards.Flag`); and the task's own. Of activities: "goal_progress" (share of the
-        goal's literals), "held" (the first object is in an acting hand), "success_in_hand" (success while the first
-        object is in all acting hands).
-      measures: what the reward is made of, for the next step's difference.
-      bad_actions: numbers that were not finite and were taken for 0, since the first reset.
-      memory: what sensors know of the last reading; None where none of them asks.
-    """
-
-    batch: Batch
-    obs: dict[str, Array]
-    reward: Float[Array, "W"]
-    terminated: Bool[Array, "W"]
-    truncated: Bool[Array, "W"]
-    info: dict[str, Any]
-    measures: Measures
-    bad_actions: Int[Array, "W"]
-    memory: Memory | None = None
-
-    @property
-    def done(self) -> Bool[Array, "W"]:
-        """The episode is over."""
-        return self.terminated | self.truncated
-
-
-@struct.dataclass
-class _Seen:
-    """What is computed after physics, in one program."""
-
-    obs: dict[str, Array]
-    reward: Float[Array, "W"]
-    terminated: Bool[Array, "W"]
-    truncated: Bool[Array, "W"]
-    info: dict[str, Array]
-    measures: Measures
 
 
 class Environment:
@@ -128,7 +85,9 @@ class Environment:
         self.privileged_names = objective.vectors["privileged_state"]
         self._substeps = round(ACTION_PERIOD / (core.engine.substeps * core.engine.timestep))
         self._clean = jax.jit(self._clean_fn)
-        self._see, self._see_first = jax.jit(self._after_step), jax.jit(self._after_reset)
+        self._rows = jax.jit(lambda key: pick_rows(key, core.starts.pool.size))
+        compiled = jax.jit if core.engine.pure else OfView
+        self._see, self._see_first = compiled(self._after_step), compiled(self._after_reset)
         if core.engine.pure:
             self._step = jax.jit(self.step_fn, donate_argnums=0)
             self._reset = jax.jit(self.reset_fn, donate_argnums=0)
@@ -189,7 +148,6 @@ class Environment:
             batch.controllers,
             batch.flags,
             world.step,
-            world.key,
             state.measures,
             bad,
         )
@@ -247,7 +205,7 @@ class Environment:
             raise EngineError(f"start_from takes {self.num_worlds} rows, each from 0 to {size - 1}")
         chosen = self.core.starts.pool.rows(rows)
         batch = self.core.load(self.core.start(as_seed(seed)), chosen.physics, chosen.states)
-        return self._begun(batch, jnp.ones(self.num_worlds, bool), None)
+        return self._begun(batch, jnp.ones(self.num_worlds, bool), None, jnp.asarray(rows, jnp.int32))
 
     def reset_fn(self, state: EnvState, mask: Bool[Array, "W"]) -> EnvState:
         """`reset` of the masked worlds, not compiled."""
@@ -255,16 +213,25 @@ class Environment:
         state = dataclasses.replace(state, info={k: v for k, v in state.info.items() if k != "final_obs"})
         return self._begun(self.core.reset_fn(state.batch, mask), mask, state)
 
-    def _begun(self, batch: Batch, mask: Bool[Array, "W"], before: EnvState | None) -> EnvState:
-        """After a reset of the masked worlds; the others are as before."""
+    def _begun(
+        self,
+        batch: Batch,
+        mask: Bool[Array, "W"],
+        before: EnvState | None,
+        rows: Int[Array, "W"] | None = None,
+    ) -> EnvState:
+        """After a reset of the masked worlds, to these rows of the pool; None: those that were drawn for them. The
+        other worlds are as before."""
         world = batch.world
-        old = None if before is None else _Seen(**{f.name: getattr(before, f.name) for f in dataclasses.fields(_Seen)})
-        seen = self._see_first(world.view, world.states, batch.controllers, world.step, world.key, mask, old)
+        old = None if before is None else Seen(**{f.name: getattr(before, f.name) for f in dataclasses.fields(Seen)})
+        if rows is None:
+            rows = self._rows(world.key)
+        seen = self._see_first(world.view, world.states, batch.controllers, world.step, rows, mask, old)
         count = jnp.zeros(self.num_worlds, jnp.int32) if before is None else before.bad_actions
         return self._state(batch, seen, count, before, mask)
 
     def _state(
-        self, batch: Batch, seen: _Seen, bad: Int[Array, "W"], before: EnvState | None, begun: Array | None = None
+        self, batch: Batch, seen: Seen, bad: Int[Array, "W"], before: EnvState | None, begun: Array | None = None
     ) -> EnvState:
         """A state with its pictures. `begun`: worlds that were reset since `before`; the others keep its pictures."""
         last = None if before is None else (before.obs, before.memory)
@@ -295,11 +262,10 @@ class Environment:
         controllers: tuple[Any, ...],
         flags: Int[Array, "W"],
         control_steps: Int[Array, "W"],
-        key: UInt[Array, "W 2"],
         before: Measures,
         bad: Int[Array, "W"],
-    ) -> _Seen:
-        now = self.objective.measure(view, states, status, key, before)
+    ) -> Seen:
+        now = self.objective.measure(view, states, status, None, before)
         sound = flags == 0
         terms = {
             name: jnp.where(sound, jnp.nan_to_num(term), 0.0)
@@ -319,12 +285,12 @@ class Environment:
         states: ExtendedStates,
         controllers: tuple[Any, ...],
         control_steps: Int[Array, "W"],
-        key: UInt[Array, "W 2"],
+        rows: Int[Array, "W"],
         mask: Bool[Array, "W"],
-        before: _Seen | None,
-    ) -> _Seen:
+        before: Seen | None,
+    ) -> Seen:
         status = self._goal.status(states, view) if self._goal is not None else GoalStatus.empty(self.num_worlds)
-        now = self.objective.measure(view, states, status, key)
+        now = self.objective.measure(view, states, status, rows)
         zero = jnp.zeros(self.num_worlds, jnp.int32)
         none, terms = zero.astype(bool), {name: zero.astype(jnp.float32) for name in self.objective.terms}
         steps = control_steps // self._substeps
@@ -348,7 +314,7 @@ class Environment:
         truncated: Bool[Array, "W"],
         flags: Int[Array, "W"],
         bad: Int[Array, "W"],
-    ) -> _Seen:
+    ) -> Seen:
         info = {
             "success": success,
             **self.objective.info(view, measures, status),
@@ -360,7 +326,7 @@ class Environment:
         time_left = 1.0 - steps.astype(jnp.float32) / self.task.horizon
         obs = self._observer.vectors(view, states, controllers[0], measures, status, time_left)
         total = jnp.stack([terms[name] for name in self.objective.terms]).sum(0)
-        return _Seen(obs, total, terminated, truncated, info, measures)
+        return Seen(obs, total, terminated, truncated, info, measures)
 
     # Bad input.
 

@@ -24,6 +24,8 @@ NAMES = (
 
 _NAME = re.compile(rf"(?:{NAMESPACE}/)?(?P<name>[^/]+?)(?:-v(?P<version>\d+))?")
 
+_ACTIVITY = re.compile(rf"(?:{NAMESPACE}/)?activity/(?P<name>[^/]+?)(?:-v(?P<version>\d+))?")
+
 
 def short_name(name: str) -> str | None:
     """CookingMeat of CookingMeat, ig2mj/CookingMeat and ig2mj/CookingMeat-v0; None where there is no such one."""
@@ -31,6 +33,12 @@ def short_name(name: str) -> str | None:
     if match is None or match["name"] not in NAMES or int(match["version"] or VERSION) != VERSION:
         return None
     return match["name"]
+
+
+def activity_name(name: str) -> str | None:
+    """cleaning_windows of activity/cleaning_windows and ig2mj/activity/cleaning_windows-v0; None of other names."""
+    match = _ACTIVITY.fullmatch(name)
+    return None if match is None or int(match["version"] or VERSION) != VERSION else match["name"]
 
 
 def register(gymnasium: Any) -> None:

@@ -2,6 +2,7 @@
 
     env = ig2mj.make("CookingMeat", robot="humanoid", worlds=4096)
     env = ig2mj.make("PointNavigation", worlds=16)
+    env = ig2mj.make("activity/cleaning_up_after_a_meal", robot="fetch")
 
 `CookingMeat`, `ig2mj/CookingMeat` and `ig2mj/CookingMeat-v0` are the same.
 """
@@ -17,13 +18,14 @@ import jax
 from ig2mj.agents.grasping import MODES, Grasping
 from ig2mj.engine.registry import make_engine
 from ig2mj.envs.environment import Environment
-from ig2mj.envs.names import NAMES, NAMESPACE, short_name
+from ig2mj.envs.names import NAMES, NAMESPACE, activity_name, short_name
 from ig2mj.envs.observations import Observer, check_names
-from ig2mj.envs.setups import setup_activity, setup_navigation
+from ig2mj.envs.setups import setup_activity, setup_bddl, setup_navigation
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.sensors.base import SensorOptions
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.tasks.activities import ACTIVITIES
+from ig2mj.tasks.bddl.task import BddlTask, bddl_task
 from ig2mj.tasks.navigation.task import NAVIGATION, NavigationTask
 from ig2mj.tasks.task import Task
 from ig2mj.worlds.core import Core
@@ -31,6 +33,8 @@ from ig2mj.worlds.pool import Pool
 
 VECTORS = ("proprioception", "privileged_state")
 """Observations that every engine and every task can make."""
+
+AnyTask = Task | NavigationTask | BddlTask
 
 TASKS: dict[str, Task | NavigationTask] = {**ACTIVITIES, **NAVIGATION}
 """By name, in the order of `list_envs`."""
@@ -41,8 +45,15 @@ def list_envs() -> list[str]:
     return list(NAMES)
 
 
-def find_task(name: str) -> Task | NavigationTask:
-    """The task of an environment's name. Raises UnknownNameError, with near matches."""
+def find_task(name: str) -> AnyTask:
+    """The task of an environment's name: of `list_envs`, or "activity/" and one of BEHAVIOR-100's.
+
+    Raises:
+      UnknownNameError: with near matches. For activities also what `bddl_task` raises.
+    """
+    activity = activity_name(name)
+    if activity is not None:
+        return bddl_task(activity)
     short = short_name(name)
     if short is None:
         raise UnknownNameError("environment", name.removeprefix(f"{NAMESPACE}/"), NAMES)
@@ -50,7 +61,7 @@ def find_task(name: str) -> Task | NavigationTask:
 
 
 def make(
-    name: str | Task | NavigationTask,
+    name: str | AnyTask,
     robot: str | None = None,
     worlds: int = 1,
     engine: str | None = None,
@@ -68,13 +79,13 @@ def make(
     """Makes an environment.
 
     Args:
-      name: of a task (`list_envs`), or a task of your own.
+      name: of a task (`list_envs`), "activity/" and the name of an activity of BEHAVIOR-100, or a task of your own.
       robot: "humanoid", "fetch" or "turtlebot"; None: the first that the task lists.
       worlds: how many step together.
       engine: "native", "warp" or "jax"; None: "warp" where JAX has a GPU, else "native".
       grasping: "mitten" (sticks to the task's first object at the first touch, as in the paper's experiments),
         "assisted", "sticky" or "physical"; with the last three an action of an activity closes hands, too. None:
-        "mitten" for activities, "physical" for navigation.
+        "mitten" for the paper's activities, "assisted" for others, "physical" for navigation.
       observations: names of sensors and of the task's own vectors, see `ig2mj.envs.observations`; pictures and laser
         scans need the native or the warp engine.
       paper_rl: the thresholds that the paper's runs had: any force cuts, and three quarters of the stains may stay.
@@ -88,7 +99,7 @@ def make(
       UnknownNameError: no such environment, robot, mode, observation, engine or split.
       EngineError: the engine cannot do what is asked.
     """
-    task = name if isinstance(name, Task | NavigationTask) else find_task(name)
+    task = name if isinstance(name, AnyTask) else find_task(name)
     robot = next(iter(task.robots)) if robot is None else robot
     mode = task.grasping if grasping is None else grasping
     if mode not in MODES:
@@ -97,6 +108,8 @@ def make(
         raise EngineError(f"worlds = {worlds}: an environment has at least one")
     if isinstance(task, NavigationTask):
         setup = setup_navigation(task, robot, split, pool_size)
+    elif isinstance(task, BddlTask):
+        setup = setup_bddl(task, robot, pool, split, pool_size)
     else:
         setup = setup_activity(task, robot, mode, pool, split, pool_size, paper_rl)
     if engine is None:

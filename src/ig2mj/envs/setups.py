@@ -13,8 +13,11 @@ from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.envs.environment import Companions
 from ig2mj.errors import UnknownNameError
 from ig2mj.scene.scene import Scene, load_scene
-from ig2mj.tasks.actions import ActionMap, hand_actions, robot_actions
+from ig2mj.tasks.actions import ActionMap, hand_actions, robot_actions, whole_actions
 from ig2mj.tasks.activity_objective import ActivityObjective
+from ig2mj.tasks.bddl.goal import conditions
+from ig2mj.tasks.bddl.objective import BddlObjective
+from ig2mj.tasks.bddl.task import BddlTask, activity_pool, standing_place
 from ig2mj.tasks.navigation.companions import wanderers
 from ig2mj.tasks.navigation.objective import NavigationObjective
 from ig2mj.tasks.navigation.starts import make_starts
@@ -27,6 +30,9 @@ from ig2mj.worlds.rules import Rules
 
 PAPER_RL_STAINS = 0.75
 """Share of the stains that may stay in the paper's runs (spec/robots_tasks_sensors.md section 0.1)."""
+
+STANDING = {"humanoid": 0.55, "fetch": 0.0}
+"""m above the floor at which robots start."""
 
 DRIVERS: dict[str, Any] = {"turtlebot": TurtleBot, "fetch": Fetch}
 """Robots of navigation tasks by name."""
@@ -97,6 +103,22 @@ def setup_navigation(task: NavigationTask, robot: str, split: str, count: int | 
         robot_actions(controllers[0].action_names, arm=arm, gripper=task.goal == "close"),
         companions=companions,
     )
+
+
+def setup_bddl(task: BddlTask, robot: str, pool: Pool | None, split: str, count: int | None) -> Setup:
+    """Of an activity that BDDL defines. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
+    if robot not in task.robots:
+        raise UnknownNameError(f"robot that can do {task.name}", robot, task.robots)
+    rows = pool if pool is not None else activity_pool(task, split, count)
+    x, y = standing_place(task, rows)
+    body: Robot = ROBOTS[robot](pos=(x, y, STANDING[robot]))
+    scene = load_scene(task.home, agents=[body], objects=task.binding.additions)
+    rules = Rules.of_scene(scene)
+    goal = conditions(task.binding).compile_goal(rules.model)
+    controller = body.controller(scene.tables, 0)
+    objective = BddlObjective(task.objects_in(scene), goal, scene)
+    actions = whole_actions(controller.action_names, controller.action_high)
+    return Setup(scene, rules.with_goal(goal), rows, (controller,), objective, actions)
 
 
 def rules_of(task: Task, scene: Scene, paper_rl: bool = False) -> Rules:

@@ -88,6 +88,11 @@ def hand_actions(names: Sequence[str], hands: tuple[int, ...], closing: bool) ->
     return ActionMap(tuple(chosen), places, np.array(scale * len(hands), np.float32), rest)
 
 
+def whole_actions(names: Sequence[str], high: Float[np.ndarray, "n"]) -> ActionMap:
+    """All numbers of a robot's action; 1 is its limit `high`."""
+    return ActionMap(tuple(names), np.arange(len(names)), high.astype(np.float32), np.zeros(len(names), np.float32))
+
+
 DRIVE = ("forward", "turn_left")
 ARM = tuple(f"eef_{n}" for n in _ROTATION)
 

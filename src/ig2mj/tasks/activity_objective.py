@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, UInt
+from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import quat_rotate_inverse, relative_pose
@@ -38,7 +38,7 @@ class ActivityObjective:
         view: PhysicsView,
         states: ExtendedStates,
         status: GoalStatus,
-        key: UInt[Array, "W 2"],
+        row: Int[Array, "W"] | None,
         before: Measures | None = None,
     ) -> Measures:
         return self.reward.measure(view, states, status, before)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Protocol, runtime_checkable
 
-from jaxtyping import Bool, Float, UInt
+from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.predicates.compile import GoalStatus
@@ -38,15 +38,15 @@ class Objective(Protocol):
         view: PhysicsView,
         states: ExtendedStates,
         status: GoalStatus,
-        key: UInt[Array, "W 2"],
+        row: Int[Array, "W"] | None,
         before: Measures | None = None,
     ) -> Measures:
         """What is measured now.
 
         Args:
           status: of the task's goal; empty for a task without a goal expression.
-          key: of the world's episode: what is drawn at random for an episode follows from it.
-          before: of the step before; None at the start of an episode.
+          row: of the pool that the episodes begin with; None after steps. before: of the step before; None at the
+            start of episodes.
         """
         ...
 

@@ -42,6 +42,7 @@ from ig2mj.states.world import ExtendedStates, Swap, WorldState
 from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.hands import Hands
+from ig2mj.worlds.lazy.of_view import OfView
 from ig2mj.worlds.lazy.stepper import StateStepper
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.rules import Outcome, Rules, States
@@ -84,7 +85,7 @@ class Core:
         self.action_high = np.concatenate([np.zeros(0), *(c.action_high for c in self.controllers)])
         self.starts = Starts(engine, rules.initial if rules is not None else None, pool)
         self._physics_step = engine.step  # a world at rest steps in under 2 us: even looking up a name counts
-        self._control = jax.jit(self._control_fn)
+        self._control = self._of_view(self._control_fn)
         self._count, self._chosen = jax.jit(self._count_fn), jax.jit(chosen)
         if engine.pure:
             self.advance, self.grasp = jax.jit(self.advance_fn), jax.jit(self.hands.act)
@@ -122,7 +123,7 @@ class Core:
     def step_fn(self, batch: Batch, action: Float[Array, "W n"] | None = None) -> tuple[Batch, GoalStatus]:
         """`step`, not compiled."""
         if self.controllers and action is not None:
-            action, controllers = self._control(action, batch.world.view, batch.controllers)
+            action, controllers = self._control(batch.world.view, action, batch.controllers)
             batch = dataclasses.replace(batch, controllers=controllers)
         return self._control_step(batch, action)
 
@@ -133,7 +134,7 @@ class Core:
         calls it in 4 times `steps`, and MJX keeps a CUDA graph of each.
         """
         if self.controllers:
-            action, controllers = self._control(action, batch.world.view, batch.controllers)
+            action, controllers = self._control(batch.world.view, action, batch.controllers)
             batch = dataclasses.replace(batch, controllers=controllers)
         if not self.engine.pure:
             batch, status = self._control_step(batch, action)
@@ -141,8 +142,12 @@ class Core:
                 batch, status = self._control_step(batch, None)
             return batch, status
 
-        batch, each = jax.lax.scan(lambda batch, _: self._control_step(batch, action), batch, None, steps)
-        return batch, jax.tree.map(lambda a: a[-1], each)
+        def body(batch: Batch, _: None) -> tuple[Batch, list[Array]]:
+            batch, status = self._control_step(batch, action)
+            return batch, [status.holds, status.fraction, status.literals]
+
+        batch, each = jax.lax.scan(body, batch, None, steps)
+        return batch, GoalStatus(*(field[-1] for field in each))
 
     def _control_step(self, batch: Batch, ctrl: Float[Array, "W nu"] | None) -> tuple[Batch, GoalStatus]:
         """One control step of MuJoCo's controls."""
@@ -201,10 +206,14 @@ class Core:
         self, action: Float[Array, "W n"], view: PhysicsView, controllers: tuple[Any, ...]
     ) -> tuple[Float[Array, "W nu"], tuple[Any, ...]]:
         """MuJoCo's controls for an action of the robots, and what their controllers remember now."""
-        return self._control(action, view, controllers)
+        return self._control(view, action, controllers)
+
+    def _of_view(self, function: Callable[..., Any]) -> Callable[..., Any]:
+        """A function of the view and others, compiled as the engine's views want it."""
+        return jax.jit(function) if self.engine.pure else OfView(function)
 
     def _control_fn(
-        self, action: Float[Array, "W n"], view: PhysicsView, states: tuple[Any, ...]
+        self, view: PhysicsView, action: Float[Array, "W n"], states: tuple[Any, ...]
     ) -> tuple[Float[Array, "W nu"], tuple[Any, ...]]:
         action = jnp.clip(jnp.asarray(action), self.action_low, self.action_high)
         sizes = np.cumsum([c.action_size for c in self.controllers])[:-1]

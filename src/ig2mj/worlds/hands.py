@@ -17,6 +17,7 @@ from ig2mj.agents.base import Controller
 from ig2mj.agents.grasping import Grasping, GraspState
 from ig2mj.engine.base import Engine, Physics
 from ig2mj.engine.view import OF_CONSTRAINTS, Array, PhysicsView, read_field, replace_fields
+from ig2mj.worlds.lazy.of_view import OfView
 
 Held = GraspState | None
 """What hands hold; None where they hold by friction alone."""
@@ -29,7 +30,7 @@ class Hands:
         """Binds a rule of grasping to an engine and to the controllers that ask hands to close."""
         self._engine, self._grasping, self._controllers = engine, grasping, tuple(controllers)
         self._holds = grasping is not None and grasping.active
-        self._update = jax.jit(self._updated)
+        self._update = jax.jit(self._updated) if engine.pure else OfView(self._updated)
         if grasping is not None:
             self._constraints, self._read = jax.jit(grasping.write), jax.jit(grasping.read)
 

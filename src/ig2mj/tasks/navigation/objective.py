@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 from flax import struct
-from jaxtyping import Bool, Float, Int, UInt
+from jaxtyping import Bool, Float, Int
 
 from ig2mj.agents.turtlebot import BASE_RADIUS
 from ig2mj.engine.view import Array, PhysicsView
@@ -25,7 +25,6 @@ from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.navigation.floor import look_up
 from ig2mj.tasks.navigation.starts import GROUND, Starts
 from ig2mj.tasks.navigation.task import NavigationTask
-from ig2mj.worlds.random_streams import pick_rows
 
 CLOSED = 0.05
 """Share of its range up to which a joint counts as closed."""
@@ -64,7 +63,6 @@ class NavigationObjective:
     def __init__(self, task: NavigationTask, scene: Scene, starts: Starts):
         """`starts`: of this task in this scene."""
         self._task, self._floor, tables = task, starts.floor, scene.tables
-        self._rows = starts.pool.size
         self._goals, self._fields, self._shortest = starts.goals, starts.fields, starts.shortest
         self._ground = np.isin(np.array(tables.object_categories), GROUND)
         self._hand = int(np.flatnonzero(tables.hand_agent == 0)[0]) if task.goal == "reach" else -1
@@ -102,10 +100,10 @@ class NavigationObjective:
         view: PhysicsView,
         states: ExtendedStates,
         status: GoalStatus,
-        key: UInt[Array, "W 2"],
+        row: Int[Array, "W"] | None,
         before: Measures | None = None,
     ) -> Measures:
-        row = pick_rows(jnp.asarray(key), self._rows) if before is None else before.row
+        row = jnp.asarray(row if before is None else before.row)
         base = jnp.asarray(view.agent.base_pos)[:, 0]
         pos, goal = base[:, :2], jnp.asarray(self._goals)[row]
         floor = self._floor

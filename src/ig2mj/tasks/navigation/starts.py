@@ -80,7 +80,7 @@ def make_starts(
     rng, count = np.random.default_rng(SEEDS[split]), count or COUNT[split]
     households = _Households(task, bare)
     base = fitted(households.still, NativeEngine(scene, 1)._start, 1, scene.name)
-    places = _Places(scene, np.asarray(base.whole("qpos")))
+    places = Places(scene, np.asarray(base.whole("qpos")))
     floor = places.floor()
     cells = floor.cells
     goals, fields, shortest = np.zeros((count, 3)), [], np.zeros(count)
@@ -118,7 +118,7 @@ class _Placed:
 
 
 def _place(
-    places: _Places,
+    places: Places,
     floor: FloorMap,
     cells: np.ndarray,
     rng: np.random.Generator,
@@ -137,7 +137,7 @@ def _place(
     raise EngineError(f"in {TRIES} places of '{places.scene.name}' a robot of the task collides with something")
 
 
-def _snapshots(base: Snapshot, rows: list, places: _Places) -> Snapshot:
+def _snapshots(base: Snapshot, rows: list, places: Places) -> Snapshot:
     """One row for each pair of a household (None: the base's) and poses of the robots."""
     whole = [base if household is None else _with_household(base, household) for household, _ in rows]
     if all(household is None for household, _ in rows):
@@ -155,7 +155,7 @@ def _with_household(base: Snapshot, household: Snapshot) -> Snapshot:
     return dataclasses.replace(base, scene=household.scene, time=household.time)
 
 
-class _Places:
+class Places:
     """Where the robots of a scene can stand in its settled household."""
 
     def __init__(self, scene: Scene, qpos: Float[np.ndarray, "nq"]):
@@ -195,6 +195,11 @@ class _Places:
         other = geom[own.any(1) & ~own.all(1) & (apart <= 0)]
         self._hide(number)
         return bool((self._ground[other] | (self._agent[other] == number)).all())
+
+    def object_positions(self, names: Sequence[str]) -> Float[np.ndarray, "n 3"]:
+        """Origins of objects in the settled household, world frame, m."""
+        mujoco.mj_kinematics(self.scene.model, self._data)
+        return self._data.xpos[[self.scene.tables.object_root[self.scene.object_index(n)] for n in names]]
 
     def floor(self) -> FloorMap:
         """Where the first robot can stand."""

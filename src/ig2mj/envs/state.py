@@ -1,0 +1,60 @@
+"""What an environment is made of that changes: `EnvState`.
+
+Axis: W worlds.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flax import struct
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.view import Array
+from ig2mj.sensors.base import Memory
+from ig2mj.tasks.objective import Measures
+from ig2mj.worlds.batch import Batch
+
+
+@struct.dataclass
+class EnvState:
+    """All worlds of an environment.
+
+    Attributes:
+      batch: of the core. obs: observations by name. reward: of the last step.
+      terminated: success or failure ended the episode. truncated: the horizon or a guard did; never both.
+      info: "success"; "steps" of the episode; "reward/..." of each term; "bad_actions" (numbers of the last action that
+        were not finite); "flags" (`guards.Flag`); and the task's own. Of activities: "goal_progress" (share of the
+        goal's literals), "held" (the first object is in an acting hand), "success_in_hand" (success while the first
+        object is in all acting hands).
+      measures: what the reward is made of, for the next step's difference.
+      bad_actions: numbers that were not finite and were taken for 0, since the first reset.
+      memory: what sensors know of the last reading; None where none of them asks.
+    """
+
+    batch: Batch
+    obs: dict[str, Array]
+    reward: Float[Array, "W"]
+    terminated: Bool[Array, "W"]
+    truncated: Bool[Array, "W"]
+    info: dict[str, Any]
+    measures: Measures
+    bad_actions: Int[Array, "W"]
+    memory: Memory | None = None
+
+    @property
+    def done(self) -> Bool[Array, "W"]:
+        """The episode is over."""
+        return self.terminated | self.truncated
+
+
+@struct.dataclass
+class Seen:
+    """What is computed after physics, in one program."""
+
+    obs: dict[str, Array]
+    reward: Float[Array, "W"]
+    terminated: Bool[Array, "W"]
+    truncated: Bool[Array, "W"]
+    info: dict[str, Array]
+    measures: Measures

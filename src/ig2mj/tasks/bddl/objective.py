@@ -1,0 +1,91 @@
+"""The objective of a BDDL activity: the share of its goal that holds (spec/robots_tasks_sensors.md section 2.5).
+
+Axes: W worlds, n objects, H hands.
+"""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+from jaxtyping import Bool, Float, Int
+
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.poses import relative_pose
+from ig2mj.predicates.compile import CompiledExpression, GoalStatus
+from ig2mj.scene.scene import Scene
+from ig2mj.states.world import ExtendedStates
+
+
+@struct.dataclass
+class Progress:
+    """Share of the goal that holds, in every world."""
+
+    share: Float[Array, "W"]
+
+
+class BddlObjective:
+    """See `ig2mj.tasks.objective.Objective`."""
+
+    terms = ("goal",)
+
+    def __init__(self, objects: tuple[str, ...], goal: CompiledExpression, scene: Scene):
+        """`objects`: that the activity is about. `goal`: of the same scene."""
+        self._objects = np.array([scene.object_index(name) for name in objects], int)
+        self._hands = np.flatnonzero(scene.tables.hand_agent == 0)
+        pose = [*(f"pos_{a}" for a in "xyz"), *(f"quat_{a}" for a in "wxyz")]
+        held = [f"in_hand_{k}" for k in range(len(self._hands))]
+        self.vectors: dict[str, tuple[str, ...]] = {
+            "privileged_state": (
+                *(f"{name}_{n}" for name in objects for n in pose),
+                *(f"{name}_{n}" for name in objects for n in held),
+                *(f"holds_{k}" for k in range(len(goal.atoms))),
+                *("goal_progress", "time_left"),
+            )
+        }
+
+    def measure(
+        self,
+        view: PhysicsView,
+        states: ExtendedStates,
+        status: GoalStatus,
+        row: Int[Array, "W"] | None,
+        before: Progress | None = None,
+    ) -> Progress:
+        return Progress(jnp.asarray(status.fraction, jnp.float32))
+
+    def rewards(self, before: Progress, now: Progress) -> dict[str, Float[Array, "W"]]:
+        """iGibson's: how much the share grew."""
+        return {"goal": now.share - before.share}
+
+    def ended(self, now: Progress, status: GoalStatus) -> tuple[Bool[Array, "W"], Bool[Array, "W"]]:
+        """Success ends an episode; there is no failure."""
+        holds = jnp.asarray(status.holds)
+        return holds, jnp.zeros_like(holds)
+
+    def info(self, view: PhysicsView, now: Progress, status: GoalStatus) -> dict[str, Array]:
+        return {"goal_progress": now.share}
+
+    def observe(
+        self,
+        view: PhysicsView,
+        states: ExtendedStates,
+        now: Progress,
+        status: GoalStatus,
+        time_left: Float[Array, "W"],
+    ) -> dict[str, Float[Array, "W n"]]:
+        """`privileged_state`: poses of the objects in the frame of the robot's base, which hands hold them, which
+        literals of the goal are true."""
+        agent, worlds = view.agent, view.object_com.shape[0]
+        base_pos, base_quat = jnp.asarray(agent.base_pos)[:, :1], jnp.asarray(agent.base_quat)[:, :1]
+        com, quat = jnp.asarray(view.object_com)[:, self._objects], jnp.asarray(view.object_quat)[:, self._objects]
+        place, turn = relative_pose(base_pos, base_quat, com, quat)
+        held = jnp.asarray(view.held)[:, self._hands][:, :, self._objects].swapaxes(1, 2)
+        columns = [
+            jnp.concatenate([place, turn], axis=-1).reshape(worlds, -1),
+            held.reshape(worlds, -1).astype(jnp.float32),
+            jnp.asarray(status.literals).astype(jnp.float32),
+            now.share[:, None],
+            time_left[:, None],
+        ]
+        return {"privileged_state": jnp.concatenate(columns, axis=1)}

@@ -1,0 +1,137 @@
+"""`BddlTask`: an activity that BDDL defines, bound to a home, as a task for environments.
+
+    env = ig2mj.make("activity/cleaning_up_after_a_meal", robot="fetch")
+
+The home is the shipped one in which the least has to be added. Start states are sampled on first use and kept. The
+robot starts on free floor, as near as it can be to what the activity is about.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import os
+import sys
+
+import numpy as np
+import scipy.ndimage
+
+from ig2mj.agents.turtlebot import TurtleBot
+from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.process.compilation import cache_folder
+from ig2mj.scene.manifest import load_manifest
+from ig2mj.scene.paths import scene_folder, shipped_homes
+from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.tasks.bddl.binding import Binding, BindingError
+from ig2mj.tasks.bddl.definitions import load_activity
+from ig2mj.tasks.bddl.start import fitting, load_bound, sample_start, start_conditions
+from ig2mj.tasks.navigation.starts import Places
+from ig2mj.tasks.pools import SEEDS, VERSION
+from ig2mj.worlds.pool import Pool, load_pool, save_pool
+
+PREFIX = "activity/"
+
+HORIZON = 1000
+"""Agent steps: 100 s."""
+
+ROWS = 16
+"""Start states unless another number is asked for."""
+
+CLEARANCE = 0.45
+"""m around the robot that are free of furniture."""
+
+
+@dataclasses.dataclass(frozen=True)
+class BddlTask:
+    """See the module's text.
+
+    Attributes:
+      name: "activity/" and the activity's name. summary: one sentence. binding: which objects of the home play it.
+      robots: names of those that can do it. horizon, grasping: as of `ig2mj.tasks.task.Task`.
+    """
+
+    name: str
+    summary: str
+    binding: Binding
+    robots: tuple[str, ...] = ("humanoid", "fetch")
+    horizon: int = HORIZON
+    grasping: str = "assisted"
+
+    @property
+    def home(self) -> str:
+        """Name of the home."""
+        return self.binding.home
+
+    def objects_in(self, scene: Scene) -> tuple[str, ...]:
+        """Names of the scene's objects that the activity is about."""
+        return tuple(dict.fromkeys(n for n in self.binding.objects.values() if n in scene.object_names))
+
+
+def bddl_task(name: str) -> BddlTask:
+    """The task of an activity's name, with or without "activity/".
+
+    Raises:
+      UnknownNameError: no such activity. BindingError: no home has what it needs. See also `load_activity`.
+    """
+    short = name.removeprefix(PREFIX)
+    activity = load_activity(short)
+    bound, errors = fitting(activity, [load_manifest(scene_folder(home)) for home in shipped_homes()])
+    if not bound:
+        home, reasons = min(errors.items(), key=lambda item: len(item[1]))
+        raise BindingError(activity.name, home, reasons)
+    words = activity.name.replace("_", " ")
+    return BddlTask(PREFIX + activity.name, f"{words[0].upper()}{words[1:]}.", bound[0])
+
+
+def activity_pool(task: BddlTask, split: str = "train", count: int | None = None) -> Pool:
+    """Start states of the bare household, read from the cache or sampled now.
+
+    Raises:
+      UnknownNameError: no such split. EngineError: none could be sampled.
+    """
+    if split not in SEEDS:
+        raise UnknownNameError("split", split, SEEDS)
+    wanted, bare = count or ROWS, load_bound(task.binding)
+    made_of = [VERSION, bare.digest, [c.expression for c in start_conditions(task.binding, bare)]]
+    mark = hashlib.blake2b(json.dumps(made_of, default=str).encode(), digest_size=6).hexdigest()
+    short = task.name.removeprefix(PREFIX)
+    file = cache_folder() / "pools" / f"{short}-{split}-{wanted}-{mark}.npz"
+    if file.exists():
+        return load_pool(file, bare)
+    print(f"sampling {wanted} start states of {task.name} in {task.home}, once", file=sys.stderr)
+    done = sample_start(task.binding, bare, wanted, SEEDS[split])
+    pool = done.sampled.pool
+    if pool is None:
+        raise EngineError(f"no start of {task.name} could be sampled: {dict(done.sampled.rejected.most_common(3))}")
+    keep = np.setdiff1d(np.arange(pool.size), done.reached)
+    if not len(keep):
+        raise EngineError(f"{task.name} is done in all of its sampled start states")
+    pool = pool.rows(keep)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    beside = file.with_name(f".{os.getpid()}-{file.name}")
+    save_pool(pool, beside, bare, {"task": task.name, "split": split})
+    beside.replace(file)
+    return pool
+
+
+def standing_place(task: BddlTask, pool: Pool) -> tuple[float, float]:
+    """World x and y (m): free floor with room to turn, near the activity's objects in the pool's first row.
+
+    Raises:
+      EngineError: the home has no map, or no such floor.
+    """
+    probe = load_scene(task.home, agents=[TurtleBot()], objects=task.binding.additions)
+    own = probe.start_data().qpos.copy()
+    row = np.asarray(pool.physics.scene.qpos)[0]
+    own[: len(row)] = row
+    places = Places(probe, own)
+    floor = places.floor()
+    padded = np.pad(floor.free, 1)
+    away = np.asarray(scipy.ndimage.distance_transform_edt(padded))[1:-1, 1:-1] * floor.resolution
+    cells = np.argwhere(away >= min(CLEARANCE, away.max()))
+    spots = floor.centres(cells)
+    centres = places.object_positions(task.objects_in(probe))[:, :2]
+    apart = np.linalg.norm(spots[:, None] - centres[None], axis=-1)
+    x, y = spots[int(np.argmin(np.median(apart, axis=1)))]
+    return float(x), float(y)
