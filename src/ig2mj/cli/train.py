@@ -14,6 +14,8 @@ WORLDS = {"native": 16}
 
 PURE_WORLDS = 2048
 
+OUT_OF_MEMORY = ("RESOURCE_EXHAUSTED", "Out of memory", "Failed to allocate")
+
 
 def run(
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")],
@@ -120,7 +122,15 @@ def run(
     if shown is not None:
         depends["demos"] = int(shown.reward.shape[0])
         learner = begin_as_clone(algorithm, shown, seed)
-    result = train(world, algorithm, settings, depends, learner, shared)
+    try:
+        result = train(world, algorithm, settings, depends, learner, shared)
+    except Exception as e:  # XLA's and Warp's errors have no type of their own
+        if not any(sign in str(e) for sign in OUT_OF_MEMORY):
+            raise
+        smaller = f"--worlds {count // 2}, or for sac and dagger --set capacity=..."
+        raise Ig2mjError(
+            f"{count} worlds and what is learned from do not fit into the device's memory: {smaller}"
+        ) from e
     device = jax.devices()[0]
     card = {
         "command": shlex.join(["ig2mj", *sys.argv[1:]]),
