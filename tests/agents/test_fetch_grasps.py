@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from robot_world import GraspingWorld, can
 
 from ig2mj.agents import Fetch

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import ig2mj
 from ig2mj.agents.base import Controller, Robot
+from ig2mj.agents.fetch import Fetch
 from ig2mj.agents.humanoid import Humanoid, HumanoidController
 from ig2mj.agents.humanoid.frames import FINGER_CLOSED, HAND_POS, THUMB_CLOSED
 from ig2mj.agents.humanoid.robot import BODY
@@ -194,8 +195,15 @@ def test_an_unknown_preset_is_named():
         Humanoid(compat="papers")
 
 
-def test_without_any_control_the_humanoid_stays_at_its_start():
-    """Keyframes of a scene without actuators know no controls; the robot's start is what its servos are told first."""
-    simulation = ig2mj.Simulation(ig2mj.load_scene("small_home", agents=[Humanoid(pos=(1.65, 0.95, 1.0))]))
+@pytest.mark.parametrize("home", ["small_home", "tiny_home"])
+def test_without_any_control_two_robots_stay_at_their_start(home, tiny_home_folder):
+    """A scene without actuators has none in its keyframe, or no keyframe at all; the robots' start is what their servos
+    are told first."""
+    fetch, humanoid = Fetch(pos=(-1.0, -1.5, 0.0)), Humanoid(pos=(1.65, 0.95, 1.0))
+    scene = ig2mj.load_scene(tiny_home_folder if home == "tiny_home" else home, agents=[fetch, humanoid])
+    simulation = ig2mj.Simulation(scene)
+    start = np.array(simulation.view.agent.joint_pos)
     view = simulation.step(count=15)
-    assert np.asarray(view.agent.base_pos)[0, 0] == pytest.approx([1.65, 0.95, 1.0], abs=0.02)
+    assert np.asarray(view.agent.base_pos)[0, 1] == pytest.approx([1.65, 0.95, 1.0], abs=0.02)
+    of_fetch = np.asarray(scene.tables.agent_joint_agent) == 0
+    assert np.abs(np.asarray(view.agent.joint_pos) - start)[0, of_fetch].max() < 0.02

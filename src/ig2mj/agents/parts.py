@@ -161,8 +161,11 @@ def add_pulled_joints(
 def extend_keyframes(spec: mujoco.MjSpec, qpos: Vector, dofs: int, controls: Vector) -> None:
     """Keyframes of a scene know nothing of what was attached: its joints and actuators come last in them.
 
-    To be called when the robot's actuators have been added.
+    A scene without keyframes gets one, of its zero pose: else all servos would pull to 0 until the first action. To be
+    called when the robot's actuators have been added.
     """
+    if not spec.keys:
+        spec.add_key(name="start")
     for key in spec.keys:
         for field, values in (("qpos", qpos), ("qvel", [0.0] * dofs), ("ctrl", controls)):
             present = list(getattr(key, field))

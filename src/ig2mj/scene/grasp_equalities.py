@@ -9,6 +9,10 @@ from ig2mj.scene.manifest import AgentEntry, Manifest
 TIME_CONSTANT = 0.02
 """Seconds in which a grasp takes back what it was pulled apart: MuJoCo's default, 2.4 physics steps."""
 
+IMPEDANCE = (0.98, 0.995, 0.001)
+"""MuJoCo's solimp. With its default, 0.9 to 0.95, a constraint yields as much as its lighter body would: a knife of
+0.1 kg turned by 0.2 rad in the hand for each N m, and its blade could not press with the 10 N that cut."""
+
 
 def equality_name(hand: str, body: str) -> str:
     """Of the constraint between two bodies."""
@@ -38,4 +42,5 @@ def add_grasp_equalities(spec: mujoco.MjSpec, manifest: Manifest, agents: list[A
                     name2=body,
                     active=False,
                     solref=[TIME_CONSTANT, 1.0],
+                    solimp=[*IMPEDANCE, 0.5, 2.0],
                 )
