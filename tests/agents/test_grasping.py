@@ -153,3 +153,17 @@ def test_grasps_are_a_pure_function_of_a_batch(tiny_home_folder):
     write = world.grasping.write(after)
     assert np.asarray(write.eq_active).sum(1).tolist() == [1, 0, 0]
     assert np.asarray(write.ignored_contacts).sum((1, 2)).tolist() == [1, 0, 0]
+
+
+def test_idle_hands_are_those_that_an_update_would_not_change(tiny_home_folder):
+    world = over_the_can(tiny_home_folder)
+    grasping, empty = world.grasping, world.grasping.initial(1)
+    closed, still = np.array([[1.0, 1.0]], np.float32), np.zeros((1, 2), np.float32)
+    assert grasping.idle(world.view, empty)
+    assert not np.asarray(grasping.update(world.view, empty, closed, still).held).any()
+    touched = np.zeros_like(world.view.agent.finger_force)
+    touched[0, 7, 0] = 1.0
+    assert not grasping.idle(world.view.replace(agent=world.view.agent.replace(finger_force=touched)), empty)
+    world.act(right_hand_trigger=1)
+    world.act(times=3)
+    assert world.held[1] and not grasping.idle(world.view, world.grasps), "it may be let go of"

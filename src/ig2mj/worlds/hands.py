@@ -40,6 +40,9 @@ class Hands:
         """Physics and view after hands took hold or let go, as after every control step. Uses up `physics`."""
         if not self._holds or held is None:
             return physics, view, held
+        assert self._grasping is not None
+        if not self._engine.pure and self._grasping.idle(view, held):
+            return physics, view, held
         after, changed = self._update(view, held, controllers)
         if not self._engine.pure:
             if np.asarray(changed).any():
