@@ -70,10 +70,15 @@ class Result:
 
 @dataclasses.dataclass
 class _Window:
-    """What happened since the last report, and in the last episodes."""
+    """What happened since the last report, and in the last episodes.
+
+    `last` reaches back over `episodes` episodes and `least` steps of all worlds together: over less than an episode's
+    horizon those that end are mostly the short ones, and those succeed.
+    """
 
     began: float
     episodes: int
+    least: float
     last: deque[dict[str, float]] = dataclasses.field(default_factory=deque)
     steps: float = 0.0
     updates: float = 0.0
@@ -82,7 +87,11 @@ class _Window:
 
     def add(self, sums: Mapping[str, float]) -> None:
         self.last.append(dict(sums))
-        while len(self.last) > 1 and sum(s["episodes"] for s in list(self.last)[1:]) >= self.episodes:
+        episodes, steps = (sum(s[name] for s in self.last) for name in ("episodes", "steps"))
+        while len(self.last) > 1:
+            episodes, steps = episodes - self.last[0]["episodes"], steps - self.last[0]["steps"]
+            if episodes < self.episodes or steps < self.least:
+                break
             self.last.popleft()
 
     def mean(self) -> dict[str, float | None]:
@@ -91,7 +100,7 @@ class _Window:
         episodes, steps = total.pop("episodes"), total.pop("steps")
         found: dict[str, float | None] = {}
         for name, value in total.items():
-            count = steps if name.startswith("reward") else episodes
+            count = steps if name.startswith("reward") else episodes if steps >= self.least else 0
             found[name] = value / count if count else None
         return found
 
@@ -140,8 +149,9 @@ def train(
 
     learner, memory = step.place(learner, memory)
     play = step.begin(run.seed + iteration)  # a resumed run has other starts
+    least = float(getattr(getattr(env, "task", env), "horizon", 0)) * step.num_worlds
     waiting = 2 if resumed and run.save_buffer else algorithm.warm_up(resumed)
-    window, budget = _Window(time.monotonic(), int(np.clip(step.num_worlds, *EPISODES))), run.minutes * 60
+    window, budget = _Window(time.monotonic(), int(np.clip(step.num_worlds, *EPISODES)), least), run.minutes * 60
     logged = saved = time.monotonic()
     compile_s = simulator = math.nan
     zero = logged  # when the clock was 0
@@ -174,7 +184,7 @@ def train(
         _guard(losses, checkpoints)
         window.add(sums)
         window.steps += sums["steps"] if done else 0
-        window.updates += losses.pop("updates") if done else 0
+        window.updates += losses.pop("updates") * (done > 0)
         window.losses = losses
         solved = run.until is not None and _solved(window, run.until)
         stopped = "solved" if solved else "time" if clock >= budget else None
@@ -185,7 +195,7 @@ def train(
             passed = max(now_s - window.began, 1e-9)
             row = _row(window, passed, clock, iteration, env_steps, compile_s)
             log.row(row)
-            logged, window = now_s, _Window(now_s, window.episodes, window.last)
+            logged, window = now_s, _Window(now_s, window.episodes, least, window.last)
         if now_s - saved >= run.checkpoint_every or stopped:
             save(learner)
             saved = time.monotonic()
@@ -208,8 +218,9 @@ def _guard(losses: dict[str, float], checkpoints: Checkpoints | None) -> None:
 
 
 def _solved(window: _Window, until: float) -> bool:
-    episodes = sum(s["episodes"] for s in window.last)
-    return episodes >= window.episodes and sum(s["success"] for s in window.last) >= until * episodes
+    episodes, steps = (sum(s[name] for s in window.last) for name in ("episodes", "steps"))
+    enough = episodes >= window.episodes and steps >= window.least
+    return enough and sum(s["success"] for s in window.last) >= until * episodes
 
 
 def _row(
