@@ -45,6 +45,7 @@ def _starts(folder: pathlib.Path, suite: str) -> list[str]:
     tried = {name: len(row["seeds"]) for name, row in rows.items()}
     done = {name: sum(seed["done"] for seed in row["seeds"]) for name, row in rows.items()}
     most = max(tried.values())
+    allowed = round(min(row.get("allowed", 60.0) for row in rows.values()))
     never = sum(n == 0 for n in done.values())
     enough = sum(10 * done[name] >= 8 * most for name in rows)
     option = "" if suite == "behavior100" else f" --suite {suite}"
@@ -55,7 +56,7 @@ def _starts(folder: pathlib.Path, suite: str) -> list[str]:
         "### Starts, sampled",
         "",
         f"`python benchmarks/behavior100_starts.py{option} --seeds {most} --resume`: the start of each activity,",
-        "sampled in the home to which least is added, or the next one where that fails; 60 s of wall time a seed",
+        f"sampled in the home to which least is added, or the next one where that fails; {allowed} s of wall time a seed",
         "(one whose first three seeds fail is not tried with more).",
         f"**Of {len(rows)} activities {enough} succeed with at least 8 of 10 seeds** ({most} were tried); of all",
         f"{sum(tried.values())} seeds {sum(done.values())} succeeded, {never} activities never did.",

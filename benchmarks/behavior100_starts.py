@@ -38,7 +38,7 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results" / "behavior100"
 PAGE = ROOT / "docs" / "behavior100.md"
 SECONDS = 60.0
-"""Wall time that a seed may take."""
+"""Wall time that a seed may take, if nothing else is said."""
 HOPELESS = 3
 """An activity whose first seeds all fail, so many of them, is not tried with more."""
 
@@ -48,6 +48,7 @@ def main() -> None:
     parser.add_argument("--suite", choices=("behavior100", "behavior1k"), default="behavior100")
     parser.add_argument("--activities", nargs="*", help="just these")
     parser.add_argument("--seeds", type=int, default=10)
+    parser.add_argument("--seconds", type=float, default=SECONDS, help="wall time that a seed may take")
     parser.add_argument("--resume", action="store_true", help="keep the seeds of earlier runs, do the others")
     parser.add_argument("--part", nargs=2, type=int, metavar=("N", "OF"), default=(0, 1), help="every OF-th activity")
     parser.add_argument("--out", type=pathlib.Path, default=RESULTS)
@@ -67,7 +68,7 @@ def main() -> None:
         tried = [seed["done"] for seed in known.get("seeds", ())]
         if len(tried) >= args.seeds or (len(tried) >= HOPELESS and not any(tried)):
             continue
-        row = try_activity(bound, args.seeds, known)
+        row = try_activity(bound, args.seeds, known, args.seconds)
         file.write_text(json.dumps(row) + "\n", encoding="utf-8")
         good = sum(seed["done"] for seed in row["seeds"])
         why = row.get("failed") or ", ".join(list(row["reasons"])[:2] if good < len(row["seeds"]) else [])
@@ -76,7 +77,7 @@ def main() -> None:
     write_page(args.page, args.out)
 
 
-def try_activity(bound: list[Binding], seeds: int, known: dict[str, Any]) -> dict[str, Any]:
+def try_activity(bound: list[Binding], seeds: int, known: dict[str, Any], seconds: float) -> dict[str, Any]:
     """What came of the seeds; those in `known` are kept if the home and the binding are still the same."""
     if not bound:
         return {"home": None, "failed": "fits no home", "seeds": [], "reasons": {}}
@@ -84,31 +85,32 @@ def try_activity(bound: list[Binding], seeds: int, known: dict[str, Any]) -> dic
         bound = sorted(bound, key=lambda b: b.home != known["home"])
     found: dict[str, Any] = {}
     for best in bound[:HOMES]:
-        found = try_home(best, seeds, known)
+        found = try_home(best, seeds, known, seconds)
         if "failed" not in found and any(seed["done"] for seed in found["seeds"]):
             return found
         known = {}
     return found
 
 
-def try_home(best: Binding, seeds: int, known: dict[str, Any]) -> dict[str, Any]:
+def try_home(best: Binding, seeds: int, known: dict[str, Any], seconds: float) -> dict[str, Any]:
     """What came of the seeds in one home."""
     row: dict[str, Any] = {
         "home": best.home,
         "added": list(best.additions),
         "preparing": 0.0,
+        "allowed": seconds,
         "seeds": [],
         "reasons": {},
     }
     if known.get("home") == best.home and known.get("added") == row["added"] and "failed" not in known:
         row |= {key: known[key] for key in ("seeds", "reasons")}
     try:
-        return {**row, **sample_seeds(best, seeds, row)}
+        return {**row, **sample_seeds(best, seeds, row, seconds)}
     except Ig2mjError as e:
         return {**row, "failed": f"{type(e).__name__}: {e}"}
 
 
-def sample_seeds(binding: Binding, seeds: int, row: dict[str, Any]) -> dict[str, Any]:
+def sample_seeds(binding: Binding, seeds: int, row: dict[str, Any], seconds: float) -> dict[str, Any]:
     """Samples the seeds that are not among those of `row` yet."""
     began = time.monotonic()
     scene = load_bound(binding)
@@ -122,7 +124,7 @@ def sample_seeds(binding: Binding, seeds: int, row: dict[str, Any]) -> dict[str,
         if len(done) >= HOPELESS and not any(one["done"] for one in done):
             break
         wall, processor = time.monotonic(), time.process_time()
-        made, why = sample_row(sampler, wanted, seed, 0, SECONDS)
+        made, why = sample_row(sampler, wanted, seed, 0, seconds)
         done.append(
             {
                 "done": made is not None,
