@@ -11,7 +11,7 @@ PYTEST_ARGS ?=
 .PHONY: help setup demo test test-slow test-gpu check docs homes-check format bench clean distclean
 
 help:
-	@echo "make demo       convert the small home, run it, cook a fish in it; leaves pictures, a plot, a film, a report"
+	@echo "make demo       convert the small home, run it, cook a fish in it; leaves pictures, a plot, films, a report"
 	@echo "make test       the quick tests (JOBS=$(JOBS) processes)"
 	@echo "make test-slow  the tests that take long"
 	@echo "make test-gpu   the tests that need a CUDA device"

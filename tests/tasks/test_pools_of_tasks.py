@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
 from ig2mj.errors import UnknownNameError
 from ig2mj.tasks.activities import ACTIVITIES
-from ig2mj.tasks.pools import bare_scene, make_pool, pool_file, pool_of
+from ig2mj.tasks.pools import HASHES, SEEDS, bare_scene, known_hash, make_pool, pool_file, pool_hash, pool_of
 
 TASK = ACTIVITIES["GraspingBook"]
 
@@ -38,3 +40,27 @@ def test_a_pool_is_made_once_and_again_byte_for_byte(cache):
 def test_an_unknown_split_is_named(cache):
     with pytest.raises(UnknownNameError, match="held_out"):
         pool_of(TASK, "test")
+
+
+def test_the_known_hashes_are_of_the_present_pools():
+    """A change of a task, its home or the sampler's version asks for new pools: `ig2mj sample-task all`."""
+    known = set(json.loads(HASHES.read_text()))
+    files = set()
+    for task in ACTIVITIES.values():
+        scene = bare_scene(task)
+        files |= {pool_file(task, scene, split).name for split in SEEDS}
+    assert known <= files
+
+
+def test_a_small_pool_has_no_known_hash(cache):
+    pool_of(TASK, count=2)
+    file = pool_file(TASK, bare_scene(TASK), count=2)
+    assert known_hash(file) is None and len(pool_hash(file)) == 64
+
+
+@pytest.mark.slow
+def test_a_pool_of_the_usual_size_is_made_anew_byte_for_byte(cache):
+    task = ACTIVITIES["CookingMeat"]
+    pool_of(task, jobs=2)
+    file = pool_file(task, bare_scene(task))
+    assert pool_hash(file) == known_hash(file)

@@ -1,4 +1,4 @@
-"""`ig2mj demo`: the small home from its URDF source to a running scene, and a fish that cooks in it."""
+"""`ig2mj demo`: the small home from its URDF source to a running scene, a fish that cooks in it, a robot that cooks."""
 
 from __future__ import annotations
 
@@ -21,10 +21,11 @@ def run(
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")] = pathlib.Path("out/demo"),
     jobs: int = 2,
 ) -> int:
-    """Convert the small home, run it, tell what stands where, cook a fish and freeze milk in it.
+    """Convert the small home, run it, tell what stands where, cook a fish and freeze milk in it; let a robot cook.
 
     Leaves DIR/dataset (the source), DIR/small_home (the scene and report.html), DIR/pictures and DIR/cooking
-    (temperatures as CSV, JSON and a plot, pictures, a film).
+    (temperatures as CSV, JSON and a plot, pictures, a film), and DIR/expert.mp4: in the shipped home birch a scripted
+    expert brings a steak to the stove until it is cooked.
 
     Args:
       out: folder for everything the demo makes.
@@ -48,6 +49,7 @@ def run(
         failed = _convert(console, step, small_home.NAME, out / "dataset", scene, jobs)
         _look(console, step, scene, out / "pictures")
         failed += _cook(console, step, scene, out / "cooking")
+        failed += _watch_expert(console, step, out / "expert.mp4")
     console.print(f"{time.perf_counter() - start:.0f} s. Look around in it: [bold]ig2mj view {scene}[/]")
     return 1 if failed else 0
 
@@ -149,3 +151,36 @@ def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
     for what in absent:
         console.print(f"           did not happen: {what}")
     return len(absent)
+
+
+def _watch_expert(console: Console, step: Step, file: pathlib.Path) -> int:
+    """A film of the scripted expert of CookingMeat; 1 if the steak is not cooked in the end."""
+    from ig2mj.envs.experts import expert_of
+    from ig2mj.envs.registry import make
+    from ig2mj.envs.rollout import play
+    from ig2mj.process.settings import GL_INSTALL_HINT
+    from ig2mj.showcase.episode_film import EpisodeFilm
+    from ig2mj.viewer.offscreen import default_backend
+
+    report = step("a robot cooks")
+    report("sampling where the steak lies", 0, None)
+    env = make("CookingMeat", robot="humanoid", engine="native", split="held_out", pool_size=1)
+    filming = default_backend() != "warp"  # its pictures take seconds
+    film = EpisodeFilm(file, env) if filming else None
+
+    def watch(state: Any) -> None:
+        if film is not None:
+            film.see(state)
+        seconds = int(state.info["steps"][0]) / 10
+        report(f"{seconds:.1f} s", int(state.info["steps"][0]), None)
+
+    try:
+        played = play(env, expert_of(env), 1, in_order=True, watch=watch)
+    finally:
+        if film is not None:
+            film.close()
+    cooked = played.success[0]
+    ending = "cooks the steak" if cooked else "does not cook the steak"
+    console.print(f"[bold]expert[/]     the humanoid {ending} in {played.steps / 10:.1f} s")
+    console.print(f"[bold]film[/]       {file if filming else f'none: it needs OpenGL ({GL_INSTALL_HINT})'}")
+    return 0 if cooked else 1

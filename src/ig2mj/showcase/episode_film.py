@@ -20,7 +20,7 @@ from ig2mj.viewer.state_marks import Tinter, draw_marks, marks, tint_of_objects
 WIDTH, HEIGHT = 640, 480
 """Pixels."""
 
-BETWEEN = 3
+BETWEEN = 2
 """Frames of an agent step of 1/10 s; positions between two steps are interpolated."""
 
 JUMP = 0.3

@@ -26,7 +26,7 @@ from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.tasks.task import Task
 from ig2mj.worlds.pool import Pool, load_pool, save_pool, stack
 
-VERSION = 1
+VERSION = 2
 """Of the rules by which pools of tasks are made. Raise it when the sampler's results change."""
 
 SEEDS = {"train": 1_000_003, "held_out": 2_000_003}
@@ -43,6 +43,9 @@ MAX_CHUNKS = 400
 
 FLAT = 0.98
 """Cosine of the angle between an object's z axis and the vertical from which it lies flat: 11 degrees."""
+
+HASHES = pathlib.Path(__file__).with_name("pool_hashes.json")
+"""Of the activities' pools of the usual sizes, by the names of their files. `ig2mj sample-task all` checks them."""
 
 Progress = Callable[[int, int], None]
 """Called with the number of rows made and wanted."""
@@ -96,6 +99,16 @@ def pool_file(task: Task, scene: Scene, split: str = "train", count: int | None 
     made_of = json.dumps([VERSION, scene.digest, task.objects, task.start, near, task.flat])
     mark = hashlib.blake2b(made_of.encode(), digest_size=6).hexdigest()
     return cache_folder() / "pools" / f"{task.name}-{split}-{count or COUNT[split]}-{mark}.npz"
+
+
+def pool_hash(file: pathlib.Path) -> str:
+    """sha256 of a pool's file."""
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+def known_hash(file: pathlib.Path) -> str | None:
+    """sha256 of a pool of the usual size as it was first made, by the name of its file; None for any other."""
+    return json.loads(HASHES.read_text()).get(file.name)
 
 
 def make_pool(
