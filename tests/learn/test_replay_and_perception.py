@@ -1,0 +1,99 @@
+"""What is replayed, and what networks see."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from small_envs import PointMass, SeenPointMass
+
+from ig2mj.learn.collect import Transition
+from ig2mj.learn.evaluate import wilson
+from ig2mj.learn.perception import FAR, Perception, Seen, shrunk
+from ig2mj.learn.replay import Replay
+from ig2mj.learn.sac import projected
+
+GAMMA = 0.5
+
+
+def told(steps, terminated, truncated):
+    """Two worlds; what is seen in step t of world w is 100 w + t, and after it half more; rewards are 1."""
+    number = 100.0 * jnp.arange(2) + jnp.asarray(steps, jnp.float32)[:, None]
+    picture = jnp.zeros((len(steps), 2, 0), jnp.uint8)
+    ends = [jnp.asarray(e, bool)[:, None] & jnp.array([True, False]) for e in (terminated, truncated)]
+    vector = jnp.repeat(number[..., None], 4, axis=-1)
+    ones = jnp.ones(number.shape)
+    return Transition(Seen(vector, picture), vector[..., :2], {}, ones, *ends, Seen(vector + 0.5, picture))
+
+
+@pytest.fixture(scope="module")
+def samples():
+    """Of a ring of six steps that was written over once; world 0 ends with success in step 4, is cut off in step 6."""
+    replay = Replay.empty(6, 2, Perception(PointMass(2).observation_spaces), 2)
+    for first in (0, 2, 4, 6):
+        steps = [first, first + 1]
+        replay = replay.insert(told(steps, [s == 4 for s in steps], [s == 6 for s in steps]))
+    drawn = replay.sample(jax.random.PRNGKey(0), 400, 3, GAMMA)
+    return jax.tree.map(np.asarray, drawn)
+
+
+def test_rewards_go_on_to_the_end_of_the_episode_and_no_farther(samples):
+    start = samples.seen.vector[:, 0]
+    assert set(start) == {2, 3, 4, 5, 102, 103, 104, 105}  # rows 6 and 7 are only ends, 0 and 1 were written over
+    for first, steps in ((2, 3), (3, 2), (4, 1), (5, 2), (102, 3), (105, 3)):
+        reward = sum(GAMMA**k for k in range(steps))
+        assert samples.reward[start == first] == pytest.approx(reward), first
+
+
+def test_success_has_no_value_after_it_and_a_cut_has_that_of_what_was_seen_last(samples):
+    start = samples.seen.vector[:, 0]
+    for first, discount, after in ((2, 0, 4.5), (4, 0, 4.5), (5, GAMMA**2, 6.5), (102, GAMMA**3, 104.5)):
+        assert samples.discount[start == first] == pytest.approx(discount), first
+        assert samples.after.vector[start == first, 0] == pytest.approx(after), first
+
+
+def test_a_picture_is_averaged_over_areas_and_no_depth_is_far_away():
+    picture = np.zeros((1, 4, 4, 1), np.float32)
+    picture[0, :2, :2, 0] = (1.0, 2.0)
+    picture[0, 2:, 2:, 0] = 9.0
+    small = np.asarray(shrunk(picture, "depth", 2))[0, :, :, 0]
+    assert small[0, 0] == round(255 * 1.5 / FAR)
+    assert small[1, 1] == small[0, 1] == 255
+    assert np.asarray(shrunk((255 * (picture > 0)).astype(np.uint8), "rgb", 2))[0, :, :, 0].tolist() == [
+        [255, 0],
+        [0, 255],
+    ]
+
+
+def test_an_actor_from_pixels_does_not_see_the_privileged_state():
+    env = SeenPointMass(2)
+    perception = Perception(env.observation_spaces, "rgbd")
+    assert perception.actor_size == 2 and perception.vector_size == 4
+    assert perception.picture_shape == (32, 32, 4)
+    state = env.reset(0)
+    seen = perception(state.obs)
+    assert np.array_equal(seen.vector[:, :2], state.obs["proprioception"])
+    assert np.array_equal(seen.vector[:, 2:], state.obs["privileged_state"])
+
+
+def test_a_projected_distribution_keeps_its_mean_within_the_support():
+    support = jnp.linspace(-2.0, 2.0, 9)
+    chance = jnp.full((1, 9), 1 / 9)
+    shared = np.asarray(projected(chance, 0.3 + 0.5 * support[None], support))
+    assert shared.sum() == pytest.approx(1.0, abs=1e-6)
+    assert (shared @ np.asarray(support))[0] == pytest.approx(0.3, abs=1e-6)
+    outside = np.asarray(projected(chance, jnp.full((1, 9), 7.0), support))
+    assert outside[0, -1] == pytest.approx(1.0, abs=1e-6)
+
+
+def test_the_interval_of_a_rate_is_that_of_the_textbook():
+    """Wilson's interval of 8 in 10: 0.490 to 0.943 (by hand from its formula)."""
+    assert wilson(8, 10) == pytest.approx((0.490, 0.943), abs=1e-3)
+    assert wilson(10, 10)[1] == 1.0
