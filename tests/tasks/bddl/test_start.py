@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import types
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from ig2mj.errors import InputError
 from ig2mj.sampling.many import make_sampler
 from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.paths import scene_folder
+from ig2mj.tasks.bddl import start
 from ig2mj.tasks.bddl.binding import bind
 from ig2mj.tasks.bddl.definitions import load_activity
 from ig2mj.tasks.bddl.start import load_bound, row_status, sample_start, start_conditions
@@ -68,3 +70,20 @@ def test_the_scene_of_a_pool_is_built_again_with_its_additions(sampled, tmp_path
     save_pool(done.sampled.pool, file, dataclasses.replace(scene, additions=others))
     with pytest.raises(InputError, match="was made with another"):
         load_pool_scene(file)
+
+
+def test_homes_are_tried_until_a_start_can_be_sampled_in_one(monkeypatch):
+    """What is added may find no room in the home to which least is added."""
+    small, large = bound_in("small_home", "cleaning_windows"), bound_in("juniper", "cleaning_windows")
+    scene, tried = load_bound(small), []
+
+    def sampled(binding, *_, **__):
+        tried.append(binding.home)
+        return types.SimpleNamespace(sampled=types.SimpleNamespace(complete=binding is large))
+
+    monkeypatch.setattr(start, "load_bound", lambda binding, home: scene)
+    monkeypatch.setattr(start, "sample_start", sampled)
+    assert start.first_that_works([small, large])[0] is large and tried == ["small_home", "juniper"]
+    assert start.first_that_works([small, small])[0] is small, "where none works, the first"
+    tried.clear()
+    assert start.first_that_works([small])[0] is small and not tried, "the only one is taken as it is"
