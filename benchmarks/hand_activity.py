@@ -1,4 +1,4 @@
-"""What the pushing hand does in homes, on the native engine: does it touch and move things at all?
+"""What the pushing hand does in homes, on the native engine: does it touch and move objects at all?
 
     python benchmarks/hand_activity.py [HOME ...] [--made 20 60 120] [--seconds 10] [--worlds 4] [--out DIR]
 

@@ -42,9 +42,9 @@ SIZE = 128
 """Pixels."""
 
 FIRST = 60
-"""Steps at the start that are timed by themselves: things fall onto what is below them and come to rest.
+"""Steps at the start that are timed by themselves: objects fall onto what is below them and come to rest.
 
-Bullet lets nothing sleep before two seconds, MuJoCo as soon as a thing lies still for some steps.
+Bullet lets nothing sleep before two seconds, MuJoCo as soon as an object lies still for some steps.
 """
 
 LABELS = {

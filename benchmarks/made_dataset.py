@@ -4,7 +4,7 @@
 
 Both engines are given the same URDF source. The home of 20 is the table's: a fridge, a coffee table and a countertop,
 with fifteen cracker boxes on the latter, five by three as in iGibson's script (spec robots_tasks_sensors.md 6.5). Those
-of 60 and 120 are one large room with furniture that opens, chairs, and household things on the furniture that has a
+of 60 and 120 are one large room with furniture that opens, chairs, and household objects on the furniture that has a
 top. Counts include floor and walls.
 """
 
@@ -24,7 +24,7 @@ SIZES = (20, 60, 120)
 TABLE_A7 = ("countertop", "coffee_table", "fridge", "cracker_box")
 
 TOPS = ("countertop", "breakfast_table", "coffee_table", "desk", "console_table")
-"""Furniture that carries things."""
+"""Furniture that carries objects."""
 FURNITURE = (
     "countertop", "fridge", "bottom_cabinet", "breakfast_table", "stove", "coffee_table", "shelf", "dishwasher",
     "desk", "sofa", "console_table", "washer", "top_cabinet", "stand", "bed",
@@ -40,7 +40,7 @@ PITCH = 2.6
 AIR = 0.002
 """Metres left under everything, as in iGibson's scenes."""
 RIM, GAP = 0.02, 0.03
-"""Metres: from the edge of a top, and between the things on it."""
+"""Metres: from the edge of a top, and between the objects on it."""
 WALL_HEIGHT, WALL_THICKNESS = 2.5, 0.2
 
 

@@ -16,7 +16,7 @@ HULL_VERTICES = 24
 def write_home(folder: pathlib.Path, num_objects: int, seed: int = 0) -> pathlib.Path:
     """Writes scene.xml and manifest.json of a home with `num_objects` objects, and returns the folder.
 
-    One object in six is furniture (a cabinet with a drawer and a door, or a table); the things on it are hulls of 24
+    One object in six is furniture (a cabinet with a drawer and a door, or a table); the objects on it are hulls of 24
     corners, boxes and cylinders. Fifteen of them stand on each piece until all
     are placed. All of it comes to rest within two seconds.
     """

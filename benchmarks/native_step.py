@@ -2,7 +2,7 @@
 
     python benchmarks/native_step.py [--objects 60] [--scene FOLDER] [--seconds 3] [--json FILE]
 
-Four cases: everything asleep; a hand that hovers (always awake); a hand that pushes things about, back to the start
+Four cases: everything asleep; a hand that hovers (always awake); a hand that pushes objects about, back to the start
 every three seconds; a batch of worlds on threads. "physics" is MuJoCo alone, taking the same four physics steps;
 "engine" adds touching, forces, boxes and poses; "awake" is the mean number of objects awake.
 """

@@ -22,7 +22,7 @@ DIRT = {"dustyable": {}, "stainable": {}}
 
 
 def write_stateful_home(folder: pathlib.Path, num_objects: int) -> pathlib.Path:
-    """As `made_home.write_home`; furniture heats and cools what is inside it, things are food, every tenth is a rag."""
+    """As `made_home.write_home`; furniture heats and cools what is in it, objects are food, every tenth is a rag."""
     write_home(folder, num_objects)
     manifest = mf.load_manifest(folder)
     cabinets = 0

@@ -2,7 +2,7 @@
 
     python benchmarks/states_step.py [--objects 60] [--worlds 64 512] [--json FILE]
 
-One world beside the native engine (microseconds per control step, on one core): everything asleep; one thing that
+One world beside the native engine (microseconds per control step, on one core): everything asleep; one object that
 moves; the same without states. Many worlds (microseconds per world and step of the one jitted function that also runs
 on a GPU).
 """
@@ -85,7 +85,7 @@ def one_world(scene: ig2mj.Scene, rules: Rules, seconds: float) -> list[Row]:
         physics, view = engine.step(physics)
     loose = np.flatnonzero(~scene.tables.object_fixed)
     moved = [jax.tree.map(np.copy, view) for _ in range(2)]
-    moved[1].object_com[0, loose[0]] += 1e-3  # one thing moves a millimetre, back and forth
+    moved[1].object_com[0, loose[0]] += 1e-3  # one object moves a millimetre, back and forth
     moved[1].body_pos[0, scene.tables.object_root[loose[0]]] += 1e-3
 
     still, cooling, moving, beside = (Stepped(rules) for _ in range(4))

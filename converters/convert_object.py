@@ -91,7 +91,7 @@ def convert_object(
 def _read(file: pathlib.Path, category: str, name: str, options: ConvertOptions) -> tuple[ObjectModel, Dataset | None]:
     """Reads the URDF, its metadata, and the dataset it lies in, if it does."""
     if not inputs.is_file(file):
-        raise InputError(file, "is no file", element="--urdf", mend="name an object's URDF")
+        raise InputError(file, "is no file", element="--urdf", fix="name an object's URDF")
     if not name.strip() or not category.strip():
         raise InputError(file, "the object needs a category and a name", element="--category, --model")
     root = _dataset_root(file)
@@ -127,7 +127,7 @@ def _scale(source: ObjectModel, bounding_box: tuple[float, float, float] | None)
     wanted = np.asarray(bounding_box, dtype=float)
     if not np.all(np.isfinite(wanted)) or np.any(wanted <= 0):
         raise InputError(
-            source.file, f"cannot have the size {bounding_box}", element="--bbox", mend="give positive metres"
+            source.file, f"cannot have the size {bounding_box}", element="--bbox", fix="give positive metres"
         )
     size = source.metadata.bbox_size
     if size is None:

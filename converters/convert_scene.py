@@ -123,7 +123,7 @@ def _drop_missing(dataset: Dataset, scene: SceneDescription, options: ConvertOpt
         return []
     if not options.skip_missing:
         problem = f"{len(lines)} models are not in the dataset: {', '.join(lines)}"
-        raise InputError(scene.file, problem, mend="--skip-missing converts without them")
+        raise InputError(scene.file, problem, fix="--skip-missing converts without them")
     gone = {i.name for i in missing}
     scene.instances = [i for i in scene.instances if i.name not in gone]
     return lines

@@ -1,4 +1,4 @@
-"""The smallest scene that has one of everything engines differ in: a table, things on it, a blade, a weld, a hand.
+"""The smallest scene that has one of everything engines differ in: a table, objects on it, a blade, a weld, a hand.
 
 `write_bench(folder)` writes it in the project's own format, `add_pusher` is its agent. World frame, metres; the table's
 top is z = 0.4. Every shape is a box or a sphere, so that the JAX engine can run it too.

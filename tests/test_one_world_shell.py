@@ -1,4 +1,4 @@
-"""`ig2mj.Simulation`: moving things by name, and what it says when that makes no sense."""
+"""`ig2mj.Simulation`: moving objects by name, and what it says when that makes no sense."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A small home for tests: one room, furniture with joints, things to put, to cut, to heat and to clean.
+"""A small home for tests: one room, furniture with joints, objects to put, to cut, to heat and to clean.
 
 `write_tiny_home(folder)` writes `scene.xml`, `manifest.json` and `rooms.npz` in the project's own format, with no
 converter involved. World frame: the room spans x, y in [-2, 2] (m), the floor's top is z = 0.

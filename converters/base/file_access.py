@@ -88,7 +88,7 @@ class FileGuard:
         else:
             if self.dataset and (name.startswith("/") or re.match(r"[A-Za-z]:", name)):
                 raise OutsideError(
-                    self.file, f"'{said}' is absolute", element=element, mend="name it relative to the model's folder"
+                    self.file, f"'{said}' is absolute", element=element, fix="name it relative to the model's folder"
                 )
             path = (base or self.folder) / name
         try:
@@ -97,8 +97,8 @@ class FileGuard:
             raise InputError(self.file, f"'{said}' cannot be resolved: {e}", element=element) from e
         if self.roots is not None and not any(real.is_relative_to(root) for root in self.roots):
             where = "the dataset root" if self.dataset else "the URDF's folder and its package"
-            mend = "move the file inside" if self.dataset else "move the file inside, or name its folder by --mesh-root"
-            raise OutsideError(self.file, f"'{said}' lies outside {where}", element=element, mend=mend)
+            fix = "move the file inside" if self.dataset else "move the file inside, or name its folder by --mesh-root"
+            raise OutsideError(self.file, f"'{said}' lies outside {where}", element=element, fix=fix)
         return real
 
     def _in_package(self, rest: str, element: str) -> pathlib.Path:
@@ -108,15 +108,15 @@ class FileGuard:
             folders = [*self._packages, *([] if own is None else [own])]
             return next((f / inside for f in folders if inputs.is_file(f / inside)), folders[0] / inside)
         if package in ("", ".", ".."):
-            mend = "name the package's folder by --package-path" if not package else ""
-            raise InputError(self.file, f"'package://{shortened(rest)}' names no package", element=element, mend=mend)
+            fix = "name the package's folder by --package-path" if not package else ""
+            raise InputError(self.file, f"'package://{shortened(rest)}' names no package", element=element, fix=fix)
         root = self._on_path(package) or find_package(self.file.parent, package)
         if root is None:
             raise InputError(
                 self.file,
                 f"no folder above it is the package '{shortened(package)}'",
                 element=element,
-                mend="put the URDF into the package's folder, with a package.xml, or name it by --package-path",
+                fix="put the URDF into the package's folder, with a package.xml, or name it by --package-path",
             )
         beside = self.file.parent.resolve() / package
         if self.roots is not None and root not in self.roots and not (beside.is_symlink() or beside == root):

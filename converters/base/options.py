@@ -34,7 +34,7 @@ class ConvertOptions:
         its volume's error under 15 % and its openings open (see `HullOptions`).
       bullet_inertia: inertia of the bounding box, as Bullet computes it, instead of the hulls'.
       colours: of visuals without a texture: the source's, or household ones by category. "auto": the source's, unless
-        every object of a scene is of one flat colour, which tells of the modelling program and not of the things.
+        every object of a scene is of one flat colour, which tells of the modelling program and not of the objects.
       assets: folder that gets `meshes/` and `textures/`, relative to the output's, so that many scenes can share them.
       keep_hovering: start loose objects exactly where the source has them, even in mid-air.
       jobs: processes. cache: use the caches of decompositions and of finished outputs.

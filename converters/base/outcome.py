@@ -16,7 +16,7 @@ class CheckResult:
         "joint_clearance".
       passed: nothing to complain about.
       summary: one line for people.
-      failures: one dict per failing thing, with the key "object" where it is about one.
+      failures: one dict per failing object, with the key "object" where it is about one.
       measured: per object name (or joint name) what was measured.
       seconds: it took.
       advisory: worth knowing, but no fault of the conversion.

@@ -44,10 +44,10 @@ def replaced_folder(out: str | os.PathLike) -> Iterator[pathlib.Path]:
 
 def _check(target: pathlib.Path) -> None:
     if target.exists() and not target.is_dir():
-        raise InputError(target, "is a file", element="--out", mend="name a folder")
+        raise InputError(target, "is a file", element="--out", fix="name a folder")
     if target.is_dir() and any(target.iterdir()) and not (target / MARK).is_file():
         problem = "is a folder with other things in it, and is not overwritten"
-        raise InputError(target, problem, element="--out", mend="name a new or empty folder")
+        raise InputError(target, problem, element="--out", fix="name a new or empty folder")
 
 
 def _prefix(target: pathlib.Path) -> str:

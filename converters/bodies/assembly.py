@@ -27,7 +27,7 @@ MOMENT_MARGIN = 1e-5
 
 @dataclasses.dataclass
 class VisualPart:
-    """A thing to draw, in its body's frame: a triangle mesh (vertices, faces, perhaps uv) or a primitive."""
+    """An object to draw, in its body's frame: a triangle mesh (vertices, faces, perhaps uv) or a primitive."""
 
     kind: str  # "mesh", "box", "cylinder", "sphere" or "capsule"
     pose: np.ndarray
@@ -226,7 +226,7 @@ class _Planner:
 
 
 def has_own_look(assembly: Assembly) -> bool:
-    """Whether the visuals say how the thing looks: a texture, or more than one colour."""
+    """Whether the visuals say how the object looks: a texture, or more than one colour."""
     parts = [part for body in assembly.bodies for part in body.visuals]
     return any(part.texture for part in parts) or len({part.rgba for part in parts if part.rgba is not None}) > 1
 

@@ -1,4 +1,4 @@
-"""Checks that move things: does the scene come to rest, does each joint go through its range."""
+"""Checks that move objects: does the scene come to rest, does each joint go through its range."""
 
 from __future__ import annotations
 

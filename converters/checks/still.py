@@ -17,7 +17,7 @@ from ..mjcf.model_index import ModelIndex, geom_box
 BOX_TOLERANCE = 0.015
 """Relative, per axis: collision AABB at q = 0 against the asked bounding box (dataset_format.md section 8.15)."""
 BOX_SLACK = 2e-3
-"""Metres that are always allowed: thin things are thickened."""
+"""Metres that are always allowed: thin objects are thickened."""
 SOURCE_TOLERANCE, SOURCE_SLACK = 1e-3, 2e-3
 """Relative and in metres: collision AABB against that of the source's meshes. Flat groups are thickened by 1 mm."""
 MASS_TOLERANCE = 1e-3

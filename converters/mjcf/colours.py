@@ -1,4 +1,4 @@
-"""Flat colours for things whose own look cannot be read: encrypted or missing visuals."""
+"""Flat colours for objects whose own look cannot be read: encrypted or missing visuals."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class Dataset:
             raise InputError(
                 root,
                 "is no dataset root: it has neither objects/ nor scenes/",
-                mend="give the folder that holds VERSION, metadata/, objects/ and scenes/",
+                fix="give the folder that holds VERSION, metadata/, objects/ and scenes/",
             )
         self.warnings: list[str] = []
         self.version = read_version(self.root, self.warnings)
@@ -87,8 +87,8 @@ class Dataset:
         if key not in self._models:
             folder = self._inside("objects", category, model)
             if not inputs.is_folder(folder):
-                mend = f"known models: {', '.join(self.models(category)[:5]) or 'none'}"
-                raise InputError(folder, "model folder does not exist", element=f"{category}/{model}", mend=mend)
+                fix = f"known models: {', '.join(self.models(category)[:5]) or 'none'}"
+                raise InputError(folder, "model folder does not exist", element=f"{category}/{model}", fix=fix)
             file = folder / f"{model}.urdf"
             if not self.has_model(category, model):
                 raise InputError(file, "does not exist", element=f"{category}/{model}")
@@ -142,7 +142,7 @@ class Dataset:
             if given.parent == pathlib.Path() and inputs.is_file(folder / word):
                 return folder / word
             known = ", ".join(f.name for f in sorted(folder.glob("*.urdf"))[:6])
-            raise InputError(urdf, "does not exist", mend=f"{folder} has {known}")
+            raise InputError(urdf, "does not exist", fix=f"{folder} has {known}")
         if random_index is not None:
             names = [f"{name}_random_{random_index}"]
         else:
@@ -150,7 +150,7 @@ class Dataset:
         for stem in names:
             if inputs.is_file(folder / f"{stem}.urdf"):
                 return folder / f"{stem}.urdf"
-        raise InputError(folder / f"{names[0]}.urdf", "does not exist", mend="name the file with --urdf")
+        raise InputError(folder / f"{names[0]}.urdf", "does not exist", fix="name the file with --urdf")
 
     def scene(
         self, name: str, urdf: str | os.PathLike | None = None, options: SceneOptions | None = None
@@ -212,7 +212,7 @@ class Dataset:
                 raise OutsideError(self.root, f"'{part}' is no name of a folder", element="/".join(parts))
         path = self.root.joinpath(*parts)
         if not inputs.real_path(path).is_relative_to(self.root):
-            raise OutsideError(path, "a symbolic link leads outside the dataset root", mend="copy the files instead")
+            raise OutsideError(path, "a symbolic link leads outside the dataset root", fix="copy the files instead")
         return path
 
     def _choose_models(self, scene: SceneDescription, seed: int) -> None:

@@ -93,7 +93,7 @@ def _suffix(file: pathlib.Path) -> str:
     suffix = file.suffix.lower()
     if suffix not in FORMATS:
         raise MeshError(
-            file, f"'{suffix or file.name}' is no mesh format that is read", mend=f"use one of {', '.join(FORMATS)}"
+            file, f"'{suffix or file.name}' is no mesh format that is read", fix=f"use one of {', '.join(FORMATS)}"
         )
     return suffix
 
@@ -180,7 +180,7 @@ def _read_with_trimesh(file: pathlib.Path, guard: FileGuard) -> list[MeshPart]:
     suffix = _suffix(file)
     raw = read_bytes(_existing(file), MAX_SCENE_FILE_BYTES if suffix in (".dae", ".glb", ".gltf") else MAX_MESH_BYTES)
     if raw.startswith(b"version https://git-lfs"):
-        raise MeshError(file, "is a Git LFS pointer, not the mesh", mend="run git lfs pull")
+        raise MeshError(file, "is a Git LFS pointer, not the mesh", fix="run git lfs pull")
     if suffix == ".stl" and len(raw) > 50 * (MAX_FACES + 100) and not raw.lstrip().startswith(b"solid"):
         raise too_many_faces(file, (len(raw) - 84) // 50)
     turn = np.eye(4)

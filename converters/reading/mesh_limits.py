@@ -26,5 +26,5 @@ def check_vertices(vertices: np.ndarray, file: object) -> None:
 
 def too_many_faces(file: object, count: int) -> MeshError:
     return MeshError(
-        file, f"has {count} or more faces, the limit is {MAX_FACES}", mend="simplify the mesh, for example in Blender"
+        file, f"has {count} or more faces, the limit is {MAX_FACES}", fix="simplify the mesh, for example in Blender"
     )

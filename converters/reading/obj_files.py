@@ -47,7 +47,7 @@ def read_obj(file: pathlib.Path) -> ObjFile:
     """Reads an OBJ. Raises MeshError: no text, no faces, bad numbers, non-finite vertices, too many faces."""
     raw = read_bytes(file, MAX_MESH_BYTES)
     if raw.startswith(b"version https://git-lfs"):
-        raise MeshError(file, "is a Git LFS pointer, not the mesh", mend="run git lfs pull")
+        raise MeshError(file, "is a Git LFS pointer, not the mesh", fix="run git lfs pull")
     if b"\0" in raw[:4096]:
         raise MeshError(file, "is no OBJ: it is not text")
     lines = raw.decode("utf-8", errors="replace").replace("\\\r\n", " ").replace("\\\n", " ").split("\n")

@@ -129,7 +129,7 @@ def _read_segments(file: pathlib.Path) -> np.ndarray:
     image = _open(file)
     side = int(image.size[0] * PIXEL / SEG_RESOLUTION)
     if image.mode in ("RGB", "RGBA", "LA"):
-        raise InputError(file, f"is a colour image ({image.mode}), not one of ids", mend="save it as 8-bit grey")
+        raise InputError(file, f"is a colour image ({image.mode}), not one of ids", fix="save it as 8-bit grey")
     return np.array(image.resize((side, side), Image.Resampling.NEAREST)).astype(np.int64)
 
 

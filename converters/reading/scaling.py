@@ -4,7 +4,7 @@ The whole object, at joint positions 0, is stretched by s along its base link's 
 against the base sees the linear map A = R^T diag(s) R, which is a shear where s is not uniform and R is no quarter
 turn. iGibson applies diag(s) in every link frame instead (fact 12): the same for trees without rotations, a distortion
 for others. Here A is baked into the vertices, so the stretched object is right at joint positions 0; joints keep their
-orientation, axes and origins are mapped with the geometry. The one thing that has no rigid result is a hinge whose
+orientation, axes and origins are mapped with the geometry. The one object that has no rigid result is a hinge whose
 axis is oblique to s in a turned frame: what is perpendicular to it would not stay so. That is refused.
 """
 
@@ -121,7 +121,7 @@ def _scaled_joint(
             model.file,
             f"the uneven scale {' '.join(f'{v:g}' for v in s)} would bend this hinge: its axis is oblique to the base",
             element=f"joint '{joint.name}'",
-            mend="scale the object evenly",
+            fix="scale the object evenly",
         )
     factor = 1.0
     if joint.type == "prismatic":

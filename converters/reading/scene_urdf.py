@@ -132,7 +132,7 @@ def _read_instance(link: Element, name: str, joint: Element | None, file: pathli
         for what, word in (("name", name), ("category", category), ("model", model)):
             _check_file_name(word, what, link, file)
     if joint is None and kind in ("object", "building"):
-        raise InputError(file, "no joint has it as its child", element=where(link), mend="add its joint to 'world'")
+        raise InputError(file, "no joint has it as its child", element=where(link), fix="add its joint to 'world'")
     fixed, pose = True, np.eye(4)
     if joint is not None:
         joint_type = (joint.get("type") or "").strip()
@@ -140,7 +140,7 @@ def _read_instance(link: Element, name: str, joint: Element | None, file: pathli
             raise InputError(file, f"joint type '{joint_type}' is neither fixed nor floating", element=where(joint))
         fixed, pose = joint_type == "fixed", read_origin(joint, file)
     if link.get("bounding_box") is not None and link.get("scale") is not None:
-        raise InputError(file, "has both bounding_box and scale", element=where(link), mend="keep one of them")
+        raise InputError(file, "has both bounding_box and scale", element=where(link), fix="keep one of them")
     instance = Instance(
         name,
         category,
@@ -185,7 +185,7 @@ def _check_file_name(word: str, what: str, link: Element, file: pathlib.Path) ->
     """Names, categories and models become parts of paths."""
     if "/" in word or "\\" in word or word.startswith("."):
         raise InputError(
-            file, f"the {what} '{word}' holds a slash or begins with a dot", element=where(link), mend="rename it"
+            file, f"the {what} '{word}' holds a slash or begins with a dot", element=where(link), fix="rename it"
         )
 
 

@@ -105,7 +105,7 @@ def _read_joint(element: Element, file: pathlib.Path, warnings: list[str]) -> Jo
     kind = (element.get("type") or "").strip()
     if kind not in JOINT_TYPES:
         raise InputError(
-            file, f"joint type '{kind}' is not supported", element=where(element), mend=f"use {', '.join(JOINT_TYPES)}"
+            file, f"joint type '{kind}' is not supported", element=where(element), fix=f"use {', '.join(JOINT_TYPES)}"
         )
     ends = []
     for tag in ("parent", "child"):

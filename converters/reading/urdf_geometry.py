@@ -117,7 +117,7 @@ class GeometryReader:
                 file,
                 f"geometry <{shape.kind}> is not supported",
                 element=where(element),
-                mend="use mesh, box, cylinder, sphere or capsule",
+                fix="use mesh, box, cylinder, sphere or capsule",
             )
         if np.any(size <= 0):
             raise MeshError(file, f"a size of the {shape.kind} is not positive", element=where(kind))

@@ -78,7 +78,7 @@ def decode_xml(raw: bytes, file: object) -> str:
     text = _DECLARATION.sub(_only_newlines, text, count=1)
     text = _COMMENT.sub(_only_newlines, text)
     if "<!ENTITY" in text:
-        raise InputError(file, "declares XML entities, which are refused", mend="replace the entities by their text")
+        raise InputError(file, "declares XML entities, which are refused", fix="replace the entities by their text")
     return text
 
 

@@ -40,7 +40,7 @@ class _Columns:
 
 
 def height_maps(model: HouseholdObject) -> Heights:
-    """Where things can be put, all joints at 0.
+    """Where objects can be put, all joints at 0.
 
     inside: under another part of the same object, or surrounded by it on all four sides (a basin, an open drawer).
     onTop: on any other level top. under: on the floor beneath the base link.

@@ -35,7 +35,7 @@ def write_scene(root: pathlib.Path, plan: Plan, home: Arrangement, seed: int = 0
 
 
 def scene_urdf(name: str, things: list[Placed]) -> str:
-    """The pseudo-URDF: building parts, then one link per thing whose joint gives its bounding-box centre."""
+    """The pseudo-URDF: building parts, then one link per object whose joint gives its bounding-box centre."""
     lines = ['<?xml version="1.0" ?>', '<robot name="igibson_scene">', '  <link name="world"/>']
     for part in reversed(BUILDING):
         lines.append(f'  <link category="{part}" model={quoteattr(name)} name="{part}"/>')

@@ -1,4 +1,4 @@
-"""All things of a home and what is free between them: overlap tests on collision hulls, with every joint at 0.
+"""All objects of a home and what is free between them: overlap tests on collision hulls, with every joint at 0.
 
 Two hulls overlap unless a face normal of one of them separates them: a test that may say "overlap" for hulls that miss
 each other edge to edge by little, and never the other way round.
@@ -13,16 +13,16 @@ import numpy as np
 from .placed import Hull, Placed, boxes_of
 
 AIR = 0.0008
-"""m, kept between a thing and what it stands on: it settles by less than the converter's 5 mm."""
+"""m, kept between an object and what it stands on: it settles by less than the converter's 5 mm."""
 FLAT = ("carpet", "mat")
 """Categories that are walked and driven over: they need no air around them and block no way."""
 
 
 class Arrangement:
-    """The things that stand, blocks of the building, and zones that moving parts sweep or people walk in.
+    """The objects that stand, blocks of the building, and zones that moving parts sweep or people walk in.
 
     Attributes:
-      things: name -> Placed, in the order they were put.
+      objects: name -> Placed, in the order they were put.
     """
 
     def __init__(self, blocks: np.ndarray):
@@ -48,7 +48,7 @@ class Arrangement:
         return f"{category}_{number}"
 
     def put(self, thing: Placed) -> Placed:
-        """Adds a thing where it is; ask `fits` first."""
+        """Adds an object where it is; ask `fits` first."""
         self.things[thing.name] = thing
         self._solid.add(_Group(thing, thing.parts()))
         swept = thing.swept()
@@ -61,7 +61,7 @@ class Arrangement:
         self._ways.append((owner, np.asarray(boxes, float).reshape(-1, 2, 3)))
 
     def fits(self, thing: Placed, *, ignore: Iterable[str] = (), gap: float = 0.0, ways: bool = True) -> bool:
-        """Whether a thing overlaps nothing that stands and nothing that moves, and its own moving parts meet
+        """Whether an object overlaps nothing that stands and nothing that moves, and its own moving parts meet
         nothing.
 
         Args:
@@ -119,7 +119,7 @@ class _Groups:
 
 
 class _Group:
-    """Hulls of one thing (None: the building), with the boxes around them and around all."""
+    """Hulls of one object (None: the building), with the boxes around them and around all."""
 
     def __init__(self, thing: Placed | None, hulls: list[Hull]):
         self.thing, self.hulls = thing, hulls

@@ -15,7 +15,7 @@ TOLERANCE = 2e-5  # m: the rounding of normals
 
 
 def blocked(plan: Plan, things: Iterable[Placed]) -> list[tuple[str, str]]:
-    """(thing, what is in the way) for everything whose moving parts meet a wall, stairs, or another fixed thing."""
+    """(object, what is in the way) for everything whose moving parts meet a wall, stairs, or another fixed object."""
     things = list(things)
     still = [(thing.name, thing.parts()) for thing in things if thing.fixed]
     still.append(("walls", [_block(box) for box in (*wall_boxes(plan), *stair_boxes(plan))]))

@@ -1,4 +1,4 @@
-"""Small things: what lies on what, and what is kept in what, by room. Fills a home up to its number of things."""
+"""Small objects: what lies on what, and what is kept in what, by room. Fills a home up to its number of objects."""
 
 from __future__ import annotations
 
@@ -109,9 +109,9 @@ ON_ROOM = {
 }  # fmt: skip
 
 HOLLOW = {"bowl": FOOD, "basket": ("t-shirt", "toy", "hand_towel"), "frying_pan": ("egg",), "tray": ("mug", "glass")}
-"""What holds other things, and those things."""
+"""What holds other things, and those objects."""
 PILES = ("hardback", "magazine", "notebook", "board_game", "folder")
-"""What is laid on the last thing of its kind; at most PILE of them."""
+"""What is laid on the last object of its kind; at most PILE of them."""
 PILE = 3
 PILED = 0.6  # how often
 MOST = {
@@ -128,18 +128,18 @@ MOST = {
     "carpet": 4,
     "bowl": 3,
 }
-"""Small things per host; every other host has at most two."""
+"""Small objects per host; every other host has at most two."""
 GENEROUS = ("shelf", "fridge", "breakfast_table", "desk")
 """Hosts that get two things in a turn."""
 AT_ONCE = 5
-"""Things on a dining table before any other host gets one: a bowl and the plates."""
+"""Objects on a dining table before any other host gets one: a bowl and the plates."""
 CARELESS = 8.0  # degrees by which what lies on furniture is off its lines
 ANY_WAY = ("toy", "ball", "sock", "t-shirt", "apple", "orange", "lemon", "tomato", "banana", "pear", "pen", "pencil")
 """What lies at any angle."""
 
 
 def fill(home: HomeInProgress) -> Iterator[Placed]:
-    """Puts small things, one per host in turn, so that all rooms get some, until nothing fits any more."""
+    """Puts small objects, one per host in turn, so that all rooms get some, until nothing fits any more."""
     kits = {room.name: RoomKit(home, room) for room in home.plan.rooms}
     held: dict[str, int] = {}
     piles: dict[str, list[Placed]] = {}

@@ -47,12 +47,12 @@ class Ground:
             self._gates.append((self._cell(y), self._cell(x)))
 
     def allows(self, thing: Placed) -> bool:
-        """Whether every room and doorway can still be reached with this thing in its place."""
+        """Whether every room and doorway can still be reached with this object in its place."""
         after = self._without(thing)
         return after is None or self._sound(after)
 
     def occupy(self, thing: Placed) -> None:
-        """Takes a thing's floor away."""
+        """Takes an object's floor away."""
         after = self._without(thing)
         if after is not None:
             self.free = after

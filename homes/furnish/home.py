@@ -1,4 +1,4 @@
-"""A whole home: the rooms furnished turn by turn, then filled with small things up to the wanted number."""
+"""A whole home: the rooms furnished turn by turn, then filled with small objects up to the wanted number."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ RULES: dict[str, Rule] = {
     "television_room": living.television_room,
     "utility_room": kitchen.utility_room,
 }
-"""Room kind -> a generator that gives after each thing it put (or None where there was no room for one)."""
+"""Room kind -> a generator that gives after each object it put (or None where there was no room for one)."""
 
 FURNITURE_SHARE = 0.64
-"""Of the things that are neither doors nor windows: furniture comes first, small things take what is left."""
+"""Of the objects that are neither doors nor windows: furniture comes first, small objects take what is left."""
 SMALL_SHARE = 0.8
-"""The same in homes of less than ROOMY things: a kitchen without a stove is none."""
+"""The same in homes of less than ROOMY objects: a kitchen without a stove is none."""
 
 
 def furnish_home(
@@ -53,7 +53,7 @@ def furnish_home(
     """Furnishes a plan.
 
     Args:
-      objects: how many things in all, doors and windows included; fewer where nothing more fits.
+      objects: how many objects in all, doors and windows included; fewer where nothing more fits.
       pieces: room kind -> furniture beside what rooms of that kind have anyway.
     """
     home = start_home(plan, random.Random(f"{seed}/{plan.name}/things"), seed=seed, limit=objects)
@@ -115,5 +115,5 @@ def _steps(room: Room, objects: int) -> int:
 
 
 def _advance(rule: Iterator[Placed | None]) -> bool:
-    """Lets a rule go on until it has put one thing; False when it is through."""
+    """Lets a rule go on until it has put one object; False when it is through."""
     return any(thing is not None for thing in rule)

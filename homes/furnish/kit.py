@@ -1,6 +1,6 @@
 """The placing of furniture in one room: against a wall, beside something, before it, on a carpet.
 
-A method gives the thing it put, or None where there was no room for it; it never makes two things overlap, never blocks
+A method gives the object it put, or None where there was no room for it; it never makes two overlap, never blocks
 a way or what opens, and draws every choice from the home's random generator.
 """
 
@@ -195,7 +195,7 @@ class RoomKit(LooseKit):
         return self.at_wall(category, height=height, gap=BARE_WALL, near=near)
 
     def above(self, anchor: Placed, category: str, height: float, *, index: int | None = None) -> Placed | None:
-        """Hangs something on the wall behind another thing, its lower edge at `height`."""
+        """Hangs something on the wall behind another object, its lower edge at `height`."""
         index = self.home.index(category) if index is None else index
         side = next(name for name, way in SIDES.items() if np.allclose(way, anchor.front, atol=0.1))
         near = (float(anchor.centre[0]), float(anchor.centre[1]))
@@ -230,7 +230,7 @@ class RoomKit(LooseKit):
         return True
 
     def _zone(self, thing: Placed, depth: float) -> np.ndarray:
-        """[2, 3] box of floor before a thing."""
+        """[2, 3] box of floor before an object."""
         box = thing.box()
         front = thing.front
         zone = box.copy()

@@ -178,7 +178,7 @@ def pantry_room(kit: RoomKit) -> Iterator[Placed | None]:
 
 
 def utility_room(kit: RoomKit) -> Iterator[Placed | None]:
-    """Washer, dryer, a cupboard, cleaning things."""
+    """Washer, dryer, a cupboard, cleaning objects."""
     washer = kit.at_wall("washer", place="corner", room_before=BEFORE)
     yield washer
     if washer:

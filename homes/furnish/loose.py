@@ -1,4 +1,4 @@
-"""Small things put on something or into it."""
+"""Small objects put on something or into it."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MOST_POSES = 8  # stable orientations of a model at most (poses.MOST)
 
 
 class LooseKit(RoomBase):
-    """Puts things on tops, and in cupboards, fridges, drawers and shelves."""
+    """Puts objects on tops, and in cupboards, fridges, drawers and shelves."""
 
     def on(self, host: Placed, category: str, *, index: int | None = None, at: tuple[float, float] | str | None = None,
            degrees: float | None = None, scale: float = 1.0, tries: int = 24, surface: Surface | None = None,
@@ -90,7 +90,7 @@ def resting(category: str, index: int, stand: int | None = None, seed: int = 0) 
 
 
 def _within(thing: Placed, host: Placed, surface: Surface) -> bool:
-    """Whether a thing's box, seen from the host, stays on the surface."""
+    """Whether an object's box, seen from the host, stays on the surface."""
     points = np.concatenate(thing.hulls())
     local = (points - host.position) @ host.rotation / host.scale
     low, high = local[:, :2].min(0), local[:, :2].max(0)

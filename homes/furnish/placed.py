@@ -78,7 +78,7 @@ class Placed:
       name: in the scene. category, index: which model. scale: one number for all axes.
       position: of the base frame, m. rotation: [3, 3].
       fixed: to the house. rooms: instances.
-      host: the thing it stands on or in, or None.
+      host: the object it stands on or in, or None.
     """
 
     name: str

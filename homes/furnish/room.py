@@ -16,7 +16,7 @@ from .placed import Placed, Shape, shape
 
 SIDES = {"south": (0, 1), "east": (-1, 0), "north": (0, -1), "west": (1, 0)}
 """Side of a room -> the direction into the room."""
-ROOMY = 40  # things, doors and windows included
+ROOMY = 40  # objects, doors and windows included
 
 
 @dataclasses.dataclass
@@ -24,8 +24,8 @@ class HomeInProgress:
     """What all rooms of a home share.
 
     Attributes:
-      models, small_models: at most so many models of a category are used, of fixed and of loose things.
-      limit: no more things than that. seed: of the models.
+      models, small_models: at most so many models of a category are used, of fixed and of loose objects.
+      limit: no more objects than that. seed: of the models.
     """
 
     plan: Plan
@@ -39,12 +39,12 @@ class HomeInProgress:
 
     @property
     def full(self) -> bool:
-        """No more things are wanted."""
+        """No more objects are wanted."""
         return self.limit is not None and len(self.things.things) >= self.limit
 
     @property
     def roomy(self) -> bool:
-        """So many things are wanted that there is no need to save any."""
+        """So many objects are wanted that there is no need to save any."""
         return self.limit is None or self.limit >= ROOMY
 
     def index(self, category: str, wanted: Callable[[Shape], bool] | None = None) -> int:
@@ -111,7 +111,7 @@ class RoomBase:
         return shape(category, index, self.home.seed)
 
     def thing(self, category: str, index: int, position, turn: np.ndarray, fixed: bool | None = None) -> Placed:
-        """A thing of this room that is not put yet."""
+        """An object of this room that is not put yet."""
         fixed = find(category).fixed if fixed is None else fixed
         rooms, seed = (self.room.name,), self.home.seed
         return Placed(category, category, index, np.asarray(position, float), turn, fixed, rooms, seed=seed)
@@ -123,6 +123,6 @@ class RoomBase:
 
 
 def degrees_of(thing: Placed) -> float:
-    """Yaw of a thing's front."""
+    """Yaw of an object's front."""
     angle = float(np.degrees(np.arctan2(thing.rotation[1, 0], thing.rotation[0, 0])))
     return round(angle / 90) * 90 if abs(angle / 90 - round(angle / 90)) < 1e-6 else angle

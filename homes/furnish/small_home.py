@@ -1,4 +1,4 @@
-"""The small home: one kitchen-living room, a bit more than twenty things, placed by hand. `ig2mj demo` runs it."""
+"""The small home: one kitchen-living room, a bit more than twenty objects, placed by hand. `ig2mj demo` runs it."""
 
 from __future__ import annotations
 

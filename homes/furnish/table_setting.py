@@ -16,7 +16,7 @@ PLACE_DISTANCE = 0.75  # m, from the table's edge to the middle of a chair that 
 
 
 def lay_table(kit: RoomKit, table: Placed) -> Iterator[Placed]:
-    """Gives one thing after the other; first what stands in the middle, then all plates, all glasses, ..."""
+    """Gives one object after the other; first what stands in the middle, then all plates, all glasses, ..."""
     middle = kit.on(table, kit.rng.choice(CENTREPIECES), at="middle", degrees=0.0)
     if middle is not None:
         yield middle

@@ -39,13 +39,13 @@ class TelevisionArea:
 
 
 def floor_between(sofa: Placed, other: Placed) -> float:
-    """m between a sofa's front and the side of another thing that is turned to it."""
+    """m between a sofa's front and the side of another object that is turned to it."""
     across = abs(float(sofa.front @ (other.centre - sofa.centre)[:2]))
     return across - (sofa.size[0] + other.size[0]) / 2
 
 
 def aside(sofa: Placed, other: Placed) -> float:
-    """m by which another thing is off the line that a sofa looks along."""
+    """m by which another object is off the line that a sofa looks along."""
     x, y = (other.centre - sofa.centre)[:2]
     return abs(float(sofa.front[0] * y - sofa.front[1] * x))
 

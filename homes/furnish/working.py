@@ -70,7 +70,7 @@ def _car(kit: RoomKit) -> Placed | None:
 
 
 def storage_room(kit: RoomKit) -> Iterator[Placed | None]:
-    """Shelves, boxes, cleaning things."""
+    """Shelves, boxes, cleaning objects."""
     for _ in range(2):
         yield kit.at_wall("shelf", place="corner")
     for category in ("carton", "vacuum", "carton", "bucket", "ladder", "basket"):

@@ -1,4 +1,4 @@
-"""Boxes, bags, baskets, bins, folders: things that hold things, many with a lid or flap that opens."""
+"""Boxes, bags, baskets, bins, folders: objects that hold objects, many with a lid or flap that opens."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lamps, candles, pictures, plants, clocks, Christmas things, fixtures of a wall."""
+"""Lamps, candles, pictures, plants, clocks, Christmas objects, fixtures of a wall."""
 
 from __future__ import annotations
 

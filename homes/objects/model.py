@@ -74,7 +74,7 @@ class HouseholdObject:
     """A finished model, ready to be written. Shapes are in link frames; joint origins are relative to the parent link.
 
     rest: which orientations it can be put down in: "upright", "standing" or "any" (see poses.stable_orientations).
-    furniture: it stands fixed in a room, and its model says where things can be put (see height_maps.py).
+    furniture: it stands fixed in a room, and its model says where objects can be put (see height_maps.py).
     """
 
     category: str

@@ -1,4 +1,4 @@
-"""The sixteen homes: drawings, sizes, and how many things each holds. 119 rooms in all.
+"""The sixteen homes: drawings, sizes, and how many objects each holds. 119 rooms in all.
 
 A drawing has one letter per cell (see `plan.grid_rooms`); `columns` from the left and `rows` from the top, metres.
 Three homes have the sizes of the paper's table A.7: aspen 20, birch 60, spruce 120 objects. Sequoia

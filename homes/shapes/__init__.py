@@ -1,1 +1,1 @@
-"""Shapes: bricks that are seen and collide, their materials, and where things can be put on them."""
+"""Shapes: bricks that are seen and collide, their materials, and where objects can be put on them."""

@@ -1,4 +1,4 @@
-"""Where things can be put on or in a model: level tops of its hulls, and how much air is above them."""
+"""Where objects can be put on or in a model: level tops of its hulls, and how much air is above them."""
 
 from __future__ import annotations
 

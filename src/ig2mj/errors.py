@@ -1,6 +1,6 @@
 """Errors a user can cause.
 
-Every message is one line and names the file, the element in it and what would mend it.
+Every message is one line and names the file, the element in it and what would fix it.
 The command line prints that line and exits with status 2.
 """
 
@@ -21,18 +21,18 @@ class InputError(Ig2mjError):
     Attributes:
       file: path of the file, as the user would find it.
       element: what in the file is wrong (a link, a joint, a line), or ''.
-      mend: what would put it right, or ''.
+      fix: what would put it right, or ''.
     """
 
-    def __init__(self, file: object, problem: str, *, element: str = "", mend: str = ""):
-        self.file, self.problem, self.element, self.mend = str(file), problem, element, mend
+    def __init__(self, file: object, problem: str, *, element: str = "", fix: str = ""):
+        self.file, self.problem, self.element, self.fix = str(file), problem, element, fix
         where = f"{self.file}: {element}" if element else self.file
-        text = f"{where}: {problem}" + (f" ({mend})" if mend else "")
+        text = f"{where}: {problem}" + (f" ({fix})" if fix else "")
         super().__init__(" ".join(text.split()))
 
     def __reduce__(self):
         """So that it survives the way back from a worker process."""
-        fields = {"file": self.file, "problem": self.problem, "element": self.element, "mend": self.mend}
+        fields = {"file": self.file, "problem": self.problem, "element": self.element, "fix": self.fix}
         return (_rebuild_input_error, (type(self), fields))
 
 

@@ -1,4 +1,4 @@
-"""Cases of the throughput benchmark: the hand where it reaches things, buffer sizes from where they are told to be."""
+"""Cases of the throughput benchmark: the hand where it reaches objects, buffer sizes from where they are told to be."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pushing hand: it touches and moves things, in every batch alike, and lets go of what it cannot push."""
+"""The pushing hand: it touches and moves objects, in every batch alike, and lets go of what it cannot push."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ def entry(name: str, category: str, fixed: bool) -> mf.ObjectEntry:
 
 
 def write_room(folder: Path, things: dict[str, str], heavy: str = "") -> Path:
-    """Two halves of a floor with a wall of 2 m between them (x = 0), a closed crate, and things at given places."""
+    """Two halves of a floor with a wall of 2 m between them (x = 0), a closed crate, and objects at given places."""
     crate = [("0.3 0.3 0.01", f"0 0 {z}") for z in (0.01, 0.59)]
     crate += [("0.3 0.01 0.3", f"0 {y} 0.3") for y in (0.29, -0.29)]
     crate += [("0.01 0.3 0.3", f"{x} 0 0.3") for x in (0.29, -0.29)]
@@ -51,7 +51,7 @@ def write_room(folder: Path, things: dict[str, str], heavy: str = "") -> Path:
 
 @pytest.fixture(scope="module")
 def room(tmp_path_factory):
-    """Two things on the crate, one in it, one beside it, one on the wall's other side."""
+    """Two objects on the crate, one in it, one beside it, one on the wall's other side."""
     things = {"on_a": "1.9 1 0.65", "on_b": "2.1 1.1 0.65", "inside": "2 1 0.07", "beside": "2 0.2 0.05"}
     return ig2mj.load_scene(write_room(tmp_path_factory.mktemp("room"), {**things, "behind": "-1 0 0.05"}))
 
@@ -105,7 +105,7 @@ def test_the_thumb_makes_the_hand_wider():
 
 
 def test_a_heavy_thing_is_in_the_way(tmp_path):
-    """A box of 108 kg right on the thing: nothing leads through it."""
+    """A box of 108 kg right on the object: nothing leads through it."""
     things = {"under": "2 -1 0.04", "free": "3 0.5 0.04", "block": "2 -1 0.39"}
     scene = ig2mj.load_scene(write_room(tmp_path / "lid", things, heavy="block"))
     reach = find_reach(scene)

@@ -37,7 +37,7 @@ def command(monkeypatch):
 
 def test_a_user_error_is_one_line_on_stderr_and_status_2(command, capsys):
     def run() -> None:
-        raise InputError("a.urdf", "has no\nlinks", element="robot", mend="add one")
+        raise InputError("a.urdf", "has no\nlinks", element="robot", fix="add one")
 
     command(run)
     assert cli.call(["probe"]) == 2

@@ -1,4 +1,4 @@
-"""`ig2mj doctor`: what counts as healthy, and that every lack names its mend."""
+"""`ig2mj doctor`: what counts as healthy, and that every lack names its fix."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_a_package_that_is_absent_or_too_old_names_the_line_that_installs_it():
     )
     assert not checks["numpy"].ok
     assert "but >=1000 is needed" in checks["numpy"].found
-    assert checks["numpy"].mend.endswith('install "numpy>=1000"')
+    assert checks["numpy"].fix.endswith('install "numpy>=1000"')
     assert checks["no-such-package"].found == "not installed"
     assert checks["rich"].ok
     assert all(c.required for c in checks.values())
@@ -47,7 +47,7 @@ def test_a_lacking_extra_is_optional_and_names_the_extra():
     (check,) = diagnosis.package_checks([(Requirement("no-such-package"), "learn"), (Requirement("rich"), "learn")])
     assert not check.ok
     assert not check.required
-    assert check.mend.endswith('[learn]"')
+    assert check.fix.endswith('[learn]"')
     assert "no-such-package" in check.found
     assert "rich" not in check.found
 
@@ -63,15 +63,15 @@ def test_a_gpu_that_jax_does_not_see_gets_the_extra_for_its_driver(driver, extra
     jax = {"devices": ["cpu:0 cpu"], "backend": "cpu"}
     warp = {"devices": ["cpu CPU"], "cuda": [], "cache": "/tmp"}
     checks = by_name(diagnosis.accelerator_checks(jax, warp, ("NVIDIA H200", driver)))
-    assert checks["JAX on CUDA"].mend.endswith(f'[{extra}]"')
-    assert checks["Warp on CUDA"].mend
+    assert checks["JAX on CUDA"].fix.endswith(f'[{extra}]"')
+    assert checks["Warp on CUDA"].fix
     assert diagnosis.healthy(checks.values())
 
 
 def test_without_a_gpu_nothing_is_to_be_mended():
     jax = {"devices": ["cpu:0 cpu"], "backend": "cpu"}
     warp = {"devices": ["cpu CPU"], "cuda": [], "cache": "/tmp"}
-    assert not any(c.mend for c in diagnosis.accelerator_checks(jax, warp, None))
+    assert not any(c.fix for c in diagnosis.accelerator_checks(jax, warp, None))
 
 
 @pytest.mark.parametrize("broken", ["jax", "warp"])
@@ -83,13 +83,13 @@ def test_a_library_that_does_not_start_is_unhealthy_and_named(broken):
     probes[broken] = {"error": "ImportError: libfoo"}
     checks = diagnosis.accelerator_checks(probes["jax"], probes["warp"], GPU)
     assert not diagnosis.healthy(checks)
-    assert [c.mend != "" for c in checks if not c.ok] == [True]
+    assert [c.fix != "" for c in checks if not c.ok] == [True]
 
 
 def test_one_rendering_backend_is_enough_and_none_at_all_is_told():
     checks = by_name(diagnosis.picture_checks({"egl": "no libEGL", "osmesa": None, "warp": None}))
     assert checks["osmesa"].ok
-    assert "apt-get install" in checks["egl"].mend
+    assert "apt-get install" in checks["egl"].fix
     assert "any" not in checks
     checks = by_name(diagnosis.picture_checks({"egl": "a", "osmesa": "b", "warp": "c"}))
     assert not checks["any"].ok
@@ -102,7 +102,7 @@ def test_a_cache_folder_that_cannot_be_written_names_its_variable(monkeypatch, t
     monkeypatch.setenv("IG2MJ_CACHE_DIR", str(file / "cache"))
     check = by_name(diagnosis.cache_checks({}))["ig2mj (conversions)"]
     assert not check.ok
-    assert "IG2MJ_CACHE_DIR" in check.mend
+    assert "IG2MJ_CACHE_DIR" in check.fix
 
 
 def test_cache_sizes_are_counted(monkeypatch, tmp_path):
@@ -139,23 +139,23 @@ def found(monkeypatch):
 
 
 def test_the_command_exits_1_only_if_something_required_is_broken(found, capsys):
-    found(Check("machine", "display", False, "none [x]", mend="set DISPLAY"))
+    found(Check("machine", "display", False, "none [x]", fix="set DISPLAY"))
     assert cli.call(["doctor"]) == 0
     out = capsys.readouterr().out
     assert "none [x]" in out
     assert "-> set DISPLAY" in out
-    found(Check("engines", "MuJoCo", False, "gone", required=True, mend="mend me"))
+    found(Check("engines", "MuJoCo", False, "gone", required=True, fix="fix me"))
     assert cli.call(["doctor"]) == 1
     assert "BAD" in capsys.readouterr().out
 
 
 def test_json_is_the_whole_report(found, capsys):
-    found(Check("engines", "MuJoCo", False, "gone", required=True, mend="mend me"))
+    found(Check("engines", "MuJoCo", False, "gone", required=True, fix="fix me"))
     assert cli.call(["doctor", "--json"]) == 1
     report = json.loads(capsys.readouterr().out)
     assert report["ok"] is False
     assert report["checks"] == [
-        {"group": "engines", "name": "MuJoCo", "ok": False, "found": "gone", "required": True, "mend": "mend me"}
+        {"group": "engines", "name": "MuJoCo", "ok": False, "found": "gone", "required": True, "fix": "fix me"}
     ]
 
 

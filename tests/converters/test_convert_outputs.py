@@ -174,9 +174,9 @@ def test_a_bounding_box_that_cannot_be_is_exit_2(bbox, dataset, tmp_path, capsys
 
 
 def test_input_errors_survive_the_way_back_from_a_worker_process():
-    error = pickle.loads(pickle.dumps(InputError("a.urdf", "is broken", element="link 'x'", mend="mend it")))
+    error = pickle.loads(pickle.dumps(InputError("a.urdf", "is broken", element="link 'x'", fix="fix it")))
     assert (error.file, error.element) == ("a.urdf", "link 'x'")
-    assert str(error) == "a.urdf: link 'x': is broken (mend it)"
+    assert str(error) == "a.urdf: link 'x': is broken (fix it)"
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from tiny_house import SCENE, instance_xml, scene_xml
 
 @pytest.fixture(scope="module")
 def scene(dataset, convert, tmp_path_factory):
-    """The tiny house with odd things in it: see `_write_models` and `_instances`."""
+    """The tiny house with odd objects in it: see `_write_models` and `_instances`."""
     root = pathlib.Path(shutil.copytree(dataset, tmp_path_factory.mktemp("statements") / "own"))
     _write_models(root)
     file = root / "scenes" / SCENE / "urdf" / "odd.urdf"

@@ -20,7 +20,7 @@ THINGS = 24
 
 
 def _model(sleep: str = "enable", extra: str = "") -> mujoco.MjModel:
-    """Things strewn over a floor, a pillar and a cabinet with a door; some geoms only to be seen, one pair excluded."""
+    """Objects strewn over a floor, a pillar and a cabinet with a door; some geoms only visible, one pair excluded."""
     rng = np.random.default_rng(0)
     shapes = ['type="box" size=".05 .04 .03"', 'type="sphere" size=".05"', 'type="cylinder" size=".04 .05"']
     things = "".join(

@@ -82,7 +82,7 @@ def test_one_step_from_the_same_state(name, bench_folder, falling, native_single
 @pytest.mark.parametrize("name", PURE)
 def test_forces_of_one_step_agree_to_a_thousandth(name, bench_folder, native, native_single):
     """Box let go 5 mm over the table, as it is caught: four contacts that every engine finds, and a knife in the air.
-    Where things slide, solvers stop at their tolerance, and forces agree to a few percent (the velocities above)."""
+    Where objects slide, solvers stop at their tolerance, and forces agree to a few percent (the velocities above)."""
     lifted = native.write(native.fresh(), native.teleport("box", [0, 0, bench_scene.TOP + bench_scene.HALF + 0.005]))
     lifted = native.write(lifted, native.teleport("knife", [0.3, 0.1, 0.9], TIPPED))
     physics, _ = native.run(lifted, 2)
@@ -215,7 +215,7 @@ def test_predicates_of_the_whole_bench_are_equal(bench_folder):
 FLAGS = [(c, i, s) for c in ("pyramidal", "elliptic") for i in ("implicitfast", "Euler") for s in ("enable", "disable")]
 
 MJX_FLAGS = [f[:2] for f in FLAGS if f[2] == "enable"]
-"""The MJX engines decide themselves whether things sleep: always on Warp, never on JAX."""
+"""The MJX engines decide themselves whether objects sleep: always on Warp, never on JAX."""
 
 
 @pytest.mark.parametrize(("cone", "integrator", "sleep"), FLAGS)

@@ -223,7 +223,7 @@ def reference_forces(simulation: ig2mj.Simulation) -> np.ndarray:
 
 @pytest.mark.parametrize("cone", [mujoco.mjtCone.mjCONE_PYRAMIDAL, mujoco.mjtCone.mjCONE_ELLIPTIC])
 def test_link_force_is_the_largest_normal_force_of_any_physics_step(tiny_home, cone):
-    """spec/states.md 10.1 with section 19's mend: the largest of all substeps, not the last one's."""
+    """spec/states.md 10.1 with section 19's fix: the largest of all substeps, not the last one's."""
     scene = dataclasses.replace(tiny_home, model=mujoco.MjModel.from_xml_path(str(tiny_home.folder / "scene.xml")))
     scene.model.opt.cone = cone
     simulation = ig2mj.Simulation(scene)

@@ -45,7 +45,7 @@ def test_without_a_file_everything_fits(tiny_home, tmp_path):
 
 
 def test_measured_buffers_do_not_hold_a_scene_before_it_has_come_to_rest(tiny_home):
-    """Then worlds start settled; small_home started in nine worlds with contacts lost, and things flew off."""
+    """Then worlds start settled; small_home started in nine worlds with contacts lost, and objects flew off."""
     widest = default_profile(tiny_home.model)
     assert holds_everything(widest, tiny_home.model)
     for name in ("awake_dofs", "constraints", "contacts", "convex_contacts"):

@@ -38,7 +38,7 @@ MOTORS = "".join(f'<velocity joint="{j}" kv="{kv}"/>' for j, kv in (("x", 60), (
 
 
 def _home(rng: np.random.Generator) -> mujoco.MjModel:
-    """Towers and single things on a floor, cabinets with doors, an arm that drives among them, a welded pair."""
+    """Towers and single objects on a floor, cabinets with doors, an arm that drives among them, a welded pair."""
     bodies, number = [], 0
     for _ in range(28):
         x, y = rng.uniform(0.4, 3, 2) * rng.choice([-1, 1], 2)

@@ -149,7 +149,7 @@ def test_masses_are_those_of_real_things():
     assert 0.01 < mass["table_knife"] < 0.15
     for name, entry in catalogue().items():
         x, y, z = entry.size
-        # Nothing is denser than lead; only hollow and flat things are lighter than a balloon's skin.
+        # Nothing is denser than lead; only hollow and flat objects are lighter than a balloon's skin.
         assert 1 < entry.mass / (x * y * z) < 11000, name
 
 

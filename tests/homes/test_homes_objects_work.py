@@ -22,7 +22,7 @@ OPENABLE = [name for name, entry in catalogue().items() if any(j.openable for j 
 
 
 class Converted:
-    """One converted object, with things added to its world, stepped from rest."""
+    """One converted object, with objects added to its world, stepped from rest."""
 
     def __init__(
         self,
@@ -174,7 +174,7 @@ def test_a_drawer_holds_a_book_while_it_is_pulled_out_and_pushed_in(convert, cat
 
 @pytest.mark.parametrize("category", OPENABLE)
 def test_every_joint_of_every_model_opens_under_5_newton_metres_or_20_newtons_and_stays(convert, category: str):
-    """Open and half open; loose things are held by their base."""
+    """Open and half open; loose objects are held by their base."""
     for index in range(find(category).count):
         moving = Converted(convert(category, index), fixed=True)
         for openable in moving.manifest.objects[0].openable:

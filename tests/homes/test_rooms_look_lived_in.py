@@ -21,7 +21,7 @@ OPENINGS = ("door", "window")
 
 
 def things_in(name: str, room: Room, *categories: str) -> list[Placed]:
-    """All things of a room, or those of some categories."""
+    """All objects of a room, or those of some categories."""
     found = [t for t in home(name).things.things.values() if t.rooms == (room.name,)]
     return [t for t in found if not categories or t.category in categories]
 

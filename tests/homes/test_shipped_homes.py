@@ -77,7 +77,7 @@ def test_a_disc_of_30_cm_reaches_every_room_by_the_homes_own_map(name: str):
 
 @each_home
 def test_walls_floors_and_ceilings_are_there(name: str):
-    """floor.n.01, the one synset of BEHAVIOR-100's things that no household object stands for."""
+    """floor.n.01, the one synset of BEHAVIOR-100's objects that no household object stands for."""
     found = [o.category for o in load_manifest(SHIPPED_HOMES / name).objects if o.category in BUILDING]
     assert sorted(found) == sorted(BUILDING)
 
@@ -133,7 +133,7 @@ def test_everything_opens_and_stays_in_every_other_home(name: str):
 
 
 def _opens_and_stays(name: str) -> None:
-    """Every joint that opens something, loose things' too, with all else in the home as it stands."""
+    """Every joint that opens something, loose objects' too, with all else in the home as it stands."""
     scene = load(name)
     opened = [
         open_joint(scene.model, openable.joint, openable.closed, openable.open)

@@ -1,4 +1,4 @@
-"""Where a hand looks for what is in it: the points between which rays run, and the point things should be near."""
+"""Where a hand looks for what is in it: the points between which rays run, and the point objects should be near."""
 
 from __future__ import annotations
 

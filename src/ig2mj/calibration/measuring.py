@@ -69,7 +69,7 @@ def calibrate(
 
     Args:
       scene: with or without an agent; a robot that is its first agent acts at random.
-      reach: of the floating hand that is its only agent; it pushes objects about. None: things are only dropped.
+      reach: of the floating hand that is its only agent; it pushes objects about. None: objects are only dropped.
       engine: "warp" or "native"; "": warp where JAX has a GPU.
       num_worlds: measured side by side; 0: `WORLDS`.
       rounds: of two simulated seconds each.
@@ -221,7 +221,7 @@ def _count_warp(
     seed: int,
     progress: Progress,
 ) -> tuple[Measurement, int]:
-    """One measurement, and the capacity flags that any world raised (the count then is of a world that lost things)."""
+    """One measurement, and the capacity flags that any world raised (its count then leaves objects out)."""
     engine = WarpEngine(scene, worlds, profile=profile.for_worlds(worlds), initial=start)
     act = _Disturbance(scene, reach, engine, seed)
     bins = {"awake_dofs": scene.model.nv + 1, "constraints": BINS, "contacts": BINS}

@@ -1,4 +1,4 @@
-"""What a floating hand can push from where: a free start, and a map of the ways that lead from thing to thing.
+"""What a floating hand can push from where: a free start, and a map of the ways that lead from object to object.
 
 Worked out on the host from a settled scene, before the hand is added to it, and checked with MuJoCo's own collision
 detection: a box around the hand's geoms is moved along each way. Everything that is fixed is in the way (walls, closed
@@ -61,7 +61,7 @@ ASIDE, LIFT, ABOVE = (0.3, 0.5), 0.15, 0.4
 where none of these is free, straight above it."""
 
 BEYOND = 0.2
-"""Metres behind an object that should be free where there is a choice: things are pushed there."""
+"""Metres behind an object that should be free where there is a choice: objects are pushed there."""
 
 OPEN = 1.2
 """Metres that can be seen in one of ten directions, at least, from a start: it is in no closed cabinet."""

@@ -66,7 +66,7 @@ COMMANDS: dict[str, str] = {
     "demos": "record demonstrations of scripted experts",
     "sample-task": "sample an environment's start states, and keep them in the cache",
     "homes": "build our own dataset of household objects and homes",
-    "doctor": "tell what this machine can run, and how to mend what it cannot",
+    "doctor": "tell what this machine can run, and how to fix what it cannot",
 }
 
 _USAGE = "usage: ig2mj [--debug] [--version] COMMAND ..."

@@ -129,7 +129,7 @@ def show_row(
 
     loaded = load_pool_scene(pool, scene)
     if [f"{a.category}/{a.model}" for a in loaded.additions] != list(binding.additions):
-        raise InputError(pool, f"was made for another activity than {binding.activity.name}", mend="name that one")
+        raise InputError(pool, f"was made for another activity than {binding.activity.name}", fix="name that one")
     rows = load_pool(pool, loaded)
     if not 0 <= row < rows.size:
         raise Ig2mjError(f"--row {row}: {pool} has rows 0 to {rows.size - 1}")

@@ -103,7 +103,7 @@ def _look(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
 
 
 def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Path) -> int:
-    """Cooks; leaves table, plot, pictures and film; number of things that were to happen and did not."""
+    """Cooks; leaves table, plot, pictures and film; number of objects that were to happen and did not."""
     from ig2mj.process.settings import GL_INSTALL_HINT
     from ig2mj.showcase import cooking
     from ig2mj.showcase.cooking_film import CookingFilm

@@ -1,4 +1,4 @@
-"""`ig2mj doctor`: what this machine can run, and the one line that mends each thing that is missing."""
+"""`ig2mj doctor`: what this machine can run, and the one line that fixes each thing that is missing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import tyro
 
 
 def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
-    """Tell what this machine can run, and how to mend what it cannot.
+    """Tell what this machine can run, and how to fix what it cannot.
 
     Exits 0 if everything that ig2mj needs is there, even where optional things are missing; else 1.
 
@@ -55,11 +55,11 @@ def _print_table(checks, ok: bool) -> None:
             table.add_row("", f"[bold]{group}[/bold]", "")
         mark = "[green]ok[/green]" if check.ok else ("[red]BAD[/red]" if check.required else "[yellow]--[/yellow]")
         table.add_row(mark, f"  {escape(check.name)}", escape(check.found))
-        if check.mend:
-            table.add_row("", "", f"[cyan]-> {escape(check.mend)}[/cyan]")
+        if check.fix:
+            table.add_row("", "", f"[cyan]-> {escape(check.fix)}[/cyan]")
     console = stdout_console()
     console.print(table)
     if ok:
         console.print("\nEverything that ig2mj needs is here. [yellow]--[/yellow] marks optional things.")
     else:
-        console.print("\n[red]Something that ig2mj needs is missing[/red]: mend the lines marked BAD.")
+        console.print("\n[red]Something that ig2mj needs is missing[/red]: fix the lines marked BAD.")

@@ -11,7 +11,7 @@ from ig2mj.errors import InputError
 def check_folder_of(file: pathlib.Path) -> None:
     """The folder must be there. Raises InputError."""
     if not file.parent.is_dir():
-        raise InputError(file, f"the folder {file.parent} does not exist", mend="make it, or choose another place")
+        raise InputError(file, f"the folder {file.parent} does not exist", fix="make it, or choose another place")
 
 
 def check_picture(file: pathlib.Path, others: Iterable[str] = ()) -> None:
@@ -21,5 +21,5 @@ def check_picture(file: pathlib.Path, others: Iterable[str] = ()) -> None:
     Image.init()
     endings = {ending for ending, form in Image.registered_extensions().items() if form in Image.SAVE}
     if file.suffix.lower() not in {*endings, *others}:
-        raise InputError(file, "is no kind of picture that can be written", mend="use .png or .jpg")
+        raise InputError(file, "is no kind of picture that can be written", fix="use .png or .jpg")
     check_folder_of(file)

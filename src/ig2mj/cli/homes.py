@@ -140,7 +140,7 @@ def _scenes_of(dataset: pathlib.Path, wanted: tuple[str, ...]) -> list[str]:
 
     found = sorted(folder.parent.name for folder in (dataset / "scenes").glob("*/urdf"))
     if not found:
-        raise InputError(dataset, "holds no scenes/*/urdf", mend="give the folder that `ig2mj homes build` wrote")
+        raise InputError(dataset, "holds no scenes/*/urdf", fix="give the folder that `ig2mj homes build` wrote")
     for name in wanted:
         if name not in found:
             raise UnknownNameError(f"home of {dataset}", name, found)

@@ -1,4 +1,4 @@
-"""What this machine can run: a list of checks, each with the one line that mends what is missing.
+"""What this machine can run: a list of checks, each with the one line that fixes what is missing.
 
 `diagnose()` is what `ig2mj doctor` prints. Everything that may hang or crash (drivers, OpenGL) is tried in a process
 of its own.
@@ -37,7 +37,7 @@ class Check:
 
     Attributes:
       group: heading it stands under. name: what was looked at. found: what there is, or what is wrong with it.
-      ok: usable. required: ig2mj does not run without it. mend: the line that puts it right; '' where ok or where
+      ok: usable. required: ig2mj does not run without it. fix: the line that puts it right; '' where ok or where
         there is nothing to be done.
     """
 
@@ -46,7 +46,7 @@ class Check:
     ok: bool
     found: str
     required: bool = False
-    mend: str = ""
+    fix: str = ""
 
 
 def diagnose(progress: Callable[[str], None] = lambda text: None) -> list[Check]:
@@ -110,8 +110,8 @@ def machine_checks(nvidia: tuple[str, int] | None) -> list[Check]:
     display = next((f"{v}={os.environ[v]}" for v in ("WAYLAND_DISPLAY", "DISPLAY") if os.environ.get(v)), None)
     if sys.platform in ("darwin", "win32"):
         display = sys.platform
-    mend = "" if display else "`ig2mj view SCENE --picture out.png` needs no display; for the viewer set DISPLAY"
-    return [*checks, Check("machine", "display", display is not None, display or "none", mend=mend)]
+    fix = "" if display else "`ig2mj view SCENE --picture out.png` needs no display; for the viewer set DISPLAY"
+    return [*checks, Check("machine", "display", display is not None, display or "none", fix=fix)]
 
 
 def package_checks(wanted: Iterable[tuple[Requirement, str | None]]) -> list[Check]:
@@ -129,15 +129,15 @@ def package_checks(wanted: Iterable[tuple[Requirement, str | None]]) -> list[Che
     checks = []
     for requirement in base:
         found, ok = _installed(requirement)
-        mend = "" if ok else pip_install(str(requirement))
-        checks.append(Check("packages", requirement.name, ok, found, True, mend))
+        fix = "" if ok else pip_install(str(requirement))
+        checks.append(Check("packages", requirement.name, ok, found, True, fix))
     for extra, packages in extras.items():
         if extra.startswith("gpu"):
             continue  # judged by the devices that JAX finds
         lacking = [r.name for r in packages if not _installed(r)[1]]
         found = f"missing or too old: {', '.join(lacking)}" if lacking else ", ".join(r.name for r in packages)
-        mend = pip_install_extra(extra) if lacking else ""
-        checks.append(Check("packages", f"extra [{extra}]", not lacking, found, mend=mend))
+        fix = pip_install_extra(extra) if lacking else ""
+        checks.append(Check("packages", f"extra [{extra}]", not lacking, found, fix=fix))
     return checks
 
 
@@ -165,16 +165,16 @@ def accelerator_checks(jax: dict[str, Any], warp: dict[str, Any], nvidia: tuple[
         devices = jax["devices"]
         checks.append(Check("engines", "JAX", True, f"{', '.join(devices)}; default {jax['backend']}", True))
         cuda = [d for d in devices if d.startswith(("cuda", "gpu"))]
-        mend = pip_install_extra(extra) if nvidia and not cuda else ""
-        checks.append(Check("engines", "JAX on CUDA", bool(cuda), ", ".join(cuda) or "no CUDA device", mend=mend))
+        fix = pip_install_extra(extra) if nvidia and not cuda else ""
+        checks.append(Check("engines", "JAX on CUDA", bool(cuda), ", ".join(cuda) or "no CUDA device", fix=fix))
     if "error" in warp:
-        mend = _reinstall("warp-lang==1.18.0")
-        checks.append(Check("engines", "Warp", False, warp["error"], True, mend))
+        fix = _reinstall("warp-lang==1.18.0")
+        checks.append(Check("engines", "Warp", False, warp["error"], True, fix))
     else:
         checks.append(Check("engines", "Warp", True, ", ".join(warp["devices"]), True))
         cuda = warp["cuda"]
-        mend = "update the NVIDIA driver" if nvidia and not cuda else ""
-        checks.append(Check("engines", "Warp on CUDA", bool(cuda), ", ".join(cuda) or "no CUDA device", mend=mend))
+        fix = "update the NVIDIA driver" if nvidia and not cuda else ""
+        checks.append(Check("engines", "Warp on CUDA", bool(cuda), ", ".join(cuda) or "no CUDA device", fix=fix))
     return checks
 
 
@@ -183,13 +183,13 @@ def picture_checks(backends: dict[str, str | None]) -> list[Check]:
     any_works = None in backends.values()
     checks = []
     for name, error in backends.items():
-        mend = ""
+        fix = ""
         if error is not None:
-            mend = GL_INSTALL_HINT if name != "warp" else _reinstall("warp-lang==1.18.0")
+            fix = GL_INSTALL_HINT if name != "warp" else _reinstall("warp-lang==1.18.0")
         what = "draws (slow, needs no OpenGL)" if name == "warp" else "draws"
-        checks.append(Check("pictures", name, error is None, error or what, mend=mend))
+        checks.append(Check("pictures", name, error is None, error or what, fix=fix))
     if not any_works:
-        checks.append(Check("pictures", "any", False, "no backend draws", mend=GL_INSTALL_HINT))
+        checks.append(Check("pictures", "any", False, "no backend draws", fix=GL_INSTALL_HINT))
     return checks
 
 
@@ -203,13 +203,13 @@ def tool_checks() -> list[Check]:
         found, ok = f"{len(categories())} categories", True
     except Ig2mjError as e:
         found, ok = str(e), False
-    mend = "" if ok else _reinstall("bddl==1.0.1")
-    checks = [Check("tools", "taxonomy (bddl)", ok, found, True, mend)]
+    fix = "" if ok else _reinstall("bddl==1.0.1")
+    checks = [Check("tools", "taxonomy (bddl)", ok, found, True, fix)]
     try:
-        found, mend = ffmpeg_program(), ""
+        found, fix = ffmpeg_program(), ""
     except Ig2mjError:
-        found, mend = "none", pip_install_extra("demo")
-    return [*checks, Check("tools", "ffmpeg (films)", not mend, found, mend=mend)]
+        found, fix = "none", pip_install_extra("demo")
+    return [*checks, Check("tools", "ffmpeg (films)", not fix, found, fix=fix)]
 
 
 def cache_checks(warp: dict[str, Any]) -> list[Check]:
@@ -225,7 +225,7 @@ def cache_checks(warp: dict[str, Any]) -> list[Check]:
         path = pathlib.Path(folder).expanduser()
         ok = _writable(path)
         found = f"{path}: {_size(path)}" + ("" if ok else ", not writable")
-        checks.append(Check("caches", name, ok, found, mend="" if ok else f"export {variable}=<a folder of yours>"))
+        checks.append(Check("caches", name, ok, found, fix="" if ok else f"export {variable}=<a folder of yours>"))
     return checks
 
 

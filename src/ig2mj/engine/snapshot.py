@@ -241,14 +241,14 @@ def fitted(snapshot: Snapshot, start: Snapshot, num_worlds: int, scene: str) -> 
             found = getattr(getattr(snapshot, part), field.name).shape[len(batch) :]
             wanted = getattr(getattr(start, part), field.name).shape
             if tuple(found) != tuple(wanted):
-                mend = (
+                fix = (
                     "load it into the scene that it was saved from"
                     if part == "scene"
                     else "load it into the scene with the agents that it was saved with, or take its `without_agents()`"
                 )
                 raise EngineError(
                     f"the snapshot does not fit scene '{scene}': {field.name} of its {part} has shape {tuple(found)}, "
-                    f"the scene's {tuple(wanted)} ({mend})"
+                    f"the scene's {tuple(wanted)} ({fix})"
                 )
     return dataclasses.replace(snapshot, model_fields=_fitted_fields(snapshot.model_fields, start.model_fields, batch))
 

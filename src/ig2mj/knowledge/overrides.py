@@ -46,7 +46,7 @@ def load_overrides(path: str | os.PathLike) -> Overrides:
     except OSError as e:
         raise InputError(file, f"cannot be read: {e.strerror or e}") from e
     except msgspec.DecodeError as e:  # ValidationError is one
-        raise InputError(file, str(e), mend="see ig2mj.knowledge.overrides for the form") from e
+        raise InputError(file, str(e), fix="see ig2mj.knowledge.overrides for the form") from e
     tables = [overrides.categories, overrides.models, *overrides.compat.values()]
     for key, changes in ((k, c) for table in tables for k, c in table.items()):
         for ability, parameters in changes.items():
@@ -56,15 +56,15 @@ def load_overrides(path: str | os.PathLike) -> Overrides:
 
 def _check(file: pathlib.Path, element: str, ability: str, parameters: Parameters) -> None:
     if ability not in ABILITIES:
-        raise InputError(file, "is no ability", element=element, mend=f"abilities are {', '.join(sorted(ABILITIES))}")
+        raise InputError(file, "is no ability", element=element, fix=f"abilities are {', '.join(sorted(ABILITIES))}")
     known = ABILITIES[ability].defaults
     for name, value in parameters.items():
         if name not in known:
             have = ", ".join(known) or "none"
-            raise InputError(file, f"has no parameter '{name}'", element=element, mend=f"its parameters: {have}")
+            raise InputError(file, f"has no parameter '{name}'", element=element, fix=f"its parameters: {have}")
         if isinstance(value, bool) != isinstance(known[name], bool):
             wanted = "true or false" if isinstance(known[name], bool) else "a number"
-            raise InputError(file, f"parameter '{name}' is {value!r}", element=element, mend=f"give {wanted}")
+            raise InputError(file, f"parameter '{name}' is {value!r}", element=element, fix=f"give {wanted}")
 
 
 @functools.cache

@@ -35,7 +35,7 @@ def taxonomy() -> dict[str, Node]:
     try:
         root = json.loads(file.read_bytes())
     except (OSError, ValueError) as e:
-        raise InputError(file, f"cannot be read: {e}", mend="reinstall bddl==1.0.1") from e
+        raise InputError(file, f"cannot be read: {e}", fix="reinstall bddl==1.0.1") from e
     raw: dict[str, dict[str, Any]] = {}
     children: dict[str, set[str]] = {}
     parents: dict[str, set[str]] = {}

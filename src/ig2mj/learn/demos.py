@@ -181,7 +181,7 @@ def load_demos(file: str | os.PathLike, perception: Perception, world: Mapping[s
     path = pathlib.Path(file)
     parts = list(_runs(path, perception, world))
     if not parts:
-        raise InputError(path, "holds no run", mend=_MEND)
+        raise InputError(path, "holds no run", fix=_MEND)
     fields = {name: jnp.asarray(np.concatenate([p[name] for p in parts])) for name in parts[0]}
     seen, after = (Seen(fields.pop(f"{k}_vector"), fields.pop(f"{k}_picture")) for k in ("seen", "after"))
     return Demos(seen=seen, after=after, **fields)
@@ -206,16 +206,16 @@ def _opened(path: pathlib.Path) -> Iterator[Any]:
     import h5py
 
     if not path.is_file():
-        raise InputError(path, "there is no such file", mend=_MEND)
+        raise InputError(path, "there is no such file", fix=_MEND)
     try:
         opened = h5py.File(path, "r")
     except OSError as e:
-        raise InputError(path, "is no HDF5 file, or a broken one", mend=_MEND) from e
+        raise InputError(path, "is no HDF5 file, or a broken one", fix=_MEND) from e
     with opened as found:
         if found.attrs.get("format") != FORMAT or found.attrs.get("version") != FORMAT_VERSION:
-            raise InputError(path, f"is no file of {FORMAT}, version {FORMAT_VERSION}", mend=_MEND)
+            raise InputError(path, f"is no file of {FORMAT}, version {FORMAT_VERSION}", fix=_MEND)
         if not {"world", "spaces"} <= set(found.attrs):
-            raise InputError(path, "does not say what it is of", element="attributes world and spaces", mend=_MEND)
+            raise InputError(path, "does not say what it is of", element="attributes world and spaces", fix=_MEND)
         yield found
 
 

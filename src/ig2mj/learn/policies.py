@@ -123,8 +123,8 @@ class Policy:
         except FileNotFoundError as e:
             raise InputError(file, "there is no such file") from e
         except Exception as e:  # numpy raises whatever a broken archive makes it stumble over
-            mend = "`ig2mj train` writes policies"
-            raise InputError(file, f"is no policy ({type(e).__name__})", mend=mend) from e
+            fix = "`ig2mj train` writes policies"
+            raise InputError(file, f"is no policy ({type(e).__name__})", fix=fix) from e
         if card.get("format") != FORMAT_VERSION:
             raise InputError(file, f"has format {card.get('format')}, and {FORMAT_VERSION} is what can be read")
         return cls(card, weights, mean, deviation)
@@ -199,7 +199,7 @@ def find_policy(name: str | os.PathLike) -> pathlib.Path:
     if file.is_dir() and (file / "policy.npz").is_file():
         return file / "policy.npz"
     if file.suffix == ".npz" or len(file.parts) > 1:
-        raise InputError(file, "there is no such file", mend="`ig2mj train` writes policies")
+        raise InputError(file, "there is no such file", fix="`ig2mj train` writes policies")
     known = shipped()
     if str(name) not in known:
         raise UnknownNameError("policy", str(name), known)

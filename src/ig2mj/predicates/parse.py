@@ -43,11 +43,11 @@ def parse(source: str, name: str = "expression") -> Expression:
     """
     tokens = _tokens(source, name)
     if not tokens:
-        raise ExpressionError(name, "is empty", mend="write for instance (cooked fish_0)")
+        raise ExpressionError(name, "is empty", fix="write for instance (cooked fish_0)")
     tree, rest = _tree(tokens, 0, name, 0)
     if rest != len(tokens):
         raise ExpressionError(
-            name, "goes on after its end", element=f"'{tokens[rest]}'", mend="join parts with (and ...)"
+            name, "goes on after its end", element=f"'{tokens[rest]}'", fix="join parts with (and ...)"
         )
     return _expression(tree, name)
 
@@ -68,7 +68,7 @@ def _tree(tokens: list[str], at: int, name: str, depth: int) -> tuple[Tree, int]
     if depth > MAX_DEPTH:
         raise ExpressionError(name, f"is nested deeper than {MAX_DEPTH}")
     if at >= len(tokens):
-        raise ExpressionError(name, "ends too early", mend="close every bracket")
+        raise ExpressionError(name, "ends too early", fix="close every bracket")
     if tokens[at] == ")":
         raise ExpressionError(name, "closes a bracket that was not opened")
     if tokens[at] != "(":
@@ -79,7 +79,7 @@ def _tree(tokens: list[str], at: int, name: str, depth: int) -> tuple[Tree, int]
         part, at = _tree(tokens, at, name, depth + 1)
         parts.append(part)
     if at >= len(tokens):
-        raise ExpressionError(name, "ends too early", mend="close every bracket")
+        raise ExpressionError(name, "ends too early", fix="close every bracket")
     return parts, at + 1
 
 
@@ -90,7 +90,7 @@ def _expression(tree: Tree, name: str) -> Expression:
 
     def wants(count: int, form: str) -> None:
         if len(parts) != count:
-            raise ExpressionError(name, f"'{word}' has {len(parts)} parts", element=_show(tree), mend=f"write {form}")
+            raise ExpressionError(name, f"'{word}' has {len(parts)} parts", element=_show(tree), fix=f"write {form}")
 
     match word:
         case "and":

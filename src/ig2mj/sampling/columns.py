@@ -151,7 +151,7 @@ def _cylinder(
 
 @dataclasses.dataclass(frozen=True)
 class Level:
-    """What a window of columns looks like from one height: the first surface below it, the first thing above it.
+    """What a window of columns looks like from one height: the first surface below it, the first object above it.
 
     Attributes:
       surface: height of the surface, -inf where there is none. owner: object it belongs to, -1 none.

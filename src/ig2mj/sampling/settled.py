@@ -83,7 +83,7 @@ def make_pool(
         if tried >= TRIES * count + width:
             raise EngineError(
                 f"of {tried} disturbed states of '{scene.name}' only {len(rows)} came to rest with everything in the "
-                f"house and apart (convert the scene with its checks and mend what does not settle)"
+                f"house and apart (convert the scene with its checks and fix what does not settle)"
             )
         physics = engine.load(physics, start)
         world = jnp.arange(tried, tried + width)

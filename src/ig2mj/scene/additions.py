@@ -138,7 +138,7 @@ def _read(file: pathlib.Path) -> ElementTree.Element:
     try:
         return ElementTree.parse(file).getroot()
     except (OSError, ElementTree.ParseError) as e:
-        raise InputError(file, f"cannot be read: {e}", mend="convert it again") from e
+        raise InputError(file, f"cannot be read: {e}", fix="convert it again") from e
 
 
 def _child(root: ElementTree.Element, tag: str) -> ElementTree.Element:

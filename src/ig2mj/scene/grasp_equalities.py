@@ -1,4 +1,4 @@
-"""The equality constraints by which hands hold things: compiled with the scene, switched off."""
+"""The equality constraints by which hands hold objects: compiled with the scene, switched off."""
 
 from __future__ import annotations
 

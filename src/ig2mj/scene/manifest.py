@@ -158,15 +158,15 @@ def load_manifest(path: str | os.PathLike) -> Manifest:
     try:
         raw = file.read_bytes()
     except FileNotFoundError as e:
-        raise ManifestError(file, "there is no such file", mend="give the folder that `ig2mj convert` wrote") from e
+        raise ManifestError(file, "there is no such file", fix="give the folder that `ig2mj convert` wrote") from e
     except OSError as e:
         raise ManifestError(file, f"cannot be read: {e.strerror or e}") from e
     try:
         manifest = msgspec.json.decode(raw, type=Manifest)
     except msgspec.ValidationError as e:
-        raise ManifestError(file, str(e), mend="convert the scene again") from e
+        raise ManifestError(file, str(e), fix="convert the scene again") from e
     except msgspec.DecodeError as e:
-        raise ManifestError(file, f"is no valid JSON: {e}", mend="convert the scene again") from e
+        raise ManifestError(file, f"is no valid JSON: {e}", fix="convert the scene again") from e
     check_manifest(manifest, file)
     return manifest
 
@@ -184,7 +184,7 @@ def check_manifest(manifest: Manifest, file: object = "manifest.json") -> None:
             file,
             f"has format version {manifest.format_version}, this ig2mj reads {FORMAT_VERSION}",
             element="format_version",
-            mend="convert the scene again",
+            fix="convert the scene again",
         )
     names = [o.name for o in manifest.objects]
     if len(set(names)) != len(names):

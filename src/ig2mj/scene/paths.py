@@ -41,15 +41,15 @@ def scene_folder(path: str | os.PathLike) -> pathlib.Path:
     bare = len(path.parts) == 1
     if bare and (SHIPPED_HOMES / path).is_dir():
         return SHIPPED_HOMES / path
-    mend = _MEND
+    fix = _MEND
     if bare and (homes := shipped_homes()):
         near = difflib.get_close_matches(path.name, homes, n=3, cutoff=0.5)
-        mend += (
+        fix += (
             f", or a home that `ig2mj homes list` names; near matches: {', '.join(near)}"
             if near
             else (f", or one of {', '.join(homes)}")
         )
-    raise InputError(path, "there is no such scene", mend=mend)
+    raise InputError(path, "there is no such scene", fix=fix)
 
 
 def model_file(path: str | os.PathLike) -> pathlib.Path:
@@ -61,4 +61,4 @@ def model_file(path: str | os.PathLike) -> pathlib.Path:
     for name in MODEL_FILES:
         if (folder / name).is_file():
             return folder / name
-    raise InputError(folder, f"holds no {MODEL_FILES[0]}", mend=_MEND)
+    raise InputError(folder, f"holds no {MODEL_FILES[0]}", fix=_MEND)

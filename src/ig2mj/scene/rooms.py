@@ -65,12 +65,12 @@ def load_rooms(path: str | os.PathLike) -> Rooms:
     file = pathlib.Path(path)
     if file.is_dir():
         file = file / "rooms.npz"
-    mend = "convert the scene again"
+    fix = "convert the scene again"
     try:
         with file.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
             version = int(data["format_version"])
             if version != FORMAT_VERSION:
-                raise InputError(file, f"has format version {version}, this ig2mj reads {FORMAT_VERSION}", mend=mend)
+                raise InputError(file, f"has format version {version}, this ig2mj reads {FORMAT_VERSION}", fix=fix)
             rooms = Rooms(
                 names=tuple(str(n) for n in data["names"]),
                 types=tuple(str(t) for t in data["types"]),
@@ -81,16 +81,16 @@ def load_rooms(path: str | os.PathLike) -> Rooms:
                 trav_resolution=float(data["trav_resolution"]),
             )
     except KeyError as e:
-        raise InputError(file, f"lacks an array: {e.args[0]}", mend=mend) from e
+        raise InputError(file, f"lacks an array: {e.args[0]}", fix=fix) from e
     except FileNotFoundError as e:
-        raise InputError(file, "does not exist", mend=mend) from e
+        raise InputError(file, "does not exist", fix=fix) from e
     except (OSError, ValueError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as e:
-        raise InputError(file, f"cannot be read: {e}", mend=mend) from e
+        raise InputError(file, f"cannot be read: {e}", fix=fix) from e
     shape = rooms.room_map.shape
     if len(shape) != 2 or shape[0] != shape[1] or len(rooms.names) != len(rooms.types):
-        raise InputError(file, "its arrays do not fit together", mend=mend)
+        raise InputError(file, "its arrays do not fit together", fix=fix)
     if rooms.room_map.size and not 0 <= rooms.room_map.min() <= rooms.room_map.max() <= len(rooms.names):
-        raise InputError(file, "room_map names rooms that do not exist", element="room_map", mend=mend)
+        raise InputError(file, "room_map names rooms that do not exist", element="room_map", fix=fix)
     if not rooms.resolution > 0 or not rooms.trav_resolution > 0:
-        raise InputError(file, "a resolution is not positive", element="resolution", mend=mend)
+        raise InputError(file, "a resolution is not positive", element="resolution", fix=fix)
     return rooms

@@ -175,4 +175,4 @@ def _compile(spec: mujoco.MjSpec | None, file: pathlib.Path, generated: bool) ->
 
 
 def _not_mjcf(file: pathlib.Path, e: Exception | str) -> InputError:
-    return InputError(file, f"MuJoCo cannot load it: {e}", mend="convert the scene again")
+    return InputError(file, f"MuJoCo cannot load it: {e}", fix="convert the scene again")

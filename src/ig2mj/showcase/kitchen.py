@@ -1,6 +1,6 @@
 """The kitchen of the cooking demo: a fish near a stove's heat source, milk inside a fridge, a hand before the stove.
 
-Things are found by category, so that any home with one of each will do.
+Objects are found by category, so that any home with one of each will do.
 """
 
 from __future__ import annotations

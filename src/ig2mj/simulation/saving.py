@@ -74,5 +74,5 @@ def load_world(file: str | os.PathLike, like: SavedWorld, scene: Scene) -> Saved
     if header.get("version") != VERSION:
         raise InputError(file, f"has version {header.get('version')}, this ig2mj reads {VERSION}")
     if header.get("objects") != list(scene.object_names):
-        raise InputError(file, f"is of scene '{header.get('scene')}'", mend="restore it in that scene")
+        raise InputError(file, f"is of scene '{header.get('scene')}'", fix="restore it in that scene")
     return found

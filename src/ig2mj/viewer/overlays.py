@@ -94,7 +94,7 @@ class RoomNames:
 
 
 class Clock:
-    """Simulated time, contacts, and how many movable things are awake."""
+    """Simulated time, contacts, and how many movable objects are awake."""
 
     title = "clock"
 

@@ -117,7 +117,7 @@ def _with_model(scene: Scene, model: mujoco.MjModel, file: str | os.PathLike) ->
     """The scene with a model that may have agents behind the scene's own bodies. Raises InputError."""
     bodies, geoms = len(scene.tables.body_object), len(scene.tables.geom_object)
     if model.nbody < bodies or model.ngeom < geoms or (model.geom_type[:geoms] != scene.model.geom_type[:geoms]).any():
-        raise InputError(file, "was dumped from another version of the scene", mend="give the scene it was dumped from")
+        raise InputError(file, "was dumped from another version of the scene", fix="give the scene it was dumped from")
     more = {"body_object": model.nbody - bodies, "body_agent": model.nbody - bodies, "body_hand": model.nbody - bodies}
     more |= {"geom_object": model.ngeom - geoms, "actuator_agent": model.nu - len(scene.tables.actuator_agent)}
     padded = {n: np.pad(getattr(scene.tables, n), (0, count), constant_values=-1) for n, count in more.items()}

@@ -40,7 +40,7 @@ def save_tree(file: str | os.PathLike, tree: Any, header: dict[str, Any]) -> Non
         unfinished.replace(path)
     except OSError as e:
         unfinished.unlink(missing_ok=True)
-        raise InputError(path, f"cannot be written: {e.strerror or e}", mend="choose another place") from e
+        raise InputError(path, f"cannot be written: {e.strerror or e}", fix="choose another place") from e
 
 
 def read_header(file: str | os.PathLike) -> dict[str, Any]:
@@ -63,7 +63,7 @@ def load_tree(file: str | os.PathLike, like: Tree) -> tuple[Tree, dict[str, Any]
         def leaf(keys: Any, wanted: Any) -> np.ndarray:
             name = _name(keys)
             if name not in archive.files:
-                raise InputError(file, "is missing", element=name, mend="make the file again with this version")
+                raise InputError(file, "is missing", element=name, fix="make the file again with this version")
             try:
                 array = archive[name]
             except (ValueError, OSError, zipfile.BadZipFile, zlib.error) as e:
@@ -73,7 +73,7 @@ def load_tree(file: str | os.PathLike, like: Tree) -> tuple[Tree, dict[str, Any]
                     file,
                     f"has shape {array.shape}, the scene needs (any, {', '.join(map(str, wanted.shape[1:]))})",
                     element=name,
-                    mend="make the file again for this scene",
+                    fix="make the file again for this scene",
                 )
             return array.astype(wanted.dtype)
 
@@ -105,7 +105,7 @@ def build(kind: type[Tree], arrays: Mapping[str, np.ndarray], file: str | os.Pat
         elif name in arrays:
             fields[field.name] = arrays[name]
         elif field.default is not None:  # one whose default is None may be left out
-            raise InputError(file, "is missing", element=name, mend="make the file again with this version")
+            raise InputError(file, "is missing", element=name, fix="make the file again with this version")
     return kind(**fields)
 
 

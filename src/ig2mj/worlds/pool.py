@@ -85,7 +85,7 @@ def load_pool_scene(
     for entry in header.get("additions", ()):
         model = find_model(f"{entry['category']}/{entry['model']}")
         if model.sha256 != entry["sha256"]:
-            raise InputError(file, f"was made with another '{model.category}/{model.model}' added", mend=_MEND)
+            raise InputError(file, f"was made with another '{model.category}/{model.model}' added", fix=_MEND)
         wanted.append(f"{model.category}/{model.model}")
     return load_scene(header["scene"] if scene is None else scene, agents, wanted)
 
@@ -106,26 +106,26 @@ def load_pool(file: str | os.PathLike, scene: Scene | None = None) -> Pool:
       InputError: the file is missing, broken, of another scene, or of another format.
     """
     header = _pool_header(file)
-    mend = _MEND
+    fix = _MEND
     if scene is not None and header.get("scene") != scene.name:
-        raise InputError(file, f"is a pool of scene '{header.get('scene')}', not of '{scene.name}'", mend=mend)
+        raise InputError(file, f"is a pool of scene '{header.get('scene')}', not of '{scene.name}'", fix=fix)
     if scene is not None and [a["name"] for a in header.get("additions", ())] != [a.name for a in scene.additions]:
-        raise InputError(file, "was made with other objects added", mend="load the scene with `load_pool_scene`")
+        raise InputError(file, "was made with other objects added", fix="load the scene with `load_pool_scene`")
     if scene is not None and header.get("digest") != scene.digest:
-        raise InputError(file, f"was made before '{scene.name}' was converted as it is now", mend=mend)
+        raise InputError(file, f"was made before '{scene.name}' was converted as it is now", fix=fix)
     arrays = read_arrays(file, "")
     arrays.pop(HEADER)
     pool = build(Pool, arrays, file)
     lengths = {len(array) if array.ndim else 0 for array in arrays.values()}
     if len(lengths) != 1:
-        raise InputError(file, f"has arrays of different lengths: {', '.join(map(str, sorted(lengths)))}", mend=mend)
+        raise InputError(file, f"has arrays of different lengths: {', '.join(map(str, sorted(lengths)))}", fix=fix)
     if not pool.size:
-        raise InputError(file, "has no rows", mend=mend)
+        raise InputError(file, "has no rows", fix=fix)
     return pool
 
 
 def _pool_header(file: str | os.PathLike) -> dict[str, Any]:
     header = read_header(file)
     if header.get("kind") != "pool" or header.get("format_version") != FORMAT_VERSION:
-        raise InputError(file, f"is no pool of format {FORMAT_VERSION}", mend=_MEND)
+        raise InputError(file, f"is no pool of format {FORMAT_VERSION}", fix=_MEND)
     return header

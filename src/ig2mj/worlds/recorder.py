@@ -118,12 +118,12 @@ def read_dump(file: str | os.PathLike, scene: str) -> tuple[Snapshot, mujoco.MjM
     arrays = read_arrays(file, "frames.physics.")
     binary = read_arrays(file, MODEL).get("", np.zeros(0, np.uint8))
     if not len(binary):
-        raise InputError(file, "is missing", element=MODEL, mend="record it again")
+        raise InputError(file, "is missing", element=MODEL, fix="record it again")
     physics = build(Snapshot, arrays, file)
     try:
         model = mujoco.MjModel.from_binary_path("dump.mjb", assets={"dump.mjb": binary.tobytes()})
     except ValueError as e:
-        raise InputError(file, f"MuJoCo cannot read it: {e}", element=MODEL, mend="use the MuJoCo of the run") from e
+        raise InputError(file, f"MuJoCo cannot read it: {e}", element=MODEL, fix="use the MuJoCo of the run") from e
     if physics.qpos.shape[1:] != (model.nq,) or not len(physics.qpos):
         raise InputError(file, f"has shape {physics.qpos.shape}", element="frames.physics.qpos")
     return physics, model, header
@@ -136,7 +136,7 @@ def check_dump(file: str | os.PathLike, scene: str) -> dict[str, Any]:
         raise InputError(
             file,
             f"is a {header.get('kind')} of scene '{header.get('scene')}', not a dump of '{scene}'",
-            mend="give the scene it was dumped from",
+            fix="give the scene it was dumped from",
         )
     return header
 

@@ -305,7 +305,7 @@ class World:
         listed = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
         raise EngineError(
             f"world {self.number}: position or velocity is not finite at t = {data.time:.3f} s of {listed} "
-            "(reset the world; a smaller timestep or weaker controls may mend it)"
+            "(reset the world; a smaller timestep or weaker controls may fix it)"
         )
 
     def _plan(self, trees: np.ndarray | None) -> PosePlan:

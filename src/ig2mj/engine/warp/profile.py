@@ -168,17 +168,17 @@ def load_profile(folder: str | os.PathLike, model: mujoco.MjModel, name: str = P
     file = pathlib.Path(folder) / name
     if not file.exists():
         return default_profile(model)
-    mend = "run `ig2mj calibrate` again, or delete the file"
+    fix = "run `ig2mj calibrate` again, or delete the file"
     try:
         profile = msgspec.json.decode(file.read_bytes(), type=EngineProfile)
     except msgspec.MsgspecError as e:
-        raise InputError(file, f"is no engine profile: {e}", mend=mend) from e
+        raise InputError(file, f"is no engine profile: {e}", fix=fix) from e
     for name in ("awake_dofs", "constraints", "contacts", "convex_contacts"):
         if getattr(profile, name) < 1:
-            raise InputError(file, "must be at least 1", element=name, mend=mend)
+            raise InputError(file, "must be at least 1", element=name, fix=fix)
     for name in ("spare_contacts", "spare_convex_contacts"):
         if getattr(profile, name) < 0:
-            raise InputError(file, "must not be negative", element=name, mend=mend)
+            raise InputError(file, "must not be negative", element=name, fix=fix)
     return fit(profile, model)
 
 

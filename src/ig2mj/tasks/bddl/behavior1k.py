@@ -75,7 +75,7 @@ def unpack(archive: pathlib.Path, target: pathlib.Path, sha256: str = SHA256) ->
     """
     found = hashlib.sha256(archive.read_bytes()).hexdigest()
     if found != sha256:
-        raise InputError(archive, f"has the SHA-256 {found}, not {sha256}", mend=f"try `{FETCH}` again")
+        raise InputError(archive, f"has the SHA-256 {found}, not {sha256}", fix=f"try `{FETCH}` again")
     with tarfile.open(archive) as tar:
         for member in tar:
             path = pathlib.PurePosixPath(member.name)
@@ -107,7 +107,7 @@ def _download(work: pathlib.Path) -> pathlib.Path:
         lines = [line for line in done.stderr.splitlines() if line.strip()]
         said = lines[-1] if lines else "it says nothing"
         raise InputError(
-            f"bddl {VERSION}", f"pip cannot download it: {said}", mend="check the network and pip's settings"
+            f"bddl {VERSION}", f"pip cannot download it: {said}", fix="check the network and pip's settings"
         )
     return found[0]
 

@@ -43,7 +43,7 @@ def read_problem(name: str | os.PathLike, behavior_1k: bool = False) -> Problem:
     try:
         text = file.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as e:
-        raise InputError(file, f"cannot be read: {e}", mend="name a BDDL definition") from e
+        raise InputError(file, f"cannot be read: {e}", fix="name a BDDL definition") from e
     return parse_problem(text, str(file), tolerant=tolerant)
 
 

@@ -242,8 +242,8 @@ class _Reader:
             self.remarks.append(str(self.error(at, what)))
         return self.tolerant
 
-    def error(self, at: Tree, problem: str, mend: str = "") -> BddlError:
-        return error(self.file, at, problem, mend)
+    def error(self, at: Tree, problem: str, fix: str = "") -> BddlError:
+        return error(self.file, at, problem, fix)
 
 
 def _is(tree: Tree, word: str) -> bool:

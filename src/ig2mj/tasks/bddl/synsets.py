@@ -1,7 +1,7 @@
 """Which categories of objects may stand for a synset of an activity.
 
 BEHAVIOR-100 speaks of synsets of ig2mj's own taxonomy (`ig2mj.knowledge`). BEHAVIOR-1K has a finer one of its own; for
-what ours does not know something near stands in, and says so: a synset with a category of the same name, the thing in
+what ours does not know something near stands in, and says so: a synset with a category of the same name, the object in
 `carton__of__milk` (milk, else a carton), the synset right above; a few are named one by one.
 """
 

@@ -37,14 +37,14 @@ class Group:
 Tree: TypeAlias = Word | Group
 
 
-def error(file: str, at: Tree, problem: str, mend: str = "") -> BddlError:
+def error(file: str, at: Tree, problem: str, fix: str = "") -> BddlError:
     """The error that names a place: its line, and its word (of a group: the first)."""
     first = at
     while isinstance(first, Group) and first.parts:
         first = first.parts[0]
     word = first.text if isinstance(first, Word) else "()"
     shown = word if at is first else f"({word}"
-    return BddlError(file, problem, element=f"line {at.line}: '{shown}'", mend=mend)
+    return BddlError(file, problem, element=f"line {at.line}: '{shown}'", fix=fix)
 
 
 def read_tree(text: str, file: str) -> Group:
@@ -82,6 +82,6 @@ def read_tree(text: str, file: str) -> Group:
     if open_groups:
         raise error(file, open_groups[-1][0], "is never closed", "add a ')'")
     if not found:
-        raise BddlError(file, "is empty", mend="a definition begins with (define")
+        raise BddlError(file, "is empty", fix="a definition begins with (define")
     assert isinstance(found[0], Group)
     return found[0]

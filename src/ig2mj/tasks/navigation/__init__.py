@@ -1,1 +1,1 @@
-"""Tasks of moving about: navigation to a point, among loose things and other robots, reaching, closing furniture."""
+"""Tasks of moving about: navigation to a point, among loose objects and other robots, reaching, closing furniture."""

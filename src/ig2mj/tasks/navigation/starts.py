@@ -38,13 +38,13 @@ OPEN_CHANCE = 0.5
 
 SETTLE_SECONDS = 5.0
 TRIES = 100
-"""Places tried for a goal, a start or a loose thing (spec section 2.3)."""
+"""Places tried for a goal, a start or a loose object (spec section 2.3)."""
 
 YAWS = 4
 """Directions in which a robot is tried in every cell; it can stand where it can in one of them."""
 
 APART = 0.8
-"""m between robots at the start, and from loose things to the robot."""
+"""m between robots at the start, and from loose objects to the robot."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -254,7 +254,7 @@ class _Households:
     def _settled(
         self, joints: np.ndarray, values: np.ndarray, spots: dict[str, np.ndarray], start: Snapshot | None = None
     ) -> Snapshot:
-        """The household after joints were opened and things were put down, at rest."""
+        """The household after joints were opened and objects were put down, at rest."""
         engine, tables = self._engine, self._scene.tables
         physics = engine.reset() if start is None else engine.load(engine.reset(), start)
         model = self._scene.model

@@ -1,12 +1,12 @@
 """Contacts of MuJoCo Warp are checked against their geoms: strays are dropped, slanted normals on faces set upright.
 
-Its convex collision works in single precision. Where a small thing rests on a wide box, as everything does on a floor,
+Its convex collision works in single precision. Where a small object rests on a wide box, as everything does on a floor,
 by a hundredth of a millimetre, it gives
 
-- now and then a contact metres away from the thing. Such a lever makes the solver's matrix
-  singular, and the world is lost (not finite) or the thing flies off. A contact belongs within the bounding boxes of
+- now and then a contact metres away from the object. Such a lever makes the solver's matrix
+  singular, and the world is lost (not finite) or the object flies off. A contact belongs within the bounding boxes of
   both geoms; what lies outside by more than its own depth is dropped, and the pair's next step gives a sound one;
-- in up to one of twenty steps (floor of 12 m, thing nearly flat) a normal that is not the floor's. Where a shallow
+- in up to one of twenty steps (floor of 12 m, object nearly flat) a normal that is not the floor's. Where a shallow
   contact lies on a box's face, further from its edges than it is deep, the shortest way out is across that face: the
   normal is set to the face's.
 """
