@@ -74,6 +74,9 @@ RANDOM_CELLS = 96
 MANY_CELLS = 3_000_000
 """Where none of the first will do, as many candidates are looked at as make this number of cells under the object."""
 
+NOWHERE = frozenset(("no surface", "no room", "not supported"))
+"""Reasons of candidates that were not even let go. Where `DRAWS` orientations meet no others, none ever will."""
+
 Truth = Callable[[], bool]
 
 

@@ -19,7 +19,7 @@ from ig2mj.engine.snapshot import Snapshot
 from ig2mj.errors import StateError
 from ig2mj.predicates.literals import object_index, room_index
 from ig2mj.sampling.conditions import Condition, order
-from ig2mj.sampling.placement import RESTING_PENETRATION, Areas, Budget, Placer, Rejections
+from ig2mj.sampling.placement import NOWHERE, RESTING_PENETRATION, Areas, Budget, Placer, Rejections
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.rules import PLACEMENTS, elsewhere, on_floor
 from ig2mj.sampling.setters import Change, set_by_name
@@ -132,7 +132,7 @@ class RowSampler:
                 back = max(k - 1, 0)
                 self.query.load(before[back])
                 del before[back:]
-                if k == 0 and not reasons:
+                if k == 0 and NOWHERE.issuperset(reasons):
                     return False
                 k = back
         return True
