@@ -63,7 +63,7 @@ COMMANDS: dict[str, str] = {
     "rollout": "play episodes of an environment, and tell how they ended",
     "train": "train a policy in an environment",
     "evaluate": "tell how often a policy succeeds from states it has not seen",
-    "demos": "record demonstrations of scripted experts",
+    "demos": "collect demonstrations of scripted experts, and replay recordings",
     "sample-task": "sample an environment's start states, and keep them in the cache",
     "homes": "build our own dataset of household objects and homes",
     "doctor": "tell what this machine can run, and how to fix what it cannot",

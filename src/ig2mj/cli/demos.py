@@ -1,4 +1,4 @@
-"""`ig2mj demos`: demonstrations of the scripted experts."""
+"""`ig2mj demos`: demonstrations of the scripted experts to learn from, and recordings to replay."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import pathlib
 from typing import Annotated
 
 import tyro
+
+from ig2mj.cli.demos_replay import replay
 
 
 def collect(
@@ -76,4 +78,4 @@ def collect(
     return 0
 
 
-SUBCOMMANDS = {"collect": collect}
+SUBCOMMANDS = {"collect": collect, "replay": replay}

@@ -28,6 +28,7 @@ def run(
     held_out: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     pool_size: int = 0,
     video: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    record: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     paper_rl: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
@@ -47,6 +48,7 @@ def run(
       held_out: held-out start states, the first EPISODES of them, each played once.
       pool_size: start states; 0: as many as the split has.
       video: film of the first episode of the first world (.mp4, .gif); needs OpenGL and the native engine.
+      record: HDF5 of everything that happens in all worlds, for `ig2mj demos replay`.
       paper_rl: the thresholds that the paper's runs had.
       json: the last line is one JSON object.
     """
@@ -75,6 +77,10 @@ def run(
         split=split,
         pool_size=pool_size or None,
     )
+    if record is not None:
+        from ig2mj.demos import record as recorded
+
+        played = recorded(played, record)
     film = None
     if video is not None:
         from ig2mj.showcase.episode_film import EpisodeFilm
@@ -90,6 +96,7 @@ def run(
             film.see if film is not None else None,
         )
     finally:
+        played.close()
         if film is not None:
             film.close()
     successes, in_hand = sum(outcome.success), sum(outcome.success_in_hand)

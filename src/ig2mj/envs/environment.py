@@ -56,6 +56,7 @@ class Environment:
       task, robot, grasping: what is done by whom, and how hands hold (`ig2mj.agents.grasping.MODES`).
       scene, core: the household with its robot, and what steps it. objective: what is measured, rewarded and observed.
       num_worlds: W. action_names: [n]. observation_spaces: of each observation, without the world axis.
+      made_with: what else `ig2mj.make` was given, by the names of its arguments, so that it can be made again.
     """
 
     def __init__(
@@ -80,7 +81,7 @@ class Environment:
         self.task, self.robot, self.grasping = task, robot, grasping
         self.scene, self.core, self.num_worlds = scene, core, core.engine.num_worlds
         self.objective, self._goal, self._map, self._observer = objective, core.rules.goal, action_map, observer
-        self._companions = companions
+        self._companions, self.made_with = companions, dict[str, Any]()
         self.action_names, self.observation_spaces = action_map.names, observer.spaces
         self.privileged_names = objective.vectors["privileged_state"]
         self._substeps = round(ACTION_PERIOD / (core.engine.substeps * core.engine.timestep))
@@ -109,18 +110,10 @@ class Environment:
 
     def with_horizon(self, horizon: int) -> Environment:
         """The same environment, on the same core, with longer or shorter episodes."""
-        task = dataclasses.replace(self.task, horizon=horizon)
-        return Environment(
-            task,
-            self.robot,
-            self.scene,
-            self.core,
-            self._map,
-            self.objective,
-            self._observer,
-            self.grasping,
-            self._companions,
-        )
+        parts = (self.robot, self.scene, self.core, self._map, self.objective, self._observer, self.grasping)
+        new = Environment(dataclasses.replace(self.task, horizon=horizon), *parts, self._companions)
+        new.made_with = self.made_with
+        return new
 
     # Steps.
 
@@ -205,6 +198,10 @@ class Environment:
             raise EngineError(f"start_from takes {self.num_worlds} rows, each from 0 to {size - 1}")
         chosen = self.core.starts.pool.rows(rows)
         batch = self.core.load(self.core.start(as_seed(seed)), chosen.physics, chosen.states)
+        return self.resume(batch, rows)
+
+    def resume(self, batch: Batch, rows: Int[np.ndarray, "W"]) -> EnvState:
+        """The state of worlds that someone else has put where they are, in episodes of these rows of the pool."""
         return self._begun(batch, jnp.ones(self.num_worlds, bool), None, jnp.asarray(rows, jnp.int32))
 
     def reset_fn(self, state: EnvState, mask: Bool[Array, "W"]) -> EnvState:
@@ -237,7 +234,7 @@ class Environment:
         last = None if before is None else (before.obs, before.memory)
         pictures, memory = self._observer.pictures(batch.world, batch.controllers[0], last, begun)
         obs = {name: {**seen.obs, **pictures}[name] for name in self.observation_spaces}
-        of_step = (seen.reward, seen.terminated, seen.truncated, seen.info, seen.measures)
+        of_step = (seen.reward, seen.terminated, seen.truncated, seen.info, seen.measures, seen.status)
         return EnvState(batch, obs, *of_step, bad.astype(jnp.int32), memory)
 
     # What is computed after physics. Pure.
@@ -326,7 +323,7 @@ class Environment:
         time_left = 1.0 - steps.astype(jnp.float32) / self.task.horizon
         obs = self._observer.vectors(view, states, controllers[0], measures, status, time_left)
         total = jnp.stack([terms[name] for name in self.objective.terms]).sum(0)
-        return Seen(obs, total, terminated, truncated, info, measures)
+        return Seen(obs, total, terminated, truncated, info, measures, status)
 
     # Bad input.
 

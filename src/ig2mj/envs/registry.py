@@ -124,6 +124,8 @@ def make(
     chosen = check_names(observations, setup.objective)
     perceived = SensorSuite(physics, scene, rules.model, controllers[0], chosen, settings)
     observer = Observer(observations, setup.objective, perceived)
-    return Environment(
+    env = Environment(
         task, robot, scene, core, setup.actions, setup.objective, observer, mode, companions=setup.companions
     )
+    env.made_with = {"paper_rl": paper_rl, "split": split, "pool_size": setup.pool.size, **options}
+    return env

@@ -11,6 +11,7 @@ from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
+from ig2mj.predicates.compile import GoalStatus
 from ig2mj.sensors.base import Memory
 from ig2mj.tasks.objective import Measures
 from ig2mj.worlds.batch import Batch
@@ -27,7 +28,7 @@ class EnvState:
         were not finite); "flags" (`guards.Flag`); and the task's own. Of activities: "goal_progress" (share of the
         goal's literals), "held" (the first object is in an acting hand), "success_in_hand" (success while the first
         object is in all acting hands).
-      measures: what the reward is made of, for the next step's difference.
+      measures: what the reward is made of, for the next step's difference. status: of the task's goal.
       bad_actions: numbers that were not finite and were taken for 0, since the first reset.
       memory: what sensors know of the last reading; None where none of them asks.
     """
@@ -39,6 +40,7 @@ class EnvState:
     truncated: Bool[Array, "W"]
     info: dict[str, Any]
     measures: Measures
+    status: GoalStatus
     bad_actions: Int[Array, "W"]
     memory: Memory | None = None
 
@@ -58,3 +60,4 @@ class Seen:
     truncated: Bool[Array, "W"]
     info: dict[str, Array]
     measures: Measures
+    status: GoalStatus

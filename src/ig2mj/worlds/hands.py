@@ -5,6 +5,7 @@ Axes: W worlds.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
@@ -15,7 +16,7 @@ from jaxtyping import Bool
 
 from ig2mj.agents.base import Controller
 from ig2mj.agents.grasping import Grasping, GraspState
-from ig2mj.engine.base import Engine, Physics
+from ig2mj.engine.base import Engine, Physics, Write
 from ig2mj.engine.view import OF_CONSTRAINTS, Array, PhysicsView, read_field, replace_fields
 from ig2mj.worlds.lazy.of_view import OfView
 
@@ -46,11 +47,20 @@ class Hands:
         after, changed = self._update(view, held, controllers)
         if not self._engine.pure:
             if np.asarray(changed).any():
-                physics = self._engine.write(physics, self._constraints(after))
+                physics = self._engine.write(physics, self._exact(self._constraints(after)))
             return physics, self._engine.view(physics), after
         physics = self._engine.write(physics, self._constraints(after))
         now = self._engine.view(physics)  # what is not read of it is never computed
         return physics, replace_fields(view, {name: read_field(now, name) for name in OF_CONSTRAINTS}), after
+
+    def _exact(self, write: Write) -> Write:
+        """The same write in double precision: constraints that nobody holds by keep the compiled numbers. Rounded ones
+        would be written in all worlds as soon as one hand of one world takes hold."""
+        assert self._grasping is not None and write.model_fields is not None
+        compiled = np.asarray(self._grasping.scene.model.eq_data[:, :12])
+        data = np.asarray(write.model_fields.eq_data)
+        exact = np.where(data == compiled.astype(np.float32), compiled, data)
+        return dataclasses.replace(write, model_fields=dataclasses.replace(write.model_fields, eq_data=exact))
 
     def read(self, physics: Physics) -> Held:
         """What hands hold in worlds that were loaded, or changed from outside: the constraints that are on."""

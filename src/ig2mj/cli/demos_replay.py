@@ -1,0 +1,114 @@
+"""`ig2mj demos replay FILE`: replays recordings, checks that they come out the same, films and observes them."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+if TYPE_CHECKING:
+    from ig2mj.demos.reader import Run
+    from ig2mj.envs.environment import EnvState
+
+
+def replay(
+    file: Annotated[pathlib.Path, tyro.conf.Positional],
+    by: str = "action",
+    check: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    video: pathlib.Path | None = None,
+    sensors: str = "",
+    out: pathlib.Path | None = None,
+    threads: int = 0,
+) -> int:
+    """Replay a recording of an environment (`ig2mj rollout --record FILE`).
+
+    Args:
+      file: the recording.
+      by: action: every action is taken again, natively with the same bytes; state: every frame is loaded as it was
+        written, exact on any machine.
+      check: compare every byte of every frame; status 1 and the first difference of each run where one is not the same.
+      video: film of the first run (.mp4, .gif); needs OpenGL and the native engine.
+      sensors: observations to make that were not recorded, e.g. rgb,depth; written to --out.
+      out: HDF5 of the observations; default: FILE with .sensors.h5.
+      threads: that the native engine steps worlds on; 0: one per processor.
+    """
+    import sys
+
+    from ig2mj.demos.reader import Recording
+    from ig2mj.demos.replay import MODES, Replayer
+    from ig2mj.envs.registry import VECTORS
+    from ig2mj.errors import Ig2mjError, UnknownNameError
+
+    if by not in MODES:
+        raise UnknownNameError("way to replay", by, MODES)
+    if threads < 0:
+        raise Ig2mjError(f"--threads {threads}: 0 or more are possible")
+    names = tuple(name.strip() for name in sensors.split(",") if name.strip())
+    options: dict[str, Any] = {"threads": threads} if threads else {}
+    with Recording(file) as recording:
+        replayer = Replayer(recording, by, observations=names or VECTORS, **options)
+        for warning in replayer.warnings:
+            print(f"warning: {warning}", file=sys.stderr)
+        watchers: list[Any] = []
+        try:
+            if video is not None:
+                watchers.append(_Filming(video, replayer.env))
+            if names:
+                watchers.append(_Observing(out or file.with_suffix(".sensors.h5"), names))
+
+            def watch(state: EnvState, runs: dict[int, Run], frame: int) -> None:
+                for watcher in watchers:
+                    watcher.see(state, runs, frame)
+
+            done = replayer(check, watch if watchers else None)
+        finally:
+            for watcher in watchers:
+                watcher.close()
+    for difference in done.differences:
+        print(f"{file}: {difference}")
+    same = "" if not check or by == "state" or done.differences else ", all the same"
+    print(f"{file}: {done.runs} runs, {done.frames} frames by {by}{same}")
+    return 1 if done.differences else 0
+
+
+class _Filming:
+    """A film of the first run of the first world that is replayed."""
+
+    def __init__(self, file: pathlib.Path, env: Any):
+        from ig2mj.showcase.episode_film import EpisodeFilm
+
+        self._film, self._run = EpisodeFilm(file, env), ""
+
+    def see(self, state: EnvState, runs: dict[int, Run], frame: int) -> None:
+        if 0 in runs and self._run in ("", runs[0].name):
+            self._run = runs[0].name
+            self._film.see(state)
+
+    def close(self) -> None:
+        self._film.close()
+
+
+class _Observing:
+    """Observations of all runs: `/run_000000/<name>` [T + 1, ...], written frame by frame."""
+
+    def __init__(self, file: pathlib.Path, names: tuple[str, ...]):
+        import h5py
+
+        self._opened, self._names = h5py.File(file, "w"), names
+        self._opened.attrs["format"] = "ig2mj observations"
+
+    def see(self, state: EnvState, runs: dict[int, Run], frame: int) -> None:
+        import numpy as np
+
+        for world, run in runs.items():
+            for name in self._names:
+                row, path = np.asarray(state.obs[name])[world], f"{run.name}/{name}"
+                if path not in self._opened:
+                    self._opened.create_dataset(
+                        path, (run.frames, *row.shape), row.dtype, chunks=(1, *row.shape), compression="gzip"
+                    )
+                self._opened[path][frame] = row  # pyright: ignore[reportIndexIssue]
+
+    def close(self) -> None:
+        self._opened.close()

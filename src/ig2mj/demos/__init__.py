@@ -1,0 +1,7 @@
+"""Recordings of environments: everything of every frame, to be replayed bit for bit (docs/demonstrations.md)."""
+
+from ig2mj.demos.environments import RecordedEnvironment, record
+from ig2mj.demos.reader import Recording, Run
+from ig2mj.demos.replay import Replayer, replay
+
+__all__ = ["RecordedEnvironment", "Recording", "Replayer", "Run", "record", "replay"]

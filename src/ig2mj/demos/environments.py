@@ -1,0 +1,149 @@
+"""`record`: an environment that writes down everything it does.
+
+    env = record(ig2mj.make("CookingMeat", engine="native"), "runs.h5")
+    state = env.reset(0)
+    state = env.step(state, action)
+    env.close()
+
+It takes the place of the environment everywhere: for `play`, for Gymnasium's face (`gym_env.unwrapped.env = record(
+gym_env.unwrapped.env, file)`), for experts. What is called as a part of a compiled program (`step_fn`, `reset_fn`) is
+not recorded.
+
+Axes: W worlds, n numbers of an action.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import weakref
+from collections.abc import Collection
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Int
+
+from ig2mj.demos.frames import FrameRows, frame_of, names_of
+from ig2mj.demos.origin import origin_of
+from ig2mj.demos.writer import RunWriter
+from ig2mj.engine.view import Array
+from ig2mj.envs.environment import Environment, EnvState, Seed, as_seed
+from ig2mj.errors import EngineError
+from ig2mj.worlds.random_streams import pick_rows
+
+
+class RecordedEnvironment(Environment):
+    """An environment with a file. Attributes: writer: of the file."""
+
+    def __init__(self, env: Environment, file: str | os.PathLike, worlds: Collection[int] | None = None):
+        """See `record`."""
+        self.__dict__.update(env.__dict__)
+        self._inner, self._file = env, file
+        self._worlds = list(range(env.num_worlds)) if worlds is None else sorted(worlds)
+        if self._worlds and not 0 <= self._worlds[0] <= self._worlds[-1] < env.num_worlds:
+            raise EngineError(f"worlds to record are from 0 to {env.num_worlds - 1}")
+        self._last: EnvState | None = None
+        self._rows = FrameRows(env.core.engine, self._worlds)
+        self.writer: RunWriter | None = None
+
+    def step(self, state: EnvState, action: Array) -> EnvState:
+        """As `Environment.step`."""
+        if state is not self._last:
+            self._begin(state, np.ones(self.num_worlds, bool), {})
+        given = np.asarray(action)
+        after = self._inner.step(state, action)
+        self._note(given, after)
+        return after
+
+    def step_autoreset(self, state: EnvState, action: Array) -> EnvState:
+        """As `Environment.step_autoreset`."""
+        after = self.step(state, action)
+        kept = {name: getattr(after, name) for name in ("obs", "reward", "terminated", "truncated", "info")}
+        if self.pure:
+            kept = jax.tree.map(jnp.copy, kept)  # the reset uses the state up
+        done = np.asarray(after.done)
+        new = self.reset(after, done) if done.any() else after
+        info = {**kept.pop("info"), "final_obs": kept.pop("obs")}
+        self._last = dataclasses.replace(new, info=info, **kept)
+        return self._last
+
+    def reset(self, seed: Seed | EnvState = 0, mask: Bool[Array, "W"] | None = None) -> EnvState:
+        """As `Environment.reset`."""
+        if not isinstance(seed, EnvState):
+            return self._begin(self._inner.reset(seed), np.ones(self.num_worlds, bool), {"seed": _number(seed)})
+        chosen = np.ones(self.num_worlds, bool) if mask is None else np.asarray(mask, bool)
+        if seed is not self._last:
+            chosen = np.ones_like(chosen)
+        return self._begin(self._inner.reset(seed, mask), chosen, {})
+
+    def start_from(self, rows: Int[np.ndarray, "W"], seed: Seed = 0) -> EnvState:
+        """As `Environment.start_from`."""
+        state = self._inner.start_from(rows, seed)
+        return self._begin(state, np.ones(self.num_worlds, bool), {"seed": _number(seed)}, np.asarray(rows))
+
+    def close(self) -> None:
+        """Ends all runs, and closes the file; may be called twice."""
+        if self.writer is not None:
+            self.writer.close()
+        self._inner.close()
+
+    def __enter__(self) -> RecordedEnvironment:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def _begin(
+        self, state: EnvState, mask: np.ndarray, about: dict[str, Any], rows: np.ndarray | None = None
+    ) -> EnvState:
+        """New runs in the masked worlds."""
+        if self.writer is None:
+            frame = frame_of(self.core.engine, state)
+            steps = ["action", "reward/total", "terminated", "truncated", "success", *self._terms()]
+            self.writer = RunWriter(self._file, origin_of(self._inner), names_of(frame), steps)
+            weakref.finalize(self, self.writer.close)
+        if rows is None:
+            rows = np.asarray(pick_rows(jnp.asarray(state.batch.world.key), self.core.starts.pool.size))
+        frames, episode = self._rows(state), np.asarray(state.batch.episode)
+        for world in self._worlds:
+            if mask[world]:
+                own = {"episode": int(episode[world]), "row": int(rows[world]), **about}
+                self.writer.begin(world, frames[world], own)
+        self._last = state
+        return state
+
+    def _note(self, action: np.ndarray, state: EnvState) -> None:
+        """A frame of all worlds, and the ends of runs."""
+        assert self.writer is not None
+        frames = self._rows(state)
+        success = np.asarray(state.info["success"])
+        ends = [np.asarray(state.terminated), np.asarray(state.truncated)]
+        terms = [np.asarray(state.info[f"reward/{name}"]) for name in self.objective.terms]
+        steps = [action.astype(np.float32), np.asarray(state.reward), *ends, success, *terms]
+        for world in self._worlds:
+            self.writer.add(world, frames[world], [array[world, ...] for array in steps])
+            if ends[0][world] or ends[1][world]:
+                self.writer.end(world, success=bool(success[world]), terminated=bool(ends[0][world]))
+        self._last = state
+
+    def _terms(self) -> list[str]:
+        return [f"reward/{name}" for name in self.objective.terms]
+
+
+def record(env: Environment, file: str | os.PathLike, worlds: Collection[int] | None = None) -> RecordedEnvironment:
+    """An environment that records itself, from its next reset on.
+
+    Args:
+      file: HDF5, replaced if it is there. What is not written yet is at most `writer.FLUSH` frames of each world.
+      worlds: which ones; None: all.
+
+    Raises:
+      EngineError: there are no such worlds. InputError, at the first reset: the file cannot be written.
+    """
+    return RecordedEnvironment(env, file, worlds)
+
+
+def _number(seed: Seed) -> int:
+    return int(np.asarray(as_seed(seed)))

@@ -1,0 +1,195 @@
+"""`Frame`: everything of a world that goes on changing, and what each number of it belongs to.
+
+Axes: W worlds, L literals of the goal.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+from jaxtyping import Bool, Int, UInt
+
+from ig2mj.engine.base import Engine, Physics
+from ig2mj.engine.snapshot import Snapshot
+from ig2mj.engine.view import Array
+from ig2mj.envs.environment import Environment, EnvState
+from ig2mj.scene.scene import Scene
+from ig2mj.states.world import ExtendedStates
+
+
+@struct.dataclass
+class Frame:
+    """All worlds at one instant; every array begins with the world axis.
+
+    Attributes:
+      physics, states: of the worlds. controllers: what the robots' controllers remember. grasps: what hands hold.
+      measures: what the task's reward is made of. goal: truth of each literal of the goal.
+      key: of the episode's random numbers. step: control steps since its start. flags: `ig2mj.worlds.guards.Flag`.
+    """
+
+    physics: Snapshot
+    states: ExtendedStates
+    controllers: tuple[Any, ...]
+    grasps: Any
+    measures: Any
+    goal: Bool[Array, "W L"]
+    key: UInt[Array, "W 2"]
+    step: Int[Array, "W"]
+    flags: Int[Array, "W"]
+
+
+def frame_of(engine: Engine, state: EnvState) -> Frame:
+    """What is recorded of an environment's state; arrays are still where the engine has them."""
+    return Frame(engine.snapshot(state.batch.world.physics), *_besides_physics(state))
+
+
+def _besides_physics(state: EnvState) -> tuple[Any, ...]:
+    batch, world = state.batch, state.batch.world
+    remembered = (world.states, batch.controllers, batch.grasps, state.measures)
+    return (*remembered, state.status.literals, world.key, world.step, batch.flags)
+
+
+class FrameRows:
+    """Frames of an environment as arrays of each world on the host, in the order of `names_of(frame_of(...))`."""
+
+    def __init__(self, engine: Engine, worlds: Sequence[int]):
+        """`worlds`: those that are wanted."""
+        self._engine, self._worlds = engine, list(worlds)
+        self._leaves: list[Any] = []
+        self._rows: list[list[np.ndarray]] = []
+
+    def __call__(self, state: EnvState) -> dict[int, list[np.ndarray]]:
+        """Of every wanted world. Arrays that are the very same as before are not fetched again."""
+        leaves, worlds = jax.tree.leaves(_besides_physics(state)), self._worlds
+        old = self._leaves or [None] * len(leaves)
+        for k, (leaf, before) in enumerate(zip(leaves, old, strict=True)):
+            if leaf is before:
+                continue
+            array = np.asarray(leaf)
+            rows = [array[w, ...] for w in worlds]
+            if k < len(self._rows):
+                self._rows[k] = rows
+            else:
+                self._rows.append(rows)
+        self._leaves = leaves
+        physics = self._physics(state.batch.world.physics)
+        return {w: [*physics(w), *(rows[k] for rows in self._rows)] for k, w in enumerate(worlds)}
+
+    def _physics(self, physics: Physics) -> Callable[[int], list[np.ndarray]]:
+        engine = self._engine
+        if not engine.pure:
+            return lambda world: jax.tree.leaves(engine.export(physics, world))
+        arrays = [np.asarray(a) for a in jax.tree.leaves(engine.snapshot(physics))]
+        return lambda world: [a[world, ...] for a in arrays]
+
+
+def resumed(env: Environment, frame: Frame, rows: Int[np.ndarray, "W"]) -> EnvState:
+    """An environment's state that goes on from a frame of all its worlds, as if it had never stopped.
+
+    Args:
+      rows: of the pool, with which the worlds' episodes began.
+    """
+    batch = env.core.load(env.core.start(), frame.physics, jax.tree.map(jnp.asarray, frame.states))
+    seconds = jnp.float32(env.core.engine.substeps * env.core.engine.timestep)
+    step = jnp.asarray(frame.step)
+    world = dataclasses.replace(batch.world, key=jnp.asarray(frame.key), step=step, time=step * seconds)
+    batch = dataclasses.replace(
+        batch,
+        world=world,
+        controllers=jax.tree.map(jnp.asarray, frame.controllers),
+        grasps=jax.tree.map(jnp.asarray, frame.grasps),
+        flags=jnp.asarray(frame.flags),
+    )
+    state = env.resume(batch, rows)
+    return dataclasses.replace(state, measures=jax.tree.map(jnp.asarray, frame.measures))
+
+
+def names_of(tree: Any) -> list[str]:
+    """Names of a pytree's leaves, with slashes: "physics/scene/qpos"."""
+    found = jax.tree_util.tree_flatten_with_path(tree)[0]
+    return [jax.tree_util.keystr(keys, simple=True, separator="/") for keys, _ in found]
+
+
+class Labels:
+    """What a number of a frame's array belongs to, for people: an object, a joint, a hand."""
+
+    def __init__(self, scene: Scene):
+        """Reads names from the compiled model."""
+        self._scene, model = scene, scene.model
+        self._objects = list(scene.object_names)
+        joint_of = [model.joint(int(j)).name for j in model.dof_jntid]
+        widths = {0: 7, 1: 4}
+        qpos = [model.joint(j).name for j in range(model.njnt) for _ in range(widths.get(int(model.jnt_type[j]), 1))]
+        trees = ["" for _ in range(model.ntree)]
+        for body in range(model.nbody - 1, 0, -1):
+            if model.body_treeid[body] >= 0:
+                trees[model.body_treeid[body]] = model.body(body).name
+        equalities = [model.equality(e).name for e in range(model.neq)]
+        actuators = [model.actuator(a).name for a in range(model.nu)]
+        whole = {"qpos": qpos, "qvel": joint_of, "qacc_warmstart": joint_of, "tree_asleep": trees}
+        self._whole = whole | {"eq_active": equalities, "eq_data": equalities, "ctrl": actuators}
+        self._hands = [model.body(int(b)).name for b in scene.tables.hand_body]
+
+    def __call__(self, field: str, index: tuple[int, ...], shape: tuple[int, ...]) -> str:
+        """Of the number at `index` of a field of one world, which has `shape`; "" where it is nobody's."""
+        name, first = field.rpartition("/")[2], index[0] if index else 0
+        if field.startswith("physics/") and name in self._whole:
+            names = self._whole[name]
+            at = first + (len(names) - shape[0] if "/agents/" in field else 0)
+            return names[at] if at < len(names) else ""
+        if name == "ignored_contacts":
+            return f"{self._hands[first]}, {self._objects[index[1]]}"
+        if field.startswith("states/") and shape and shape[0] == len(self._objects):
+            return self._objects[first]
+        if field.startswith("grasps/") and shape and shape[0] == len(self._hands):
+            return self._hands[first]
+        return ""
+
+
+@dataclasses.dataclass(frozen=True)
+class Difference:
+    """The first number that differs. `world`: of the batch. `frame`: of the run. `owner`: an object, joint or hand."""
+
+    run: str
+    frame: int
+    field: str
+    owner: str
+    index: tuple[int, ...]
+    recorded: float
+    found: float
+
+    def __str__(self) -> str:
+        of = f" of {self.owner}" if self.owner else ""
+        at = f"[{', '.join(map(str, self.index))}]" if self.index else ""
+        values = f"{self.recorded!r} is recorded, {self.found!r} came out"
+        return f"{self.run}, frame {self.frame}: {self.field}{at}{of}: {values}"
+
+
+def first_difference(
+    labels: Labels, run: str, frame: int, names: list[str], recorded: list[np.ndarray], found: list[np.ndarray]
+) -> Difference | None:
+    """Of two frames of one world, compared byte by byte; None where they are the same."""
+    for name, a, b in zip(names, recorded, found, strict=True):
+        if a.shape == b.shape and a.dtype == b.dtype and a.tobytes() == b.tobytes():
+            continue
+        if a.shape != b.shape:
+            return Difference(run, frame, name, "", (), float(a.size), float(b.size))
+        raw = [np.ascontiguousarray(x).reshape(-1).view(np.uint8).reshape(max(x.size, 1), -1) for x in (a, b)]
+        if a.dtype != b.dtype:
+            return Difference(run, frame, f"{name} ({a.dtype}, here {b.dtype})", "", (), 0.0, 0.0)
+        place = int(np.flatnonzero((raw[0] != raw[1]).any(1))[0])
+        index = tuple(int(i) for i in np.unravel_index(place, a.shape)) if a.shape else ()
+        owner = labels(name, index, a.shape)
+        return Difference(run, frame, name, owner, index, float(a[index]), float(b[index]))
+    return None
+
+
+def stacked(rows: list[list[np.ndarray]]) -> list[np.ndarray]:
+    """Arrays with a world axis, from those of each world."""
+    return [np.stack(each) for each in zip(*rows, strict=True)]

@@ -1,0 +1,211 @@
+"""Replaying recordings of environments: by their actions, bit for bit, or by their states.
+
+By action a run is put at its first frame and every action is taken again. On the native engine every byte of every
+frame comes out the same, with any number of threads and in another process: each world is stepped by one thread from
+start to end, a snapshot has all that MuJoCo goes on from (sleep and warm start among it), and random numbers belong to
+the episode's key. A run is replayed at the row of the batch at which it was recorded, in a batch of the same size,
+since compiled programs may treat rows differently.
+
+By state every frame is loaded as it was written: exact on any machine, to look at and to observe with other sensors.
+
+Axes: W worlds.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import jax
+import numpy as np
+
+from ig2mj.demos.frames import (
+    Difference,
+    Frame,
+    FrameRows,
+    Labels,
+    first_difference,
+    frame_of,
+    names_of,
+    resumed,
+    stacked,
+)
+from ig2mj.demos.origin import BINDING, LOOSE, differences, origin_of
+from ig2mj.demos.reader import Recording, Run
+from ig2mj.demos.writer import FLUSH
+from ig2mj.envs.environment import Environment, EnvState
+from ig2mj.envs.registry import VECTORS, find_task, make
+from ig2mj.errors import EngineError, InputError
+
+MODES = ("action", "state")
+
+Watch = Callable[[EnvState, dict[int, Run], int], None]
+"""Called with the environment's state, the run of each world that is replayed, and the number of the frame."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Replayed:
+    """What came of a replay.
+
+    Attributes:
+      runs, frames: how many were replayed. differences: the first of each run that was not the same.
+      warnings: what is another here than where it was recorded.
+    """
+
+    runs: int
+    frames: int
+    differences: list[Difference]
+    warnings: list[str]
+
+
+class Replayer:
+    """Replays the runs of a file in one environment. Attributes: env: it. warnings: see `Replayed`."""
+
+    def __init__(
+        self,
+        recording: Recording,
+        by: str = "action",
+        env: Environment | None = None,
+        observations: Sequence[str] = VECTORS,
+        **options: Any,
+    ):
+        """Makes the environment that the file was recorded in.
+
+        Args:
+          by: one of `MODES`. env: the environment, where `ig2mj.make` cannot make it: a task of one's own.
+          observations, options: of the environment; others than recorded change what is seen, not what happens.
+
+        Raises:
+          InputError: the file is broken; or, by action, something that the outcome hangs on is another here.
+        """
+        self.recording, self.by = recording, by
+        self.env = env if env is not None else _environment(recording, observations, options)
+        here = origin_of(self.env)
+        bound = differences(recording.header, here, BINDING)
+        if bound and by == "action":
+            raise InputError(
+                recording.file,
+                f"cannot be replayed by action: {'; '.join(bound)}",
+                fix="replay it by state (--by state)",
+            )
+        self.warnings = bound + differences(recording.header, here, LOOSE)
+        if recording.header.get("engine") != "native" and by == "action":
+            self.warnings.append(f"engine {recording.header.get('engine')} does not promise the same bytes")
+        worlds = recording.value("worlds", int)
+        if worlds != self.env.num_worlds:
+            raise EngineError(f"the recording is of {worlds} worlds, the environment has {self.env.num_worlds}")
+        state = self.env.reset(0)
+        frame = frame_of(self.env.core.engine, state)
+        self._names, self._tree = names_of(frame), jax.tree.structure(frame)
+        self._rows = FrameRows(self.env.core.engine, range(worlds))
+        self._like = self._rows(state)[0]
+        self._labels = Labels(self.env.scene)
+        for run in recording.runs:
+            if run.world >= worlds:
+                raise run.broken("attribute world", f"is {run.world}, and the file is of {worlds} worlds")
+            if run.frames and (missing := [n for n in self._names if n not in run.names]):
+                raise run.broken(f"frames/{missing[0]}", "is missing")
+
+    def __call__(self, check: bool = False, watch: Watch | None = None, runs: Sequence[Run] | None = None) -> Replayed:
+        """Replays.
+
+        Args:
+          check: compare every byte of every frame. runs: which; None: all.
+
+        Raises:
+          InputError: an array of the file is broken.
+        """
+        wanted = self.recording.runs if runs is None else runs
+        queues: dict[int, list[Run]] = {}
+        for run in wanted:
+            if run.frames:
+                queues.setdefault(run.world, []).append(run)
+        found: list[Difference] = []
+        frames = 0
+        while queues:
+            now = {world: queue.pop(0) for world, queue in queues.items()}
+            queues = {world: queue for world, queue in queues.items() if queue}
+            frames += sum(run.frames for run in now.values())
+            found += self._by_action(now, check, watch) if self.by == "action" else self._by_state(now, watch)
+        return Replayed(sum(1 for r in wanted if r.frames), frames, found, self.warnings)
+
+    def _by_action(self, now: dict[int, Run], check: bool, watch: Watch | None) -> list[Difference]:
+        found: dict[int, Difference] = {}
+        readers = {world: self._frames(run) for world, run in now.items()}
+        actions = {world: self._actions(run) for world, run in now.items()}
+        recorded = {world: next(reader) for world, reader in readers.items()}
+        state = self._put(recorded, now)
+        longest, zero = max(run.frames for run in now.values()), np.zeros(self.env.action_space.shape, np.float32)
+        for k in range(longest):
+            if k:
+                given = [next(actions[w], zero) if w in actions else zero for w in range(self.env.num_worlds)]
+                state = self.env.step(state, np.stack(given))
+            going = {w: run for w, run in now.items() if k < run.frames}
+            if check:
+                if k:
+                    recorded = {world: next(readers[world]) for world in going if world not in found}
+                came = self._rows(state)
+                for world, rows in recorded.items():
+                    one = first_difference(self._labels, now[world].name, k, self._names, rows, came[world])
+                    if one is not None:
+                        found[world] = one
+                if len(found) == len(now):
+                    break
+            if watch is not None:
+                watch(state, going, k)
+        return [found[world] for world in sorted(found)]
+
+    def _by_state(self, now: dict[int, Run], watch: Watch | None) -> list[Difference]:
+        readers = {world: self._frames(run) for world, run in now.items()}
+        last: dict[int, list[np.ndarray]] = {}
+        for k in range(max(run.frames for run in now.values())):
+            last |= {world: rows for world, reader in readers.items() if (rows := next(reader, None)) is not None}
+            state = self._put(last, now)
+            if watch is not None:
+                watch(state, {w: run for w, run in now.items() if k < run.frames}, k)
+        return []
+
+    def _put(self, rows: dict[int, list[np.ndarray]], now: dict[int, Run]) -> EnvState:
+        """The environment at these frames; worlds that are not replayed stand where the first does."""
+        some = next(iter(rows.values()))
+        each = [rows.get(world, some) for world in range(self.env.num_worlds)]
+        frame: Frame = jax.tree.unflatten(self._tree, stacked(each))
+        size = self.env.core.starts.pool.size
+        begun = [now[w].row if w in now else 0 for w in range(self.env.num_worlds)]
+        return resumed(self.env, frame, np.clip(begun, 0, size - 1))
+
+    def _frames(self, run: Run) -> Iterator[list[np.ndarray]]:
+        """The arrays of one frame after the other."""
+        for start in range(0, run.frames, FLUSH):
+            stop = min(start + FLUSH, run.frames)
+            rows = run.frame_rows(self._names, start, stop, self._like)
+            for k in range(stop - start):
+                yield [array[0 if len(array) == 1 else k, ...] for array in rows]
+
+    def _actions(self, run: Run) -> Iterator[np.ndarray]:
+        like = np.zeros(self.env.action_space.shape, np.float32)
+        for start in range(0, run.frames - 1, FLUSH):
+            stop = min(start + FLUSH, run.frames - 1)
+            rows = run.rows("steps/action", start, stop, like)
+            for k in range(stop - start):
+                yield rows[0 if len(rows) == 1 else k]
+
+
+def replay(file: str | os.PathLike, by: str = "action", check: bool = True, **options: Any) -> Replayed:
+    """Replays all runs of a file. Arguments and errors as of `Replayer`."""
+    with Recording(file) as recording:
+        return Replayer(recording, by, **options)(check)
+
+
+def _environment(recording: Recording, observations: Sequence[str], options: dict[str, Any]) -> Environment:
+    """The environment that a file was recorded in, with a pool of no more than it needs."""
+    task = find_task(recording.value("task", str))
+    made = recording.value("made_with", dict)
+    robot, grasping = recording.value("robot", str), recording.value("grasping", str)
+    worlds, engine = recording.value("worlds", int), recording.value("engine", str)
+    if not 0 < worlds <= 65536:
+        raise InputError(recording.file, f"is {worlds}", element="attribute worlds")
+    env = make(task, robot, worlds, engine, grasping, observations=observations, **(made | options))
+    return env.with_horizon(recording.value("horizon", int))

@@ -1,0 +1,209 @@
+"""Recordings of environments replay bit for bit; what is not the same is named; files that are broken are refused."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+
+import ig2mj
+from ig2mj.cli import call
+from ig2mj.demos import Recording, Replayer, record
+from ig2mj.envs.experts import expert_of
+from ig2mj.errors import InputError
+
+ROWS, HORIZON = 4, 12
+
+
+@pytest.fixture(scope="module")
+def env():
+    made = ig2mj.make("CookingMeat", worlds=2, engine="native", pool_size=ROWS)
+    return made.with_horizon(HORIZON)
+
+
+@pytest.fixture(scope="module")
+def recorded(env, tmp_path_factory):
+    """27 steps: two whole runs and the beginning of a third in each world; observations of all frames."""
+    file = tmp_path_factory.mktemp("recordings") / "runs.h5"
+    expert, rng, seen = expert_of(env), np.random.default_rng(0), []
+    with record(env, file) as played:
+        state = played.reset(3)
+        seen.append(np.asarray(state.obs["proprioception"]))
+        for step in range(27):
+            noise = 0.3 * rng.standard_normal((2, env.action_space.shape[0]))
+            state = played.step_autoreset(state, np.asarray(expert(state)) + noise)
+            seen.append(np.asarray(state.obs["proprioception"]) if step < HORIZON - 1 else None)
+    return file, seen
+
+
+def changed(recorded, tmp_path):
+    copy = tmp_path / "copy.h5"
+    shutil.copy(recorded[0], copy)
+    return copy
+
+
+def test_a_recording_says_what_it_is_of_and_how_its_runs_ended(env, recorded):
+    with Recording(recorded[0]) as recording:
+        assert [run.frames for run in recording.runs] == [13, 13, 13, 13, 4, 4]
+        assert [run.world for run in recording.runs] == [0, 1] * 3
+        first = recording.runs[0]
+        assert first.attributes["ended"] and 0 <= first.attributes["row"] < ROWS
+        assert recording.header["scene_hash"] == env.scene.digest
+        qpos = first.rows("frames/physics/agents/qpos", 0, 13)
+        assert qpos.dtype == np.float64 and (qpos[1:] != qpos[:-1]).any()
+        assert len(first.rows("frames/physics/agents/eq_data", 0, 13)) == 1  # the same in all frames
+        total = first.rows("steps/reward/total", 0, 12)
+        terms = [first.rows(f"steps/{name}", 0, 12) for name in first.step_names if name.startswith("reward/")]
+        assert sum(np.broadcast_to(t, 12) for t in terms) == pytest.approx(2 * total, abs=1e-4)
+
+
+def test_by_action_every_byte_of_every_frame_comes_out_the_same_on_another_number_of_threads(recorded):
+    with Recording(recorded[0]) as recording:
+        replayer = Replayer(recording, threads=1)
+        assert replayer.warnings == []
+        done = replayer(check=True)
+        assert (done.runs, done.frames, done.differences) == (6, 60, [])
+        alone = replayer(check=True, runs=recording.runs[3:4])  # the other world stands somewhere else
+        assert (alone.runs, alone.differences) == (1, [])
+
+
+def test_by_state_every_frame_is_there_and_can_be_observed(env, recorded):
+    file, seen = recorded
+    with Recording(file) as recording:
+        found = []
+        replayer = Replayer(recording, "state", env=env)
+        replayer(watch=lambda state, runs, k: found.append(np.asarray(state.obs["proprioception"])))
+        for k in range(HORIZON):
+            assert found[k] == pytest.approx(seen[k], abs=1e-5), k
+
+
+def test_the_first_difference_is_named_by_run_frame_object_and_field(env, recorded, tmp_path):
+    copy = changed(recorded, tmp_path)
+    joint = env.scene.model.joint("steak_0/free")
+    with h5py.File(copy, "a") as opened:
+        rows = np.asarray(opened["run_000002/frames/physics/scene/qpos"])
+        rows = np.repeat(rows, 13, axis=0) if len(rows) == 1 else rows
+        rows[5:, joint.qposadr[0] + 2] += 1e-16 + np.spacing(rows[5:, joint.qposadr[0] + 2])
+        del opened["run_000002/frames/physics/scene/qpos"]
+        opened["run_000002/frames/physics/scene/qpos"] = rows
+    with Recording(copy) as recording:
+        (found,) = Replayer(recording, env=env)(check=True).differences
+    assert (found.run, found.frame, found.field) == ("run_000002", 5, "physics/scene/qpos")
+    assert found.owner == "steak_0/free"
+    assert str(found).startswith("run_000002, frame 5: physics/scene/qpos[")
+    assert " of steak_0/free: " in str(found)
+
+
+def test_another_engine_version_is_refused_by_action_and_warned_of_by_state(env, recorded, tmp_path):
+    copy = changed(recorded, tmp_path)
+    with h5py.File(copy, "a") as opened:
+        opened.attrs["mujoco"], opened.attrs["processor"] = "1.2.3", "abacus"
+    with Recording(copy) as recording:
+        with pytest.raises(InputError, match=r"cannot be replayed by action: mujoco was 1\.2\.3, and is \d") as refused:
+            Replayer(recording, env=env)
+        assert "\n" not in str(refused.value)
+        warnings = Replayer(recording, "state", env=env).warnings
+    assert [w.split(" was ")[0] for w in warnings] == ["mujoco", "processor"]
+
+
+def spoil(opened, what, tmp_path):
+    run = opened["run_000001"]
+    if what == "missing":
+        del run["frames/states/temperature"]
+    elif what == "rows":
+        values = np.asarray(run["steps/action"])[:-1]
+        del run["steps/action"]
+        run["steps/action"] = values
+    elif what == "text":
+        del run["frames/key"]
+        run["frames/key"] = np.array(["a"] * 13, dtype=h5py.string_dtype())
+    elif what == "shape":
+        del run["frames/states/wetness"]
+        run["frames/states/wetness"] = np.zeros((1, 3), np.float32)
+    elif what == "outside":
+        with h5py.File(tmp_path / "other.h5", "w") as other:
+            other["x"] = np.zeros(1)
+        del run["frames/flags"]
+        run["frames/flags"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "/x")
+    elif what == "claimed":
+        run.attrs["frames"] = 10**9
+        del run["frames/physics/time"]
+        run.create_dataset("frames/physics/time", (10**9,), np.float64, chunks=(200,))
+    elif what == "negative":
+        run.attrs["frames"] = -1
+
+
+@pytest.mark.parametrize(
+    ("what", "named"),
+    [
+        ("missing", r"run_000001/frames/states/temperature: is missing"),
+        ("rows", r"run_000001/steps/action: has 11 rows, and the run 12"),
+        ("text", r"run_000001/frames/key: is no array of numbers"),
+        ("shape", r"run_000001/frames/states/wetness: is float32\[3\], must be float32\[\d+\]"),
+        ("outside", r"run_000001/frames/flags: is missing"),
+        ("claimed", r"run_000001/frames/\S+: (claims|has)"),
+        ("negative", r"run_000001/attribute frames: is -1"),
+    ],
+)
+def test_a_file_that_was_tampered_with_is_refused_with_file_and_field(env, recorded, tmp_path, what, named):
+    copy = changed(recorded, tmp_path)
+    with h5py.File(copy, "a") as opened:
+        spoil(opened, what, tmp_path)
+    with pytest.raises(InputError, match=named) as refused, Recording(copy) as recording:
+        Replayer(recording, env=env)(check=True)
+    assert str(copy) in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_truncated_and_foreign_files_end_in_one_line(recorded, tmp_path, capsys):
+    cut, foreign, text = tmp_path / "cut.h5", tmp_path / "foreign.h5", tmp_path / "text.h5"
+    content = recorded[0].read_bytes()
+    cut.write_bytes(content[: len(content) // 2])
+    text.write_text("hello")
+    with h5py.File(foreign, "w") as opened:
+        opened["x"] = np.zeros(3)
+    for file in (cut, foreign, text, tmp_path / "none.h5"):
+        assert call(["demos", "replay", str(file)]) == 2
+        lines = capsys.readouterr().err.strip().splitlines()
+        assert len(lines) == 1 and str(file) in lines[0]
+
+
+KILLED = """
+import os, signal, sys
+import numpy as np
+from ig2mj.demos.writer import RunWriter
+
+about = {name: "" for name in ("mujoco", "ig2mj", "scene", "scene_hash", "model_hash")}
+writer = RunWriter(sys.argv[1], about, ["a", "late"], ["action"])
+writer.begin(0, [np.zeros(3), np.zeros(2)], {})
+for k in range(1, 451):
+    writer.add(0, [np.full(3, k / 7), np.full(2, float(k > 300))], [np.full(2, k)])
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_process_that_is_killed_loses_no_more_than_200_frames(tmp_path):
+    file = tmp_path / "killed.h5"
+    done = subprocess.run([sys.executable, "-c", KILLED, str(file)], check=False)
+    assert done.returncode < 0
+    with Recording(file) as recording:
+        (run,) = recording.runs
+        assert 251 <= run.frames <= 451
+        assert not run.attributes["ended"]
+        last = run.frames - 200
+        assert run.rows("frames/a", last, run.frames)[:, 0] == pytest.approx(np.arange(last, run.frames) / 7)
+        late = np.concatenate([run.rows("frames/late", k, min(k + 200, run.frames)) for k in range(0, run.frames, 200)])
+        assert (late[:, 0] == (np.arange(run.frames) > 300)).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("threads", [1, 2, 8])
+def test_a_fresh_process_comes_to_the_same_bytes(recorded, threads):
+    command = [sys.executable, "-m", "ig2mj", "demos", "replay", str(recorded[0]), "--check", "--threads", str(threads)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "6 runs, 60 frames by action, all the same" in done.stdout
