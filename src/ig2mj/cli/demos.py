@@ -7,7 +7,7 @@ from typing import Annotated
 
 import tyro
 
-from ig2mj.cli.demos_replay import replay
+from ig2mj.cli.demos_replay import export, replay
 
 
 def collect(
@@ -78,4 +78,4 @@ def collect(
     return 0
 
 
-SUBCOMMANDS = {"collect": collect, "replay": replay}
+SUBCOMMANDS = {"collect": collect, "replay": replay, "export": export}

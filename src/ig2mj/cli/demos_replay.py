@@ -1,4 +1,4 @@
-"""`ig2mj demos replay FILE`: replays recordings, checks that they come out the same, films and observes them."""
+"""`ig2mj demos replay FILE` and `export FILE`: replays recordings, checks, films, observes and exports them."""
 
 from __future__ import annotations
 
@@ -70,6 +70,38 @@ def replay(
     same = "" if not check or by == "state" or done.differences else ", all the same"
     print(f"{file}: {done.runs} runs, {done.frames} frames by {by}{same}")
     return 1 if done.differences else 0
+
+
+def export(
+    file: Annotated[pathlib.Path, tyro.conf.Positional],
+    out: pathlib.Path,
+    to: str = "robomimic",
+    by: str = "action",
+    obs: str = "",
+) -> int:
+    """Write a recording in the format of another project, with observations made by a replay.
+
+    Args:
+      file: the recording (`ig2mj rollout --record FILE`).
+      out: the file to write.
+      to: robomimic.
+      by: action, which compares every byte, or state.
+      obs: observations, e.g. proprioception,rgb; default: proprioception,privileged_state.
+    """
+    from ig2mj.demos.reader import Recording
+    from ig2mj.demos.replay import MODES, Replayer
+    from ig2mj.demos.robomimic import export_robomimic
+    from ig2mj.envs.registry import VECTORS
+    from ig2mj.errors import UnknownNameError
+
+    for kind, name, known in (("format", to, ("robomimic",)), ("way to replay", by, MODES)):
+        if name not in known:
+            raise UnknownNameError(kind, name, known)
+    names = tuple(name.strip() for name in obs.split(",") if name.strip())
+    with Recording(file) as recording:
+        done = export_robomimic(Replayer(recording, by, observations=names or VECTORS), out)
+    print(f"{out}: {done.runs} runs of {file}")
+    return 0
 
 
 class _Filming:
