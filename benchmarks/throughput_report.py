@@ -22,7 +22,7 @@ KEY = ("scene", "worlds", "case", "what", "iterations", "label")
 """What makes a case; a newer row of the same case replaces the older one."""
 
 ASKED = {(20, "full"): 200_000, (60, "full"): 100_000, (120, "full"): 50_000, (60, "camera"): 40_000}
-"""Control steps per second to reach on one H200, disturbed, by the number of objects (issue, "Numbers to reach")."""
+"""Control steps per second to reach on one H200, disturbed, by the number of objects."""
 
 MEMORY_ASKED = 2.0
 """MB per world without cameras (same section)."""

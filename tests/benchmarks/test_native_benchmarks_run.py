@@ -1,4 +1,4 @@
-"""Every benchmark of the native engine runs with tiny settings, and says what it measured (issue: Benchmarks).
+"""Every benchmark of the native engine runs with tiny settings, and says what it measured.
 
 The homes are made of the project's own objects; PyBullet is an extra ("bench").
 """

@@ -1,5 +1,5 @@
 """The three engines agree: one step from the same state stage by stage, one second beside a perturbed shadow, and what
-the view says of a settled scene (issue "Thousands of households on one GPU", section Parity)."""
+the view says of a settled scene."""
 
 from __future__ import annotations
 

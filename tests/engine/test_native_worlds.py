@@ -53,7 +53,7 @@ def assert_rows_equal(one: PhysicsView, row: int, other: PhysicsView, other_row:
 
 
 def test_worlds_do_not_depend_on_threads_or_on_each_other_bitwise(hand_home):
-    """issue 3, exactness: the same for any thread count; and one world is row w of four."""
+    """The same for any thread count; and one world is row w of four."""
     four = rollout(NativeEngine(hand_home, 4, threads=1), [0, 1, 2, 3], 15)
     for threads in (2, 3, 4):
         again = rollout(NativeEngine(hand_home, 4, threads=threads), [0, 1, 2, 3], 15)

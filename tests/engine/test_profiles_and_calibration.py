@@ -1,4 +1,4 @@
-"""Engine profiles: safe defaults, files, and measuring a home (issue, item 2)."""
+"""Engine profiles: safe defaults, files, and measuring a home."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How homes are furnished: the rules hold, nothing overlaps, nothing blocks a way or a door (issue 5)."""
+"""How homes are furnished: the rules hold, nothing overlaps, nothing blocks a way or a door."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the catalogue of our own objects promises: every category, every synset, every annotated link (issue 5)."""
+"""What the catalogue of our own objects promises: every category, every synset, every annotated link."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Generated objects do what they are for, in C MuJoCo after conversion (issue 5, "Done means"). Slow."""
+"""Generated objects do what they are for, in C MuJoCo after conversion. Slow."""
 
 from __future__ import annotations
 

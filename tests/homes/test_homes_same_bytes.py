@@ -1,4 +1,4 @@
-"""Same seed, same bytes: in other processes, with other hash seeds and numbers of jobs (issue 5)."""
+"""Same seed, same bytes: in other processes, with other hash seeds and numbers of jobs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a visitor of any of the fifteen homes would look for: the rules of homes/furnish hold everywhere (issue 5)."""
+"""What a visitor of any of the fifteen homes would look for: the rules of homes/furnish hold everywhere."""
 
 from __future__ import annotations
 

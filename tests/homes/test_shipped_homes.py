@@ -1,4 +1,4 @@
-"""What lies in scenes_mjcf/: complete, small, at rest, open-able, reachable (issue 5, "Done means")."""
+"""What lies in scenes_mjcf/: complete, small, at rest, open-able, reachable."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What moving parts sweep, whether they meet other parts, and what holds them (issue 5, "Done means")."""
+"""What moving parts sweep, whether they meet other parts, and what holds them."""
 
 from __future__ import annotations
 

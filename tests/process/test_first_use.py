@@ -1,4 +1,4 @@
-"""First use: progress while kernels compile, and folders that keep what was compiled (issue, item 8)."""
+"""First use: progress while kernels compile, and folders that keep what was compiled."""
 
 from __future__ import annotations
 

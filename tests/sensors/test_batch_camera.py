@@ -1,4 +1,4 @@
-"""Batched cameras: tints and particles of each world, depth and segmentation against MuJoCo (issue, item 7)."""
+"""Batched cameras: tints and particles of each world, depth and segmentation against MuJoCo."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`Core`: episodes, resets from a pool, random streams, guards (issue, items 1, 3, 4 and 5)."""
+"""`Core`: episodes, resets from a pool, random streams, guards."""
 
 from __future__ import annotations
 

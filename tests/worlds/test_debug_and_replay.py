@@ -1,4 +1,4 @@
-"""Debug mode dumps the last steps of a world that goes wrong, and `ig2mj view --dump` shows them (issue, item 3)."""
+"""Debug mode dumps the last steps of a world that goes wrong, and `ig2mj view --dump` shows them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pools: made by settling disturbed homes, saved, loaded, refused where they do not belong (issue, item 4)."""
+"""Pools: made by settling disturbed homes, saved, loaded, refused where they do not belong."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Worlds on two devices: the same as on one (issue, item 6). Runs in a process that has two CPU devices."""
+"""Worlds on two devices: the same as on one. Runs in a process that has two CPU devices."""
 
 from __future__ import annotations
 
