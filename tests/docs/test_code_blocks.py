@@ -26,6 +26,7 @@ PARSED_ONLY = {
     "ig2mj activity sample": "takes half a minute",
     "ig2mj activity show cleaning_windows --pool": "needs what the line before it makes",
     "ig2mj sample-task": "takes minutes",
+    "ig2mj train": "takes minutes, on a GPU",
     "ig2mj calibrate": "takes minutes on a CPU",
     "ig2mj homes build": "takes minutes; run by `make homes-check`",
     "ig2mj homes pictures": "needs what the lines before it make",

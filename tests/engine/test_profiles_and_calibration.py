@@ -176,11 +176,14 @@ def test_a_home_with_nothing_to_push_is_measured_without_a_hand(tmp_path, capsys
     home.mkdir()
     sides = [(f"{x} 0 0", "0.01 0.3 0.3") for x in (-0.3, 0.3)] + [(f"0 {y} 0", "0.3 0.01 0.3") for y in (-0.3, 0.3)]
     sides += [(f"0 0 {z}", "0.3 0.3 0.01") for z in (-0.3, 0.3)]
-    shell = [f'<geom name="shell/collision_{k}" type="box" size="{s}" pos="{p}"/>' for k, (p, s) in enumerate(sides)]
+    shell = [
+        f'<geom name="shell/collision_{k}" type="box" group="3" size="{s}" pos="{p}"/>'
+        for k, (p, s) in enumerate(sides)
+    ]
     (home / "scene.xml").write_text(
         '<mujoco><option><flag sleep="enable"/></option><worldbody>'
         f'<body name="shell">{"".join(shell)}</body><body name="thing" pos="0 0 -0.2"><freejoint name="thing/free"/>'
-        '<geom name="thing/collision_0" type="box" size="0.03 0.03 0.03"/></body></worldbody></mujoco>'
+        '<geom name="thing/collision_0" type="box" group="3" size="0.03 0.03 0.03"/></body></worldbody></mujoco>'
     )
     objects = [
         mf.ObjectEntry("shell", "shelf", "made", ["shell"], True, (0.6, 0.6, 0.6), 1.0),

@@ -33,7 +33,7 @@ HOME = HandWorld(
     fingers=1,
 )  # fmt: skip
 GOAL = """(and (cooked fish) (not (burnt fish)) (inside fish oven) (on_top fish table) (soaked rag) (dusty table)
-               (sliced fish) (forn 1 (?x - object) (in_contact_with ?x table)))"""
+               (sliced fish) (forn 1 (?x - thing) (in_contact_with ?x table)))"""
 AWAY = [(0, 0, 9)]
 VIEWS = [
     HOME.view(fingers=AWAY),

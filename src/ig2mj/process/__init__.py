@@ -12,6 +12,9 @@ or earlier by whoever wants to; a second call does nothing. What the user has de
   - JAX's option `jax_cpu_enable_async_dispatch` is off: small CPU programs run in the calling thread. Not where the
     variable JAX_CPU_ENABLE_ASYNC_DISPATCH is set.
 
+`use_processor_only` (processes that sample rows of pools):
+  - JAX's option `jax_platforms` is "cpu".
+
 `prepare_mujoco` (every engine):
   - MuJoCo's user warning: what it warns of goes to the logger "ig2mj.mujoco", not to a file in the working folder.
 
@@ -38,6 +41,7 @@ from ig2mj.process.settings import (
     quiet_warp,
     run_programs_inline,
     use_gl,
+    use_processor_only,
     used_gl,
 )
 
@@ -50,5 +54,6 @@ __all__ = [
     "quiet_warp",
     "run_programs_inline",
     "use_gl",
+    "use_processor_only",
     "used_gl",
 ]

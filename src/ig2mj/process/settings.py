@@ -63,6 +63,13 @@ def run_programs_inline() -> None:
         jax.config.update("jax_cpu_enable_async_dispatch", False)
 
 
+def use_processor_only() -> None:
+    """Keeps JAX off the GPU in this process; only before JAX is first used."""
+    import jax
+
+    jax.config.update("jax_platforms", "cpu")
+
+
 @functools.cache
 def prepare_warp() -> None:
     """Warp reports compilation as the rest of ig2mj does, keeps kernels where IG2MJ_CACHE_DIR says, and is repaired."""

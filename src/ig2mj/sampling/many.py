@@ -21,6 +21,7 @@ import numpy as np
 
 from ig2mj.errors import EngineError
 from ig2mj.predicates.logic import Expression
+from ig2mj.process import use_processor_only
 from ig2mj.sampling.conditions import Condition, bind, read_conditions
 from ig2mj.sampling.placement import Budget, Rejections
 from ig2mj.sampling.query import SceneQuery
@@ -132,7 +133,7 @@ _here: list[RowSampler] = []
 
 
 def _load(folder: str, objects: tuple[str, ...]) -> None:
-    jax.config.update("jax_platforms", "cpu")  # many processes would fill a GPU's memory
+    use_processor_only()  # many processes would fill a GPU's memory
     _here.append(make_sampler(load_scene(folder, objects=objects)))
 
 
