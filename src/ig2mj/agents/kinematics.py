@@ -77,7 +77,6 @@ def inverse(
     iterations: int = 6,
     damping: float = 0.05,
     posture: float = 0.02,
-    ease: Float[np.ndarray, "J"] | None = None,
 ) -> Float[Array, "W J"]:
     """Joint positions that bring the tip to a pose, by damped least squares; a fixed number of steps, within limits.
 
@@ -87,7 +86,6 @@ def inverse(
       damping: of the least squares (m and rad alike). posture: share of the way to `rest` in an iteration.
     """
     low, high = jnp.asarray(chain.lower, q.dtype), jnp.asarray(chain.upper, q.dtype)
-    readily = jnp.ones(q.shape[-1], q.dtype) if ease is None else jnp.asarray(ease, q.dtype)
 
     def step(q: Float[Array, "W J"], _: None) -> tuple[Float[Array, "W J"], None]:
         tip, turned, jacobian = forward(chain, q)
@@ -95,9 +93,8 @@ def inverse(
         error = jnp.concatenate([pos - tip, turn], axis=-1)
         back = posture * (jnp.asarray(rest, q.dtype) - q)
         left = error - jnp.einsum("...ij,...j->...i", jacobian, back)
-        eased = jacobian * readily
-        square = jnp.einsum("...ij,...kj->...ik", eased, jacobian) + damping**2 * jnp.eye(6, dtype=q.dtype)
-        q = q + back + jnp.einsum("...ij,...i->...j", eased, solve_positive(square, left))
+        square = jnp.einsum("...ij,...kj->...ik", jacobian, jacobian) + damping**2 * jnp.eye(6, dtype=q.dtype)
+        q = q + back + jnp.einsum("...ij,...i->...j", jacobian, solve_positive(square, left))
         return jnp.clip(q, low, high), None
 
     return jax.lax.scan(step, q, None, length=iterations)[0]

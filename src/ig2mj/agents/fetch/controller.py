@@ -52,10 +52,6 @@ GAIN = 2.0
 STRETCH = np.array([0.2, 0.2, 0.2, 0.5, 0.5, 0.5])
 """m and rad: goal of a full command."""
 
-EASE = (VELOCITY[CHAIN_JOINTS] / VELOCITY[CHAIN_JOINTS].max()) ** 2
-"""How readily trunk and arm move: squares of their speed limits. With all alike the slow trunk (0.1 m/s) would do most
-of what is vertical, and slow the arm down to a third."""
-
 LEASH = 0.15
 """rad or m that a servo's target may be ahead of its joint: a blocked arm does not push ever harder."""
 
@@ -143,7 +139,7 @@ class FetchController:
         q = q[:, np.array(CHAIN_JOINTS)]
         pos, quat, _ = forward(CHAIN, q)
         turned = quat_multiply(rotation_vector_to_quat(command[:, 3:]), quat)
-        return inverse(CHAIN, q, pos + command[:, :3], turned, self._start[CHAIN_JOINTS], ease=EASE)
+        return inverse(CHAIN, q, pos + command[:, :3], turned, self._start[CHAIN_JOINTS])
 
     def _move(
         self, state: FetchState, q: Float[Array, "W 14"], joints: list[int], velocity: Float[Array, "W n"]
