@@ -11,13 +11,13 @@ counted over all steps. Compilation is timed apart.
 from __future__ import annotations
 
 import argparse
-import json
 import pathlib
 import time
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+import results
 from throughput import device, memory
 
 import ig2mj
@@ -120,11 +120,7 @@ def main() -> None:
     args = parser.parse_args()
     for name in args.environments:
         for worlds in args.worlds:
-            row = run(name, worlds, args)
-            print(json.dumps(row), flush=True)
-            if args.rows:
-                with args.rows.open("a") as file:
-                    file.write(json.dumps(row) + "\n")
+            results.keep_row(run(name, worlds, args), args.rows)
 
 
 if __name__ == "__main__":

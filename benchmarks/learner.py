@@ -9,13 +9,13 @@ updates of the iteration are made, in one program. The buffer holds `--capacity`
 from __future__ import annotations
 
 import argparse
-import json
 import pathlib
 import time
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+import results
 
 from ig2mj.envs.observations import Space
 from ig2mj.learn.collect import Transition
@@ -117,10 +117,7 @@ def main() -> None:
         "device": jax.devices()[0].device_kind,
         "settings": changes,
     }  # fmt: skip
-    print(json.dumps(row))
-    if args.out:
-        with args.out.open("a", encoding="utf-8") as file:
-            file.write(json.dumps(row) + "\n")
+    results.keep_row(row, args.out)
 
 
 if __name__ == "__main__":

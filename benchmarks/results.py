@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import importlib.metadata
+import json
 import os
 import pathlib
 import platform
@@ -19,6 +20,15 @@ from rich.table import Table
 
 RESULTS = pathlib.Path(__file__).resolve().parent / "results"
 PACKAGES = ("mujoco", "jax", "jaxlib", "numpy", "pybullet")
+
+
+def keep_row(row: dict[str, Any], file: pathlib.Path | None) -> None:
+    """Prints a row as a line of JSON, and adds it to a file of such lines; None: no file."""
+    line = json.dumps(row)
+    print(line, flush=True)
+    if file is not None:
+        with file.open("a", encoding="utf-8") as opened:
+            opened.write(line + "\n")
 
 
 def machine(core: int) -> dict[str, Any]:

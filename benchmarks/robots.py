@@ -11,13 +11,13 @@ house or moved too fast are counted over all steps; physics steps are worlds tim
 from __future__ import annotations
 
 import argparse
-import json
 import pathlib
 import time
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+import results
 import scipy.ndimage
 from batch_case import ten_literals
 from throughput import _bits, device, memory
@@ -202,11 +202,7 @@ def main() -> None:
     args = parser.parse_args()
     for home in args.homes:
         for worlds in args.worlds:
-            row = run(home, worlds, args)
-            print(json.dumps(row), flush=True)
-            if args.rows:
-                with args.rows.open("a") as file:
-                    file.write(json.dumps(row) + "\n")
+            results.keep_row(run(home, worlds, args), args.rows)
 
 
 if __name__ == "__main__":

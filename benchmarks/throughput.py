@@ -15,7 +15,6 @@ from __future__ import annotations
 import argparse
 import contextlib
 import fcntl
-import json
 import os
 import pathlib
 import time
@@ -26,6 +25,7 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+import results
 import warp as wp
 from batch_case import HAND_DOFS, Case
 from disturbance import LEAST, Watch, join, summary
@@ -218,11 +218,7 @@ def main() -> None:
                     solver = {"iterations": limit, "ls_iterations": limit} if limit else {}
                     row = run(case, worlds, not args.idle, what, args.lock, **solver)
                     row |= {"ready_s": case.seconds, "label": args.label, **device()}
-                    line = json.dumps(row)
-                    print(line, flush=True)
-                    if args.rows:
-                        with args.rows.open("a") as file:
-                            file.write(line + "\n")
+                    results.keep_row(row, args.rows)
 
 
 if __name__ == "__main__":

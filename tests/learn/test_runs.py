@@ -21,6 +21,7 @@ from small_envs import PointMass
 
 from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
 from ig2mj.learn.checkpoints import Checkpoints
+from ig2mj.learn.networks import Actor
 from ig2mj.learn.options import configured
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy, depends_on
@@ -166,6 +167,11 @@ def test_a_policy_for_something_else_is_refused_with_the_pair_that_differs(done,
     (tmp_path / "broken.npz").write_bytes(b"PK\x03\x04nothing")
     with pytest.raises(InputError, match="is no policy"):
         Policy.load(tmp_path / "broken.npz")
+
+
+def test_an_unknown_encoder_is_not_taken_for_the_small_one():
+    with pytest.raises(UnknownNameError, match="paper"):
+        Actor(6, net="papr")
 
 
 def test_settings_are_known_by_name_and_type():

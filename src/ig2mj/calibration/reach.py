@@ -35,9 +35,6 @@ RANGE = 1.5
 GRID, GRID_HEIGHTS = 0.6, (0.5, 1.3)
 """Metres between neighbours of the grid, and their heights over each floor."""
 
-GRID_STEP = 0.85
-"""Metres: neighbours on the grid are as close as this, also from one height to the other and across."""
-
 TO_GRID = 1.2
 """Metres from a station within which its neighbours on the grid are looked for."""
 

@@ -36,7 +36,6 @@ class ModelLayout:
       hand_of_geom: [G] hand that the geom is part of, -1 none.
       finger_of_geom, graspable_of_geom: [G] finger link, and graspable body, whose geom it is, -1 none. What is welded
         to a graspable body is part of it.
-      link_tree: [L] tree of the link's body, -1: static.
       qpos_tree, qpos_dof: [nq] tree and first degree of freedom of the joint that owns the coordinate.
       qpos_ndof: [nq] number of degrees of freedom of that joint.
       equality_tree: [E, 2] trees that an equality constraint joins, -1: the world or nothing.
@@ -60,7 +59,6 @@ class ModelLayout:
     hand_of_geom: Int[np.ndarray, "G"]
     finger_of_geom: Int[np.ndarray, "G"]
     graspable_of_geom: Int[np.ndarray, "G"]
-    link_tree: Int[np.ndarray, "L"]
     qpos_tree: Int[np.ndarray, "nq"]
     qpos_dof: Int[np.ndarray, "nq"]
     qpos_ndof: Int[np.ndarray, "nq"]
@@ -139,7 +137,6 @@ def make_layout(model: mujoco.MjModel, tables: SceneTables) -> ModelLayout:
         hand_of_geom=tables.body_hand[geom_body],
         finger_of_geom=finger_of_body[geom_body],
         graspable_of_geom=graspable_of_body[geom_body],
-        link_tree=body_tree[tables.link_body],
         qpos_tree=body_tree[model.jnt_bodyid[joint]],
         qpos_dof=np.asarray(model.jnt_dofadr)[joint],
         qpos_ndof=joint_ndof[joint],

@@ -24,11 +24,10 @@ from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.checkpoints import Checkpoints
 from ig2mj.learn.demos import Demos
-from ig2mj.learn.labels import imitation_loss
+from ig2mj.learn.labels import Imitation
 from ig2mj.learn.log import Log
 from ig2mj.learn.moments import Moments
-from ig2mj.learn.networks import Actor
-from ig2mj.learn.perception import Perception, Seen, blank
+from ig2mj.learn.perception import Perception, Seen
 from ig2mj.learn.train import Run
 
 APART = 10
@@ -79,18 +78,16 @@ class BC:
         """Compiles nothing yet."""
         self.perception, self.action_size = perception, action_size
         self.config = c = config or BCConfig()
-        guess = perception.vector_size - perception.actor_size if perception.picture_shape and c.guess else 0
-        self.actor = Actor(action_size, c.actor, perception.picture_shape, c.net, guess)
-        self._adam = optax.chain(optax.clip_by_global_norm(10.0), optax.flatten(optax.scale_by_adam()))
+        self._imitation = Imitation(perception, action_size, c)
+        self.actor = self._imitation.actor
         self.learn = jax.jit(self.learn_fn, donate_argnums=0)
         self.judge = jax.jit(self.judge_fn)
 
     def init(self, key: Array, demos: Demos) -> BCLearner:
         """Untrained, with the means of the demonstrations."""
-        seen, size = blank(self.perception, 1), self.perception.actor_size
-        actor = self.actor.init(jnp.asarray(key), seen.vector[:, :size], seen.picture)["params"]
+        actor, opt = self._imitation.init(key)
         moments = Moments.initial(self.perception.vector_size).update(demos.seen.vector)
-        return BCLearner(actor, self._adam.init(actor), moments, jnp.int32(0))
+        return BCLearner(actor, opt, moments, jnp.int32(0))
 
     def learn_fn(
         self, learner: BCLearner, demos: Demos, rows: Int[Array, "k"], key: Array
@@ -105,21 +102,8 @@ class BC:
             deviation = jnp.sqrt(learner.moments.var + 1e-4)
             vector += c.noise * deviation * jax.random.normal(noise_key, vector.shape)
             seen = Seen(vector, demos.seen.picture[row])
-            slope, found = jax.grad(imitation_loss, has_aux=True)(
-                learner.actor,
-                self.actor,
-                self.perception,
-                learner.moments,
-                seen,
-                demos.label[row],
-                shift_key,
-                c.guess,
-            )
-            share = jnp.clip(learner.updates / c.steps, 0, 1)
-            rate = c.last_lr + (c.lr - c.last_lr) * 0.5 * (1 + jnp.cos(jnp.pi * share))
-            step, opt = self._adam.update(slope, learner.opt)
-            actor = jax.tree.map(lambda a, s: a - rate * s, learner.actor, step)
-            return dataclasses.replace(learner, actor=actor, opt=opt, updates=learner.updates + 1), found
+            rate = jnp.asarray(optax.cosine_decay_schedule(c.lr, c.steps, c.last_lr / c.lr)(learner.updates))
+            return self._imitation.update(learner, seen, demos.label[row], shift_key, rate)
 
         learner, found = jax.lax.scan(update, learner, jax.random.split(key, CALL))
         return learner, jax.tree.map(jnp.mean, found)
@@ -128,9 +112,7 @@ class BC:
         """The loss on these rows, 4,096 of them at most."""
         row = rows[: 4 * 1024]
         seen = Seen(demos.seen.vector[row], demos.seen.picture[row])
-        _, found = imitation_loss(
-            learner.actor, self.actor, self.perception, learner.moments, seen, demos.label[row], key, 0.0
-        )
+        _, found = self._imitation.loss(learner.actor, learner.moments, seen, demos.label[row], key)
         return found["actor_loss"]
 
 

@@ -23,10 +23,9 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
 from ig2mj.learn.collect import Hint, Transition, if_ready
-from ig2mj.learn.labels import Labels, imitation_loss
-from ig2mj.learn.moments import Moments, average
-from ig2mj.learn.networks import Actor
-from ig2mj.learn.perception import Perception, Seen, blank
+from ig2mj.learn.labels import Imitation, Labels
+from ig2mj.learn.moments import Moments
+from ig2mj.learn.perception import Perception, Seen
 
 
 @dataclasses.dataclass(frozen=True)
@@ -93,9 +92,8 @@ class Dagger:
         """`expert`: see `collect.Hint`. `axis`: the name of an axis of devices over which gradients are averaged."""
         self.perception, self.action_size, self.hint, self.axis = perception, action_size, expert, axis
         self.config = c = config or DaggerConfig()
-        guess = perception.vector_size - perception.actor_size if perception.picture_shape and c.guess else 0
-        self.actor = Actor(action_size, c.actor, perception.picture_shape, c.net, guess)
-        self._adam = optax.chain(optax.clip_by_global_norm(10.0), optax.flatten(optax.scale_by_adam()))
+        self._imitation = Imitation(perception, action_size, c, axis)
+        self.actor = self._imitation.actor
 
     @property
     def length(self) -> int:
@@ -113,10 +111,9 @@ class Dagger:
 
     def init(self, key: Array) -> DaggerLearner:
         """Untrained."""
-        seen, size = blank(self.perception, 1), self.perception.actor_size
-        actor = self.actor.init(jnp.asarray(key), seen.vector[:, :size], seen.picture)["params"]
+        actor, opt = self._imitation.init(key)
         moments = Moments.initial(self.perception.vector_size)
-        return DaggerLearner(actor, self._adam.init(actor), moments, jnp.float32(0), jnp.int32(0))
+        return DaggerLearner(actor, opt, moments, jnp.float32(0), jnp.int32(0))
 
     def memory(self, num_worlds: int) -> Labels:
         """No labels yet."""
@@ -167,18 +164,13 @@ class Dagger:
         memory = memory.insert(rollout.seen, rollout.extra["label"])
         moments = learner.moments.update(rollout.seen.vector, self.axis)
         learner = dataclasses.replace(learner, moments=moments, progress=progress)
-        rate = c.last_lr + (c.lr - c.last_lr) * 0.5 * (1 + jnp.cos(jnp.pi * jnp.clip(progress, 0, 1)))
+        rate = jnp.asarray(optax.cosine_decay_schedule(c.lr, 1, c.last_lr / c.lr)(progress))
 
         def many(learner: DaggerLearner) -> tuple[DaggerLearner, dict[str, Array]]:
             def update(learner: DaggerLearner, key: Array) -> tuple[DaggerLearner, dict[str, Array]]:
                 sample_key, shift_key = jax.random.split(key)
                 seen, label = memory.sample(sample_key, c.batch)
-                slope, found = jax.grad(imitation_loss, has_aux=True)(
-                    learner.actor, self.actor, self.perception, learner.moments, seen, label, shift_key, c.guess
-                )
-                step, opt = self._adam.update(average(slope, self.axis), learner.opt)
-                actor = jax.tree.map(lambda a, s: a - rate * s, learner.actor, step)
-                return dataclasses.replace(learner, actor=actor, opt=opt, updates=learner.updates + 1), found
+                return self._imitation.update(learner, seen, label, shift_key, rate)
 
             learner, found = jax.lax.scan(update, learner, jax.random.split(key, self.samples))
             return learner, jax.tree.map(jnp.mean, found)

@@ -10,13 +10,14 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import optax
 from flax import struct
 from jaxtyping import Float, Int, UInt8
 
 from ig2mj.engine.view import Array
-from ig2mj.learn.moments import Moments
+from ig2mj.learn.moments import Moments, average
 from ig2mj.learn.networks import Actor, shifted
-from ig2mj.learn.perception import Perception, Seen
+from ig2mj.learn.perception import Perception, Seen, blank
 
 
 @struct.dataclass
@@ -67,27 +68,49 @@ class Labels:
         return Seen(self.vector[row, world], self.picture[row, world]), self.label[row, world]
 
 
-def imitation_loss(
-    params: Any,
-    actor: Actor,
-    perception: Perception,
-    moments: Moments,
-    seen: Seen,
-    label: Float[Array, "B n"],
-    key: Array,
-    guess_weight: float,
-) -> tuple[Array, dict[str, Array]]:
-    """Mean squared difference of the actor's action from the label; with pictures, also of its guess of what it cannot
-    see from the truth."""
-    normal = moments.normal(seen.vector)
-    picture = seen.picture
-    if perception.picture_shape is not None:
-        picture = shifted(picture, perception.picture_shape, key)
-    looked: Any = actor.apply({"params": params}, normal[:, : perception.actor_size], picture)
-    mean, _, guess = looked
-    loss = jnp.square(jnp.tanh(mean) - label).mean()
-    found: dict[str, Array] = {"actor_loss": loss}
-    if guess.shape[-1]:
-        found["guess_loss"] = jnp.square(guess - normal[:, perception.actor_size :]).mean()
-        loss += guess_weight * found["guess_loss"]
-    return loss, found
+class Imitation:
+    """An actor that learns labels. All methods are pure.
+
+    Attributes:
+      actor: the network.
+    """
+
+    def __init__(self, perception: Perception, action_size: int, config: Any, axis: str | None = None):
+        """`config`: of cloning or DAgger. `axis`: the name of an axis of devices over which gradients are averaged."""
+        guess = perception.vector_size - perception.actor_size if perception.picture_shape and config.guess else 0
+        self.actor = Actor(action_size, config.actor, perception.picture_shape, config.net, guess)
+        self._perception, self._weight, self._axis = perception, config.guess, axis
+        self._adam = optax.chain(optax.clip_by_global_norm(10.0), optax.flatten(optax.scale_by_adam()))
+
+    def init(self, key: Array) -> tuple[Any, Any]:
+        """Parameters and the optimiser's state, untrained."""
+        seen, size = blank(self._perception, 1), self._perception.actor_size
+        params = self.actor.init(jnp.asarray(key), seen.vector[:, :size], seen.picture)["params"]
+        return params, self._adam.init(params)
+
+    def loss(
+        self, params: Any, moments: Moments, seen: Seen, label: Float[Array, "B n"], key: Array
+    ) -> tuple[Array, dict[str, Array]]:
+        """Mean squared difference of the actor's action from the label ("actor_loss"); with pictures, also of its guess
+        of what it cannot see from the truth."""
+        normal = moments.normal(seen.vector)
+        picture = seen.picture
+        if self._perception.picture_shape is not None:
+            picture = shifted(picture, self._perception.picture_shape, key)
+        looked: Any = self.actor.apply({"params": params}, normal[:, : self._perception.actor_size], picture)
+        mean, _, guess = looked
+        loss = jnp.square(jnp.tanh(mean) - label).mean()
+        found: dict[str, Array] = {"actor_loss": loss}
+        if guess.shape[-1]:
+            found["guess_loss"] = jnp.square(guess - normal[:, self._perception.actor_size :]).mean()
+            loss += self._weight * found["guess_loss"]
+        return loss, found
+
+    def update(
+        self, learner: Any, seen: Seen, label: Float[Array, "B n"], key: Array, rate: Array
+    ) -> tuple[Any, dict[str, Array]]:
+        """One update of a learner that has `actor`, `opt`, `moments` and `updates`."""
+        slope, found = jax.grad(self.loss, has_aux=True)(learner.actor, learner.moments, seen, label, key)
+        step, opt = self._adam.update(average(slope, self._axis), learner.opt)
+        actor = jax.tree.map(lambda a, s: a - rate * s, learner.actor, step)
+        return dataclasses.replace(learner, actor=actor, opt=opt, updates=learner.updates + 1), found

@@ -13,6 +13,7 @@ import jax.numpy as jnp
 from jaxtyping import Float, UInt8
 
 from ig2mj.engine.view import Array
+from ig2mj.errors import UnknownNameError
 
 LOG_STD = (-5.0, 0.0)
 """Limits of the logarithm of an actor's standard deviation, before tanh (FlashSAC's recommendation)."""
@@ -21,6 +22,7 @@ FIRST_STD = 0.3
 """Standard deviation of an untrained actor."""
 
 NETS = ("small", "paper")
+"""Encoders of pictures."""
 
 
 class Trunk(nn.Module):
@@ -60,6 +62,9 @@ class Actor(nn.Module):
     """Mean and logarithm of the standard deviation of a Gaussian; its tanh is the action.
 
     With `guess`, a linear guess of that many hidden numbers is made from the picture's features, for an auxiliary loss.
+
+    Raises:
+      UnknownNameError: `net` is none of `NETS`.
     """
 
     action_size: int
@@ -67,6 +72,11 @@ class Actor(nn.Module):
     picture_shape: tuple[int, int, int] | None = None
     net: str = "small"
     guess: int = 0
+
+    def __post_init__(self) -> None:
+        if self.net not in NETS:
+            raise UnknownNameError("encoder", self.net, NETS)
+        super().__post_init__()
 
     @nn.compact
     def __call__(

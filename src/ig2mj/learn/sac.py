@@ -246,7 +246,7 @@ class SAC:
         scale = memory.scale.update(rollout.reward, rollout.done, c.gamma, self.axis)
         memory = SACMemory(memory.replay.insert(rollout), scale, memory.demos)
         learner = dataclasses.replace(learner, moments=learner.moments.update(rollout.seen.vector, self.axis))
-        rate = c.last_lr + (c.lr - c.last_lr) * 0.5 * (1 + jnp.cos(jnp.pi * jnp.clip(progress, 0, 1)))
+        rate = jnp.asarray(optax.cosine_decay_schedule(c.lr, 1, c.last_lr / c.lr)(progress))
 
         def many(learner: SACLearner) -> tuple[SACLearner, dict[str, Array]]:
             def group(learner: SACLearner, key: Array) -> tuple[SACLearner, dict[str, Array]]:

@@ -181,7 +181,3 @@ class Sensor:
     def looks(self) -> bool:
         """It needs the engine itself, not only the view: pictures or rays."""
         return bool(self.pictures) or self.rays is not None
-
-    @property
-    def needs_eye(self) -> bool:
-        return bool(self.pictures) or self.remembers

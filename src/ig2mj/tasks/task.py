@@ -113,7 +113,6 @@ class Task:
       distances: pairs of points whose distances the reward is made of, in the order of the stages.
       stains_of: object whose stains are counted in the reward, or None.
       robots: name of each robot that can do it, and how it takes part.
-      held_when_done: success while the first object is in a hand, or in both of several, is reported by itself.
       horizon: agent steps until an episode is truncated. grasping: mode unless another is asked for.
     """
 
@@ -129,7 +128,6 @@ class Task:
     robots: Mapping[str, Acts]
     stains_of: str | None = None
     flat: tuple[str, ...] = ()
-    held_when_done: bool = False
     horizon: int = HORIZON
     grasping: str = "mitten"
 

@@ -3,7 +3,7 @@
     image = render(model, data, "kitchen_camera", width=640, height=480)
     image = render(model, data, FreeView.around(model, azimuth=120))
 
-A backend is used only after it has really drawn a picture in a process of its own (`available_backends`), because a
+A backend is used only after it has really drawn a picture in a process of its own (`probe`), because a
 broken OpenGL driver may abort the process that tries it. OpenGL pictures take about 10 ms; the ray caster needs no
 OpenGL at all and takes seconds. One process can use only one of EGL and OSMesa: the first that was used stays.
 """
@@ -79,7 +79,7 @@ def render(
       width, height: pixels.
       groups: geom groups that are drawn. Sites follow group 0.
       segmentation: return which geom is seen at each pixel, not its colour.
-      backend: one of BACKENDS; None takes the first of `available_backends()`.
+      backend: one of BACKENDS; None takes `default_backend()`.
       decorate: adds geoms to the scene before it is drawn; Warp's ray caster leaves them out.
 
     Returns:
@@ -111,11 +111,6 @@ def default_backend() -> str:
         if probe(name) is None:
             return name
     raise MissingDependencyError(f"no way to draw pictures works here; for OpenGL without a display: {GL_INSTALL_HINT}")
-
-
-def available_backends() -> dict[str, str | None]:
-    """Tries every backend in a process of its own. Value None: it drew; else one line that says what went wrong."""
-    return {name: probe(name) for name in BACKENDS}
 
 
 @functools.cache

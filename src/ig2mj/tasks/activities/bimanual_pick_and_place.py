@@ -29,5 +29,4 @@ BIMANUAL_PICK_AND_PLACE = Task(
         (At("cauldron_0"), At("coffee_table_0", above=0.25)),
     ),
     robots={"humanoid": Acts((1.85, 0.0, 0.55), hands=BOTH, weights=BIMANUAL_WEIGHTS)},
-    held_when_done=True,
 )

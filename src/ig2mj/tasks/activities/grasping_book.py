@@ -19,5 +19,4 @@ GRASPING_BOOK = Task(
         "humanoid": Acts((2.3, 0.05, 0.55), hands=RIGHT, weights=HUMANOID_WEIGHTS),
         "fetch": Acts((2.3, 0.0, 0.015)),
     },
-    held_when_done=True,
 )

@@ -10,7 +10,7 @@ from flax import struct
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array
-from ig2mj.geometry.poses import length, quat_conjugate, quat_multiply, quat_rotate, quat_to_rotation_vector
+from ig2mj.geometry.poses import length, quat_rotate
 
 NEAR, BLEND = 0.03, 0.06
 """m: horizontal distance to a goal within which a hand goes straight down, and over which it comes down to that."""
@@ -74,11 +74,6 @@ def around(
     wanted = jnp.maximum(along, radius - apart)
     flat = move[:, :2] + (wanted - along) * out
     return jnp.concatenate([flat, move[:, 2:]], axis=1)
-
-
-def turn_to(quat: Float[Array, "W 4"], goal: Float[Array, "W 4"]) -> Float[Array, "W 3"]:
-    """The rotation vector, world frame, that turns one orientation into another."""
-    return quat_to_rotation_vector(quat_multiply(goal, quat_conjugate(quat)))
 
 
 def levelled(quat: Float[Array, "W 4"]) -> Float[Array, "W 3"]:

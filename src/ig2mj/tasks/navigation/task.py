@@ -7,9 +7,6 @@ from __future__ import annotations
 
 import dataclasses
 
-GOALS = ("point", "reach", "close")
-"""Kinds of goals: the base at a point of the floor; the first hand at a point in the air; furniture closed."""
-
 
 @dataclasses.dataclass(frozen=True)
 class NavigationTask:
@@ -18,7 +15,8 @@ class NavigationTask:
     Attributes:
       name: as `ig2mj.make` takes it. summary: one sentence. home: a shipped home.
       robots: names of those that can do it; the first is the usual one.
-      goal: one of `GOALS`.
+      goal: "point" (the base at a point of the floor), "reach" (the first hand at a point in the air) or "close"
+        (furniture closed).
       objects: of the object library, put on free floor at random in every episode.
       others: how many TurtleBots drive about at random.
       opened: categories of furniture whose joints are opened at random.
