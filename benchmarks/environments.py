@@ -18,6 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import results
+from kernel_times import profiled
 from throughput import device, memory
 
 import ig2mj
@@ -75,6 +76,9 @@ def run(name: str, num_worlds: int, args: argparse.Namespace) -> dict:
         carry, seen = jax.block_until_ready(call(carry))
         times.append(time.time() - start)
         totals.append([float(np.mean(s)) for s in seen])
+    kernels: dict = {}
+    if args.kernels:
+        (carry, seen), kernels = profiled(lambda: call(carry), CALL, args.kernels, "agent step")
     state = carry[0]
     steps = num_worlds * len(times) * CALL
     reward, done, held, success = np.mean(totals, axis=0)
@@ -90,7 +94,8 @@ def run(name: str, num_worlds: int, args: argparse.Namespace) -> dict:
         "agent_steps_per_s": round(steps / sum(times)),
         "ms_per_agent_step": round(1e3 * sum(times) / len(times) / CALL, 2),
         "ready_s": round(ready, 1),
-        "physics_steps": 12 * (steps + num_worlds * CALL),
+        "physics_steps": 12 * (steps + num_worlds * CALL * (2 if kernels else 1)),
+        **({"kernels": kernels} if kernels else {}),
         "metrics": env.metrics(state),
         "mean_reward": round(float(reward), 5),
         "episodes_over_per_step": round(float(done), 6),
@@ -116,6 +121,7 @@ def main() -> None:
     parser.add_argument(
         "--profile", type=int, nargs=4, help="buffers: awake dofs, constraints, contacts, convex contacts of a world"
     )
+    parser.add_argument("--kernels", type=int, default=0, metavar="N", help="print the N longest kernels of a GPU")
     parser.add_argument("--rows", type=pathlib.Path, help="rows are added to this file, as JSON lines")
     args = parser.parse_args()
     for name in args.environments:

@@ -16,6 +16,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import results
+from kernel_times import profiled
 
 from ig2mj.envs.observations import Space
 from ig2mj.learn.collect import Transition
@@ -70,6 +71,7 @@ def main() -> None:
     parser.add_argument("--capacity", type=int, default=0, help="SAC's replay buffer, steps of all worlds together")
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--set", nargs="*", default=[], metavar="NAME=VALUE")
+    parser.add_argument("--kernels", type=int, default=0, metavar="N", help="print the N longest kernels")
     parser.add_argument("--out", type=pathlib.Path)
     args = parser.parse_args()
     perception = Perception(spaces(args.obs), args.obs)
@@ -117,6 +119,11 @@ def main() -> None:
         "device": jax.devices()[0].device_kind,
         "settings": changes,
     }  # fmt: skip
+    if args.kernels:
+        key, now = jax.random.split(key)
+        _, row["kernels"] = profiled(
+            lambda: iteration(learner, memory, now, True), algorithm.samples, args.kernels, "update"
+        )
     results.keep_row(row, args.out)
 
 

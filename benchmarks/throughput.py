@@ -29,6 +29,7 @@ import results
 import warp as wp
 from batch_case import HAND_DOFS, Case
 from disturbance import LEAST, Watch, join, summary
+from kernel_times import profiled
 
 from ig2mj.calibration.pushing import push, start_pushing
 from ig2mj.engine.health import CAPACITY, Overflow
@@ -46,8 +47,10 @@ SIZE = 128
 """Pixels a side of the pictures."""
 
 
-def run(case: Case, num_worlds: int, disturbed: bool, what: str, lock: pathlib.Path | None, **solver: int) -> dict:
-    """Times one batch. The first call is not counted."""
+def run(
+    case: Case, num_worlds: int, disturbed: bool, what: str, lock: pathlib.Path | None, kernels: int = 0, **solver: int
+) -> dict:
+    """Times one batch. The first call is not counted. `kernels`: so many of the longest are printed afterwards."""
     start = time.time()
     scene, model = case.scene, case.model
     profile = case.profile.for_worlds(num_worlds)
@@ -70,6 +73,9 @@ def run(case: Case, num_worlds: int, disturbed: bool, what: str, lock: pathlib.P
             carry, (seen, acts) = jax.block_until_ready(compiled(carry))
             times.append(time.time() - start)
             activity.append(acts)
+        profile_row: dict = {}
+        if kernels:
+            (carry, _), profile_row = profiled(lambda: compiled(carry), STEPS, kernels, "control step")
     batch = carry[0]
     overflow = np.asarray(batch.world.physics.overflow)
     row: dict[str, Any] = {
@@ -96,6 +102,8 @@ def run(case: Case, num_worlds: int, disturbed: bool, what: str, lock: pathlib.P
         "mean_seen": float(np.asarray(seen).mean()),
         "troubles": worlds.metrics(batch) if what in ("full", "camera") else {},
     }
+    if profile_row:
+        row["kernels"] = profile_row
     sound = row["capacity_overflows"] == 0 and row["non_finite"] == 0
     row["counts"] = sound and (not disturbed or row["hand_contact_share"] >= LEAST)
     return row
@@ -206,6 +214,7 @@ def main() -> None:
     parser.add_argument("--iterations", type=int, nargs="+", default=[0], help="solver limits to try; 0: the engine's")
     parser.add_argument("--pool", type=int, default=16, help="rows of initial states")
     parser.add_argument("--profiles", type=pathlib.Path, help="folder with <home>/engine_profile.json")
+    parser.add_argument("--kernels", type=int, default=0, metavar="N", help="print the N longest kernels")
     parser.add_argument("--label", default="", help="a remark for the rows")
     parser.add_argument("--lock", type=pathlib.Path, help="file to lock while timing")
     parser.add_argument("--rows", type=pathlib.Path, help="rows are added to this file, as JSON lines")
@@ -216,7 +225,7 @@ def main() -> None:
             for what in args.what:
                 for limit in args.iterations:
                     solver = {"iterations": limit, "ls_iterations": limit} if limit else {}
-                    row = run(case, worlds, not args.idle, what, args.lock, **solver)
+                    row = run(case, worlds, not args.idle, what, args.lock, args.kernels, **solver)
                     row |= {"ready_s": case.seconds, "label": args.label, **device()}
                     results.keep_row(row, args.rows)
 

@@ -1,0 +1,83 @@
+"""Where a GPU's time goes: device time by kernel, and the time in which nothing runs.
+
+CUPTI sees kernels inside CUDA graphs too, so XLA's and Warp's are listed side by side. `--kernels N` of
+`throughput.py`, `environments.py` and `learner.py` prints the N longest after their rows.
+"""
+
+from __future__ import annotations
+
+import collections
+import pathlib
+import re
+import tempfile
+import time
+from collections.abc import Callable
+from typing import Any
+
+import jax
+
+WARP_NAME = re.compile(r"_[0-9a-f]{8}_cuda_kernel_forward|_cuda_kernel_forward")
+
+
+def profiled(call: Callable[[], Any], steps: int, most: int, unit: str = "step") -> tuple[Any, dict[str, Any]]:
+    """Runs `call` under the profiler, prints the longest kernels, and returns its result and a summary.
+
+    Args:
+      call: what to run; its result is waited for. steps: how many steps it makes. most: kernels to print.
+      unit: what a step is.
+
+    Returns:
+      The result, and milliseconds a step: `wall` (with the profiler's own cost), `kernels` (their sum), `busy` (at
+      least one runs), `idle` (between the first and the last kernel, none runs); `launches`: kernels and copies.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        with jax.profiler.trace(folder):
+            began = time.perf_counter()
+            result = jax.block_until_ready(call())
+            wall = time.perf_counter() - began
+        events = _events(folder)
+    total, calls = collections.Counter(), collections.Counter()
+    for _, duration, name in events:
+        total[name] += duration
+        calls[name] += 1
+    busy, span = _busy(events)
+    per = 1e6 * steps
+    summary = {
+        "wall": round(1e3 * wall / steps, 3),
+        "kernels": round(sum(total.values()) / per, 3),
+        "busy": round(busy / per, 3),
+        "idle": round((span - busy) / per, 3),
+        "launches": round(len(events) / steps, 1),
+        "unit": f"ms per {unit}",
+    }
+    print(summary, flush=True)
+    whole = max(sum(total.values()), 1)
+    for name, nanoseconds in total.most_common(most):
+        share = f"{nanoseconds / whole:6.1%} {nanoseconds / steps / 1e3:9.2f} us {calls[name] / steps:7.1f} x"
+        print(f"{share}  {name[:100]}", flush=True)
+    return result, summary
+
+
+def _events(folder: str) -> list[tuple[float, float, str]]:
+    """Start and duration in ns, and name, of what ran on the first GPU."""
+    file = next(pathlib.Path(folder).rglob("*.xplane.pb"))
+    found = []
+    for plane in jax.profiler.ProfileData.from_file(str(file)).planes:
+        if "GPU:0" not in plane.name:
+            continue
+        for line in plane.lines:
+            if line.name.startswith("Stream"):
+                found += [(e.start_ns, e.duration_ns, WARP_NAME.sub("", e.name)) for e in line.events]
+    return sorted(found)
+
+
+def _busy(events: list[tuple[float, float, str]]) -> tuple[float, float]:
+    """Nanoseconds in which something runs, and from the first start to the last end."""
+    if not events:
+        return 0.0, 0.0
+    busy, until = 0.0, events[0][0]
+    for start, duration, _ in events:
+        end = start + duration
+        busy += max(0.0, end - max(start, until))
+        until = max(until, end)
+    return busy, until - events[0][0]
