@@ -6,15 +6,19 @@ VENV := .venv
 BIN := $(VENV)/bin
 JOBS ?= 2
 PYTEST_ARGS ?=
+# Environments of other projects' programs, and which of them `make test-interop` runs.
+INTEROP ?= .interop
+INTEROP_ENVS ?= $(notdir $(patsubst %/requirements.txt,%,$(wildcard tests/interop/*/requirements.txt)))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-slow test-gpu check docs homes-check format bench clean distclean
+.PHONY: help setup demo test test-slow test-gpu test-interop check docs homes-check format bench clean distclean
 
 help:
 	@echo "make demo       convert the small home, run it, cook a fish in it; leaves pictures, a plot, films, a report"
 	@echo "make test       the quick tests (JOBS=$(JOBS) processes)"
 	@echo "make test-slow  the tests that take long"
 	@echo "make test-gpu   the tests that need a CUDA device"
+	@echo "make test-interop  with other projects' programs, each in an environment of its own (some GB; INTEROP_ENVS=...)"
 	@echo "make check      ruff and pyright"
 	@echo "make docs       the documentation site, in out/site/"
 	@echo "make homes-check  build and convert all homes anew and compare them byte for byte with scenes_mjcf/"
@@ -58,6 +62,22 @@ test-slow: setup
 
 test-gpu: setup
 	@JAX_PLATFORMS=cuda,cpu $(BIN)/python -m pytest -m gpu --timeout 1800 $(PYTEST_ARGS)
+
+# Each folder of tests/interop/ has the requirements of one environment, and tests that run in it (its README).
+test-interop: $(addprefix interop-,$(INTEROP_ENVS))
+
+interop-%: $(INTEROP)/%/.installed setup
+	@IG2MJ_PYTHON=$(abspath $(BIN)/python) $(INTEROP)/$*/bin/python -m pytest -c tests/interop/pytest.ini \
+	    --rootdir tests/interop --confcutdir tests/interop $(PYTEST_ARGS) tests/interop/$*
+
+# A first line "# python: 3.12" names another Python than the project's.
+$(INTEROP)/%/.installed: tests/interop/%/requirements.txt
+	@echo "installing $* into $(INTEROP)/$*"
+	@python=$$(sed -n '1s/^# python: */python/p' $<); $${python:-$(PYTHON)} -m venv $(INTEROP)/$*
+	@$(INTEROP)/$*/bin/python -m pip install -q --disable-pip-version-check pytest pytest-timeout -r $<
+	@touch $@
+
+.PRECIOUS: $(INTEROP)/%/.installed
 
 check: setup
 	@$(BIN)/ruff check

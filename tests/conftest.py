@@ -39,6 +39,8 @@ if hypothesis is not None:
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 
+collect_ignore = ["interop"]  # other projects' programs: `make test-interop`
+
 
 def pytest_configure(config: pytest.Config) -> None:
     """Keep compiled JAX programs between runs, where pytest keeps a cache at all."""
