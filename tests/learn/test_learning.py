@@ -6,6 +6,7 @@ import dataclasses
 import sys
 from pathlib import Path
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -14,7 +15,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from small_envs import FarReward, FarRewardThatEnds, PointMass
 
+from ig2mj.learn.collect import GUIDED, Advice
 from ig2mj.learn.dagger import Dagger, DaggerConfig
+from ig2mj.learn.guidance import guided, share
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy, depends_on
 from ig2mj.learn.ppo import PPO, PPOConfig
@@ -82,3 +85,33 @@ def test_an_expert_that_answers_in_any_state_is_imitated(pure):
     result = train(env, algorithm, quiet(iterations=40, until=None))
     assert result.row["actor_loss"] < 0.05
     assert result.row["success"] > 0.9  # the expert itself acts no more since half of the run
+
+
+@pytest.mark.parametrize("pure", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_an_expert_begins_episodes_and_leaves_them_to_the_policy(pure):
+    """Without it the same run reaches a third; the success reported is of episodes without the expert."""
+    env = PointMass(64, pure=pure)
+
+    def expert(state):
+        return jnp.clip(10 * (state.goal - state.pos), -1, 1)
+
+    config = dataclasses.replace(SMALL_SAC, guided=0.6, reach=15, copy=5.0)
+    algorithm = SAC(Perception(env.observation_spaces), 2, config, expert=expert)
+    result = train(env, algorithm, quiet(iterations=60, until=None))
+    assert result.row["success"] > 0.9
+    assert result.row["copy_loss"] < 0.2
+
+
+def test_the_expert_acts_up_to_the_handover_and_less_as_the_run_goes_on():
+    action, label = jnp.zeros((1000, 2)), jnp.ones((1000, 2))
+    first, nothing = jnp.zeros(1000, jnp.int32), jnp.zeros(1000, jnp.int32)
+    key = jax.random.PRNGKey(0)
+    chosen, extra, handover = guided(key, action, Advice(first, label), nothing, jnp.float32(20), 0.0)
+    assert np.array_equal(chosen[:, 0] == 1, handover > 0)
+    assert np.array_equal(extra[GUIDED], handover > 0)
+    assert 0.1 < (np.asarray(handover) == 0).mean() < 0.25 and int(handover.max()) == 20
+    chosen, _, same = guided(key, action, Advice(first + 10, label), handover, jnp.float32(20), 0.0)
+    assert np.array_equal(same, handover)  # drawn once in an episode
+    assert np.array_equal(chosen[:, 0] == 1, handover > 10)
+    limits = [float(share(jnp.float32(p), 0.5)) for p in (0.0, 0.25, 0.5, 1.0)]
+    assert limits == [1.0, 0.5, 0.0, 0.0]

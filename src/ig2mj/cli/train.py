@@ -30,6 +30,7 @@ def run(
     out: pathlib.Path | None = None,
     resume: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     demos: pathlib.Path | None = None,
+    expert: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     save_buffer: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     until: float | None = None,
     programs: int = 1,
@@ -45,7 +46,7 @@ def run(
       algo: sac, ppo, bc (from --demos alone), or dagger (a scripted expert corrects the policy).
       robot: humanoid, fetch or turtlebot; default: the first that the task lists.
       grasping: mitten, assisted, sticky or physical; default: mitten for activities.
-      obs: state (proprioception and privileged state) or rgbd (what the paper's agents see; needs the warp engine).
+      obs: state (proprioception and privileged state) or rgbd (what the paper's agents see).
       engine: native, warp or jax; default: warp on a GPU, else native.
       worlds: how many play at once; 0: 2048, natively 16.
       minutes: of training; compiling is not counted.
@@ -54,6 +55,8 @@ def run(
       resume: go on from the newest checkpoint in the folder.
       demos: demonstrations (`ig2mj demos collect`): all that bc learns from; sac begins as their clone and replays
         them.
+      expert: for sac: the task's scripted expert begins episodes and corrects the policy, ever less, until half of the
+        run is over (--set guided=0.5).
       save_buffer: checkpoints hold the replay buffer, too; without it a resumed run first plays it full again.
       until: stop once so large a share of the last episodes succeeds (0.98).
       programs: of an iteration: 1, or 2 (the worlds' and the learner's, so that both are timed).
@@ -92,6 +95,8 @@ def run(
         return train_from_demos(env, demos, robot, grasping, obs, minutes, seed, out, resume, set)
     if demos is not None and algo != "sac":
         raise Ig2mjError(f"--demos: {algo} takes none (bc and sac do)")
+    if expert and algo != "sac":
+        raise Ig2mjError(f"--expert is for sac: {'dagger always has one' if algo == 'dagger' else 'ppo learns alone'}")
     if engine is None:
         engine = "warp" if jax.default_backend() == "gpu" else "native"
     config = configured(config_of(algo, small=engine == "native"), set)
@@ -113,10 +118,10 @@ def run(
     )
     perception = Perception(world.observation_spaces, obs)
     shown = load_demos(demos, perception, world_of(world)) if demos is not None else None
-    algorithm = made(config, perception, world, shown, AXIS if shared else None)
+    algorithm = made(config, perception, world, shown, AXIS if shared else None, expert)
     if out is None:
         out = pathlib.Path("runs") / "-".join([world.task.name, world.robot, world.grasping, algo, obs, str(seed)])
-    depends = {**depends_on(world, perception), "paper_rl": paper_rl}
+    depends = {**depends_on(world, perception), "paper_rl": paper_rl, "expert": expert}
     settings = Run(minutes, None, seed, out, resume, save_buffer, until=until, programs=programs)
     learner = None
     if shown is not None:
@@ -147,6 +152,7 @@ def run(
         "training_success": result.row.get("success"),
         "scene": world.scene.digest,
         "paper_rl": paper_rl,
+        "expert": expert,
     }
     file = out / "policy.npz"
     Policy.of(algorithm, result.learner, depends_on(world, perception), card).save(file)

@@ -45,16 +45,24 @@ def config_of(name: str, small: bool = False) -> Config:
 
 
 def made(
-    config: Config, perception: Perception, env: Environment, demos: Demos | None = None, axis: str | None = None
+    config: Config,
+    perception: Perception,
+    env: Environment,
+    demos: Demos | None = None,
+    axis: str | None = None,
+    expert: bool = False,
 ) -> Any:
-    """The algorithm of these settings for an environment. `demos`: for SAC. `axis`: of several devices.
+    """The algorithm of these settings for an environment.
+
+    Args:
+      demos: for SAC. axis: of several devices. expert: the task's expert helps SAC; DAgger always has it.
 
     Raises:
-      UnknownNameError, EngineError: DAgger needs an expert, and the task has none.
+      UnknownNameError: the task has no expert, and one is needed.
     """
     size = env.action_space.shape[0]
     if isinstance(config, SACConfig):
-        return SAC(perception, size, config, axis, demos)
+        return SAC(perception, size, config, axis, demos, expert_of(env) if expert else None)
     if isinstance(config, PPOConfig):
         return PPO(perception, size, config, axis)
     return Dagger(perception, size, expert_of(env), config, axis)

@@ -90,8 +90,24 @@ class Play:
     steps: Int[Array, "W"]
 
 
-Act = Callable[[Any, Any, Seen, Array, Any], tuple[Array, dict[str, Array], Any]]
-"""(what was learned, memory, seen, key, what an expert would do or None) -> (action, extra, memory)"""
+@struct.dataclass
+class Advice:
+    """What an algorithm knows beside what is seen.
+
+    Attributes:
+      steps: of the running episode so far; 0 at its start. label: what an expert would do; None without one.
+    """
+
+    steps: Int[Array, "W"]
+    label: Float[Array, "W n"] | None = None
+
+
+Act = Callable[[Any, Any, Seen, Array, Advice], tuple[Array, dict[str, Array], Any]]
+"""(what was learned, memory, seen, key, advice) -> (action, extra, memory)"""
+
+GUIDED = "guided"
+"""The name among a transition's extras of whether the expert had a part in the episode [W]; such episodes are left out
+of the success that is reported."""
 
 Hint = Callable[[Any], Array] | None
 """An expert: from the environment's state to actions [W, n] (`ig2mj.envs.experts.expert_of`)."""
@@ -115,8 +131,8 @@ def collect_fn(
 
     def step(play: Play, key: Array) -> tuple[Play, tuple[Transition, dict[str, Array]]]:
         seen = perception(play.state.obs)
-        told = None if hint is None else hint(play.state)
-        action, extra, memory = act(learned, play.memory, seen, key, told)
+        advice = Advice(play.steps, None if hint is None else hint(play.state))
+        action, extra, memory = act(learned, play.memory, seen, key, advice)
         state = env.step_autoreset_fn(play.state, action)
         new, kept = _stepped(perception, play, seen, action, extra, memory, state)
         return dataclasses.replace(new, state=_kept(state)), kept
@@ -135,10 +151,10 @@ class NativeCollector:
         self._perception, self._act, self._hint = perception, act, hint
 
     def _choose(
-        self, learned: Any, memory: Any, obs: Mapping[str, Array], key: Array, told: Array | None
+        self, learned: Any, memory: Any, obs: Mapping[str, Array], key: Array, advice: Advice
     ) -> tuple[Seen, Array, dict[str, Array], Any]:
         seen = self._perception(obs)
-        return seen, *self._act(learned, memory, seen, key, told)
+        return seen, *self._act(learned, memory, seen, key, advice)
 
     def __call__(
         self, learned: Any, play: Play, key: Array, length: int
@@ -146,8 +162,8 @@ class NativeCollector:
         """As `collect_fn`; also the seconds that were spent in the environment."""
         rollout, sums, spent = [], [], 0.0
         for k in np.asarray(jax.random.split(key, length)):
-            told = None if self._hint is None else self._hint(play.state)
-            seen, action, extra, memory = self._before(learned, play.memory, play.state.obs, k, told)
+            advice = Advice(play.steps, None if self._hint is None else self._hint(play.state))
+            seen, action, extra, memory = self._before(learned, play.memory, play.state.obs, k, advice)
             action = np.asarray(action)
             began = time.perf_counter()
             state = self._env.step_autoreset(play.state, action)
@@ -191,13 +207,16 @@ def _stepped(
 def _sums(transition: Transition, total: Array, steps: Array, info: Mapping[str, Any]) -> dict[str, Array]:
     """Over the worlds: of the episodes that ended their number, return, success, steps; of all steps the rest."""
     over = transition.done.astype(jnp.float32)
+    worlds = jnp.float32(over.shape[0])
+    if GUIDED in transition.extra:
+        over = over * ~transition.extra[GUIDED]
     success = jnp.asarray(info.get("success", transition.terminated), jnp.float32)
     sums = {
         "episodes": over.sum(),
         "return": (over * total).sum(),
         "success": (over * success).sum(),
         "length": (over * steps).sum(),
-        "steps": jnp.float32(over.shape[0]),
+        "steps": worlds,
         "reward": transition.reward.sum(),
     }
     if "flags" in info:

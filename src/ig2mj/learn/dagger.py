@@ -22,7 +22,7 @@ from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
-from ig2mj.learn.collect import Hint, Transition, if_ready
+from ig2mj.learn.collect import Advice, Hint, Transition, if_ready
 from ig2mj.learn.labels import Imitation, Labels
 from ig2mj.learn.moments import Moments
 from ig2mj.learn.perception import Perception, Seen
@@ -125,10 +125,10 @@ class Dagger:
         return Turns(jnp.zeros(num_worlds), jnp.zeros(num_worlds, jnp.int32))
 
     def act(
-        self, learner: DaggerLearner, turns: Turns, seen: Seen, key: Array, told: Array | None = None
+        self, learner: DaggerLearner, turns: Turns, seen: Seen, key: Array, advice: Advice
     ) -> tuple[Float[Array, "W n"], dict[str, Array], Turns]:
         """The expert's action in its worlds, the policy's in the others; a world's turn is up to 50 steps long."""
-        assert told is not None, "DAgger needs an expert"
+        assert advice.label is not None, "DAgger needs an expert"
         c = self.config
         draw_key, time_key, noise_key, any_key, which_key = jax.random.split(key, 5)
         over = turns.left <= 0
@@ -139,7 +139,7 @@ class Dagger:
         mean = looked[0]
         share = jnp.where(learner.updates == 0, 1.0, 1.0 - learner.progress / max(c.alone, 1e-6))
         expert = draw < share
-        label = jnp.clip(told, -1.0, 1.0)
+        label = jnp.clip(advice.label, -1.0, 1.0)
         wild = (jax.random.uniform(which_key, expert.shape) < c.disturbed) & expert
         action = jnp.where(expert[:, None], label, jnp.tanh(mean))
         action = action + c.noise * jax.random.normal(noise_key, action.shape)

@@ -22,7 +22,7 @@ from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
-from ig2mj.learn.collect import Transition, if_ready
+from ig2mj.learn.collect import Advice, Transition, if_ready
 from ig2mj.learn.moments import Moments, RewardScale, average
 from ig2mj.learn.networks import Actor, Value, shifted
 from ig2mj.learn.perception import Perception, Seen, blank
@@ -136,7 +136,7 @@ class PPO:
     # How it acts.
 
     def act(
-        self, learner: PPOLearner, noise: None, seen: Seen, key: Array, told: Array | None = None
+        self, learner: PPOLearner, noise: None, seen: Seen, key: Array, advice: Advice | None = None
     ) -> tuple[Float[Array, "W n"], dict[str, Array], None]:
         """Actions, with what is needed to learn from them."""
         mean, log_std, _ = self._look(learner.actor, learner.moments, seen)

@@ -27,6 +27,7 @@ class Sample:
 
     Attributes:
       reward: of up to n steps, discounted. discount: of the value of `after`: 0 where nothing comes after it.
+      label: what an expert would have done; without columns where there was none.
     """
 
     seen: Seen
@@ -34,11 +35,13 @@ class Sample:
     reward: Float[Array, "*b"]
     discount: Float[Array, "*b"]
     after: Seen
+    label: Float[Array, "*b l"]
 
 
 @struct.dataclass
 class Replay:
-    """See the module's text. `head`: row that is written next. `size`: rows that are full."""
+    """See the module's text. `label`: what an expert would have done; without columns where there is none. `head`: row
+    that is written next. `size`: rows that are full."""
 
     vector: Float[Array, "T W v"]
     picture: UInt8[Array, "T W q"]
@@ -48,12 +51,13 @@ class Replay:
     truncated: Bool[Array, "T W"]
     after_vector: Float[Array, "T W v"]
     after_picture: UInt8[Array, "T W q"]
+    label: Float[Array, "T W l"]
     head: Int[Array, ""]
     size: Int[Array, ""]
 
     @classmethod
-    def empty(cls, steps: int, worlds: int, perception: Perception, action_size: int) -> Replay:
-        """Room for so many steps of so many worlds."""
+    def empty(cls, steps: int, worlds: int, perception: Perception, action_size: int, label_size: int = 0) -> Replay:
+        """Room for so many steps of so many worlds. `label_size`: numbers of an expert's action, 0 without one."""
         shape = perception.picture_shape
         bytes_ = 0 if shape is None else shape[0] * shape[1] * shape[2]
 
@@ -69,13 +73,14 @@ class Replay:
             truncated=zeros(dtype=jnp.bool_),
             after_vector=zeros(perception.vector_size),
             after_picture=zeros(bytes_, dtype=jnp.uint8),
+            label=zeros(label_size),
             head=jnp.int32(0),
             size=jnp.int32(0),
         )
 
     @classmethod
-    def of_demos(cls, demos: Demos) -> Replay:
-        """A full ring of demonstrations, as if one world had made them one after the other."""
+    def of_demos(cls, demos: Demos, labelled: bool = False) -> Replay:
+        """A full ring of demonstrations, as if one world had made them one after the other. `labelled`: with labels."""
         count = demos.reward.shape[0]
         columns = {
             "vector": demos.seen.vector,
@@ -86,6 +91,7 @@ class Replay:
             "truncated": demos.truncated,
             "after_vector": demos.after.vector,
             "after_picture": demos.after.picture,
+            "label": demos.label if labelled else demos.label[:, :0],
         }
         one = {name: a.reshape(count, 1, *a.shape[1:]) for name, a in columns.items()}
         return cls(**one, head=jnp.int32(0), size=jnp.int32(count))
@@ -113,6 +119,7 @@ class Replay:
             truncated=put(self.truncated, rollout.truncated),
             after_vector=put(self.after_vector, rollout.after.vector),
             after_picture=put(self.after_picture, rollout.after.picture),
+            label=put(self.label, rollout.extra["label"]) if self.label.shape[-1] else self.label,
             head=(self.head + length) % self.capacity,
             size=jnp.minimum(self.size + length, self.capacity),
         )
@@ -143,4 +150,5 @@ class Replay:
             reward=(running * rewards * discounts).sum(1),
             discount=jnp.where(ends, 0.0, gamma ** taken.astype(jnp.float32)),
             after=Seen(self.after_vector[last, world], self.after_picture[last, world]),
+            label=self.label[row, world],
         )

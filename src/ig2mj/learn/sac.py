@@ -6,6 +6,9 @@ that of Squint (arXiv 2602.21203) and FlashSAC (arXiv 2604.04539): many updates 
 normalization, returns over three steps, rewards scaled to the atoms' range, a target entropy that belongs to a standard
 deviation of 0.15, exploration noise that is held for a random number of steps.
 
+With an expert episodes begin under it, and its labels draw the actor, ever less, until the policy is left alone
+(`ig2mj.learn.guidance`).
+
 With demonstrations the actor begins as their clone, the critics learn alone for a while, and up to half of a batch is
 of demonstrations: a share that falls to nothing along the run.
 
@@ -28,8 +31,9 @@ from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
-from ig2mj.learn.collect import Transition, if_ready
+from ig2mj.learn.collect import Advice, Hint, Transition, if_ready
 from ig2mj.learn.demos import Demos
+from ig2mj.learn.guidance import guided, share
 from ig2mj.learn.moments import Moments, RewardScale, average
 from ig2mj.learn.networks import Actor, shifted, twins
 from ig2mj.learn.perception import Perception, Seen, blank
@@ -50,6 +54,8 @@ class SACConfig:
       alpha: weight of the entropy at first. std: standard deviation of actions that the target entropy belongs to.
       held: longest time that exploration noise is held, in steps.
       head_start: updates of the critics before the actor learns, where it begins as a clone of demonstrations.
+      guided: share of the run over which an expert helps. reach: steps of an episode that it acts at most, at first.
+      disturbance: deviation of what is added to its actions. copy: weight of its labels in the actor's loss, at first.
       guess: weight of the actor's guess of the privileged state from its features, from pixels.
       lr: learning rate, falling to `last_lr` along a cosine over the run.
       actor, critic: sizes of the layers. net: encoder ("small" or "paper").
@@ -71,6 +77,10 @@ class SACConfig:
     std: float = 0.15
     held: int = 16
     head_start: int = 2000
+    guided: float = 0.5
+    reach: int = 120
+    disturbance: float = 0.1
+    copy: float = 5.0
     guess: float = 1.0
     lr: float = 3e-4
     last_lr: float = 1e-4
@@ -81,7 +91,7 @@ class SACConfig:
 
 @struct.dataclass
 class SACLearner:
-    """All that is learned. `updates`: of the critics so far."""
+    """All that is learned. `updates`: of the critics so far. `progress`: share of the run that is over."""
 
     actor: Any
     critic: Any
@@ -92,6 +102,7 @@ class SACLearner:
     alpha_opt: Any
     moments: Moments
     updates: Int[Array, ""]
+    progress: Float[Array, ""]
 
 
 @struct.dataclass
@@ -108,16 +119,20 @@ class SACMemory:
 
 @struct.dataclass
 class Noise:
-    """Exploration noise of every world, and for how many more steps it is held."""
+    """Exploration noise of every world, and for how many more steps it is held.
+
+    `handover`: the step of the episode at which the policy takes over from the expert.
+    """
 
     value: Float[Array, "W n"]
     left: Int[Array, "W"]
+    handover: Int[Array, "W"]
 
 
 class SAC:
     """See the module's text. All methods are pure."""
 
-    name, hint = "sac", None
+    name = "sac"
 
     def __init__(
         self,
@@ -126,12 +141,11 @@ class SAC:
         config: SACConfig | None = None,
         axis: str | None = None,
         demos: Demos | None = None,
+        expert: Hint = None,
     ):
-        """
-        Args:
-          axis: the name of an axis of devices over which gradients are averaged. demos: see the module's text.
-        """
-        self.perception, self.action_size, self.axis, self._demos = perception, action_size, axis, demos
+        """`axis`: the name of an axis of devices over which gradients are averaged. `demos`, `expert`: see above."""
+        self.perception, self.action_size, self.axis = perception, action_size, axis
+        self._demos, self.hint = demos, expert
         self.config = c = config or SACConfig()
         guess = perception.vector_size - perception.actor_size if perception.picture_shape and c.guess else 0
         self.actor = Actor(action_size, c.actor, perception.picture_shape, c.net, guess)
@@ -177,6 +191,7 @@ class SAC:
             alpha_opt=self._adam.init(log_alpha),
             moments=Moments.initial(p.vector_size),
             updates=jnp.int32(0),
+            progress=jnp.float32(0),
         )
 
     def memory(self, num_worlds: int) -> SACMemory:
@@ -184,8 +199,9 @@ class SAC:
         c = self.config
         rows = max(c.capacity // (num_worlds * c.length), 1) * c.length
         rows = max(rows, -(-(c.horizon + 1) // c.length) * c.length)
-        replay = Replay.empty(rows, num_worlds, self.perception, self.action_size)
-        demos = Replay.of_demos(self._demos) if self._demos is not None else None
+        labels = self.action_size if self.hint is not None else 0
+        replay = Replay.empty(rows, num_worlds, self.perception, self.action_size, labels)
+        demos = Replay.of_demos(self._demos, labelled=labels > 0) if self._demos is not None else None
         return SACMemory(replay, RewardScale.initial(num_worlds), demos)
 
     def cloned(self, learner: SACLearner, actor: Any, moments: Moments) -> SACLearner:
@@ -194,37 +210,45 @@ class SAC:
 
     def noise(self, num_worlds: int) -> Noise:
         """Before the first step."""
-        return Noise(jnp.zeros((num_worlds, self.action_size)), jnp.zeros(num_worlds, jnp.int32))
+        held, handover = jnp.zeros((2, num_worlds), jnp.int32)
+        return Noise(jnp.zeros((num_worlds, self.action_size)), held, handover)
 
     # How it acts.
 
     def act(
-        self, learner: SACLearner, noise: Noise, seen: Seen, key: Array, told: Array | None = None
+        self, learner: SACLearner, noise: Noise, seen: Seen, key: Array, advice: Advice | None = None
     ) -> tuple[Float[Array, "W n"], dict[str, Array], Noise]:
-        """Actions with noise, each number's held for a time that is drawn from a zeta(2) distribution."""
+        """Actions with noise, each number's held for a time that is drawn from a zeta(2) distribution; the expert's
+        where it still has the episode."""
         noise_key, time_key = jax.random.split(key)
         fresh = jax.random.normal(noise_key, noise.value.shape)
         # the largest k with u < 1 / k has about zeta(2)'s tail: P(at least k) = 1 / k
         uniform = jax.random.uniform(time_key, noise.left.shape, minval=1e-6)
         held = jnp.minimum(jnp.floor(1.0 / uniform).astype(jnp.int32), self.config.held)
         over = noise.left <= 0
-        noise = Noise(jnp.where(over[:, None], fresh, noise.value), jnp.where(over, held, noise.left) - 1)
+        value, left = jnp.where(over[:, None], fresh, noise.value), jnp.where(over, held, noise.left) - 1
         mean, log_std, _ = self._look(learner.actor, learner.moments, seen)
-        return jnp.tanh(mean + jnp.exp(log_std) * noise.value), {}, noise
+        action = jnp.tanh(mean + jnp.exp(log_std) * value)
+        if advice is None or advice.label is None:
+            return action, {}, Noise(value, left, noise.handover)
+        limit = self.config.reach * share(learner.progress, self.config.guided)
+        noise_key = jax.random.fold_in(key, 1)
+        action, extra, handover = guided(noise_key, action, advice, noise.handover, limit, self.config.disturbance)
+        return action, extra, Noise(value, left, handover)
 
     def _look(self, actor: Any, moments: Moments, seen: Seen) -> tuple[Array, Array, Array]:
         own = moments.normal(seen.vector[:, : self.perception.actor_size])
         looked: Any = self.actor.apply({"params": actor}, own, seen.picture)
         return looked
 
-    def _draw(self, actor: Any, moments: Moments, seen: Seen, key: Array) -> tuple[Array, Array, Array]:
-        """Actions, the logarithm of their density, and the guess."""
+    def _draw(self, actor: Any, moments: Moments, seen: Seen, key: Array) -> tuple[Array, Array, Array, Array]:
+        """Actions, the logarithm of their density, the guess, and the middle of the actions' distribution."""
         mean, log_std, guess = self._look(actor, moments, seen)
         eps = jax.random.normal(key, mean.shape)
         raw = mean + jnp.exp(log_std) * eps
         density = -0.5 * jnp.square(eps) - log_std - 0.5 * math.log(2 * math.pi)
         stretch = 2 * (math.log(2.0) - raw - jax.nn.softplus(-2 * raw))  # log of tanh's slope
-        return jnp.tanh(raw), (density - stretch).sum(-1), guess
+        return jnp.tanh(raw), (density - stretch).sum(-1), guess, jnp.tanh(mean)
 
     # How it learns.
 
@@ -245,7 +269,8 @@ class SAC:
         c = self.config
         scale = memory.scale.update(rollout.reward, rollout.done, c.gamma, self.axis)
         memory = SACMemory(memory.replay.insert(rollout), scale, memory.demos)
-        learner = dataclasses.replace(learner, moments=learner.moments.update(rollout.seen.vector, self.axis))
+        moments = learner.moments.update(rollout.seen.vector, self.axis)
+        learner = dataclasses.replace(learner, moments=moments, progress=progress)
         rate = jnp.asarray(optax.cosine_decay_schedule(c.lr, 1, c.last_lr / c.lr)(progress))
 
         def many(learner: SACLearner) -> tuple[SACLearner, dict[str, Array]]:
@@ -273,7 +298,7 @@ class SAC:
         else:
             late = True
         batch = dataclasses.replace(batch, reward=batch.reward * memory.scale.factor(c.largest))
-        action, density, _ = self._draw(learner.actor, learner.moments, batch.after, target_key)  # of all at once
+        action, density, _, _ = self._draw(learner.actor, learner.moments, batch.after, target_key)  # of all at once
         alpha = jnp.exp(learner.log_alpha)
         parts = jax.tree.map(lambda a: a.reshape(c.every, c.batch, *a.shape[1:]), (batch, action, density))
 
@@ -337,19 +362,23 @@ class SAC:
             seen = Seen(seen.vector, shifted(seen.picture, p.picture_shape, shift_key))
         alpha = jnp.exp(learner.log_alpha)
 
-        def loss(actor: Any) -> tuple[Array, tuple[Array, Array]]:
-            action, density, guess = self._draw(actor, learner.moments, seen, draw_key)
+        def loss(actor: Any) -> tuple[Array, dict[str, Array]]:
+            action, density, guess, middle = self._draw(actor, learner.moments, seen, draw_key)
             logits: Any = self.critic.apply({"params": learner.critic}, normal, action)
             q = (jax.nn.softmax(logits) @ self._support).mean(0)
-            wrong = jnp.float32(0)
+            total, found = (alpha * density - q).mean(), {"entropy": -density.mean()}
             if guess.shape[-1]:
-                wrong = jnp.square(guess - normal[:, p.actor_size :]).mean()
-            return (alpha * density - q).mean() + c.guess * wrong, (density.mean(), wrong)
+                found["guess_loss"] = jnp.square(guess - normal[:, p.actor_size :]).mean()
+                total += c.guess * found["guess_loss"]
+            if batch.label.shape[-1]:
+                found["copy_loss"] = jnp.square(middle - batch.label).mean()
+                total += c.copy * share(learner.progress, c.guided) * found["copy_loss"]
+            return total, found
 
-        (value, (density, wrong)), slope = jax.value_and_grad(loss, has_aux=True)(learner.actor)
+        (value, found), slope = jax.value_and_grad(loss, has_aux=True)(learner.actor)
         step, actor_opt = self._adam.update(average(slope, self.axis), learner.actor_opt)
         actor = jax.tree.map(lambda a, s: a - rate * s, learner.actor, step)
-        lack = average(-density - self._entropy, self.axis)  # more entropy than wanted lowers its weight
+        lack = average(found["entropy"] - self._entropy, self.axis)  # more entropy than wanted lowers its weight
         step, alpha_opt = self._adam.update(lack, learner.alpha_opt)
         learner = dataclasses.replace(
             learner,
@@ -358,8 +387,7 @@ class SAC:
             log_alpha=learner.log_alpha - rate * step,  # pyright: ignore[reportOperatorIssue]
             alpha_opt=alpha_opt,
         )
-        losses = {"actor_loss": value, "entropy": -density}
-        return learner, losses | ({"guess_loss": wrong} if self.actor.guess else {})
+        return learner, {"actor_loss": value, **found}
 
 
 def projected(

@@ -27,7 +27,7 @@ from ig2mj.learn.collect import TrainingEnv
 from ig2mj.learn.iteration import Algorithm, ManyDevices, OneDevice
 from ig2mj.learn.log import Log
 
-EPISODES = (100, 2000)
+EPISODES = (100, 500)
 """Return and success are told of so many of the last episodes: of as many as there are worlds, within these limits."""
 
 

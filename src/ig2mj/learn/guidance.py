@@ -1,0 +1,54 @@
+"""An expert's part in reinforcement learning: it begins episodes and corrects the actor, and leaves both to the policy.
+
+In every episode it acts for a number of steps that is drawn from 0 to a limit, then the policy takes over. The limit
+falls to 0 over the first part of a run, so that the policy's starts move back from near the goal to the start of the
+task: a reverse curriculum (Uchendu et al. 2023, "Jump-Start Reinforcement Learning"). A tenth of the episodes is
+without the expert from the first step of the run on; success is reported of those alone.
+
+Axes: W worlds, n numbers of an action.
+"""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Float, Int
+
+from ig2mj.engine.view import Array
+from ig2mj.learn.collect import GUIDED, Advice
+
+ALONE = 0.1
+"""Share of the episodes in which the expert has no part."""
+
+
+def share(progress: Float[Array, ""], until: float) -> Float[Array, ""]:
+    """How much the expert helps: 1 at the start of a run, 0 once the share `until` of it is over."""
+    return jnp.clip(1.0 - progress / max(until, 1e-6), 0.0, 1.0)
+
+
+def guided(
+    key: Array,
+    action: Float[Array, "W n"],
+    advice: Advice,
+    handover: Int[Array, "W"],
+    limit: Float[Array, ""],
+    noise: float,
+) -> tuple[Float[Array, "W n"], dict[str, Array], Int[Array, "W"]]:
+    """The expert's actions where it still has the episode, the policy's elsewhere.
+
+    Args:
+      action: the policy's. handover: step of the running episode at which the policy takes over.
+      limit: of the steps that the expert acts in a new episode. noise: deviation of what is added to its actions.
+
+    Returns:
+      Actions; for the transition the label and whether the expert had a part; the steps of handing over.
+    """
+    assert advice.label is not None, "guidance needs an expert"
+    reach_key, which_key, noise_key = jax.random.split(key, 3)
+    drawn = jax.random.randint(reach_key, handover.shape, 0, jnp.round(limit).astype(jnp.int32) + 1)
+    drawn = jnp.where(jax.random.uniform(which_key, handover.shape) < ALONE, 0, drawn)
+    handover = jnp.where(advice.steps == 0, drawn, handover)
+    label = jnp.clip(advice.label, -1.0, 1.0)
+    shaken = jnp.clip(label + noise * jax.random.normal(noise_key, label.shape), -1.0, 1.0)
+    action = jnp.where((advice.steps < handover)[:, None], shaken, action)
+    return action, {"label": label, GUIDED: handover > 0}, handover
