@@ -36,6 +36,7 @@ LAYERS = [
     "demos",
     "viewer",
     "simulation",
+    "web",
     "planning",
     "calibration",
     "diagnosis",
