@@ -38,6 +38,7 @@ LAYERS = [
     "simulation",
     "web",
     "planning",
+    "vr",
     "calibration",
     "diagnosis",
     "showcase",

@@ -207,3 +207,21 @@ def test_a_fresh_process_comes_to_the_same_bytes(recorded, threads):
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert "6 runs, 60 frames by action, all the same" in done.stdout
+
+
+@pytest.mark.slow
+def test_what_devices_say_is_recorded_and_a_run_goes_on_past_success(env, tmp_path):
+    file, head = tmp_path / "person.h5", np.zeros((2, 8))
+    driven = ig2mj.make("CookingMeat", worlds=2, engine="native", pool_size=ROWS, whole_actions=True, period=1 / 30)
+    assert driven.action_names[0] == "body_x" and driven.action_space.shape == (28,)
+    with record(driven.with_horizon(3), file, devices={"head": head}, past_success=True) as played:
+        state = played.reset(0)
+        for step in range(5):
+            played.devices["head"] = np.full((2, 8), step / 8)
+            state = played.step(state, np.full((2, 28), 0.05 * step))
+        assert np.asarray(state.truncated).all()
+    with Recording(file) as recording:
+        assert [run.frames for run in recording.runs] == [6, 6]
+        assert recording.runs[0].rows("steps/devices/head", 0, 5)[:, 0].tolist() == [0, 1 / 8, 2 / 8, 3 / 8, 4 / 8]
+        assert recording.runs[0].attributes["success"] is False
+        assert Replayer(recording)(check=True).differences == []  # made again with the same actions and period

@@ -17,7 +17,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import weakref
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import jax
@@ -35,9 +35,21 @@ from ig2mj.worlds.random_streams import pick_rows
 
 
 class RecordedEnvironment(Environment):
-    """An environment with a file. Attributes: writer: of the file."""
+    """An environment with a file.
 
-    def __init__(self, env: Environment, file: str | os.PathLike, worlds: Collection[int] | None = None):
+    Attributes:
+      writer: of the file.
+      devices: what a person's devices say now, [W, ...] by name; written with the next step as `devices/<name>`.
+    """
+
+    def __init__(
+        self,
+        env: Environment,
+        file: str | os.PathLike,
+        worlds: Collection[int] | None = None,
+        devices: Mapping[str, np.ndarray] | None = None,
+        past_success: bool = False,
+    ):
         """See `record`."""
         self.__dict__.update(env.__dict__)
         self._inner, self._file = env, file
@@ -47,6 +59,9 @@ class RecordedEnvironment(Environment):
         self._last: EnvState | None = None
         self._rows = FrameRows(env.core.engine, self._worlds)
         self.writer: RunWriter | None = None
+        self.devices: dict[str, np.ndarray] = dict(devices or {})
+        self._device_names, self._past_success = list(self.devices), past_success
+        self._succeeded = np.zeros(env.num_worlds, bool)
 
     def step(self, state: EnvState, action: Array) -> EnvState:
         """As `Environment.step`."""
@@ -86,6 +101,9 @@ class RecordedEnvironment(Environment):
     def close(self) -> None:
         """Ends all runs, and closes the file; may be called twice."""
         if self.writer is not None:
+            if self._past_success:
+                for world in self._worlds:
+                    self.writer.end(world, success=bool(self._succeeded[world]), terminated=False)
             self.writer.close()
         self._inner.close()
 
@@ -102,6 +120,7 @@ class RecordedEnvironment(Environment):
         if self.writer is None:
             frame = frame_of(self.core.engine, state)
             steps = ["action", "reward/total", "terminated", "truncated", "success", *self._terms()]
+            steps += [f"devices/{name}" for name in self._device_names]
             self.writer = RunWriter(self._file, origin_of(self._inner), names_of(frame), steps)
             weakref.finalize(self, self.writer.close)
         if rows is None:
@@ -111,6 +130,7 @@ class RecordedEnvironment(Environment):
             if mask[world]:
                 own = {"episode": int(episode[world]), "row": int(rows[world]), **about}
                 self.writer.begin(world, frames[world], own)
+                self._succeeded[world] = False
         self._last = state
         return state
 
@@ -122,9 +142,11 @@ class RecordedEnvironment(Environment):
         ends = [np.asarray(state.terminated), np.asarray(state.truncated)]
         terms = [np.asarray(state.info[f"reward/{name}"]) for name in self.objective.terms]
         steps = [action.astype(np.float32), np.asarray(state.reward), *ends, success, *terms]
+        steps += [self.devices[name] for name in self._device_names]
+        self._succeeded |= success
         for world in self._worlds:
             self.writer.add(world, frames[world], [array[world, ...] for array in steps])
-            if ends[0][world] or ends[1][world]:
+            if not self._past_success and (ends[0][world] or ends[1][world]):
                 self.writer.end(world, success=bool(success[world]), terminated=bool(ends[0][world]))
         self._last = state
 
@@ -132,17 +154,26 @@ class RecordedEnvironment(Environment):
         return [f"reward/{name}" for name in self.objective.terms]
 
 
-def record(env: Environment, file: str | os.PathLike, worlds: Collection[int] | None = None) -> RecordedEnvironment:
+def record(
+    env: Environment,
+    file: str | os.PathLike,
+    worlds: Collection[int] | None = None,
+    devices: Mapping[str, np.ndarray] | None = None,
+    past_success: bool = False,
+) -> RecordedEnvironment:
     """An environment that records itself, from its next reset on.
 
     Args:
       file: HDF5, replaced if it is there. What is not written yet is at most `writer.FLUSH` frames of each world.
       worlds: which ones; None: all.
+      devices: arrays [W, ...] with the names, shapes and types of what a person's devices say
+        (`RecordedEnvironment.devices`); None: nobody's.
+      past_success: a run goes on past success and failure of the episode, until a reset or `close`.
 
     Raises:
       EngineError: there are no such worlds. InputError, at the first reset: the file cannot be written.
     """
-    return RecordedEnvironment(env, file, worlds)
+    return RecordedEnvironment(env, file, worlds, devices, past_success)
 
 
 def _number(seed: Seed) -> int:

@@ -5,7 +5,8 @@
     state = env.step(state, action)              # action: [W, n], -1..1
     state = env.reset(state, state.terminated | state.truncated)
 
-An agent step is 1/10 s: three control steps of the core, the action held in all of them. What the core can compile is
+An agent step is 1/10 s unless `make` is given another period: three control steps of the core, the action held in
+all of them. What the core can compile is
 compiled, and so is this: on a pure engine `step_fn` and `reset_fn` may be part of a program of your own. A state that
 was given to a method is used up; go on with the one that it returns.
 
@@ -56,6 +57,7 @@ class Environment:
       task, robot, grasping: what is done by whom, and how hands hold (`ig2mj.agents.grasping.MODES`).
       scene, core: the household with its robot, and what steps it. objective: what is measured, rewarded and observed.
       num_worlds: W. action_names: [n]. observation_spaces: of each observation, without the world axis.
+      period: seconds of an agent step.
       made_with: what else `ig2mj.make` was given, by the names of its arguments, so that it can be made again.
     """
 
@@ -70,11 +72,16 @@ class Environment:
         observer: Observer,
         grasping: str,
         companions: Companions | None = None,
+        period: float = ACTION_PERIOD,
     ):
         """Binds a core, whose rules have the task's goal if it has one, to rewards and observations.
 
         Args:
           companions: what the scene's other robots do; None: there are none.
+          period: seconds of an agent step.
+
+        Raises:
+          EngineError: the core has no rules, or `period` is no whole number of its control steps.
         """
         if core.rules is None:
             raise EngineError("an environment needs a core with rules")
@@ -84,7 +91,10 @@ class Environment:
         self._companions, self.made_with = companions, dict[str, Any]()
         self.action_names, self.observation_spaces = action_map.names, observer.spaces
         self.privileged_names = objective.vectors["privileged_state"]
-        self._substeps = round(ACTION_PERIOD / (core.engine.substeps * core.engine.timestep))
+        step = core.engine.substeps * core.engine.timestep
+        self.period, self._substeps = period, round(period / step)
+        if self._substeps < 1 or abs(self._substeps * step - period) > 1e-6:
+            raise EngineError(f"an agent step of {period:g} s is no whole number of control steps of {step:g} s")
         self._clean = jax.jit(self._clean_fn)
         self._rows = jax.jit(lambda key: pick_rows(key, core.starts.pool.size))
         compiled = jax.jit if core.engine.pure else OfView
@@ -111,7 +121,7 @@ class Environment:
     def with_horizon(self, horizon: int) -> Environment:
         """The same environment, on the same core, with longer or shorter episodes."""
         parts = (self.robot, self.scene, self.core, self._map, self.objective, self._observer, self.grasping)
-        new = Environment(dataclasses.replace(self.task, horizon=horizon), *parts, self._companions)
+        new = Environment(dataclasses.replace(self.task, horizon=horizon), *parts, self._companions, self.period)
         new.made_with = self.made_with
         return new
 

@@ -15,12 +15,13 @@ from typing import Any
 
 import jax
 
+from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import MODES, Grasping
 from ig2mj.engine.registry import make_engine
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.names import NAMES, NAMESPACE, activity_name, short_name
 from ig2mj.envs.observations import Observer, check_names
-from ig2mj.envs.setups import setup_activity, setup_bddl, setup_navigation
+from ig2mj.envs.setups import Control, setup_activity, setup_bddl, setup_navigation
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.sensors.base import SensorOptions
 from ig2mj.sensors.suite import SensorSuite
@@ -74,6 +75,8 @@ def make(
     pool_size: int | None = None,
     image_size: int | None = None,
     sensors: SensorOptions | None = None,
+    whole_actions: bool = False,
+    period: float = ACTION_PERIOD,
     **options: Any,
 ) -> Environment:
     """Makes an environment.
@@ -93,6 +96,9 @@ def make(
         the number of rows; sampled on first use and kept (`ig2mj sample-task`). Navigation makes its own each time.
       image_size: pixels, height and width of pictures; None: those of `sensors`, by default 128.
       sensors: settings of the sensors.
+      whole_actions: an action has every number of the robot's controller, 1 being its limit, not only the hands that
+        the task moves: for people and their devices.
+      period: seconds of an agent step, a whole number of control steps of 1/30 s.
       options: go to the engine.
 
     Raises:
@@ -106,12 +112,13 @@ def make(
         raise UnknownNameError("grasping mode", mode, MODES)
     if worlds < 1:
         raise EngineError(f"worlds = {worlds}: an environment has at least one")
+    control = Control(whole_actions, period)
     if isinstance(task, NavigationTask):
-        setup = setup_navigation(task, robot, split, pool_size)
+        setup = setup_navigation(task, robot, split, pool_size, control)
     elif isinstance(task, BddlTask):
-        setup = setup_bddl(task, robot, pool, split, pool_size)
+        setup = setup_bddl(task, robot, pool, split, pool_size, control)
     else:
-        setup = setup_activity(task, robot, mode, pool, split, pool_size, paper_rl)
+        setup = setup_activity(task, robot, mode, pool, split, pool_size, paper_rl, control)
     if engine is None:
         engine = "warp" if jax.default_backend() == "gpu" else "native"
     scene, rules, controllers = setup.scene, setup.rules, setup.controllers
@@ -125,7 +132,9 @@ def make(
     perceived = SensorSuite(physics, scene, rules.model, controllers[0], chosen, settings)
     observer = Observer(observations, setup.objective, perceived)
     env = Environment(
-        task, robot, scene, core, setup.actions, setup.objective, observer, mode, companions=setup.companions
+        task, robot, scene, core, setup.actions, setup.objective, observer, mode, setup.companions, period
     )
     env.made_with = {"paper_rl": paper_rl, "split": split, "pool_size": setup.pool.size, **options}
+    if control != Control():
+        env.made_with |= {"whole_actions": whole_actions, "period": period}
     return env

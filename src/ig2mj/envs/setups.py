@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from ig2mj.agents.base import Controller, Robot
+from ig2mj.agents.base import ACTION_PERIOD, Controller, Robot
 from ig2mj.agents.fetch import Fetch
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.envs.environment import Companions
@@ -38,6 +39,22 @@ DRIVERS: dict[str, Any] = {"turtlebot": TurtleBot, "fetch": Fetch}
 """Robots of navigation tasks by name."""
 
 
+@dataclasses.dataclass(frozen=True)
+class Control:
+    """How the robot that acts is driven: `whole_actions` and `period` of `ig2mj.make`."""
+
+    whole: bool = False
+    period: float = ACTION_PERIOD
+
+    def controller(self, robot: Robot, scene: Scene) -> Controller:
+        """Of the scene's first robot."""
+        return robot.controller(scene.tables, 0, self.period)
+
+    def actions(self, controller: Controller, of_task: Callable[[], ActionMap]) -> ActionMap:
+        """Every number of the controller's, or those that the task moves."""
+        return whole_actions(controller.action_names, controller.action_high) if self.whole else of_task()
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Setup:
     """See the module's text.
@@ -58,7 +75,14 @@ class Setup:
 
 
 def setup_activity(
-    task: Task, robot: str, grasping: str, pool: Pool | None, split: str, count: int | None, paper_rl: bool
+    task: Task,
+    robot: str,
+    grasping: str,
+    pool: Pool | None,
+    split: str,
+    count: int | None,
+    paper_rl: bool,
+    control: Control,
 ) -> Setup:
     """Of an activity. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
     if robot not in ROBOTS:
@@ -66,19 +90,22 @@ def setup_activity(
     body = make_robot(task, robot)
     scene = load_scene(task.home, agents=[body], objects=task.objects)
     rules = rules_of(task, scene, paper_rl)
-    controller = body.controller(scene.tables, 0)
+    controller = control.controller(body, scene)
     return Setup(
         scene,
         rules,
         pool if pool is not None else pool_of(task, split, count),
         (controller,),
         ActivityObjective(task, robot, scene, rules.model),
-        hand_actions(controller.action_names, task.acts(robot).hands, closing=grasping != "mitten"),
+        control.actions(
+            controller,
+            lambda: hand_actions(controller.action_names, task.acts(robot).hands, closing=grasping != "mitten"),
+        ),
         task.objects_of_interest[:1],
     )
 
 
-def setup_navigation(task: NavigationTask, robot: str, split: str, count: int | None) -> Setup:
+def setup_navigation(task: NavigationTask, robot: str, split: str, count: int | None, control: Control) -> Setup:
     """Of a navigation task. Arguments as of `ig2mj.make`; `count`: start states."""
     if robot not in task.robots:
         raise UnknownNameError(f"robot that can do {task.name}", robot, task.robots)
@@ -87,7 +114,7 @@ def setup_navigation(task: NavigationTask, robot: str, split: str, count: int | 
     scene = load_scene(task.home, agents=robots, objects=task.objects)
     rules = Rules.of_scene(scene)
     starts = make_starts(task, load_scene(task.home, objects=task.objects), scene, rules.initial, split, count)
-    controllers = tuple(r.controller(scene.tables, k) for k, r in enumerate(robots))
+    controllers = tuple(r.controller(scene.tables, k, control.period) for k, r in enumerate(robots))
     arm = task.goal in ("reach", "close")
     companions = None
     if others:
@@ -100,12 +127,14 @@ def setup_navigation(task: NavigationTask, robot: str, split: str, count: int | 
         starts.pool,
         controllers,
         NavigationObjective(task, scene, starts),
-        robot_actions(controllers[0].action_names, arm=arm, gripper=task.goal == "close"),
+        control.actions(
+            controllers[0], lambda: robot_actions(controllers[0].action_names, arm=arm, gripper=task.goal == "close")
+        ),
         companions=companions,
     )
 
 
-def setup_bddl(task: BddlTask, robot: str, pool: Pool | None, split: str, count: int | None) -> Setup:
+def setup_bddl(task: BddlTask, robot: str, pool: Pool | None, split: str, count: int | None, control: Control) -> Setup:
     """Of an activity that BDDL defines. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
     if robot not in task.robots:
         raise UnknownNameError(f"robot that can do {task.name}", robot, task.robots)
@@ -115,7 +144,7 @@ def setup_bddl(task: BddlTask, robot: str, pool: Pool | None, split: str, count:
     scene = load_scene(task.home, agents=[body], objects=task.binding.additions)
     rules = Rules.of_scene(scene)
     goal = conditions(task.binding).compile_goal(rules.model)
-    controller = body.controller(scene.tables, 0)
+    controller = control.controller(body, scene)
     objective = BddlObjective(task.objects_in(scene), goal, scene)
     actions = whole_actions(controller.action_names, controller.action_high)
     return Setup(scene, rules.with_goal(goal), rows, (controller,), objective, actions)
