@@ -39,8 +39,12 @@ class Controller(Protocol):
       action_names: [n] what each number of an action means.
       action_low, action_high: [n] limits; actions beyond them are clipped.
       proprioception_names: [m] what each number of `proprioception` means.
+      agent: its number in the scene's tables.
+      moves_eye: `eye` depends on more than the view.
     """
 
+    agent: int
+    moves_eye: bool
     action_names: tuple[str, ...]
     action_low: Float[np.ndarray, "n"]
     action_high: Float[np.ndarray, "n"]
@@ -76,8 +80,8 @@ class Controller(Protocol):
         ...
 
     def eye(self, view: PhysicsView, state: ControllerState) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
-        """Pose of the agent's camera in the world (MuJoCo's camera axes). The view has it as compiled; an agent that
-        moves its eye without joints says here where it is."""
+        """Pose of the agent's camera in the world (MuJoCo's camera axes). Engines know the compiled camera only; an
+        agent that moves its eye without joints (`moves_eye`) says here where it is, and the core puts it into views."""
         ...
 
     def proprioception(self, view: PhysicsView, state: ControllerState) -> Float[Array, "W m"]:

@@ -78,6 +78,7 @@ class FloatingHand:
 class HandController:
     """An action is the controls themselves: where palm and fingers are to go, see `hand_ctrl`. It feels nothing."""
 
+    moves_eye = False
     action_names: tuple[str, ...] = (
         *("x", "y", "z", "roll", "pitch", "yaw"),
         *(f"{f}_{s}" for f in ("thumb", "index", "middle", "ring", "pinky") for s in ("proximal", "distal")),
@@ -87,7 +88,7 @@ class HandController:
     proprioception_names: tuple[str, ...] = ()
 
     def __init__(self, agent: int):
-        self._agent = agent
+        self.agent = agent
 
     @property
     def action_size(self) -> int:
@@ -112,7 +113,7 @@ class HandController:
         return jnp.zeros((state.shape[0], 1), jnp.float32)
 
     def eye(self, view: PhysicsView, state: Float[Array, "W 16"]) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
-        return view.agent.eye_pos[:, self._agent], view.agent.eye_quat[:, self._agent]
+        return view.agent.eye_pos[:, self.agent], view.agent.eye_quat[:, self.agent]
 
     def proprioception(self, view: PhysicsView, state: Float[Array, "W 16"]) -> Float[Array, "W 0"]:
         return jnp.zeros((state.shape[0], 0), jnp.float32)

@@ -114,11 +114,13 @@ class TurtleBot:
 class TurtleBotController:
     """Actions of -1 to 1 are the drive's largest speeds forwards and to the left; or one of five discrete ones."""
 
+    moves_eye = False
+
     def __init__(self, agent: int, tables: SceneTables, discrete: bool = False):
         self.action_names: tuple[str, ...]
         self.action_low: np.ndarray
         self.action_high: np.ndarray
-        self._agent, self._discrete = agent, discrete
+        self.agent, self._discrete = agent, discrete
         self._wheels = np.flatnonzero(tables.agent_joint_agent == agent)
         self._limits = drive_limits(WHEEL_RADIUS, AXLE, MAX_WHEEL)
         self._choices = discrete_drive(WHEEL_RADIUS, AXLE, MAX_WHEEL)
@@ -157,7 +159,7 @@ class TurtleBotController:
         return state
 
     def eye(self, view: PhysicsView, state: Float[Array, "W 0"]) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
-        return jnp.asarray(view.agent.eye_pos)[:, self._agent], jnp.asarray(view.agent.eye_quat)[:, self._agent]
+        return jnp.asarray(view.agent.eye_pos)[:, self.agent], jnp.asarray(view.agent.eye_quat)[:, self.agent]
 
     def proprioception(self, view: PhysicsView, state: Float[Array, "W 0"]) -> Float[Array, "W 2"]:
         """Speed forwards (m/s) and to the left (rad/s), reckoned from the wheels. (iGibson forgets the radius in the

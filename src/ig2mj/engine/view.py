@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import dataclasses
 import typing
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import jax
@@ -53,7 +53,10 @@ class AgentView(_MadeLater):
     base_quat: Float[Array, "W A 4"] = _field("orientation of the base body")
     base_linvel: Float[Array, "W A 3"] = _field("velocity of the base body's origin, m/s")
     base_angvel: Float[Array, "W A 3"] = _field("angular velocity of the base body, rad/s")
-    eye_pos: Float[Array, "W A 3"] = _field("camera; the base body's origin for an agent without a camera")
+    eye_pos: Float[Array, "W A 3"] = _field(
+        "camera, where the agent's controller has it in views of the core, where it is compiled in views of an engine; "
+        "the base body's origin for an agent without a camera"
+    )
     eye_quat: Float[Array, "W A 4"] = _field("orientation of the camera (MuJoCo's axes: -z forward, y up)")
     joint_pos: Float[Array, "W Q"] = _field("positions of scalar joints, rad or m")
     joint_vel: Float[Array, "W Q"] = _field("velocities of scalar joints, rad/s or m/s")
@@ -174,6 +177,20 @@ def assemble(fields: Mapping[str, Any]) -> PhysicsView:
 def replace_fields(view: PhysicsView, fields: Mapping[str, Any]) -> PhysicsView:
     """The view with other arrays at some paths."""
     return assemble({name: fields[name] if name in fields else read_field(view, name) for name in SCHEMA})
+
+
+EYES = ("eye_pos", "eye_quat")
+"""Fields of the view's agents that a controller may decide."""
+
+
+def with_eyes_later(view: PhysicsView, eyes: Callable[[], tuple[Array, Array]]) -> PhysicsView:
+    """The view with other poses of eyes [W, A, 3], [W, A, 4], made when somebody reads one of them; never traced."""
+    new, agent = object.__new__(PhysicsView), object.__new__(AgentView)
+    new.__dict__.update(view.__dict__)
+    agent.__dict__.update({name: array for name, array in view.agent.__dict__.items() if name not in EYES})
+    agent.__dict__["_later"] = lambda name: eyes()[EYES.index(name)] if name in EYES else getattr(view.agent, name)
+    new.__dict__["agent"] = agent
+    return new
 
 
 OF_CONSTRAINTS = ("touching", "link_force", "awake", "held", "agent.finger_force", "agent.touching")

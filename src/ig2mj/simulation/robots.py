@@ -71,8 +71,8 @@ class RobotsOfWorld:
 
     def grasp(self, physics: Physics, view: PhysicsView) -> tuple[Physics, PhysicsView]:
         """Physics and view after hands took hold or let go."""
-        physics, view, self.held = self._core.grasp(physics, view, self.held, self.controllers)
-        return physics, view
+        physics, after, self.held = self._core.grasp(physics, view, self.held, self.controllers)
+        return physics, view if after is view else self._core.eyes.seen(after, self.controllers)
 
     @property
     def holding(self) -> dict[str, str | None]:
@@ -83,3 +83,10 @@ class RobotsOfWorld:
             for hand, body, on in zip(hands, np.asarray(self.held.body)[0], np.asarray(self.held.held)[0], strict=True):
                 hands[hand] = tables.object_names[tables.graspable_object[body]] if on else None
         return hands
+
+
+def remembered(simulation: Simulation) -> tuple[Any, ...]:
+    """What the controllers of a simulation remember, where its view depends on that; else nothing."""
+    if not simulation.scene.agents or not simulation.core.eyes.moving:
+        return ()
+    return simulation.core.first_controllers() if simulation._robots is None else simulation._robots.controllers

@@ -37,7 +37,7 @@ from ig2mj.sampling.setters import lacks, set_by_name
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.simulation import pictures
 from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_openables, write_of_pose
-from ig2mj.simulation.robots import RobotsOfWorld
+from ig2mj.simulation.robots import RobotsOfWorld, remembered
 from ig2mj.simulation.sampling import WorldSampler
 from ig2mj.simulation.saving import everything, load_world, save_world
 from ig2mj.states import registry
@@ -127,7 +127,8 @@ class Simulation:
     @property
     def view(self) -> PhysicsView:
         """Everything that states and predicates know of physics; world axis of length 1."""
-        return self.engine.view(self.physics)
+        view = self.engine.view(self.physics)
+        return self.core.eyes.seen(view, remembered(self)) if self.scene.agents else view
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -215,10 +216,11 @@ class Simulation:
             )
         row, view = None if row is None else row[None], self.view
         advance, physics, states, done = self.core.advance, self.physics, self._states_or_none, 0
+        controllers = remembered(self)
         robots = self.robots if self._grasping is not None else None
         try:
             for done in range(1, count + 1):  # noqa: B007 (counted below, also where a step raises)
-                physics, view, states, _ = advance(physics, states, row)
+                physics, view, states, _ = advance(physics, states, row, controllers)
                 if robots is not None:
                     physics, view = robots.grasp(physics, view)
                 row = None

@@ -41,6 +41,7 @@ from ig2mj.predicates.compile import GoalStatus
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
 from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Batch
+from ig2mj.worlds.eyes import Eyes
 from ig2mj.worlds.hands import Hands
 from ig2mj.worlds.lazy.of_view import OfView
 from ig2mj.worlds.lazy.stepper import StateStepper
@@ -56,7 +57,8 @@ class Core:
     """Start, step and reset of the worlds of one engine.
 
     Attributes:
-      advance: see `advance_fn`. hands: what they hold. grasp: `hands.act`, compiled where that helps.
+      advance: see `advance_fn`. hands: what they hold. grasp: `hands.act`, compiled where that helps. eyes: where they
+        are in views.
       engine: physics. rules: states and goal. controllers: of the scene's robots. grasping: how their hands hold.
       starts: what episodes start from.
       action_low, action_high: [n] limits of an action, of all robots one after the other.
@@ -81,6 +83,7 @@ class Core:
         """
         self.engine, self.rules, self.controllers = engine, rules, tuple(controllers)
         self.grasping, self.hands = grasping, Hands(engine, grasping, self.controllers)
+        self.eyes = Eyes(engine, self.controllers)
         self.action_low = np.concatenate([np.zeros(0), *(c.action_low for c in self.controllers)])
         self.action_high = np.concatenate([np.zeros(0), *(c.action_high for c in self.controllers)])
         self.starts = Starts(engine, rules.initial if rules is not None else None, pool)
@@ -152,15 +155,21 @@ class Core:
     def _control_step(self, batch: Batch, ctrl: Float[Array, "W nu"] | None) -> tuple[Batch, GoalStatus]:
         """One control step of MuJoCo's controls."""
         world, controllers = batch.world, batch.controllers
-        physics, view, states, status = self.advance_fn(world.physics, world.states, ctrl)
-        physics, view, grasps = self.hands.act(physics, view, batch.grasps, controllers)
+        physics, view, states, status = self.advance_fn(world.physics, world.states, ctrl, controllers)
+        physics, after, grasps = self.hands.act(physics, view, batch.grasps, controllers)
+        if after is not view:
+            view = self.eyes.seen(after, controllers)
         clocks = (world.step, world.time, batch.flags, batch.troubles)
         step, time, flags, troubles = self._count(*clocks, self.engine.health(physics), view.object_com)
         world = WorldState(physics=physics, view=view, states=states, key=world.key, step=step, time=time)
         return dataclasses.replace(batch, world=world, grasps=grasps, flags=flags, troubles=troubles), status
 
     def advance_fn(
-        self, physics: Physics, states: States, ctrl: Float[Array, "W nu"] | None = None
+        self,
+        physics: Physics,
+        states: States,
+        ctrl: Float[Array, "W nu"] | None = None,
+        controllers: tuple[Any, ...] = (),
     ) -> tuple[Physics, PhysicsView, States, GoalStatus]:
         """What of a step is not about episodes: physics, its view, the states and the goal after one control step.
 
@@ -169,11 +178,15 @@ class Core:
 
         Args:
           ctrl: MuJoCo's controls; None keeps the last ones.
+          controllers: what the robots' controllers remember, which may be where their eyes are; none: eyes are where
+            they were compiled.
         """
         physics, view = self._physics_step(physics, ctrl)
+        view = self.eyes.seen(view, controllers)
         states, swap, status = self._react(states, view)
         if swap is not None:
             physics, view = self.teleport(physics, view, swap)
+            view = self.eyes.seen(view, controllers)
         return physics, view, states, status
 
     def prepare(self, physics: Physics, states: States) -> None:
@@ -280,7 +293,7 @@ class Core:
         started = (rows.states, key, *zero, self.first_controllers(), self.hands.read(physics))
         going = (world.states, world.key, world.step, world.time, batch.controllers, batch.grasps)
         states, key, step, time, controllers, grasps = self._chosen(mask, started, going)
-        view = self.engine.view(physics)
+        view = self.eyes.seen(self.engine.view(physics), controllers)
         world = WorldState(physics=physics, view=view, states=states, key=key, step=step, time=time)
         flags = jnp.where(mask, 0, batch.flags)
         return dataclasses.replace(
@@ -293,7 +306,7 @@ class Core:
         nothing = jnp.zeros(count, jnp.int32)
         world = WorldState(
             physics=physics,
-            view=self.engine.view(physics),
+            view=self.eyes.seen(self.engine.view(physics), self.first_controllers()),
             states=self.starts.pool.rows(np.zeros(count, int)).states,
             key=jnp.zeros((count, 2), jnp.uint32),
             step=nothing,
@@ -353,7 +366,7 @@ class Core:
         return self._with(batch, self.engine.load(world.physics, physics, mask), states)
 
     def _with(self, batch: Batch, physics: Physics, states: ExtendedStates) -> Batch:
-        view = self.engine.view(physics)
+        view = self.eyes.seen(self.engine.view(physics), batch.controllers)
         return dataclasses.replace(
             batch,
             world=dataclasses.replace(batch.world, physics=physics, view=view, states=states),

@@ -81,6 +81,7 @@ class FetchController:
         *("forward", "turn_left", "head_pan", "head_tilt"),
         *("eef_x", "eef_y", "eef_z", "eef_rx", "eef_ry", "eef_rz", "gripper"),
     )
+    moves_eye = False
     action_low: np.ndarray = -np.ones(11)
     action_high: np.ndarray = np.ones(11)
 
@@ -93,7 +94,7 @@ class FetchController:
         proprioception: str = "default",
     ):
         """Args: start: positions of the joints. proprioception: one of `ig2mj.agents.fetch.proprioception.LISTS`."""
-        self._agent, self._period, self._start = agent, period, np.asarray(start)
+        self.agent, self._period, self._start = agent, period, np.asarray(start)
         self._list, self.proprioception_names = proprioception, LISTS[proprioception]
         name = tables.agent_names[agent]
         self._joints = np.array([tables.agent_joint_names.index(f"{name}_{n}_joint") for n in JOINT_NAMES])
@@ -164,7 +165,7 @@ class FetchController:
         return length(pulled - forward(CHAIN, q)[0])[:, None]
 
     def eye(self, view: PhysicsView, state: FetchState) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
-        return jnp.asarray(view.agent.eye_pos)[:, self._agent], jnp.asarray(view.agent.eye_quat)[:, self._agent]
+        return jnp.asarray(view.agent.eye_pos)[:, self.agent], jnp.asarray(view.agent.eye_quat)[:, self.agent]
 
     def proprioception(self, view: PhysicsView, state: FetchState) -> Float[Array, "W m"]:
         """See `ig2mj.agents.fetch.proprioception`."""
@@ -172,4 +173,4 @@ class FetchController:
         q, speed = jnp.asarray(agent.joint_pos)[:, self._joints], jnp.asarray(agent.joint_vel)[:, self._joints]
         held = jnp.asarray(view.held)[:, self._hand].any((1, 2))
         asked = jnp.concatenate([state.wheels, state.target], axis=1)
-        return feel(self._list, view, self._agent, q, speed, asked, held)
+        return feel(self._list, view, self.agent, q, speed, asked, held)

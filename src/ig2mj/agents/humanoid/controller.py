@@ -93,12 +93,14 @@ class HumanoidController:
         *(f"{hand}_{n}" for hand in HANDS for n in (*_POSE, "trigger", "reset")),
     )
 
+    moves_eye = True
+
     def __init__(self, tables: SceneTables, agent: int, period: float, grasp_flags: bool = True):
         name = tables.agent_names[agent]
         pose = [MAX_MOVE] * 3 + [MAX_TURN] * 3
         self.action_high: np.ndarray = np.array([*pose, *pose, *pose, 1.0, 1.0, *pose, 1.0, 1.0], np.float32)
         self.action_low: np.ndarray = -self.action_high
-        self._agent, self._gain = agent, 1.0 / period
+        self.agent, self._gain = agent, 1.0 / period
         self._hands = np.flatnonzero(tables.hand_agent == agent)
         self._finger_joints = np.array(
             [
@@ -140,7 +142,7 @@ class HumanoidController:
         by_hand = action[:, 12:].reshape(-1, 2, 8)
 
         turn = rpy_to_quat(action[:, 3:6])
-        base_pos, base_quat = view.agent.base_pos[:, self._agent], view.agent.base_quat[:, self._agent]
+        base_pos, base_quat = view.agent.base_pos[:, self.agent], view.agent.base_quat[:, self.agent]
         body_pos, body_quat = compose(base_pos, base_quat, action[:, :3], turn)
         body_pos = body_pos.at[:, 2].set(jnp.clip(body_pos[:, 2], *BODY_Z))
 
@@ -175,7 +177,7 @@ class HumanoidController:
 
     def eye(self, view: PhysicsView, state: HumanoidState) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
         """The camera where the head was sent: moves with the body, without delay and without mass."""
-        base = view.agent.base_pos[:, self._agent], view.agent.base_quat[:, self._agent]
+        base = view.agent.base_pos[:, self.agent], view.agent.base_quat[:, self.agent]
         camera = jnp.asarray(CAMERA_QUAT, jnp.float32)
         return compose(*base, state.eye_pos, quat_multiply(state.eye_quat, jnp.broadcast_to(camera, (1, 4))))
 
@@ -183,13 +185,13 @@ class HumanoidController:
         self, view: PhysicsView, state: HumanoidState
     ) -> tuple[Bool[Array, "W 2"], Float[Array, "W 2 3"], Float[Array, "W 2 4"]]:
         """For people: which hands are far from their targets, and the targets in the world."""
-        base = view.agent.base_pos[:, [self._agent]], view.agent.base_quat[:, [self._agent]]
+        base = view.agent.base_pos[:, [self.agent]], view.agent.base_quat[:, [self.agent]]
         pos, quat = compose(*base, state.hand_pos, state.hand_quat)
         return length(pos - view.agent.hand_pos[:, self._hands]) > GHOST_DISTANCE, pos, quat
 
     def proprioception(self, view: PhysicsView, state: HumanoidState) -> Float[Array, "W m"]:
         """Poses in the body's frame; trigger 0 open to 1 closed; 1 for a hand that holds something, else -1."""
-        base = view.agent.base_pos[:, [self._agent]], view.agent.base_quat[:, [self._agent]]
+        base = view.agent.base_pos[:, [self.agent]], view.agent.base_quat[:, [self.agent]]
         pos, quat = relative_pose(*base, view.agent.hand_pos[:, self._hands], view.agent.hand_quat[:, self._hands])
         hands = jnp.concatenate([pos, quat_to_rpy(quat)], axis=-1).reshape(-1, 12)
         ends = [state.trigger[..., None]]
