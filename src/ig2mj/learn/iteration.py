@@ -220,7 +220,7 @@ class ManyDevices:
 
     def _placed(self, array: Any, spec: PartitionSpec) -> jax.Array:
         sharding = NamedSharding(self._mesh, spec)
-        if isinstance(array, jax.Array) and array.sharding == sharding:
+        if isinstance(array, jax.Array) and array.sharding.is_equivalent_to(sharding, array.ndim):
             return array
         held = np.asarray(array)
         return jax.make_array_from_callback(held.shape, sharding, lambda index: held[index])

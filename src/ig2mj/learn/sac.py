@@ -35,7 +35,7 @@ from ig2mj.learn.collect import Advice, Hint, Transition, if_ready
 from ig2mj.learn.demos import Demos
 from ig2mj.learn.guidance import guided, share
 from ig2mj.learn.moments import Moments, RewardScale, average, share_of
-from ig2mj.learn.networks import Actor, shifted, twins
+from ig2mj.learn.networks import Actor, projected, shifted, twins
 from ig2mj.learn.perception import Perception, Seen, blank
 from ig2mj.learn.replay import Replay, Sample
 
@@ -390,13 +390,3 @@ class SAC:
             alpha_opt=alpha_opt,
         )
         return learner, {"actor_loss": value, **found}
-
-
-def projected(
-    chance: Float[Array, "B K"], places: Float[Array, "B K"], support: Float[Array, "K"]
-) -> Float[Array, "B K"]:
-    """A distribution over places, shared out to the nearest atoms of an even support."""
-    gap = support[1] - support[0]
-    inside = jnp.clip(places, support[0], support[-1])
-    share = jnp.clip(1.0 - jnp.abs(inside[:, :, None] - support) / gap, 0.0, 1.0)
-    return (chance[:, :, None] * share).sum(1)
