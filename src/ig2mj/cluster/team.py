@@ -82,7 +82,6 @@ class Team:
         threading.Thread(target=team._beat, name="ig2mj-beat", daemon=True).start()
         import jax
 
-        jax.config.update("jax_cpu_collectives_implementation", "gloo")
         jax.distributed.initialize(
             f"{place.host}:{port}",
             place.count,

@@ -1,4 +1,4 @@
-"""Three repairs of Warp 1.18 as JAX uses it. Each concerns the whole process, and takes nothing from other users of Warp.
+"""Three repairs of Warp 1.18 as JAX uses it. Each concerns the whole process; other users of Warp lose nothing by them.
 
 CUDA streams that belong to JAX stay known to Warp. Warp wraps JAX's stream in an object for each call and forgets the
 stream when the object goes away. Two calls that overlap on one stream, as they do when JAX dispatches ahead, then fail
