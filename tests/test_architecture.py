@@ -19,7 +19,6 @@ LAYERS = [
     "errors",
     "install_hint",
     "process",
-    "cluster",
     "knowledge",
     "scene",
     "geometry",

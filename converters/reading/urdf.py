@@ -123,6 +123,9 @@ def _read_joint(element: Element, file: pathlib.Path, warnings: list[str]) -> Jo
         joint.axis = vector / length
     if kind in ("revolute", "prismatic"):
         _read_limits(joint, element, file, warnings)
+    limit = element.find("limit")
+    if limit is not None and kind in MOVING:
+        joint.effort, joint.velocity = (_positive_or_none(limit, a, file) for a in ("effort", "velocity"))
     _read_dynamics(joint, element, file, warnings)
     mimic = element.find("mimic")
     if mimic is not None and kind in MOVING:
@@ -147,8 +150,6 @@ def _read_limits(joint: Joint, element: Element, file: pathlib.Path, warnings: l
             warnings.append(f"{where(limit)}: lower {lower:g} > upper {upper:g}; the joint can move without end")
         else:
             joint.lower, joint.upper = lower, upper
-    if limit is not None:
-        joint.effort, joint.velocity = (_positive_or_none(limit, a, file) for a in ("effort", "velocity"))
 
 
 def _limit(element: Element, attribute: str, file: pathlib.Path) -> float | None:

@@ -27,6 +27,7 @@ PARSED_ONLY = {
     "ig2mj activity show cleaning_windows --pool": "needs what the line before it makes",
     "ig2mj sample-task": "takes minutes",
     "ig2mj train": "takes minutes, on a GPU",
+    "ig2mj rollout PointNavigation --robot-urdf": "needs a robot of the reader's",
     "ig2mj rollout CookingMeat --agent expert": "samples start states for a minute; run by tests of its own",
     "ig2mj demos": "needs what the lines before it make",
     "ig2mj calibrate": "takes minutes on a CPU",

@@ -5,5 +5,6 @@ from ig2mj.agents.fetch import Fetch
 from ig2mj.agents.floating_hand import FloatingHand
 from ig2mj.agents.humanoid import Humanoid
 from ig2mj.agents.turtlebot import TurtleBot
+from ig2mj.agents.urdf import UrdfRobot
 
-__all__ = ["Controller", "Fetch", "FloatingHand", "Humanoid", "Robot", "TurtleBot"]
+__all__ = ["Controller", "Fetch", "FloatingHand", "Humanoid", "Robot", "TurtleBot", "UrdfRobot"]

@@ -51,7 +51,7 @@ from ig2mj.install_hint import pip_install_module
 #: hyphen in it an underscore.
 COMMANDS: dict[str, str] = {
     "demo": "convert the small home, run it, tell what stands where, cook a fish in it",
-    "convert": "turn an iGibson scene or a URDF object into MJCF",
+    "convert": "turn an iGibson scene, or the URDF of an object or a robot, into MJCF",
     "view": "open a scene in MuJoCo's viewer, or write a picture of it",
     "inspect": "list a scene's objects, joints, abilities and rooms",
     "states": "list the extended states of a scene's objects",

@@ -1,4 +1,4 @@
-"""`ig2mj convert scene|object`: iGibson scenes and URDF objects to MJCF."""
+"""`ig2mj convert scene|object|robot`: iGibson scenes, URDF objects and robots to MJCF."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ COLOURS = Literal["auto", "source", "category"]
 
 @dataclasses.dataclass(frozen=True)
 class Common:
-    """What both conversions take.
+    """What all conversions take.
 
     Attributes:
       jobs: processes that work side by side: on the models of a scene, on the parts of a single object.
@@ -135,7 +135,34 @@ def convert_object(
     return _tell(outcome, out, "object.xml", common.json)
 
 
-SUBCOMMANDS = {"scene": convert_scene, "object": convert_object}
+def convert_robot(
+    urdf: pathlib.Path,
+    out: pathlib.Path,
+    name: str | None = None,
+    mesh_root: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None,
+    package_path: Annotated[tuple[pathlib.Path, ...], tyro.conf.arg(metavar="DIR")] = (),
+    common: Annotated[Common, tyro.conf.OmitArgPrefixes] = DEFAULTS,
+) -> int:
+    """Converts a robot's URDF: OUT/object.xml, robot.json, meshes/; for `UrdfRobot.load(OUT)` in Python.
+
+    `ig2mj rollout` and `ig2mj view` take the URDF itself (`--robot-urdf`). Exit status: 0 converted; 2 bad input.
+
+    Args:
+      urdf: the robot's URDF.
+      out: folder for the result; an earlier result there is replaced when everything went well.
+      name: of the robot; default the file's.
+      mesh_root: folder below which meshes may lie that the URDF names by ../ or by an absolute path.
+      package_path: folders with the packages of `package://` names.
+    """
+    from ig2mj_converters.convert_robot import convert_robot as convert
+
+    options = _options(common, mesh_root=mesh_root, package_path=package_path)
+    with _progress(f"converting {urdf.name}") as options_with:
+        outcome = convert(urdf, out, name=name, options=options_with(options))
+    return _tell(outcome, out, "object.xml", common.json)
+
+
+SUBCOMMANDS = {"scene": convert_scene, "object": convert_object, "robot": convert_robot}
 
 
 def _options(common: Common, **of_command: Any) -> ConvertOptions:

@@ -19,6 +19,8 @@ def run(
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")],
     agent: str = "random",
     robot: str | None = None,
+    robot_urdf: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    robot_layout: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     grasping: str | None = None,
     engine: str | None = None,
     worlds: int = 1,
@@ -39,6 +41,8 @@ def run(
       agent: who acts: zero (nothing moves), random, expert (a script; the six activities have one), or a policy: a file
         that `ig2mj train` wrote, or the name of one that ships.
       robot: humanoid, fetch or turtlebot; default: the first that `ig2mj list-envs` names.
+      robot_urdf: a robot of your own instead, from its URDF (docs/environments.md).
+      robot_layout: TOML or JSON that says which of its joints drive, reach and grip; default: found from their names.
       grasping: mitten, assisted, sticky or physical; default: the task's own.
       engine: native, warp or jax; default: warp on a GPU, else native.
       worlds: how many play at once.
@@ -56,10 +60,12 @@ def run(
 
     import numpy as np
 
+    from ig2mj.cli.robot_urdf import check_layout, own_robot
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.envs.rollout import play
     from ig2mj.errors import Ig2mjError
 
+    check_layout(robot_urdf, robot_layout)
     policy = None if agent in AGENTS else _policy(agent)
     if episodes < 1 or worlds < 1:
         raise Ig2mjError(f"--episodes {episodes}, --worlds {worlds}: at least one of each is needed")
@@ -68,7 +74,7 @@ def run(
     split = "held_out" if held_out else split
     played = make(
         env,
-        robot,
+        robot if robot_urdf is None else own_robot(robot_urdf, robot_layout, robot),
         worlds,
         engine,
         grasping,

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import pathlib
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
 from ig2mj.errors import Ig2mjError
+
+if TYPE_CHECKING:
+    from ig2mj.scene.scene import Scene
 
 Vec3 = tuple[float, float, float]
 
@@ -29,6 +32,9 @@ def run(
     video: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     pool: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="POOL.npz")] = None,
     row: int = 0,
+    robot_urdf: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    robot_layout: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    robot_at: Annotated[Vec3, tyro.conf.arg(metavar="X Y DEGREES")] = (0.0, 0.0, 0.0),
 ) -> None:
     """Open a scene in MuJoCo's viewer, or write a picture of it.
 
@@ -50,7 +56,15 @@ def run(
       pool: page through the rows of a pool of this scene, with the objects that were added to it: the right arrow turns
         the page; with --picture, one row.
       row: the row to begin with.
+      robot_urdf: a robot of your own in the scene, from its URDF (docs/environments.md).
+      robot_layout: TOML or JSON that says which of its joints drive, reach and grip; default: found from their names.
+      robot_at: where it stands (metres) and how far it is turned from the x axis.
     """
+    from ig2mj.cli.robot_urdf import check_layout
+
+    check_layout(robot_urdf, robot_layout)
+    if robot_urdf is not None and (dump is not None or pool is not None):
+        raise Ig2mjError("--robot-urdf goes neither with --dump nor with --pool")
     _check(picture or video, camera, eye, target, size, seconds)
     if dump is not None:
         _replay(scene, dump, picture, video, camera, eye, target, size, seconds, collision, paused)
@@ -65,14 +79,15 @@ def run(
     if row:
         raise Ig2mjError("--row belongs to --pool")
     if picture is not None:
-        _write_picture(scene, picture, camera, eye, target, size, seconds, collision)
+        home = _with_robot(scene, robot_urdf, robot_layout, robot_at)
+        _write_picture(home, picture, camera, eye, target, size, seconds, collision)
         return
     import sys
 
     print(f"opening {scene}: first the scene is loaded, then the window comes", file=sys.stderr, flush=True)
     from ig2mj.simulation import Simulation
 
-    world = Simulation(scene)
+    world = Simulation(_with_robot(scene, robot_urdf, robot_layout, robot_at))
     if seconds > 0:
         world.step(count=round(seconds * 30))
     world.launch_viewer(paused=paused)
@@ -172,17 +187,28 @@ def _page_through(scene, pool, row, picture, camera, eye, target, size, collisio
     print(f"wrote {picture} (row {row} of {rows.size})", file=sys.stderr)
 
 
-def _write_picture(scene, file, camera, eye, target, size, seconds, collision) -> None:
+def _with_robot(scene: pathlib.Path, urdf: pathlib.Path | None, layout: pathlib.Path | None, at: Vec3) -> Scene:
+    """The scene, with a robot of one's own where there is one."""
+    import math
+
+    from ig2mj.scene.scene import load_scene
+
+    if urdf is None:
+        return load_scene(scene)
+    from ig2mj.cli.robot_urdf import own_robot
+
+    return load_scene(scene, agents=[own_robot(urdf, layout).at(at[0], at[1], math.radians(at[2]))])
+
+
+def _write_picture(home, file, camera, eye, target, size, seconds, collision) -> None:
     """MuJoCo alone is enough for a picture: the scene's start, `seconds` later."""
     import sys
 
     import mujoco
     from PIL import Image
 
-    from ig2mj.scene.scene import load_scene
     from ig2mj.viewer.offscreen import VISIBLE_GROUPS, default_backend, render
 
-    home = load_scene(scene)
     data = home.start_data()
     if seconds > 0:
         mujoco.mj_step(home.model, data, nstep=max(1, round(seconds / home.model.opt.timestep)))

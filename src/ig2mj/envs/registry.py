@@ -17,6 +17,7 @@ import jax
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import MODES, Grasping
+from ig2mj.agents.urdf import UrdfRobot
 from ig2mj.engine.registry import make_engine
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.names import NAMES, NAMESPACE, activity_name, short_name
@@ -63,7 +64,7 @@ def find_task(name: str) -> AnyTask:
 
 def make(
     name: str | AnyTask,
-    robot: str | None = None,
+    robot: str | UrdfRobot | None = None,
     worlds: int = 1,
     engine: str | None = None,
     grasping: str | None = None,
@@ -83,7 +84,9 @@ def make(
 
     Args:
       name: of a task (`list_envs`), "activity/" and the name of an activity of BEHAVIOR-100, or a task of your own.
-      robot: "humanoid", "fetch" or "turtlebot"; None: the first that the task lists.
+      robot: "humanoid", "fetch" or "turtlebot"; None: the first that the task lists. Or one of your own from a URDF
+        (`ig2mj.agents.urdf`): an action then has every number of its controller, and in activities it stands where
+        Fetch would.
       worlds: how many step together.
       engine: "native", "warp" or "jax"; None: "warp" where JAX has a GPU, else "native".
       grasping: "mitten" (sticks to the task's first object at the first touch, as in the paper's experiments),
@@ -131,9 +134,8 @@ def make(
     chosen = check_names(observations, setup.objective)
     perceived = SensorSuite(physics, scene, rules.model, controllers[0], chosen, settings)
     observer = Observer(observations, setup.objective, perceived)
-    env = Environment(
-        task, robot, scene, core, setup.actions, setup.objective, observer, mode, setup.companions, period
-    )
+    name = robot if isinstance(robot, str) else robot.name
+    env = Environment(task, name, scene, core, setup.actions, setup.objective, observer, mode, setup.companions, period)
     env.made_with = {"paper_rl": paper_rl, "split": split, "pool_size": setup.pool.size, **options}
     if control != Control():
         env.made_with |= {"whole_actions": whole_actions, "period": period}

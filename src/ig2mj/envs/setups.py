@@ -11,8 +11,9 @@ import numpy as np
 from ig2mj.agents.base import ACTION_PERIOD, Controller, Robot
 from ig2mj.agents.fetch import Fetch
 from ig2mj.agents.turtlebot import TurtleBot
+from ig2mj.agents.urdf import UrdfRobot
 from ig2mj.envs.environment import Companions
-from ig2mj.errors import UnknownNameError
+from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.tasks.actions import ActionMap, hand_actions, robot_actions, whole_actions
 from ig2mj.tasks.activity_objective import ActivityObjective
@@ -76,7 +77,7 @@ class Setup:
 
 def setup_activity(
     task: Task,
-    robot: str,
+    robot: str | UrdfRobot,
     grasping: str,
     pool: Pool | None,
     split: str,
@@ -85,9 +86,13 @@ def setup_activity(
     control: Control,
 ) -> Setup:
     """Of an activity. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
-    if robot not in ROBOTS:
+    if isinstance(robot, UrdfRobot):
+        (task, body), robot = _in_place_of_fetch(task, robot), robot.name
+        control = dataclasses.replace(control, whole=True)
+    elif robot not in ROBOTS:
         raise UnknownNameError("robot", robot, ROBOTS)
-    body = make_robot(task, robot)
+    else:
+        body = make_robot(task, robot)
     scene = load_scene(task.home, agents=[body], objects=task.objects)
     rules = rules_of(task, scene, paper_rl)
     controller = control.controller(body, scene)
@@ -105,12 +110,23 @@ def setup_activity(
     )
 
 
-def setup_navigation(task: NavigationTask, robot: str, split: str, count: int | None, control: Control) -> Setup:
+def setup_navigation(
+    task: NavigationTask, robot: str | UrdfRobot, split: str, count: int | None, control: Control
+) -> Setup:
     """Of a navigation task. Arguments as of `ig2mj.make`; `count`: start states."""
-    if robot not in task.robots:
+    if isinstance(robot, UrdfRobot):
+        if not robot.drives:
+            raise EngineError(f"robot '{robot.name}' is fixed to the floor: it cannot do {task.name}")
+        if task.goal != "point" and robot.layout.hand is None:
+            raise EngineError(f"robot '{robot.name}' has no hand: it cannot do {task.name}")
+        first: Robot = robot
+        control = dataclasses.replace(control, whole=True)
+    elif robot not in task.robots:
         raise UnknownNameError(f"robot that can do {task.name}", robot, task.robots)
+    else:
+        first = DRIVERS[robot]()
     others = [TurtleBot(name=f"other_{k}") for k in range(task.others)]
-    robots: list[Robot] = [DRIVERS[robot](), *others]
+    robots: list[Robot] = [first, *others]
     scene = load_scene(task.home, agents=robots, objects=task.objects)
     rules = Rules.of_scene(scene)
     starts = make_starts(task, load_scene(task.home, objects=task.objects), scene, rules.initial, split, count)
@@ -134,13 +150,15 @@ def setup_navigation(task: NavigationTask, robot: str, split: str, count: int | 
     )
 
 
-def setup_bddl(task: BddlTask, robot: str, pool: Pool | None, split: str, count: int | None, control: Control) -> Setup:
+def setup_bddl(
+    task: BddlTask, robot: str | UrdfRobot, pool: Pool | None, split: str, count: int | None, control: Control
+) -> Setup:
     """Of an activity that BDDL defines. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
-    if robot not in task.robots:
+    if isinstance(robot, str) and robot not in task.robots:
         raise UnknownNameError(f"robot that can do {task.name}", robot, task.robots)
     rows = pool if pool is not None else activity_pool(task, split, count)
     x, y = standing_place(task, rows)
-    body: Robot = ROBOTS[robot](pos=(x, y, STANDING[robot]))
+    body: Robot = robot.at(x, y, 0.0) if isinstance(robot, UrdfRobot) else ROBOTS[robot](pos=(x, y, STANDING[robot]))
     scene = load_scene(task.home, agents=[body], objects=task.binding.additions)
     rules = Rules.of_scene(scene)
     goal = conditions(task.binding).compile_goal(rules.model)
@@ -148,6 +166,15 @@ def setup_bddl(task: BddlTask, robot: str, pool: Pool | None, split: str, count:
     objective = BddlObjective(task.objects_in(scene), goal, scene)
     actions = whole_actions(controller.action_names, controller.action_high)
     return Setup(scene, rules.with_goal(goal), rows, (controller,), objective, actions)
+
+
+def _in_place_of_fetch(task: Task, robot: UrdfRobot) -> tuple[Task, UrdfRobot]:
+    """The task with a robot of one's own, and that robot where Fetch would stand. Raises EngineError without a hand."""
+    if robot.layout.hand is None:
+        raise EngineError(f"robot '{robot.name}' has no hand: it cannot do {task.name}")
+    acts = dataclasses.replace(task.acts("fetch"), hands=(0,))
+    placed = robot.at(acts.pos[0], acts.pos[1], np.radians(acts.yaw))
+    return dataclasses.replace(task, robots={**task.robots, robot.name: acts}), placed
 
 
 def rules_of(task: Task, scene: Scene, paper_rl: bool = False) -> Rules:

@@ -1,0 +1,157 @@
+"""The controller of a URDF robot: a differential drive, each joint of the arm by its velocity, a gripper.
+
+| numbers | in units of |
+|---|---|
+| forward, turn_left (where it drives) | the drive's largest speeds |
+| one for each joint of the arm, by its name | the joint's largest speed |
+| gripper (where it has one) | open from 0 on, closed below |
+
+Velocities of the arm become positions of servos, which go on from the last ones and not from where the arm sags to.
+
+Axes: W worlds, J joints of the arm, F of the gripper.
+"""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+from jaxtyping import Bool, Float
+
+from ig2mj.agents.controllers import differential_drive, drive_limits, wheel_odometry
+from ig2mj.agents.kinematics import forward
+from ig2mj.agents.urdf.body import RobotBody
+from ig2mj.agents.urdf.description import Description
+from ig2mj.agents.urdf.layout import Layout
+from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.geometry.poses import length
+from ig2mj.scene.tables import SceneTables
+
+LEASH = 0.15
+"""rad or m, beside the way of two actions at full speed, that a servo's target may be ahead of its joint: a blocked arm
+does not push ever harder."""
+
+
+@struct.dataclass
+class UrdfState:
+    """What the controller remembers.
+
+    Attributes:
+      arm, fingers: positions that the servos are at. closed: the gripper was told to close. held: it held something.
+    """
+
+    arm: Float[Array, "W J"]
+    fingers: Float[Array, "W F"]
+    closed: Bool[Array, "W"]
+    held: Bool[Array, "W"]
+
+
+class UrdfController:
+    """See the module's text. `ig2mj.agents.base.Controller`."""
+
+    moves_eye = False
+
+    def __init__(
+        self,
+        tables: SceneTables,
+        agent: int,
+        period: float,
+        description: Description,
+        layout: Layout,
+        body: RobotBody,
+    ):
+        """Of a robot that is compiled into the scene of these tables."""
+        self.agent, self._period = agent, period
+        own = tables.agent_names[agent]
+
+        def places(names: tuple[str, ...]) -> np.ndarray:
+            return np.array([tables.agent_joint_names.index(f"{own}_{n}") for n in names], int)
+
+        self._wheels, self._arm, self._fingers = places(layout.wheels), places(layout.arm), places(layout.gripper)
+        self._hand = np.flatnonzero(tables.hand_agent == agent)
+        self._arm_speed = np.array([description.joint(n).speed for n in layout.arm], np.float32)
+        self._leash = (LEASH + 2 * period * self._arm_speed).astype(np.float32)
+        limits = np.array([body.limits(n) for n in layout.arm], np.float32).reshape(-1, 2)
+        self._low, self._high = limits[:, 0], limits[:, 1]
+        ends = np.array([body.limits(n) for n in layout.gripper], np.float32).reshape(-1, 2)
+        self._open, self._closed = (ends[:, 1], ends[:, 0]) if layout.closed == "lower" else (ends[:, 0], ends[:, 1])
+        self._start = np.array([body.start_of(n, layout) for n in (*layout.arm, *layout.gripper)], np.float32)
+        self._drive, self._signs = (body.drive(layout) if layout.wheels else None), body.wheel_signs(layout)
+        if self._drive is not None:
+            self._speeds = drive_limits(*self._drive).astype(np.float32)
+        self._chain = body.chain(layout)
+        self._chain_joints = np.array(body.chain_joints(layout), int)
+        self.action_names: tuple[str, ...] = (
+            *(("forward", "turn_left") if self._drive else ()),
+            *layout.arm,
+            *(("gripper",) if layout.gripper else ()),
+        )
+        self.action_high: np.ndarray = np.ones(len(self.action_names), np.float32)
+        self.action_low: np.ndarray = -self.action_high
+        moving = (*layout.arm, *layout.gripper)
+        self.proprioception_names: tuple[str, ...] = (
+            *(("dd_base_lin_vel", "dd_base_ang_vel") if self._drive else ()),
+            *(f"{name}_qpos" for name in moving),
+            *(f"{name}_qvel" for name in moving),
+            *(("is_grasping",) if len(self._hand) else ()),
+        )
+
+    @property
+    def action_size(self) -> int:
+        return len(self.action_names)
+
+    def initial(self, num_worlds: int) -> UrdfState:
+        row = jnp.tile(jnp.asarray(self._start), (num_worlds, 1))
+        no = jnp.zeros(num_worlds, bool)
+        return UrdfState(row[:, : len(self._arm)], row[:, len(self._arm) :], no, no)
+
+    def control(
+        self, action: Float[Array, "W n"], view: PhysicsView, state: UrdfState
+    ) -> tuple[Float[Array, "W U"], UrdfState]:
+        action = jnp.clip(jnp.asarray(action, jnp.float32), self.action_low, self.action_high)
+        q = jnp.asarray(view.agent.joint_pos)
+        parts, first = [], 0
+        if self._drive is not None:
+            parts.append(differential_drive(action[:, :2] * self._speeds, *self._drive) * self._signs)
+            first = 2
+        velocity = action[:, first : first + len(self._arm)] * self._arm_speed
+        now = q[:, self._arm]
+        arm = jnp.clip(state.arm + velocity * self._period, now - self._leash, now + self._leash)
+        arm = jnp.clip(arm, self._low, self._high)
+        held = jnp.asarray(view.held)[:, self._hand].any((1, 2))
+        fingers, closed = state.fingers, state.closed
+        if len(self._fingers):
+            closed = action[:, -1] < 0
+            asked = jnp.where(closed[:, None], self._closed, self._open)
+            frozen = jnp.where((held & ~state.held)[:, None], q[:, self._fingers], state.fingers)
+            fingers = jnp.where(held[:, None], frozen, asked)
+        return jnp.concatenate([*parts, arm, fingers], axis=1), UrdfState(arm, fingers, closed, held)
+
+    def grip(self, state: UrdfState) -> Float[Array, "W H"]:
+        return jnp.repeat(state.closed[:, None].astype(jnp.float32), len(self._hand), axis=1)
+
+    def lag(self, view: PhysicsView, state: UrdfState) -> Float[Array, "W H"]:
+        """From where the arm is to where its servos pull it."""
+        if self._chain is None:
+            return jnp.zeros((state.closed.shape[0], len(self._hand)))
+        q = jnp.asarray(view.agent.joint_pos)[:, self._arm][:, self._chain_joints]
+        pulled = forward(self._chain, state.arm[:, self._chain_joints])[0]
+        return length(pulled - forward(self._chain, q)[0])[:, None]
+
+    def eye(self, view: PhysicsView, state: UrdfState) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
+        return jnp.asarray(view.agent.eye_pos)[:, self.agent], jnp.asarray(view.agent.eye_quat)[:, self.agent]
+
+    def proprioception(self, view: PhysicsView, state: UrdfState) -> Float[Array, "W m"]:
+        """Speeds of the base reckoned from the wheels (m/s, rad/s); positions and velocities of arm and gripper; 1 with
+        something in the hand, else -1."""
+        agent, moving = view.agent, np.concatenate([self._arm, self._fingers])
+        q, speed = jnp.asarray(agent.joint_pos), jnp.asarray(agent.joint_vel)
+        parts: list[Array] = []
+        if self._drive is not None:
+            radius, axle, _ = self._drive
+            parts.append(wheel_odometry(speed[:, self._wheels] * self._signs, radius, axle))
+        parts += [q[:, moving], speed[:, moving]]
+        if len(self._hand):
+            held = jnp.asarray(view.held)[:, self._hand].any((1, 2))
+            parts.append(jnp.where(held, 1.0, -1.0)[:, None])
+        return jnp.concatenate(parts, axis=1)

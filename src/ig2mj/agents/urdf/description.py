@@ -1,0 +1,79 @@
+"""`Description`: what `robot.json` says of a converted robot beside its MJCF (`ig2mj_converters.convert_robot`)."""
+
+from __future__ import annotations
+
+import pathlib
+
+import msgspec
+
+from ig2mj.errors import InputError
+
+ROBOT_FILE = "robot.json"
+
+FORMAT_VERSION = 1
+
+MAX_EFFORT, MAX_SPEED, MAX_WHEEL_SPEED = 100.0, 1.0, 15.0
+"""N m or N, and rad/s or m/s, where the URDF gives none; rad/s of a joint without limits (spec/robots_tasks_sensors.md
+section 1.1: iGibson's)."""
+
+
+class JointEntry(msgspec.Struct, frozen=True):
+    """A joint that moves. parent, child: links; type: revolute, continuous, prismatic or floating.
+
+    effort: N m or N. velocity: rad/s or m/s; 0 where the URDF gives none. mimics: the joint that it follows.
+    """
+
+    name: str
+    type: str
+    parent: str
+    child: str
+    effort: float = 0.0
+    velocity: float = 0.0
+    mimics: str | None = None
+
+    @property
+    def force(self) -> float:
+        """N m or N."""
+        return self.effort or MAX_EFFORT
+
+    @property
+    def speed(self) -> float:
+        """rad/s or m/s."""
+        return self.velocity or (MAX_WHEEL_SPEED if self.type == "continuous" else MAX_SPEED)
+
+
+class FrameEntry(msgspec.Struct, frozen=True):
+    """Where a link is. on: the link that moves it. pos: m in that link's frame. axes: rotation matrix."""
+
+    on: str
+    pos: tuple[float, float, float]
+    axes: tuple[tuple[float, float, float], tuple[float, float, float], tuple[float, float, float]]
+
+
+class Description(msgspec.Struct, frozen=True):
+    """A robot. base: its root link. joints: without fixed ones. frames: of all links, by name."""
+
+    format_version: int
+    name: str
+    base: str
+    joints: list[JointEntry]
+    frames: dict[str, FrameEntry]
+
+    @classmethod
+    def load(cls, folder: pathlib.Path) -> Description:
+        """Raises InputError: there is no such file, it is broken, or of another version."""
+        file = folder / ROBOT_FILE
+        again = f"convert the robot: ig2mj convert robot --urdf FILE --out {folder}"
+        try:
+            made = msgspec.json.decode(file.read_bytes(), type=cls)
+        except OSError as e:
+            raise InputError(file, "cannot be read", fix=again) from e
+        except (msgspec.DecodeError, msgspec.ValidationError) as e:
+            raise InputError(file, f"is no description of a robot: {e}", fix=again) from e
+        if made.format_version != FORMAT_VERSION:
+            raise InputError(file, f"has format version {made.format_version}, not {FORMAT_VERSION}", fix=again)
+        return made
+
+    def joint(self, name: str) -> JointEntry:
+        """The joint of this name."""
+        return next(joint for joint in self.joints if joint.name == name)

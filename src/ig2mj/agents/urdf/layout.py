@@ -1,0 +1,174 @@
+"""`Layout`: which joints of a URDF robot drive, reach and grip, and where it looks from.
+
+Found from names and kinds of joints, and where that is not right, written in a TOML (or JSON) file:
+
+    base = "differential"                   # or "fixed": bolted to the floor
+    wheels = ["left_wheel_joint", "right_wheel_joint"]
+    arm = ["shoulder_pan", "shoulder_lift", "wrist"]
+    gripper = ["left_finger_joint", "right_finger_joint"]
+    closed = "lower"                        # the limit of the gripper's joints at which it is closed, or "upper"
+    hand = "hand"                           # the link that holds; default: the one that the gripper's joints hang on
+    camera = "camera_link"                  # x forward, z up
+    laser = "laser_link"
+
+    [start]                                 # rad or m, at the beginning of an episode; others at 0
+    shoulder_lift = 0.4
+
+What a file leaves out is found; `[]` and `""` say that there is none.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import pathlib
+import tomllib
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ig2mj.agents.urdf.description import Description, JointEntry
+from ig2mj.errors import InputError, UnknownNameError
+
+BASES = ("differential", "fixed")
+CLOSED = ("lower", "upper")
+LEFT, RIGHT = ("left", "_l_", "l_wheel"), ("right", "_r_", "r_wheel")
+GRIPS = ("finger", "gripper", "jaw", "thumb")
+PASSIVE = ("caster", "castor", "swivel")
+CAMERAS = ("camera", "eyes", "cam_", "head_tilt", "head")
+LASERS = ("laser", "scan", "lidar")
+
+
+@dataclasses.dataclass(frozen=True)
+class Layout:
+    """See the module's text.
+
+    Attributes:
+      base: one of `BASES`. wheels: left and right joint; none where the base is fixed.
+      arm: joints in the order of the action. gripper: joints that close together. closed: one of `CLOSED`.
+      hand, camera, laser: links; None: there is none. start: positions of joints, rad or m.
+    """
+
+    base: str
+    wheels: tuple[str, ...] = ()
+    arm: tuple[str, ...] = ()
+    gripper: tuple[str, ...] = ()
+    closed: str = "lower"
+    hand: str | None = None
+    camera: str | None = None
+    laser: str | None = None
+    start: Mapping[str, float] = dataclasses.field(default_factory=dict)
+
+    @classmethod
+    def found(cls, robot: Description, given: Mapping[str, Any] | None = None, where: str = "layout") -> Layout:
+        """The layout of a robot.
+
+        Args:
+          given: what is not to be found but taken, as in the file. where: what errors name.
+
+        Raises:
+          InputError: an entry is of the wrong kind, or the robot cannot be driven so. UnknownNameError: the robot has
+            no such joint or link.
+        """
+        given = dict(given or {})
+        _check(robot, given, where)
+        joints = [joint for joint in robot.joints if joint.mimics is None]
+        wheels = tuple(given["wheels"] if "wheels" in given else _wheels(joints))
+        base = given.get("base", "differential" if len(wheels) == 2 else "fixed")
+        if base == "differential" and len(wheels) != 2:
+            raise InputError(
+                where, f"a differential drive has two wheels, not {len(wheels)}", element="wheels",
+                fix='name them, left and right: wheels = ["left_wheel_joint", "right_wheel_joint"], or base = "fixed"',
+            )  # fmt: skip
+        wheels = wheels if base == "differential" else ()
+        free = [joint for joint in joints if joint.name not in wheels and not _named(joint.name, PASSIVE)]
+        gripper = given.get("gripper", [j.name for j in free if _named(j.name, GRIPS) or _named(j.child, GRIPS)])
+        rolling = {j.name for j in free if j.type == "continuous" and _named(j.name, ("wheel",))}
+        arm = given.get("arm", [j.name for j in free if j.name not in gripper and j.name not in rolling])
+        both = sorted(set(arm) & set(gripper))
+        if both:
+            raise InputError(where, f"joint '{both[0]}' is of the arm and of the gripper", element="arm, gripper")
+        return cls(
+            base=base,
+            wheels=wheels,
+            arm=tuple(arm),
+            gripper=tuple(gripper),
+            closed=given.get("closed", "lower"),
+            hand=_link(given, "hand", _hand(robot, arm, gripper)),
+            camera=_link(given, "camera", _first(robot, CAMERAS)),
+            laser=_link(given, "laser", _first(robot, LASERS)),
+            start=dict(given.get("start", {})),
+        )
+
+    @classmethod
+    def load(cls, robot: Description, file: str | os.PathLike) -> Layout:
+        """From a TOML or a JSON file. Raises as `found`; InputError: it cannot be read."""
+        path = pathlib.Path(file)
+        try:
+            text = path.read_text(encoding="utf-8")
+            given = json.loads(text) if path.suffix.lower() == ".json" else tomllib.loads(text)
+        except (OSError, UnicodeDecodeError) as e:
+            raise InputError(path, "cannot be read", fix="name a TOML or JSON file") from e
+        except ValueError as e:
+            raise InputError(path, f"is no {path.suffix.lstrip('.').upper() or 'TOML'}: {e}") from e
+        return cls.found(robot, given, str(path))
+
+
+def _check(robot: Description, given: dict[str, Any], where: str) -> None:
+    """Whether entries are known, of the right kind, and name what there is."""
+    known = [field.name for field in dataclasses.fields(Layout)]
+    for name, value in given.items():
+        if name not in known:
+            raise UnknownNameError(f"entry of {where}", name, known)
+        if name in ("wheels", "arm", "gripper"):
+            if not isinstance(value, list | tuple) or not all(isinstance(entry, str) for entry in value):
+                raise InputError(where, "must be a list of names of joints", element=name)
+            _check_names("joint of the robot", value, [joint.name for joint in robot.joints])
+        elif name == "start":
+            if not isinstance(value, Mapping) or not all(_is_number(v) for v in value.values()):
+                raise InputError(where, "must be a table of numbers by joint", element=name)
+            _check_names("joint of the robot", list(value), [joint.name for joint in robot.joints])
+        elif not isinstance(value, str):
+            raise InputError(where, "must be a text", element=name)
+        elif name in ("hand", "camera", "laser") and value:
+            _check_names("link of the robot", [value], list(robot.frames))
+        elif name in ("base", "closed") and value not in (choices := BASES if name == "base" else CLOSED):
+            raise InputError(where, f"is '{value}'", element=name, fix=f"use {' or '.join(choices)}")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _check_names(kind: str, names: Sequence[str], known: Sequence[str]) -> None:
+    for name in names:
+        if name not in known:
+            raise UnknownNameError(kind, name, known)
+
+
+def _named(name: str, parts: Sequence[str]) -> bool:
+    return any(part in name.lower() for part in parts)
+
+
+def _wheels(joints: Sequence[JointEntry]) -> list[str]:
+    """The left and the right driven wheel, where there is one of each."""
+    rolling = [j.name for j in joints if j.type == "continuous" and "wheel" in j.name.lower()]
+    rolling = [name for name in rolling if not _named(name, PASSIVE)]
+    left, right = ([name for name in rolling if _named(name, side)] for side in (LEFT, RIGHT))
+    return [left[0], right[0]] if len(left) == len(right) == 1 else []
+
+
+def _hand(robot: Description, arm: Sequence[str], gripper: Sequence[str]) -> str | None:
+    """The link that the gripper hangs on, else the last one of the arm."""
+    if gripper:
+        return robot.joint(gripper[0]).parent
+    return robot.joint(arm[-1]).child if arm else None
+
+
+def _first(robot: Description, names: Sequence[str]) -> str | None:
+    """The first link of the likeliest name."""
+    return next((link for part in names for link in robot.frames if part in link.lower()), None)
+
+
+def _link(given: Mapping[str, Any], name: str, found: str | None) -> str | None:
+    return (given[name] or None) if name in given else found
