@@ -59,7 +59,7 @@ def run(
     )
     worlds = Core(engine, Rules(model, case.goal), case.pool)
     watch, seconds = Watch(engine), engine.substeps * engine.timestep
-    call, carry = _program(case, worlds, watch, disturbed, what)
+    call, carry = program(case, worlds, watch, disturbed, what)
     before = np.array(carry[0].world.view.object_com)
     compiled = call.lower(carry).compile()
     compile_seconds = time.time() - start
@@ -109,8 +109,8 @@ def run(
     return row
 
 
-def _program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str):
-    """The jitted function of `STEPS` control steps, and the carry to begin with."""
+def program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str, steps: int = STEPS):
+    """The jitted function of so many control steps, and the carry to begin with."""
     engine = watch.engine
     seconds = engine.substeps * engine.timestep
     camera = None
@@ -148,7 +148,7 @@ def _program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str)
         )
 
     body = physics if what in ("physics", "view") else full
-    call = jax.jit(lambda carry: jax.lax.scan(body, carry, None, STEPS), donate_argnums=0)
+    call = jax.jit(lambda carry: jax.lax.scan(body, carry, None, steps), donate_argnums=0)
     batch = jax.block_until_ready(worlds.start(0))
     pusher = start_pushing(case.reach, engine.num_worlds, case.scene.model.nu)
     # Copies: what is donated must not be in the batch as well.

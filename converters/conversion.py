@@ -41,6 +41,7 @@ def convert_object(
     *,
     model: str | None = None,
     bounding_box: tuple[float, float, float] | None = None,
+    fixed: bool = False,
     options: ConvertOptions | None = None,
 ) -> Outcome:
     """As `convert_object.convert_object`, with the cache of finished outputs before it."""
@@ -49,10 +50,12 @@ def convert_object(
     def work() -> Outcome:
         from .convert_object import convert_object as convert
 
-        return convert(urdf, category, out, model=model, bounding_box=bounding_box, options=options)
+        return convert(urdf, category, out, model=model, bounding_box=bounding_box, fixed=fixed, options=options)
 
     box = None if bounding_box is None else [float(v) for v in bounding_box]
     request = {"kind": "object", "urdf": _absolute(urdf), "category": category, "model": model, "box": box}
+    if fixed:
+        request["fixed"] = True
     return _done(request, out, options, work)
 
 

@@ -45,13 +45,14 @@ def convert_object(
     *,
     model: str | None = None,
     bounding_box: tuple[float, float, float] | None = None,
+    fixed: bool = False,
     options: ConvertOptions | None = None,
 ) -> Outcome:
     """Converts one object: `object.xml`, `manifest.json`, `meshes/`, and the report.
 
-    The object stands on a ground plane, free to move; the halves of a sliceable one lie beside it. Masses are the
-    URDF's own; without any, the object weighs its bounding box times the category's density where the URDF lies in a
-    dataset, else a general one (`link_inertials`).
+    The object stands on a ground plane, free to move unless it is `fixed`; the halves of a sliceable one lie beside it.
+    Masses are the URDF's own; without any, the object weighs its bounding box times the category's density where the
+    URDF lies in a dataset, else a general one (`link_inertials`).
 
     Args:
       category: what it is, in iGibson's names: decides its abilities. model: its name, default the URDF's.
@@ -72,7 +73,9 @@ def convert_object(
     with replaced_folder(out) as folder:
         start = time.perf_counter()
         ag = dataset is None or source.category not in dataset.specs or dataset.enable_ag(source.category)
-        builder, manifest, compiled = _write(source, built, folder, options, assisted_grasp=ag)
+        builder, manifest, compiled = _write(
+            source, built, folder, options, fixed=fixed, assisted_grasp=ag and not fixed
+        )
         timings = {"models": read_seconds, "writing": time.perf_counter() - start}
         outcome = finish(
             folder,
@@ -169,6 +172,7 @@ def _write(
     folder: pathlib.Path,
     options: ConvertOptions,
     *,
+    fixed: bool,
     assisted_grasp: bool,
 ) -> tuple[ModelBuilder, Manifest, mujoco.MjModel]:
     """Writes `object.xml`: the object on a ground plane, its halves beside it, all at rest."""
@@ -177,7 +181,7 @@ def _write(
     name, assemblies = source.model, {name: model.assembly for name, model in built.items()}
     base = resting_pose(assemblies[name])
     low, high = extent(assemblies[name], base)
-    whole = Placement(Instance(name=name, category=source.category, model=source.model, pose=base, fixed=False))
+    whole = Placement(Instance(name=name, category=source.category, model=source.model, pose=base, fixed=fixed))
     metadata = assemblies[name].model.metadata
     halves, _ = make_halves(whole, metadata.object_parts[: len(built) - 1], assemblies[name].scale, set())
     places = {name: base} | _beside(low, high, {half.name: assemblies[half.name] for half in halves})
@@ -185,7 +189,7 @@ def _write(
     for placement in [whole, *halves]:
         assembly = assemblies[placement.name]
         roots = [places[placement.name] @ assembly.bodies[index].pose for index in assembly.roots]
-        elements = add_object(builder, assembly, placement.name, roots, fixed=False)
+        elements = add_object(builder, assembly, placement.name, roots, fixed=fixed)
         build.elements[placement.name] = elements
         build.start_joints |= {elements.joints[j.name]: clamp(j, 0.0) for j in assembly.joints()}
         build.entries.append(
@@ -193,7 +197,7 @@ def _write(
                 placement.name,
                 assembly,
                 elements,
-                fixed=False,
+                fixed=fixed,
                 parts=placement.parts,
                 part_of=placement.part_of,
                 parked=placement.parked,

@@ -19,6 +19,7 @@ LAYERS = [
     "errors",
     "install_hint",
     "process",
+    "cluster",
     "knowledge",
     "scene",
     "geometry",

@@ -1,6 +1,6 @@
 """The object library: converted models that can be added to any home when it is loaded (`load_scene(objects=...)`).
 
-One model of every category that is not fixed to a house, the first but for `OTHERS`: more of a category are copies of
+One model of every category that is not fixed to a house, the first but for `MODELS`: more of a category are copies of
 it. All that an activity may place somewhere is there, also what homes have fixed but BEHAVIOR places; beds, sinks and
 cabinets belong to homes.
 """
@@ -20,17 +20,23 @@ ASSETS = "../../.."
 PLACED = ("car", "christmas_tree", "christmas_tree_decorated", "grill", "painting", "pool")
 """Fixed where a home has them, but activities put them anywhere: free in the library."""
 
-OTHERS = {"carton": 2}
-"""Number of the model where it is not the first: the roomiest carton, which holds what activities pack."""
+MODELS = {"carton": (2,), "shelf": (14,)}
+"""Numbers of the models where it is not the first alone. The roomiest carton holds what activities pack; the shelf is a
+board for a wall, which no home has."""
+
+
+def is_fixed(category: str) -> bool:
+    """Whether the library's models of a category must be given a place, where they stay (`load_scene`)."""
+    return catalogue()[category].fixed and category not in PLACED
 
 
 def library_models(dataset: pathlib.Path) -> list[tuple[str, str, pathlib.Path]]:
     """(category, model, URDF) of each model of the library that the dataset holds, sorted by category."""
     found = []
-    for category, entry in catalogue().items():
-        if entry.fixed and category not in PLACED:
+    for category in catalogue():
+        if is_fixed(category) and category not in MODELS:
             continue
-        number = OTHERS.get(category, 0)
-        folders = sorted(f for f in (dataset / "objects" / category).glob(f"*{category}_{number:02d}") if f.is_dir())
-        found += [(category, folder.name, folder / f"{folder.name}.urdf") for folder in folders]
+        for number in MODELS.get(category, (0,)):
+            folders = (f for f in (dataset / "objects" / category).glob(f"*{category}_{number:02d}") if f.is_dir())
+            found += [(category, folder.name, folder / f"{folder.name}.urdf") for folder in sorted(folders)]
     return found

@@ -56,15 +56,17 @@ def build_dataset(
       {category: number of whole models written}. Raises UnknownNameError for a category that is not in the catalogue.
     """
     entries = _chosen(only)
-    tasks = [(entry.category, index) for entry in entries for index in range(entry.count)]
+    tasks = [(entry.category, index) for entry in entries for index in range(entry.count + entry.extra)]
     objects = out / "objects"
     objects.mkdir(parents=True, exist_ok=True)
     for entry in entries:
         shutil.rmtree(objects / entry.category, ignore_errors=True)
     sizes: dict[str, list[list[float]]] = {entry.category: [] for entry in entries}
     chunks = [(str(objects), seed, tasks[k : k + CHUNK]) for k in range(0, len(tasks), CHUNK)]
+    usual = {entry.category: entry.count for entry in entries}
     for done, (category, size) in enumerate(_run(chunks, jobs), start=1):
-        sizes[category].append(size)
+        if len(sizes[category]) < usual[category]:  # models come in the order of their numbers
+            sizes[category].append(size)
         if progress:
             progress(done, len(tasks))
     write_metadata(out, entries, sizes)

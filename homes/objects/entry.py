@@ -24,7 +24,8 @@ class Entry:
       build: the family function; called as build(builder, **options).
       size: real (depth x, width y, height z) in metres as it stands; the front looks along +x.
       mass: kilograms of a model of that size, contents included.
-      count: how many models.
+      count: how many models. extra: further ones, numbered on, for the object library alone: no home has them, and
+        the category's mean size and mass do not count them.
       fixed: furniture that is screwed or too heavy to be free in a scene.
       rest: "any" (put down on any stable side), "standing" (mostly as built) or "upright" (only as built).
       vary: each edge is multiplied by a random factor of 1 +- vary; uniform: all three by the same.
@@ -39,6 +40,7 @@ class Entry:
     mass: float
     count: int = 3
     fixed: bool = False
+    extra: int = 0
     rest: str = "any"
     vary: float = 0.08
     uniform: bool = False

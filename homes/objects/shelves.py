@@ -10,9 +10,16 @@ from .entry import Entry
 from .model import ObjectBuilder
 from .parts import BOARD
 
+WALL_BOARD, WALL_BOARD_SIZE = 14, (0.28, 0.90, 0.025)
+"""Number of the model that is a single board for a wall, and its size in metres."""
+
 
 def shelf(b: ObjectBuilder) -> None:
-    """A bookcase: sides, back and boards; open to the front. Variants: ladder frame of metal, low and wide, cubes."""
+    """A bookcase: sides, back and boards; open to the front. Variants: ladder frame of metal, low and wide, cubes; and
+    a board for a wall, whose bracket is out of sight."""
+    if b.index == WALL_BOARD:
+        b.add(box(*WALL_BOARD_SIZE), materials.wood("oak", b.rng))
+        return
     x, y, z = b.size
     plan = b.pick(("bookcase", "metal", "cubes", "low"))
     wood = materials.wood(b.pick(materials.WOODS), b.rng) if b.rng.random() < 0.7 else materials.plain("white", "wood")
@@ -135,7 +142,7 @@ def pegboard(b: ObjectBuilder) -> None:
 
 
 CATEGORIES = [
-    Entry("shelf", shelf, (0.34, 0.85, 1.60), 28.0, 14, fixed=True, rest="upright", vary=0.18),
+    Entry("shelf", shelf, (0.34, 0.85, 1.60), 28.0, WALL_BOARD, extra=1, fixed=True, rest="upright", vary=0.18),
     Entry("towel_rack", towel_rack, (0.120, 0.600, 0.080), 1.0, 3, fixed=True, rest="upright"),
     Entry("coatrack", coatrack, (0.420, 0.420, 1.750), 5.0, 3, rest="upright", uniform=True, fixed=True),
     Entry("paper_towel_holder", roll_holder, (0.150, 0.150, 0.320), 0.5, 3, rest="upright", uniform=True),

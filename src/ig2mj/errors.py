@@ -77,6 +77,10 @@ class EngineError(Ig2mjError):
     """An engine cannot run the scene, or a step of it went wrong."""
 
 
+class ClusterError(Ig2mjError):
+    """Processes or machines that are to work together cannot: out of reach, of other versions, or one has died."""
+
+
 class PoseError(Ig2mjError):
     """A pose or joint position that cannot be set: not finite, no rotation, or of something that cannot move."""
 

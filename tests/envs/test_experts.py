@@ -30,6 +30,7 @@ LEAST = {
     ("GraspingBook", "humanoid"): 0.95,
     ("SoakingTowel", "humanoid"): 0.95,
     ("BimanualPickAndPlace", "humanoid"): 0.95,
+    ("CleaningStainedShelf", "humanoid"): 0.95,
     ("SlicingFruit", "humanoid"): 0.85,
     ("CookingMeat", "fetch"): 0.9,
     ("GraspingBook", "fetch"): 0.9,

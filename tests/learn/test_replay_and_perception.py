@@ -16,9 +16,9 @@ from small_envs import PointMass, SeenPointMass
 
 from ig2mj.learn.collect import Transition
 from ig2mj.learn.evaluate import wilson
+from ig2mj.learn.networks import projected
 from ig2mj.learn.perception import FAR, Perception, Seen, shrunk
 from ig2mj.learn.replay import Replay
-from ig2mj.learn.sac import projected
 
 GAMMA = 0.5
 

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from ig2mj.errors import UnknownNameError
+from ig2mj.errors import Ig2mjError, UnknownNameError
 from ig2mj.knowledge import synset
 from ig2mj.scene.additions import SLAB, name_additions
 from ig2mj.scene.library import find_model, library
@@ -23,11 +23,11 @@ def stocked():
     return load_scene("birch", objects=ADDED)
 
 
-def test_every_model_of_the_library_has_a_synset_and_is_loose():
+def test_every_model_of_the_library_has_a_synset_and_all_but_the_wall_board_are_loose():
     assert len(library()) > 300
     for models in library().values():
         for model in models.values():
-            assert not model.entry.fixed
+            assert model.entry.fixed == (model.category == "shelf")
             assert model.entry.category == model.category
             assert synset(model.category) == model.entry.synset
 
@@ -52,6 +52,31 @@ def test_additions_come_last_and_change_nothing_of_the_home(plain, stocked):
     start = stocked.start_data().qpos
     assert np.array_equal(start[: plain.model.nq], plain.start_data().qpos)
     assert [a.name for a in stocked.additions] == ["apple_0", "apple_1", "jar_1", "steak_0"]
+
+
+def test_an_addition_with_a_place_is_fixed_there(plain):
+    scene = load_scene("birch", objects=["steak", "shelf@-1,-3.4,0.9,90", "mug@0.5,0.25,1,0", "apple"])
+    data = scene.start_data()
+    names = ("steak_0", "shelf_2", "mug_0", "apple_0", "apple_0_part_0", "apple_0_part_1")
+    assert scene.object_names[-6:] == names
+    for name, pos, quat in (
+        ("shelf_2", (-1, -3.4, 0.9), (0.5**0.5, 0, 0, 0.5**0.5)),
+        ("mug_0", (0.5, 0.25, 1), (1, 0, 0, 0)),
+    ):
+        entry, body = scene.object(name), scene.model.body(name)
+        assert entry.fixed and not entry.assisted_grasp and body.dofnum[0] == 0
+        assert np.allclose(data.xpos[body.id], pos) and np.allclose(data.xquat[body.id], quat)
+    assert scene.model.nq == plain.model.nq + 4 * 7
+    assert [a.wanted for a in scene.additions][1] == "shelf/shelf_14@-1,-3.4,0.9,90"
+    again = load_scene("birch", objects=[a.wanted for a in scene.additions])
+    elsewhere = load_scene("birch", objects=["steak", "shelf@-1,-3.4,0.8,90", "mug@0.5,0.25,1,0", "apple"])
+    assert scene.digest == again.digest != elsewhere.digest
+
+
+@pytest.mark.parametrize("wanted", ["shelf", "shelf@1,2", "shelf@1,2,3,left"])
+def test_fixed_furniture_wants_a_place_of_four_numbers(wanted):
+    with pytest.raises(Ig2mjError, match=r"1,2,0\.9,-90|four numbers"):
+        load_scene("birch", objects=[wanted])
 
 
 def test_equal_models_share_their_meshes(plain, stocked):

@@ -120,16 +120,15 @@ def _convert_objects(
     """Converts the object library; adds lines of failed checks to `failed`. How many models."""
     from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.conversion import convert_object
-    from ig2mj_homes.dataset.object_library import ASSETS, FOLDER, library_models
+    from ig2mj_homes.dataset.object_library import ASSETS, FOLDER, is_fixed, library_models
     from ig2mj_homes.dataset.ship import strip_report
 
     models = library_models(dataset)
     for number, (category, model, urdf) in enumerate(models):
         progress(category, number, len(models))
         folder = out / FOLDER / category / model
-        convert_object(
-            urdf, category, folder, model=model, options=ConvertOptions(assets=ASSETS, cache=cache, max_hulls=MAX_HULLS)
-        )
+        options = ConvertOptions(assets=ASSETS, cache=cache, max_hulls=MAX_HULLS)
+        convert_object(urdf, category, folder, model=model, fixed=is_fixed(category), options=options)
         failed += strip_report(folder, keep_checks=False)
     return len(models)
 

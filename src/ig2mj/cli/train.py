@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pathlib
-from typing import Annotated
+from typing import Annotated, Any
 
 import tyro
 
@@ -34,7 +34,7 @@ def run(
     save_buffer: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     until: float | None = None,
     programs: int = 1,
-    devices: int = 1,
+    devices: str = "1",
     paper_rl: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     pool_size: int = 0,
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = (),
@@ -60,18 +60,22 @@ def run(
       save_buffer: checkpoints hold the replay buffer, too; without it a resumed run first plays it full again.
       until: stop once so large a share of the last episodes succeeds (0.98).
       programs: of an iteration: 1, or 2 (the worlds' and the learner's, so that both are timed).
-      devices: that share the worlds and the learning; 0: all of this machine.
+      devices: how many share the worlds and the learning, or all: those of this machine, or of all the processes that
+        were started together (docs/scale.md).
       paper_rl: the thresholds that the paper's runs had.
       pool_size: start states; 0: as many as the split has.
       set: settings of the algorithm, as updates=16 or actor=128,128.
     """
     import dataclasses
+    import os
     import platform
     import shlex
     import sys
 
     import jax
 
+    from ig2mj.cluster.place import place_of
+    from ig2mj.cluster.team import Team
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.errors import Ig2mjError, UnknownNameError
     from ig2mj.learn.algorithms import config_of, made
@@ -89,6 +93,8 @@ def run(
         raise UnknownNameError("kind of observation", obs, MODES)
     if minutes <= 0:
         raise Ig2mjError(f"--minutes {minutes}: more than 0 is needed")
+    if devices != "all" and not (devices.isdigit() and int(devices)):
+        raise Ig2mjError(f"--devices {devices}: a number from 1 on, or all")
     if algo == "bc":
         from ig2mj.cli.clone import train_from_demos
 
@@ -97,65 +103,93 @@ def run(
         raise Ig2mjError(f"--demos: {algo} takes none (bc and sac do)")
     if expert and algo != "sac":
         raise Ig2mjError(f"--expert is for sac: {'dagger always has one' if algo == 'dagger' else 'ppo learns alone'}")
-    if engine is None:
-        engine = "warp" if jax.default_backend() == "gpu" else "native"
-    config = configured(config_of(algo, small=engine == "native"), set)
-    names = VECTORS if obs == "state" else (*VECTORS, "rgb", "depth")
-    count = worlds or WORLDS.get(engine, PURE_WORLDS)
-    shared = jax.local_devices()[: devices or None] if devices != 1 else []
-    if (devices > 1 and len(shared) < devices) or devices < 0 or count % max(len(shared), 1):
-        have = f"there are {len(jax.local_devices())} devices, and worlds are shared evenly"
-        raise Ig2mjError(f"--devices {devices} --worlds {count}: {have}")
-    world = make(
-        env,
-        robot,
-        count // max(len(shared), 1),
-        engine,
-        grasping,
-        observations=names,
-        paper_rl=paper_rl,
-        pool_size=pool_size or None,
-    )
-    perception = Perception(world.observation_spaces, obs)
-    shown = load_demos(demos, perception, world_of(world)) if demos is not None else None
-    algorithm = made(config, perception, world, shown, AXIS if shared else None, expert)
-    if out is None:
-        out = pathlib.Path("runs") / "-".join([world.task.name, world.robot, world.grasping, algo, obs, str(seed)])
-    depends = {**depends_on(world, perception), "paper_rl": paper_rl, "expert": expert}
-    settings = Run(minutes, None, seed, out, resume, save_buffer, until=until, programs=programs)
-    learner = None
-    if shown is not None:
-        depends["demos"] = int(shown.reward.shape[0])
-        learner = begin_as_clone(algorithm, shown, seed)
-    try:
-        result = train(world, algorithm, settings, depends, learner, shared)
-    except Exception as e:  # XLA's and Warp's errors have no type of their own
-        if not any(sign in str(e) for sign in OUT_OF_MEMORY):
-            raise
-        smaller = f"--worlds {count // 2}, or for sac and dagger --set capacity=..."
-        raise Ig2mjError(
-            f"{count} worlds and what is learned from do not fit into the device's memory: {smaller}"
-        ) from e
-    device = jax.devices()[0]
-    card = {
-        "command": shlex.join(["ig2mj", *sys.argv[1:]]),
-        "algorithm": algo,
-        "settings": dataclasses.asdict(config),
-        "seed": seed,
-        "worlds": count,
-        "engine": engine,
-        "devices": max(len(shared), 1),
-        "device": f"{device.device_kind} ({platform.machine()})",
-        "minutes": round(result.row["seconds"] / 60, 2),
-        "compile_s": round(result.compile_s, 1),
-        "env_steps": result.row["env_steps"],
-        "training_success": result.row.get("success"),
-        "scene": world.scene.digest,
-        "paper_rl": paper_rl,
-        "expert": expert,
-    }
-    file = out / "policy.npz"
-    Policy.of(algorithm, result.learner, depends_on(world, perception), card).save(file)
-    print(file)
-    print(f"how good it is on states it has not seen: ig2mj evaluate {file}", file=sys.stderr)
-    return 0
+    team = Team.join(place_of(os.environ))
+    with team.together():
+        if engine is None:
+            engine = "warp" if jax.default_backend() == "gpu" else "native"
+        config = configured(config_of(algo, small=engine == "native"), set)
+        names = VECTORS if obs == "state" else (*VECTORS, "rgb", "depth")
+        count = worlds or WORLDS.get(engine, PURE_WORLDS)
+        shared = _devices(devices, team.count)
+        if count % max(len(shared), 1):
+            raise Ig2mjError(
+                f"--devices {devices} --worlds {count}: worlds are shared evenly over {len(shared)} devices"
+            )
+        with team.turns():  # the first one samples start states where there are none, the others read them
+            world = make(
+                env,
+                robot,
+                count // max(len(shared), 1),
+                engine,
+                grasping,
+                observations=names,
+                paper_rl=paper_rl,
+                pool_size=pool_size or None,
+            )
+        perception = Perception(world.observation_spaces, obs)
+        shown = load_demos(demos, perception, world_of(world)) if demos is not None else None
+        algorithm = made(config, perception, world, shown, AXIS if shared else None, expert)
+        if out is None:
+            out = pathlib.Path("runs") / "-".join([world.task.name, world.robot, world.grasping, algo, obs, str(seed)])
+        depends = {**depends_on(world, perception), "paper_rl": paper_rl, "expert": expert}
+        settings = Run(minutes, None, seed, out, resume, save_buffer, until=until, programs=programs)
+        learner = None
+        if shown is not None:
+            depends["demos"] = int(shown.reward.shape[0])
+            learner = begin_as_clone(algorithm, shown, seed)
+        try:
+            result = train(world, algorithm, settings, depends, learner, shared, team)
+        except Exception as e:  # XLA's and Warp's errors have no type of their own
+            if not any(sign in str(e) for sign in OUT_OF_MEMORY):
+                raise
+            smaller = f"--worlds {count // 2}, or for sac and dagger --set capacity=..."
+            raise Ig2mjError(
+                f"{count} worlds and what is learned from do not fit into the device's memory: {smaller}"
+            ) from e
+        if not team.first:
+            return 0
+        device = jax.devices()[0]
+        card = {
+            "command": shlex.join(["ig2mj", *sys.argv[1:]]),
+            "algorithm": algo,
+            "settings": dataclasses.asdict(config),
+            "seed": seed,
+            "worlds": count,
+            "engine": engine,
+            "devices": max(len(shared), 1),
+            "device": f"{device.device_kind} ({platform.machine()})",
+            "minutes": round(result.row["seconds"] / 60, 2),
+            "compile_s": round(result.compile_s, 1),
+            "env_steps": result.row["env_steps"],
+            "training_success": result.row.get("success"),
+            "scene": world.scene.digest,
+            "paper_rl": paper_rl,
+            "expert": expert,
+        }
+        file = out / "policy.npz"
+        Policy.of(algorithm, result.learner, depends_on(world, perception), card).save(file)
+        print(file)
+        print(f"how good it is on states it has not seen: ig2mj evaluate {file}", file=sys.stderr)
+        return 0
+
+
+def _devices(wanted: str, processes: int) -> list[Any]:
+    """Those of all processes that share the work, as many of each; none where there is only one.
+
+    Raises:
+      Ig2mjError: there are not so many.
+    """
+    import jax
+
+    from ig2mj.errors import Ig2mjError
+
+    if wanted == "1" and processes == 1:
+        return []
+    every = jax.devices()
+    least = min(sum(d.process_index == p for d in every) for p in range(processes))
+    each = least if wanted == "all" else int(wanted) // processes
+    if not 0 < each <= least or (wanted != "all" and int(wanted) % processes):
+        have = f"there are {len(every)} devices in {processes} processes, and each takes as many"
+        raise Ig2mjError(f"--devices {wanted}: {have if processes > 1 else f'there are {len(every)} devices'}")
+    by_process = [[d for d in every if d.process_index == p][:each] for p in range(processes)]
+    return [device for own in by_process for device in own]

@@ -50,7 +50,7 @@ def origin_of_scene(scene: Scene) -> dict[str, Any]:
     """Of a household with its robots."""
     binary = np.zeros(mujoco.mj_sizeModel(scene.model), np.uint8)
     mujoco.mj_saveModel(scene.model, None, binary)
-    additions = [f"{a.category}/{a.model}" for a in scene.additions]
+    additions = [a.wanted for a in scene.additions]
     return {
         "scene": scene.name,
         "scene_hash": scene.digest,

@@ -17,6 +17,7 @@ from typing import Any
 import jax
 import numpy as np
 
+from ig2mj.cluster.team import Team
 from ig2mj.errors import InputError
 
 KEPT = 3
@@ -95,14 +96,57 @@ class Checkpoints:
                 why = " ".join(str(e).split())[:120]
                 print(f"{folder}: broken ({why}); the checkpoint before it is taken", file=sys.stderr)
                 continue
-            arrays = [jax.numpy.asarray(leaves[name]) for name in _leaves(like)]
+            arrays = [np.asarray(leaves[name]) for name in _leaves(like)]
             return jax.tree.unflatten(jax.tree.structure(like), arrays), meta
         return None
 
 
+def newest(
+    checkpoints: Checkpoints, like: Any, depends: Mapping[str, Any], team: Team
+) -> tuple[Any, dict[str, Any]] | None:
+    """`Checkpoints.newest` for all processes of a team: the first one reads, and gives the others what it found.
+
+    A replay buffer, gigabytes of which each process needs only its own part, is read by each of them instead.
+    """
+    if team.count == 1 or "memory" in like:
+        with team.turns():
+            return checkpoints.newest(like, depends)
+    found = checkpoints.newest(like, depends) if team.first else None
+    meta = team.barrier("the checkpoint", None if found is None else found[1])
+    if meta is None:
+        return None
+    return same(like if found is None else found[0], team), meta
+
+
+def same(tree: Any, team: Team) -> Any:
+    """What the first process of a team has, in all of them; all must have arrays of these shapes."""
+    if team.count == 1:
+        return tree
+    from jax.experimental.multihost_utils import broadcast_one_to_all
+
+    return jax.tree.map(np.asarray, broadcast_one_to_all(jax.tree.map(np.asarray, tree), team.first))
+
+
+def whole(tree: Any, team: Team) -> Any:
+    """Arrays that are shared out over the devices of a team, as each process can read them; all must ask."""
+    if team.count == 1:
+        return tree
+    from jax.experimental.multihost_utils import process_allgather
+
+    def one(array: jax.Array) -> np.ndarray:
+        return np.asarray(array if array.is_fully_replicated else process_allgather(array, tiled=True))
+
+    return jax.tree.map(one, tree)
+
+
 def _leaves(tree: Any) -> dict[str, np.ndarray]:
-    """Arrays by their path in a tree."""
-    return {jax.tree_util.keystr(path): np.asarray(a) for path, a in jax.tree_util.tree_leaves_with_path(tree)}
+    """Arrays by their path in a tree; of what other processes hold, only the shape."""
+
+    def read(array: Any) -> Any:
+        there = not isinstance(array, jax.Array) or array.is_fully_addressable or array.is_fully_replicated
+        return np.asarray(array) if there else np.empty(array.shape, array.dtype)
+
+    return {jax.tree_util.keystr(path): read(a) for path, a in jax.tree_util.tree_leaves_with_path(tree)}
 
 
 def refuse_difference(file: object, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:

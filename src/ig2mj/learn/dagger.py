@@ -24,7 +24,7 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.engine.view import Array
 from ig2mj.learn.collect import Advice, Hint, Transition, if_ready
 from ig2mj.learn.labels import Imitation, Labels
-from ig2mj.learn.moments import Moments
+from ig2mj.learn.moments import Moments, share_of
 from ig2mj.learn.perception import Perception, Seen
 
 
@@ -33,7 +33,8 @@ class DaggerConfig:
     """Settings; `ig2mj train --set name=value` changes them.
 
     Attributes:
-      length: steps of the worlds in an iteration. updates: for each of them. batch: samples of an update.
+      length: steps of the worlds in an iteration. updates: for each of them.
+      batch: samples of an update, of all devices together.
       capacity: labels that are kept, of all worlds together. warm_up: steps of each world before the first update.
       alone: share of the run after which the expert acts no more. noise: deviation of what is added to actions.
       disturbed: share of the expert's steps in which its action is replaced by a random one.
@@ -169,7 +170,7 @@ class Dagger:
         def many(learner: DaggerLearner) -> tuple[DaggerLearner, dict[str, Array]]:
             def update(learner: DaggerLearner, key: Array) -> tuple[DaggerLearner, dict[str, Array]]:
                 sample_key, shift_key = jax.random.split(key)
-                seen, label = memory.sample(sample_key, c.batch)
+                seen, label = memory.sample(sample_key, share_of(c.batch, self.axis))
                 return self._imitation.update(learner, seen, label, shift_key, rate)
 
             learner, found = jax.lax.scan(update, learner, jax.random.split(key, self.samples))

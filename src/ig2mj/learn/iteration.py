@@ -3,7 +3,10 @@
 On one device with a pure engine both are one program, or two. On several, every device plays its own part of the worlds
 in a program of its own, from a thread of its own (XLA cannot compile one program for several GPUs that holds MJX-Warp's
 calls, `ig2mj.worlds.sharding`); then one program over all devices learns: each from the part of the replay buffer that
-it holds, with gradients averaged. Weights are the same everywhere.
+it holds, with gradients averaged. Weights are the same everywhere. The devices may belong to several processes, on
+several hosts (`ig2mj.cluster.team`): every process runs the same loop, and the program over all devices keeps them in
+step. What decides about the loop (the clock, what the episodes gave) goes through that program, too, so that all
+processes decide alike.
 
 Axes: W worlds, T steps.
 """
@@ -114,11 +117,12 @@ class OneDevice:
 
     def place(self, learner: Any, memory: Any) -> tuple[Any, Any]:
         """Where an iteration wants them."""
-        return learner, memory
+        return jax.tree.map(jnp.asarray, (learner, memory))
 
     def __call__(
-        self, learner: Any, memory: Any, play: Play, key: Array, progress: float, ready: bool
+        self, learner: Any, memory: Any, play: Play, key: Array, progress: float, ready: bool, clock: float = 0.0
     ) -> tuple[Any, Any, Play, dict[str, float], dict[str, float], float | None]:
+        """Where all stands after an iteration, sums over its steps, losses, and seconds of the simulator if known."""
         share, go = jnp.float32(progress), jnp.bool_(ready)
         if self._whole is not None:
             learner, memory, play, sums, losses = self._whole(learner, memory, play, key, share, go)
@@ -128,36 +132,45 @@ class OneDevice:
             play, rollout, sums, spent = self._collect(learner, play, play_key)
             learner, memory, losses = self._learn(learner, memory, rollout, learn_key, share, go)
         sums, losses = jax.device_get((sums, losses))
-        return learner, memory, play, floats(sums), floats(losses), spent
+        return learner, memory, play, floats(sums), {**floats(losses), "clock": clock}, spent
 
 
 class ManyDevices:
-    """The same over several devices of this process; see the module's text."""
+    """The same over several devices, of this process or of several; see the module's text."""
 
     def __init__(self, env: TrainingEnv, algorithm: Algorithm, devices: Sequence[Any]):
         """
         Args:
-          env: one device's part of the worlds. algorithm: made with `axis=AXIS`.
+          env: one device's part of the worlds. algorithm: made with `axis=AXIS`. devices: of all processes, in the same
+            order in each of them.
 
         Raises:
-          EngineError: the engine is not pure.
+          EngineError: the engine is not pure, or the samples of an update are not shared evenly.
         """
         if not env.pure:
             raise EngineError("several devices need an engine that runs on devices (warp or jax)")
-        self._env, self._algorithm, self._devices = env, algorithm, list(devices)
-        self.num_worlds = env.num_worlds * len(self._devices)
-        self._mesh = Mesh(np.array(self._devices), (AXIS,))
+        own = [d for d in devices if d.process_index == jax.process_index()]
+        batch = getattr(algorithm.config, "batch", 0)
+        if batch % len(devices):
+            raise EngineError(f"a batch of {batch} samples cannot be shared by {len(devices)} devices: --set batch=...")
+        self._env, self._algorithm, self._devices = env, algorithm, own
+        self._first, self._count = list(devices).index(own[0]), len(devices)
+        self.num_worlds = env.num_worlds * self._count
+        self._mesh = Mesh(np.array(devices), (AXIS,))
         self._threads = ThreadPoolExecutor(len(self._devices), "ig2mj-learn")
 
         def collect(learner: Any, play: Play, key: Array) -> Any:
-            return collect_fn(
+            play, rollout, sums = collect_fn(
                 env, algorithm.perception, algorithm.act, algorithm.hint, learner, play, key, algorithm.length
             )
+            return play, rollout, jax.tree.map(lambda a: a[None], sums)
 
-        def learn(learner: Any, memory: Any, rollout: Any, key: Array, progress: Array, ready: Array) -> Any:
+        def learn(learner: Any, memory: Any, rollout: Any, sums: Any, times: Array, key: Array, ready: Array) -> Any:
             own = jax.random.fold_in(key, jax.lax.axis_index(AXIS))
+            progress, clock = jax.lax.pmax(times[0], AXIS)
             learner, memory, losses = algorithm.learn(learner, memory, rollout, own, progress, ready)
-            return learner, memory, jax.lax.pmean({**losses, "all_finite": 1.0 * finite(learner)}, AXIS)
+            losses = jax.lax.pmean({**losses, "all_finite": 1.0 * finite(learner)}, AXIS)
+            return learner, memory, jax.tree.map(lambda a: jax.lax.psum(a[0], AXIS), sums), losses, clock
 
         self._collect = jax.jit(collect, donate_argnums=1)
         kinds: list[Any] = []
@@ -168,13 +181,13 @@ class ManyDevices:
             return jax.tree.leaves(memory)
 
         specs = self._specs(jax.eval_shape(leaves))
-        self._memory_specs, whole = jax.tree.unflatten(kinds[0], specs), PartitionSpec()
+        self._memory_specs, whole, each = jax.tree.unflatten(kinds[0], specs), PartitionSpec(), PartitionSpec(AXIS)
         self._learn = jax.jit(
             jax.shard_map(
                 learn,
                 mesh=self._mesh,
-                in_specs=(whole, self._memory_specs, PartitionSpec(None, AXIS), whole, whole, whole),
-                out_specs=(whole, self._memory_specs, whole),
+                in_specs=(whole, self._memory_specs, PartitionSpec(None, AXIS), each, each, whole, whole),
+                out_specs=(whole, self._memory_specs, whole, whole, whole),
                 check_vma=False,
             ),
             donate_argnums=(0, 1),
@@ -191,42 +204,80 @@ class ManyDevices:
 
     def memory(self) -> Any:
         """What belongs to the worlds, at first, each part where it belongs."""
-        return self.place(None, self._algorithm.memory(self.num_worlds))[1]
+        shardings = jax.tree.map(lambda spec: NamedSharding(self._mesh, spec), self._memory_specs)
+        return jax.jit(lambda: self._algorithm.memory(self.num_worlds), out_shardings=shardings)()
 
     def begin(self, seed: int) -> Any:
-        """All worlds at the start of an episode, in one batch for each device."""
+        """All worlds at the start of an episode, in one batch for each device of this process."""
         env, noise = self._env, self._algorithm.noise
-        plays = self._each(lambda k: begin(env, noise(env.num_worlds), seed + k * APART))
+        plays = self._each(lambda k: begin(env, noise(env.num_worlds), seed + (self._first + k) * APART))
         return [jax.device_put(play, device) for play, device in zip(plays, self._devices, strict=True)]
 
     def place(self, learner: Any, memory: Any) -> tuple[Any, Any]:
         """Weights on every device, the replay buffer's parts on their own."""
-        specs = jax.tree.map(lambda spec: NamedSharding(self._mesh, spec), self._memory_specs)
-        everywhere = NamedSharding(self._mesh, PartitionSpec())
-        return jax.device_put(learner, everywhere), jax.device_put(memory, specs)
+        learner = jax.tree.map(lambda a: self._placed(a, PartitionSpec()), learner)
+        return learner, jax.tree.map(self._placed, memory, self._memory_specs)
+
+    def _placed(self, array: Any, spec: PartitionSpec) -> jax.Array:
+        sharding = NamedSharding(self._mesh, spec)
+        if isinstance(array, jax.Array) and array.sharding.is_equivalent_to(sharding, array.ndim):
+            return array
+        held = np.asarray(array)
+        return jax.make_array_from_callback(held.shape, sharding, lambda index: held[index])
 
     def __call__(
-        self, learner: Any, memory: Any, plays: list[Play], key: Array, progress: float, ready: bool
+        self, learner: Any, memory: Any, plays: list[Play], key: Array, progress: float, ready: bool, clock: float = 0.0
     ) -> tuple[Any, Any, list[Play], dict[str, float], dict[str, float], float]:
+        """As `OneDevice.__call__`; `losses["clock"]` is the largest of all processes' clocks."""
         play_key, learn_key = jax.random.split(key)
-        keys = np.asarray(jax.random.split(play_key, len(self._devices)))
+        keys = np.asarray(jax.random.split(play_key, self._count))[self._first :]
         began = time.perf_counter()
         done = self._each(lambda k: jax.block_until_ready(self._collect(self._part(learner, k), plays[k], keys[k])))
         spent = time.perf_counter() - began
-        rollout = jax.tree.map(self._joined, *[rollout for _, rollout, _ in done])
-        share, go = jnp.float32(progress), jnp.bool_(ready)
-        learner, memory, losses = self._learn(learner, memory, rollout, np.asarray(learn_key), share, go)
-        sums = jax.tree.map(lambda *a: sum(float(x) for x in a), *[sums for _, _, sums in done])
-        return learner, memory, [play for play, _, _ in done], sums, floats(jax.device_get(losses)), spent
+        rollout, sums = ([one[k] for one in done] for k in (1, 2))
+        learner, memory, sums, losses, told = self.learn(
+            learner, memory, rollout, sums, np.asarray(learn_key), progress, ready, clock
+        )
+        losses = {**floats(losses), "clock": told}
+        return learner, memory, [play for play, _, _ in done], floats(sums), losses, spent
+
+    def learn(
+        self,
+        learner: Any,
+        memory: Any,
+        rollouts: Sequence[Any],
+        sums: Sequence[Any],
+        key: np.ndarray,
+        progress: float,
+        ready: bool,
+        clock: float = 0.0,
+    ) -> tuple[Any, Any, dict[str, Any], dict[str, Any], float]:
+        """Learns from rollouts, one for each device of this process, each on its own device.
+
+        Args:
+          sums: of each rollout, arrays [1]. key: the same in every process. progress, clock: the largest count.
+
+        Returns:
+          Learner, memory, sums over all devices, means of losses, and the largest clock.
+        """
+        rollout = jax.tree.map(lambda *a: self._joined(a, 1), *rollouts)
+        total = jax.tree.map(lambda *a: self._joined(a, 0), *sums)
+        row = np.array([[progress, clock]], np.float32)
+        times = self._joined([jax.device_put(row, device) for device in self._devices], 0)
+        learner, memory, total, losses, told = self._learn(learner, memory, rollout, total, times, key, np.bool_(ready))
+        total, losses, told = jax.device_get((total, losses, told))
+        return learner, memory, total, losses, float(told)
 
     def _part(self, tree: Any, k: int) -> Any:
         """One device's copy of what is the same on all."""
         device = self._devices[k]
         return jax.tree.map(lambda a: next(s.data for s in a.addressable_shards if s.device == device), tree)
 
-    def _joined(self, *pieces: jax.Array) -> jax.Array:
-        shape = (pieces[0].shape[0], self.num_worlds, *pieces[0].shape[2:])
-        sharding = NamedSharding(self._mesh, PartitionSpec(None, AXIS))
+    def _joined(self, pieces: Sequence[jax.Array], axis: int) -> jax.Array:
+        """One array over all devices from those of this process's devices, put side by side along an axis."""
+        first = pieces[0].shape
+        shape = (*first[:axis], first[axis] * self._count, *first[axis + 1 :])
+        sharding = NamedSharding(self._mesh, PartitionSpec(*[None] * axis, AXIS))
         return jax.make_array_from_single_device_arrays(shape, sharding, list(pieces))
 
     def _each(self, act: Callable[[int], Any]) -> list[Any]:

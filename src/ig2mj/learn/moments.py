@@ -93,3 +93,8 @@ class RewardScale:
 def average(tree: Any, axis: str | None) -> Any:
     """Over the devices of an axis; without one, as it is."""
     return tree if axis is None else jax.lax.pmean(tree, axis)
+
+
+def share_of(batch: int, axis: str | None) -> int:
+    """One device's samples of a batch that the devices of an axis share; without one, all of them."""
+    return batch if axis is None else max(batch // jax.lax.axis_size(axis), 1)

@@ -133,3 +133,13 @@ def shifted(picture: UInt8[Array, "B q"], shape: tuple[int, int, int], key: Arra
     start = jax.random.randint(key, (count, 2), 0, 2 * by + 1)
     moved = jax.vmap(lambda p, s: jax.lax.dynamic_slice(p, (s[0], s[1], 0), shape))(padded, start)
     return moved.reshape(count, -1)
+
+
+def projected(
+    chance: Float[Array, "B K"], places: Float[Array, "B K"], support: Float[Array, "K"]
+) -> Float[Array, "B K"]:
+    """A distribution over places, shared out to the nearest atoms of an even support."""
+    gap = support[1] - support[0]
+    inside = jnp.clip(places, support[0], support[-1])
+    share = jnp.clip(1.0 - jnp.abs(inside[:, :, None] - support) / gap, 0.0, 1.0)
+    return (chance[:, :, None] * share).sum(1)

@@ -34,8 +34,8 @@ from ig2mj.engine.view import Array
 from ig2mj.learn.collect import Advice, Hint, Transition, if_ready
 from ig2mj.learn.demos import Demos
 from ig2mj.learn.guidance import guided, share
-from ig2mj.learn.moments import Moments, RewardScale, average
-from ig2mj.learn.networks import Actor, shifted, twins
+from ig2mj.learn.moments import Moments, RewardScale, average, share_of
+from ig2mj.learn.networks import Actor, projected, shifted, twins
 from ig2mj.learn.perception import Perception, Seen, blank
 from ig2mj.learn.replay import Replay, Sample
 
@@ -45,7 +45,8 @@ class SACConfig:
     """Settings; `ig2mj train --set name=value` changes them.
 
     Attributes:
-      length: steps of the worlds in an iteration. updates: for each of them. batch: samples of an update.
+      length: steps of the worlds in an iteration. updates: for each of them.
+      batch: samples of an update, of all devices together.
       capacity: steps that are replayed, of all worlds together. warm_up: steps of each world before the first update.
       refill: the same after a resume, where the policy plays the buffer full again.
       horizon: steps of a return before the critics' value. gamma: discount of a step (1/10 s).
@@ -291,7 +292,8 @@ class SAC:
         """Updates of the critics, and one of the actor."""
         c = self.config
         sample_key, target_key, actor_key = jax.random.split(key, 3)
-        batch = memory.replay.sample(sample_key, c.every * c.batch, c.horizon, c.gamma)
+        size = share_of(c.batch, self.axis)
+        batch = memory.replay.sample(sample_key, c.every * size, c.horizon, c.gamma)
         if memory.demos is not None:
             batch = self._with_demos(batch, memory.demos, sample_key, progress)
             late = learner.updates >= c.head_start
@@ -300,7 +302,7 @@ class SAC:
         batch = dataclasses.replace(batch, reward=batch.reward * memory.scale.factor(c.largest))
         action, density, _, _ = self._draw(learner.actor, learner.moments, batch.after, target_key)  # of all at once
         alpha = jnp.exp(learner.log_alpha)
-        parts = jax.tree.map(lambda a: a.reshape(c.every, c.batch, *a.shape[1:]), (batch, action, density))
+        parts = jax.tree.map(lambda a: a.reshape(c.every, size, *a.shape[1:]), (batch, action, density))
 
         def critic(carry: tuple, part: tuple[Sample, Array, Array]) -> tuple[tuple, dict[str, Array]]:
             params, target, opt = carry
@@ -388,13 +390,3 @@ class SAC:
             alpha_opt=alpha_opt,
         )
         return learner, {"actor_loss": value, **found}
-
-
-def projected(
-    chance: Float[Array, "B K"], places: Float[Array, "B K"], support: Float[Array, "K"]
-) -> Float[Array, "B K"]:
-    """A distribution over places, shared out to the nearest atoms of an even support."""
-    gap = support[1] - support[0]
-    inside = jnp.clip(places, support[0], support[-1])
-    share = jnp.clip(1.0 - jnp.abs(inside[:, :, None] - support) / gap, 0.0, 1.0)
-    return (chance[:, :, None] * share).sum(1)

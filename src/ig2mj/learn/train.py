@@ -21,8 +21,9 @@ from typing import Any
 import jax
 import numpy as np
 
+from ig2mj.cluster.team import Team
 from ig2mj.errors import Ig2mjError
-from ig2mj.learn.checkpoints import Checkpoints
+from ig2mj.learn.checkpoints import Checkpoints, newest, same, whole
 from ig2mj.learn.collect import TrainingEnv
 from ig2mj.learn.iteration import Algorithm, ManyDevices, OneDevice
 from ig2mj.learn.log import Log
@@ -112,6 +113,7 @@ def train(
     depends: Mapping[str, Any] | None = None,
     learner: Any = None,
     devices: Sequence[Any] = (),
+    team: Team | None = None,
 ) -> Result:
     """Trains.
 
@@ -120,6 +122,7 @@ def train(
       learner: what to begin with; None: untrained.
       devices: where several are to share the work; `env` is then one device's part of the worlds, and the algorithm
         knows the axis (`iteration.ManyDevices`).
+      team: the processes whose devices they are; the first one reads and writes the run's folder. None: this one alone.
 
     Raises:
       Ig2mjError: a loss is not finite, or nothing can be resumed.
@@ -130,36 +133,40 @@ def train(
     learner = algorithm.init(first_key) if learner is None else learner
     step: Any = ManyDevices(env, algorithm, devices) if devices else OneDevice(env, algorithm, run.programs)
     memory = step.memory()
+    team = team or Team()
     checkpoints = Checkpoints(run.out) if run.out is not None else None
-    log = Log(run.out, quiet=run.quiet)
+    log = Log(run.out if team.first else None, quiet=run.quiet or not team.first)
     clock, iteration, env_steps, resumed = 0.0, 0, 0, False
     if run.resume:
         if checkpoints is None:
             raise Ig2mjError("--resume needs --out, the folder of the run")
         tree = {"learner": learner, "key": key, **({"memory": memory} if run.save_buffer else {})}
-        found = checkpoints.newest(tree, {**depends, "save_buffer": run.save_buffer})
+        found = newest(checkpoints, tree, {**depends, "save_buffer": run.save_buffer}, team)
         if found is not None:
             tree, meta = found
             learner, key, memory = tree["learner"], tree["key"], tree.get("memory", memory)
             clock, iteration, env_steps = meta["seconds"], meta["iteration"], meta["env_steps"]
             resumed = True
             log.forget_after(clock)
-    elif checkpoints is not None and checkpoints.numbers():
+    elif team.barrier("is the folder free", checkpoints is not None and bool(checkpoints.numbers())):
         raise Ig2mjError(f"{run.out} holds a run already: take --resume to go on with it, or another --out")
 
-    learner, memory = step.place(learner, memory)
-    play = step.begin(run.seed + iteration)  # a resumed run has other starts
+    learner, memory = step.place(same(learner, team), memory)
+    with team.turns():
+        play = step.begin(run.seed + iteration)  # a resumed run has other starts
     least = float(getattr(getattr(env, "task", env), "horizon", 0)) * step.num_worlds
     waiting = 2 if resumed and run.save_buffer else algorithm.warm_up(resumed)
     window, budget = _Window(time.monotonic(), int(np.clip(step.num_worlds, *EPISODES)), least), run.minutes * 60
-    logged = saved = time.monotonic()
+    logged, saved = time.monotonic(), clock
     compile_s = simulator = math.nan
     zero = logged  # when the clock was 0
     row: dict[str, Any] = {}
 
     def save(learner: Any) -> None:
         if checkpoints is not None:
-            tree = {"learner": learner, "key": key, **({"memory": memory} if run.save_buffer else {})}
+            tree = {"learner": learner, "key": key, **({"memory": whole(memory, team)} if run.save_buffer else {})}
+            if not team.first:
+                return
             meta = {"seconds": clock, "iteration": iteration, "env_steps": env_steps}
             checkpoints.save(iteration, tree, {**meta, "depends": {**depends, "save_buffer": run.save_buffer}})
 
@@ -169,7 +176,8 @@ def train(
         progress = min(clock / budget, 1.0)
         if run.iterations is not None:
             progress = max(progress, iteration / run.iterations)
-        learner, memory, play, sums, losses, spent = step(learner, memory, play, now, progress, done >= waiting)
+        learner, memory, play, sums, losses, spent = step(learner, memory, play, now, progress, done >= waiting, clock)
+        told = losses.pop("clock")
         took = time.monotonic() - began
         if done == 0:
             compile_s, logged = took, time.monotonic()
@@ -187,7 +195,9 @@ def train(
         window.updates += losses.pop("updates") * (done > 0)
         window.losses = losses
         solved = run.until is not None and _solved(window, run.until)
-        stopped = "solved" if solved else "time" if clock >= budget else None
+        if team.count == 1:
+            told = clock
+        stopped = "solved" if solved else "time" if told >= budget else None
         if run.iterations is not None and iteration >= run.iterations:
             stopped = "iterations"
         now_s = time.monotonic()
@@ -196,9 +206,9 @@ def train(
             row = _row(window, passed, clock, iteration, env_steps, compile_s)
             log.row(row)
             logged, window = now_s, _Window(now_s, window.episodes, least, window.last)
-        if now_s - saved >= run.checkpoint_every or stopped:
+        if told - saved >= run.checkpoint_every or stopped:
             save(learner)
-            saved = time.monotonic()
+            saved = told
         if stopped:
             log.close()
             return Result(learner, row, iteration, compile_s, stopped)

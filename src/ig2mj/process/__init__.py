@@ -21,7 +21,7 @@ or earlier by whoever wants to; a second call does nothing. What the user has de
 `prepare_warp` (Warp engines):
   - `warp.config.log_level`: WARNING where it was INFO, and long compilations are reported on stderr instead.
   - `warp.config.kernel_cache_dir`: below IG2MJ_CACHE_DIR, where that is set and Warp's own folder was not chosen.
-  - Two repairs of Warp 1.18, of its streams and of its graph captures (`ig2mj.process.warp_repairs`).
+  - Three repairs of Warp 1.18, of its streams, graph captures and devices (`ig2mj.process.warp_repairs`).
 
 `use_gl` (the first picture):
   - The class of OpenGL contexts that `mujoco.Renderer` makes. Environment variables are not changed.

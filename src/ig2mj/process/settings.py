@@ -75,7 +75,11 @@ def prepare_warp() -> None:
     """Warp reports compilation as the rest of ig2mj does, keeps kernels where IG2MJ_CACHE_DIR says, and is repaired."""
     import warp as wp
 
-    from ig2mj.process.warp_repairs import collect_nothing_during_captures, keep_external_streams
+    from ig2mj.process.warp_repairs import (
+        collect_nothing_during_captures,
+        find_devices_of_this_process,
+        keep_external_streams,
+    )
 
     if wp.config.log_level == wp.LOG_INFO:  # the default: nobody asked for more or for less
         wp.config.log_level = wp.LOG_WARNING
@@ -84,6 +88,7 @@ def prepare_warp() -> None:
     report_warp_compilation()
     keep_external_streams()
     collect_nothing_during_captures()
+    find_devices_of_this_process()
 
 
 @contextlib.contextmanager

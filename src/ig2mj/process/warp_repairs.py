@@ -1,4 +1,4 @@
-"""Two repairs of Warp 1.18 as JAX uses it. Each concerns the whole process, and takes nothing from other users of Warp.
+"""Three repairs of Warp 1.18 as JAX uses it. Each concerns the whole process; other users of Warp lose nothing by them.
 
 CUDA streams that belong to JAX stay known to Warp. Warp wraps JAX's stream in an object for each call and forgets the
 stream when the object goes away. Two calls that overlap on one stream, as they do when JAX dispatches ahead, then fail
@@ -10,6 +10,10 @@ the collector runs in it, in the capturing thread. Compiled programs of JAX in r
 dropped is one) are destroyed then, and XLA unloads their CUDA modules, which CUDA forbids while the thread captures:
 "CUDA_ERROR_STREAM_CAPTURE_UNSUPPORTED: Failed to unload module", and the next launch fails with error 901, since the
 capture is lost. (Warp puts off unloading its own modules; it cannot know of XLA's.)
+
+JAX's devices are found by their number in this process. Warp takes their number among the devices of all processes of
+`jax.distributed`, finds no such GPU in the second process, and so loads no kernels beforehand there: the first call
+would load them while it captures a graph.
 """
 
 from __future__ import annotations
@@ -88,3 +92,16 @@ def collect_nothing_during_captures() -> None:
     wp.ScopedCapture.__enter__ = enter_without_collector
     wp.ScopedCapture.__exit__ = leave_and_collect
     setattr(wp.ScopedCapture, _REPAIRED, True)
+
+
+def find_devices_of_this_process() -> None:
+    """Applies the third repair, once per process."""
+    if getattr(wp.device_from_jax, _REPAIRED, False):
+        return
+    find = wp.device_from_jax
+
+    def find_local(jax_device: Any) -> Any:
+        return wp.get_cuda_device(jax_device.local_hardware_id) if jax_device.platform == "gpu" else find(jax_device)
+
+    setattr(find_local, _REPAIRED, True)
+    wp.device_from_jax = find_local

@@ -121,7 +121,7 @@ def _run(
             yield sample_row(sampler, wanted, seed, n, seconds)
         return
     context = multiprocessing.get_context("spawn")
-    objects = tuple(f"{a.category}/{a.model}" for a in scene.additions)
+    objects = tuple(a.wanted for a in scene.additions)
     with concurrent.futures.ProcessPoolExecutor(
         min(jobs, len(numbers)), context, initializer=_load, initargs=(os.fspath(scene.folder), objects)
     ) as pool:

@@ -17,7 +17,7 @@ from collections.abc import Iterable, Sequence
 
 import msgspec
 
-from ig2mj.errors import InputError
+from ig2mj.errors import Ig2mjError, InputError
 from ig2mj.scene.library import LibraryModel, find_model
 from ig2mj.scene.manifest import JointEntry, LinkEntry, Manifest, ObjectEntry, OpenableEntry
 
@@ -46,21 +46,51 @@ NAMED = (
 """MJCF attributes that may hold an object's name, or a name that begins with it."""
 
 
+Place = tuple[float, float, float, float]
+"""x, y, z (m) of an object's frame, and degrees that it is turned about the vertical."""
+
+
 @dataclasses.dataclass(frozen=True)
 class Addition:
-    """An object of the library in a scene: its name there, and the hash of its model (`LibraryModel.sha256`)."""
+    """An object of the library in a scene.
+
+    Attributes:
+      name: in the scene. category, model: of the library. sha256: of the model (`LibraryModel.sha256`).
+      place: where it is fixed; None: it can be moved.
+    """
 
     name: str
     category: str
     model: str
     sha256: str
+    place: Place | None = None
+
+    @property
+    def wanted(self) -> str:
+        """What `load_scene(objects=...)` takes for it."""
+        fixed = "" if self.place is None else f"@{','.join(f'{v:g}' for v in self.place)}"
+        return f"{self.category}/{self.model}{fixed}"
+
+
+def place_of(wanted: str) -> tuple[str, Place | None]:
+    """The model's name, and where it is fixed: "shelf/shelf_14@1,2,0.9,-90". Raises Ig2mjError: not four numbers."""
+    name, mark, place = wanted.partition("@")
+    if not mark:
+        return name, None
+    try:
+        x, y, z, yaw = map(float, place.split(","))
+    except ValueError:
+        raise Ig2mjError(
+            f"'{wanted}': a fixed object's place is x,y,z,yaw, four numbers in metres and degrees"
+        ) from None
+    return name, (x, y, z, yaw)
 
 
 def name_additions(taken: Iterable[str], wanted: Sequence[str]) -> list[tuple[str, LibraryModel]]:
     """The names that `wanted` get ("apple", or "apple/apple_00") in a scene whose objects have the names `taken`.
 
     Raises:
-      UnknownNameError: the library has no such category or model.
+      UnknownNameError: the library has no such category or model. Ig2mjError: a place is not four numbers.
     """
     names = set(taken)
     numbers: dict[str, int] = {}
@@ -68,7 +98,7 @@ def name_additions(taken: Iterable[str], wanted: Sequence[str]) -> list[tuple[st
         if match := re.fullmatch(r"(.+)_(\d+)", name):
             numbers[match[1]] = max(numbers.get(match[1], -1), int(match[2]))
     found = []
-    for model in map(find_model, wanted):
+    for model in (find_model(place_of(name)[0]) for name in wanted):
         number = numbers.get(model.category, -1) + 1
         while f"{model.category}_{number}" in names:
             number += 1
@@ -83,23 +113,31 @@ def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -
 
     Args:
       file: its scene.xml. manifest: its manifest; not changed.
-      wanted: what is added, in this order: "apple" or "apple/apple_00".
+      wanted: what is added, in this order: "apple" or "apple/apple_00"; "shelf/shelf_14@1,2,0.9,-90" is fixed there.
 
     Returns:
       MJCF whose paths are absolute, the manifest with all entries, what was added.
 
     Raises:
-      UnknownNameError: the library has no such model. InputError: a file is no MJCF.
+      UnknownNameError: the library has no such model. InputError: a file is no MJCF. Ig2mjError: a fixed model has
+      no place.
     """
     root = _read(file)
     _make_absolute(root, file.parent)
     world, assets = _child(root, "worldbody"), _child(root, "asset")
     known = {(e.tag, e.get("name")) for e in assets}
     named = name_additions((o.name for o in manifest.objects), wanted)
-    cells = _add_slab(root, [o for _, model in named for o in model.manifest.objects])
+    places = [place_of(name)[1] for name in wanted]
+    for (_, model), at in zip(named, places, strict=True):
+        if model.entry.fixed and at is None:
+            raise Ig2mjError(
+                f"'{model.category}/{model.model}' is fixed: say where, as in '{model.category}@1,2,0.9,-90'"
+            )
+    loose = [o for (_, model), at in zip(named, places, strict=True) if at is None for o in model.manifest.objects]
+    cells = _add_slab(root, loose) if loose else []
     start: list[float] = []
     place = iter(cells)
-    for name, model in named:
+    for (name, model), at in zip(named, places, strict=True):
         added = _read(model.file)
         _make_absolute(added, model.folder)
         _rename(added, model.entry.name, name)
@@ -111,6 +149,11 @@ def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -
                 assets.append(asset)
         poses = _start_values(added)
         bodies = {body.get("name"): body for body in _child(added, "worldbody").findall("body")}
+        if at is not None:
+            _fix(bodies[name], at)
+            start += poses[name][1]
+            world.append(bodies[name])
+            continue
         for entry in model.manifest.objects:
             x, y = next(place)
             roots = [bodies[f"{name}{body.removeprefix(model.entry.name)}"] for body in entry.bodies]
@@ -128,9 +171,12 @@ def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -
     _extend_key(root, start)
     merged = copy.copy(manifest)
     merged.objects = list(manifest.objects)
-    for name, model in named:
-        merged.objects += [_entry(o, model.entry.name, name) for o in model.manifest.objects]
-    additions = [Addition(name, m.category, m.model, m.sha256) for name, m in named]
+    for (name, model), at in zip(named, places, strict=True):
+        entries = [_entry(o, model.entry.name, name) for o in model.manifest.objects]
+        if at is not None:
+            entries = [msgspec.structs.replace(entries[0], fixed=True, assisted_grasp=False)]
+        merged.objects += entries
+    additions = [Addition(name, m.category, m.model, m.sha256, at) for (name, m), at in zip(named, places, strict=True)]
     return ElementTree.tostring(root, encoding="unicode"), merged, additions
 
 
@@ -182,6 +228,15 @@ def _take_defaults(root: ElementTree.Element, added: ElementTree.Element) -> Non
             target.append(element)
 
 
+def _fix(body: ElementTree.Element, place: Place) -> None:
+    """Takes the free joint from a body and puts it in its place for good."""
+    for joint in [j for j in body if j.tag == "freejoint" or j.get("type") == "free"]:
+        body.remove(joint)
+    half = math.radians(place[3]) / 2
+    body.set("pos", _numbers(place[:3]))
+    body.set("quat", _numbers([math.cos(half), 0.0, 0.0, math.sin(half)]))
+
+
 def _add_slab(root: ElementTree.Element, entries: Sequence[ObjectEntry]) -> list[tuple[float, float]]:
     """Adds the slab and returns a place (x, y) on it for each object, whatever way it is turned."""
     reach = [math.hypot(*o.base_link_offset) + math.hypot(*o.bounding_box) / 2 for o in entries]
@@ -205,17 +260,17 @@ def _add_slab(root: ElementTree.Element, entries: Sequence[ObjectEntry]) -> list
 
 
 def _start_values(root: ElementTree.Element) -> dict[str, tuple[list[float], list[float]]]:
-    """Of every free body in the world: position and quaternion at the start, and positions of the joints on it."""
+    """Of every body in the world: position and quaternion at the start, and positions of the joints on it."""
     key = root.find("keyframe/key")
     saved = [] if key is None else [float(v) for v in key.get("qpos", "").split()]
     found, at = {}, 0
     for body in _child(root, "worldbody").findall("body"):
         joints = [j for j in body.iter("joint") if j.get("type") != "free"]
-        width = 7 + len(joints)
+        free = 7 * any(j.tag == "freejoint" or j.get("type") == "free" for j in body)
         own = [float(v) for v in f"{body.get('pos', '0 0 0')} {body.get('quat', '1 0 0 0')}".split()]
-        values = saved[at : at + width] if saved else [*own, *[0.0] * len(joints)]
-        found[str(body.get("name"))] = values[:7], values[7:]
-        at += width
+        values = saved[at : at + free + len(joints)] if saved else [0.0] * (free + len(joints))
+        found[str(body.get("name"))] = values[:free] if saved and free else own, values[free:]
+        at += free + len(joints)
     return found
 
 

@@ -73,6 +73,7 @@ class Scene:
         for file in (model_file(self.folder), self.folder / MANIFEST_FILE):
             hashed.update(file.read_bytes())
         hashed.update("\n".join((*self.object_names, *(a.sha256 for a in self.additions))).encode())
+        hashed.update("".join(a.wanted for a in self.additions if a.place is not None).encode())
         return hashed.hexdigest()
 
     def object_index(self, name: str) -> int:
@@ -91,7 +92,7 @@ class Scene:
         file = model_file(self.folder)
         if self.additions:
             own = load_manifest(self.folder / MANIFEST_FILE)
-            spec = _spec_from_text(add_objects(file, own, [f"{a.category}/{a.model}" for a in self.additions])[0], file)
+            spec = _spec_from_text(add_objects(file, own, [a.wanted for a in self.additions])[0], file)
         else:
             spec = read_spec(file)
         _attach_all(self.agents, spec, self.manifest)
@@ -117,6 +118,7 @@ def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: S
       agents: robots to compile into it, e.g. `FloatingHand(pos=(0, 0, 1))`.
       objects: what to add from the object library, e.g. ["steak", "plate/plate_00"]. Additions are named
         `<category>_<n>`, going on from the home's own, and stand outside the house until they are put somewhere.
+        "shelf/shelf_14@1,2,0.9,-90" is fixed for good: its frame at x, y, z (m), turned by degrees about the vertical.
 
     Raises:
       InputError: a file is missing or is no valid MJCF. UnknownNameError: the library has no such object.

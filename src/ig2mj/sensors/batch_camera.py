@@ -23,6 +23,7 @@ from mujoco import mjx
 
 from ig2mj.engine.base import Engine
 from ig2mj.engine.mjx.engine import MjxEngine, MjxPhysics
+from ig2mj.engine.mjx.physics import own_device
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
@@ -89,10 +90,10 @@ class BatchCamera:
         self._host = host = make_render_model(engine.scene, particles, [s.camera for s in self._sectors])
         self.cameras = [_camera_id(host, name) for name in cameras]
         self._plan(host)
-        self._model = mjx.put_model(host, impl="warp")
+        self._model = mjx.put_model(host, own_device(), impl="warp")
         data = mujoco.MjData(host)
         mujoco.mj_forward(host, data)
-        self._template = mjx.put_data(host, data, impl="warp", naconmax=1, naccdmax=1, njmax=1)
+        self._template = mjx.put_data(host, data, own_device(), impl="warp", naconmax=1, naccdmax=1, njmax=1)
         self._context = mjx.create_render_context(
             host,
             nworld=engine.num_worlds,

@@ -96,7 +96,9 @@ def pool_file(task: Task, scene: Scene, split: str = "train", count: int | None 
     if split not in SEEDS:
         raise UnknownNameError("split", split, SEEDS)
     near = [[n.object, *n.pos, n.least, n.most] for n in task.near]
-    made_of = json.dumps([VERSION, scene.digest, task.objects, task.start, near, task.flat])
+    made_of = json.dumps(
+        [VERSION, scene.digest, task.objects, task.start, near, task.flat, *([task.upright] if task.upright else [])]
+    )
     mark = hashlib.blake2b(made_of.encode(), digest_size=6).hexdigest()
     return cache_folder() / "pools" / f"{task.name}-{split}-{count or COUNT[split]}-{mark}.npz"
 
@@ -152,7 +154,8 @@ def _near(task: Task, scene: Scene, pool: Pool) -> Bool[np.ndarray, "P"]:
         for near in task.near:
             distance = np.linalg.norm(com[scene.object_index(near.object)] - near.pos)
             good[row] &= near.least <= distance <= near.most
-        for name in task.flat:
+        for name in (*task.flat, *task.upright):
             _, x, y, _ = quat[scene.object_index(name)]
-            good[row] &= abs(1.0 - 2.0 * (x * x + y * y)) >= FLAT
+            up = 1.0 - 2.0 * (x * x + y * y)
+            good[row] &= (abs(up) if name in task.flat else up) >= FLAT
     return good

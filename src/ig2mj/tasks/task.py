@@ -108,6 +108,7 @@ class Task:
       home: a shipped home. objects: what is added to it from the object library.
       start: conditions of the start states. near: restrictions of where objects may be at the start.
       flat: objects that lie flat at the start, either way up: their own z axis is vertical.
+      upright: objects whose own z axis points up at the start.
       goal: expression; an episode ends with success when it holds.
       objects_of_interest: the objects that the task is about; the first is what mittens take hold of.
       distances: pairs of points whose distances the reward is made of, in the order of the stages.
@@ -128,6 +129,7 @@ class Task:
     robots: Mapping[str, Acts]
     stains_of: str | None = None
     flat: tuple[str, ...] = ()
+    upright: tuple[str, ...] = ()
     horizon: int = HORIZON
     grasping: str = "mitten"
 

@@ -22,6 +22,7 @@ from jaxtyping import Int
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.errors import InputError
+from ig2mj.scene.additions import Addition
 from ig2mj.scene.library import find_model
 from ig2mj.scene.scene import Agent, Scene, load_scene
 from ig2mj.states.world import ExtendedStates
@@ -86,7 +87,8 @@ def load_pool_scene(
         model = find_model(f"{entry['category']}/{entry['model']}")
         if model.sha256 != entry["sha256"]:
             raise InputError(file, f"was made with another '{model.category}/{model.model}' added", fix=_MEND)
-        wanted.append(f"{model.category}/{model.model}")
+        at = entry.get("place")
+        wanted.append(Addition(**{**entry, "place": None if at is None else tuple(at)}).wanted)
     return load_scene(header["scene"] if scene is None else scene, agents, wanted)
 
 

@@ -20,6 +20,7 @@ from mujoco.mjx._src import collision_driver
 from ig2mj.engine.contact_filter import geom_hands
 from ig2mj.engine.mjx.contacts import Contacts, jax_contacts
 from ig2mj.engine.mjx.engine import MjxEngine
+from ig2mj.engine.mjx.physics import own_device
 from ig2mj.engine.native.sleep import FULLY_AWAKE
 from ig2mj.engine.view import Array
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
@@ -40,10 +41,10 @@ class JaxEngine(MjxEngine):
         return own
 
     def _put_model(self, model: mujoco.MjModel) -> mjx.Model:
-        return mjx.put_model(model, impl="jax")
+        return mjx.put_model(model, own_device(), impl="jax")
 
     def _put_data(self, model: mujoco.MjModel, data: mujoco.MjData) -> mjx.Data:
-        return mjx.put_data(model, data, impl="jax")
+        return mjx.put_data(model, data, own_device(), impl="jax")
 
     def _contacts(self, data: mjx.Data) -> Contacts:
         return jax_contacts(data)

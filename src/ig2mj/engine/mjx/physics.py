@@ -74,6 +74,11 @@ def mujoco_of(row: Snapshot, model: mujoco.MjModel, tables: SceneTables) -> tupl
     return model, data
 
 
+def own_device() -> jax.Device:
+    """Where models and data are put: MJX itself takes the first device of all processes, which may be another one's."""
+    return jax.local_devices()[0]
+
+
 def uncommitted(tree: Any) -> Any:
     """The same arrays without the device that MJX commits them to.
 

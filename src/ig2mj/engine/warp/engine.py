@@ -23,6 +23,7 @@ from ig2mj.engine.contact_filter import geom_hands
 from ig2mj.engine.health import Usage
 from ig2mj.engine.mjx.contacts import Contacts, warp_contacts
 from ig2mj.engine.mjx.engine import MjxEngine, MjxPhysics
+from ig2mj.engine.mjx.physics import own_device
 from ig2mj.engine.native.settle import settle
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
@@ -118,7 +119,7 @@ class WarpEngine(MjxEngine):
         return ignored
 
     def _put_model(self, model: mujoco.MjModel) -> mjx.Model:
-        put = mjx.put_model(model, impl="warp", graph_mode=self._graph_mode)
+        put = mjx.put_model(model, own_device(), impl="warp", graph_mode=self._graph_mode)
         if len(self.tables.hand_body) and self._filters:
             code = encode(geom_hands(model, self.tables), self.tables.geom_object, self.tables.num_objects)
             put = put.tree_replace({"_impl.geom_adhesion": jnp.asarray(code)})
@@ -129,6 +130,7 @@ class WarpEngine(MjxEngine):
         return mjx.put_data(
             model,
             data,
+            own_device(),
             impl="warp",
             naconmax=worlds * profile.contacts,
             naccdmax=worlds * profile.convex_contacts,

@@ -238,8 +238,12 @@ def able(o: ObjectEntry, predicates: Iterable[str]) -> bool:
 
 
 def _library_models(known: Kinds, synset_name: str, fits: Callable[[ObjectEntry], bool]) -> list[LibraryModel]:
-    """Models of the library for a synset: of its own categories, else of all below it; halves last."""
-    models = [m for c in known.categories for m in library().get(c, {}).values() if fits(m.entry)]
+    """Models of the library for a synset, one of each category: of its own, else of all below it; halves last.
+
+    What is fixed furniture a home has or has not.
+    """
+    first = [next(iter(models.values())) for c in known.categories if (models := library().get(c))]
+    models = [m for m in first if not m.entry.fixed and fits(m.entry)]
     for choice in (
         [m for m in models if synset(m.category) == synset_name and not m.category.startswith("half_")],
         [m for m in models if not m.category.startswith("half_")],

@@ -21,6 +21,7 @@ from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.actions import SPEED, TURN_SPEED
 from ig2mj.tasks.experts import (
     bimanual_pick_and_place,
+    cleaning_stained_shelf,
     cooking_meat,
     grasping_book,
     slicing_fruit,
@@ -35,6 +36,7 @@ Plan = Callable[[Sight], list[Wish]]
 PLANS: dict[str, Plan] = {
     "GraspingBook": grasping_book.plan,
     "SoakingTowel": soaking_towel.plan,
+    "CleaningStainedShelf": cleaning_stained_shelf.plan,
     "CookingMeat": cooking_meat.plan,
     "SlicingFruit": slicing_fruit.plan,
     "BimanualPickAndPlace": bimanual_pick_and_place.plan,

@@ -1,0 +1,169 @@
+"""One process of `benchmarks/scaling.py`, with one GPU: makes a case ready, then measures whenever it is told to.
+
+    python benchmarks/scaling_worker.py CASE '{"worlds": 8192, ...}'
+
+Says `READY {...}` on standard output; for each line `{"seconds": 8}` on standard input it answers `DONE {...}`; it ends
+with its input. A learner of several processes finds the others by the variables of `ig2mj.cluster.place`; what they
+measure together they time together.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import pathlib
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import numpy as np
+from throughput import device, memory, program
+
+from ig2mj.cluster.place import place_of
+from ig2mj.cluster.team import Team
+
+Measure = Callable[[float], dict[str, Any]]
+
+
+def say(word: str, row: dict[str, Any]) -> None:
+    """One line for the process that started this one."""
+    print(f"{word} {json.dumps(row)}", flush=True)
+
+
+def simulator(settings: dict[str, Any]) -> tuple[dict[str, Any], Measure]:
+    """Worlds in which a hand pushes objects about, with all states and a goal; with `pictures` also 128x128 RGB-D."""
+    from batch_case import Case
+    from disturbance import Watch
+
+    from ig2mj.engine.health import CAPACITY
+    from ig2mj.engine.warp.engine import WarpEngine
+    from ig2mj.worlds import Core, Rules
+
+    profiles = settings.get("profiles")
+    case = Case(settings["home"], True, 16, pathlib.Path(profiles) if profiles else None)
+    worlds, steps = settings["worlds"], settings["steps"]
+    engine = WarpEngine(
+        case.scene,
+        worlds,
+        profile=case.profile.for_worlds(worlds),
+        initial=jax.tree.map(lambda a: a[0], case.pool.physics),
+    )
+    core = Core(engine, Rules(case.model, case.goal), case.pool)
+    call, carry = program(case, core, Watch(engine), True, "camera" if settings["pictures"] else "full", steps)
+    compiled = call.lower(carry).compile()
+    held = [jax.block_until_ready(compiled(carry))[0]]
+
+    def one() -> float:
+        began = time.perf_counter()
+        held[0], _ = jax.block_until_ready(compiled(held[0]))
+        return time.perf_counter() - began
+
+    each = min(one(), one())
+
+    def measure(seconds: float) -> dict[str, Any]:
+        calls = max(2, round(seconds / each))
+        began = time.perf_counter()
+        for _ in range(calls):
+            one()
+        took = time.perf_counter() - began
+        batch = held[0][0]
+        overflow = np.asarray(batch.world.physics.overflow)
+        return {
+            "seconds": took,
+            "steps": worlds * steps * calls,
+            "overflow": int(((overflow & int(CAPACITY)) != 0).sum()),
+            "non_finite": int((~np.asarray(engine.health(batch.world.physics).finite)).sum()),
+        }
+
+    return {"objects": case.scene.tables.num_objects, **memory(worlds)}, measure
+
+
+def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measure]:
+    """SAC from pixels on an environment, as `ig2mj train` runs it: on one GPU one program for all of an iteration."""
+    import ig2mj
+    from ig2mj.envs.registry import VECTORS
+    from ig2mj.learn.algorithms import config_of, made
+    from ig2mj.learn.checkpoints import Checkpoints
+    from ig2mj.learn.iteration import AXIS, ManyDevices, OneDevice
+    from ig2mj.learn.perception import Perception
+
+    worlds, count = settings["worlds"], team.count
+    names = VECTORS if settings["obs"] == "state" else (*VECTORS, "rgb", "depth")
+    env: Any = ig2mj.make(
+        settings["env"], worlds=worlds, engine=settings["engine"], observations=names, pool_size=settings["pool_size"]
+    )
+    config = dataclasses.replace(
+        config_of("sac"), batch=settings["batch"] * count, capacity=settings["capacity"] * count
+    )
+    perception = Perception(env.observation_spaces, settings["obs"])
+    sac = made(config, perception, env, None, AXIS if count > 1 else None)
+    step: Any = ManyDevices(env, sac, jax.devices()) if count > 1 else OneDevice(env, sac)
+    held, memory_, key = *step.place(sac.init(jax.random.PRNGKey(0)), step.memory()), jax.random.PRNGKey(1)
+    play = step.begin(0)
+    parts = {name: sum(a.size for a in jax.tree.leaves(getattr(held, name))) for name in ("actor", "critic")}
+    state = [held, memory_, play, key]
+
+    def one(ready: bool) -> tuple[float, dict[str, float], dict[str, float]]:
+        began = time.perf_counter()
+        state[3], now = jax.random.split(state[3])
+        *state[:3], sums, losses, _ = step(state[0], state[1], state[2], now, 0.1, ready)
+        return time.perf_counter() - began, sums, losses
+
+    for _ in range(sac.warm_up(False)):
+        one(False)
+    one(True)
+    each = team.barrier("an iteration", min(one(True)[0], one(True)[0]))
+    rounds = [0]
+
+    def measure(seconds: float) -> dict[str, Any]:
+        rounds[0] += 1
+        team.barrier(f"round {rounds[0]}")
+        iterations = max(3, round(seconds / each))
+        began = time.perf_counter()
+        done = [one(True) for _ in range(iterations)]
+        took = time.perf_counter() - began
+        parts_of_play = state[2] if isinstance(state[2], list) else [state[2]]
+        troubles = [env.metrics(p.state) for p in parts_of_play]
+        return {
+            "seconds": took,
+            "steps": sum(sums["steps"] for _, sums, _ in done) / count,  # every process gives the sum of all
+            "updates": sum(losses["updates"] for _, _, losses in done),
+            "finite": all(np.isfinite(list(losses.values())).all() for _, _, losses in done),
+            "overflow": sum(t["overflow"] for t in troubles),
+            "non_finite": sum(t["not_finite"] for t in troubles),
+        }
+
+    with tempfile.TemporaryDirectory() as folder:
+        kept = Checkpoints(folder).save(1, {"learner": jax.device_get(state[0])}, {})
+        size = sum(f.stat().st_size for f in kept.rglob("*") if f.is_file())
+    about = {
+        "parameters": parts,
+        "checkpoint_bytes": size,
+        "replay_bytes_per_step": _bytes(state[1]) // (config.capacity // count),
+        "updates_of_the_critics_per_update_of_the_actor": config.every,
+    }
+    return {**about, **memory(worlds)}, measure
+
+
+def _bytes(tree: Any) -> int:
+    """Of the arrays of a tree, on one device."""
+    return sum(a.addressable_shards[0].data.nbytes for a in jax.tree.leaves(tree))
+
+
+def main() -> None:
+    began = time.time()
+    case, settings = sys.argv[1], json.loads(sys.argv[2])
+    team = Team.join(place_of(os.environ))
+    with team.together():
+        about, measure = simulator(settings) if case == "simulator" else learner(settings, team)
+        say("READY", {**about, **device(), "ready_s": round(time.time() - began, 1)})
+        for line in sys.stdin:
+            say("DONE", measure(json.loads(line)["seconds"]))
+
+
+if __name__ == "__main__":
+    main()

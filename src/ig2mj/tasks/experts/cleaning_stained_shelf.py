@@ -1,0 +1,44 @@
+"""Cleaning Stained Shelf: take the towel from above, and draw it flat over the board from stain to stain."""
+
+from __future__ import annotations
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.engine.view import Array
+from ig2mj.states.definitions import stain
+from ig2mj.states.particles import world_normals, world_positions
+from ig2mj.tasks.experts.motion import Wish, levelled, where, wish
+from ig2mj.tasks.experts.reaching import take
+from ig2mj.tasks.experts.sight import Sight
+
+TOWEL, SHELF = "hand_towel_0", "shelf_2"
+
+PRESS = 0.01
+"""m below the board that the towel's underside goes for."""
+
+LIFT = 0.005
+"""m above the board at which the towel does not touch it yet."""
+
+FACING_UP = 0.7
+"""Smallest z of the normal of a stain that a flat towel wipes."""
+
+
+def plan(see: Sight) -> list[Wish]:
+    """One hand."""
+    towel, (low, _) = see.com(TOWEL), see.box(TOWEL)
+    board = see.box(SHELF)[1][:, 2]
+    move = jnp.concatenate([(_nearest(see, towel) - towel)[:, :2], (board - PRESS - low[:, 2])[:, None]], axis=1)
+    return [where(see.holds(TOWEL), wish(move, levelled(see.quat(TOWEL)), close=True), take(see, TOWEL))]
+
+
+def _nearest(see: Sight, towel: Float[Array, "W 3"]) -> Float[Array, "W 3"]:
+    """The stain on the board's top that is nearest to the towel; the towel itself where there is none."""
+    row = stain.row_of(see.model, see.scene.object_index(SHELF))
+    pos = world_positions(see.states.stain, see.view)[:, row]
+    up = world_normals(see.states.stain, see.view)[:, row, :, 2] > FACING_UP
+    left = jnp.asarray(see.states.stain.alive)[:, row] & up
+    apart = jnp.where(left, jnp.sum(jnp.square(pos - towel[:, None])[..., :2], axis=-1), jnp.inf)
+    nearest = pos[np.arange(pos.shape[0]), jnp.argmin(apart, axis=1)]
+    return jnp.where(left.any(1)[:, None], nearest, towel)

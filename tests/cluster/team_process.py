@@ -1,0 +1,118 @@
+"""One process of a team of tests: `python team_process.py TASK OUT`, its place in the variables of its surroundings.
+
+Run by tests/cluster/test_teams.py, which compares what the processes print.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+import sys
+import time
+
+sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "learn"))
+
+from ig2mj.cluster.place import place_of
+from ig2mj.cluster.team import Team
+
+WORLDS, LENGTH = 16, 8
+
+
+def rollout(algorithm, start: int, stop: int):
+    """Worlds `start` to `stop` of a rollout that is the same whoever asks."""
+    import jax.numpy as jnp
+    import numpy as np
+
+    from ig2mj.learn.collect import Transition
+    from ig2mj.learn.perception import Seen
+
+    rng, p = np.random.default_rng(7), algorithm.perception
+
+    def normal(*tail: int):
+        return jnp.asarray(rng.standard_normal((LENGTH, WORLDS, *tail))[:, start:stop], jnp.float32)
+
+    def seen() -> Seen:
+        return Seen(normal(p.vector_size), jnp.zeros((LENGTH, stop - start, 0), jnp.uint8))
+
+    ends = jnp.asarray(rng.random((LENGTH, WORLDS))[:, start:stop] < 0.1)
+    raw = normal(2)
+    extra = {"raw": raw, "chance": normal() - 3.0}
+    return Transition(seen(), jnp.tanh(raw), extra, normal(), ends, jnp.zeros_like(ends), seen())
+
+
+def gradient(team: Team) -> dict:
+    """Adam's first moment after one update of PPO on the whole rollout: a tenth of the averaged, clipped gradient."""
+    import jax
+    import numpy as np
+    from small_envs import PointMass
+
+    from ig2mj.learn.iteration import AXIS, ManyDevices
+    from ig2mj.learn.perception import Perception
+    from ig2mj.learn.ppo import PPO, PPOConfig
+
+    config = PPOConfig(length=LENGTH, epochs=1, parts=1, actor=(32, 32), critic=(32, 32), lr=1e-3)
+    perception, count = Perception(PointMass.observation_spaces), jax.device_count()
+    key = jax.random.PRNGKey(3)
+    if team.count == 1:
+        ppo = PPO(perception, 2, config)
+        learner, _, losses = jax.jit(ppo.learn)(
+            ppo.init(key), ppo.memory(WORLDS), rollout(ppo, 0, WORLDS), key, 0.5, np.bool_(True)
+        )
+    else:
+        ppo = PPO(perception, 2, config, AXIS)
+        step = ManyDevices(PointMass(WORLDS // count), ppo, jax.devices())
+        learner, memory = step.place(ppo.init(key), step.memory())
+        share = WORLDS // count
+        own = jax.device_put(rollout(ppo, team.rank * share, (team.rank + 1) * share), jax.local_devices()[0])
+        progress = 0.5 if team.rank == 0 else 0.25  # the largest counts
+        learner, _, _, losses, _ = step.learn(learner, memory, [own], [{}], np.asarray(key), progress, True)
+    mu = next(np.asarray(a) for a in jax.tree.leaves(learner.opt) if getattr(a, "ndim", 0) == 1)
+    found = {"mean": learner.moments.mean, "var": learner.moments.var, "scale": losses["reward_scale"]}
+    weights = np.concatenate([np.asarray(a).ravel() for a in jax.tree.leaves(learner.actor)])
+    return {
+        "gradient": (mu * 10).tolist(),
+        "weights": weights.tolist(),
+        **{k: np.asarray(v).tolist() for k, v in found.items()},
+    }
+
+
+def learn(team: Team, out: str, iterations: int, resume: bool, seconds: float = 0.0) -> dict:
+    """A short run of SAC on a point mass; `seconds`: at least so long, to be killed meanwhile."""
+    import jax
+    from small_envs import PointMass
+
+    from ig2mj.learn.iteration import AXIS
+    from ig2mj.learn.perception import Perception
+    from ig2mj.learn.sac import SAC, SACConfig
+    from ig2mj.learn.train import Run, train
+
+    devices = jax.devices()
+    config = SACConfig(updates=4, batch=64, capacity=4000, actor=(32,), critic=(32,), atoms=21)
+    env = PointMass(32 // len(devices))
+    sac = SAC(Perception(env.observation_spaces), 2, config, AXIS if len(devices) > 1 else None)
+    minutes = seconds / 60 if seconds else 5.0
+    run = Run(minutes, iterations=None if seconds else iterations, out=out, resume=resume, quiet=True)
+    print("READY", flush=True)
+    result = train(env, sac, run, devices=devices if len(devices) > 1 else (), team=team)
+    return {"iteration": result.iteration, "env_steps": result.row["env_steps"], "stopped": result.stopped}
+
+
+def main() -> None:
+    task, out = sys.argv[1:3]
+    team = Team.join(place_of(os.environ), patience=60.0)
+    with team.together():
+        if task == "gradient":
+            found = gradient(team)
+        elif task == "turns":
+            began = time.time()
+            with team.turns():
+                time.sleep(0.5 if team.first else 0.0)
+                found = {"began": began, "seconds": time.time() - began}
+        else:
+            found = learn(team, out, int(task.split("-")[1]), "resume" in task, 60.0 if "long" in task else 0.0)
+    print("RESULT" + json.dumps({"rank": team.rank, **found}), flush=True)
+
+
+if __name__ == "__main__":
+    main()
