@@ -45,6 +45,10 @@ class ManifestError(InputError):
     """A scene's manifest.json does not fit its schema or its scene.xml."""
 
 
+class PolicyMismatch(InputError):
+    """A policy is for another task, robot, way of grasping, list of actions or observations; names the pair."""
+
+
 def without_lines(message: object) -> str:
     """A compiler's message without line numbers, for a text that ig2mj generated: the user has no such lines."""
     return re.sub(r",? line -?\d+", "", " ".join(str(message).split()))

@@ -43,3 +43,16 @@ def test_wrong_options_name_what_is_near(capsys):
     ):
         assert call(arguments) == 2, arguments
         assert told in capsys.readouterr().err, arguments
+
+
+def test_a_training_that_does_not_fit_ends_in_one_line(tmp_path, capsys, monkeypatch):
+    from ig2mj.learn import train as loop
+
+    def full(*arguments, **named):
+        raise RuntimeError("RESOURCE_EXHAUSTED: Out of memory while trying to allocate 17179869184 bytes.")
+
+    monkeypatch.setattr(loop, "train", full)
+    arguments = ["train", "PointNavigation", "--worlds", "8", "--pool-size", "4", "--out", str(tmp_path / "run")]
+    assert call([*arguments, "--engine", "native"]) == 2
+    (line,) = [text for text in capsys.readouterr().err.splitlines() if "memory" in text]
+    assert "8 worlds" in line and "--worlds 4" in line

@@ -63,6 +63,7 @@ COMMANDS: dict[str, str] = {
     "rollout": "play episodes of an environment, and tell how they ended",
     "train": "train a policy in an environment",
     "evaluate": "tell how often a policy succeeds from states it has not seen",
+    "policies": "list trained policies that ship, show a model card, add a run as one of them",
     "demos": "collect demonstrations of scripted experts, and replay recordings",
     "sample-task": "sample an environment's start states, and keep them in the cache",
     "homes": "build our own dataset of household objects and homes",

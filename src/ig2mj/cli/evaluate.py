@@ -46,7 +46,8 @@ def run(
     from ig2mj.envs.rollout import play
     from ig2mj.errors import Ig2mjError
     from ig2mj.learn.evaluate import acting, summary
-    from ig2mj.learn.policies import Policy, find_policy
+    from ig2mj.learn.policies import Policy
+    from ig2mj.learn.shipped import find_policy
 
     if episodes < 1:
         raise Ig2mjError(f"--episodes {episodes}: at least one is needed")
@@ -74,6 +75,7 @@ def run(
         "robot": env.robot,
         "grasping": env.grasping,
         "agent": str(policy),
+        "weights": loaded.weights_digest,
         "paper_rl": loaded.card.get("paper_rl", False),
         "split": split,
         "drawn": drawn,

@@ -51,7 +51,8 @@ def run(
       split: start states: train or held_out.
       held_out: held-out start states, the first EPISODES of them, each played once.
       pool_size: start states; 0: as many as the split has.
-      video: film of the first episode of the first world (.mp4, .gif); needs OpenGL and the native engine.
+      video: film of the first episode of the first world (.mp4, .gif), or five of its frames side by side (.png, .jpg);
+        needs OpenGL and the native engine.
       record: HDF5 of everything that happens in all worlds, for `ig2mj demos replay`.
       paper_rl: the thresholds that the paper's runs had.
       json: the last line is one JSON object.
@@ -139,7 +140,8 @@ def run(
 def _policy(name: str) -> Policy:
     """Raises UnknownNameError: neither an agent nor a policy. InputError: it cannot be read."""
     from ig2mj.errors import UnknownNameError
-    from ig2mj.learn.policies import Policy, find_policy, shipped
+    from ig2mj.learn.policies import Policy
+    from ig2mj.learn.shipped import find_policy, shipped
 
     try:
         return Policy.load(find_policy(name))

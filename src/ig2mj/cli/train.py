@@ -14,8 +14,6 @@ WORLDS = {"native": 16}
 
 PURE_WORLDS = 2048
 
-OUT_OF_MEMORY = ("RESOURCE_EXHAUSTED", "Out of memory", "Failed to allocate")
-
 
 def run(
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")],
@@ -37,6 +35,7 @@ def run(
     devices: str = "1",
     paper_rl: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     pool_size: int = 0,
+    videos: float = 0.0,
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = (),
 ) -> int:
     """Train a policy.
@@ -55,8 +54,8 @@ def run(
       resume: go on from the newest checkpoint in the folder.
       demos: demonstrations (`ig2mj demos collect`): all that bc learns from; sac begins as their clone and replays
         them.
-      expert: for sac: the task's scripted expert begins episodes and corrects the policy, ever less, until half of the
-        run is over (--set guided=0.5).
+      expert: for sac: the task's scripted expert begins episodes and corrects the policy, ever less, until 70 % of
+        the run are over (--set guided=0.7).
       save_buffer: checkpoints hold the replay buffer, too; without it a resumed run first plays it full again.
       until: stop once so large a share of the last episodes succeeds (0.98).
       programs: of an iteration: 1, or 2 (the worlds' and the learner's, so that both are timed).
@@ -64,6 +63,8 @@ def run(
         were started together (docs/scale.md).
       paper_rl: the thresholds that the paper's runs had.
       pool_size: start states; 0: as many as the split has.
+      videos: minutes between two films of a held-out episode, in the folder videos of the run; 0: none. They are made
+        beside the training by a process of low priority, and need OpenGL and ffmpeg.
       set: settings of the algorithm, as updates=16 or actor=128,128.
     """
     import dataclasses
@@ -76,12 +77,14 @@ def run(
 
     from ig2mj.cluster.place import place_of
     from ig2mj.cluster.team import Team
+    from ig2mj.cli.train_films import Films
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.errors import Ig2mjError, UnknownNameError
     from ig2mj.learn.algorithms import config_of, made
     from ig2mj.learn.bc import begin_as_clone
     from ig2mj.learn.demos import load_demos
     from ig2mj.learn.iteration import AXIS
+    from ig2mj.learn.memory import is_out_of_memory, too_large
     from ig2mj.learn.options import configured
     from ig2mj.learn.perception import MODES, Perception
     from ig2mj.learn.policies import Policy, depends_on, world_of
@@ -137,17 +140,6 @@ def run(
         if shown is not None:
             depends["demos"] = int(shown.reward.shape[0])
             learner = begin_as_clone(algorithm, shown, seed)
-        try:
-            result = train(world, algorithm, settings, depends, learner, shared, team)
-        except Exception as e:  # XLA's and Warp's errors have no type of their own
-            if not any(sign in str(e) for sign in OUT_OF_MEMORY):
-                raise
-            smaller = f"--worlds {count // 2}, or for sac and dagger --set capacity=..."
-            raise Ig2mjError(
-                f"{count} worlds and what is learned from do not fit into the device's memory: {smaller}"
-            ) from e
-        if not team.first:
-            return 0
         device = jax.devices()[0]
         card = {
             "command": shlex.join(["ig2mj", *sys.argv[1:]]),
@@ -158,16 +150,27 @@ def run(
             "engine": engine,
             "devices": max(len(shared), 1),
             "device": f"{device.device_kind} ({platform.machine()})",
-            "minutes": round(result.row["seconds"] / 60, 2),
-            "compile_s": round(result.compile_s, 1),
-            "env_steps": result.row["env_steps"],
-            "training_success": result.row.get("success"),
             "scene": world.scene.digest,
             "paper_rl": paper_rl,
             "expert": expert,
         }
-        file = out / "policy.npz"
-        Policy.of(algorithm, result.learner, depends_on(world, perception), card).save(file)
+        file, films = out / "policy.npz", Films.of(world, out, 60 * videos, paper_rl)
+
+        def kept(learner: Any, row: dict[str, Any]) -> None:
+            made_in = {"minutes": round(row["seconds"] / 60, 2), "env_steps": row["env_steps"]}
+            made_in |= {"training_success": row.get("success"), "compile_s": row.get("compile_s")}
+            Policy.of(algorithm, learner, depends_on(world, perception), {**card, **made_in}).save(file)
+            films.offer(file, row["seconds"])
+
+        try:
+            result = train(world, algorithm, settings, depends, learner, shared, team, kept)
+        except Exception as e:  # XLA's and Warp's errors have no type of their own
+            if not is_out_of_memory(e):
+                raise
+            raise Ig2mjError(too_large(world, algorithm, count, max(len(shared), 1))) from e
+        if not team.first:
+            return 0
+        films.offer(file, result.row["seconds"], last=True)
         print(file)
         print(f"how good it is on states it has not seen: ig2mj evaluate {file}", file=sys.stderr)
         return 0

@@ -19,7 +19,7 @@ VIDEOS = (".mp4", ".gif")
 
 
 def run(
-    scene: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="SCENE")],
+    scene: Annotated[pathlib.Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="SCENE")] = None,
     picture: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     camera: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None,
     eye: Annotated[Vec3 | None, tyro.conf.arg(name="from", metavar="X Y Z")] = None,
@@ -35,6 +35,7 @@ def run(
     robot_urdf: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     robot_layout: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     robot_at: Annotated[Vec3, tyro.conf.arg(metavar="X Y DEGREES")] = (0.0, 0.0, 0.0),
+    policy: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None,
 ) -> None:
     """Open a scene in MuJoCo's viewer, or write a picture of it.
 
@@ -52,14 +53,25 @@ def run(
       paused: open the window paused.
       dump: replay the last steps of a world that went wrong, from the file that debug mode wrote; with --picture, the
         last of them whose numbers are finite.
-      video: write the dump as a video (.mp4 or .gif) instead of opening a window.
+      video: write the dump, or an episode of the policy, as a video (.mp4 or .gif; of a policy also as a film strip,
+        .png or .jpg) instead of opening a window.
       pool: page through the rows of a pool of this scene, with the objects that were added to it: the right arrow turns
         the page; with --picture, one row.
       row: the row to begin with.
       robot_urdf: a robot of your own in the scene, from its URDF (docs/environments.md).
       robot_layout: TOML or JSON that says which of its joints drive, reach and grip; default: found from their names.
       robot_at: where it stands (metres) and how far it is turned from the x axis.
+      policy: instead of a scene: a trained policy at work, the name of one that ships (`ig2mj policies list`) or the
+        folder of a run; it begins at held-out start state --row.
     """
+    if policy is not None:
+        from ig2mj.cli.view_policy import view_policy
+
+        _only_policy(scene, picture, dump, pool, camera, eye, target, seconds, collision)
+        view_policy(policy, video, row, paused)
+        return
+    if scene is None:
+        raise Ig2mjError("name a scene, or a policy with --policy (`ig2mj homes list` names homes)")
     from ig2mj.cli.robot_urdf import check_layout
 
     check_layout(robot_urdf, robot_layout)
@@ -91,6 +103,13 @@ def run(
     if seconds > 0:
         world.step(count=round(seconds * 30))
     world.launch_viewer(paused=paused)
+
+
+def _only_policy(scene, *others) -> None:
+    if scene is not None:
+        raise Ig2mjError("--policy shows its own task's home: name no scene")
+    if any(others):
+        raise Ig2mjError("with --policy go --video, --row and --paused alone")
 
 
 def _check(picture, camera, eye, target, size, seconds) -> None:

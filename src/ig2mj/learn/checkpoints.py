@@ -149,14 +149,14 @@ def _leaves(tree: Any) -> dict[str, np.ndarray]:
     return {jax.tree_util.keystr(path): read(a) for path, a in jax.tree_util.tree_leaves_with_path(tree)}
 
 
-def refuse_difference(file: object, found: Mapping[str, Any], wanted: Mapping[str, Any]) -> None:
-    """Raises InputError for the first setting that differs, with both values."""
+def refuse_difference(
+    file: object, found: Mapping[str, Any], wanted: Mapping[str, Any], error: type[InputError] = InputError
+) -> None:
+    """Raises `error` for the first setting that differs, with both values."""
     as_read = json.loads(json.dumps(dict(wanted)))
     for name in [*as_read, *(n for n in found if n not in as_read)]:
         if found.get(name) != as_read.get(name):
-            raise InputError(
-                file, f"is for {name} = {_short(found.get(name))}, and here it is {_short(as_read.get(name))}"
-            )
+            raise error(file, f"is for {name} = {_short(found.get(name))}, and here it is {_short(as_read.get(name))}")
 
 
 def _short(value: Any) -> str:

@@ -23,15 +23,13 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.engine.view import Array
-from ig2mj.errors import InputError, UnknownNameError
+from ig2mj.errors import InputError, PolicyMismatch
 from ig2mj.learn.checkpoints import refuse_difference
 from ig2mj.learn.moments import Moments
 from ig2mj.learn.networks import Actor
 from ig2mj.learn.perception import Perception
 
 FORMAT_VERSION = 1
-
-_HERE = pathlib.Path(__file__).resolve()
 
 CARD = "card.json"
 
@@ -136,8 +134,17 @@ class Policy:
         return (*depends["vector"], *(("rgb", "depth") if depends["mode"] == "rgbd" else ()))
 
     def check(self, env: Any, perception: Perception, file: object = "the policy") -> None:
-        """Raises InputError where the policy is for something else, with the pair that differs."""
-        refuse_difference(file, self.card["depends"], depends_on(env, perception))
+        """Raises PolicyMismatch where the policy is for something else, with the pair that differs."""
+        refuse_difference(file, self.card["depends"], depends_on(env, perception), PolicyMismatch)
+
+    @property
+    def weights_digest(self) -> str:
+        """Of the weights as they are in the file: 16 hexadecimal digits."""
+        mark = hashlib.blake2b(digest_size=8)
+        for name in sorted(self.weights):
+            mark.update(name.encode() + np.asarray(self.weights[name], np.float16).tobytes())
+        mark.update(np.asarray(self.mean, np.float32).tobytes() + np.asarray(self.deviation, np.float32).tobytes())
+        return mark.hexdigest()
 
     def actor(self, perception: Perception, *, drawn: bool = False) -> Any:
         """A pure function from observations by name to actions [W, n].
@@ -182,31 +189,3 @@ def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
             place = place.setdefault(folder, {})
         place[name] = value
     return tree
-
-
-def find_policy(name: str | os.PathLike) -> pathlib.Path:
-    """The file of a policy.
-
-    Args:
-      name: a file; or the name of a policy that ships (`shipped`).
-
-    Raises:
-      UnknownNameError: neither a file nor the name of a shipped policy, with near matches.
-    """
-    file = pathlib.Path(name)
-    if file.is_file():
-        return file
-    if file.is_dir() and (file / "policy.npz").is_file():
-        return file / "policy.npz"
-    if file.suffix == ".npz" or len(file.parts) > 1:
-        raise InputError(file, "there is no such file", fix="`ig2mj train` writes policies")
-    known = shipped()
-    if str(name) not in known:
-        raise UnknownNameError("policy", str(name), known)
-    return known[str(name)]
-
-
-def shipped() -> dict[str, pathlib.Path]:
-    """Files of the policies that ship, by name: the task's name alone is the humanoid's from pixels."""
-    folders = [_HERE.parents[3] / "policies", _HERE.parents[2] / "ig2mj_policies"]
-    return {file.stem: file for folder in folders if folder.is_dir() for file in sorted(folder.glob("*.npz"))}

@@ -78,7 +78,7 @@ class SACConfig:
     std: float = 0.15
     held: int = 16
     head_start: int = 2000
-    guided: float = 0.5
+    guided: float = 0.7
     reach: int = 120
     disturbance: float = 0.1
     copy: float = 5.0

@@ -15,7 +15,7 @@ import math
 import pathlib
 import time
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import jax
@@ -114,6 +114,7 @@ def train(
     learner: Any = None,
     devices: Sequence[Any] = (),
     team: Team | None = None,
+    kept: Callable[[Any, dict[str, Any]], None] | None = None,
 ) -> Result:
     """Trains.
 
@@ -123,6 +124,7 @@ def train(
       devices: where several are to share the work; `env` is then one device's part of the worlds, and the algorithm
         knows the axis (`iteration.ManyDevices`).
       team: the processes whose devices they are; the first one reads and writes the run's folder. None: this one alone.
+      kept: called by the first process after every checkpoint with what was learned and the last report.
 
     Raises:
       Ig2mjError: a loss is not finite, or nothing can be resumed.
@@ -209,6 +211,8 @@ def train(
         if told - saved >= run.checkpoint_every or stopped:
             save(learner)
             saved = told
+            if kept is not None and team.first:
+                kept(learner, {"seconds": clock, "env_steps": env_steps, **row})
         if stopped:
             log.close()
             return Result(learner, row, iteration, compile_s, stopped)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import pathlib
 
 import mujoco
 import numpy as np
@@ -12,6 +13,7 @@ from jaxtyping import UInt8
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.showcase.cooking_pictures import caption_at, font
+from ig2mj.showcase.film_strip import ENDINGS, FilmStrip
 from ig2mj.tasks.task import Task
 from ig2mj.viewer.film import Film
 from ig2mj.viewer.offscreen import FreeView, render
@@ -42,7 +44,7 @@ class EpisodeFilm:
     def __init__(self, file: str | os.PathLike, env: Environment, world: int = 0):
         """
         Args:
-          file: its ending says the format (.mp4, .gif).
+          file: its ending says the format: a film (.mp4, .gif), or a strip of five of its frames (.png, .jpg).
 
         Raises:
           InputError: another ending. MissingDependencyError: there is no ffmpeg.
@@ -50,7 +52,8 @@ class EpisodeFilm:
         assert env.core.rules is not None
         self._env, self._world, self._model_of_states = env, world, env.core.rules.model
         self._objects = env.task.objects_of_interest if isinstance(env.task, Task) else ()
-        self._film = Film(file, WIDTH, HEIGHT, BETWEEN / ACTION_PERIOD)
+        strip = pathlib.Path(file).suffix.lower() in ENDINGS
+        self._film = FilmStrip(file) if strip else Film(file, WIDTH, HEIGHT, BETWEEN / ACTION_PERIOD)
         self._drawn: mujoco.MjData | None = None
         self._camera: FreeView | None = None
         self._tinter: Tinter | None = None

@@ -1,0 +1,79 @@
+"""`ig2mj policies`: trained policies that ship with the project."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import Annotated
+
+import tyro
+
+
+def list_(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
+    """List the policies that ship, with their success on held-out start states.
+
+    Args:
+      json: print one JSON object.
+    """
+    from ig2mj.cli.printing import make_table, print_json, stdout_console
+    from ig2mj.learn.policies import Policy
+    from ig2mj.learn.shipped import shipped
+
+    cards = {name: (Policy.load(file).card, file.stat().st_size) for name, file in shipped().items()}
+    if json:
+        print_json({name: {**card, "bytes": size} for name, (card, size) in cards.items()})
+        return 0
+    rows = []
+    for name, (card, size) in cards.items():
+        depends, found = card["depends"], card.get("evaluation", {})
+        rate = f"{found['success_rate']:.1%} of {found['episodes']}" if found else "-"
+        trained = f"{card.get('minutes', '-')} min, {card.get('device', '-')}"
+        rows.append((name, depends["robot"], depends["grasping"], depends["mode"], rate, trained, f"{size / 1e6:.2f}"))
+    if not rows:
+        print("no policy ships with this version")
+        return 0
+    columns = ("policy", "robot", "grasping", "sees", "success, held out", "trained", "MB")
+    stdout_console().print(make_table("policies", columns, rows))
+    return 0
+
+
+def show(name: Annotated[str, tyro.conf.Positional]) -> int:
+    """Print a policy's model card.
+
+    Args:
+      name: of a policy that ships, or a file that `ig2mj train` wrote.
+    """
+    from ig2mj.cli.printing import print_json
+    from ig2mj.learn.policies import Policy
+    from ig2mj.learn.shipped import find_policy, model_card
+
+    file = find_policy(name)
+    policy = Policy.load(file)
+    if "evaluation" in policy.card:
+        print(model_card(file.stem, policy), end="")
+    else:
+        print_json(policy.card)
+    return 0
+
+
+def add(
+    run: Annotated[pathlib.Path, tyro.conf.Positional],
+    evaluation: pathlib.Path,
+    name: str | None = None,
+    folder: pathlib.Path | None = None,
+) -> int:
+    """Make a run's policy one that ships, with its model card.
+
+    Args:
+      run: the run's folder, or its policy.npz.
+      evaluation: what `ig2mj evaluate RUN --episodes 1000 --json` printed.
+      name: of the policy; default: the task's, with the robot, grasping and observation where they are unusual.
+      folder: where it goes; default: policies/ of this checkout.
+    """
+    from ig2mj.learn.shipped import CHECKOUT, add_policy
+
+    file = add_policy(run, evaluation, name, folder or CHECKOUT)
+    print(f"{file} ({file.stat().st_size / 1e6:.2f} MB) and {file.with_suffix('.md').name}")
+    return 0
+
+
+SUBCOMMANDS = {"list": list_, "show": show, "add": add}

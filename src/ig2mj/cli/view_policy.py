@@ -1,0 +1,61 @@
+"""`ig2mj view --policy NAME`: a trained policy at work, in MuJoCo's window or as a film."""
+
+from __future__ import annotations
+
+import pathlib
+
+
+def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -> None:
+    """Shows a policy in one native world, at held-out start states.
+
+    Args:
+      name: of a shipped policy, or a run's folder or file. video: film or film strip of one episode, without a window.
+      row: of the held-out start states, to begin with.
+
+    Raises:
+      UnknownNameError, InputError: there is no such policy. Ig2mjError: there is no such row.
+    """
+    import sys
+
+    import numpy as np
+
+    from ig2mj.envs.registry import make
+    from ig2mj.errors import Ig2mjError
+    from ig2mj.learn.evaluate import acting
+    from ig2mj.learn.policies import Policy
+    from ig2mj.learn.shipped import find_policy
+    from ig2mj.viewer.acting import STEP_TIME, ActingWorld
+    from ig2mj.viewer.interactive import launch
+
+    file = find_policy(name)
+    policy = Policy.load(file)
+    depends = policy.card["depends"]
+    env = make(
+        depends["task"],
+        depends["robot"],
+        1,
+        "native",
+        depends["grasping"],
+        observations=policy.observations,
+        paper_rl=policy.card.get("paper_rl", False),
+        split="held_out",
+    )
+    act, size = acting(policy, env, file), env.core.starts.pool.size
+    if not 0 <= row < size:
+        raise Ig2mjError(f"--row {row}: the held-out start states are 0 to {size - 1}")
+    if video is not None:
+        from ig2mj.showcase.episode_film import EpisodeFilm
+
+        film, state = EpisodeFilm(video, env), env.start_from(np.array([row]))
+        try:
+            film.see(state)
+            while not bool(np.asarray(state.done)[0]):
+                state = env.step(state, act(state))
+                film.see(state)
+        finally:
+            film.close()
+        print(f"wrote {video} ({'success' if bool(np.asarray(state.info['success'])[0]) else 'no success'})")
+        return
+    world = ActingWorld(env, act, row)
+    launch(world, step_time=STEP_TIME, paused=paused)
+    print(f"{world.successes} of {world.episodes} episodes succeeded", file=sys.stderr)

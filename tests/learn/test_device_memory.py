@@ -1,0 +1,59 @@
+"""Out of device memory: one line with the number of worlds that would fit."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+
+import jax
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from small_envs import PointMass
+
+from ig2mj.learn import memory
+from ig2mj.learn.perception import Perception
+from ig2mj.learn.sac import SAC, SACConfig
+
+
+class Device:
+    def memory_stats(self):
+        return {"bytes_limit": 2_000_000_000}
+
+
+@pytest.fixture
+def sac():
+    env = PointMass(4)
+    return env, SAC(Perception(env.observation_spaces), 2, SACConfig(capacity=1_000_000))
+
+
+def test_the_number_of_worlds_that_fit_counts_worlds_and_replay_buffer(sac, monkeypatch):
+    env, algorithm = sac
+    monkeypatch.setattr(jax, "local_devices", lambda: [Device()])
+    line = memory.too_large(env, algorithm, 4096)
+    fit = int(re.search(r"--worlds (\d+)", line)[1])
+    assert "\n" not in line and "4096 worlds do not fit into 2.0 GB" in line
+    used = memory.world_bytes(env) * fit + memory.memory_bytes(algorithm, fit)
+    assert 0.8 * 2e9 < used <= memory.USED * 2e9 and fit % memory.STEP == 0
+    large = SAC(algorithm.perception, 2, SACConfig(capacity=100_000_000))
+    assert "take a smaller --set capacity" in memory.too_large(env, large, 4096)
+
+
+def test_the_bytes_of_a_replay_buffer_are_those_that_it_takes(sac):
+    _, algorithm = sac
+    small = SAC(algorithm.perception, 2, SACConfig(capacity=1000))
+    assert memory.memory_bytes(small, 10) == sum(a.nbytes for a in jax.tree.leaves(small.memory(10)))
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        "RESOURCE_EXHAUSTED: Out of memory while trying to allocate 64 bytes",
+        "Failed to allocate 5 bytes on device 'cuda:0'",
+    ],
+)
+def test_errors_of_both_allocators_are_known(message):
+    assert memory.is_out_of_memory(RuntimeError(message))
+    assert not memory.is_out_of_memory(RuntimeError("a shape is wrong"))

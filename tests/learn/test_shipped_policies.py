@@ -1,0 +1,136 @@
+"""Policies that ship: loaded by name, installed from a run with a model card, within their sizes."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import jax
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+from small_envs import PointMass
+
+from ig2mj.cli import call
+from ig2mj.errors import InputError, PolicyMismatch, UnknownNameError
+from ig2mj.learn import shipped
+from ig2mj.learn.bc import BC, BCConfig
+from ig2mj.learn.moments import Moments
+from ig2mj.learn.perception import Perception
+from ig2mj.learn.policies import Policy, depends_of, world_of
+
+EVALUATION = {
+    "split": "held_out",
+    "episodes": 1000,
+    "success_rate": 0.987,
+    "success_low": 0.978,
+    "success_high": 0.992,
+    "mean_return": 1.5,
+    "engine": "native",
+    "drawn": False,
+}
+
+
+def made(sizes=(16, 16), **world) -> Policy:
+    """An untrained policy, said to be for CookingMeat."""
+    env = PointMass(2)
+    perception = Perception(env.observation_spaces)
+    algorithm = BC(perception, 2, BCConfig(actor=sizes))
+    actor, _ = algorithm._imitation.init(jax.random.PRNGKey(0))
+    learner = type("Learner", (), {"actor": actor, "moments": Moments.initial(4)})
+    said = {"task": "CookingMeat", "robot": "humanoid", "grasping": "mitten", "actions": ["x", "y"], **world}
+    depends = depends_of({**world_of(env), **said}, perception)
+    command = "ig2mj train CookingMeat --algo bc --out /somewhere/runs/meat --demos /somewhere/meat.h5"
+    return Policy.of(algorithm, learner, depends, {"command": command, "seed": 0, "algorithm": "bc"})
+
+
+@pytest.fixture
+def run(tmp_path):
+    """A run's folder with its evaluation, and a folder for what ships."""
+    folder = tmp_path / "run"
+    folder.mkdir()
+    policy = made()
+    policy.save(folder / "policy.npz")
+    evaluation = tmp_path / "evaluation.json"
+    evaluation.write_text("a remark\n" + json.dumps({**EVALUATION, "weights": policy.weights_digest}) + "\n")
+    (tmp_path / "policies").mkdir()
+    return folder, evaluation, tmp_path / "policies"
+
+
+def test_a_run_becomes_a_policy_that_is_found_by_name(run, monkeypatch):
+    folder, evaluation, target = run
+    file = shipped.add_policy(folder, evaluation, folder=target)
+    assert file.name == "CookingMeat-state.npz"
+    loaded = Policy.load(file)
+    assert loaded.card["evaluation"]["success_rate"] == 0.987
+    assert loaded.weights_digest == made().weights_digest
+    assert "somewhere" not in loaded.card["command"] and "--demos meat.h5" in loaded.card["command"]
+    page = file.with_suffix(".md").read_text()
+    assert "98.7% of 1,000 held-out episodes" in page and "helped by | nobody" in page
+    monkeypatch.setattr(shipped, "shipped", lambda: {"CookingMeat-state": file})
+    assert shipped.find_policy("CookingMeat-state") == file
+    with pytest.raises(UnknownNameError, match="near matches: CookingMeat-state"):
+        shipped.find_policy("CookingMeat-stat")
+
+
+def test_a_name_says_what_is_unusual():
+    assert shipped.usual_name(made()) == "CookingMeat-state"
+    assert shipped.usual_name(made(robot="fetch", grasping="physical")) == "CookingMeat-fetch-physical-state"
+    assert shipped.usual_name(made(task="PointNavigation", robot="turtlebot", grasping="physical")) == "PointNavigation"
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"weights": "0"}, "weights: is the evaluation of another policy"),
+        ({"split": "train"}, "not of held-out states"),
+        ({"episodes": None}, "episodes: is missing"),
+    ],
+)
+def test_an_evaluation_of_something_else_is_refused(run, change, told):
+    folder, evaluation, target = run
+    found = json.loads(evaluation.read_text().splitlines()[-1]) | change
+    evaluation.write_text(json.dumps({k: v for k, v in found.items() if v is not None}))
+    with pytest.raises(InputError, match=told):
+        shipped.add_policy(folder, evaluation, folder=target)
+    assert not list(target.iterdir())
+
+
+def test_a_file_too_large_is_refused_and_leaves_nothing(run, monkeypatch):
+    folder, evaluation, target = run
+    for limit, told in (("MOST_BYTES", "a policy may have"), ("MOST_BYTES_OF_ALL", "all policies together")):
+        with monkeypatch.context() as patched:
+            patched.setattr(shipped, limit, 1000)
+            with pytest.raises(InputError, match=told):
+                shipped.add_policy(folder, evaluation, folder=target)
+        assert not list(target.iterdir())
+
+
+def test_what_ships_is_within_its_sizes_and_evaluated_on_a_thousand_held_out_episodes():
+    files = shipped.shipped((shipped.CHECKOUT,))
+    assert sum(file.stat().st_size for file in files.values()) <= shipped.MOST_BYTES_OF_ALL
+    for name, file in files.items():
+        assert file.stat().st_size <= shipped.MOST_BYTES, name
+        policy = Policy.load(file)
+        assert policy.card["evaluation"]["episodes"] >= shipped.EPISODES, name
+        assert policy.card["digest"] and shipped.usual_name(policy) == name
+        assert file.with_suffix(".md").read_text() == shipped.model_card(name, policy)
+
+
+def test_a_policy_for_another_robot_is_a_mismatch_that_names_the_pair():
+    env = PointMass(2)
+    with pytest.raises(PolicyMismatch, match='is for task = "CookingMeat", and here it is "PointMass"'):
+        made().check(env, Perception(env.observation_spaces))
+
+
+def test_the_shell_lists_shows_and_adds(run, monkeypatch, capsys):
+    folder, evaluation, target = run
+    assert call(["policies", "add", str(folder), "--evaluation", str(evaluation), "--folder", str(target)]) == 0
+    assert "CookingMeat-state.npz" in capsys.readouterr().out
+    assert call(["policies", "show", str(target / "CookingMeat-state.npz")]) == 0
+    assert "# CookingMeat-state" in capsys.readouterr().out
+    monkeypatch.setattr(shipped, "shipped", lambda: {"CookingMeat-state": target / "CookingMeat-state.npz"})
+    assert call(["policies", "list", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["CookingMeat-state"]["evaluation"]["episodes"] == 1000
