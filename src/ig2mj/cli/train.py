@@ -75,9 +75,9 @@ def run(
 
     import jax
 
+    from ig2mj.cli.train_films import Films
     from ig2mj.cluster.place import place_of
     from ig2mj.cluster.team import Team
-    from ig2mj.cli.train_films import Films
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.errors import Ig2mjError, UnknownNameError
     from ig2mj.learn.algorithms import config_of, made
