@@ -193,7 +193,7 @@ def pyproject() -> dict:
     return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 
-DATA_PACKAGE = "ig2mj_scenes"
+DATA_PACKAGES = ("ig2mj_policies", "ig2mj_scenes")
 """The homes that ship: packed as they are, no Python among them."""
 
 
@@ -209,7 +209,7 @@ def packed_folders() -> dict[str, pathlib.Path]:
 
 def test_the_package_list_of_pyproject_is_complete():
     listed = pyproject()["tool"]["setuptools"]["packages"]
-    assert sorted(listed) == sorted([*packed_folders(), DATA_PACKAGE])
+    assert sorted(listed) == sorted([*packed_folders(), *DATA_PACKAGES])
 
 
 def test_every_package_has_an_init_file():
