@@ -19,7 +19,7 @@ import jax.numpy as jnp
 import numpy as np
 import results
 from kernel_times import profiled
-from throughput import device, memory
+from throughput import device, exclusive, memory
 
 import ig2mj
 from ig2mj.engine.warp.profile import EngineProfile
@@ -69,16 +69,17 @@ def run(name: str, num_worlds: int, args: argparse.Namespace) -> dict:
     carry = (state, jnp.zeros((num_worlds, size)), jax.random.key(1))
     call = program.lower(carry).compile() if env.core.engine.pure else program
     ready = time.time() - began
-    carry, seen = jax.block_until_ready(call(carry))
-    times, totals = [], []
-    while len(times) < 2 or sum(times) < 60 * args.minutes:
-        start = time.time()
+    with exclusive(args.lock):
         carry, seen = jax.block_until_ready(call(carry))
-        times.append(time.time() - start)
-        totals.append([float(np.mean(s)) for s in seen])
-    kernels: dict = {}
-    if args.kernels:
-        (carry, seen), kernels = profiled(lambda: call(carry), CALL, args.kernels, "agent step")
+        times, totals = [], []
+        while len(times) < 2 or sum(times) < 60 * args.minutes:
+            start = time.time()
+            carry, seen = jax.block_until_ready(call(carry))
+            times.append(time.time() - start)
+            totals.append([float(np.mean(s)) for s in seen])
+        kernels: dict = {}
+        if args.kernels:
+            (carry, seen), kernels = profiled(lambda: call(carry), CALL, args.kernels, "agent step")
     state = carry[0]
     steps = num_worlds * len(times) * CALL
     reward, done, held, success = np.mean(totals, axis=0)
@@ -122,6 +123,7 @@ def main() -> None:
         "--profile", type=int, nargs=4, help="buffers: awake dofs, constraints, contacts, convex contacts of a world"
     )
     parser.add_argument("--kernels", type=int, default=0, metavar="N", help="print the N longest kernels of a GPU")
+    parser.add_argument("--lock", type=pathlib.Path, help="file to lock while timing, as of throughput.py")
     parser.add_argument("--rows", type=pathlib.Path, help="rows are added to this file, as JSON lines")
     args = parser.parse_args()
     for name in args.environments:

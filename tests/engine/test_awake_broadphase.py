@@ -14,6 +14,7 @@ from ig2mj.engine.warp.patches import awake_kernels, pins
 pytestmark = pytest.mark.skipif(bool(pins.mismatches()), reason=f"our kernels do not fit: {pins.mismatches()}")
 if not pins.mismatches():
     from ig2mj.engine.warp.patches.broadphase import serves
+    from ig2mj.engine.warp.patches.replacements import KERNELS
 
 WORLDS = 8
 THINGS = 24
@@ -48,6 +49,9 @@ def _pairs(put, data, before: np.ndarray | None) -> set[tuple[int, int, int]]:
     world, pair = context.collision_worldid.numpy()[:count], context.collision_pair.numpy()[:count]
     found = [(int(w), int(a), int(b)) for w, (a, b) in zip(world, pair, strict=True)]
     assert len(found) == len(set(found)), "no pair twice"
+    if KERNELS.active:
+        kinds = [tuple(put.geom_type.numpy()[p]) for p in pair]
+        assert kinds == sorted(kinds) and len(set(kinds)) > 3, "pairs are sorted by their types"
     return set(found)
 
 
@@ -62,8 +66,10 @@ def test_it_finds_the_pairs_that_upstream_finds(second_pass: bool):
     state = np.array(data.body_awake.numpy())
     movable = state != int(types.SleepState.STATIC)
     kinds = [int(types.SleepState.ASLEEP), int(types.SleepState.AWAKE)]
-    before = np.where(movable, rng.choice(kinds, state.shape, p=[0.7, 0.3]), state).astype(np.int32)
-    woken = np.where(movable & (rng.random(state.shape) < 0.2), kinds[1], before).astype(np.int32)
+    trees = np.maximum(model.body_treeid, 0)  # all bodies of a tree sleep or none
+    awake, wakes = (rng.random((WORLDS, model.ntree))[:, trees] < share for share in (0.3, 0.2))
+    before = np.where(movable, np.where(awake, kinds[1], kinds[0]), state).astype(np.int32)
+    woken = np.where(movable & wakes, kinds[1], before).astype(np.int32)
     qpos = np.array(data.qpos.numpy()) + rng.normal(0, 0.02, (WORLDS, model.nq)).astype(np.float32)
     data.qpos.assign(qpos)
     mujoco_warp.kinematics(put, data)

@@ -2,8 +2,10 @@
 
 MuJoCo Warp's two broad phases go through all pairs of geoms, or sort all geoms, of every world in every step, twice; in
 a home of 60 objects with 600 colliding geoms that is more than half of its physics. What sleeps or stands meets nothing
-new. Here each geom of an awake body is held against all others: bounding spheres first, then MuJoCo Warp's own filter.
-The pairs found are the same, in another order.
+new. Here each kinematic tree that is awake gets a box around the bounding spheres of its geoms (`_boxes`); geoms whose
+spheres reach into one of a world's boxes become its candidates (`_candidates`); awake geoms and candidates are held
+against each other, spheres first, then by MuJoCo Warp's own filter (`_pairs_kernel`). The pairs found are the same, in
+another order; then they are sorted by the types of their geoms (`sorted_pairs`).
 """
 
 # Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
@@ -18,15 +20,127 @@ import warp as wp
 from mujoco.mjx.third_party.mujoco_warp._src import collision_driver, types
 from mujoco.mjx.third_party.mujoco_warp._src.math import upper_tri_index
 
-LANES = 16
-"""Threads that share the partners of one geom in one world."""
+from ig2mj.engine.warp.patches.sorted_pairs import sort_pairs
 
-AWAKE = int(types.SleepState.AWAKE)
+LANES = 32
+"""Threads that share the candidates of one world."""
+
+AWAKE = wp.constant(int(types.SleepState.AWAKE))
+
+TREES, MOVERS, NEAR = wp.constant(0), wp.constant(1), wp.constant(2)
+"""Columns of a world's counts: trees that are awake, their geoms, and candidates for their partners."""
+
+
+@wp.func
+@no_type_check
+def _newly(body_awake: wp.array2d[int], before: wp.array2d[int], incremental: bool, world: int, body: int) -> bool:
+    """Whether a body is awake; in the second pass, whether the first pass woke it."""
+    if body_awake[world, body] != AWAKE:
+        return False
+    return not incremental or before[world, body] != AWAKE
+
+
+@wp.func
+@no_type_check
+def _reach(
+    rbound: wp.array2d[float], margin: wp.array2d[float], gap: wp.array2d[float], world: int, geom: int
+) -> float:
+    """Radius of a geom's bounding sphere with what its contacts may be listed ahead; 0 for planes, which have none."""
+    bound = rbound[world % rbound.shape[0], geom]
+    if bound <= 0.0:
+        return 0.0
+    return bound + margin[world % margin.shape[0], geom] + gap[world % gap.shape[0], geom]
+
+
+@wp.kernel(enable_backward=False)
+@no_type_check
+def _boxes(
+    incremental: bool,
+    nbody: int,
+    tree_dofadr: wp.array[int],
+    dof_bodyid: wp.array[int],
+    body_treeid: wp.array[int],
+    body_geomadr: wp.array[int],
+    body_geomnum: wp.array[int],
+    geom_contype: wp.array[int],
+    geom_conaffinity: wp.array[int],
+    geom_rbound: wp.array2d[float],
+    geom_margin: wp.array2d[float],
+    geom_gap: wp.array2d[float],
+    geom_xpos: wp.array2d[wp.vec3],
+    body_awake: wp.array2d[int],
+    body_awake_before: wp.array2d[int],
+    count: wp.array2d[int],
+    boxes: wp.array3d[wp.vec3],
+):
+    """A box for each tree that is awake, in no order: its corners with the lowest and the highest coordinates."""
+    world, tree = wp.tid()
+    root = dof_bodyid[tree_dofadr[tree]]
+    if not _newly(body_awake, body_awake_before, incremental, world, root):
+        return
+    low = wp.vec3(1.0e10, 1.0e10, 1.0e10)
+    high = wp.vec3(-1.0e10, -1.0e10, -1.0e10)
+    for body in range(root, nbody):  # a tree's bodies follow each other
+        if body_treeid[body] != tree:
+            break
+        for k in range(body_geomnum[body]):
+            geom = body_geomadr[body] + k
+            if geom_contype[geom] != 0 or geom_conaffinity[geom] != 0:
+                reach = _reach(geom_rbound, geom_margin, geom_gap, world, geom)
+                middle = geom_xpos[world, geom]
+                corner = wp.vec3(reach, reach, reach)
+                low = wp.min(low, middle - corner)
+                high = wp.max(high, middle + corner)
+    if low[0] <= high[0]:
+        place = wp.atomic_add(count, world, TREES, 1)
+        boxes[world, place, 0] = low
+        boxes[world, place, 1] = high
+
+
+@wp.kernel(enable_backward=False)
+@no_type_check
+def _candidates(
+    incremental: bool,
+    geom_bodyid: wp.array[int],
+    geom_contype: wp.array[int],
+    geom_conaffinity: wp.array[int],
+    geom_rbound: wp.array2d[float],
+    geom_margin: wp.array2d[float],
+    geom_gap: wp.array2d[float],
+    geom_xpos: wp.array2d[wp.vec3],
+    body_awake: wp.array2d[int],
+    body_awake_before: wp.array2d[int],
+    boxes: wp.array3d[wp.vec3],
+    count: wp.array2d[int],
+    movers: wp.array2d[int],
+    near: wp.array2d[int],
+):
+    """Lists each world's awake geoms, and all that reach into one of its boxes, in no order."""
+    world, geom = wp.tid()
+    trees = count[world, TREES]
+    if trees == 0 or (geom_contype[geom] == 0 and geom_conaffinity[geom] == 0):
+        return
+    body = geom_bodyid[geom]
+    if _newly(body_awake, body_awake_before, incremental, world, body):
+        movers[world, wp.atomic_add(count, world, MOVERS, 1)] = geom
+    elif incremental and body_awake[world, body] == AWAKE:
+        return  # the first pass had its pairs with all that was asleep then
+    reach = _reach(geom_rbound, geom_margin, geom_gap, world, geom)
+    place = geom_xpos[world, geom]
+    found = reach == 0.0  # a plane reaches everywhere
+    for k in range(trees):
+        if not found:
+            low = boxes[world, k, 0]
+            high = boxes[world, k, 1]
+            apart = place - wp.max(low, wp.min(place, high))
+            found = wp.dot(apart, apart) <= reach * reach
+    if found:
+        near[world, wp.atomic_add(count, world, NEAR, 1)] = geom
 
 
 @functools.cache
 @no_type_check
-def _kernel(
+def _pairs_kernel(
     rules: int,
     aabbs: int,
     rbounds: int,
@@ -35,13 +149,12 @@ def _kernel(
     pair_margins: int,
     pair_gaps: int,
     dataids: int,
-    incremental: bool,
 ) -> wp.Kernel:
     """The kernel for a model whose arrays have so many rows (1, or one for each world)."""
     close = collision_driver._broadphase_filter(rules, aabbs, rbounds, margins, gaps, pair_margins, pair_gaps)
 
     @wp.kernel(module="unique", enable_backward=False, grid_stride=False)
-    def awake_broadphase(
+    def awake_pairs(
         ngeom: int,
         geom_type: wp.array[int],
         geom_bodyid: wp.array[int],
@@ -56,82 +169,77 @@ def _kernel(
         geom_xpos: wp.array2d[wp.vec3],
         geom_xmat: wp.array2d[wp.mat33],
         body_awake: wp.array2d[int],
-        body_awake_before: wp.array2d[int],
+        count: wp.array2d[int],
+        movers: wp.array2d[int],
+        near: wp.array2d[int],
         naconmax: int,
         ncollision: wp.array[int],
         collision_pair: wp.array[wp.vec2i],
         collision_pairid: wp.array[wp.vec2i],
         collision_worldid: wp.array[int],
     ):
-        world, geom, lane = wp.tid()
-        body = geom_bodyid[geom]
-        if body_awake[world, body] != wp.static(AWAKE):
-            return
-        if wp.static(incremental) and body_awake_before[world, body] == wp.static(AWAKE):
-            return  # the first pass had all pairs of what was awake then
-        place = geom_xpos[world, geom]
-        bound = geom_rbound[world % geom_rbound.shape[0], geom]
-        slack = geom_margin[world % geom_margin.shape[0], geom] + geom_gap[world % geom_gap.shape[0], geom]
-        for other in range(lane, ngeom, wp.static(LANES)):
-            other_bound = geom_rbound[world % geom_rbound.shape[0], other]
-            if bound > 0.0 and other_bound > 0.0:  # planes have none
-                apart = geom_xpos[world, other] - place
-                reach = bound + other_bound + slack
-                reach += geom_margin[world % geom_margin.shape[0], other] + geom_gap[world % geom_gap.shape[0], other]
-                if wp.dot(apart, apart) > reach * reach:
+        world, lane = wp.tid()
+        for c in range(lane, count[world, wp.static(NEAR)], wp.static(LANES)):
+            other = near[world, c]
+            awake = body_awake[world, geom_bodyid[other]] == wp.static(AWAKE)
+            place = geom_xpos[world, other]
+            reach = _reach(geom_rbound, geom_margin, geom_gap, world, other)
+            for k in range(count[world, wp.static(MOVERS)]):
+                geom = movers[world, k]
+                if other <= geom and awake:
+                    continue  # a pair of two that are awake is found by its first geom
+                if reach > 0.0:
+                    apart = geom_xpos[world, geom] - place
+                    both = reach + _reach(geom_rbound, geom_margin, geom_gap, world, geom)
+                    if wp.dot(apart, apart) > both * both:
+                        continue
+                first = wp.min(geom, other)
+                second = wp.max(geom, other)
+                pairid = nxn_pairid[upper_tri_index(ngeom, first, second)]
+                if pairid[0] < -1 and pairid[1] < 0:
                     continue
-            other_body = geom_bodyid[other]
-            if other <= geom and body_awake[world, other_body] == wp.static(AWAKE):
-                continue  # a pair of two that are awake is found by its first geom
-            if wp.static(incremental) and body_awake_before[world, other_body] == wp.static(AWAKE):
-                continue
-            first = wp.min(geom, other)
-            second = wp.max(geom, other)
-            pairid = nxn_pairid[upper_tri_index(ngeom, first, second)]
-            if pairid[0] < -1 and pairid[1] < 0:
-                continue
-            first_type = geom_type[first]
-            second_type = geom_type[second]
-            if wp.static(dataids > 1):
-                row = world % geom_dataid.shape[0]
-                if collision_driver._mesh_missing(geom_dataid, first, first_type, row):
-                    continue
-                if collision_driver._mesh_missing(geom_dataid, second, second_type, row):
-                    continue
-            near = close(
-                geom_aabb,
-                geom_rbound,
-                geom_margin,
-                geom_gap,
-                pair_margin,
-                pair_gap,
-                geom_xpos,
-                geom_xmat,
-                first,
-                second,
-                pairid[0],
-                world,
-            )
-            if near or pairid[1] >= 0:
-                collision_driver._add_geom_pair(
-                    naconmax,
+                first_type = geom_type[first]
+                second_type = geom_type[second]
+                if wp.static(dataids > 1):
+                    row = world % geom_dataid.shape[0]
+                    if collision_driver._mesh_missing(geom_dataid, first, first_type, row):
+                        continue
+                    if collision_driver._mesh_missing(geom_dataid, second, second_type, row):
+                        continue
+                meets = close(
+                    geom_aabb,
+                    geom_rbound,
+                    geom_margin,
+                    geom_gap,
+                    pair_margin,
+                    pair_gap,
+                    geom_xpos,
+                    geom_xmat,
                     first,
                     second,
-                    first_type,
-                    second_type,
+                    pairid[0],
                     world,
-                    pairid,
-                    ncollision,
-                    collision_pair,
-                    collision_pairid,
-                    collision_worldid,
                 )
+                if meets or pairid[1] >= 0:
+                    collision_driver._add_geom_pair(
+                        naconmax,
+                        first,
+                        second,
+                        first_type,
+                        second_type,
+                        world,
+                        pairid,
+                        ncollision,
+                        collision_pair,
+                        collision_pairid,
+                        collision_worldid,
+                    )
 
-    return awake_broadphase
+    return awake_pairs
 
 
 def awake_broadphase(m: Any, d: Any, ctx: Any, awake_prev: Any = None) -> None:
-    """Finds pairs of geoms that may touch, where at least one is awake.
+    """Finds pairs of geoms that may touch, where at least one is awake, sorted by the types of their geoms.
 
     Args:
       m, d, ctx: MuJoCo Warp's model, data and collision context. The model must have sleep on, no explicit contact
@@ -139,31 +247,53 @@ def awake_broadphase(m: Any, d: Any, ctx: Any, awake_prev: Any = None) -> None:
       awake_prev: which bodies were awake in the first pass of this step; given in the second pass, which looks for the
         pairs of what that pass woke.
     """
-    arrays = (m.geom_aabb, m.geom_rbound, m.geom_margin, m.geom_gap, m.pair_margin, m.pair_gap, m.geom_dataid)
-    kernel = _kernel(m.opt.broadphase_filter, *(a.shape[0] for a in arrays), awake_prev is not None)
+    before = d.body_awake if awake_prev is None else awake_prev
+    spheres = [m.geom_rbound, m.geom_margin, m.geom_gap]
+    collides = [m.geom_contype, m.geom_conaffinity]
+    count = wp.zeros((d.nworld, 3), dtype=int)
+    boxes = wp.empty((d.nworld, m.ntree, 2), dtype=wp.vec3)
+    # MJX passes on what upstream's functions read, and leaves other fields (`tree_bodynum`) empty
+    bodies = [m.nbody, m.tree_dofadr, m.dof_bodyid, m.body_treeid, m.body_geomadr, m.body_geomnum]
+    awake = [d.body_awake, before]
     wp.launch(
-        kernel,
-        dim=(d.nworld, m.ngeom, LANES),
+        _boxes,
+        dim=(d.nworld, m.ntree),
+        inputs=[awake_prev is not None, *bodies, *collides, *spheres, d.geom_xpos, *awake],
+        outputs=[count, boxes],
+    )
+    movers = wp.empty((d.nworld, m.ngeom), dtype=int)
+    near = wp.empty((d.nworld, m.ngeom), dtype=int)
+    wp.launch(
+        _candidates,
+        dim=(d.nworld, m.ngeom),
+        inputs=[awake_prev is not None, m.geom_bodyid, *collides, *spheres, d.geom_xpos, *awake, boxes],
+        outputs=[count, movers, near],
+    )
+    arrays = (m.geom_aabb, *spheres, m.pair_margin, m.pair_gap, m.geom_dataid)
+    wp.launch(
+        _pairs_kernel(m.opt.broadphase_filter, *(a.shape[0] for a in arrays)),
+        dim=(d.nworld, LANES),
         inputs=[
             m.ngeom,
             m.geom_type,
             m.geom_bodyid,
             m.geom_dataid,
             m.geom_aabb,
-            m.geom_rbound,
-            m.geom_margin,
-            m.geom_gap,
+            *spheres,
             m.pair_margin,
             m.pair_gap,
             m.nxn_pairid,
             d.geom_xpos,
             d.geom_xmat,
             d.body_awake,
-            d.body_awake if awake_prev is None else awake_prev,
+            count,
+            movers,
+            near,
             d.naconmax,
         ],
         outputs=[d.ncollision, ctx.collision_pair, ctx.collision_pairid, ctx.collision_worldid],
     )
+    sort_pairs(m, d, ctx)
 
 
 def serves(m: Any) -> bool:

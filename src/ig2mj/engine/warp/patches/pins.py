@@ -44,6 +44,14 @@ PINS: dict[str, dict[str, str]] = {
         "_broadphase_filter": "41a3e719defc2bbb",
         "_mesh_missing": "ba0b184b9e6feeb6",
         "_add_geom_pair": "a263137856fb448b",
+        "create_collision_context": "17130b8ffb859316",
+        "_narrowphase": "ee2ccd9e09b5570d",
+    },
+    "third_party.mujoco_warp._src.sleep": {
+        "sleep": "26f96a277dece2bd",
+        "_sweep_awake_trees": "0579b7a7f89dbd56",
+        "_check_island_can_sleep": "0a4c452212d2ec59",
+        "_build_cycles": "d9907205cea19db8",
     },
     "third_party.mujoco_warp._src.forward": {
         "_advance": "54efaa99438929bd",

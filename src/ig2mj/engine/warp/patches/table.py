@@ -3,8 +3,9 @@
 import functools
 
 from mujoco.mjx.third_party.mujoco_warp._src import collision_driver, forward, passive, solver
+from mujoco.mjx.third_party.mujoco_warp._src import sleep as sleep_module
 
-from ig2mj.engine.warp.patches import collision, compact_solver, gravity, velocity
+from ig2mj.engine.warp.patches import collision, compact_solver, gravity, sleeping, velocity
 
 OWN = {
     (solver, "_cholesky_factorize_solve"): compact_solver.cholesky_factorize_solve,
@@ -17,4 +18,5 @@ OWN = {
     (collision_driver, "sap_broadphase"): functools.partial(collision.choose_broadphase, "sap_broadphase"),
     (forward, "_advance"): velocity.advance,
     (forward, "fwd_velocity"): velocity.fwd_velocity,
+    (sleep_module, "sleep"): sleeping.sleep,
 }
