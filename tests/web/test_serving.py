@@ -29,9 +29,10 @@ async def echo(connection) -> None:
         await connection.send(message)
 
 
-def only_ping(message) -> None:
-    if message not in ("ping", "pong"):
+def only_ping(message) -> bool:
+    if message not in ("ping", "unwanted"):
         raise ValueError(message)
+    return message == "ping"
 
 
 def serving(token: str | None = None, **options) -> PageServer:
@@ -135,6 +136,13 @@ def test_another_sites_page_gets_nothing():
         assert talk(server, Origin=f"http://127.0.0.1:{server.port}") == "ping"
         assert get(server, Host="evil.example")[0] == 403
         assert get(server, Host=f"localhost:{server.port}")[0] == 200
+
+
+def test_an_unwanted_message_is_dropped_and_the_page_stays():
+    with serving() as server, connect(f"ws://127.0.0.1:{server.port}/") as page:
+        page.send("unwanted")
+        page.send("ping")
+        assert page.recv(timeout=10) == "ping"
 
 
 def test_a_thousand_bad_messages_and_requests_harm_nobody():

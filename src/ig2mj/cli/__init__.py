@@ -53,6 +53,7 @@ COMMANDS: dict[str, str] = {
     "demo": "convert the small home, run it, tell what stands where, cook a fish in it",
     "convert": "turn an iGibson scene, or the URDF of an object or a robot, into MJCF",
     "view": "open a scene in MuJoCo's viewer, or write a picture of it",
+    "web": "show a scene, a task or a recording in the browser, on machines without a display",
     "inspect": "list a scene's objects, joints, abilities and rooms",
     "states": "list the extended states of a scene's objects",
     "predicates": "tell what holds in a scene, or what an expression still lacks",

@@ -131,6 +131,15 @@ class Replayer:
             found += self._by_action(now, check, watch) if self.by == "action" else self._by_state(now, watch)
         return Replayed(sum(1 for r in wanted if r.frames), frames, found, self.warnings)
 
+    def at(self, run: Run, frame: int) -> EnvState:
+        """The environment at a frame of a run as it was written; every world stands where that one did.
+
+        Raises:
+          InputError: an array of the file is broken.
+        """
+        rows = run.frame_rows(self._names, frame, frame + 1, self._like)
+        return self._put({run.world: [array[0, ...] for array in rows]}, {run.world: run})
+
     def _by_action(self, now: dict[int, Run], check: bool, watch: Watch | None) -> list[Difference]:
         found: dict[int, Difference] = {}
         readers = {world: self._frames(run) for world, run in now.items()}

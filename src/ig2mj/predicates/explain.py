@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import jax
@@ -25,10 +26,17 @@ def explain(compiled: CompiledExpression, states: ExtendedStates, view: PhysicsV
     context = Context(compiled.model, states, view, questions.relations(states, view))
     truth = np.asarray(compiled.literals.combine(questions.facts(compiled.literals, states, view), states.sliced))[0]
     table = dict(zip(compiled.atoms, truth.tolist(), strict=True))
-    if _value(compiled.ground, table):
+    if value_of(compiled.ground, table):
         return f"{logic.text(compiled.source)} holds."
     lines = [f"{logic.text(compiled.source)} does not hold. Missing:"]
-    literals = {x.atom: x for x in compiled.literals.literals}
+    _missing(compiled.ground, table, True, reason_of(compiled, context), lines, "  ")
+    return "\n".join(lines)
+
+
+def reason_of(compiled: CompiledExpression, context: Context) -> Callable[[Atom], str]:
+    """What gives the numbers behind a literal of an expression, in the first world of a context; "" where there are
+    none."""
+    literals, states = {x.atom: x for x in compiled.literals.literals}, context.states
 
     def reason(atom: Atom) -> str:
         literal = literals[atom]
@@ -38,36 +46,37 @@ def explain(compiled: CompiledExpression, states: ExtendedStates, view: PhysicsV
             return "judged by its halves"
         return literal.predicate.why(context, literal.arguments, 0) if literal.predicate.why else ""
 
-    _missing(compiled.ground, table, True, reason, lines, "  ")
-    return "\n".join(lines)
+    return reason
 
 
-def _value(e: Expression, table: dict[Atom, bool]) -> bool:
+def value_of(e: Expression, table: dict[Atom, bool]) -> bool:
+    """Truth of a ground expression, from that of its atoms."""
     match e:
         case Atom():
             return table[e]
         case Not(part):
-            return not _value(part, table)
+            return not value_of(part, table)
         case And(parts):
-            return all(_value(p, table) for p in parts)
+            return all(value_of(p, table) for p in parts)
         case Or(parts):
-            return any(_value(p, table) for p in parts)
+            return any(value_of(p, table) for p in parts)
         case Exactly(count, parts):
-            return sum(_value(p, table) for p in parts) == count
+            return sum(value_of(p, table) for p in parts) == count
         case Pairing(count, rows):
-            rows_found, columns_found = _pairs(rows, table)
+            rows_found, columns_found = pairs_found(rows, table)
             return min(rows_found, columns_found) >= count
     raise TypeError(f"{e!r} is no ground expression")
 
 
-def _pairs(rows, table: dict[Atom, bool]) -> tuple[int, int]:
-    grid = [[p is not None and _value(p, table) for p in row] for row in rows]
+def pairs_found(rows, table: dict[Atom, bool]) -> tuple[int, int]:
+    """Of a pairing: how many of its rows, and of its columns, have one that holds."""
+    grid = [[p is not None and value_of(p, table) for p in row] for row in rows]
     return sum(any(row) for row in grid), sum(any(column) for column in zip(*grid, strict=True))
 
 
 def _missing(e: Expression, table: dict[Atom, bool], wanted: bool, reason, lines: list[str], indent: str) -> None:
     """Adds lines about `e`, which is not as wanted."""
-    if _value(e, table) == wanted:
+    if value_of(e, table) == wanted:
         return
     match e:
         case Atom():
@@ -85,12 +94,12 @@ def _missing(e: Expression, table: dict[Atom, bool], wanted: bool, reason, lines
             for p in parts:
                 _missing(p, table, wanted, reason, lines, indent)
         case Exactly(count, parts):
-            found = sum(_value(p, table) for p in parts)
+            found = sum(value_of(p, table) for p in parts)
             lines.append(f"{indent}{'' if wanted else 'not '}exactly {count} of {len(parts)} (now {found}):")
             for p in parts:
                 _missing(p, table, found < count, reason, lines, indent + "  ")
         case Pairing(count, rows):
-            found = min(_pairs(rows, table))
+            found = min(pairs_found(rows, table))
             lines.append(f"{indent}{'' if wanted else 'not '}{count} pairs (now {found}):")
             for p in (p for row in rows for p in row if p is not None):
                 _missing(p, table, wanted, reason, lines, indent + "  ")

@@ -45,7 +45,8 @@ MOST_PAGES = 32
 """Web sockets at a time."""
 
 Talk = Callable[[ServerConnection], Awaitable[None]]
-Check = Callable[[str | bytes], object]
+Check = Callable[[str | bytes], bool]
+"""Whether a message is wanted; raises ValueError for one that no page of ours sends."""
 
 _SILENT = logging.getLogger("ig2mj.web.websockets")
 _SILENT.addHandler(logging.NullHandler())
@@ -82,7 +83,7 @@ class Gate:
     """
 
     def __init__(self, access: Access, check: Check | None = None, largest: int = LARGEST_MESSAGE):
-        """`check` raises ValueError for messages that no page sends; `largest`: bytes of a message."""
+        """`check`: looks at every message, see `Check`; `largest`: bytes of a message."""
         self.access, self.check, self.largest, self.refused = access, check, largest, 0
         self._cookie, self._session = "ig2mj", secrets.token_urlsafe(32)
 
@@ -167,6 +168,11 @@ class Gate:
         }
 
 
+def page_headers() -> dict[str, str]:
+    """What every answer says: nothing from other hosts, no guessing of types, no keeping."""
+    return dict(_HEADERS)
+
+
 class GuardedConnection(ServerConnection):
     """A web socket that ends itself when its page sends what no page sends, or too much of it."""
 
@@ -182,7 +188,8 @@ class GuardedConnection(ServerConnection):
         reason = "too many messages" if self._allowance < 0 else ""
         if not reason and self.gate.check is not None:
             try:
-                self.gate.check(message)
+                if not self.gate.check(message):
+                    return await self.recv(decode)
             except ValueError:
                 reason = "malformed message"
         if reason:

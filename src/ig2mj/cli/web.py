@@ -1,0 +1,161 @@
+"""`ig2mj web SCENE|TASK|FILE`: the viewer in the browser, for machines without a display."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+from ig2mj.errors import Ig2mjError, UnknownNameError
+
+if TYPE_CHECKING:
+    from ig2mj.web.sources import Source
+
+AGENTS = ("zero", "random", "expert")
+_RECORDINGS = (".h5", ".hdf5")
+
+
+def run(
+    what: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENE|TASK|FILE")],
+    port: int = 8080,
+    host: str | None = None,
+    token: str | None = None,
+    certificate: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    key: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    goal: Annotated[str | None, tyro.conf.arg(metavar="EXPRESSION")] = None,
+    set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="STATE=OBJECT[=VALUE] ...")] = (),
+    pool: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="POOL.npz")] = None,
+    worlds: int = 1,
+    engine: str = "native",
+    agent: str = "zero",
+    robot: str | None = None,
+    seed: int = 0,
+    paused: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+) -> None:
+    """Show a home, a task or a recording in the browser, and let it run.
+
+    Only this machine can open the page, unless --host and --token are given. Ctrl+C ends it.
+
+    Args:
+      what: folder of a converted scene, its scene.xml, or the name of a home that comes with ig2mj; or an environment
+        (`ig2mj list-envs`); or a recording (`ig2mj rollout --record FILE`).
+      port: of the page; 0: any free one.
+      host: address to listen on besides this machine's own, e.g. 0.0.0.0; needs --token.
+      token: what the page demands, at least 16 letters and digits; auto draws one.
+      certificate: PEM file; the page is served by HTTPS.
+      key: PEM file of the certificate's private key, where it is not in the same file.
+      goal: scene: an expression that is shown with what is missing, e.g. '(cooked fish_0)'.
+      set: scene: set states first, e.g. toggled_on=stove or temperature=fish=80.
+      pool: scene: rows to start from (`ig2mj sample`).
+      worlds: how many there are; the page shows one of them.
+      engine: native, warp or jax. Objects can be dragged on the native one.
+      agent: task: who acts: zero, random, or expert.
+      robot: task: humanoid, fetch or turtlebot; default: the first that the task lists.
+      seed: task: of start states and of random actions.
+      paused: begin paused.
+    """
+    import sys
+
+    from ig2mj.install_hint import require_extras
+
+    require_extras("web")
+    from ig2mj.web.access import access_for
+
+    access = access_for(host, port, token, certificate, key)
+    if worlds < 1:
+        raise Ig2mjError(f"--worlds {worlds}: at least one is needed")
+    print(f"loading {what}; the address of the page comes when it is ready", file=sys.stderr, flush=True)
+    from ig2mj.web.viewer import WebViewer
+
+    source = _source(what, goal, set, pool, worlds, engine, agent, robot, seed)
+    with WebViewer(source, access, playing=not paused, title=f"ig2mj: {pathlib.Path(what).name}") as viewer:
+        print(viewer.url, flush=True)
+        viewer.wait()
+
+
+def _source(
+    what: str,
+    goal: str | None,
+    set: tuple[str, ...],
+    pool: pathlib.Path | None,
+    worlds: int,
+    engine: str,
+    agent: str,
+    robot: str | None,
+    seed: int,
+) -> Source:
+    from ig2mj.envs.names import activity_name, short_name
+
+    if agent not in AGENTS:
+        raise UnknownNameError("agent", agent, AGENTS)
+    file = pathlib.Path(what)
+    recorded = file.suffix.lower() in _RECORDINGS
+    task = not recorded and not file.exists() and (short_name(what) or activity_name(what)) is not None
+    if (recorded or task) and (goal is not None or set or pool is not None):
+        raise Ig2mjError("--goal, --set and --pool are for a scene; tasks and recordings have their own")
+    if not task and (agent != "zero" or robot is not None):
+        raise Ig2mjError("--agent and --robot are for a task")
+    if recorded:
+        return _recording(file)
+    if task:
+        return _task(what, worlds, engine, agent, robot, seed)
+    return _home(what, goal, set, pool, worlds, engine)
+
+
+def _recording(file: pathlib.Path) -> Source:
+    import sys
+
+    from ig2mj.demos.reader import Recording
+    from ig2mj.web.recorded import Recorded
+
+    source = Recorded(Recording(file))
+    for warning in source.warnings:
+        print(f"warning: {warning}", file=sys.stderr)
+    return source
+
+
+def _task(name: str, worlds: int, engine: str, agent: str, robot: str | None, seed: int) -> Source:
+    import numpy as np
+
+    from ig2mj.envs.experts import expert_of
+    from ig2mj.envs.registry import make
+    from ig2mj.web.sources import Acting
+
+    env = make(name, robot, worlds, engine)
+    shape, rng = (worlds, *env.action_space.shape), np.random.default_rng(seed)
+    nothing = np.zeros(shape, np.float32)
+    acts: dict[str, Any] = {
+        "zero": lambda state: nothing,
+        "random": lambda state: rng.uniform(-1, 1, shape).astype(np.float32),
+    }
+    return Acting(env, expert_of(env) if agent == "expert" else acts[agent], seed)
+
+
+def _home(
+    name: str, goal: str | None, set: tuple[str, ...], pool: pathlib.Path | None, worlds: int, engine: str
+) -> Source:
+    import jax
+    import numpy as np
+
+    from ig2mj.cli.worlds import started
+    from ig2mj.engine.registry import make_engine
+    from ig2mj.predicates import parse
+    from ig2mj.scene.scene import load_scene
+    from ig2mj.web.sources import Home
+    from ig2mj.worlds.core import Core
+    from ig2mj.worlds.pool import load_pool, load_pool_scene
+    from ig2mj.worlds.rules import Rules
+
+    if pool is not None and set:
+        raise Ig2mjError("--set belongs to a scene's own start: give it without --pool")
+    wanted = None if goal is None else parse(goal, "--goal")
+    scene = load_scene(name) if pool is None else load_pool_scene(pool, name)
+    rules = Rules.of_scene(scene)
+    compiled = None if wanted is None else rules.compiled(wanted)
+    core = Core(make_engine(engine, scene, worlds), rules, None if pool is None else load_pool(pool, scene))
+    if not set:
+        return Home(scene, core, compiled)
+    one = started(pathlib.Path(name), "paper", 0.0, set)
+    states = jax.tree.map(lambda a: np.repeat(np.asarray(a), worlds, 0), one.states)
+    return Home(scene, core, compiled, lambda core, batch: core.load(batch, one.engine.export(one.physics, 0), states))

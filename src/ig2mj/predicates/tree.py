@@ -1,0 +1,78 @@
+"""An expression as a tree of what holds and what does not, and why: for panels and other readers of parts."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING
+
+import jax
+import numpy as np
+
+from ig2mj.engine.view import PhysicsView
+from ig2mj.predicates import logic
+from ig2mj.predicates.base import Context
+from ig2mj.predicates.explain import pairs_found, reason_of, value_of
+from ig2mj.predicates.logic import And, Atom, Exactly, Expression, Not, Or, Pairing
+from ig2mj.predicates.questions import Questions
+from ig2mj.states.world import ExtendedStates
+
+if TYPE_CHECKING:
+    from ig2mj.predicates.compile import CompiledExpression
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """A part of an expression in one world.
+
+    Attributes:
+      text: the literal, or what its parts have to do ("all of", "one of"). literal: it has no parts.
+      holds: its truth. wanted: the truth that would make the whole hold. why: numbers behind a literal that is not as
+      wanted, else "". parts: of which it is made.
+    """
+
+    text: str
+    holds: bool
+    wanted: bool
+    literal: bool = False
+    why: str = ""
+    parts: tuple[Part, ...] = ()
+
+    @property
+    def fine(self) -> bool:
+        """It is as it should be."""
+        return self.holds == self.wanted
+
+
+def tree(compiled: CompiledExpression, states: ExtendedStates, view: PhysicsView, world: int = 0) -> Part:
+    """The expression in one world, without quantifiers: they are written out for the scene's objects."""
+    states, view = jax.tree.map(lambda leaf: np.asarray(leaf)[world : world + 1], (states, view))
+    questions = compiled.questions or Questions.of(compiled.model)
+    context = Context(compiled.model, states, view, questions.relations(states, view))
+    truth = np.asarray(compiled.literals.combine(questions.facts(compiled.literals, states, view), states.sliced))[0]
+    table = dict(zip(compiled.atoms, truth.tolist(), strict=True))
+    reason = reason_of(compiled, context)
+
+    def part(e: Expression, wanted: bool) -> Part:
+        holds = value_of(e, table)
+        match e:
+            case Atom():
+                why = reason(e) if holds != wanted else ""
+                return Part(logic.text(e), holds, wanted, True, why)
+            case Not(Atom() as inner):
+                inside = part(inner, not wanted)
+                return Part(f"not {inside.text}", holds, wanted, True, inside.why)
+            case Not(inner):
+                return Part("not", holds, wanted, parts=(part(inner, not wanted),))
+            case And(parts) | Or(parts):
+                name = "all of" if isinstance(e, And) else "one of"
+                return Part(name, holds, wanted, parts=tuple(part(p, wanted) for p in parts))
+            case Exactly(count, parts):
+                found = sum(value_of(p, table) for p in parts)
+                name = f"exactly {count} of {len(parts)}, now {found}"
+                return Part(name, holds, wanted, parts=tuple(part(p, found <= count) for p in parts))
+            case Pairing(count, rows):
+                inner = tuple(part(p, wanted) for row in rows for p in row if p is not None)
+                return Part(f"{count} pairs, now {min(pairs_found(rows, table))}", holds, wanted, parts=inner)
+        raise TypeError(f"{e!r} is no ground expression")
+
+    return part(compiled.ground, True)

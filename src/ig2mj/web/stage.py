@@ -1,0 +1,261 @@
+"""What pages see: the home as nodes of viser's scene, of which only what changed is sent.
+
+A body is a frame with what is drawn of it below; a pose is two short messages, geometry is sent once, and again only
+when its object's colour changes. Dust and stains hang on their bodies, so that they move for free.
+
+Axis: B bodies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import mujoco
+import numpy as np
+import viser
+from jaxtyping import Float
+
+from ig2mj.scene.scene import Scene
+from ig2mj.sensors.render_model import BACKGROUND
+from ig2mj.states.definitions.water import DROP_RADIUS
+from ig2mj.viewer.overlays import ObjectNames, RoomNames
+from ig2mj.viewer.overview import home_overview
+from ig2mj.web.geometry import PLAIN, Look, glb_of_geoms, visual_geoms
+from ig2mj.web.looks import WATER_COLOUR, Patches
+
+MOVED = 1e-5
+"""Metres, and parts of a quaternion: what differs less is not sent."""
+
+BUILDING = frozenset({"walls", "floors", "ceilings"})
+"""Categories that no click is for: they are behind everything."""
+
+Click = Callable[[int], None]
+Pull = Callable[[Any, int, Any], None]
+
+
+class Stage:
+    """The nodes of a home.
+
+    Attributes: sent: poses that were sent so far, and geometries.
+    """
+
+    def __init__(self, server: viser.ViserServer, scene: Scene, on_click: Click, on_drag: Pull | None):
+        """Sends the home as it starts.
+
+        Args:
+          on_click: called with the object that is clicked. on_drag: called with viser's event, a body, and the event's
+            node, while a movable body is dragged; None: nothing can be dragged.
+        """
+        self._server, self._scene, self._model = server, scene, scene.model
+        self._on_click, self._on_drag = on_click, on_drag
+        data = scene.start_data()
+        mujoco.mj_kinematics(self._model, data)
+        self._pos, self._quat = data.xpos.copy(), data.xquat.copy()
+        self._geoms: dict[int, list[int]] = {}
+        for g in _drawn(scene):
+            self._geoms.setdefault(int(self._model.geom_bodyid[g]), []).append(g)
+        self._looks: dict[int, Look] = {}
+        self._plain: dict[int, bytes] = {}
+        self._patches: dict[tuple[str, int], tuple[Patches, Any]] = {}
+        self._drops: Any = None
+        self._names: list[Any] = []
+        self._rooms: list[Any] = []
+        self._line: Any = None
+        self.sent = {"poses": 0, "geometries": 0}
+        owner = np.asarray(scene.tables.body_object)
+        self._object_of = {body: int(owner[body]) for body in range(self._model.nbody)}
+        self._prepare()
+        self._frames = {body: self._add_body(body) for body in sorted(self._geoms)}
+        self._view(data)
+
+    def _prepare(self) -> None:
+        scene = self._server.scene
+        scene.configure_environment_map("studio", environment_intensity=0.25)
+        scene.configure_default_lights(enabled=True, cast_shadow=False)
+        colour = np.round(np.array(BACKGROUND[:3]) * 255).astype(np.uint8)
+        scene.set_background_image(np.tile(colour, (4, 4, 1)), format="png")
+        scene.world_axes.visible = False
+
+    def _view(self, data: mujoco.MjData) -> None:
+        """Where pages look from at first: the whole home."""
+        view = home_overview(self._scene, data)
+        azimuth, elevation = np.radians(view.azimuth), np.radians(view.elevation)
+        flat = np.cos(elevation)
+        forward = np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])
+        camera, at = self._server.initial_camera, np.asarray(view.lookat, float)
+        camera.position, camera.look_at = tuple(at - 0.95 * view.distance * forward), tuple(at)
+        camera.fov = float(np.radians(45))
+        camera.near, camera.far = 0.05, 500.0
+
+    # Bodies.
+
+    def _add_body(self, body: int) -> Any:
+        pose: dict[str, Any] = {"position": tuple(self._pos[body]), "wxyz": tuple(self._quat[body])}
+        frame = self._server.scene.add_frame(f"/b{body}", show_axes=False, **pose)
+        self._draw(body, PLAIN)
+        return frame
+
+    def _draw(self, body: int, look: Look) -> None:
+        """Sends a body's geometry; in place of the one that is there."""
+        if look == PLAIN and body in self._plain:
+            glb = self._plain[body]
+        else:
+            glb = glb_of_geoms(self._model, self._geoms[body], look)
+        if look == PLAIN:
+            self._plain[body] = glb
+        node = self._server.scene.add_glb(f"/b{body}/look", glb, cast_shadow=False, receive_shadow=False)
+        self.sent["geometries"] += 1
+        obj = self._object_of[body]
+        if obj < 0 or self._scene.tables.object_categories[obj] in BUILDING:
+            return
+
+        @node.on_click
+        async def _(event: Any) -> None:
+            self._on_click(obj)
+
+        if self._on_drag is None or self._model.body_weldid[body] == 0:
+            return
+        on_drag = self._on_drag
+
+        @node.on_drag("left")
+        async def _(event: Any) -> None:
+            on_drag(event, body, node)
+
+    def move(self, pos: Float[np.ndarray, "B 3"], quat: Float[np.ndarray, "B 4"]) -> int:
+        """Sends the poses that changed, world frame; says how many."""
+        good = np.isfinite(pos).all(1) & np.isfinite(quat).all(1)
+        moved = good & (np.abs(pos - self._pos).max(1) > MOVED) | good & (np.abs(quat - self._quat).max(1) > MOVED)
+        bodies = [b for b in np.flatnonzero(moved).tolist() if b in self._frames]
+        with self._server.atomic():
+            for body in bodies:
+                frame = self._frames[body]
+                frame.position, frame.wxyz = pos[body], quat[body]
+        self._pos[moved], self._quat[moved] = pos[moved], quat[moved]
+        self.sent["poses"] += len(bodies)
+        return len(bodies)
+
+    # States.
+
+    def colour(self, looks: Mapping[int, Look]) -> None:
+        """Gives objects their looks; those that are not named look plain."""
+        for body in self._geoms:
+            look = looks.get(self._object_of[body], PLAIN)
+            if look != self._looks.get(body, PLAIN):
+                self._looks[body] = look
+                self._draw(body, look)
+
+    def dirty(self, patches: Mapping[tuple[str, int], Patches]) -> None:
+        """Shows dust and stains; what is not named is clean."""
+        for key in [k for k in self._patches if k not in patches]:
+            self._patches.pop(key)[1].remove()
+        for (kind, body), new in patches.items():
+            old = self._patches.get((kind, body))
+            if old is not None and all(np.array_equal(getattr(old[0], n), getattr(new, n)) for n in ("pos", "scale")):
+                continue
+            vertices, faces = _ball() if new.round else _block()
+            node = self._server.scene.add_batched_meshes_simple(
+                f"/b{body}/{kind}" if body in self._geoms else f"/{kind}_b{body}",
+                vertices,
+                faces,
+                batched_positions=new.pos.astype(np.float32),
+                batched_wxyzs=new.quat.astype(np.float32),
+                batched_scales=new.scale.astype(np.float32),
+                batched_colors=_rgb(new.rgb),
+                lod="off",
+                flat_shading=not new.round,
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+            self._patches[kind, body] = (new, node)
+
+    def rain(self, drops: Float[np.ndarray, "N 3"]) -> None:
+        """Shows water drops in the air, world frame."""
+        if len(drops) == 0:
+            if self._drops is not None:
+                self._drops.remove()
+                self._drops = None
+            return
+        turned = np.tile(np.array([1, 0, 0, 0], np.float32), (len(drops), 1))
+        if self._drops is None or len(self._drops.batched_positions) != len(drops):
+            vertices, faces = _ball()
+            self._drops = self._server.scene.add_batched_meshes_simple(
+                "/drops",
+                vertices,
+                faces,
+                batched_positions=drops,
+                batched_wxyzs=turned,
+                batched_scales=np.full(len(drops), DROP_RADIUS, np.float32),
+                batched_colors=_rgb(WATER_COLOUR),
+                lod="off",
+                cast_shadow=False,
+                receive_shadow=False,
+            )
+        elif not np.array_equal(self._drops.batched_positions, drops):
+            self._drops.batched_positions = drops
+
+    # What is written, and the spring.
+
+    def write_names(self, shown: bool) -> None:
+        """Names above objects, or none."""
+        if shown and not self._names:
+            data = self._scene.start_data()
+            mujoco.mj_kinematics(self._model, data)
+            for label in ObjectNames(self._scene).labels(data):
+                body = int(self._scene.tables.object_root[self._scene.object_index(label.text)])
+                if body not in self._geoms:
+                    continue
+                turn = data.xmat[body].reshape(3, 3)
+                place = turn.T @ (np.array(label.pos) - data.xpos[body])
+                self._names.append(self._server.scene.add_label(f"/b{body}/name", label.text, position=tuple(place)))
+        for node in self._names:
+            node.visible = shown
+
+    def write_rooms(self, shown: bool) -> None:
+        """Names of rooms on their floors, or none."""
+        if shown and not self._rooms:
+            for k, label in enumerate(RoomNames(self._scene).labels(self._scene.start_data())):
+                self._rooms.append(self._server.scene.add_label(f"/room{k}", label.text, position=label.pos))
+        for node in self._rooms:
+            node.visible = shown
+
+    def spring(self, ends: Float[np.ndarray, "N 2 3"]) -> None:
+        """Lines from what is dragged to the pointers, world frame."""
+        if len(ends) == 0:
+            if self._line is not None:
+                self._line.remove()
+                self._line = None
+        elif self._line is None or len(self._line.points) != len(ends):
+            self._line = self._server.scene.add_line_segments(
+                "/spring", ends.astype(np.float32), colors=(230, 80, 20), thickness=0.01
+            )
+        else:
+            self._line.points = ends.astype(np.float32)
+
+
+def _drawn(scene: Scene) -> list[int]:
+    """Visual geoms, and the collision geoms of objects that have none."""
+    model, owner = scene.model, np.asarray(scene.tables.geom_object)
+    seen = visual_geoms(model)
+    without = set(range(scene.tables.num_objects)) - set(owner[seen].tolist())
+    others = visual_geoms(model, (3,))
+    return sorted([*seen.tolist(), *(g for g in others.tolist() if int(owner[g]) in without)])
+
+
+def _rgb(colour: tuple[float, float, float]) -> tuple[int, int, int]:
+    r, g, b = (round(255 * c) for c in colour)
+    return r, g, b
+
+
+def _ball() -> tuple[np.ndarray, np.ndarray]:
+    from trimesh import creation
+
+    ball = creation.icosphere(subdivisions=1)
+    return ball.vertices.astype(np.float32), ball.faces.astype(np.uint32)
+
+
+def _block() -> tuple[np.ndarray, np.ndarray]:
+    from trimesh import creation
+
+    block = creation.box(extents=(2, 2, 2))
+    return block.vertices.astype(np.float32), block.faces.astype(np.uint32)
