@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 
 import mujoco
 import numpy as np
 import pytest
+from fake_window import FakeHandle
 
 import ig2mj
 from ig2mj.errors import MissingDependencyError
@@ -15,6 +15,7 @@ from ig2mj.scene.rooms import Rooms
 from ig2mj.viewer import interactive
 from ig2mj.viewer.interactive import ViewerState, open_viewer
 from ig2mj.viewer.label_space import Sight, uncovered
+from ig2mj.viewer.mouse import MAX_FORCE, Mouse
 from ig2mj.viewer.overlays import Clock, Label, ObjectNames, Overlay, RoomNames, default_overlays
 from ig2mj.viewer.overview import home_overview
 
@@ -160,35 +161,6 @@ def test_the_overview_leaves_out_what_is_parked(tiny_home, data):
     assert all(np.linalg.norm(p - view.lookat) > view.distance for p in parked)
 
 
-class FakeHandle:
-    """Stands for MuJoCo's window: closes itself after some pictures, and notes what it was told."""
-
-    def __init__(self, model, pictures: int):
-        self.left, self.synced, self.texts = pictures, 0, []
-        self.cam, self.perturb = mujoco.MjvCamera(), mujoco.MjvPerturb()
-        self.user_scn = mujoco.MjvScene(model, maxgeom=100)
-        self.viewport = mujoco.MjrRect(0, 0, 800, 600)
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *error):
-        pass
-
-    def is_running(self) -> bool:
-        self.left -= 1
-        return self.left >= 0
-
-    def lock(self):
-        return contextlib.nullcontext()
-
-    def set_texts(self, texts) -> None:
-        self.texts.append(texts)
-
-    def sync(self) -> None:
-        self.synced += 1
-
-
 class CopyingWorld:
     """A world whose data is a new copy after every step, as that of a batched engine is."""
 
@@ -233,12 +205,19 @@ def test_the_mouse_pushes_the_held_body_and_lets_it_go(tiny_home, data):
     scene = mujoco.MjvScene(tiny_home.model, maxgeom=500)
     mujoco.mjv_updateScene(tiny_home.model, data, option, None, camera, mujoco.mjtCatBit.mjCAT_ALL.value, scene)
     mujoco.mjv_initPerturb(tiny_home.model, data, scene, perturb)
-    perturb.refselpos[2] += 1.0
-    assert interactive._drag(tiny_home.model, data, perturb, 0) == body
-    assert data.xfrc_applied[body, 2] > 0
+    mouse, sight = Mouse(), np.array([1.0, 0.0, 0.0])
+    perturb.refselpos[2] += 0.5
+    mouse.apply(tiny_home.model, data, perturb, sight)
+    assert 0 < data.xfrc_applied[body, 2] <= MAX_FORCE
     perturb.active = 0
-    assert interactive._drag(tiny_home.model, data, perturb, body) == 0
+    mouse.apply(tiny_home.model, data, perturb, sight)
     assert not data.xfrc_applied.any()
+    mouse.push(1 / 30)
+    pushed = []
+    for _ in range(5):
+        mouse.apply(tiny_home.model, data, perturb, sight)
+        pushed.append(float(data.xfrc_applied[body, 0]))
+    assert pushed == [MAX_FORCE] * 3 + [0.0] * 2, "a tenth of a second"
 
 
 def test_before_anything_slow_the_window_says_what_is_prepared(tiny_home, monkeypatch):

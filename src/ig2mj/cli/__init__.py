@@ -61,6 +61,7 @@ COMMANDS: dict[str, str] = {
     "sample": "sample initial states in which conditions hold, as a pool for batched resets",
     "activity": "list BEHAVIOR's activities, what each asks for in a home, and sample its starts",
     "list-envs": "list the environments, and which robots can do what in them",
+    "play": "drive a robot in an environment by keyboard and mouse",
     "rollout": "play episodes of an environment, and tell how they ended",
     "train": "train a policy in an environment",
     "evaluate": "tell how often a policy succeeds from states it has not seen",

@@ -1,7 +1,7 @@
 """The interactive viewer: MuJoCo's own window, run at real time, with overlays and a few keys of ours.
 
-MuJoCo's passive viewer draws; the simulation steps here, in the thread that called. Objects can be dragged with the
-mouse as in MuJoCo's viewer (double-click, then Ctrl and a mouse button).
+MuJoCo's passive viewer draws; the simulation steps here, in the thread that called. Objects can be dragged and pushed
+with the mouse (`ig2mj.viewer.mouse`).
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ import numpy as np
 from ig2mj.errors import EngineError, MissingDependencyError
 from ig2mj.scene.scene import Scene
 from ig2mj.viewer.label_space import Sight, uncovered
+from ig2mj.viewer.mouse import Mouse
+from ig2mj.viewer.offscreen import FreeView
 from ig2mj.viewer.overlays import Drawing, Label, Overlay, default_overlays
 from ig2mj.viewer.overview import home_overview
 from ig2mj.viewer.state_marks import draw_marks
@@ -28,7 +30,7 @@ from ig2mj.viewer.state_marks import draw_marks
 #: all letters.
 OVERLAY_KEYS = "6789"
 #: GLFW's codes of the other keys.
-_SPACE, _SLASH, _ENTER, _BACKSPACE, _RIGHT = 32, 47, 257, 259, 262
+_SPACE, _SLASH, _PUSH, _ENTER, _BACKSPACE, _RIGHT = 32, 47, ord("P"), 257, 259, 262
 PREPARING = ("preparing", "states are compiled; once per machine and scene")
 """What the window says before the first step."""
 
@@ -40,13 +42,14 @@ class ViewerState:
 
     Attributes:
       overlays: in the order of their keys. shown: whether each is on. paused, help: as they say.
-      steps: control steps asked for with the right arrow while paused. reset: go back to the start.
+      steps: control steps asked for with the right arrow while paused. reset: go back to the start. push: push what is
+        picked.
     """
 
-    def __init__(self, overlays: Sequence[Overlay], paused: bool = False):
-        self.overlays = list(overlays)
+    def __init__(self, overlays: Sequence[Overlay], paused: bool = False, more_keys: Sequence[tuple[str, str]] = ()):
+        self.overlays, self._more_keys = list(overlays), list(more_keys)
         self.shown = [True] * len(self.overlays)
-        self.paused, self.help, self.steps, self.reset = paused, False, 0, False
+        self.paused, self.help, self.steps, self.reset, self.push = paused, False, 0, False, False
 
     def press(self, key: int) -> None:
         """Does what a key (GLFW code) stands for; other keys are MuJoCo's."""
@@ -56,6 +59,8 @@ class ViewerState:
             self.steps += 1
         elif key == _BACKSPACE:
             self.reset = True
+        elif key == _PUSH:
+            self.push = True
         elif key in (_ENTER, _SLASH):
             self.help = not self.help
         elif 0 < key < 128 and chr(key) in OVERLAY_KEYS[: len(self.overlays)]:
@@ -75,6 +80,10 @@ class ViewerState:
             ("Space", "pause, go on"),
             ("Right arrow", "one step, while paused"),
             ("Backspace", "back to the start"),
+            ("Double-click", "pick an object"),
+            ("Ctrl, right button", "drag what is picked"),
+            ("P", "push what is picked"),
+            *self._more_keys,
         ]
         rows += [(k, f"{o.title} on, off") for k, o in zip(OVERLAY_KEYS, self.overlays, strict=False)]
         return [*rows, ("Enter or ?", "this list"), ("F1", "MuJoCo's keys"), ("Esc", "free camera")]
@@ -168,6 +177,9 @@ def open_viewer(
     paused: bool = False,
     key_callback: Callable[[int], None] | None = None,
     prepare: Callable[[], object] | None = None,
+    more_keys: Sequence[tuple[str, str]] = (),
+    camera: Callable[[], FreeView | None] | None = None,
+    own_letters: bool = False,
 ) -> None:
     """Opens the window and runs the simulation until it is closed.
 
@@ -180,22 +192,23 @@ def open_viewer(
       paused: begin paused.
       key_callback: is told of every key (GLFW code) that is pressed, in this thread.
       prepare: does what takes long, such as compiling; must not change `data`, which is drawn meanwhile.
+      more_keys: what `key_callback` does, key and text, for the list of keys.
+      camera: where each picture is taken from; None where it gives none: where the mouse has put the camera.
+      own_letters: letters are `key_callback`'s: the marks that MuJoCo's viewer shows for some of them stay off or on.
 
     Raises:
       MissingDependencyError: there is no display.
     """
-    state = ViewerState(default_overlays(scene) if overlays is None else overlays, paused)
+    state, mouse = ViewerState(default_overlays(scene) if overlays is None else overlays, paused, more_keys), Mouse()
     keys: queue.SimpleQueue[int] = queue.SimpleQueue()
     with _launch(scene.model, data, keys.put) as handle:
-        view = home_overview(scene, data)
-        handle.cam.lookat[:] = view.lookat
-        handle.cam.distance, handle.cam.azimuth, handle.cam.elevation = view.distance, view.azimuth, view.elevation
+        _look(handle.cam, home_overview(scene, data))
         handle.set_texts([(mujoco.mjtFontScale.mjFONTSCALE_150, mujoco.mjtGridPos.mjGRID_TOPLEFT, *PREPARING)])
         handle.sync()
         if prepare is not None:
             prepare()  # without the lock, so that the window lives
+        marks = np.array(handle.opt.flags) if own_letters else None
         due = time.monotonic()
-        held = 0
         while handle.is_running():
             while not keys.empty():
                 key = keys.get()
@@ -206,9 +219,15 @@ def open_viewer(
                 if state.reset and reset is not None:
                     reset()
                 state.reset = False
-                held = _drag(scene.model, data, handle.perturb, held)
+                if state.push:
+                    mouse.push(step_time)
+                state.push = False
+                mouse.apply(scene.model, data, handle.perturb, _sight(handle.cam))
                 if state.wants_step():
                     step()
+                if marks is not None:
+                    handle.opt.flags[:] = marks
+                _look(handle.cam, camera() if camera is not None else None)
                 state.draw_labels(data, handle.user_scn, Sight.of_window(handle, scene.model.vis.global_.fovy))
                 texts = state.texts(data)
             handle.set_texts(texts)
@@ -236,15 +255,19 @@ def _launch(model: mujoco.MjModel, data: mujoco.MjData, key_callback: Callable[[
         raise EngineError(f"MuJoCo's viewer does not open: {e}") from e
 
 
-def _drag(model: mujoco.MjModel, data: mujoco.MjData, perturb: mujoco.MjvPerturb, held: int) -> int:
-    """Applies the force of the mouse; takes away the one of the body held before. Returns the body held now, or 0."""
-    if held:
-        data.xfrc_applied[held] = 0
-    if not (perturb.active and perturb.select > 0):
-        return 0
-    mujoco.mjv_applyPerturbPose(model, data, perturb, 0)
-    mujoco.mjv_applyPerturbForce(model, data, perturb)
-    return int(perturb.select)
+def _sight(cam: mujoco.MjvCamera) -> np.ndarray:
+    """Where the window's free camera looks to, a unit vector."""
+    azimuth, elevation = np.radians(cam.azimuth), np.radians(cam.elevation)
+    flat = np.cos(elevation)
+    return np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])
+
+
+def _look(cam: mujoco.MjvCamera, view: FreeView | None) -> None:
+    """Moves the window's camera, where a view is given."""
+    if view is not None:
+        cam.type = mujoco.mjtCamera.mjCAMERA_FREE
+        cam.lookat[:] = view.lookat
+        cam.distance, cam.azimuth, cam.elevation = view.distance, view.azimuth, view.elevation
 
 
 def _columns(rows: Sequence[tuple[str, str]]) -> tuple[str, str]:

@@ -1,0 +1,81 @@
+"""`ig2mj play ENV`: drive a robot in an environment by keyboard and mouse."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import Annotated
+
+import tyro
+
+STEPS_PER_SECOND = 30
+
+FOREVER = 10**9
+"""Steps of an episode: a person's does not end by itself."""
+
+
+def run(
+    env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")],
+    robot: str | None = None,
+    robot_urdf: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    robot_layout: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    grasping: str | None = None,
+    seed: int = 0,
+    pool_size: int = 8,
+    record: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    keys: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+) -> int:
+    """Drive a robot in an environment by keyboard and mouse, in MuJoCo's viewer.
+
+    In the window: Enter lists the keys. Without the robot, objects are picked with a double-click, dragged with Ctrl
+    and the right button by a spring of at most 100 N, and pushed with P, as in iGibson's viewer.
+
+    Args:
+      env: CookingMeat, or ig2mj/CookingMeat-v0 (`ig2mj list-envs`).
+      robot: humanoid, fetch or turtlebot; default: the first that `ig2mj list-envs` names.
+      robot_urdf: a robot of your own instead, from its URDF.
+      robot_layout: TOML or JSON that says which of its joints drive, reach and grip; default: found from their names.
+      grasping: assisted, sticky, physical or mitten; default: assisted where there are hands.
+      seed: of the start states.
+      pool_size: start states; those of an activity are sampled first, which takes a while.
+      record: HDF5 of all runs, for `ig2mj demos replay`; what the mouse does to objects is not in it.
+      keys: print the keys, and do nothing else.
+    """
+    from ig2mj.viewer.play.keys import BINDINGS
+
+    if keys:
+        for binding in BINDINGS:
+            print(f"{binding.shown:16} {binding.command}")
+        return 0
+    from ig2mj.cli.robot_urdf import check_layout, own_robot
+    from ig2mj.envs.registry import find_task, make
+    from ig2mj.tasks.navigation.task import NavigationTask
+    from ig2mj.viewer.play.session import PlaySession, launch
+
+    check_layout(robot_urdf, robot_layout)
+    if grasping is None:
+        grasping = "physical" if isinstance(find_task(env), NavigationTask) else "assisted"
+    made = make(
+        env,
+        robot if robot_urdf is None else own_robot(robot_urdf, robot_layout, robot),
+        1,
+        "native",
+        grasping,
+        pool_size=pool_size,
+        whole_actions=True,
+        period=1 / STEPS_PER_SECOND,
+    ).with_horizon(FOREVER)
+    if record is not None:
+        from ig2mj.demos import record as recorded
+
+        made = recorded(made, record, past_success=True)
+    try:
+        session = PlaySession(made, seed)
+        launch(session)
+    finally:
+        made.close()
+    print(
+        f"{made.task.name}: the goal was reached {session.successes} times"
+        if session.successes != 1
+        else f"{made.task.name}: the goal was reached once"
+    )
+    return 0

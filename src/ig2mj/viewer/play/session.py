@@ -1,0 +1,158 @@
+"""`PlaySession`: a person in an environment: keys in, control steps out, and what the corner of the window says.
+
+    session = PlaySession(ig2mj.make("CookingMeat", engine="native", whole_actions=True, period=1 / 30))
+    session.press(265)           # the arrow up
+    session.step()               # 1/30 s
+
+Nothing of it needs a window; `launch` gives it one.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+
+import mujoco
+import numpy as np
+
+from ig2mj.envs.environment import Environment
+from ig2mj.scene.scene import Scene
+from ig2mj.viewer.interactive import open_viewer
+from ig2mj.viewer.offscreen import FreeView
+from ig2mj.viewer.overlays import Label, default_overlays
+from ig2mj.viewer.play.actions import Wish, action_of
+from ig2mj.viewer.play.keys import BINDINGS, Held
+
+NEAR = 0.05
+"""m before the robot's eye at which the window's camera turns, where it looks with that eye."""
+
+BEHIND = (2.2, 25.0)
+"""m and degrees: where the window's camera begins, behind and above the robot."""
+
+
+class PlaySession:
+    """One world of an environment, driven by keys.
+
+    Attributes:
+      env, state: the environment and where it is. closed, hand: of the robot's hands, and which one is moved.
+      with_eye: the window looks with the robot's eye. successes: how often the goal was reached.
+    """
+
+    def __init__(self, env: Environment, seed: int = 0, clock: Callable[[], float] = time.monotonic):
+        """At the start of the first episode. `env`: of one world, with whole actions; `clock`: s."""
+        self.env, self.state, self._clock = env, env.reset(seed), clock
+        self._controller = env.core.controllers[0]
+        self._hands = int(np.sum(env.scene.tables.hand_agent == 0))
+        self._keys, self.with_eye, self.successes = Held(), False, 0
+        self._begin()
+
+    def _begin(self) -> None:
+        self.hand = self._hands - 1 if self._hands else 0
+        self.closed, self._resets, self._reached = [False] * max(self._hands, 1), set[int](), False
+
+    @property
+    def scene(self) -> Scene:
+        """The household with the robot."""
+        return self.env.scene
+
+    @property
+    def data(self) -> mujoco.MjData:
+        """MuJoCo's data of the world: live, so that forces put on it act."""
+        return self.env.core.engine.to_mujoco(self.state.batch.world.physics, 0)[1]
+
+    def press(self, key: int) -> None:
+        """Takes a key (GLFW code) that went down."""
+        command = self._keys.press(key, self._clock())
+        if command == "close or open":
+            self.closed[self.hand] = not self.closed[self.hand]
+        elif command == "other hand" and self._hands:
+            self.hand = (self.hand + 1) % self._hands
+        elif command == "hand back to rest":
+            self._resets.add(self.hand)
+        elif command == "see with the robot's eye":
+            self.with_eye = not self.with_eye
+
+    def step(self) -> None:
+        """One step of the environment with what the keys say now."""
+        wish = Wish(self._keys.moves(self._clock()), self.hand, tuple(self.closed), frozenset(self._resets))
+        self._resets.clear()
+        action = action_of(wish, self._controller.action_names, self._controller.action_high, self.env.period)
+        self.state = self.env.step(self.state, action[None].astype(np.float32))
+        reached = bool(np.asarray(self.state.info["success"])[0])
+        self.successes += reached and not self._reached
+        self._reached |= reached
+
+    def reset(self) -> None:
+        """A new episode."""
+        self.state = self.env.reset(self.state)
+        self._begin()
+
+    @property
+    def holding(self) -> list[str | None]:
+        """Object in each hand."""
+        tables = self.scene.tables
+        held = np.asarray(self.state.batch.world.view.held)[0][tables.hand_agent == 0]
+        return [tables.object_names[int(np.argmax(row))] if row.any() else None for row in held]
+
+    def view(self) -> FreeView | None:
+        """Where the window looks from; None: where the mouse has put its camera."""
+        if not self.with_eye:
+            return None
+        agent = self.state.batch.world.view.agent
+        pos, turn = np.asarray(agent.eye_pos, float)[0, 0], np.zeros(9)
+        mujoco.mju_quat2Mat(turn, np.asarray(agent.eye_quat, float)[0, 0])
+        ahead = -turn.reshape(3, 3)[:, 2]
+        azimuth = math.degrees(math.atan2(ahead[1], ahead[0]))
+        return FreeView(
+            lookat=tuple(pos + NEAR * ahead),
+            distance=NEAR,
+            azimuth=azimuth,
+            elevation=math.degrees(math.asin(np.clip(ahead[2], -1.0, 1.0))),
+        )
+
+    def behind(self) -> FreeView:
+        """Behind and above the robot."""
+        agent = self.state.batch.world.view.agent
+        pos, (w, _, _, z) = np.asarray(agent.base_pos, float)[0, 0], np.asarray(agent.base_quat, float)[0, 0]
+        distance, above = BEHIND
+        return FreeView((pos[0], pos[1], max(pos[2], 0.6)), distance, math.degrees(2 * math.atan2(z, w)), -above)
+
+    # What the corner of the window says (an overlay of the viewer).
+
+    title = "robot"
+
+    def labels(self, data: mujoco.MjData) -> Sequence[Label]:
+        """None."""
+        return ()
+
+    def lines(self, data: mujoco.MjData) -> Sequence[tuple[str, str]]:
+        """The goal, and what hands do."""
+        progress = float(np.asarray(self.state.info["goal_progress"])[0])
+        rows = [("goal", "reached" if self._reached else f"{progress:.0%}")]
+        names = ("left hand", "right hand") if self._hands == 2 else ("hand",)
+        for number, (name, held) in enumerate(zip(names, self.holding, strict=False)):
+            doing = held or ("closed" if self.closed[number] else "open")
+            rows.append((f"> {name}" if number == self.hand and self._hands > 1 else name, doing))
+        return rows
+
+
+def launch(session: PlaySession) -> None:
+    """Opens the window and plays until it is closed. Raises as `open_viewer`."""
+    first = [session.behind()]
+
+    def camera() -> FreeView | None:
+        return first.pop() if first else session.view()
+
+    open_viewer(
+        session.scene,
+        session.data,
+        session.step,
+        reset=session.reset,
+        overlays=[*default_overlays(session.scene), session],
+        step_time=session.env.period,
+        key_callback=session.press,
+        more_keys=[(binding.shown, binding.command) for binding in BINDINGS],
+        camera=camera,
+        own_letters=True,
+    )
