@@ -2,6 +2,7 @@
 
     python benchmarks/placement.py                 60 pairs per predicate, 20 seeds each, in birch and spruce
     python benchmarks/placement.py --resume        only the pairs that no earlier run got to
+    python benchmarks/placement.py --jobs 32 --requests 140    with 32 processes, each on a processor of its own
 
 For each predicate, pairs of a loose object and something to place it at are drawn at random among those of fitting
 size, and each is requested with several seeds. What succeeded is woken, stepped for five seconds, and asked again; the
@@ -16,8 +17,12 @@ run can be stopped at any time. The table is made of all lines that there are.
 from __future__ import annotations
 
 import collections
+import concurrent.futures
 import dataclasses
+import functools
 import json
+import multiprocessing
+import os
 import pathlib
 import time
 from typing import Any
@@ -45,7 +50,7 @@ class Args:
 
     Attributes:
       homes: where requests are drawn, in turn. requests: pairs per predicate. seeds: times that each is requested.
-      predicates: which ones. resume: keep the pairs of earlier runs. out: folder for results.
+      predicates: which ones. resume: keep the pairs of earlier runs. jobs: processes. out: folder for results.
     """
 
     homes: tuple[str, ...] = ("birch", "spruce")
@@ -53,6 +58,7 @@ class Args:
     seeds: int = 20
     predicates: tuple[str, ...] = PREDICATES
     resume: bool = False
+    jobs: int = 1
     out: pathlib.Path = RESULTS
 
 
@@ -125,8 +131,9 @@ def request(sampler: RowSampler, predicate: str, first: str, second: str, seeds:
 
 def measure(args: Args, folder: pathlib.Path) -> None:
     """Requests all pairs that are not on file yet."""
+    todo: list[tuple[pathlib.Path, str, str, str, str]] = []
     for k, home in enumerate(args.homes):
-        sampler = make_sampler(ig2mj.load_scene(home))
+        sampler = sampler_of(home)
         count = args.requests // len(args.homes) + (k < args.requests % len(args.homes))
         for predicate in args.predicates:
             file = folder / f"{predicate}_{home}.jsonl"
@@ -134,13 +141,46 @@ def measure(args: Args, folder: pathlib.Path) -> None:
                 file.unlink(missing_ok=True)
             known = {tuple(line["pair"]) for line in _lines(file)}
             pairs = requests(sampler, predicate, count, np.random.default_rng([7, k]))
-            for first, second in pairs:
-                if (first, second) in known:
-                    continue
-                found = request(sampler, predicate, first, second, args.seeds)
-                with file.open("a", encoding="utf-8") as out:
-                    out.write(json.dumps(found) + "\n")
-            print(f"{predicate} in {home}: {len(pairs)} pairs", flush=True)
+            todo += [(file, home, predicate, *pair) for pair in pairs if pair not in known]
+    # one at a time from each predicate and home, so that a run that is stopped has some of all
+    turn: collections.Counter[pathlib.Path] = collections.Counter()
+    turns = {}
+    for one in todo:
+        turns[one] = turn[one[0]]
+        turn[one[0]] += 1
+    todo.sort(key=turns.__getitem__)
+    if args.jobs == 1:
+        for file, *what in todo:
+            _keep(file, _request(*what, args.seeds))
+        return
+    spawn = multiprocessing.get_context("spawn")
+    cores = spawn.Queue()
+    for core in sorted(os.sched_getaffinity(0))[: args.jobs]:
+        cores.put(core)
+    with concurrent.futures.ProcessPoolExecutor(args.jobs, spawn, _take_core, (cores,)) as pool:
+        running = {pool.submit(_request, *what, args.seeds): file for file, *what in todo}
+        for k, done in enumerate(concurrent.futures.as_completed(running)):
+            _keep(running[done], done.result())
+            print(f"{k + 1} of {len(todo)} pairs", flush=True)
+
+
+@functools.cache
+def sampler_of(home: str) -> RowSampler:
+    """A home's sampler, made once in a process."""
+    return make_sampler(ig2mj.load_scene(home))
+
+
+def _request(home: str, predicate: str, first: str, second: str, seeds: int) -> dict[str, Any]:
+    return request(sampler_of(home), predicate, first, second, seeds)
+
+
+def _take_core(cores: multiprocessing.Queue) -> None:
+    os.sched_setaffinity(0, {cores.get()})
+
+
+def _keep(file: pathlib.Path, found: dict[str, Any]) -> None:
+    with file.open("a", encoding="utf-8") as out:
+        out.write(json.dumps(found) + "\n")
 
 
 def _lines(file: pathlib.Path) -> list[dict[str, Any]]:
