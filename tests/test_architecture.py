@@ -194,7 +194,7 @@ def pyproject() -> dict:
 
 
 DATA_PACKAGES = ("ig2mj_policies", "ig2mj_scenes")
-"""The homes that ship: packed as they are, no Python among them."""
+"""Homes and policies that ship: packed as they are, no Python among them."""
 
 
 def packed_folders() -> dict[str, pathlib.Path]:

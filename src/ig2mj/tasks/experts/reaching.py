@@ -6,11 +6,15 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from ig2mj.engine.view import Array
+from ig2mj.geometry.poses import length
 from ig2mj.tasks.experts.motion import Wish, over, wish
 from ig2mj.tasks.experts.sight import Sight
 
 CLEARANCE = 0.12
 """m above an object's top at which a hand comes over it."""
+
+CLOSING = 0.05
+"""m from the point at which a hand that has to be closed does so."""
 
 BELOW = 0.03
 """m below its top that the hand goes for: what lies there stops it."""
@@ -24,6 +28,7 @@ def take(see: Sight, name: str, hand: int = 0) -> Wish:
 
 
 def take_at(see: Sight, place: Float[Array, "W 3"], hand: int = 0) -> Wish:
-    """From above onto a point of an object's surface, until it is touched."""
+    """From above onto a point of an object's surface, until it is touched; the hand closes when it is near."""
     down = jnp.array([0.0, 0.0, BELOW], jnp.float32)
-    return wish(over(see.grip(hand), place - down, place[:, 2] + CLEARANCE))
+    grip = see.grip(hand)
+    return wish(over(grip, place - down, place[:, 2] + CLEARANCE), close=length(grip - place) < CLOSING)
