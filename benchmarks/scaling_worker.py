@@ -101,7 +101,7 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
     )
     perception = Perception(env.observation_spaces, settings["obs"])
     sac = made(config, perception, env, None, AXIS if count > 1 else None)
-    step: Any = ManyDevices(env, sac, jax.devices()) if count > 1 else OneDevice(env, sac)
+    step: Any = ManyDevices(env, sac, jax.devices(), team) if count > 1 else OneDevice(env, sac)
     held, memory_, key = *step.place(sac.init(jax.random.PRNGKey(0)), step.memory()), jax.random.PRNGKey(1)
     play = step.begin(0)
     parts = {name: sum(a.size for a in jax.tree.leaves(getattr(held, name))) for name in ("actor", "critic")}

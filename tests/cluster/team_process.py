@@ -61,7 +61,7 @@ def gradient(team: Team) -> dict:
         )
     else:
         ppo = PPO(perception, 2, config, AXIS)
-        step = ManyDevices(PointMass(WORLDS // count), ppo, jax.devices())
+        step = ManyDevices(PointMass(WORLDS // count), ppo, jax.devices(), team)
         learner, memory = step.place(ppo.init(key), step.memory())
         share = WORLDS // count
         own = jax.device_put(rollout(ppo, team.rank * share, (team.rank + 1) * share), jax.local_devices()[0])

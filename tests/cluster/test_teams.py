@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ig2mj.cluster import team as teams
 from ig2mj.cluster.place import Place
 from ig2mj.cluster.team import Team, _Link
+from ig2mj.cluster.versions import versions
 from ig2mj.errors import ClusterError
 
 SCRIPT = Path(__file__).parent / "team_process.py"
@@ -133,7 +133,7 @@ def test_nobody_there():
     ],
 )
 def test_another_version_is_refused_on_both_sides(changes, said):
-    own = {"rank": 0, "count": 2, "pid": 1, "host": "a", **teams.versions()}
+    own = {"rank": 0, "count": 2, "pid": 1, "host": "a", **versions()}
     place, team = Place("127.0.0.1", free_port(), 0, 2), Team(0, 2)
     with socket.create_server(("127.0.0.1", 0)) as server:
         other = _Link(socket.create_connection(server.getsockname()))

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures
+
 if TYPE_CHECKING:
     from ig2mj.tasks.bddl.binding import Binding
     from ig2mj.tasks.bddl.start import SampledStart
@@ -22,6 +24,8 @@ def sample(
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="POOL.npz")] = None,
     seed: int = 0,
     jobs: int = 0,
+    cluster: Cluster = None,
+    resume: Resume = False,
     behavior1k: Flag = False,
     json: Flag = False,
 ) -> int:
@@ -37,12 +41,14 @@ def sample(
       out: the file; default: NAME.npz in the working directory.
       seed: the same seed gives the same pool.
       jobs: processes; 0: one per processor.
+      cluster: do it on a Ray cluster: its address, or auto.
+      resume: go on with a run that was broken off.
       behavior1k: of BEHAVIOR-1K instead of BEHAVIOR-100.
       json: print the result as JSON.
     """
     from ig2mj.cli.bindings import binding_as_text, find_homes
     from ig2mj.cli.files import check_folder_of
-    from ig2mj.cli.printing import add_bar, progress_bar
+    from ig2mj.cluster.pieces import Where
     from ig2mj.errors import Ig2mjError
     from ig2mj.tasks.bddl.definitions import load_activity
     from ig2mj.tasks.bddl.start import first_that_works, fitting, sample_start
@@ -59,19 +65,16 @@ def sample(
     if not bound:
         raise Ig2mjError(" ".join(line.strip() for line in binding_as_text(None, [], errors)))
     binding, loaded = first_that_works(bound, seed, scene)
-    with progress_bar() as bar:
-        report = add_bar(bar, f"sampling in {loaded.name}")
-        done = sample_start(
-            binding,
-            loaded,
-            count,
-            seed,
-            jobs=jobs,
-            progress=lambda made, failed: report(f"{failed} given up" if failed else "", made + failed, count),
-        )
-    if done.sampled.pool is not None:
-        note = {"activity": name, "behavior1k": behavior1k, "seed": seed, "rows": list(done.sampled.rows)}
-        save_pool(done.sampled.pool, file, loaded, note)
+    where = Where(jobs, cluster, resume)
+    request = {"command": "activity sample", "activity": name, "scene": loaded.digest, "rows": count, "seed": seed}
+    with opened(file, request, where) as journal, follow(f"sampling in {loaded.name}", where) as report:
+        done = sample_start(binding, loaded, count, seed, where=where, journal=journal, report=report)
+        if done.sampled.pool is not None:
+            note = {"activity": name, "behavior1k": behavior1k, "seed": seed, "rows": list(done.sampled.rows)}
+            save_pool(done.sampled.pool, file, loaded, note)
+        if not done.sampled.failed:
+            journal.finish()
+    tell_failures(done.sampled.failed, count)
     _tell(done, binding, file, json)
     return 0 if done.sampled.complete else 1
 
@@ -93,6 +96,7 @@ def _tell(done: SampledStart, binding: Binding, file: pathlib.Path, as_json: boo
             "goal_holds_in": done.reached,
             "seconds": round(sampled.seconds, 3),
             "rejected": dict(sampled.rejected.most_common()),
+            "failed": sampled.failed,
         }
         print_json(result)
         return
@@ -104,8 +108,8 @@ def _tell(done: SampledStart, binding: Binding, file: pathlib.Path, as_json: boo
         )
     if done.reached:
         print(f"the goal holds already in rows {', '.join(map(str, done.reached))}", file=sys.stderr)
-    if not sampled.complete:
-        lacking = sampled.requested - len(sampled.rows)
+    lacking = sampled.requested - len(sampled.rows) - len(sampled.failed)
+    if lacking:
         print(f"{lacking} of {sampled.requested} rows could not be sampled in {binding.home}", file=sys.stderr)
         rows = [(reason, str(n)) for reason, n in sampled.rejected.most_common(12)]
         stdout_console().print(make_table("why candidates were turned down", ("reason", "times"), rows))

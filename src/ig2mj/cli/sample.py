@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import pathlib
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
+
+from ig2mj.cli.pieces import Cluster, Resume
+
+if TYPE_CHECKING:
+    from ig2mj.cluster.pieces import Where
 
 
 def run(
@@ -15,6 +20,8 @@ def run(
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     seed: int = 0,
     jobs: int = 0,
+    cluster: Cluster = None,
+    resume: Resume = False,
     add: Annotated[tuple[str, ...], tyro.conf.arg(metavar="CATEGORY")] = (),
     disturb: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     share: float = 0.3,
@@ -33,12 +40,15 @@ def run(
       out: the file; default: pool.npz in the working directory.
       seed: the same seed gives the same pool.
       jobs: processes; 0: one per processor.
+      cluster: do it on a Ray cluster: its address, or auto.
+      resume: go on with a run that was broken off.
       add: add an object of this category (or category/model) from the object library.
       disturb: no conditions: shift, turn and drop loose objects at random instead.
       share: with --disturb: probability that a loose object is moved, per row.
       json: print the result as JSON.
     """
     from ig2mj.cli.files import check_folder_of
+    from ig2mj.cluster.pieces import Where
     from ig2mj.errors import Ig2mjError
     from ig2mj.scene.scene import load_scene
 
@@ -54,8 +64,10 @@ def run(
     check_folder_of(file)
     loaded = load_scene(scene, objects=add)
     if disturb:
+        if cluster is not None or resume:
+            raise Ig2mjError("--disturb: each state goes on from the one before, on this machine's threads (--jobs)")
         return _disturb(loaded, count, file, seed, share, jobs)
-    return _sample(loaded, conditions, count, file, seed, jobs, json)
+    return _sample(loaded, conditions, count, file, seed, Where(jobs, cluster, resume), json)
 
 
 def _disturb(loaded, count: int, file: pathlib.Path, seed: int, share: float, jobs: int) -> int:
@@ -81,35 +93,33 @@ def _disturb(loaded, count: int, file: pathlib.Path, seed: int, share: float, jo
     return 0
 
 
-def _sample(loaded, conditions, count: int, file: pathlib.Path, seed: int, jobs: int, as_json: bool) -> int:
+def _sample(loaded, conditions, count: int, file: pathlib.Path, seed: int, where: Where, as_json: bool) -> int:
     import json
     import sys
 
-    from ig2mj.cli.printing import add_bar, make_table, progress_bar, stdout_console
+    from ig2mj.cli.pieces import follow, opened, tell_failures
+    from ig2mj.cli.printing import make_table, stdout_console
     from ig2mj.sampling.many import sample
     from ig2mj.worlds.pool import save_pool
 
-    with progress_bar() as bar:
-        report = add_bar(bar, f"sampling in {loaded.name}")
-        done = sample(
-            loaded,
-            conditions,
-            count,
-            seed,
-            jobs=jobs,
-            progress=lambda made, failed: report(f"{failed} given up" if failed else "", made + failed, count),
-        )
-    if done.pool is not None:
-        save_pool(done.pool, file, loaded, {"seed": seed, "conditions": list(conditions), "rows": list(done.rows)})
+    request = {"command": "sample", "scene": loaded.digest, "conditions": list(conditions), "rows": count, "seed": seed}
+    with opened(file, request, where) as journal, follow(f"sampling in {loaded.name}", where) as report:
+        done = sample(loaded, conditions, count, seed, where=where, journal=journal, report=report)
+        if done.pool is not None:
+            save_pool(done.pool, file, loaded, {"seed": seed, "conditions": list(conditions), "rows": list(done.rows)})
+        if not done.failed:
+            journal.finish()
+    lacking = count - len(done.rows) - len(done.failed)
     if as_json:
         reasons = dict(done.rejected.most_common())
         print(json.dumps({"file": str(file) if done.pool else None, "rows": len(done.rows), "requested": count,
-                          "seconds": round(done.seconds, 3), "rejected": reasons}))  # fmt: skip
+                          "seconds": round(done.seconds, 3), "rejected": reasons, "failed": done.failed}))  # fmt: skip
     elif done.pool is not None:
         print(f"{file}: {done.pool.size} of {count} states of {loaded.name} in {done.seconds:.1f} s "
               f"(look: ig2mj view {loaded.folder.name} --pool {file})")  # fmt: skip
-    if not done.complete and not as_json:
-        print(f"{count - len(done.rows)} of {count} rows could not be sampled", file=sys.stderr)
+    tell_failures(done.failed, count)
+    if lacking and not as_json:
+        print(f"{lacking} of {count} rows could not be sampled", file=sys.stderr)
         rows = [(reason, str(n)) for reason, n in done.rejected.most_common(12)]
         stdout_console().print(make_table("why candidates were turned down", ("reason", "times"), rows))
     return 0 if done.complete else 1

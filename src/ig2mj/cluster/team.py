@@ -13,18 +13,18 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import platform
 import queue
 import socket
 import sys
 import threading
 import time
+import traceback
 from collections.abc import Iterator
-from importlib.metadata import version
 from typing import Any
 
 from ig2mj.cluster.place import Place
-from ig2mj.errors import ClusterError
+from ig2mj.cluster.versions import versions
+from ig2mj.errors import ClusterError, Ig2mjError
 
 BEAT = 3.0
 """Seconds between two beats of a process."""
@@ -91,6 +91,11 @@ class Team:
             initialization_timeout=int(patience),
             shutdown_timeout_seconds=10,
         )
+        jax.devices()
+        team.barrier("devices")
+        from jax.experimental.multihost_utils import sync_global_devices
+
+        sync_global_devices("ig2mj")  # connects them now: later on one may be minutes ahead, and gloo waits for 30 s
         return team
 
     # Waiting for each other.
@@ -127,15 +132,18 @@ class Team:
 
     @contextlib.contextmanager
     def together(self) -> Iterator[None]:
-        """An error inside ends the whole team, with one line in every process; at the end all leave together."""
+        """An error inside ends all processes of the team, each with one line; at the end all leave together."""
         try:
             yield
         except BaseException as e:
-            if self.count > 1:
-                time.sleep(GRACE)  # if another one's death is the reason, the line about it ends this process here
-                line = " ".join(str(e).split()) or type(e).__name__
-                self._end(f"{self.names[self.rank]} failed: {line}", leave=False)
-            raise
+            if self.count == 1:
+                raise
+            time.sleep(GRACE)  # if another one's death is the reason, the line about it ends this process here
+            line = " ".join(str(e).split()) or type(e).__name__
+            self._tell(f"{self.names[self.rank]} failed: {line}")
+            if not isinstance(e, Ig2mjError):
+                traceback.print_exc()
+            _leave(line, 2 if isinstance(e, Ig2mjError) else 1)
         if self.count > 1:
             self.barrier(THE_END)
             with self._lock:
@@ -263,19 +271,21 @@ class Team:
         with self._lock:
             return self._past.setdefault(name, queue.SimpleQueue())
 
-    def _end(self, line: str, leave: bool = True) -> None:
+    def _end(self, line: str) -> None:
         """Tells the others why the run is over, and ends this process."""
+        if self._tell(line):
+            _leave(f"training stopped: {line}", 1)
+
+    def _tell(self, line: str) -> bool:
+        """Tells the others why the run is over; False where it was over already."""
         with self._lock:
             if self._ending:
-                return
+                return False
             self._ending = True
         for link in self._links.values():
             with contextlib.suppress(OSError):
                 link.send(ended=line)
-        if leave:
-            sys.stdout.flush()
-            print(f"error: training stopped: {line}", file=sys.stderr, flush=True)
-            os._exit(1)  # the main thread may wait in a collective program for a process that is no more
+        return True
 
 
 class _Link:
@@ -315,10 +325,11 @@ class _Link:
             self._connection.close()
 
 
-def versions() -> dict[str, str]:
-    """Of what must be the same wherever parts of one piece of work are done."""
-    found = {name: version(name) for name in ("ig2mj", "jax", "mujoco", "warp-lang", "numpy")}
-    return {**found, "Python": ".".join(platform.python_version_tuple()[:2])}
+def _leave(line: str, status: int) -> None:
+    """Ends this process at once: its main thread may wait in a collective program for a process that is no more."""
+    sys.stdout.flush()
+    print(f"error: {line}", file=sys.stderr, flush=True)
+    os._exit(status)
 
 
 def _name(rank: int, pid: int, host: str) -> str:

@@ -43,13 +43,11 @@ class Checkpoints:
         Args:
           number: of the iteration. tree: arrays. meta: for JSON; counters, and what the run depends on.
         """
-        import orbax.checkpoint as ocp
-
         self.folder.mkdir(parents=True, exist_ok=True)
         target, beside = self.folder / str(number), self.folder / f".{os.getpid()}-{number}"
         shutil.rmtree(beside, ignore_errors=True)
         beside.mkdir()
-        with ocp.StandardCheckpointer() as writer:
+        with _checkpointer() as writer:
             writer.save(beside / "arrays", _leaves(tree))
         (beside / "meta.json").write_text(json.dumps(meta, indent=1), encoding="utf-8")
         if target.exists():
@@ -79,8 +77,6 @@ class Checkpoints:
         Raises:
           InputError: a checkpoint is of another run: the message names the setting that differs.
         """
-        import orbax.checkpoint as ocp
-
         for number in reversed(self.numbers()):
             folder = self.folder / str(number)
             try:
@@ -90,7 +86,7 @@ class Checkpoints:
                 continue
             refuse_difference(folder, meta["depends"], depends)
             try:
-                with ocp.StandardCheckpointer() as reader:
+                with _checkpointer() as reader:
                     leaves = reader.restore(folder / "arrays", _leaves(like))
             except Exception as e:  # what orbax raises for half a file has no type of its own
                 why = " ".join(str(e).split())[:120]
@@ -99,6 +95,17 @@ class Checkpoints:
             arrays = [np.asarray(leaves[name]) for name in _leaves(like)]
             return jax.tree.unflatten(jax.tree.structure(like), arrays), meta
         return None
+
+
+def _checkpointer() -> Any:
+    """Orbax's, for this process alone: it would wait for the others of `jax.distributed`, who read and write nothing."""
+    import orbax.checkpoint as ocp
+
+    own = jax.process_index()
+    alone = ocp.options.MultiprocessingOptions(
+        primary_host=own, active_processes={own}, barrier_sync_key_prefix=f"process{own}"
+    )
+    return ocp.StandardCheckpointer(multiprocessing_options=alone)
 
 
 def newest(

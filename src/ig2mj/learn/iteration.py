@@ -23,6 +23,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 
+from ig2mj.cluster.team import Team
 from ig2mj.engine.view import Array
 from ig2mj.errors import EngineError
 from ig2mj.learn.collect import NativeCollector, Play, TrainingEnv, begin, collect_fn
@@ -138,11 +139,11 @@ class OneDevice:
 class ManyDevices:
     """The same over several devices, of this process or of several; see the module's text."""
 
-    def __init__(self, env: TrainingEnv, algorithm: Algorithm, devices: Sequence[Any]):
+    def __init__(self, env: TrainingEnv, algorithm: Algorithm, devices: Sequence[Any], team: Team | None = None):
         """
         Args:
           env: one device's part of the worlds. algorithm: made with `axis=AXIS`. devices: of all processes, in the same
-            order in each of them.
+            order in each of them. team: these processes.
 
         Raises:
           EngineError: the engine is not pure, or the samples of an update are not shared evenly.
@@ -153,7 +154,7 @@ class ManyDevices:
         batch = getattr(algorithm.config, "batch", 0)
         if batch % len(devices):
             raise EngineError(f"a batch of {batch} samples cannot be shared by {len(devices)} devices: --set batch=...")
-        self._env, self._algorithm, self._devices = env, algorithm, own
+        self._env, self._algorithm, self._devices, self._team = env, algorithm, own, team or Team()
         self._first, self._count = list(devices).index(own[0]), len(devices)
         self.num_worlds = env.num_worlds * self._count
         self._mesh = Mesh(np.array(devices), (AXIS,))
@@ -172,7 +173,7 @@ class ManyDevices:
             losses = jax.lax.pmean({**losses, "all_finite": 1.0 * finite(learner)}, AXIS)
             return learner, memory, jax.tree.map(lambda a: jax.lax.psum(a[0], AXIS), sums), losses, clock
 
-        self._collect = jax.jit(collect, donate_argnums=1)
+        self._collect, self._compiled = jax.jit(collect, donate_argnums=1), None
         kinds: list[Any] = []
 
         def leaves() -> list[Any]:

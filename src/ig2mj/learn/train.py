@@ -133,9 +133,9 @@ def train(
     key = jax.random.PRNGKey(run.seed)
     first_key, key = jax.random.split(key)
     learner = algorithm.init(first_key) if learner is None else learner
-    step: Any = ManyDevices(env, algorithm, devices) if devices else OneDevice(env, algorithm, run.programs)
-    memory = step.memory()
     team = team or Team()
+    step: Any = ManyDevices(env, algorithm, devices, team) if devices else OneDevice(env, algorithm, run.programs)
+    memory = step.memory()
     checkpoints = Checkpoints(run.out) if run.out is not None else None
     log = Log(run.out if team.first else None, quiet=run.quiet or not team.first)
     clock, iteration, env_steps, resumed = 0.0, 0, 0, False
@@ -213,6 +213,7 @@ def train(
             saved = told
             if kept is not None and team.first:
                 kept(learner, {"seconds": clock, "env_steps": env_steps, **row})
+            team.barrier(f"saved {iteration}")
         if stopped:
             log.close()
             return Result(learner, row, iteration, compile_s, stopped)

@@ -1,27 +1,26 @@
 """`sample`: many initial states of a scene that fulfil conditions, on several processes, as a pool.
 
-Every row has a random stream of its own, which belongs to (seed, row, attempt): the rows are the same for any number of
-processes. A row that cannot be sampled within its budget is tried again with another stream, and the reasons are
-counted.
+Every row has a random stream of its own, which belongs to (seed, row, attempt), and is a piece of work of its own
+(`ig2mj.cluster.pieces`): the rows are the same for any number of processes, and on a cluster. A row that cannot be
+sampled within its budget is tried again with another stream, and the reasons are counted.
 """
 
 from __future__ import annotations
 
 import collections
-import concurrent.futures
 import dataclasses
 import functools
-import multiprocessing
-import os
+import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 
 import jax
 import numpy as np
 
+from ig2mj.cluster.journal import Journal
+from ig2mj.cluster.pieces import Piece, Report, Status, Where, WholeRunError, Work, run
 from ig2mj.errors import EngineError
 from ig2mj.predicates.logic import Expression
-from ig2mj.process import use_processor_only
 from ig2mj.sampling.conditions import Condition, bind, read_conditions
 from ig2mj.sampling.placement import Budget, Rejections
 from ig2mj.sampling.query import SceneQuery
@@ -29,6 +28,7 @@ from ig2mj.sampling.row import Row, RowSampler
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.states.initial import states_of_manifest
 from ig2mj.states.model import StateModel
+from ig2mj.worlds.archive import build, pack, unpack
 from ig2mj.worlds.pool import Pool, stack
 
 ROW_BUDGET = 600
@@ -51,6 +51,7 @@ class Sampled:
     Attributes:
       pool: the rows that succeeded; None where none did. rows: their numbers. requested: how many were wanted.
       rejected: how often which reason turned a candidate down, in all attempts. seconds: wall time.
+      failed: by the number of a row, why it could not even be tried (only where a journal was given).
     """
 
     pool: Pool | None
@@ -58,6 +59,7 @@ class Sampled:
     requested: int
     rejected: collections.Counter
     seconds: float
+    failed: dict[str, str] = dataclasses.field(default_factory=dict)
 
     @property
     def complete(self) -> bool:
@@ -72,8 +74,11 @@ def sample(
     seed: int = 0,
     *,
     jobs: int = 1,
-    seconds_per_row: float = float("inf"),
+    seconds_per_row: float = math.inf,
     progress: Progress = lambda done, failed: None,
+    where: Where | None = None,
+    journal: Journal | None = None,
+    report: Report = lambda status: None,
 ) -> Sampled:
     """Samples rows.
 
@@ -81,64 +86,97 @@ def sample(
       scene: without agents: a pool describes the household alone.
       conditions: expressions or their text (see `ig2mj.sampling.conditions`); they hold together in every row.
       count: rows. seed: the same seed gives the same rows.
-      jobs: processes; 0: one per processor.
+      jobs: processes; 0: one per processor. where: more of that, such as a cluster; it takes the place of `jobs`.
       seconds_per_row: wall time after which an attempt at a row ends; it makes results depend on the machine's speed.
+      journal: keeps finished rows, and takes rows that fail; without one they end everything.
 
     Raises:
       StateError, AbilityError, UnknownNameError, ExpressionError: a condition can never be made true.
-      EngineError: the scene itself does not come to rest.
+      EngineError: the scene itself does not come to rest. ClusterError: see `ig2mj.cluster.pieces.run`.
     """
     began = time.monotonic()
     wanted = read_conditions(conditions)
     bind(wanted, scene.tables, np.random.default_rng(0))  # errors before any work
-    rows: list[Row | None] = []
-    rejected: Rejections = collections.Counter()
-    numbers = range(count)
-    with jax.default_device(jax.local_devices(backend="cpu")[0]):  # one world, and the same rows with and without a GPU
-        for row, reasons in _run(scene, wanted, numbers, seed, jobs or os.cpu_count() or 1, seconds_per_row):
-            rows.append(row)
-            rejected.update(reasons)
-            made = sum(r is not None for r in rows)
-            progress(made, len(rows) - made)
-    good = [n for n, row in zip(numbers, rows, strict=True) if row is not None]
-    pools = [_as_pool(row) for row in rows if row is not None]
+
+    def tell(status: Status) -> None:
+        progress(status.done, status.failed)
+        report(status)
+
+    work = row_work(scene, wanted, range(count), seed, seconds_per_row)
+    _given[_key_of(scene)] = scene
+    try:
+        store, failed = run(work, where or Where(jobs), journal, tell)
+    finally:
+        _given.clear()
+        _sampler.cache_clear()
+    if failed and journal is None:
+        raise EngineError(next(iter(failed.values())))
+    numbers, pools, rejected = [], [], collections.Counter()
+    for number, piece in enumerate(work.pieces):
+        if piece.name in failed:
+            continue
+        arrays, header = unpack(store.get(piece.name))
+        rejected.update(header["rejected"])
+        if arrays:
+            numbers.append(number)
+            pools.append(build(Pool, arrays, piece.name))
     return Sampled(
         pool=stack(pools) if pools else None,
-        rows=tuple(good),
+        rows=tuple(numbers),
         requested=count,
         rejected=rejected,
         seconds=time.monotonic() - began,
+        failed=failed,
     )
 
 
-def _run(
-    scene: Scene, wanted: Sequence[Condition], numbers: Sequence[int], seed: int, jobs: int, seconds: float
-) -> Iterator[tuple[Row | None, Rejections]]:
-    """Rows and reasons, in the order of their numbers."""
-    if jobs == 1 or len(numbers) == 1:
-        sampler = make_sampler(scene)
-        for n in numbers:
-            yield sample_row(sampler, wanted, seed, n, seconds)
-        return
-    context = multiprocessing.get_context("spawn")
-    objects = tuple(a.wanted for a in scene.additions)
-    with concurrent.futures.ProcessPoolExecutor(
-        min(jobs, len(numbers)), context, initializer=_load, initargs=(os.fspath(scene.folder), objects)
-    ) as pool:
-        yield from pool.map(functools.partial(_row_here, tuple(wanted), seed, seconds), numbers)
+def row_work(
+    scene: Scene, wanted: Sequence[Condition], numbers: Sequence[int], seed: int, seconds: float = math.inf
+) -> Work:
+    """Rows as pieces of work."""
+    name, objects = _key_of(scene)
+    common = {
+        "scene": name,
+        "objects": list(objects),
+        "conditions": [[c.predicate, list(c.arguments), c.value] for c in wanted],
+        "seed": seed,
+        "seconds": None if math.isinf(seconds) else seconds,
+    }
+    return Work(
+        "ig2mj.sampling.many:row_piece",
+        f"sampling in {scene.name}",
+        [Piece(f"row_{n:06d}", {**common, "number": n}) for n in numbers],
+        check=("ig2mj.scene.scene:digest_of", {"scene": name, "objects": list(objects)}),
+    )
 
 
-_here: list[RowSampler] = []
-"""The sampler of a worker process."""
+def row_piece(
+    scene: str, objects: Sequence[str], conditions: Sequence[Sequence], seed: int, seconds: float | None, number: int
+) -> bytes:
+    """One row, packed, with the reasons why candidates were turned down; no arrays where it was given up."""
+    wanted = [Condition(predicate, tuple(arguments), value) for predicate, arguments, value in conditions]
+    with jax.default_device(jax.local_devices(backend="cpu")[0]):  # one world, and the same rows with and without a GPU
+        try:
+            sampler = _sampler(scene, tuple(objects))
+        except EngineError as e:
+            raise WholeRunError(e) from e
+        row, rejected = sample_row(sampler, wanted, seed, number, math.inf if seconds is None else seconds)
+    return pack({} if row is None else _as_pool(row), {"rejected": dict(rejected)})
 
 
-def _load(folder: str, objects: tuple[str, ...]) -> None:
-    use_processor_only()  # many processes would fill a GPU's memory
-    _here.append(make_sampler(load_scene(folder, objects=objects)))
+_given: dict[tuple[str, tuple[str, ...]], Scene] = {}
+"""Scenes that need not be loaded in this process, by `_key_of`."""
 
 
-def _row_here(wanted: tuple[Condition, ...], seed: int, seconds: float, number: int) -> tuple[Row | None, Rejections]:
-    return sample_row(_here[0], wanted, seed, number, seconds)
+def _key_of(scene: Scene) -> tuple[str, tuple[str, ...]]:
+    """What `load_scene` needs to load it on any machine that has it: its name if it ships, else its folder."""
+    return scene.portable_name, tuple(a.wanted for a in scene.additions)
+
+
+@functools.lru_cache(maxsize=1)
+def _sampler(name: str, objects: tuple[str, ...]) -> RowSampler:
+    given = _given.get((name, objects))
+    return make_sampler(given if given is not None else load_scene(name, objects=objects))
 
 
 def make_sampler(scene: Scene) -> RowSampler:

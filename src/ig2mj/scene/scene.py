@@ -18,7 +18,7 @@ from ig2mj.scene.additions import Addition, add_objects
 from ig2mj.scene.build_tables import build_tables
 from ig2mj.scene.grasp_equalities import add_grasp_equalities
 from ig2mj.scene.manifest import AgentEntry, Manifest, ObjectEntry, load_manifest
-from ig2mj.scene.paths import MANIFEST_FILE, model_file
+from ig2mj.scene.paths import MANIFEST_FILE, SHIPPED_HOMES, model_file
 from ig2mj.scene.rooms import Rooms, load_rooms
 from ig2mj.scene.tables import SceneTables
 
@@ -75,6 +75,12 @@ class Scene:
         hashed.update("\n".join((*self.object_names, *(a.sha256 for a in self.additions))).encode())
         hashed.update("".join(a.wanted for a in self.additions if a.place is not None).encode())
         return hashed.hexdigest()
+
+    @property
+    def portable_name(self) -> str:
+        """What `load_scene` finds it by on any machine that has it: its bare name if it ships, else its folder."""
+        ships = self.folder.resolve().parent == SHIPPED_HOMES.resolve()
+        return self.folder.name if ships else str(self.folder.resolve())
 
     def object_index(self, name: str) -> int:
         """Place of the object on the O axis. Raises UnknownNameError, with near matches."""
@@ -152,6 +158,11 @@ def _attach_all(agents: Sequence[Agent], spec: mujoco.MjSpec, manifest: Manifest
                     spec.add_exclude(bodyname1=body, bodyname2=name)
     add_grasp_equalities(spec, manifest, entries)
     return entries
+
+
+def digest_of(scene: str, objects: Sequence[str] = ()) -> str:
+    """`Scene.digest` of a scene and what is added to it: that another machine has the same. Errors of `load_scene`."""
+    return load_scene(scene, objects=objects).digest
 
 
 def read_spec(file: pathlib.Path) -> mujoco.MjSpec:

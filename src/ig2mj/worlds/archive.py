@@ -31,16 +31,30 @@ def save_tree(file: str | os.PathLike, tree: Any, header: dict[str, Any]) -> Non
       InputError: it cannot be written there.
     """
     path = pathlib.Path(file)
-    arrays = {_name(keys): np.asarray(leaf) for keys, leaf in jax.tree_util.tree_flatten_with_path(tree)[0]}
-    arrays[HEADER] = np.frombuffer(msgspec.json.encode(header), np.uint8)
+    packed = pack(tree, header)
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        with unfinished.open("wb") as out:
-            np.savez_compressed(out, allow_pickle=False, **arrays)
+        unfinished.write_bytes(packed)
         unfinished.replace(path)
     except OSError as e:
         unfinished.unlink(missing_ok=True)
         raise InputError(path, f"cannot be written: {e.strerror or e}", fix="choose another place") from e
+
+
+def pack(tree: Any, header: dict[str, Any]) -> bytes:
+    """What `save_tree` would write, for `unpack`."""
+    with io.BytesIO() as out:
+        arrays = {_name(keys): np.asarray(leaf) for keys, leaf in jax.tree_util.tree_flatten_with_path(tree)[0]}
+        arrays[HEADER] = np.frombuffer(msgspec.json.encode(header), np.uint8)
+        np.savez_compressed(out, allow_pickle=False, **arrays)
+        return out.getvalue()
+
+
+def unpack(packed: bytes) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """Arrays by path, and the header, of what `pack` gave. Raises InputError."""
+    with _open(packed) as archive:
+        header = _header(archive, "packed arrays")
+        return {name: archive[name] for name in archive.files if name != HEADER}, header
 
 
 def read_header(file: str | os.PathLike) -> dict[str, Any]:
@@ -114,18 +128,18 @@ def _name(keys: Any) -> str:
 
 
 @contextlib.contextmanager
-def _open(file: str | os.PathLike) -> Iterator[Any]:
+def _open(file: str | os.PathLike | bytes) -> Iterator[Any]:
     """The archive, closed afterwards. Raises InputError."""
     try:
-        stream = io.BytesIO(pathlib.Path(file).read_bytes())
+        stream = io.BytesIO(file if isinstance(file, bytes) else pathlib.Path(file).read_bytes())
     except OSError as e:
-        raise InputError(file, f"cannot be read: {e.strerror or e}") from e
+        raise InputError(str(file), f"cannot be read: {e.strerror or e}") from e
     try:
         archive = np.load(stream, allow_pickle=False)
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as e:
-        raise InputError(file, f"is no npz archive: {e}") from e
+        raise InputError("packed arrays" if isinstance(file, bytes) else file, f"is no npz archive: {e}") from e
     if not hasattr(archive, "files"):  # a single array
-        raise InputError(file, "is no npz archive")
+        raise InputError("packed arrays" if isinstance(file, bytes) else file, "is no npz archive")
     with archive:
         yield archive
 

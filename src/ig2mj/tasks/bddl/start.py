@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import os
 from collections.abc import Sequence
+from typing import Any
 
 import jax
 import numpy as np
@@ -130,6 +131,7 @@ def sample_start(
     jobs: int = 1,
     seconds_per_row: float = float("inf"),
     progress: Progress = lambda done, failed: None,
+    **options: Any,
 ) -> SampledStart:
     """Samples initial states of an activity.
 
@@ -137,7 +139,9 @@ def sample_start(
       scene: as `load_bound` gives it. The others: as of `ig2mj.sampling.many.sample`, which also says what is raised.
     """
     wanted = [c.expression for c in start_conditions(binding, scene)]
-    done = many.sample(scene, wanted, count, seed, jobs=jobs, seconds_per_row=seconds_per_row, progress=progress)
+    done = many.sample(
+        scene, wanted, count, seed, jobs=jobs, seconds_per_row=seconds_per_row, progress=progress, **options
+    )
     return SampledStart(done, () if done.pool is None else rows_where_goal_holds(binding, scene, done.pool))
 
 

@@ -1,0 +1,67 @@
+"""What commands share that do their work in pieces: options, the journal beside the output, the progress bar."""
+
+from __future__ import annotations
+
+import contextlib
+import pathlib
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Annotated, Any
+
+import tyro
+
+if TYPE_CHECKING:
+    from ig2mj.cluster.journal import Deliver, Journal
+    from ig2mj.cluster.pieces import Report, Status, Where
+
+Cluster = Annotated[str | None, tyro.conf.arg(metavar="auto|ADDRESS")]
+"""Option: the Ray cluster that does the work."""
+
+Resume = Annotated[bool, tyro.conf.FlagCreatePairsOff]
+"""Option: go on with a run that was broken off."""
+
+EVERY = 30.0
+"""Seconds between two lines where there is no terminal, on a cluster."""
+
+LISTED = 20
+"""Failed pieces that are listed by name."""
+
+
+def opened(
+    out: pathlib.Path, request: Mapping[str, Any], where: Where, deliver: Deliver | None = None, **options: Any
+) -> Journal:
+    """The journal of a run with this output. Raises ClusterError, InputError."""
+    from ig2mj.cluster.journal import Journal
+    from ig2mj.cluster.versions import versions
+
+    return Journal(out, {**request, "versions": versions()}, where.resume, deliver, **options)
+
+
+@contextlib.contextmanager
+def follow(title: str, where: Where) -> Iterator[Report]:
+    """A bar on the terminal, or lines now and then where a cluster works and there is no terminal."""
+    from ig2mj.cli.printing import add_bar, progress_bar
+
+    last = [time.monotonic()]
+    with progress_bar() as bar:
+        move = add_bar(bar, title)
+
+        def report(status: Status) -> None:
+            move(str(status), status.done + status.failed, status.total)
+            if bar.disable and where.cluster is not None and time.monotonic() - last[0] > EVERY:
+                last[0] = time.monotonic()
+                print(f"{title}: {status.done} of {status.total} done, {status}", file=sys.stderr, flush=True)
+
+        yield report
+
+
+def tell_failures(failed: Mapping[str, str], total: int) -> None:
+    """Lists failed pieces with their reasons, on standard error."""
+    if not failed:
+        return
+    print(f"{len(failed)} of {total} pieces failed; --resume tries them again:", file=sys.stderr)
+    for name, reason in list(failed.items())[:LISTED]:
+        print(f"  {name}: {reason}", file=sys.stderr)
+    if len(failed) > LISTED:
+        print(f"  and {len(failed) - LISTED} more", file=sys.stderr)

@@ -1,0 +1,170 @@
+"""`Journal`: finished pieces of a run on disk, so that a run that was broken off can go on.
+
+Beside the output `FILE` lies a folder `FILE.pieces`, or in an output folder `.pieces`, as long as the run is not
+complete: what was asked for (`request.json`), a line for each finished piece (`done.jsonl`), its bytes, and a lock: two
+runs with one output cannot be. When all is done, the folder goes.
+
+Nothing in it is pickled; a piece counts as finished only if its bytes have the hash that its line says.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import hashlib
+import json
+import os
+import pathlib
+import shutil
+import socket
+from collections.abc import Callable, Collection, Mapping
+from typing import Any
+
+from ig2mj.errors import ClusterError, InputError
+
+Deliver = Callable[[str, bytes], None]
+"""Puts the bytes of a finished piece, by its name, where they belong."""
+
+
+class Memory:
+    """Results of a run that leaves nothing behind."""
+
+    def __init__(self) -> None:
+        self._results: dict[str, bytes] = {}
+
+    def names(self) -> Collection[str]:
+        """Of the pieces that are finished."""
+        return self._results.keys()
+
+    def put(self, name: str, result: bytes) -> None:
+        """A piece is finished."""
+        self._results[name] = result
+
+    def get(self, name: str) -> bytes:
+        """What a finished piece gave."""
+        return self._results[name]
+
+
+class Journal:
+    """See the module's text; a context manager, which holds the lock."""
+
+    def __init__(
+        self,
+        out: str | os.PathLike,
+        request: Mapping[str, Any],
+        resume: bool = False,
+        deliver: Deliver | None = None,
+        there: Callable[[str], bool] = lambda name: True,
+    ):
+        """
+        Args:
+          out: the output: a file, or a folder, which must be there.
+          request: what is asked for, for JSON: only a run of the same request can be resumed.
+          resume: go on with the run that was broken off; without one, begin.
+          deliver: where results go instead of into the journal. there: whether one that was delivered still is.
+
+        Raises:
+          ClusterError: another run is at it. InputError: an unfinished run is there and not to be resumed, or is of
+            another request.
+        """
+        self.out = pathlib.Path(out)
+        inside = self.out.is_dir()
+        self.folder = self.out / ".pieces" if inside else self.out.with_name(self.out.name + ".pieces")
+        self._request = json.loads(json.dumps(dict(request)))
+        self._deliver, self._there, self._done = deliver, there, {}
+        self.folder.mkdir(exist_ok=True)
+        self._lock = self._locked()
+        try:
+            self._begin(resume)
+        except BaseException:
+            self._unlock()
+            raise
+
+    def _locked(self) -> Any:
+        opened = (self.folder / "lock").open("a+")
+        try:
+            fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            opened.seek(0)
+            who = opened.read().strip() or "another run"
+            opened.close()
+            raise ClusterError(f"{self.out}: {who} is writing there; wait for it, or choose another place") from None
+        opened.truncate(0)
+        opened.write(f"process {os.getpid()} on {socket.gethostname()}")
+        opened.flush()
+        return opened
+
+    def _begin(self, resume: bool) -> None:
+        file = self.folder / "request.json"
+        if file.exists():
+            if not resume:
+                fix = f"--resume goes on with it; to begin anew, remove {self.folder}"
+                raise InputError(self.out, "a run of this was broken off", fix=fix)
+            self._compare(file)
+            self._read()
+            return
+        beside = file.with_suffix(".part")
+        beside.write_text(json.dumps(self._request), encoding="utf-8")
+        beside.replace(file)
+
+    def _compare(self, file: pathlib.Path) -> None:
+        try:
+            known = json.loads(file.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as e:
+            raise InputError(file, f"cannot be read: {e}", fix=f"remove {self.folder}") from e
+        for name in {**known, **self._request}:
+            if known.get(name) != self._request.get(name):
+                was, now = (json.dumps(r.get(name))[:80] for r in (known, self._request))
+                raise InputError(self.out, f"the run that was broken off had {name} = {was}, and here it is {now}")
+
+    def _read(self) -> None:
+        with contextlib.suppress(FileNotFoundError):
+            for line in (self.folder / "done.jsonl").read_text(encoding="utf-8").splitlines():
+                with contextlib.suppress(ValueError, KeyError, TypeError):  # the last line, of a full disk or a kill
+                    entry = json.loads(line)
+                    self._done[str(entry["name"])] = str(entry["sha256"])
+        for name, known in list(self._done.items()):
+            if not (self._there(name) if self._deliver else self._whole(name, known)):
+                del self._done[name]
+
+    def _whole(self, name: str, known: str) -> bool:
+        try:
+            return hashlib.sha256(self._file(name).read_bytes()).hexdigest() == known
+        except OSError:
+            return False
+
+    def _file(self, name: str) -> pathlib.Path:
+        return self.folder / f"{name.replace('/', '+')}.bin"
+
+    def names(self) -> Collection[str]:
+        """Of the pieces that are finished."""
+        return self._done.keys()
+
+    def put(self, name: str, result: bytes) -> None:
+        """A piece is finished. Raises OSError: the disk of this machine is full."""
+        if self._deliver is not None:
+            self._deliver(name, result)
+        else:
+            beside = self.folder / ".part"
+            beside.write_bytes(result)
+            beside.replace(self._file(name))
+        self._done[name] = hashlib.sha256(result).hexdigest()
+        with (self.folder / "done.jsonl").open("a", encoding="utf-8") as lines:
+            lines.write(json.dumps({"name": name, "sha256": self._done[name], "bytes": len(result)}) + "\n")
+
+    def get(self, name: str) -> bytes:
+        """What a finished piece gave, where nothing else was done with it."""
+        return self._file(name).read_bytes()
+
+    def finish(self) -> None:
+        """The run is complete: the folder goes."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _unlock(self) -> None:
+        self._lock.close()
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._unlock()

@@ -1,0 +1,195 @@
+"""Pieces of work on a Ray cluster (`pip install "ig2mj[cluster]"`).
+
+Before any work one task on every node says which versions it has and whether it sees the same files; a node that
+differs is named. A node that dies while it works costs the pieces that it was doing, which are tried again on another.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import functools
+import socket
+import urllib.parse
+from typing import Any
+
+from ig2mj.cluster.pieces import Answer, Piece, Work, do, found
+from ig2mj.cluster.versions import difference, versions
+from ig2mj.errors import ClusterError
+
+REACH = 10.0
+"""Seconds in which somebody must answer at the address."""
+
+ASK = 180.0
+"""Seconds that a node may take to say what it has: its first import reads a gigabyte from a network's disk."""
+
+AHEAD = 2
+"""Pieces handed out for each processor: the next is there when one is done."""
+
+
+class RayNodes:
+    """All nodes of a cluster."""
+
+    def __init__(self, work: Work, address: str):
+        """Connects, and asks every node.
+
+        Raises:
+          ClusterError: nobody is there, or a node has other versions or files. ModuleNotFoundError: no Ray here.
+        """
+        import ray
+
+        self._ray, self._work = ray, work
+        self._mine = not ray.is_initialized()
+        if self._mine:
+            _connect(ray, address)
+        try:
+            nodes = _alive(ray)
+            self._shared = {name: ray.put(content) for name, content in work.shared.items()}
+            self._ask(nodes)
+            self._resources: dict[str, Any] = {"num_gpus": 1, "num_cpus": 1} if work.gpu else {"num_cpus": 1}
+            if not self.width:
+                what = "a GPU" if work.gpu else "a processor for work"
+                raise ClusterError(f"no node of the cluster at {address} has {what}")
+        except BaseException:
+            self.close(now=True)
+            raise
+        self._task = ray.remote(_task).options(max_retries=0, **self._resources)
+        self._busy: dict[Any, Piece] = {}
+
+    @property
+    def width(self) -> int:
+        """Grows and shrinks with the cluster."""
+        with contextlib.suppress(Exception):  # while a node goes, Ray may have no answer
+            there = self._ray.cluster_resources()
+            self._width = AHEAD * int(there.get("GPU" if self._work.gpu else "CPU", 0))
+        return self._width
+
+    _width = 0
+    _busy: dict[Any, Piece] = {}  # noqa: RUF012  until there is a task
+
+    @property
+    def running(self) -> int:
+        """Pieces that were handed out and have no answer."""
+        return len(self._busy)
+
+    def submit(self, piece: Piece) -> None:
+        """Hands a piece out to the cluster, which finds a node."""
+        keys = list(self._shared)
+        ref = self._task.remote(
+            self._work.function, self._work.gpu, piece.name, dict(piece.arguments), keys, *self._shared.values()
+        )
+        self._busy[ref] = piece
+
+    def wait(self) -> list[Answer]:
+        """Waits for the first answers."""
+        done, _ = self._ray.wait(list(self._busy), num_returns=1, timeout=None)
+        answers = []
+        for ref in done:
+            piece = self._busy.pop(ref)
+            try:
+                result, error, kind, again, all_fail = self._ray.get(ref)
+                answers.append(Answer(piece.name, result, error, kind, again, all_fail))
+            except self._ray.exceptions.RayError as e:
+                answers.append(Answer(piece.name, error=_line(e), again=True))
+        return answers
+
+    def _ask(self, nodes: list[dict[str, Any]]) -> None:
+        """Compares every node with this process. Raises ClusterError."""
+        from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
+
+        check = self._work.check and (self._work.check[0], dict(self._work.check[1]))
+        own, files = versions(), told(check)
+        if not nodes:
+            raise ClusterError("the cluster has no node that is alive")
+        asked = {}
+        for node in nodes:
+            on = NodeAffinitySchedulingStrategy(node["NodeID"], soft=False)
+            asked[node["NodeID"]] = self._ray.remote(_about).options(
+                num_cpus=0, max_retries=1, scheduling_strategy=on
+            ).remote(check)  # fmt: skip
+        for node in nodes:
+            name = f"node {node['NodeManagerHostname']} ({node['NodeManagerAddress']}, {node['NodeID'][:8]})"
+            try:
+                theirs, seen, error = self._ray.get(asked[node["NodeID"]], timeout=ASK)
+            except self._ray.exceptions.GetTimeoutError:
+                raise ClusterError(f"{name} has not answered within {ASK:g} s") from None
+            except self._ray.exceptions.RayError as e:
+                missing = "No module named" in str(e)
+                raise ClusterError(f"{name} has no ig2mj of this version" if missing else f"{name}: {_line(e)}") from e
+            if other := difference(own, theirs):
+                raise ClusterError(f"{name} has {other}")
+            if error:
+                raise ClusterError(f"{name}: {error}")
+            if seen != files:
+                raise ClusterError(f"{name} has other files than this machine ({check and check[1]})")
+
+    def close(self, now: bool) -> None:
+        """Leaves the cluster; `now`: what is being done is given up."""
+        if now:
+            for ref in self._busy:
+                with contextlib.suppress(Exception):
+                    self._ray.cancel(ref, force=True)
+        if self._mine:
+            self._ray.shutdown()
+
+
+def _task(
+    function: str, gpu: bool, name: str, arguments: dict[str, Any], keys: list[str], *shared: bytes
+) -> tuple[bytes, str, str, bool, bool]:
+    """Does a piece; runs on a node."""
+    if not gpu:
+        _leave_gpus_alone()
+    answer = do(function, Piece(name, arguments), dict(zip(keys, shared, strict=True)))
+    return answer.result, answer.error, answer.kind, answer.again, answer.all_fail
+
+
+@functools.cache
+def _leave_gpus_alone() -> None:
+    from ig2mj.process import use_processor_only
+
+    use_processor_only()
+
+
+def told(check: tuple[str, dict[str, Any]] | None) -> str:
+    """What a check says here."""
+    return "" if check is None else str(found(check[0])(**check[1]))
+
+
+def _about(check: tuple[str, dict[str, Any]] | None) -> tuple[dict[str, str], str, str]:
+    """Versions, what the check says, and what went wrong with it; runs on a node."""
+    try:
+        return versions(), told(check), ""
+    except Exception as e:
+        return versions(), "", " ".join(str(e).split()) or type(e).__name__
+
+
+def _connect(ray: Any, address: str) -> None:
+    """Raises ClusterError."""
+    if address != "auto":
+        parsed = urllib.parse.urlsplit(address if "://" in address else f"//{address}")
+        try:
+            host, port = parsed.hostname, parsed.port
+        except ValueError:
+            host = port = None
+        if not host or not port:
+            raise ClusterError(f"--cluster {address}: an address is HOST:PORT (or ray://HOST:PORT), or auto")
+        try:
+            socket.create_connection((host, port), REACH).close()
+        except OSError as e:
+            raise ClusterError(f"--cluster {address}: nobody answers there ({e.strerror or e})") from e
+    try:
+        ray.init(address=address, namespace="ig2mj", logging_level="ERROR", log_to_driver=False)
+    except ConnectionError as e:
+        why = "this machine belongs to no cluster (`ray start`)" if address == "auto" else _line(e)
+        raise ClusterError(f"--cluster {address}: {why}") from e
+    except RuntimeError as e:  # another version of Ray or Python
+        raise ClusterError(f"--cluster {address}: {_line(e)}") from e
+
+
+def _alive(ray: Any) -> list[dict[str, Any]]:
+    return [node for node in ray.nodes() if node["Alive"]]
+
+
+def _line(error: BaseException) -> str:
+    """The first words of one of Ray's errors, which go over many lines."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text if len(text) < 200 else f"{text[:200]} ..."

@@ -1,0 +1,41 @@
+"""What must be the same wherever parts of one piece of work are done."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import pathlib
+import platform
+from importlib.metadata import PackageNotFoundError, version
+
+PACKAGES = ("jax", "jaxlib", "mujoco", "warp-lang", "numpy")
+
+
+@functools.cache
+def versions() -> dict[str, str]:
+    """Versions by name; of ig2mj also a mark of its source files, since two checkouts may bear one number."""
+    found = {"Python": ".".join(platform.python_version_tuple()[:2]), "ig2mj": f"{_version('ig2mj')} ({_sources()})"}
+    return found | {name: _version(name) for name in PACKAGES}
+
+
+def difference(own: dict[str, str], other: dict[str, str]) -> str | None:
+    """The first version that differs, as "numpy 2.1, and here it is 2.2"; None where all are the same."""
+    for name, value in own.items():
+        if other.get(name) != value:
+            return f"{name} {other.get(name)}, and here it is {value}"
+    return None
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "absent"
+
+
+def _sources() -> str:
+    """8 hexadecimal digits of all source files of the package."""
+    root, hashed = pathlib.Path(__file__).resolve().parents[1], hashlib.blake2b(digest_size=4)
+    for file in sorted(root.rglob("*.py")):
+        hashed.update(file.relative_to(root).as_posix().encode() + b"\0" + file.read_bytes())
+    return hashed.hexdigest()
