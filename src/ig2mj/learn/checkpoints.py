@@ -98,7 +98,7 @@ class Checkpoints:
 
 
 def _checkpointer() -> Any:
-    """Orbax's, for this process alone: it would wait for the others of `jax.distributed`, who read and write nothing."""
+    """Orbax's, for this process alone: it would wait for the others of `jax.distributed`, who do not come."""
     import orbax.checkpoint as ocp
 
     own = jax.process_index()
