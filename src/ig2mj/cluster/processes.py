@@ -16,7 +16,7 @@ import signal
 import threading
 from collections.abc import Mapping
 
-from ig2mj.cluster.pieces import Answer, Piece, Work, do
+from ig2mj.cluster.work import Answer, Piece, Work, do
 
 
 class ThisProcess:

@@ -12,8 +12,8 @@ import socket
 import urllib.parse
 from typing import Any
 
-from ig2mj.cluster.pieces import Answer, Piece, Work, do, found
 from ig2mj.cluster.versions import difference, versions
+from ig2mj.cluster.work import Answer, Piece, Work, do, found
 from ig2mj.errors import ClusterError
 
 REACH = 10.0

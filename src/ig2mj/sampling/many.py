@@ -18,7 +18,8 @@ import jax
 import numpy as np
 
 from ig2mj.cluster.journal import Journal
-from ig2mj.cluster.pieces import Piece, Report, Status, Where, WholeRunError, Work, run
+from ig2mj.cluster.pieces import Report, Status, Where, run
+from ig2mj.cluster.work import Piece, WholeRunError, Work
 from ig2mj.errors import EngineError
 from ig2mj.predicates.logic import Expression
 from ig2mj.sampling.conditions import Condition, bind, read_conditions
