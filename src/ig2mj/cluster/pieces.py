@@ -12,7 +12,7 @@ import dataclasses
 import os
 import time
 from collections.abc import Callable
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 from ig2mj import errors
 from ig2mj.cluster.journal import Journal, Memory
@@ -58,6 +58,7 @@ class Status:
         return ", ".join(parts)
 
 
+@runtime_checkable
 class Workers(Protocol):
     """Who does pieces: `LocalProcesses`, `ThisProcess`, `RayNodes`. `width`: pieces that are worth handing out."""
 
