@@ -11,7 +11,7 @@ INTEROP ?= .interop
 INTEROP_ENVS ?= $(notdir $(patsubst %/requirements.txt,%,$(wildcard tests/interop/*/requirements.txt)))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-slow test-gpu test-interop check docs homes-check format bench clean distclean
+.PHONY: help setup web demo test test-slow test-gpu test-interop check docs homes-check format bench clean distclean
 
 help:
 	@echo "make demo       convert the small home, run it, cook a fish in it; leaves pictures, a plot, films, a report"
@@ -20,6 +20,7 @@ help:
 	@echo "make test-gpu   the tests that need a CUDA device"
 	@echo "make test-interop  with other projects' programs, each in an environment of its own (some GB; INTEROP_ENVS=...)"
 	@echo "make check      ruff and pyright"
+	@echo "make web        fetch three.js for the page of \`ig2mj vr\` (needs npm)"
 	@echo "make docs       the documentation site, in out/site/"
 	@echo "make homes-check  build and convert all homes anew and compare them byte for byte with scenes_mjcf/"
 	@echo "make format     let ruff put the code in order"
@@ -51,13 +52,29 @@ $(VENV)/.gl: $(VENV)/.created scripts/system_gl.sh
 	@sh scripts/system_gl.sh
 	@touch $@
 
+# What the page of `ig2mj vr` loads: three.js, in the version of web/package-lock.json. Wheels carry it; the repository
+# does not. IWER, which plays a headset in tests, stays in web/node_modules/.
+PAGE := src/ig2mj/vr/page/vendor
+web: $(PAGE)/three.module.js
+
+$(PAGE)/three.module.js: web/package-lock.json
+	@npm --version >/dev/null 2>&1 || { echo "error: no npm here; install Node.js (Debian: apt-get install npm)" >&2; exit 2; }
+	@cd web && npm ci --ignore-scripts --no-audit --no-fund --loglevel=error
+	@rm -rf $(PAGE) && mkdir -p $(PAGE)/addons/loaders $(PAGE)/addons/utils
+	@cp web/node_modules/three/examples/jsm/loaders/GLTFLoader.js $(PAGE)/addons/loaders/
+	@cp web/node_modules/three/examples/jsm/utils/BufferGeometryUtils.js $(PAGE)/addons/utils/
+	@cp web/node_modules/three/examples/jsm/utils/SkeletonUtils.js $(PAGE)/addons/utils/
+	@cp web/node_modules/three/LICENSE $(PAGE)/
+	@cp web/node_modules/three/build/three.core.js web/node_modules/three/build/three.module.js $(PAGE)/
+	@touch $@
+
 demo: setup
 	@$(BIN)/ig2mj demo
 
 test: setup
 	@$(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m "not slow and not gpu" $(PYTEST_ARGS)
 
-test-slow: setup
+test-slow: setup web
 	@$(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m "slow and not gpu" --timeout 1800 $(PYTEST_ARGS)
 
 test-gpu: setup

@@ -66,6 +66,7 @@ COMMANDS: dict[str, str] = {
     "train": "train a policy in an environment",
     "evaluate": "tell how often a policy succeeds from states it has not seen",
     "policies": "list trained policies that ship, show a model card, add a run as one of them",
+    "vr": "do a task yourself, in a headset or with mouse and keyboard",
     "demos": "collect demonstrations of scripted experts, and replay recordings",
     "sample-task": "sample an environment's start states, and keep them in the cache",
     "homes": "build our own dataset of household objects and homes",

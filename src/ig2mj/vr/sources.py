@@ -18,9 +18,9 @@ class PoseSource(Protocol):
         """The newest frame; None while nobody is there."""
         ...
 
-    def stand_at(self, body: Pose) -> None:
+    def stand_at(self, body: Pose) -> PoseFrame | None:
         """Moves the play area so that the person stands where a robot's body stands, and faces as it does; the height
-        stays their own."""
+        stays their own. Returns the newest frame from there."""
         ...
 
     def pulse(self, hand: int, strength: float, seconds: float) -> None:

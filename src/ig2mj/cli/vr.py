@@ -1,0 +1,153 @@
+"""`ig2mj vr TASK`: a person does a task, in a headset or with mouse and keyboard."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+
+if TYPE_CHECKING:
+    from ig2mj.vr.session import Session
+
+DEVICES = ("page", "openxr", "recorded")
+
+
+def run(
+    task: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="TASK")],
+    record: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    device: str = "page",
+    poses: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    host: str | None = None,
+    port: int = 8090,
+    token: str | None = None,
+    certificate: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="PEM")] = None,
+    key: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="PEM")] = None,
+    grasping: str = "assisted",
+    seed: int = 0,
+    row: int = -1,
+    pool_size: int = 0,
+    seconds: float = 0.0,
+    timing: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+) -> int:
+    """Do a task yourself, in a headset or with mouse and keyboard; ends with Ctrl-C.
+
+    Args:
+      task: CookingMeat, or activity/cleaning_windows (`ig2mj list-envs`); one that the humanoid can do.
+      record: HDF5 of everything that happens and of what your devices say, for `ig2mj demos replay`.
+      device: page: a page for the headset's browser (WebXR), or for mouse and keyboard; openxr: a headset of this
+        machine; recorded: devices say again what they said in --poses.
+      poses: recording whose devices are played.
+      host: address to serve the page on; default: this machine alone. Others need --token and, for headsets,
+        --certificate.
+      port: of the page; 0: any free one.
+      token: what the page demands; auto draws one.
+      certificate: your certificate, for HTTPS. key: its key, if it is in a file of its own.
+      grasping: assisted, sticky, mitten or physical.
+      seed: of what is random.
+      row: start state; -1: a random one.
+      pool_size: start states; 0: as many as the task has.
+      seconds: end after so long; 0: when you end it.
+      timing: show every two seconds where the time of a frame goes: physics, states, rendering, waiting.
+    """
+    import math
+
+    from ig2mj.errors import Ig2mjError, UnknownNameError
+
+    if device not in DEVICES:
+        raise UnknownNameError("device", device, DEVICES)
+    if (poses is not None) != (device == "recorded"):
+        raise Ig2mjError("--poses FILE belongs to --device recorded")
+    if not math.isfinite(seconds) or seconds < 0 or row < -1 or pool_size < 0:
+        raise Ig2mjError("--seconds must be finite, --seconds, --row and --pool-size not negative")
+    if device != "page" and any(value is not None for value in (host, token, certificate, key)):
+        raise Ig2mjError("--host, --token, --certificate and --key belong to --device page")
+    common = {"record_to": record, "seed": seed, "row": None if row < 0 else row}
+    if device == "page":
+        from ig2mj.vr.server import check_page
+        from ig2mj.web.access import access_for
+
+        check_page()
+        access = access_for(host, port, token, certificate, key)
+    env = _environment(task, grasping, pool_size, row)
+    if device == "page":
+        return _serve(env, access, common, seconds, timing)
+    if device == "openxr":
+        from ig2mj.vr.openxr.session import run_headset
+
+        return run_headset(env, common, seconds, timing)
+    assert poses is not None
+    return _repeat(env, poses, common)
+
+
+def _environment(task: str, grasping: str, pool_size: int, row: int):
+    from ig2mj.errors import Ig2mjError
+    from ig2mj.vr.session import person_environment
+
+    env = person_environment(task, grasping, pool_size=pool_size or None)
+    if row >= env.core.starts.pool.size:
+        raise Ig2mjError(f"--row {row}: the task has start states 0 to {env.core.starts.pool.size - 1}")
+    return env
+
+
+def _serve(env, access, common: dict, seconds: float, timing: bool) -> int:
+    import sys
+
+    from ig2mj.vr.page_source import PagePoses
+    from ig2mj.vr.server import HomePage
+    from ig2mj.vr.session import Session
+
+    source = PagePoses()
+    with Session(env, source, person=_remark, **common) as session, HomePage(session, source, access, timing) as page:
+        print(f"{env.task.name}: {env.task.summary}", file=sys.stderr)
+        print(f"open {page.server.url}", flush=True)
+        print("Ctrl-C ends the session", file=sys.stderr)
+        _play(session, seconds, timing, lambda: page.rate)
+    return _ended(session, common)
+
+
+def _repeat(env, poses: pathlib.Path, common: dict) -> int:
+    from ig2mj.vr.recorded import RecordedPoses
+    from ig2mj.vr.session import Session
+
+    source = RecordedPoses(poses)
+    with Session(env, source, person=_remark, **common) as session:
+        while not source.over:
+            session.step()
+    return _ended(session, common)
+
+
+def _play(session: Session, seconds: float, timing: bool, rate) -> None:
+    """Runs a session until it is over; tells about its timing from another thread."""
+    import sys
+    import threading
+
+    stop = threading.Event()
+
+    def tell() -> None:
+        while not stop.wait(2.0):
+            drawn = rate()
+            pictures = "" if drawn is None else f"   pictures {drawn.pictures:.0f}/s, slowest {drawn.slowest:.0f} ms"
+            print(f"{session.timing.line()}{pictures}", file=sys.stderr, flush=True)
+
+    if timing:
+        threading.Thread(target=tell, daemon=True).start()
+    try:
+        session.run(seconds or None)
+    except KeyboardInterrupt:
+        print("", file=sys.stderr)
+    finally:
+        stop.set()
+
+
+def _ended(session: Session, common: dict) -> int:
+    print(f"goal {'reached' if session.succeeded else 'not reached'}")
+    if common["record_to"] is not None:
+        print(f"wrote {common['record_to']}; `ig2mj demos replay {common['record_to']} --check` replays it")
+    return 0
+
+
+def _remark(text: str) -> None:
+    import sys
+
+    print(text, file=sys.stderr, flush=True)

@@ -1,0 +1,102 @@
+"""`PagePoses`: the devices of whoever looks at the page first, headset or mouse and keyboard."""
+
+from __future__ import annotations
+
+import dataclasses
+import threading
+import time
+from collections.abc import Callable
+
+from ig2mj.vr.desktop import DesktopPoses
+from ig2mj.vr.frames import PlayArea, Pose, PoseFrame
+from ig2mj.vr.messages import Desktop, Devices
+from ig2mj.vr.play_area import brought_to, moved
+
+STALE = 1.0
+"""s of silence of a headset: its browser stops drawing, and so telling, when it is taken off."""
+
+Pulse = Callable[[int, float, float], None]
+
+
+class PagePoses:
+    """A `PoseSource` that pages feed. All methods may be called from any thread.
+
+    Attributes: area: where the play area is now.
+    """
+
+    def __init__(self, stale: float = STALE) -> None:
+        """Nobody is there. `stale`: s without news from a headset after which nobody wears it."""
+        self._stale = stale
+        self._lock = threading.Lock()
+        self._desktop: DesktopPoses | None = None
+        self._frame: PoseFrame | None = None
+        self._heard = self._advanced = 0.0
+        self._pulse: Pulse | None = None
+        self.area = PlayArea()
+
+    # From pages.
+
+    def arrive(self, pulse: Pulse) -> None:
+        """Someone is there. `pulse`: lets their hands feel something."""
+        with self._lock:
+            self._pulse, self._desktop = pulse, None
+            self._frame = None
+
+    def leave(self) -> None:
+        """They are gone."""
+        with self._lock:
+            self._pulse, self._desktop, self._frame = None, None, None
+
+    def receive(self, message: Devices | Desktop, now: float | None = None) -> None:
+        """What a page said."""
+        now = time.monotonic() if now is None else now
+        with self._lock:
+            if isinstance(message, Devices):
+                self._frame, self._desktop = message.frame(), None
+            else:
+                self._desktop = self._desktop or DesktopPoses()
+                self._desktop.feed(message.down, message.move, message.wheel, message.buttons)
+            self._heard = now
+        self.advance(now)
+
+    def advance(self, now: float | None = None) -> None:
+        """Lets time pass for what sticks and keys do; to be called at the rate of pictures."""
+        now = time.monotonic() if now is None else now
+        with self._lock:
+            seconds = max(now - self._advanced, 0.0)
+            self._advanced = now
+            if now - self._heard > self._stale:
+                if self._desktop is not None:
+                    self._desktop.release()
+                else:
+                    self._frame = None
+            if self._desktop is not None:
+                self._frame = self._desktop.frame(seconds)
+            if self._frame is not None:
+                self.area = moved(self.area, self._frame, seconds)
+
+    # For the session.
+
+    def poll(self) -> PoseFrame | None:
+        """The newest frame; None while nobody is there."""
+        self.advance()
+        with self._lock:
+            return None if self._frame is None else dataclasses.replace(self._frame, area=self.area)
+
+    def stand_at(self, body: Pose) -> PoseFrame | None:
+        """See `PoseSource`."""
+        with self._lock:
+            if self._frame is not None and self._frame.head is not None:
+                self.area = brought_to(self.area, self._frame.head, body)
+        return self.poll()
+
+    def pulse(self, hand: int, strength: float, seconds: float) -> None:
+        """See `PoseSource`."""
+        with self._lock:
+            pulse = self._pulse
+        if pulse is not None:
+            pulse(hand, strength, seconds)
+
+    def close(self) -> None:
+        """Nobody is there any more."""
+        self.leave()
