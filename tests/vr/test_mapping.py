@@ -7,6 +7,7 @@ import math
 
 import numpy as np
 import pytest
+from rotations import turned
 from scipy.spatial.transform import Rotation
 
 from ig2mj.agents.humanoid.frames import BODY_Z, EYE_POS, HAND_POS, HAND_QUAT, MAX_MOVE, MAX_TURN, PALM_CENTER, mirrored
@@ -16,10 +17,6 @@ from ig2mj.vr.play_area import HEIGHTS, brought_to, moved
 from ig2mj.vr.xr_axes import grip_of_hand, hand_from_grip, head_from_xr, to_xr
 
 STILL = Rotation.identity()
-
-
-def turned(**about: float) -> Rotation:
-    return Rotation.from_euler("".join(about), list(about.values()), degrees=True)
 
 
 def rest(hand: int) -> Pose:
