@@ -22,7 +22,7 @@ class Timing:
 
     def __init__(self) -> None:
         """No frames yet."""
-        self._now = dict.fromkeys(PARTS, 0.0)
+        self._now: dict[str, float] = dict.fromkeys(PARTS, 0.0)
         self._rows: collections.deque[tuple[float, ...]] = collections.deque(maxlen=WINDOW)
         self.frames = 0
 

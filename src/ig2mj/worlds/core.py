@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager
 from typing import Any
 
 import jax
@@ -110,16 +109,6 @@ class Core:
         self._no_status = GoalStatus.empty(engine.num_worlds)
 
     # A control step.
-
-    def watch_physics(self, watch: Callable[[], AbstractContextManager[Any]]) -> None:
-        """Has every physics step of the native engine taken inside a context, so that its time can be told from the
-        rest's; a second call replaces the first."""
-
-        def watched(physics: Physics, ctrl: Float[Array, "W nu"] | None = None) -> tuple[Physics, PhysicsView]:
-            with watch():
-                return self.engine.step(physics, ctrl)
-
-        self._physics_step = watched
 
     def step(self, batch: Batch, action: Float[Array, "W n"] | None = None) -> tuple[Batch, GoalStatus]:
         """One control step of every world.
