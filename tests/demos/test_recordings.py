@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 import sys
@@ -55,7 +56,7 @@ def test_a_recording_says_what_it_is_of_and_how_its_runs_ended(env, recorded):
         assert recording.header["scene_hash"] == env.scene.digest
         qpos = first.rows("frames/physics/agents/qpos", 0, 13)
         assert qpos.dtype == np.float64 and (qpos[1:] != qpos[:-1]).any()
-        assert len(first.rows("frames/physics/agents/eq_data", 0, 13)) == 1  # the same in all frames
+        assert len(recording.arrays["frames/physics/agents/eq_data"]) == 1  # the same in all frames
         total = first.rows("steps/reward/total", 0, 12)
         terms = [first.rows(f"steps/{name}", 0, 12) for name in first.step_names if name.startswith("reward/")]
         assert sum(np.broadcast_to(t, 12) for t in terms) == pytest.approx(2 * total, abs=1e-4)
@@ -85,11 +86,14 @@ def test_the_first_difference_is_named_by_run_frame_object_and_field(env, record
     copy = changed(recorded, tmp_path)
     joint = env.scene.model.joint("steak_0/free")
     with h5py.File(copy, "a") as opened:
-        rows = np.asarray(opened["run_000002/frames/physics/scene/qpos"])
-        rows = np.repeat(rows, 13, axis=0) if len(rows) == 1 else rows
-        rows[5:, joint.qposadr[0] + 2] += 1e-16 + np.spacing(rows[5:, joint.qposadr[0] + 2])
-        del opened["run_000002/frames/physics/scene/qpos"]
-        opened["run_000002/frames/physics/scene/qpos"] = rows
+        (first, _), *_ = opened["run_000002"].attrs["parts"]
+        column = json.loads(opened.attrs["columns"]).index("frames/physics/scene/qpos")
+        rows = np.asarray(opened["frames/physics/scene/qpos"])
+        new = np.array(rows[opened["index"][first + 5, column]])
+        new[joint.qposadr[0] + 2] = np.nextafter(new[joint.qposadr[0] + 2], 9)
+        del opened["frames/physics/scene/qpos"]
+        opened["frames/physics/scene/qpos"] = np.concatenate([rows, new[None]])
+        opened["index"][first + 5, column] = len(rows)
     with Recording(copy) as recording:
         (found,) = Replayer(recording, env=env)(check=True).differences
     assert (found.run, found.frame, found.field) == ("run_000002", 5, "physics/scene/qpos")
@@ -110,29 +114,48 @@ def test_another_engine_version_is_refused_by_action_and_warned_of_by_state(env,
     assert [w.split(" was ")[0] for w in warnings] == ["mujoco", "processor"]
 
 
+def put(opened, name, values):
+    del opened[name]
+    opened[name] = values
+
+
 def spoil(opened, what, tmp_path):
     run = opened["run_000001"]
+    column = json.loads(opened.attrs["columns"]).index("steps/action")
     if what == "missing":
-        del run["frames/states/temperature"]
+        del opened["frames/states/temperature"]
+    elif what == "unnamed":
+        opened.attrs["columns"] = opened.attrs["columns"].replace("states/temperature", "states/other")
+        opened.move("frames/states/temperature", "frames/states/other")
     elif what == "rows":
-        values = np.asarray(run["steps/action"])[:-1]
-        del run["steps/action"]
-        run["steps/action"] = values
+        put(opened, "steps/action", np.asarray(opened["steps/action"])[:3])
     elif what == "text":
-        del run["frames/key"]
-        run["frames/key"] = np.array(["a"] * 13, dtype=h5py.string_dtype())
+        put(opened, "frames/key", np.array(["a"] * 13, dtype=h5py.string_dtype()))
     elif what == "shape":
-        del run["frames/states/wetness"]
-        run["frames/states/wetness"] = np.zeros((1, 3), np.float32)
+        put(opened, "frames/states/wetness", np.zeros((99, 3), np.float32))
     elif what == "outside":
         with h5py.File(tmp_path / "other.h5", "w") as other:
             other["x"] = np.zeros(1)
-        del run["frames/flags"]
-        run["frames/flags"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "/x")
+        del opened["frames/flags"]
+        opened["frames/flags"] = h5py.ExternalLink(str(tmp_path / "other.h5"), "/x")
     elif what == "claimed":
         run.attrs["frames"] = 10**9
-        del run["frames/physics/time"]
-        run.create_dataset("frames/physics/time", (10**9,), np.float64, chunks=(200,))
+    elif what == "claimed by the index":
+        run.attrs["frames"], run.attrs["parts"] = 10**9, np.array([[0, 10**9]])
+        names = opened["index"].shape[1]
+        del opened["index"]
+        opened.create_dataset("index", (10**9, names), np.int32, chunks=(200, names))
+    elif what == "claimed by an array":
+        del opened["frames/physics/time"]
+        opened.create_dataset("frames/physics/time", (10**9,), np.float64, chunks=(200,))
+    elif what == "huge rows":
+        del opened["frames/physics/time"]
+        huge = opened.create_dataset("frames/physics/time", (1, 10**9), np.float64, chunks=(1, 10**9), compression=1)
+        assert huge.shape == (1, 10**9)
+    elif what == "parts":
+        run.attrs["parts"] = np.array([[0, -1]])
+    elif what == "index":
+        opened["index"][:, column] = -5
     elif what == "negative":
         run.attrs["frames"] = -1
 
@@ -140,12 +163,18 @@ def spoil(opened, what, tmp_path):
 @pytest.mark.parametrize(
     ("what", "named"),
     [
-        ("missing", r"run_000001/frames/states/temperature: is missing"),
-        ("rows", r"run_000001/steps/action: has 11 rows, and the run 12"),
-        ("text", r"run_000001/frames/key: is no array of numbers"),
-        ("shape", r"run_000001/frames/states/wetness: is float32\[3\], must be float32\[\d+\]"),
-        ("outside", r"run_000001/frames/flags: is missing"),
-        ("claimed", r"run_000001/frames/\S+: (claims|has)"),
+        ("missing", r"frames/states/temperature: is missing"),
+        ("unnamed", r"run_000000/frames/states/temperature: is missing"),
+        ("rows", r"run_00000\d/steps/action: has 3 rows, and the index names others"),
+        ("text", r"frames/key: is no array of numbers"),
+        ("shape", r"run_000000/frames/states/wetness: is float32\[3\], must be float32\[\d+\]"),
+        ("outside", r"frames/flags: is missing"),
+        ("claimed", r"run_000001/attribute frames: claims 1000000000 frames, and 13 are there"),
+        ("claimed by the index", r"index: claims 1000000000 rows that are not there"),
+        ("claimed by an array", r"frames/physics/time: claims 1000000000 rows"),
+        ("huge rows", r"frames/physics/time: claims 1 rows that are not there"),
+        ("parts", r"run_000001/attribute parts: names frames that are not there"),
+        ("index", r"run_00000\d/steps/action: has \d+ rows, and the index names others"),
         ("negative", r"run_000001/attribute frames: is -1"),
     ],
 )
@@ -178,10 +207,10 @@ import numpy as np
 from ig2mj.demos.writer import RunWriter
 
 about = {name: "" for name in ("mujoco", "ig2mj", "scene", "scene_hash", "model_hash")}
-writer = RunWriter(sys.argv[1], about, ["a", "late"], ["action"])
-writer.begin(0, [np.zeros(3), np.zeros(2)], {})
+writer = RunWriter(sys.argv[1], about, {}, ["a", "late"], ["action"])
+writer.begin({0: {}}, [], [np.zeros((1, 3)), np.zeros((1, 2))])
 for k in range(1, 451):
-    writer.add(0, [np.full(3, k / 7), np.full(2, float(k > 300))], [np.full(2, k)])
+    writer.add([], [np.full((1, 3), k / 7), np.full((1, 2), float(k > 300))], [np.full((1, 2), k)])
 os.kill(os.getpid(), signal.SIGKILL)
 """
 

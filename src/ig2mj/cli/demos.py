@@ -7,6 +7,7 @@ from typing import Annotated
 
 import tyro
 
+from ig2mj.cli.demos_folder import metrics
 from ig2mj.cli.demos_replay import export, replay
 
 
@@ -78,4 +79,4 @@ def collect(
     return 0
 
 
-SUBCOMMANDS = {"collect": collect, "replay": replay, "export": export}
+SUBCOMMANDS = {"collect": collect, "replay": replay, "export": export, "metrics": metrics}

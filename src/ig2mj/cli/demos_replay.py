@@ -9,22 +9,24 @@ import tyro
 
 if TYPE_CHECKING:
     from ig2mj.demos.reader import Run
+    from ig2mj.demos.replay import Replayed
     from ig2mj.envs.environment import EnvState
 
 
 def replay(
-    file: Annotated[pathlib.Path, tyro.conf.Positional],
+    file: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE|FOLDER")],
     by: str = "action",
     check: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     video: pathlib.Path | None = None,
     sensors: str = "",
     out: pathlib.Path | None = None,
     threads: int = 0,
+    jobs: int = 1,
 ) -> int:
-    """Replay a recording of an environment (`ig2mj rollout --record FILE`).
+    """Replay a recording of an environment (`ig2mj rollout --record FILE`), or all recordings of a folder.
 
     Args:
-      file: the recording.
+      file: the recording, or a folder of them.
       by: action: every action is taken again, natively with the same bytes; state: every frame is loaded as it was
         written, exact on any machine.
       check: compare every byte of every frame; status 1 and the first difference of each run where one is not the same.
@@ -32,24 +34,56 @@ def replay(
       sensors: observations to make that were not recorded, e.g. rgb,depth; written to --out.
       out: HDF5 of the observations; default: FILE with .sensors.h5.
       threads: that the native engine steps worlds on; 0: one per processor.
+      jobs: processes, each with a recording of its own.
     """
     import sys
 
-    from ig2mj.demos.reader import Recording
-    from ig2mj.demos.replay import MODES, Replayer
-    from ig2mj.envs.registry import VECTORS
+    from ig2mj.cli.demos_folder import files_of, of_files
+    from ig2mj.demos.replay import MODES
     from ig2mj.errors import Ig2mjError, UnknownNameError
 
     if by not in MODES:
         raise UnknownNameError("way to replay", by, MODES)
-    if threads < 0:
-        raise Ig2mjError(f"--threads {threads}: 0 or more are possible")
+    if threads < 0 or jobs < 1:
+        raise Ig2mjError(f"--threads {threads}, --jobs {jobs}: 0 threads or more, and 1 process or more are possible")
+    files = files_of(file)
+    if len(files) > 1 and (video is not None or out is not None):
+        raise Ig2mjError("--video and --out are of one recording: name a file")
     names = tuple(name.strip() for name in sensors.split(",") if name.strip())
+    status = 0
+    for one, done in of_files(_replayed, files, jobs, by, check, video, names, out, threads):
+        if isinstance(done, Ig2mjError):
+            if len(files) == 1:
+                raise done
+            print(f"error: {done}", file=sys.stderr)
+            status = 2
+            continue
+        for warning in done.warnings:
+            print(f"warning: {warning}", file=sys.stderr)
+        for difference in done.differences:
+            print(f"{one}: {difference}")
+        same = "" if not check or by == "state" or done.differences else ", all the same"
+        print(f"{one}: {done.runs} runs, {done.frames} frames by {by}{same}")
+        status = max(status, 1 if done.differences else 0)
+    return status
+
+
+def _replayed(
+    file: pathlib.Path,
+    by: str,
+    check: bool,
+    video: pathlib.Path | None,
+    names: tuple[str, ...],
+    out: pathlib.Path | None,
+    threads: int,
+) -> Replayed:
+    from ig2mj.demos.reader import Recording
+    from ig2mj.demos.replay import Replayer
+    from ig2mj.envs.registry import VECTORS
+
     options: dict[str, Any] = {"threads": threads} if threads else {}
     with Recording(file) as recording:
         replayer = Replayer(recording, by, observations=names or VECTORS, **options)
-        for warning in replayer.warnings:
-            print(f"warning: {warning}", file=sys.stderr)
         watchers: list[Any] = []
         try:
             if video is not None:
@@ -61,15 +95,10 @@ def replay(
                 for watcher in watchers:
                     watcher.see(state, runs, frame)
 
-            done = replayer(check, watch if watchers else None)
+            return replayer(check, watch if watchers else None)
         finally:
             for watcher in watchers:
                 watcher.close()
-    for difference in done.differences:
-        print(f"{file}: {difference}")
-    same = "" if not check or by == "state" or done.differences else ", all the same"
-    print(f"{file}: {done.runs} runs, {done.frames} frames by {by}{same}")
-    return 1 if done.differences else 0
 
 
 def export(
@@ -83,23 +112,23 @@ def export(
 
     Args:
       file: the recording (`ig2mj rollout --record FILE`).
-      out: the file to write.
-      to: robomimic.
+      out: the file to write; a folder for lerobot.
+      to: robomimic (HDF5), lerobot (datasets v3.0: parquet and films) or igibson (HDF5).
       by: action, which compares every byte, or state.
-      obs: observations, e.g. proprioception,rgb; default: proprioception,privileged_state.
+      obs: observations, e.g. proprioception,rgb; default: proprioception,privileged_state. igibson has none.
     """
+    from ig2mj.demos.exports import EXPORTS
     from ig2mj.demos.reader import Recording
     from ig2mj.demos.replay import MODES, Replayer
-    from ig2mj.demos.robomimic import export_robomimic
     from ig2mj.envs.registry import VECTORS
     from ig2mj.errors import UnknownNameError
 
-    for kind, name, known in (("format", to, ("robomimic",)), ("way to replay", by, MODES)):
+    for kind, name, known in (("format", to, tuple(EXPORTS)), ("way to replay", by, MODES)):
         if name not in known:
             raise UnknownNameError(kind, name, known)
     names = tuple(name.strip() for name in obs.split(",") if name.strip())
     with Recording(file) as recording:
-        done = export_robomimic(Replayer(recording, by, observations=names or VECTORS), out)
+        done = EXPORTS[to](Replayer(recording, by, observations=names or VECTORS), out)
     print(f"{out}: {done.runs} runs of {file}")
     return 0
 

@@ -25,7 +25,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Int
 
-from ig2mj.demos.frames import FrameRows, frame_of, names_of
+from ig2mj.demos.frames import FrameRows
 from ig2mj.demos.origin import origin_of
 from ig2mj.demos.writer import RunWriter
 from ig2mj.engine.view import Array
@@ -57,7 +57,6 @@ class RecordedEnvironment(Environment):
         if self._worlds and not 0 <= self._worlds[0] <= self._worlds[-1] < env.num_worlds:
             raise EngineError(f"worlds to record are from 0 to {env.num_worlds - 1}")
         self._last: EnvState | None = None
-        self._rows = FrameRows(env.core.engine, self._worlds)
         self.writer: RunWriter | None = None
         self.devices: dict[str, np.ndarray] = dict(devices or {})
         self._device_names, self._past_success = list(self.devices), past_success
@@ -67,7 +66,7 @@ class RecordedEnvironment(Environment):
         """As `Environment.step`."""
         if state is not self._last:
             self._begin(state, np.ones(self.num_worlds, bool), {})
-        given = np.asarray(action)
+        given = np.array(action, np.float32)
         after = self._inner.step(state, action)
         self._note(given, after)
         return after
@@ -118,40 +117,38 @@ class RecordedEnvironment(Environment):
     ) -> EnvState:
         """New runs in the masked worlds."""
         if self.writer is None:
-            frame = frame_of(self.core.engine, state)
-            steps = ["action", "reward/total", "terminated", "truncated", "success", *self._terms()]
-            steps += [f"devices/{name}" for name in self._device_names]
-            self.writer = RunWriter(self._file, origin_of(self._inner), names_of(frame), steps)
+            self._rows = FrameRows(self.core.engine, self._worlds, state)
+            steps = ["action", "reward/total", "terminated", "truncated", "success"]
+            steps += [f"reward/{name}" for name in self.objective.terms]
+            names = (self._rows.own, self._rows.batched, steps)
+            self.writer = RunWriter(self._file, origin_of(self._inner), *names, self._worlds)
             weakref.finalize(self, self.writer.close)
+        begun = [world for world in self._worlds if mask[world]]
+        self._last = state
+        if not begun:
+            return state
         if rows is None:
             rows = np.asarray(pick_rows(jnp.asarray(state.batch.world.key), self.core.starts.pool.size))
-        frames, episode = self._rows(state), np.asarray(state.batch.episode)
-        for world in self._worlds:
-            if mask[world]:
-                own = {"episode": int(episode[world]), "row": int(rows[world]), **about}
-                self.writer.begin(world, frames[world], own)
-                self._succeeded[world] = False
-        self._last = state
+        episode = np.asarray(state.batch.episode)
+        runs = {w: {"episode": int(episode[w]), "row": int(rows[w]), **about} for w in begun}
+        self.writer.begin(runs, *self._rows(state))
         return state
 
     def _note(self, action: np.ndarray, state: EnvState) -> None:
         """A frame of all worlds, and the ends of runs."""
         assert self.writer is not None
-        frames = self._rows(state)
-        success = np.asarray(state.info["success"])
-        ends = [np.asarray(state.terminated), np.asarray(state.truncated)]
-        terms = [np.asarray(state.info[f"reward/{name}"]) for name in self.objective.terms]
-        steps = [action.astype(np.float32), np.asarray(state.reward), *ends, success, *terms]
-        steps += [self.devices[name] for name in self._device_names]
-        self._succeeded |= success
-        for world in self._worlds:
-            self.writer.add(world, frames[world], [array[world, ...] for array in steps])
-            if not self._past_success and (ends[0][world] or ends[1][world]):
-                self.writer.end(world, success=bool(success[world]), terminated=bool(ends[0][world]))
+        terms = (state.info[f"reward/{name}"] for name in self.objective.terms)
+        steps = [state.reward, state.terminated, state.truncated, state.info["success"], *terms]
+        if self.pure:
+            steps = [np.array(array) for array in steps]
+        self.writer.add(*self._rows(state), [action, *steps])
+        terminated, truncated = np.asarray(state.terminated), np.asarray(state.truncated)
+        if terminated.any() or truncated.any():
+            success = np.asarray(state.info["success"])
+            for world in self._worlds:
+                if terminated[world] or truncated[world]:
+                    self.writer.end(world, success=bool(success[world]), terminated=bool(terminated[world]))
         self._last = state
-
-    def _terms(self) -> list[str]:
-        return [f"reward/{name}" for name in self.objective.terms]
 
 
 def record(

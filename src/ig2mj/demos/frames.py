@@ -6,7 +6,7 @@ Axes: W worlds, L literals of the goal.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import jax
@@ -15,7 +15,8 @@ import numpy as np
 from flax import struct
 from jaxtyping import Bool, Int, UInt
 
-from ig2mj.engine.base import Engine, Physics
+from ig2mj.engine.base import Engine
+from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment, EnvState
@@ -56,37 +57,37 @@ def _besides_physics(state: EnvState) -> tuple[Any, ...]:
 
 
 class FrameRows:
-    """Frames of an environment as arrays of each world on the host, in the order of `names_of(frame_of(...))`."""
+    """Frames of an environment as arrays on the host, for `RunWriter`.
 
-    def __init__(self, engine: Engine, worlds: Sequence[int]):
-        """`worlds`: those that are wanted."""
+    Attributes:
+      own: names and places of the arrays that each world hands in for itself; batched: names of those that come with a
+        world axis. Together they are `names_of(frame_of(...))`, in its order.
+    """
+
+    def __init__(self, engine: Engine, worlds: Sequence[int], like: EnvState):
+        """`worlds`: those that are wanted. `like`: any state."""
         self._engine, self._worlds = engine, list(worlds)
-        self._leaves: list[Any] = []
-        self._rows: list[list[np.ndarray]] = []
+        names = names_of(frame_of(engine, like))
+        cuts = engine.pieces.cuts if isinstance(engine, NativeEngine) else []
+        self.own, self.batched = dict(zip(names, cuts, strict=False)), names[len(cuts) :]
 
-    def __call__(self, state: EnvState) -> dict[int, list[np.ndarray]]:
-        """Of every wanted world. Arrays that are the very same as before are not fetched again."""
-        leaves, worlds = jax.tree.leaves(_besides_physics(state)), self._worlds
-        old = self._leaves or [None] * len(leaves)
-        for k, (leaf, before) in enumerate(zip(leaves, old, strict=True)):
-            if leaf is before:
-                continue
-            array = np.asarray(leaf)
-            rows = [array[w, ...] for w in worlds]
-            if k < len(self._rows):
-                self._rows[k] = rows
-            else:
-                self._rows.append(rows)
-        self._leaves = leaves
-        physics = self._physics(state.batch.world.physics)
-        return {w: [*physics(w), *(rows[k] for rows in self._rows)] for k, w in enumerate(worlds)}
+    def __call__(self, state: EnvState) -> tuple[list[list[np.ndarray]], list[Any]]:
+        """Pieces of each wanted world, and arrays of all worlds; nobody changes them any more. Where a step uses up the
+        arrays of the one before, they are copied."""
+        physics, engine = state.batch.world.physics, self._engine
+        besides = jax.tree.leaves(_besides_physics(state))
+        if isinstance(engine, NativeEngine):
+            return [engine.pieces(physics.worlds[world]) for world in self._worlds], besides
+        return [], [np.array(leaf) for leaf in (*jax.tree.leaves(engine.snapshot(physics)), *besides)]
 
-    def _physics(self, physics: Physics) -> Callable[[int], list[np.ndarray]]:
-        engine = self._engine
-        if not engine.pure:
-            return lambda world: jax.tree.leaves(engine.export(physics, world))
-        arrays = [np.asarray(a) for a in jax.tree.leaves(engine.snapshot(physics))]
-        return lambda world: [a[world, ...] for a in arrays]
+    def rows(self, state: EnvState) -> list[list[np.ndarray]]:
+        """The same, as all arrays of each wanted world."""
+        own, batched = self(state)
+        arrays, found = [np.asarray(array) for array in batched], []
+        for k, w in enumerate(self._worlds):
+            found.append([cut(own[k][cut.piece][None])[0, ...] for cut in self.own.values()])
+            found[k] += [array[w, ...] for array in arrays]
+        return found
 
 
 def resumed(env: Environment, frame: Frame, rows: Int[np.ndarray, "W"]) -> EnvState:

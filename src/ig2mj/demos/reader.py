@@ -1,7 +1,7 @@
 """`Recording`: reading files that `RunWriter` wrote, and refusing all others.
 
 Nothing is believed: no array is read before its shape, type and place are what they must be, and no more is read at a
-time than a chunk. No pickle, no links out of the file.
+time than some hundred rows. No pickle, no links out of the file.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ FIX = "`ig2mj rollout --record FILE` and `ig2mj.demos.record` write such files"
 ATTRIBUTES = ("mujoco", "ig2mj", "scene", "scene_hash", "model_hash")
 """What every recording says of itself."""
 
+LARGEST_CHUNK = 2**28
+"""Bytes that are unpacked at a time."""
+
 
 class Run:
     """One run of one world.
@@ -30,16 +33,18 @@ class Run:
       names, step_names: of its arrays, without "frames/" and "steps/".
     """
 
-    def __init__(self, file: pathlib.Path, group: Any):
-        """Looks at every array, and reads none. Raises InputError."""
-        self.file, self.name, self._group = file, str(group.name).strip("/"), group
+    def __init__(self, recording: Recording, group: Any):
+        """Looks at what it claims to be, and reads no array. Raises InputError."""
+        self.file, self.name, self._recording = recording.file, str(group.name).strip("/"), recording
         self.attributes: dict[str, Any] = {name: _plain(value) for name, value in group.attrs.items()}
         self.frames = self._whole_number("frames")
         self.world, self.row = self._whole_number("world"), self._whole_number("row", 0)
-        self.names, self.step_names = self._arrays("frames", self.frames), self._arrays("steps", self.frames - 1)
+        self.names = [name[7:] for name in recording.columns if name.startswith("frames/")]
+        self.step_names = [name[6:] for name in recording.columns if name.startswith("steps/")]
+        self._parts = self._read_parts(self.attributes.pop("parts", None))
 
     def frame_rows(self, names: list[str], start: int, stop: int, like: list[Any] | None = None) -> list[np.ndarray]:
-        """Rows of arrays of "frames/", [stop - start, ...] each, or [1, ...] where all are the same.
+        """Rows of arrays of the world, [stop - start, ...] each.
 
         Args:
           like: arrays of one world's frame; other shapes or types are refused.
@@ -47,22 +52,23 @@ class Run:
         Raises:
           InputError: an array is missing, or is another than it must be.
         """
-        return [
-            self.rows(f"frames/{name}", start, stop, None if like is None else like[k]) for k, name in enumerate(names)
-        ]
+        index, wanted = self._index(start, stop), like or [None] * len(names)
+        return [self._rows(f"frames/{name}", index, like) for name, like in zip(names, wanted, strict=True)]
 
     def rows(self, name: str, start: int, stop: int, like: Any = None) -> np.ndarray:
-        """Some rows of one array; [1, ...] where it has only one for the whole run. Raises InputError."""
-        array = self._array(name)
-        if like is not None and (array.shape[1:] != like.shape or array.dtype != like.dtype):
-            raise self.broken(name, f"is {array.dtype}{list(array.shape[1:])}, must be {like.dtype}{list(like.shape)}")
-        if stop - start > 4 * FLUSH:
-            raise ValueError(f"{stop - start} rows at a time")
-        constant = len(array) == 1
-        try:
-            return np.asarray(array[:1] if constant else array[start:stop])
-        except (OSError, ValueError, RuntimeError) as e:
-            raise self.broken(name, f"cannot be read: {e}") from e
+        """Some rows of one array, [stop - start, ...]; row t of "steps/..." led from frame t to t + 1.
+
+        Raises:
+          InputError: the array is missing, or another than `like`. ValueError: more rows than are read at a time.
+        """
+        later = int(name.startswith("steps/"))
+        return self._rows(name, self._index(start + later, stop + later), like)
+
+    def all_rows(self, name: str) -> np.ndarray:
+        """All rows of one array. Raises InputError."""
+        count = self.frames - int(name.startswith("steps/"))
+        parts = [self.rows(name, k, min(k + FLUSH, count)) for k in range(0, max(count, 1), FLUSH)]
+        return np.concatenate(parts)
 
     def broken(self, name: str, problem: str) -> InputError:
         """The error that names an array of this run."""
@@ -74,36 +80,44 @@ class Run:
             raise self.broken(f"attribute {name}", f"is {value!r}, and must be a whole number")
         return value
 
-    def _arrays(self, part: str, count: int) -> list[str]:
-        """Names of the arrays of a part, in the order in which they were written; each has `count` rows, or 1."""
-        if self.frames == 0 or (part == "steps" and count == 0):
-            return []
-        import h5py
+    def _read_parts(self, parts: Any) -> np.ndarray:
+        """[n, 2] stretches of the file's index."""
+        if not isinstance(parts, np.ndarray) or parts.dtype.kind not in "iu" or parts.shape[1:] != (2,):
+            raise self.broken("attribute parts", "must be pairs of whole numbers")
+        parts = parts.astype(np.int64)
+        count = self._recording.index.shape[0]
+        if (parts < 0).any() or (parts[:, 0] > count).any() or (parts[:, 1] > count - parts[:, 0]).any():
+            raise self.broken("attribute parts", f"names frames that are not there; the file has {count}")
+        if parts[:, 1].sum() != self.frames:
+            raise self.broken("attribute frames", f"claims {self.frames} frames, and {parts[:, 1].sum()} are there")
+        return parts
 
-        folder = _hard(self._group, part)
-        if not isinstance(folder, h5py.Group):
-            raise self.broken(part, "is missing")
-        names: list[str] = []
-        _walk(folder, "", names, self)
-        for name in names:
-            rows = len(self._array(f"{part}/{name}"))
-            if rows not in (1, count):
-                raise self.broken(f"{part}/{name}", f"has {rows} rows, and the run {count}")
-        return names
+    def _index(self, start: int, stop: int) -> np.ndarray:
+        """[stop - start, C] of these frames."""
+        if stop - start > 4 * FLUSH:
+            raise ValueError(f"{stop - start} rows at a time")
+        found, before = [], 0
+        for first, count in self._parts:
+            low, high = max(start - before, 0), min(stop - before, count)
+            if high > low:
+                found.append(self._recording.read("index", int(first + low), int(first + high)))
+            before += count
+        return np.concatenate(found) if found else np.zeros((0, len(self._recording.columns)), np.int32)
 
-    def _array(self, name: str) -> Any:
-        import h5py
-
-        array: Any = self._group
-        for part in name.split("/"):
-            array = _hard(array, part) if isinstance(array, h5py.Group) else None
-        if not isinstance(array, h5py.Dataset) or array.ndim < 1:
+    def _rows(self, name: str, index: np.ndarray, like: Any) -> np.ndarray:
+        recording = self._recording
+        column = recording.columns.get(name)
+        if column is None:
             raise self.broken(name, "is missing")
-        if array.is_virtual or array.external or array.dtype.kind not in "biuf":
-            raise self.broken(name, f"is no array of numbers in this file ({array.dtype})")
-        if array.shape[0] and array.size and not _there(array):
-            raise self.broken(name, f"claims {array.shape[0]} rows that are not there")
-        return array
+        array, places = recording.arrays[name], index[:, column].astype(np.int64)
+        if like is not None and (array.shape[1:] != like.shape or array.dtype != like.dtype):
+            raise self.broken(name, f"is {array.dtype}{list(array.shape[1:])}, must be {like.dtype}{list(like.shape)}")
+        if len(places) and not 0 <= places.min() <= places.max() < len(array):
+            raise self.broken(name, f"has {len(array)} rows, and the index names others")
+        known, inverse = np.unique(places, return_inverse=True)
+        gaps = np.flatnonzero(np.diff(known) > 1) + 1  # what lies together is read together
+        parts = [recording.read(name, int(p[0]), int(p[-1]) + 1) for p in np.split(known, gaps) if len(p)]
+        return np.concatenate(parts)[inverse] if parts else np.zeros((0, *array.shape[1:]), array.dtype)
 
 
 class Recording:
@@ -138,12 +152,44 @@ class Recording:
         for name in ATTRIBUTES:
             if not isinstance(self.header.get(name), str):
                 raise InputError(self.file, "is missing", element=f"attribute {name}", fix=FIX)
+        columns = self.value("columns", list)
+        if not all(isinstance(name, str) and name.startswith(("frames/", "steps/")) for name in columns):
+            raise InputError(self.file, "must be names of arrays", element="attribute columns", fix=FIX)
+        self.columns: dict[str, int] = {name: k for k, name in enumerate(columns)}
+        self.index = self._array("index")
+        if self.index.ndim != 2 or self.index.shape[1] != len(columns) or self.index.dtype.kind != "i":
+            raise InputError(self.file, f"must have {len(columns)} columns", element="index", fix=FIX)
+        # A process that was killed at once has written no array yet.
+        there = {name: self._array(name) for name in columns if self.index.shape[0] or name in self._opened}
+        self.arrays: dict[str, Any] = {name: array for name, array in there.items() if array is not None}
         self.runs: list[Run] = []
-        for name in sorted(self._opened):
+        for name in sorted(set(self._opened) - {"index", "frames", "steps"}):
             group = _hard(self._opened, name)
             if not isinstance(group, h5py.Group):
                 raise InputError(self.file, "is no run", element=name, fix=FIX)
-            self.runs.append(Run(self.file, group))
+            self.runs.append(Run(self, group))
+
+    def _array(self, name: str) -> Any:
+        """An array of numbers that is in this very file. Raises InputError."""
+        import h5py
+
+        array: Any = self._opened
+        for part in name.split("/"):
+            array = _hard(array, part) if isinstance(array, h5py.Group) else None
+        if not isinstance(array, h5py.Dataset) or array.ndim < 1:
+            raise InputError(self.file, "is missing", element=name, fix=FIX)
+        if array.is_virtual or array.external or array.dtype.kind not in "biuf":
+            raise InputError(self.file, f"is no array of numbers in this file ({array.dtype})", element=name, fix=FIX)
+        if array.shape[0] and array.size and not _there(array):
+            raise InputError(self.file, f"claims {array.shape[0]} rows that are not there", element=name, fix=FIX)
+        return array
+
+    def read(self, name: str, start: int, stop: int) -> np.ndarray:
+        """Rows of an array of the file, or of its index. Raises InputError."""
+        try:
+            return np.asarray((self.index if name == "index" else self.arrays[name])[start:stop])
+        except (OSError, ValueError, RuntimeError) as e:
+            raise InputError(self.file, f"cannot be read: {' '.join(str(e).split())}", element=name, fix=FIX) from e
 
     def value(self, name: str, kind: type) -> Any:
         """An attribute of the file of this type; lists and tables are written as JSON. Raises InputError."""
@@ -177,25 +223,12 @@ def _hard(group: Any, name: str) -> Any:
     return group[name] if isinstance(link, h5py.HardLink) else None
 
 
-def _walk(group: Any, before: str, names: list[str], run: Run, depth: int = 0) -> None:
-    """Names of all arrays below a group."""
-    import h5py
-
-    if depth > 8:
-        raise run.broken(before, "is nested too deeply")
-    for name in group:
-        inner = _hard(group, name)
-        if isinstance(inner, h5py.Group):
-            _walk(inner, f"{before}{name}/", names, run, depth + 1)
-        else:
-            names.append(before + name)
-
-
 def _there(array: Any) -> bool:
     """Whether all rows of an array are in the file, and none is of more than a reasonable size."""
+    row = array.dtype.itemsize * int(np.prod(array.shape[1:], dtype=np.int64))
     if array.chunks is None:
         return array.id.get_storage_size() == array.nbytes
-    if array.chunks[0] > 4 * FLUSH or array.chunks[1:] != array.shape[1:]:
+    if array.chunks[0] > 4 * FLUSH or array.chunks[1:] != array.shape[1:] or array.chunks[0] * row > LARGEST_CHUNK:
         return False
     return array.id.get_num_chunks() * array.chunks[0] >= array.shape[0]
 

@@ -99,7 +99,7 @@ class Replayer:
         state = self.env.reset(0)
         frame = frame_of(self.env.core.engine, state)
         self._names, self._tree = names_of(frame), jax.tree.structure(frame)
-        self._rows = FrameRows(self.env.core.engine, range(worlds))
+        self._rows = FrameRows(self.env.core.engine, range(worlds), state).rows
         self._like = self._rows(state)[0]
         self._labels = Labels(self.env.scene)
         for run in recording.runs:
@@ -118,15 +118,9 @@ class Replayer:
           InputError: an array of the file is broken.
         """
         wanted = self.recording.runs if runs is None else runs
-        queues: dict[int, list[Run]] = {}
-        for run in wanted:
-            if run.frames:
-                queues.setdefault(run.world, []).append(run)
         found: list[Difference] = []
         frames = 0
-        while queues:
-            now = {world: queue.pop(0) for world, queue in queues.items()}
-            queues = {world: queue for world, queue in queues.items() if queue}
+        for now in self.rounds(wanted):
             frames += sum(run.frames for run in now.values())
             found += self._by_action(now, check, watch) if self.by == "action" else self._by_state(now, watch)
         return Replayed(sum(1 for r in wanted if r.frames), frames, found, self.warnings)
@@ -139,6 +133,22 @@ class Replayer:
         """
         rows = run.frame_rows(self._names, frame, frame + 1, self._like)
         return self._put({run.world: [array[0, ...] for array in rows]}, {run.world: run})
+
+    def rounds(self, runs: Sequence[Run]) -> Iterator[dict[int, Run]]:
+        """Runs that are replayed beside each other, by their worlds."""
+        queues: dict[int, list[Run]] = {}
+        for run in runs:
+            if run.frames:
+                queues.setdefault(run.world, []).append(run)
+        while queues:
+            yield {world: queue.pop(0) for world, queue in queues.items()}
+            queues = {world: queue for world, queue in queues.items() if queue}
+
+    def all_at(self, now: dict[int, Run], place: str) -> EnvState:
+        """The environment with each run's world at the "first" or "last" of its frames. Raises InputError."""
+        frames = {world: 0 if place == "first" else run.frames - 1 for world, run in now.items()}
+        rows = {w: run.frame_rows(self._names, frames[w], frames[w] + 1, self._like) for w, run in now.items()}
+        return self._put({w: [array[0, ...] for array in arrays] for w, arrays in rows.items()}, now)
 
     def _by_action(self, now: dict[int, Run], check: bool, watch: Watch | None) -> list[Difference]:
         found: dict[int, Difference] = {}
@@ -191,15 +201,14 @@ class Replayer:
             stop = min(start + FLUSH, run.frames)
             rows = run.frame_rows(self._names, start, stop, self._like)
             for k in range(stop - start):
-                yield [array[0 if len(array) == 1 else k, ...] for array in rows]
+                yield [array[k, ...] for array in rows]
 
     def _actions(self, run: Run) -> Iterator[np.ndarray]:
         like = np.zeros(self.env.action_space.shape, np.float32)
         for start in range(0, run.frames - 1, FLUSH):
             stop = min(start + FLUSH, run.frames - 1)
             rows = run.rows("steps/action", start, stop, like)
-            for k in range(stop - start):
-                yield rows[0 if len(rows) == 1 else k]
+            yield from rows
 
 
 def replay(file: str | os.PathLike, by: str = "action", check: bool = True, **options: Any) -> Replayed:

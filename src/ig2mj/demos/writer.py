@@ -1,40 +1,68 @@
 """`RunWriter`: runs of worlds to HDF5, as they go on.
 
-    /                    attributes: format, version, and what the file is of (`ig2mj.demos.origin`)
-    /run_000000          one run of one world; attributes: world, seed, episode, row, frames, ended, success
-        /frames/...      [T + 1, ...] the world at its start and after each step (`ig2mj.demos.frames.Frame`)
-        /steps/...       [T, ...] the step that led to frame t + 1: action, reward and its terms, ends
+    /                    attributes: format, version, columns, and what the file is of (`ig2mj.demos.origin`)
+    /run_000000          one run of one world; attributes: world, seed, episode, row, frames, ended, success, parts
+    /frames/<name>       [U, ...] rows of an array of the world (`ig2mj.demos.frames.Frame`)
+    /steps/<name>        [U, ...] rows of the step that led to a frame: action, reward and its terms, ends
+    /index               [N, C] of each frame of the file: its row of each of the C columns; -1: none
 
-An array that is the same in all frames of a run has one row. What is not written yet is at most `FLUSH` frames of each
-world: that much a killed process loses.
-
-Axis: T steps of a run.
+`parts` of a run are pairs (first, count) of rows of the index. An array's row is in the file once, for as long as it
+stays the same, and where runs begin alike. What is not written yet is at most `FLUSH` frames of each world: that much a
+killed process loses.
 """
 
 from __future__ import annotations
 
 import dataclasses
-import hashlib
+import json
 import os
 import pathlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from ig2mj.demos.columns import Column, Packer, Rows, gathered
+from ig2mj.engine.native.recorded import Cut
 from ig2mj.errors import InputError
 
-FORMAT, FORMAT_VERSION = "ig2mj recording", 1
+FORMAT, FORMAT_VERSION = "ig2mj recording", 2
 
 FLUSH = 200
-"""Frames of a run that are kept in memory at most (iGibson's figure)."""
+"""Frames of a world that are kept in memory at most (iGibson's figure)."""
+
+FLUSH_BYTES = 2**28
+"""Bytes of frames that are kept in memory at most."""
+
+CHUNK_BYTES = 2**17
+"""Of an array in the file; a chunk has at least one row."""
 
 INDEX = 8192
-"""Bytes below which an array is not worth the index of a packed one."""
+"""Bytes below which a single row is not worth the index of a packed array."""
 
 MOSTLY = 0.5
+"""Numbers more of which change from row to row are not packed: their last digits are noise."""
 
-PACKED = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+PACKED: dict[str, Any] = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+
+
+@dataclasses.dataclass(eq=False)
+class _Frame:
+    """Of all worlds at once, until it is written. `worlds`: those of whose runs it is one."""
+
+    own: Sequence[Sequence[Any]]
+    batched: list[Any]
+    step: list[Any] | None
+    worlds: Collection[int]
+
+
+@dataclasses.dataclass(eq=False)
+class _Run:
+    group: Any
+    attributes: dict[str, Any]
+    parts: list[tuple[int, int]]
+    starts: int  # frame that is not written yet and begins it; -1: it goes on
+    stops: int = -1  # frame behind its last one
 
 
 class RunWriter:
@@ -44,62 +72,73 @@ class RunWriter:
         self,
         file: str | os.PathLike,
         attributes: Mapping[str, Any],
-        frame_names: Sequence[str],
-        step_names: Sequence[str],
+        own: Mapping[str, Cut],
+        batched: Sequence[str],
+        steps: Sequence[str],
+        worlds: Sequence[int] = (0,),
     ):
-        """Makes the file. `frame_names`, `step_names`: of the arrays that `begin` and `add` take, in their order.
+        """Makes the file.
+
+        Args:
+          own: arrays that each world hands in for itself, by name, and their places in its pieces. batched: names of
+            those that come with a world axis. steps: of what led to a frame, with a world axis. worlds: places of the
+            recorded worlds on that axis.
 
         Raises:
           InputError: it cannot be written there.
         """
         self.file = pathlib.Path(file)
         self._opened = _created(self.file)
-        self._opened.attrs["format"], self._opened.attrs["version"] = FORMAT, FORMAT_VERSION
-        for name, value in attributes.items():
+        self._worlds, self._cuts, self._num_batched = list(worlds), list(own.values()), len(batched)
+        names = [f"frames/{name}" for name in (*own, *batched)] + [f"steps/{name}" for name in steps]
+        own_attributes = {"format": FORMAT, "version": FORMAT_VERSION, "columns": json.dumps(names)}
+        for name, value in (own_attributes | dict(attributes)).items():
             self._opened.attrs[name] = value
-        self._names = {"frames": list(frame_names), "steps": list(step_names)}
-        self._open: dict[int, _Run] = {}
-        self._single: dict[tuple[str, bytes], str] = {}  # arrays of one row that are in the file, and where
-        self.runs = 0
+        index = {"chunks": (FLUSH, max(len(names), 1)), "maxshape": (None, len(names))}
+        self._index = self._opened.create_dataset("index", (0, len(names)), np.int32, **index, **PACKED)
+        self._names, self._columns, self._arrays = names, [Column() for _ in names], [None] * len(names)
+        self._packers: dict[int, Packer] = {}  # 0: of frames, 1: of steps
+        self._pending: list[_Frame] = []
+        self._open: dict[int, list[_Run]] = {world: [] for world in worlds}  # the last one may go on
+        self._written = self._bytes = self.runs = 0
         self._opened.flush()
 
-    def begin(self, world: int, frame: list[np.ndarray], attributes: Mapping[str, Any]) -> None:
-        """A new run of a world, from this frame; a run of it that goes on ends."""
-        self.end(world)
-        group = self._opened.create_group(f"run_{self.runs:06d}")
-        for name, value in {"world": world, "frames": 0, "ended": False, **attributes}.items():
-            group.attrs[name] = value
-        self._open[world] = _Run(group, {part: [_Column() for _ in names] for part, names in self._names.items()})
-        self._put(self._open[world], "frames", frame)
-        self.runs += 1
+    def begin(self, worlds: Mapping[int, Mapping[str, Any]], own: Sequence[Sequence[Any]], batched: Sequence) -> None:
+        """New runs of some worlds, from this frame on; runs of them that go on end.
 
-    def add(self, world: int, frame: list[np.ndarray], step: list[np.ndarray]) -> None:
-        """The next frame of a world's run, and the step that led to it; nothing where no run of it is open."""
-        run = self._open.get(world)
-        if run is None:
-            return
-        if len(run.columns["steps"][0].rows) >= FLUSH:
-            self._write(run, closed=False)
-            self._opened.flush()
-        self._put(run, "frames", frame)
-        self._put(run, "steps", step)
+        Args:
+          worlds: attributes of the run of each. own: pieces of each recorded world, in their order. batched: [W, ...].
+            Nobody may change any of the arrays afterwards.
+        """
+        for world, attributes in worlds.items():
+            self.end(world)
+            group = self._opened.create_group(f"run_{self.runs:06d}")
+            about = {"world": world, "frames": 0, "ended": False, **attributes}
+            self._open[world].append(_Run(group, about, [], len(self._pending)))
+            self.runs += 1
+        self._put(_Frame(own, self._packed(0, batched), None, set(worlds)))
+
+    def add(self, own: Sequence[Sequence[Any]], batched: Sequence[Any], step: Sequence[Any]) -> None:
+        """The next frame of all runs that go on, and the step [W, ...] that led to it."""
+        going = {world for world, runs in self._open.items() if runs and runs[-1].stops < 0}
+        if going:
+            self._put(_Frame(own, self._packed(0, batched), self._packed(1, step), going))
 
     def end(self, world: int, **attributes: Any) -> None:
         """Ends the run of a world, if there is one."""
-        run = self._open.pop(world, None)
-        if run is None:
-            return
-        self._write(run, closed=True)
-        for name, value in {**attributes, "ended": True}.items():
-            run.group.attrs[name] = value
-        self._opened.flush()
+        runs = self._open[world]
+        if runs and runs[-1].stops < 0:
+            runs[-1].stops = len(self._pending)
+            runs[-1].attributes |= {**attributes, "ended": True}
 
     def close(self) -> None:
         """Ends all runs and closes the file; may be called twice."""
-        for world in list(self._open):
+        if not self._opened:
+            return
+        for world in self._worlds:
             self.end(world)
-        if self._opened:
-            self._opened.close()
+        self.flush()
+        self._opened.close()
 
     def __enter__(self) -> RunWriter:
         return self
@@ -107,100 +146,112 @@ class RunWriter:
     def __exit__(self, *error: object) -> None:
         self.close()
 
-    def _put(self, run: _Run, part: str, values: list[np.ndarray]) -> None:
-        for column, value in zip(run.columns[part], values, strict=True):
-            column.add(value)
+    def _packed(self, kind: int, arrays: Sequence[Any]) -> list[Any]:
+        packer = self._packers.get(kind)
+        if packer is None:
+            packer = self._packers[kind] = Packer(arrays)
+        return packer(arrays)
 
-    def _write(self, run: _Run, closed: bool) -> None:
-        for part, columns in run.columns.items():
-            for name, column in zip(self._names[part], columns, strict=True):
-                if column.rows:
-                    self._append(run.group, f"{part}/{name}", column, closed)
-        run.group.attrs["frames"] = run.columns["frames"][0].written
+    def _put(self, frame: _Frame) -> None:
+        if not self._pending:
+            sizes = (a.nbytes if hasattr(a, "nbytes") else len(a) for part in (*frame.own, frame.batched) for a in part)
+            self._bytes = sum(sizes)
+        self._pending.append(frame)
+        count = len(self._pending)
+        if count >= FLUSH or count * self._bytes >= FLUSH_BYTES:
+            self.flush()
 
-    def _append(self, group: Any, name: str, column: _Column, closed: bool) -> None:
-        """Writes a column's rows. `closed`: no more will come."""
-        rows, first, before = column.rows, column.rows[0], column.written
-        column.rows = []
-        same = all(row is first for row in rows)
-        column.written += len(rows)
-        if same and before == 0:
-            column.only = first
-            self._write_single(group, name, first)
-            return
-        if column.only is not None:
-            only = column.only
-            if same and (first is only or first.tobytes() == only.tobytes()):
-                return
-            del group[name]
-            path = f"{group.name}/{name}"
-            self._single = {key: at for key, at in self._single.items() if at != path}
-            made = _growing(group, name, np.stack(rows), before + len(rows), closed=False)
-            for start in range(0, before, FLUSH):
-                stop = min(start + FLUSH, before)
-                made[start:stop] = np.broadcast_to(only, (stop - start, *only.shape))
-            column.only = None
-        elif before == 0:
-            made = _growing(group, name, np.stack(rows), len(rows), closed)
-        else:
-            made = group[name]
-            made.resize(before + len(rows), axis=0)
-        made[before:] = np.stack(rows)
+    def flush(self) -> None:
+        """Writes what is not written yet."""
+        frames, self._pending = self._pending, []
+        if frames:
+            self._write(frames)
+        for world, runs in self._open.items():
+            for run in runs:
+                for name, value in run.attributes.items():
+                    run.group.attrs[name] = value
+                run.group.attrs["frames"] = sum(count for _, count in run.parts)
+                run.group.attrs["parts"] = np.array(run.parts, np.int64).reshape(-1, 2)
+                run.attributes, run.starts = {}, -1
+            self._open[world] = [run for run in runs if run.stops < 0]
+        self._opened.flush()
 
-    def _write_single(self, group: Any, name: str, row: np.ndarray) -> None:
-        """An array of one row; where an earlier run has the same one, a second link to it."""
-        digest = hashlib.blake2b(row.tobytes() + f"{row.dtype}{row.shape}".encode(), digest_size=16).digest()
-        known = self._single.get((name, digest))
-        if known is not None:
-            group[name] = self._opened[known]
-            return
-        packed = PACKED | {"chunks": (1, *row.shape)} if row.nbytes > 1024 else {}
-        group.create_dataset(name, data=row[None], **packed)
-        self._single[name, digest] = f"{group.name}/{name}"
+    def _write(self, frames: list[_Frame]) -> None:
+        num_own, num_batched = len(self._cuts), self._num_batched
+        taken = {w: np.array([k for k, f in enumerate(frames) if w in f.worlds], int) for w in self._worlds}
+        index = np.full((sum(map(len, taken.values())), len(self._names)), -1, np.int32)
+        offsets = dict(zip(taken, np.cumsum([0, *map(len, taken.values())]), strict=False))
+        begins = {w: np.searchsorted(taken[w], [r.starts for r in self._open[w] if r.starts >= 0]) for w in taken}
+        everywhere = self._packers[0].rows([f.batched for f in frames])
+        with_step = np.array([k for k, f in enumerate(frames) if f.step is not None], int)
+        steps = self._packers[1].rows([f.step for f in frames if f.step is not None]) if len(with_step) else []
+        for number, world in enumerate(self._worlds):
+            if not len(taken[world]):
+                continue
+            at = slice(offsets[world], offsets[world] + len(taken[world]))
+            own = [frames[k].own[number] for k in taken[world]] if self._cuts else []
+            pieces = [gathered(p) for p in zip(*own, strict=True)]
+            for c, cut in enumerate(self._cuts):
+                rows = pieces[cut.piece]
+                rows = Rows(cut(rows.values), rows.which, rows.source)
+                index[at, c] = self._place(c, world, rows, np.arange(len(taken[world])), begins[world], None)
+            for c, rows in enumerate(everywhere):
+                place = self._place(num_own + c, world, rows, taken[world], begins[world], world)
+                index[at, num_own + c] = place
+            stepped = np.isin(taken[world], with_step)
+            of_step = np.searchsorted(with_step, taken[world][stepped])
+            for c, rows in enumerate(steps if len(of_step) else ()):
+                place = self._place(num_own + num_batched + c, world, rows, of_step, (), world)
+                index[at.start + np.flatnonzero(stepped), num_own + num_batched + c] = place
+            self._note_parts(world, taken[world], int(offsets[world]))
+        _extend(self._index, self._written, index)
+        self._written += len(index)
+
+    def _note_parts(self, world: int, taken: np.ndarray, offset: int) -> None:
+        """Which of the rows that are about to be written are each run's."""
+        for run in self._open[world]:
+            first = np.searchsorted(taken, max(run.starts, 0))
+            stop = np.searchsorted(taken, run.stops) if run.stops >= 0 else len(taken)
+            if stop > first:
+                run.parts.append((self._written + offset + int(first), int(stop - first)))
+
+    def _place(self, c: int, world: int, rows: Rows, frames: np.ndarray, begins: Any, axis: int | None) -> Any:
+        column = self._columns[c]
+        before = column.written
+        places, new = column.place(world, rows, frames, begins, axis)
+        if new is not None and (new[0].size or not before):
+            self._arrays[c] = _with_rows(self._opened, self._names[c], self._arrays[c], before, new)
+        return places
 
 
-@dataclasses.dataclass(eq=False)
-class _Column:
-    """One array of a run: rows that are not written yet, and how many are.
+def _with_rows(file: Any, name: str, array: Any, before: int, rows: np.ndarray) -> Any:
+    """The array of the file with more rows; it is made or made anew where it must be.
 
-    Attributes:
-      last, content: the last row, and its bytes. only: of all rows so far, where they are the same.
+    A single row has no index of chunks, which would take more room. Rows without numbers are one, however many are
+    written.
     """
-
-    rows: list[np.ndarray] = dataclasses.field(default_factory=list)
-    last: np.ndarray | None = None
-    content: bytes = b""
-    written: int = 0
-    only: np.ndarray | None = None
-    _given: np.ndarray | None = None
-
-    def add(self, value: np.ndarray) -> None:
-        """Adds a row: the last one again where it has the same bytes."""
-        if self.last is None or value is not self._given:
-            content = value.tobytes()
-            if self.last is None or content != self.content:
-                self.last, self.content = np.frombuffer(content, value.dtype).reshape(value.shape), content
-            self._given = value
-        self.rows.append(self.last)
+    if array is None and len(rows) == 1 and rows.nbytes < INDEX:
+        return file.create_dataset(name, data=rows)
+    if array is None or array.chunks is None:
+        if array is not None:
+            rows, before = np.concatenate([array[:], rows]), 0
+            del file[name]
+        row = rows.shape[1:]
+        noise = rows.dtype.kind == "f" and len(rows) > 1 and (rows[1:] != rows[:-1]).mean() > MOSTLY
+        count = min(max(CHUNK_BYTES // rows[0].nbytes, 1), FLUSH)
+        shapes = {"shape": (0, *row), "maxshape": (None, *row), "chunks": (count, *row)}
+        array = file.create_dataset(name, dtype=rows.dtype, **shapes, **({} if noise else PACKED))
+    _extend(array, before, rows)
+    return array
 
 
-@dataclasses.dataclass(eq=False)
-class _Run:
-    group: Any
-    columns: dict[str, list[_Column]]
+def _extend(array: Any, before: int, rows: np.ndarray) -> None:
+    import h5py
 
-
-def _growing(group: Any, name: str, rows: np.ndarray, count: int, closed: bool) -> Any:
-    """A new array of `count` rows like these. Numbers most of which change in every frame are not packed: their last
-    digits are noise. `closed`: it never grows."""
-    row = rows.shape[1:]
-    noise = rows.dtype.kind == "f" and len(rows) > 1 and (rows[1:] != rows[:-1]).mean() > MOSTLY
-    if closed and (noise or rows.nbytes < INDEX):
-        return group.create_dataset(name, (count, *row), rows.dtype)
-    shapes = {"shape": (count, *row), "maxshape": (None, *row), "chunks": (FLUSH, *row)}
-    if closed:
-        shapes = {"shape": (count, *row), "chunks": (count, *row)}
-    return group.create_dataset(name, dtype=rows.dtype, **shapes, **({} if noise else PACKED))
+    array.id.set_extent((before + len(rows), *rows.shape[1:]))
+    place, memory = array.id.get_space(), h5py.h5s.create_simple(rows.shape)
+    place.select_hyperslab((before, *(0 for _ in rows.shape[1:])), rows.shape)
+    array.id.write(memory, place, np.ascontiguousarray(rows))
 
 
 def _created(file: pathlib.Path) -> Any:

@@ -118,6 +118,11 @@ class Environment:
         """Of one world."""
         return Space((self._map.size,), np.float32, -1.0, 1.0)
 
+    @property
+    def action_map(self) -> ActionMap:
+        """From the environment's actions to those of the task's robot."""
+        return self._map
+
     def with_horizon(self, horizon: int) -> Environment:
         """The same environment, on the same core, with longer or shorter episodes."""
         parts = (self.robot, self.scene, self.core, self._map, self.objective, self._observer, self.grasping)

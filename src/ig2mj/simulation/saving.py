@@ -6,10 +6,12 @@ import os
 from typing import TYPE_CHECKING, Any
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 from flax import struct
 
 from ig2mj.engine.snapshot import Snapshot
+from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import InputError
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
@@ -76,3 +78,13 @@ def load_world(file: str | os.PathLike, like: SavedWorld, scene: Scene) -> Saved
     if header.get("objects") != list(scene.object_names):
         raise InputError(file, f"is of scene '{header.get('scene')}'", fix="restore it in that scene")
     return found
+
+
+def put_world(simulation: Simulation, found: SavedWorld) -> PhysicsView:
+    """The simulation's world becomes another one of its scene; its view."""
+    simulation.physics = simulation.engine.load(simulation.physics, found.physics)
+    simulation._states = jax.tree.map(jnp.asarray, found.states)
+    simulation._key = jax.random.wrap_key_data(jnp.asarray(found.key))
+    simulation._steps = int(found.step[0])
+    simulation.robots.controllers, simulation.robots.held = found.controllers, found.held
+    return simulation.view

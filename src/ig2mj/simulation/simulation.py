@@ -15,7 +15,6 @@ import os
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import mujoco
 import numpy as np
 
@@ -37,9 +36,10 @@ from ig2mj.sampling.setters import lacks, set_by_name
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.simulation import pictures
 from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_openables, write_of_pose
+from ig2mj.simulation.recording import Recorded
 from ig2mj.simulation.robots import RobotsOfWorld, remembered
 from ig2mj.simulation.sampling import WorldSampler
-from ig2mj.simulation.saving import everything, load_world, save_world
+from ig2mj.simulation.saving import everything, load_world, put_world, save_world
 from ig2mj.states import registry
 from ig2mj.states.model import DEFAULTS, StateModel
 from ig2mj.states.options import StateOptions
@@ -49,7 +49,7 @@ from ig2mj.worlds.rules import Rules
 from ig2mj.worlds.worlds import controllers_of, grasping_of
 
 
-class Simulation:
+class Simulation(Recorded):
     """One world of a scene on any engine.
 
     Attributes:
@@ -218,12 +218,16 @@ class Simulation:
         advance, physics, states, done = self.core.advance, self.physics, self._states_or_none, 0
         controllers = remembered(self)
         robots = self.robots if self._grasping is not None else None
+        if (recorder := self._recorder) is not None:
+            recorder.begin()
         try:
-            for done in range(1, count + 1):  # noqa: B007 (counted below, also where a step raises)
+            for done in range(1, count + 1):
                 physics, view, states, _ = advance(physics, states, row, controllers)
                 if robots is not None:
                     physics, view = robots.grasp(physics, view)
                 row = None
+                if recorder is not None:
+                    recorder.add(physics, states, self._steps + done)
         finally:
             self.physics, self._states = physics, states
             self._steps += done
@@ -368,13 +372,7 @@ class Simulation:
 
     def restore(self, path: str | os.PathLike) -> PhysicsView:
         """Goes back to a world that `save` wrote, of this scene. Raises InputError."""
-        found = load_world(path, everything(self), self.scene)
-        self.physics = self.engine.load(self.physics, found.physics)
-        self._states = jax.tree.map(jnp.asarray, found.states)
-        self._key = jax.random.wrap_key_data(jnp.asarray(found.key))
-        self._steps = int(found.step[0])
-        self.robots.controllers, self.robots.held = found.controllers, found.held
-        return self.view
+        return put_world(self, load_world(path, everything(self), self.scene))
 
     # Pictures.
 

@@ -34,6 +34,7 @@ from ig2mj.engine.native.contacts import FingerForces, ForcePlan
 from ig2mj.engine.native.later import RAW, Agents, LaterPlan, ObjectMotion
 from ig2mj.engine.native.model_slot import ModelSlot
 from ig2mj.engine.native.one_world import Statics, World
+from ig2mj.engine.native.recorded import Pieces
 from ig2mj.engine.native.vicinity import Masks, VicinityTable
 from ig2mj.engine.native.view_rows import FIELDS, Changed, PoseRows
 from ig2mj.engine.native.writing import apply_write
@@ -271,6 +272,11 @@ class NativeEngine:
     def export(self, physics: NativePhysics, world: int) -> Snapshot:
         """One world as a snapshot in float64 numpy arrays of its own."""
         return physics.worlds[world].save()
+
+    @functools.cached_property
+    def pieces(self) -> Pieces:
+        """Takes worlds (`physics.worlds[w]`) as `export` does, in a fraction of its time, for recordings."""
+        return Pieces(self._slots[0].model, self.layout, self._statics.own_fields)
 
     def load(self, physics: NativePhysics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> NativePhysics:
         """Replaces worlds in place; see `Engine.load`. Raises EngineError where the snapshot is of another scene."""

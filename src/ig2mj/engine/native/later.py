@@ -90,9 +90,10 @@ def agents_touching(plan: LaterPlan, contacts: AgentContacts) -> np.ndarray:
         touching = np.zeros_like(contacts.remembered)
     else:
         touching = contacts.remembered & ~contacts.fresh
-    geom = contacts.geom[contacts.dist <= plan.tolerance]
-    if len(geom):
-        agent, thing = plan.agent_unit[geom], plan.object_unit[geom]
+    agent = plan.agent_unit[contacts.geom]
+    if len(agent) and agent.max() >= 0:  # mostly no contact is an agent's
+        near = contacts.dist <= plan.tolerance
+        agent, thing = agent[near], plan.object_unit[contacts.geom[near]]
         for side in (0, 1):
             both = (agent[:, side] >= 0) & (thing[:, 1 - side] >= 0)
             touching[agent[both, side], thing[both, 1 - side]] = True

@@ -1,0 +1,98 @@
+"""`ig2mj demos metrics`, and what is done to every recording of a folder in several processes."""
+
+from __future__ import annotations
+
+import pathlib
+from collections.abc import Callable, Iterator
+from typing import Annotated, Any
+
+import tyro
+
+ENDINGS = (".h5", ".hdf5")
+
+
+def metrics(
+    path: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE|FOLDER")],
+    jobs: int = 1,
+    settle: int = 150,
+    json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+) -> int:
+    """Measure recordings: goal score, disarrangement, ways of base and hands, grasping, gaze.
+
+    Args:
+      path: a recording, or a folder of them.
+      jobs: processes, each with a recording of its own.
+      settle: control steps before start and end are compared; 0: as they are.
+      json: one JSON object a run on standard output.
+    """
+    import json as form
+    import sys
+
+    from ig2mj.demos.metrics import metrics_of
+    from ig2mj.errors import Ig2mjError
+
+    if jobs < 1 or settle < 0:
+        raise Ig2mjError(f"--jobs {jobs}, --settle {settle}: at least one process, and no less than 0 steps")
+    failed = 0
+    for file, found in of_files(metrics_of, files_of(path), jobs, settle):
+        if isinstance(found, Ig2mjError):
+            print(f"error: {found}", file=sys.stderr)
+            failed += 1
+            continue
+        for run in found:
+            print(form.dumps(run) if json else _line(file, run))
+    return 2 if failed else 0
+
+
+def _line(file: pathlib.Path, run: dict[str, Any]) -> str:
+    goal, ways = run["goal"], ", ".join(f"{name} {m:.2f}" for name, m in run["path_length"].items())
+    held = ", ".join(f"{name} {share:.0%}" for name, share in run["grasping"].items())
+    looked = next(iter(run["gaze"]["objects"]), "") or "nothing"
+    return (
+        f"{file} {run['run']}: goal {goal['start']:.2f} to {goal['end']:.2f}; "
+        f"moved {run['kinematic_disarrangement']['total']:.2f} m, "
+        f"{run['logical_disarrangement']['total']} facts changed; "
+        f"ways (m): {ways}; holding: {held}; looked most at {looked}"
+    )
+
+
+def files_of(path: pathlib.Path) -> list[pathlib.Path]:
+    """The recordings of a folder, or the file itself. Raises InputError: there are none."""
+    from ig2mj.errors import InputError
+
+    if not path.is_dir():
+        return [path]
+    found = sorted(file for file in path.iterdir() if file.suffix in ENDINGS)
+    if not found:
+        raise InputError(path, f"has no recordings ({', '.join(ENDINGS)})", fix="name a folder that has")
+    return found
+
+
+def of_files(
+    work: Callable[..., Any], files: list[pathlib.Path], jobs: int, *arguments: Any
+) -> Iterator[tuple[pathlib.Path, Any]]:
+    """What `work(file, *arguments)` returns for each file, or its `Ig2mjError`, in their order.
+
+    With one job or one file it is done here; else in processes that begin afresh, since JAX must not be forked.
+    """
+    import concurrent.futures
+    import multiprocessing
+
+    if jobs == 1 or len(files) == 1:
+        for file in files:
+            yield file, _tried(work, file, arguments)
+        return
+    context = multiprocessing.get_context("spawn")
+    with concurrent.futures.ProcessPoolExecutor(min(jobs, len(files)), context) as pool:
+        waiting = [pool.submit(_tried, work, file, arguments) for file in files]
+        for file, done in zip(files, waiting, strict=True):
+            yield file, done.result()
+
+
+def _tried(work: Callable[..., Any], file: pathlib.Path, arguments: tuple[Any, ...]) -> Any:
+    from ig2mj.errors import Ig2mjError
+
+    try:
+        return work(file, *arguments)
+    except Ig2mjError as e:
+        return Ig2mjError(str(e))

@@ -1,0 +1,78 @@
+"""`EpisodeFilms`: pictures of many episodes, one after the other in few mp4 files, each found by its time."""
+
+from __future__ import annotations
+
+import pathlib
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+PIXELS = "yuv420p"
+
+
+class EpisodeFilms:
+    """Files of one camera. Attributes: about: what `info.json` says of them."""
+
+    def __init__(self, path: Callable[[dict[str, int]], pathlib.Path], fps: int, codec: str):
+        """`path`: of the file with these indices."""
+        self._path, self._fps, self._codec = path, fps, codec
+        self._place = {"chunk_index": 0, "file_index": 0}
+        self._file: pathlib.Path | None = None
+        self._container: Any = None
+        self._stream: Any = None
+        self._frames = 0
+        self.about: dict[str, Any] = {}
+
+    def add(self, pictures: np.ndarray, limit: int) -> tuple[dict[str, int], float]:
+        """Appends an episode, uint8 [T, height, width, 3].
+
+        Args:
+          limit: MB of a file after which the next episode begins another.
+
+        Returns:
+          Indices of its file, and the time in it at which it begins, s.
+        """
+        if self._file is not None and self._file.stat().st_size > limit * 2**20:
+            self.close()
+            self._place = {**self._place, "file_index": self._place["file_index"] + 1}
+            if self._place["file_index"] == 1000:
+                self._place = {"chunk_index": self._place["chunk_index"] + 1, "file_index": 0}
+        if self._container is None:
+            self._open(*pictures.shape[1:3])
+        import av
+
+        start = self._frames / self._fps
+        for picture in pictures:
+            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+            frame.pts, self._frames = self._frames, self._frames + 1
+            self._container.mux(self._stream.encode(frame))
+        return self._place, start
+
+    def close(self) -> None:
+        """Ends the file that is open; may be called twice."""
+        if self._container is not None:
+            self._container.mux(self._stream.encode())
+            self._container.close()
+        self._container, self._file, self._frames = None, None, 0
+
+    def _open(self, height: int, width: int) -> None:
+        import av
+
+        self._file = self._path(self._place)
+        self._container = av.open(str(self._file), "w")
+        # A key frame every other picture: readers take single pictures in any order.
+        self._stream = self._container.add_stream(self._codec, rate=self._fps, options={"g": "2", "crf": "18"})
+        self._stream.width, self._stream.height, self._stream.pix_fmt = width, height, PIXELS
+        self._stream.time_base = Fraction(1, self._fps)
+        self.about = {
+            "video.height": height,
+            "video.width": width,
+            "video.codec": self._codec,
+            "video.pix_fmt": PIXELS,
+            "video.is_depth_map": False,
+            "video.fps": self._fps,
+            "video.channels": 3,
+            "has_audio": False,
+        }

@@ -1,0 +1,260 @@
+"""iGibson's HDF5 logs: written from recordings, one file a run, and read back, whoever wrote them.
+
+    frame_data [N, 4]                           frame; durations that nobody measured: -1
+    physics_data/<id>/position [N, 3], orientation [N, 4] (x-y-z-w), joint_state [N, joints]
+    goal_status/satisfied, unsatisfied [N, goals]
+    agent_actions/vr_robot [N, 28]              what the humanoid did; action/robot of other robots
+    action/ig2mj                                what the environment was given
+    attributes "/metadata/..."                  physics_timestep, render_timestep, atus_activity, scene_id, ...
+
+All numbers are float64, what is not there -1. A row is the world after a step, with the action of that step, as in
+iGibson 2.0's `IGLogWriter`. Numbers of bodies are those of our objects, agents behind them; positions are those of main
+bodies' frames, where iGibson has centres of mass. `ig2mj demos replay` needs the recording itself.
+
+Axis: N steps.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import pathlib
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.demos.observing import exported_runs
+from ig2mj.demos.reader import Run
+from ig2mj.demos.replay import Replayed, Replayer
+from ig2mj.envs.environment import Environment, EnvState
+from ig2mj.errors import InputError
+from ig2mj.scene.scene import Scene
+
+METADATA = "/metadata/"
+
+HUMANOID_SIZE = 28
+"""Numbers of the action that iGibson's logs have a place for."""
+
+WIDTHS = {"position": 3, "orientation": 4}
+
+LONGEST = 10_000_000
+"""Frames of a log that is believed."""
+
+_KINDS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+
+
+@dataclasses.dataclass(frozen=True)
+class IGibsonLog:
+    """A log that was read.
+
+    Attributes:
+      metadata: without "/metadata/". names: of bodies, by their numbers; the number where the log has none.
+      position, orientation, joints: [N, 3] m, [N, 4] w-x-y-z, [N, joints], by the body's name.
+      satisfied: [N, goals], or None. actions: by their path in the file.
+    """
+
+    metadata: dict[str, Any]
+    names: dict[str, str]
+    position: dict[str, np.ndarray]
+    orientation: dict[str, np.ndarray]
+    joints: dict[str, np.ndarray]
+    satisfied: np.ndarray | None
+    actions: dict[str, np.ndarray]
+
+    @property
+    def frames(self) -> int:
+        return min((len(rows) for rows in self.position.values()), default=0)
+
+
+def export_igibson(replayer: Replayer, folder: str | os.PathLike) -> Replayed:
+    """Writes all runs of a recording that have a step: `<run>.hdf5` in a folder.
+
+    Returns:
+      What came of the replay.
+
+    Raises:
+      InputError: the recording is broken, or does not come out the same by action, or the folder is there.
+    """
+    place = pathlib.Path(folder)
+    if place.exists():
+        raise InputError(place, "is there already", fix="choose another folder")
+    place.mkdir(parents=True)
+    bodies, seen = _Bodies(replayer.env.scene), dict[str, list[tuple[np.ndarray, ...]]]()
+
+    def watch(state: EnvState, now: dict[int, Run], frame: int) -> None:
+        for world, run in now.items() if frame else ():
+            seen.setdefault(run.name, []).append(bodies.of(state, world))
+        for world, run in now.items():
+            if frame == run.frames - 1:
+                _write(place / f"{run.name}.hdf5", replayer, run, bodies, seen.pop(run.name), world)
+
+    done = replayer(check=True, watch=watch, runs=exported_runs(replayer))
+    if done.differences:
+        fix = "export it by state (--by state)"
+        raise InputError(replayer.recording.file, str(done.differences[0]), fix=fix)
+    return done
+
+
+class _Bodies:
+    """Objects and agents as iGibson counts bodies. Attributes: names: of them. joints: addresses in qpos of each."""
+
+    def __init__(self, scene: Scene):
+        model, tables = scene.model, scene.tables
+        self.names = [*scene.object_names, *tables.agent_names]
+        owner = np.where(tables.body_agent >= 0, tables.body_agent + len(scene.object_names), tables.body_object)
+        self.joints: list[np.ndarray] = [np.zeros(0, int) for _ in self.names]
+        for j in range(model.njnt):
+            body = owner[model.jnt_bodyid[j]]
+            if body >= 0 and mujoco.mjtJoint(int(model.jnt_type[j])) in _KINDS:
+                self.joints[body] = np.append(self.joints[body], model.jnt_qposadr[j])
+
+    def of(self, state: EnvState, world: int) -> tuple[np.ndarray, ...]:
+        """Positions [bodies, 3] and orientations [bodies, 4] w-x-y-z."""
+        view = state.batch.world.view
+        pos = np.concatenate([np.asarray(view.object_pos)[world], np.asarray(view.agent.base_pos)[world]])
+        quat = np.concatenate([np.asarray(view.object_quat)[world], np.asarray(view.agent.base_quat)[world]])
+        return pos, quat
+
+
+def _write(
+    file: pathlib.Path, replayer: Replayer, run: Run, bodies: _Bodies, seen: list[tuple[np.ndarray, ...]], world: int
+) -> None:
+    import h5py
+
+    env, count = replayer.env, run.frames - 1
+    pos, quat = (np.stack([row[k] for row in seen]).astype(np.float64) for k in (0, 1))
+    parts = [run.all_rows(f"frames/physics/{part}/qpos")[1:] for part in ("scene", "agents")]
+    qpos, goal = np.concatenate(parts, axis=1), run.all_rows("frames/goal")[1:]
+    action = run.all_rows("steps/action").astype(np.float64)
+    robots = np.asarray(env.action_map(action.astype(np.float32)), np.float64)
+    with h5py.File(file, "w") as out:
+        out["frame_data"] = np.column_stack([np.arange(count, dtype=np.float64), np.full((count, 3), -1.0)])
+        for body in range(len(bodies.names)):
+            group = out.create_group(f"physics_data/{body}")
+            group.create_dataset("position", data=pos[:, body], compression="gzip")
+            group.create_dataset("orientation", data=quat[:, body, [1, 2, 3, 0]], compression="gzip")
+            group.create_dataset("joint_state", data=qpos[:, bodies.joints[body]])
+        out["goal_status/satisfied"], out["goal_status/unsatisfied"] = goal.astype(float), (~goal).astype(float)
+        if robots.shape[1] == HUMANOID_SIZE:
+            out["agent_actions/vr_robot"] = robots
+        else:
+            out["agent_actions/vr_robot"] = np.full((count, HUMANOID_SIZE), -1.0)
+            out["action/robot"] = robots
+        out["action/ig2mj"] = action
+        for name, value in _metadata(env, replayer, run, bodies).items():
+            out.attrs[METADATA + name] = value
+        out.attrs["instance_id"] = run.row
+
+
+def _metadata(env: Environment, replayer: Replayer, run: Run, bodies: _Bodies) -> dict[str, Any]:
+    names = {str(k): name for k, name in enumerate(bodies.names)}
+    return {
+        "physics_timestep": float(env.core.engine.timestep),
+        "render_timestep": float(ACTION_PERIOD),
+        "git_info": json.dumps({"ig2mj": {"version": replayer.recording.header.get("ig2mj")}}),
+        "atus_activity": env.task.name,
+        "activity_definition": 0,
+        "filter_objects": False,
+        "scene_id": env.scene.name,
+        "obj_body_id_to_name": json.dumps(names),  # YAML as well
+        "urdf_file": "",
+        "run": run.name,
+        "robot": env.robot,
+    }
+
+
+def read_igibson(file: str | os.PathLike) -> IGibsonLog:
+    """Reads a log of iGibson's or of `export_igibson`.
+
+    Raises:
+      InputError: it is missing, broken, or no such log; the message names the field.
+    """
+    import h5py
+
+    path = pathlib.Path(file)
+    try:
+        with h5py.File(path, "r") as opened:
+            return _log(path, opened)
+    except OSError as e:
+        raise InputError(path, "is no HDF5 file, or a broken one") from e
+
+
+def _log(path: pathlib.Path, opened: Any) -> IGibsonLog:
+    import h5py
+
+    metadata = {str(k).removeprefix(METADATA): _plain(v) for k, v in opened.attrs.items()}
+    group = opened.get("physics_data")
+    if not isinstance(group, h5py.Group):
+        raise InputError(path, "is missing", element="physics_data", fix="it is no log of iGibson's")
+    known = _names(str(metadata.get("obj_body_id_to_name", "")))
+    found: dict[str, dict[str, np.ndarray]] = {kind: {} for kind in ("position", "orientation", "joint_state")}
+    names = {str(body): known.get(str(body), str(body)) for body in group}
+    for body, name in names.items():
+        for kind, rows in found.items():
+            rows[name] = _array(path, opened, f"physics_data/{body}/{kind}", WIDTHS.get(kind))
+    lengths = {len(rows) for of in found.values() for rows in of.values()}
+    if len(lengths) > 1:
+        raise InputError(path, f"have {sorted(lengths)} frames", element="physics_data", fix="it is cut off")
+    actions: dict[str, np.ndarray] = {}
+    for folder in ("agent_actions", "action"):
+        if isinstance(opened.get(folder), h5py.Group):
+            opened[folder].visititems(lambda name, at, f=folder: _note(path, opened, actions, f"{f}/{name}", at))
+    goal = "goal_status/satisfied"
+    return IGibsonLog(
+        metadata,
+        names,
+        found["position"],
+        {name: rows[:, [3, 0, 1, 2]] for name, rows in found["orientation"].items()},
+        found["joint_state"],
+        _array(path, opened, goal, None) if goal in opened else None,
+        actions,
+    )
+
+
+def _note(path: pathlib.Path, opened: Any, actions: dict[str, np.ndarray], name: str, at: Any) -> None:
+    if hasattr(at, "shape"):
+        actions[name] = _array(path, opened, name, None)
+
+
+def _array(path: pathlib.Path, opened: Any, name: str, width: int | None) -> np.ndarray:
+    """[N, width] numbers that are in this file. Raises InputError."""
+    import h5py
+
+    link = opened.get(name, getlink=True)
+    array = opened.get(name) if isinstance(link, h5py.HardLink) else None
+    if not isinstance(array, h5py.Dataset) or array.ndim != 2 or array.dtype.kind not in "fiu":
+        raise InputError(path, "is no table of numbers", element=name)
+    if width is not None and array.shape[1] != width:
+        raise InputError(path, f"has {array.shape[1]} numbers a frame, and must have {width}", element=name)
+    if array.is_virtual or array.external or array.shape[0] > LONGEST or array.shape[1] > 4096 or not _there(array):
+        raise InputError(path, f"claims {array.shape[0]} frames that are not there", element=name)
+    try:
+        return np.asarray(array[:], np.float64)
+    except (OSError, RuntimeError) as e:
+        raise InputError(path, f"cannot be read: {' '.join(str(e).split())}", element=name) from e
+
+
+def _there(array: Any) -> bool:
+    if not array.size:
+        return True
+    if array.chunks is None:
+        return array.id.get_storage_size() == array.nbytes
+    needed = -(-array.shape[0] // array.chunks[0]) * -(-array.shape[1] // array.chunks[1])
+    return array.id.get_num_chunks() >= needed and array.chunks[0] * array.chunks[1] <= 2**24
+
+
+def _names(text: str) -> dict[str, str]:
+    """Of bodies, from JSON or from YAML's lines "12: name"."""
+    try:
+        found = json.loads(text)
+    except ValueError:
+        pairs = (line.partition(":") for line in text.splitlines())
+        found = {key.strip(" '\""): name.strip(" '\"") for key, colon, name in pairs if colon}
+    return {str(k): str(v) for k, v in found.items()} if isinstance(found, dict) else {}
+
+
+def _plain(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value

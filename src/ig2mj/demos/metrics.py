@@ -1,0 +1,226 @@
+"""Metrics of recordings, those of iGibson's: goal, disarrangement, ways, grasping, gaze.
+
+    goal                score (share of the goal's literals) at the start, at the end, the best; and at every frame
+    kinematic           metres by which bodies of objects moved between start and end, both settled; by object
+    logical             predicates that hold at one of the two and not at the other
+    ways                metres that base and hands travelled, and the box in the base's frame that hands reached
+    grasping            share of frames in which each hand holds something
+    gaze                what the eye's axis meets: share of frames by object, fixations, mean turn (rad/s)
+
+What the eye's axis meets stands for a gaze that nobody measured. Source: iGibson 2.0's `igibson/metrics`, which lets
+the world settle before it compares; a settled world here has stood still for `SETTLE` control steps.
+
+Axes: T steps of a run, H hands.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.demos.reader import Recording, Run
+from ig2mj.demos.replay import Replayer
+from ig2mj.envs.environment import Environment, EnvState
+from ig2mj.predicates.questions import Questions
+from ig2mj.predicates.registry import PREDICATES, find
+from ig2mj.scene.scene import Scene
+from ig2mj.states.model import StateModel
+
+SETTLE = 150
+"""Control steps (iGibson's figure), 5 s."""
+
+MOVED = 1e-3
+"""Metres below which an object is not listed as moved."""
+
+Fact = tuple[str, tuple[str, ...]]
+
+
+def metrics_of(file: str | os.PathLike, settle: int = SETTLE) -> list[dict[str, Any]]:
+    """Of every run of a recording that has a step, in their order; numbers and text only.
+
+    Args:
+      settle: control steps before start and end are compared; 0: as they are.
+
+    Raises:
+      InputError: the recording is broken, or of something that is not there.
+    """
+    with Recording(file) as recording:
+        replayer = Replayer(recording, "state")
+        measured = _Measuring(replayer.env, settle)
+        runs = [run for run in recording.runs if run.frames > 1]
+        watched: dict[str, _Watched] = {}
+
+        def watch(state: EnvState, now: dict[int, Run], frame: int) -> None:
+            for world, run in now.items():
+                watched.setdefault(run.name, _Watched()).see(measured, state, world)
+
+        replayer(watch=watch, runs=runs)
+        found: dict[str, dict[str, Any]] = {}
+        for now in replayer.rounds(runs):
+            start, end = (measured.settled(replayer.all_at(now, place)) for place in ("first", "last"))
+            for world, run in now.items():
+                about = {"file": str(file), "run": run.name, "frames": run.frames, "success": bool(_success(run))}
+                own = watched[run.name].result(measured.scene)
+                found[run.name] = about | own | _disarrangement(measured, start, end, world)
+        return [found[run.name] for run in runs]
+
+
+def _success(run: Run) -> bool:
+    return bool(run.all_rows("steps/success")[-1]) if "success" in run.step_names else False
+
+
+@dataclasses.dataclass
+class _Watched:
+    """What is noted of every frame of a run."""
+
+    score: list[float] = dataclasses.field(default_factory=list)
+    base: list[np.ndarray] = dataclasses.field(default_factory=list)
+    hands: list[np.ndarray] = dataclasses.field(default_factory=list)
+    reached: list[np.ndarray] = dataclasses.field(default_factory=list)
+    holds: list[np.ndarray] = dataclasses.field(default_factory=list)
+    gaze: list[str] = dataclasses.field(default_factory=list)
+    axis: list[np.ndarray] = dataclasses.field(default_factory=list)
+
+    def see(self, measuring: _Measuring, state: EnvState, world: int) -> None:
+        view = state.batch.world.view
+        agent, turn = view.agent, _matrix(np.asarray(view.agent.base_quat)[world, 0])
+        base, hands = np.asarray(agent.base_pos)[world, 0], np.asarray(agent.hand_pos)[world]
+        self.score.append(float(np.asarray(state.status.fraction)[world]))
+        self.base.append(base)
+        self.hands.append(hands)
+        self.reached.append((hands - base) @ turn)
+        self.holds.append(np.asarray(view.held)[world].any(1))
+        axis = -_matrix(np.asarray(agent.eye_quat)[world, 0])[:, 2]
+        self.axis.append(axis)
+        self.gaze.append(measuring.met(state, world, np.asarray(agent.eye_pos)[world, 0], axis))
+
+    def result(self, scene: Scene) -> dict[str, Any]:
+        hands = [scene.model.body(int(b)).name for b in scene.tables.hand_body]
+        reached, holds, axis = np.stack(self.reached), np.stack(self.holds), np.stack(self.axis)
+        turns = np.arccos(np.clip((axis[1:] * axis[:-1]).sum(1), -1, 1))
+        seen = {name: self.gaze.count(name) / len(self.gaze) for name in dict.fromkeys(self.gaze)}
+        changes = sum(a != b for a, b in zip(self.gaze[1:], self.gaze, strict=False))
+        box = {h: [reached[:, k].min(0).tolist(), reached[:, k].max(0).tolist()] for k, h in enumerate(hands)}
+        return {
+            "goal": {
+                "start": self.score[0],
+                "end": self.score[-1],
+                "best": max(self.score),
+                "delta": self.score[-1] - self.score[0],
+                "each_frame": self.score,
+            },
+            "path_length": {
+                "base": _length(np.stack(self.base)),
+                **{name: _length(np.stack(self.hands)[:, k]) for k, name in enumerate(hands)},
+            },
+            "workspace": box,
+            "grasping": {name: float(holds[:, k].mean()) for k, name in enumerate(hands)},
+            "gaze": {
+                "objects": dict(sorted(seen.items(), key=lambda pair: -pair[1])),
+                "fixations": 1 + changes,
+                "mean_turn": float(turns.mean() / ACTION_PERIOD) if len(turns) else 0.0,
+            },
+        }
+
+
+class _Measuring:
+    """What is needed of an environment: settled worlds, facts, what an axis meets."""
+
+    def __init__(self, env: Environment, settle: int):
+        rules = env.core.rules
+        assert rules is not None
+        self.env, self.scene, self.model = env, env.scene, rules.model
+        steps = ACTION_PERIOD / (env.core.engine.substeps * env.core.engine.timestep)
+        self._settle = round(settle / steps)
+        self._questions = Questions(rules.model, env.num_worlds)
+        tables = env.scene.tables
+        self.bodies = np.flatnonzero(tables.body_object >= 0)
+        self._groups = np.array([1, 0, 0, 0, 0, 0], np.uint8)  # what is seen
+
+    def settled(self, state: EnvState) -> EnvState:
+        """The worlds after nobody has moved for a while."""
+        zero = np.zeros((self.env.num_worlds, *self.env.action_space.shape), np.float32)
+        for _ in range(self._settle):
+            state = self.env.step(state, zero)
+        return state
+
+    def facts(self, state: EnvState, asked: dict[str, list[tuple[int, ...]]]) -> dict[Fact, np.ndarray]:
+        """Truth in each world, by predicate and objects."""
+        names, world, found = self.scene.object_names, state.batch.world, {}
+        for name, rows in asked.items():
+            truth = self._questions.holds(find(name), rows, world.states, world.view)
+            for k, row in enumerate(rows):
+                found[name, tuple(names[o] for o in row)] = truth[:, k]
+        return found
+
+    def met(self, state: EnvState, world: int, start: np.ndarray, axis: np.ndarray) -> str:
+        """The object that a ray meets first; "" where it meets none, as walls and floors are objects too."""
+        if not hasattr(self.env.core.engine, "to_mujoco"):
+            return ""
+        model, data = self.env.core.engine.to_mujoco(state.batch.world.physics, world)
+        geom = np.zeros(1, np.int32)
+        eye = int(self.scene.tables.agent_body[0])
+        mujoco.mj_ray(model, data, start.astype(float), axis.astype(float), self._groups, 1, eye, geom)
+        if geom[0] < 0:
+            return ""
+        owner = int(self.scene.tables.geom_object[geom[0]])
+        return self.scene.object_names[owner] if owner >= 0 else "own body"
+
+
+def _disarrangement(measuring: _Measuring, start: EnvState, end: EnvState, world: int) -> dict[str, Any]:
+    """Kinematic and logical, of two settled states."""
+    tables, names = measuring.scene.tables, measuring.scene.object_names
+    before, after = (np.asarray(s.batch.world.view.body_pos)[world, measuring.bodies] for s in (start, end))
+    moved = np.linalg.norm(after - before, axis=1)
+    of_object = np.bincount(tables.body_object[measuring.bodies], moved, len(names))
+    listed = {names[o]: float(of_object[o]) for o in np.argsort(-of_object) if of_object[o] > MOVED}
+    asked: dict[str, list[tuple[int, ...]]] = {}
+    for state in (start, end):
+        for name, rows in _candidates(measuring.model, measuring.scene, state, world).items():
+            asked[name] = list(dict.fromkeys([*asked.get(name, []), *rows]))
+    facts = [measuring.facts(state, asked) for state in (start, end)]
+    changed = [fact for fact in facts[0] if facts[0][fact][world] != facts[1][fact][world]]
+    gone, new = ([_text(f) for f in changed if facts[k][f][world]] for k in (0, 1))
+    return {
+        "kinematic_disarrangement": {"total": float(moved.sum()), "objects": listed},
+        "logical_disarrangement": {"total": len(changed), "no_longer": gone, "now": new},
+    }
+
+
+def _text(fact: Fact) -> str:
+    return f"({' '.join((fact[0], *fact[1]))})"
+
+
+def _candidates(model: StateModel, scene: Scene, state: EnvState, world: int) -> dict[str, list[tuple[int, ...]]]:
+    """States of all objects that can have them; contacts and what lies on or in another of what is near it."""
+    tables, view = scene.tables, state.batch.world.view
+    there = ~tables.object_parked
+    asked: dict[str, list[tuple[int, ...]]] = {}
+    for p in PREDICATES.values():
+        if p.arity == 1 and p.ability:
+            asked[p.name] = [(int(o),) for o in np.flatnonzero(model.parameters.has(p.ability) & there)]
+    loose = ~tables.object_fixed & there
+    touching = [(int(a), int(b)) for a, b in np.argwhere(np.asarray(view.touching)[world]) if loose[a]]
+    com = np.asarray(view.object_com)[world][:, None]
+    low, high = np.asarray(view.aabb_low)[world], np.asarray(view.aabb_high)[world]
+    within = ((com >= low) & (com <= high)).all(-1) & ~np.eye(len(com), dtype=bool)
+    inside = [(int(a), int(b)) for a, b in np.argwhere(within) if loose[a] and there[b]]
+    pairs = {"on_top": touching, "in_contact_with": touching, "inside": inside}
+    return {name: rows for name, rows in (asked | pairs).items() if rows}
+
+
+def _length(path: np.ndarray) -> float:
+    """Metres along positions [T + 1, 3]."""
+    return float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum())
+
+
+def _matrix(quat: np.ndarray) -> np.ndarray:
+    """[3, 3] of w-x-y-z."""
+    matrix = np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, np.asarray(quat, np.float64))
+    return matrix.reshape(3, 3)
