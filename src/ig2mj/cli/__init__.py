@@ -58,6 +58,7 @@ COMMANDS: dict[str, str] = {
     "states": "list the extended states of a scene's objects",
     "predicates": "tell what holds in a scene, or what an expression still lacks",
     "calibrate": "measure the batched engine's buffers for a scene",
+    "warm-up": "compile all that a batch of worlds needs, to be kept and taken to other machines",
     "sample": "sample initial states in which conditions hold, as a pool for batched resets",
     "activity": "list BEHAVIOR's activities, what each asks for in a home, and sample its starts",
     "list-envs": "list the environments, and which robots can do what in them",

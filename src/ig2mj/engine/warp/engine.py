@@ -27,7 +27,7 @@ from ig2mj.engine.mjx.physics import own_device
 from ig2mj.engine.native.settle import settle
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
-from ig2mj.engine.warp import patches
+from ig2mj.engine.warp import kernels, patches
 from ig2mj.engine.warp.patches.ignored import encode
 from ig2mj.engine.warp.profile import EngineProfile, fit, holds_everything, profile_of_scene
 from ig2mj.errors import EngineError
@@ -83,7 +83,16 @@ class WarpEngine(MjxEngine):
         self._worlds_of_buffers = num_worlds
         if initial is None and not holds_everything(self.profile, scene.model):
             initial = settle(scene)
+        if wp.is_cuda_available():
+            self.load_kernels(scene.model)
         super().__init__(scene, num_worlds, initial=initial, **options)
+
+    def load_kernels(self, model: mujoco.MjModel, workers: int | None = None) -> int:
+        """Compiles the kernels of a step side by side, if this machine has not yet; how many modules were loaded."""
+        model = self._host_model(model)
+        with kernels.once(model, self.profile, self.own_kernels) as first:
+            launches = kernels.launches_of_step(model, self.profile, self.own_kernels) if first else []
+            return kernels.load(launches, workers=workers)
 
     def usage(self, physics: MjxPhysics) -> Usage:
         """How full the buffers were in the last physics step."""

@@ -1,0 +1,95 @@
+"""`ig2mj warm-up WHAT`: everything compiled that a batch of worlds needs, to be kept and taken elsewhere."""
+
+from __future__ import annotations
+
+import pathlib
+from typing import Annotated
+
+import tyro
+
+
+def run(
+    what: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="HOME|ENV")],
+    worlds: int = 1024,
+    robot: str | None = None,
+    observations: tuple[str, ...] = (),
+    engine: str | None = None,
+    out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FOLDER")] = None,
+    json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+) -> int:
+    """Compile all that a batch of worlds needs, before it is needed.
+
+    Makes the worlds, starts them and steps them once, so that all kernels and programs are in the cache. With --out
+    they are kept in a folder of their own, for other machines with the same card, driver and versions: there set
+    IG2MJ_CACHE_DIR to it.
+
+    Args:
+      what: a home or the folder of a scene, or an environment (`ig2mj list-envs`).
+      worlds: how many; XLA compiles for the number.
+      robot: of an environment; default: the first that `ig2mj list-envs` names.
+      observations: of an environment besides its vectors, as rgb depth.
+      engine: native, warp or jax; default: warp on a GPU, else native.
+      out: the cache's folder; default: the user's own, or IG2MJ_CACHE_DIR.
+      json: print one JSON object.
+    """
+    import os
+    import sys
+    import time
+
+    began = time.perf_counter()
+    from ig2mj.process.compilation import CACHE_VARIABLE, cache_folder
+
+    if out is not None:
+        os.environ[CACHE_VARIABLE] = str(out.expanduser().resolve())
+    seconds = _timed(what, worlds, robot, observations, engine)
+    seconds["all"] = time.perf_counter() - began
+    folder = cache_folder()
+    size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
+    row = {"what": what, "worlds": worlds, "seconds": {k: round(v, 2) for k, v in seconds.items()}}
+    if json:
+        import json as form
+
+        print(form.dumps({**row, "folder": str(folder), "megabytes": round(size / 1e6, 1)}))
+        return 0
+    parts = ", ".join(f"{name} {value:.1f}" for name, value in seconds.items())
+    print(f"{what}, {worlds:,} worlds: seconds of {parts}")
+    print(f"{folder}: {size / 1e6:.0f} MB; elsewhere: IG2MJ_CACHE_DIR={folder.name}", file=sys.stderr)
+    return 0
+
+
+def _timed(
+    what: str, worlds: int, robot: str | None, observations: tuple[str, ...], engine: str | None
+) -> dict[str, float]:
+    """Seconds of making the worlds, starting them, and their first step."""
+    import time
+
+    import jax
+    import numpy as np
+
+    import ig2mj
+    from ig2mj.envs.names import activity_name, short_name
+    from ig2mj.envs.registry import VECTORS
+    from ig2mj.errors import Ig2mjError
+
+    times = [time.perf_counter()]
+
+    def tick() -> None:
+        times.append(time.perf_counter())
+
+    if short_name(what) is not None or activity_name(what) is not None:
+        env = ig2mj.make(what, robot, worlds, engine, observations=(*VECTORS, *observations))
+        tick()
+        state = jax.block_until_ready(env.reset(0))
+        tick()
+        action = np.zeros((worlds, *env.action_space.shape), np.float32)
+        jax.block_until_ready(env.step_autoreset(state, action))
+    else:
+        if robot is not None or observations:
+            raise Ig2mjError("--robot and --observations belong to environments; a home is stepped without them")
+        batch = ig2mj.Worlds(what, worlds, engine)
+        tick()
+        started = jax.block_until_ready(batch.start(0))
+        tick()
+        jax.block_until_ready(batch.step(started))
+    tick()
+    return dict(zip(("making", "start", "first step"), np.diff(times).tolist(), strict=True))

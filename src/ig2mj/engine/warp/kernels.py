@@ -1,0 +1,121 @@
+"""The kernels of a step, compiled side by side before the first step needs them.
+
+MuJoCo Warp has a module for nearly every kernel, and Warp compiles a module when one of its kernels is first launched:
+one after the other, on one processor. Here a step is made of which only the launches are written down (`launches_of`);
+what they need is then compiled and loaded by as many threads as there are processors (`load`).
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import pathlib
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import mujoco
+import warp as wp
+from mujoco.mjx.third_party import mujoco_warp
+
+from ig2mj.engine.warp import patches
+from ig2mj.engine.warp.patches.scope import ScopedReplacement
+from ig2mj.engine.warp.profile import EngineProfile
+
+Launch = tuple[wp.Kernel, int]
+"""A kernel, and the number of threads of its blocks."""
+
+
+def launches_of(act: Callable[[], Any]) -> list[Launch]:
+    """The kernels that a function of this thread would launch, each once, in the order of their first launch.
+
+    Nothing is launched. Both branches of a condition are taken, and the body of a loop once.
+    """
+    found: dict[Launch, None] = {}
+    default = 256  # Warp's
+
+    def launch(kernel: wp.Kernel, *args: Any, block_dim: int = default, **kwargs: Any) -> None:
+        found[kernel, block_dim] = None
+
+    def capture_while(condition: Any, while_body: Callable, stream: Any = None, **kwargs: Any) -> None:
+        while_body(**kwargs)
+
+    def capture_if(
+        condition: Any, on_true: Any = None, on_false: Any = None, stream: Any = None, **kwargs: Any
+    ) -> None:
+        for branch in (on_true, on_false):
+            if branch is not None:
+                branch(**kwargs)
+
+    def suggested(kernel: wp.Kernel, device: Any = None) -> tuple[int, int]:
+        return default, 1  # the real one compiles the kernel
+
+    noted = ScopedReplacement()
+    noted.add(
+        {
+            (wp, "launch"): launch,
+            (wp, "launch_tiled"): launch,
+            (wp, "capture_while"): capture_while,
+            (wp, "capture_if"): capture_if,
+            (wp, "get_suggested_block_size"): suggested,
+        }
+    )
+    with noted.entered():
+        act()
+    return list(found)
+
+
+def launches_of_step(model: mujoco.MjModel, profile: EngineProfile, own: bool) -> list[Launch]:
+    """The kernels of a step and of a forward pass of one world.
+
+    Args:
+      profile: buffer sizes; some kernels are compiled for them. own: with our functions in place of some of MuJoCo
+        Warp's (`ig2mj.engine.warp.patches`).
+    """
+    put = mujoco_warp.put_model(model)
+    data = mujoco_warp.make_data(
+        model,
+        nworld=1,
+        naconmax=profile.contacts,
+        naccdmax=profile.convex_contacts,
+        njmax=profile.constraints,
+        nvmax=profile.awake_dofs,
+    )
+
+    def act() -> None:
+        mujoco_warp.step(put, data)
+        mujoco_warp.forward(put, data)
+
+    with patches.awake_kernels() if own else patches.upstream_kernels():
+        return launches_of(act)
+
+
+def load(launches: list[Launch], device: str | None = None, workers: int | None = None) -> int:
+    """Compiles and loads the modules of kernels, side by side.
+
+    Args:
+      device: Warp's name; None: the present one. workers: threads; None: one for each processor of this process.
+
+    Returns:
+      How many modules were loaded.
+    """
+    threads = workers or len(os.sched_getaffinity(0))
+    by_size: dict[int, dict[wp.Module, None]] = {}
+    for kernel, block_dim in launches:
+        by_size.setdefault(block_dim, {})[kernel.module] = None
+    for block_dim, modules in by_size.items():
+        wp.force_load(device or wp.get_device(), list(modules), block_dim=block_dim, max_workers=threads)
+    return sum(map(len, by_size.values()))
+
+
+@contextlib.contextmanager
+def once(model: mujoco.MjModel, profile: EngineProfile, own: bool) -> Iterator[bool]:
+    """Tells whether the kernels of such a scene still have to be compiled on this machine, and notes that they were."""
+    sizes = repr((model.nv, model.nbody, model.ngeom, model.neq, profile, own)).encode()
+    about = f"{wp.__version__} {mujoco.__version__} {wp.get_device().arch}".encode()
+    geoms = model.geom_type.tobytes() + model.geom_dataid.tobytes()
+    folder = pathlib.Path(str(wp.config.kernel_cache_dir))
+    mark = folder / f"ig2mj_{hashlib.sha256(sizes + about + geoms).hexdigest()[:16]}"
+    yield not mark.exists()
+    with contextlib.suppress(OSError):
+        mark.touch()

@@ -1,0 +1,35 @@
+"""`ig2mj warm-up` leaves a cache with which the next process starts without compiling."""
+
+from __future__ import annotations
+
+import json
+import os
+import pathlib
+import subprocess
+import sys
+
+import pytest
+
+
+def _warm_up(folder: pathlib.Path, *more: str) -> dict:
+    command = [sys.executable, "-m", "ig2mj", "warm-up", "small_home", "--worlds", "2", "--out", str(folder), "--json"]
+    environment = os.environ | {"JAX_PLATFORMS": "cpu"}
+    environment.pop("JAX_COMPILATION_CACHE_DIR", None)
+    done = subprocess.run([*command, *more], capture_output=True, text=True, env=environment, timeout=600, check=True)
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+@pytest.mark.slow
+def test_the_second_process_finds_everything_compiled(tmp_path):
+    cold, warm = _warm_up(tmp_path / "cache"), _warm_up(tmp_path / "cache")
+    assert cold["megabytes"] == warm["megabytes"] > 0
+    assert sum(1 for file in (tmp_path / "cache" / "jax").iterdir() if file.is_file()) > 3
+    steps = ("start", "first step")
+    assert sum(warm["seconds"][k] for k in steps) < 0.6 * sum(cold["seconds"][k] for k in steps)
+
+
+def test_a_home_takes_no_robot(capsys):
+    from ig2mj.cli import call
+
+    assert call(["warm-up", "small_home", "--robot", "fetch"]) == 2
+    assert "belong to environments" in capsys.readouterr().err
