@@ -20,6 +20,7 @@ PARSED_ONLY = {
     "ig2mj convert": "needs a dataset or an object of the reader's",
     "ig2mj view": "opens a window",
     "ig2mj play": "opens a window",
+    "ig2mj web": "runs until someone interrupts",
     "ig2mj demo": "takes a minute; run by tests of its own",
     "ig2mj activity fetch": "downloads",
     "ig2mj activity list --behavior1k": "needs what `fetch` downloads",

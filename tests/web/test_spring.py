@@ -6,7 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from ig2mj.web.spring import STRONGEST, Drag, felt_mass, grabbed_at, pull, release
+from ig2mj.viewer.mouse import MAX_FORCE
+from ig2mj.web.spring import Drag, felt_mass, grabbed_at, pull, release
 
 WORLD = """<mujoco><option timestep="0.00833333"/><worldbody><geom type="plane" size="5 5 1"/>
 <body name="box" pos="0 0 0.1"><freejoint/><geom type="box" size="0.1 0.1 0.1" mass="2"/></body>
@@ -56,7 +57,7 @@ def test_the_spring_is_no_stronger_than_a_hand_and_lets_go(world):
     model, data = world
     drag = Drag(model.body("box").id, np.zeros(3), np.array([0.0, 0.0, 1000.0]))
     pull(model, data, drag)
-    assert np.linalg.norm(data.xfrc_applied[drag.body, :3]) == pytest.approx(STRONGEST)
+    assert np.linalg.norm(data.xfrc_applied[drag.body, :3]) == pytest.approx(MAX_FORCE)
     release(data, drag)
     assert not data.xfrc_applied.any()
 

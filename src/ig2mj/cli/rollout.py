@@ -67,7 +67,7 @@ def run(
     from ig2mj.errors import Ig2mjError
 
     check_layout(robot_urdf, robot_layout)
-    policy = None if agent in AGENTS else _policy(agent)
+    policy = None if agent in AGENTS else policy_named(agent)
     if episodes < 1 or worlds < 1:
         raise Ig2mjError(f"--episodes {episodes}, --worlds {worlds}: at least one of each is needed")
     if video is not None:
@@ -96,7 +96,7 @@ def run(
     try:
         outcome = play(
             played,
-            _acting(agent, policy, played, seed),
+            who_acts(agent, policy, played, seed),
             episodes,
             seed,
             held_out,
@@ -137,8 +137,12 @@ def run(
     return 0
 
 
-def _policy(name: str) -> Policy:
-    """Raises UnknownNameError: neither an agent nor a policy. InputError: it cannot be read."""
+def policy_named(name: str) -> Policy:
+    """A file that `ig2mj train` wrote, or one that ships.
+
+    Raises:
+      UnknownNameError: neither an agent nor a policy. InputError: it cannot be read.
+    """
     from ig2mj.errors import UnknownNameError
     from ig2mj.learn.policies import Policy
     from ig2mj.learn.shipped import find_policy, shipped
@@ -149,7 +153,7 @@ def _policy(name: str) -> Policy:
         raise UnknownNameError("agent", name, (*AGENTS, *shipped())) from None
 
 
-def _acting(agent: str, policy: Policy | None, env: Environment, seed: int) -> Act:
+def who_acts(agent: str, policy: Policy | None, env: Environment, seed: int) -> Act:
     """Who acts. Raises UnknownNameError: the task has no expert. InputError: the policy is for something else."""
     import numpy as np
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pathlib
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
@@ -12,7 +12,6 @@ from ig2mj.errors import Ig2mjError, UnknownNameError
 if TYPE_CHECKING:
     from ig2mj.web.sources import Source
 
-AGENTS = ("zero", "random", "expert")
 _RECORDINGS = (".h5", ".hdf5")
 
 
@@ -50,7 +49,8 @@ def run(
       pool: scene: rows to start from (`ig2mj sample`).
       worlds: how many there are; the page shows one of them.
       engine: native, warp or jax. Objects can be dragged on the native one.
-      agent: task: who acts: zero, random, or expert.
+      agent: task: who acts: zero (nothing moves), random, expert, or a policy: a file that `ig2mj train` wrote, or the
+        name of one that ships.
       robot: task: humanoid, fetch or turtlebot; default: the first that the task lists.
       seed: task: of start states and of random actions.
       paused: begin paused.
@@ -65,6 +65,7 @@ def run(
     access = access_for(host, port, token, certificate, key)
     if worlds < 1:
         raise Ig2mjError(f"--worlds {worlds}: at least one is needed")
+    access.listen().close()  # a port that is taken is no news for after a minute of loading
     print(f"loading {what}; the address of the page comes when it is ready", file=sys.stderr, flush=True)
     from ig2mj.web.viewer import WebViewer
 
@@ -85,13 +86,14 @@ def _source(
     robot: str | None,
     seed: int,
 ) -> Source:
-    from ig2mj.envs.names import activity_name, short_name
+    from ig2mj.envs.names import NAMES, activity_name, short_name
+    from ig2mj.scene.paths import SHIPPED_HOMES, shipped_homes
 
-    if agent not in AGENTS:
-        raise UnknownNameError("agent", agent, AGENTS)
     file = pathlib.Path(what)
     recorded = file.suffix.lower() in _RECORDINGS
     task = not recorded and not file.exists() and (short_name(what) or activity_name(what)) is not None
+    if not (recorded or task or file.exists() or (SHIPPED_HOMES / what).is_dir()):
+        raise UnknownNameError("scene, environment or recording", what, (*shipped_homes(), *NAMES))
     if (recorded or task) and (goal is not None or set or pool is not None):
         raise Ig2mjError("--goal, --set and --pool are for a scene; tasks and recordings have their own")
     if not task and (agent != "zero" or robot is not None):
@@ -116,20 +118,13 @@ def _recording(file: pathlib.Path) -> Source:
 
 
 def _task(name: str, worlds: int, engine: str, agent: str, robot: str | None, seed: int) -> Source:
-    import numpy as np
-
-    from ig2mj.envs.experts import expert_of
-    from ig2mj.envs.registry import make
+    from ig2mj.cli.rollout import AGENTS, policy_named, who_acts
+    from ig2mj.envs.registry import VECTORS, make
     from ig2mj.web.sources import Acting
 
-    env = make(name, robot, worlds, engine)
-    shape, rng = (worlds, *env.action_space.shape), np.random.default_rng(seed)
-    nothing = np.zeros(shape, np.float32)
-    acts: dict[str, Any] = {
-        "zero": lambda state: nothing,
-        "random": lambda state: rng.uniform(-1, 1, shape).astype(np.float32),
-    }
-    return Acting(env, expert_of(env) if agent == "expert" else acts[agent], seed)
+    policy = None if agent in AGENTS else policy_named(agent)
+    env = make(name, robot, worlds, engine, observations=VECTORS if policy is None else policy.observations)
+    return Acting(env, who_acts(agent, policy, env, seed), seed)
 
 
 def _home(

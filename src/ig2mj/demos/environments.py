@@ -120,7 +120,6 @@ class RecordedEnvironment(Environment):
             self._rows = FrameRows(self.core.engine, self._worlds, state)
             steps = ["action", "reward/total", "terminated", "truncated", "success"]
             steps += [f"reward/{name}" for name in self.objective.terms]
-            steps += [f"devices/{name}" for name in self._device_names]
             names = (self._rows.own, self._rows.batched, steps)
             self.writer = RunWriter(self._file, origin_of(self._inner), *names, self._worlds)
             weakref.finalize(self, self.writer.close)
@@ -133,7 +132,6 @@ class RecordedEnvironment(Environment):
         episode = np.asarray(state.batch.episode)
         runs = {w: {"episode": int(episode[w]), "row": int(rows[w]), **about} for w in begun}
         self.writer.begin(runs, *self._rows(state))
-        self._succeeded[begun] = False
         return state
 
     def _note(self, action: np.ndarray, state: EnvState) -> None:
@@ -143,12 +141,9 @@ class RecordedEnvironment(Environment):
         steps = [state.reward, state.terminated, state.truncated, state.info["success"], *terms]
         if self.pure:
             steps = [np.array(array) for array in steps]
-        devices = (np.array(self.devices[name]) for name in self._device_names)
-        self.writer.add(*self._rows(state), [action, *steps, *devices])
+        self.writer.add(*self._rows(state), [action, *steps])
         terminated, truncated = np.asarray(state.terminated), np.asarray(state.truncated)
-        if self._past_success:
-            self._succeeded |= np.asarray(state.info["success"])
-        elif terminated.any() or truncated.any():
+        if terminated.any() or truncated.any():
             success = np.asarray(state.info["success"])
             for world in self._worlds:
                 if terminated[world] or truncated[world]:

@@ -48,14 +48,14 @@ class Controls:
         if self._source.num_worlds > 1 or self._source.rows:
             with gui.add_folder("Worlds"):
                 self._worlds()
-        with gui.add_folder("View", expand_by_default=False):
-            self._view()
-        with gui.add_folder("Object"):
-            self._object()
         self._goal: Any = None
         if self._source.goal is not None:
             with gui.add_folder("Goal"):
                 self._goal = gui.add_html("")
+        with gui.add_folder("Object"):
+            self._object()
+        with gui.add_folder("View", expand_by_default=False):
+            self._view()
 
     def _run(self) -> None:
         gui, runner = self._server.gui, self._runner

@@ -71,7 +71,7 @@ class Mailbox:
             self._shot = dataclasses.replace(shot, jump=jump) if jump != shot.jump else shot
             self._lock.notify()
 
-    def get(self, timeout: float) -> Shot | None:
+    def get(self, timeout: float | int) -> Shot | None:
         """The newest shot that was not fetched yet, or None after `timeout` seconds without one."""
         with self._lock:
             if self._shot is None:

@@ -1,4 +1,8 @@
-"""Objects dragged by a spring from a point of theirs to the pointer, as in MuJoCo's own viewer."""
+"""Objects dragged by a spring from a point of theirs to the pointer: the spring of the window's mouse, for pages.
+
+Pages say only now and then where the pointer is, so that a spring that is stretched far pulls on instead of letting go,
+and it feels the mass that moves with the point: a light stick held at its end does not shake.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +12,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-STIFFNESS = 10.0
-"""1/s: natural frequency of the spring with what hangs on it, critically damped."""
-STRONGEST = 300.0
-"""Newtons: as strong as a hand of the humanoid's (spec/robots_tasks_sensors.md 1.2)."""
+from ig2mj.viewer.mouse import RATE, limited, moment
 
 
 @dataclasses.dataclass
@@ -52,21 +53,16 @@ def carried(model: mujoco.MjModel, body: int) -> Float[np.ndarray, "3"]:
 
 
 def pull(model: mujoco.MjModel, data: mujoco.MjData, drag: Drag) -> None:
-    """Puts the spring's force on the body, until it is changed or released."""
+    """Puts the spring's force on the body, at most the mouse's 100 N, until it is changed or released."""
     at = grabbed_at(data, drag)
     if drag.mass <= 0:
         drag.mass = felt_mass(model, data, drag.body, at)
-    velocity, both = np.zeros(3), np.zeros(6)
+    both = np.zeros(6)
     mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, drag.body, both, 0)
     velocity = both[3:] + np.cross(both[:3], at - data.xpos[drag.body])
-    force = drag.mass * STIFFNESS * (STIFFNESS * (drag.target - at) - 2 * velocity) - carried(model, drag.body)
-    strength = float(np.linalg.norm(force))
-    if not np.isfinite(strength):
-        force, strength = np.zeros(3), 0.0
-    if strength > STRONGEST:
-        force *= STRONGEST / strength
-    data.xfrc_applied[drag.body, :3] = force
-    data.xfrc_applied[drag.body, 3:] = np.cross(at - data.xipos[drag.body], force)
+    force = drag.mass * RATE * (RATE * (drag.target - at) - 2 * velocity) - carried(model, drag.body)
+    force = limited(force) if np.isfinite(force).all() else np.zeros(3)
+    data.xfrc_applied[drag.body] = moment(force, at, data.xipos[drag.body])
 
 
 def release(data: mujoco.MjData, drag: Drag) -> None:

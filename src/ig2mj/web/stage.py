@@ -19,6 +19,7 @@ from jaxtyping import Float
 from ig2mj.scene.scene import Scene
 from ig2mj.sensors.render_model import BACKGROUND
 from ig2mj.states.definitions.water import DROP_RADIUS
+from ig2mj.viewer.offscreen import FreeView
 from ig2mj.viewer.overlays import ObjectNames, RoomNames
 from ig2mj.viewer.overview import home_overview
 from ig2mj.web.geometry import PLAIN, Look, glb_of_geoms, visual_geoms
@@ -26,6 +27,9 @@ from ig2mj.web.looks import WATER_COLOUR, Patches
 
 MOVED = 1e-5
 """Metres, and parts of a quaternion: what differs less is not sent."""
+
+ROBOT_HEIGHT, ROBOT_DISTANCE = 0.8, 4.5
+"""Metres: what a page looks at first where there is a robot, and from how far."""
 
 BUILDING = frozenset({"walls", "floors", "ceilings"})
 """Categories that no click is for: they are behind everything."""
@@ -71,15 +75,20 @@ class Stage:
 
     def _prepare(self) -> None:
         scene = self._server.scene
-        scene.configure_environment_map("studio", environment_intensity=0.25)
+        scene.configure_environment_map("studio", environment_intensity=0.32)
         scene.configure_default_lights(enabled=True, cast_shadow=False)
         colour = np.round(np.array(BACKGROUND[:3]) * 255).astype(np.uint8)
         scene.set_background_image(np.tile(colour, (4, 4, 1)), format="png")
         scene.world_axes.visible = False
 
     def _view(self, data: mujoco.MjData) -> None:
-        """Where pages look from at first: the whole home."""
-        view = home_overview(self._scene, data)
+        """Where pages look from at first: the whole home, or a robot in it, over its shoulder."""
+        view, agents = home_overview(self._scene, data), self._scene.tables.agent_body
+        if len(agents):
+            base, turn = data.xpos[agents[0]], data.xmat[agents[0]].reshape(3, 3)
+            ahead = float(np.degrees(np.arctan2(turn[1, 0], turn[0, 0])))
+            place = (float(base[0]), float(base[1]), ROBOT_HEIGHT)
+            view = FreeView(place, ROBOT_DISTANCE, ahead + 35.0, -50.0)
         azimuth, elevation = np.radians(view.azimuth), np.radians(view.elevation)
         flat = np.cos(elevation)
         forward = np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])

@@ -19,6 +19,8 @@ from ig2mj.web.shots import Shot
 
 _SLOW = (from_physics.ABOVE, from_physics.BELOW, from_physics.BESIDE)
 """States that look through the whole home; a table that is made four times a second leaves them out."""
+_LONG = (from_physics.CONTACTS, from_physics.JOINT_STATES, from_physics.POSE, from_physics.AABB)
+"""States of many numbers or names: they come last."""
 MOST_PARTS = 200
 """Lines of a goal; a quantifier over a large home has thousands."""
 
@@ -30,18 +32,19 @@ GOOD, BAD, SOFT = "#1b7f3b", "#b3261e", "#6b7280"
 def object_rows(model: StateModel, shot: Shot, index: int) -> list[tuple[str, str]]:
     """Name and value of every state of an object, then its predicates that are true or false by states alone."""
     rows: list[tuple[str, str]] = []
-    for spec in SPECS:
-        if spec in _SLOW or not spec.belongs_to(model, index):
-            continue
-        value = _text(spec.get(model, shot.states, shot.view, index, shot.row))
-        rows.append((spec.name.replace("_", " "), f"{value} {spec.unit}".strip() if value != "-" else value))
+    for spec in (*(s for s in SPECS if s not in (*_SLOW, *_LONG)), *_LONG):
+        if spec.belongs_to(model, index):
+            value = _text(spec.get(model, shot.states, shot.view, index, shot.row))
+            rows.append((spec.name.replace("_", " "), f"{value} {spec.unit}".strip() if value != "-" else value))
+    long = sum(spec.belongs_to(model, index) for spec in _LONG)
     named = {name for name, _ in rows}
     for predicate in PREDICATES.values():
         name, of_states = predicate.name.replace("_", " "), predicate.per_object
         able = predicate.ability is None or bool(model.parameters.has(predicate.ability)[index])
         if of_states is None or name in named or not able:
             continue
-        rows.append((name, _text(bool(np.asarray(of_states(model, shot.states))[shot.row, index]))))
+        true = bool(np.asarray(of_states(model, shot.states))[shot.row, index])
+        rows.insert(len(rows) - long, (name, _text(true)))
     return rows
 
 
@@ -112,7 +115,7 @@ def _text(value: Any) -> str:
     if isinstance(value, (bool, np.bool_)):
         return "yes" if value else "no"
     if isinstance(value, (float, np.floating)):
-        return f"{value:.4g}" if math.isfinite(value) else "-"
+        return f"{value:.3g}" if math.isfinite(value) else "-"
     if isinstance(value, (list, tuple)):
         return ", ".join(_text(v) for v in value) if value else "-"
     return str(value)
