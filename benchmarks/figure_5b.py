@@ -187,8 +187,9 @@ def main() -> None:
             for x, won in zip(TAKEOVERS, success, strict=True):
                 low, high = wilson(int(won.sum()), len(won))
                 row = {"observation": obs, "closing": kind, "seconds_before_end": "all" if np.isinf(x) else x}
-                row |= {"success": won.mean(), "low": round(low, 3), "high": round(high, 3), "runs": len(won)}
-                rows.append(row | {"demonstrations": len(shown), "pairs": pairs, "loss_apart": round(loss, 5)})
+                row |= {"success": round(float(won.mean()), 4), "low": round(low, 3), "high": round(high, 3)}
+                row |= {"runs": len(won), "demonstrations": len(shown), "pairs": pairs, "loss_apart": round(loss, 5)}
+                rows.append(row)
                 print(rows[-1], flush=True)
     args.out.mkdir(parents=True, exist_ok=True)
     with (args.out / "figure_5b.csv").open("w", newline="") as file:
