@@ -22,7 +22,8 @@ from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
-from ig2mj.learn.collect import Advice, Hint, Transition, if_ready
+from ig2mj.learn.collect import GUIDED, Advice, Hint, Transition, if_ready
+from ig2mj.learn.guidance import ALONE
 from ig2mj.learn.labels import Imitation, Labels
 from ig2mj.learn.moments import Moments, share_of
 from ig2mj.learn.perception import Perception, Seen
@@ -71,10 +72,15 @@ class DaggerLearner:
 
 @struct.dataclass
 class Turns:
-    """Who acts in each world: a number from 0 to 1; the expert, where its share is larger."""
+    """Who acts in each world: a number from 0 to 1; the expert, where its share is larger.
+
+    `left`: steps until it is drawn anew. `alone`: the expert has no part in this episode. `helped`: it had one.
+    """
 
     draw: Float[Array, "W"]
     left: Int[Array, "W"]
+    alone: Bool[Array, "W"]
+    helped: Bool[Array, "W"]
 
 
 class Dagger:
@@ -123,15 +129,19 @@ class Dagger:
 
     def noise(self, num_worlds: int) -> Turns:
         """Before the first step."""
-        return Turns(jnp.zeros(num_worlds), jnp.zeros(num_worlds, jnp.int32))
+        no, none = jnp.zeros(num_worlds, bool), jnp.zeros(num_worlds, bool)  # two: buffers are donated
+        return Turns(jnp.zeros(num_worlds), jnp.zeros(num_worlds, jnp.int32), no, none)
 
     def act(
         self, learner: DaggerLearner, turns: Turns, seen: Seen, key: Array, advice: Advice
     ) -> tuple[Float[Array, "W n"], dict[str, Array], Turns]:
-        """The expert's action in its worlds, the policy's in the others; a world's turn is up to 50 steps long."""
+        """The expert's action in its worlds, the policy's in the others; a world's turn is up to 50 steps long.
+
+        A tenth of the episodes is the policy's alone from the first update on; success is reported of such episodes.
+        """
         assert advice.label is not None, "DAgger needs an expert"
         c = self.config
-        draw_key, time_key, noise_key, any_key, which_key = jax.random.split(key, 5)
+        draw_key, time_key, noise_key, any_key, which_key, alone_key = jax.random.split(key, 6)
         over = turns.left <= 0
         draw = jnp.where(over, jax.random.uniform(draw_key, over.shape), turns.draw)
         left = jnp.where(over, jax.random.randint(time_key, over.shape, 1, 51), turns.left) - 1
@@ -139,13 +149,16 @@ class Dagger:
         looked: Any = self.actor.apply({"params": learner.actor}, own, seen.picture)
         mean = looked[0]
         share = jnp.where(learner.updates == 0, 1.0, 1.0 - learner.progress / max(c.alone, 1e-6))
-        expert = draw < share
+        begins = advice.steps == 0
+        alone = jnp.where(begins, jax.random.uniform(alone_key, begins.shape) < ALONE, turns.alone)
+        expert = (draw < share) & ~(alone & (learner.updates > 0))
+        helped = expert | (turns.helped & ~begins)
         label = jnp.clip(advice.label, -1.0, 1.0)
         wild = (jax.random.uniform(which_key, expert.shape) < c.disturbed) & expert
         action = jnp.where(expert[:, None], label, jnp.tanh(mean))
         action = action + c.noise * jax.random.normal(noise_key, action.shape)
         action = jnp.where(wild[:, None], jax.random.uniform(any_key, action.shape, minval=-1.0), action)
-        return jnp.clip(action, -1.0, 1.0), {"label": label}, Turns(draw, left)
+        return jnp.clip(action, -1.0, 1.0), {"label": label, GUIDED: helped}, Turns(draw, left, alone, helped)
 
     def learn(
         self,
