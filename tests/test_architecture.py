@@ -193,8 +193,8 @@ def pyproject() -> dict:
     return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 
-DATA_PACKAGES = ("ig2mj_policies", "ig2mj_scenes")
-"""Homes and policies that ship: packed as they are, no Python among them."""
+DATA_PACKAGES = ("ig2mj_demonstrations", "ig2mj_policies", "ig2mj_scenes")
+"""Homes, policies and demonstrations that ship: packed as they are, no Python among them."""
 
 
 def packed_folders() -> dict[str, pathlib.Path]:

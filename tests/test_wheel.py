@@ -30,7 +30,7 @@ def installed(tmp_path_factory) -> pathlib.Path:
     """A folder that the wheel was installed into; built from a copy, so that nothing of an older build gets in."""
     work = tmp_path_factory.mktemp("wheel")
     source = work / "source"
-    for folder in ("src", "converters", "homes", "policies", "scenes_mjcf"):
+    for folder in ("src", "converters", "demonstrations", "homes", "policies", "scenes_mjcf"):
         shutil.copytree(ROOT / folder, source / folder, ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(ROOT / name, source)

@@ -14,6 +14,8 @@ import pytest
 import ig2mj
 from ig2mj.cli import call
 from ig2mj.demos import Recording, Replayer, record
+from ig2mj.demos.metrics import metrics_of
+from ig2mj.demos.thin import write_thin
 from ig2mj.envs.experts import expert_of
 from ig2mj.errors import InputError
 
@@ -112,6 +114,68 @@ def test_another_engine_version_is_refused_by_action_and_warned_of_by_state(env,
         assert "\n" not in str(refused.value)
         warnings = Replayer(recording, "state", env=env).warnings
     assert [w.split(" was ")[0] for w in warnings] == ["mujoco", "processor"]
+
+
+def test_a_thin_recording_has_actions_and_first_and_last_frames_and_comes_out_the_same(env, recorded, tmp_path):
+    thin = tmp_path / "thin.h5"
+    with Recording(recorded[0]) as recording:
+        write_thin(recording, thin, recording.runs[1:4])
+        actions, last = (
+            recording.runs[2].all_rows("steps/action"),
+            recording.runs[2].frame_rows(["states/temperature"], 12, 13),
+        )
+    assert thin.stat().st_size < recorded[0].stat().st_size
+    with Recording(thin) as recording:
+        run = recording.runs[1]
+        assert [r.frames for r in recording.runs] == [13] * 3 and [r.world for r in recording.runs] == [1, 0, 1]
+        assert np.array_equal(run.all_rows("steps/action"), actions)
+        assert np.array_equal(run.frame_rows(["states/temperature"], 12, 13)[0], last[0])
+        assert run.kept(0, 13).tolist() == [True] + [False] * 11 + [True]
+        done = Replayer(recording, env=env)(check=True)
+        assert (done.runs, done.differences) == (3, [])
+        seen = []
+        Replayer(recording, "state", env=env)(watch=lambda state, runs, k: seen.append((k, sorted(runs))))
+        assert seen == [(0, [0, 1]), (12, [0, 1]), (0, [1]), (12, [1])]
+    with h5py.File(thin, "a") as opened:
+        column = json.loads(opened.attrs["columns"]).index("frames/states/temperature")
+        opened["index"][12, column] = opened["index"][0, column]  # the last frame of the first run
+    with Recording(thin) as recording:
+        (found,) = Replayer(recording, env=env)(check=True).differences
+    assert (found.run, found.frame) == ("run_000000", 12)
+
+
+def test_metrics_say_what_was_moved_reached_held_and_looked_at(env, recorded, tmp_path):
+    found = metrics_of(recorded[0], settle=3, env=env)
+    assert [run["frames"] for run in found] == [13, 13, 13, 13, 4, 4]
+    with Recording(recorded[0]) as recording:
+        frames = recording.runs[0].all_rows("frames/goal")
+    first = found[0]
+    assert first["goal"]["each_frame"] == pytest.approx(frames.mean(1)) and first["goal"]["start"] == 0
+    hands = [env.scene.model.body(int(b)).name for b in env.scene.tables.hand_body]
+    assert set(first["grasping"]) == set(hands) == set(first["workspace"])
+    right = next(name for name in hands if "right" in name)
+    assert 0.02 < first["path_length"][right] < 1.0  # 12 steps of at most 5 cm, from rest
+    assert all(m <= first["path_length"][right] + 0.05 for name, m in first["path_length"].items() if name != right)
+    low, high = np.array(first["workspace"][right])
+    assert (high >= low).all() and np.abs(high).max() < 2
+    assert sum(first["gaze"]["objects"].values()) == pytest.approx(1)
+    assert set(first["gaze"]["objects"]) <= {*env.scene.object_names, "own body", ""}
+    assert (
+        first["kinematic_disarrangement"]["total"] >= sum(first["kinematic_disarrangement"]["objects"].values()) - 1e-6
+    )
+    json.dumps(found)
+
+
+def test_a_world_that_stands_still_is_not_disarranged(env, tmp_path):
+    file = tmp_path / "still.h5"
+    with record(env, file) as played:
+        state = played.reset(0)
+        for _ in range(4):
+            state = played.step(state, np.zeros((2, env.action_space.shape[0]), np.float32))
+    for run in metrics_of(file, settle=0, env=env):
+        assert run["kinematic_disarrangement"]["total"] < 0.02
+        assert run["logical_disarrangement"] == {"total": 0, "no_longer": [], "now": []}
+        assert run["goal"]["delta"] == 0
 
 
 def put(opened, name, values):

@@ -57,11 +57,13 @@ def _line(file: pathlib.Path, run: dict[str, Any]) -> str:
 
 
 def files_of(path: pathlib.Path) -> list[pathlib.Path]:
-    """The recordings of a folder, or the file itself. Raises InputError: there are none."""
+    """The recordings of a folder, the file itself, or that of demonstrations that ship. Raises InputError: a folder
+    has none. UnknownNameError."""
+    from ig2mj.demos.shipped import find_recording
     from ig2mj.errors import InputError
 
     if not path.is_dir():
-        return [path]
+        return [find_recording(path)]
     found = sorted(file for file in path.iterdir() if file.suffix in ENDINGS)
     if not found:
         raise InputError(path, f"has no recordings ({', '.join(ENDINGS)})", fix="name a folder that has")

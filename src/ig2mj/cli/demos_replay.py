@@ -120,6 +120,7 @@ def export(
     from ig2mj.demos.exports import EXPORTS
     from ig2mj.demos.reader import Recording
     from ig2mj.demos.replay import MODES, Replayer
+    from ig2mj.demos.shipped import find_recording
     from ig2mj.envs.registry import VECTORS
     from ig2mj.errors import UnknownNameError
 
@@ -127,7 +128,7 @@ def export(
         if name not in known:
             raise UnknownNameError(kind, name, known)
     names = tuple(name.strip() for name in obs.split(",") if name.strip())
-    with Recording(file) as recording:
+    with Recording(find_recording(file)) as recording:
         done = EXPORTS[to](Replayer(recording, by, observations=names or VECTORS), out)
     print(f"{out}: {done.runs} runs of {file}")
     return 0

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 AGENTS = ("zero", "random", "expert")
 
+FORMATS = ("ig2mj", "igibson")
+
 
 def run(
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")],
@@ -31,6 +33,7 @@ def run(
     pool_size: int = 0,
     video: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     record: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    format: str = "ig2mj",
     paper_rl: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
@@ -54,6 +57,7 @@ def run(
       video: film of the first episode of the first world (.mp4, .gif), or five of its frames side by side (.png, .jpg);
         needs OpenGL and the native engine.
       record: HDF5 of everything that happens in all worlds, for `ig2mj demos replay`.
+      format: of --record: ig2mj, or igibson: one of iGibson's logs a run besides, in a folder named as FILE.
       paper_rl: the thresholds that the paper's runs had.
       json: the last line is one JSON object.
     """
@@ -64,8 +68,10 @@ def run(
     from ig2mj.cli.robot_urdf import check_layout, own_robot
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.envs.rollout import play
-    from ig2mj.errors import Ig2mjError
+    from ig2mj.errors import Ig2mjError, UnknownNameError
 
+    if format not in FORMATS:
+        raise UnknownNameError("format", format, FORMATS)
     check_layout(robot_urdf, robot_layout)
     policy = None if agent in AGENTS else policy_named(agent)
     if episodes < 1 or worlds < 1:
@@ -106,6 +112,8 @@ def run(
         played.close()
         if film is not None:
             film.close()
+    if record is not None and format == "igibson":
+        _write_igibson(record)
     successes, in_hand = sum(outcome.success), sum(outcome.success_in_hand)
     metrics = played.metrics(outcome.state)
     result = {
@@ -135,6 +143,14 @@ def run(
         )
     played.close()
     return 0
+
+
+def _write_igibson(recorded: pathlib.Path) -> None:
+    from ig2mj.demos import Recording, Replayer
+    from ig2mj.demos.igibson import export_igibson
+
+    with Recording(recorded) as recording:
+        export_igibson(Replayer(recording, "state"), recorded.with_suffix(""))
 
 
 def policy_named(name: str) -> Policy:

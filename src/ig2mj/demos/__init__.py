@@ -3,5 +3,6 @@
 from ig2mj.demos.environments import RecordedEnvironment, record
 from ig2mj.demos.reader import Recording, Run
 from ig2mj.demos.replay import Replayer, replay
+from ig2mj.demos.shipped import find_recording, shipped
 
-__all__ = ["RecordedEnvironment", "Recording", "Replayer", "Run", "record", "replay"]
+__all__ = ["RecordedEnvironment", "Recording", "Replayer", "Run", "find_recording", "record", "replay", "shipped"]

@@ -25,6 +25,7 @@ import numpy as np
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.demos.reader import Recording, Run
 from ig2mj.demos.replay import Replayer
+from ig2mj.demos.shipped import find_recording
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.predicates.questions import Questions
 from ig2mj.predicates.registry import PREDICATES, find
@@ -40,17 +41,18 @@ MOVED = 1e-3
 Fact = tuple[str, tuple[str, ...]]
 
 
-def metrics_of(file: str | os.PathLike, settle: int = SETTLE) -> list[dict[str, Any]]:
+def metrics_of(file: str | os.PathLike, settle: int = SETTLE, env: Environment | None = None) -> list[dict[str, Any]]:
     """Of every run of a recording that has a step, in their order; numbers and text only.
 
     Args:
       settle: control steps before start and end are compared; 0: as they are.
+      env: that the file was recorded in, where it is at hand or `ig2mj.make` cannot make it.
 
     Raises:
       InputError: the recording is broken, or of something that is not there.
     """
-    with Recording(file) as recording:
-        replayer = Replayer(recording, "state")
+    with Recording(find_recording(file)) as recording:
+        replayer = Replayer(recording, "state", env=env)
         measured = _Measuring(replayer.env, settle)
         runs = [run for run in recording.runs if run.frames > 1]
         watched: dict[str, _Watched] = {}

@@ -52,7 +52,7 @@ class Run:
         Raises:
           InputError: an array is missing, or is another than it must be.
         """
-        index, wanted = self._index(start, stop), like or [None] * len(names)
+        index, wanted = self.index(start, stop), like or [None] * len(names)
         return [self._rows(f"frames/{name}", index, like) for name, like in zip(names, wanted, strict=True)]
 
     def rows(self, name: str, start: int, stop: int, like: Any = None) -> np.ndarray:
@@ -62,7 +62,7 @@ class Run:
           InputError: the array is missing, or another than `like`. ValueError: more rows than are read at a time.
         """
         later = int(name.startswith("steps/"))
-        return self._rows(name, self._index(start + later, stop + later), like)
+        return self._rows(name, self.index(start + later, stop + later), like)
 
     def all_rows(self, name: str) -> np.ndarray:
         """All rows of one array. Raises InputError."""
@@ -92,8 +92,13 @@ class Run:
             raise self.broken("attribute frames", f"claims {self.frames} frames, and {parts[:, 1].sum()} are there")
         return parts
 
-    def _index(self, start: int, stop: int) -> np.ndarray:
-        """[stop - start, C] of these frames."""
+    def kept(self, start: int, stop: int) -> np.ndarray:
+        """Which of these frames are there: of a thin recording only the first and the last (`ig2mj.demos.thin`)."""
+        of_world = [k for name, k in self._recording.columns.items() if name.startswith("frames/")]
+        return (self.index(start, stop)[:, of_world[:1]] >= 0).all(1)
+
+    def index(self, start: int, stop: int) -> np.ndarray:
+        """[stop - start, C] rows that these frames have in the file's arrays; -1: none. Raises InputError."""
         if stop - start > 4 * FLUSH:
             raise ValueError(f"{stop - start} rows at a time")
         found, before = [], 0

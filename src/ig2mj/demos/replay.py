@@ -34,6 +34,7 @@ from ig2mj.demos.frames import (
 )
 from ig2mj.demos.origin import BINDING, LOOSE, differences, origin_of
 from ig2mj.demos.reader import Recording, Run
+from ig2mj.demos.shipped import find_recording
 from ig2mj.demos.writer import FLUSH
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.registry import VECTORS, find_task, make
@@ -155,7 +156,7 @@ class Replayer:
         readers = {world: self._frames(run) for world, run in now.items()}
         actions = {world: self._actions(run) for world, run in now.items()}
         recorded = {world: next(reader) for world, reader in readers.items()}
-        state = self._put(recorded, now)
+        state = self._put({world: self._there(rows, now[world]) for world, rows in recorded.items()}, now)
         longest, zero = max(run.frames for run in now.values()), np.zeros(self.env.action_space.shape, np.float32)
         for k in range(longest):
             if k:
@@ -167,6 +168,8 @@ class Replayer:
                     recorded = {world: next(readers[world]) for world in going if world not in found}
                 came = self._rows(state)
                 for world, rows in recorded.items():
+                    if rows is None:
+                        continue
                     one = first_difference(self._labels, now[world].name, k, self._names, rows, came[world])
                     if one is not None:
                         found[world] = one
@@ -180,11 +183,19 @@ class Replayer:
         readers = {world: self._frames(run) for world, run in now.items()}
         last: dict[int, list[np.ndarray]] = {}
         for k in range(max(run.frames for run in now.values())):
-            last |= {world: rows for world, reader in readers.items() if (rows := next(reader, None)) is not None}
+            there = {world: rows for world, reader in readers.items() if (rows := next(reader, None)) is not None}
+            if not there:
+                continue
+            last |= there
             state = self._put(last, now)
             if watch is not None:
-                watch(state, {w: run for w, run in now.items() if k < run.frames}, k)
+                watch(state, {w: now[w] for w in there}, k)
         return []
+
+    def _there(self, rows: list[np.ndarray] | None, run: Run) -> list[np.ndarray]:
+        if rows is None:
+            raise run.broken("frames", "has no first frame")
+        return rows
 
     def _put(self, rows: dict[int, list[np.ndarray]], now: dict[int, Run]) -> EnvState:
         """The environment at these frames; worlds that are not replayed stand where the first does."""
@@ -195,13 +206,17 @@ class Replayer:
         begun = [now[w].row if w in now else 0 for w in range(self.env.num_worlds)]
         return resumed(self.env, frame, np.clip(begun, 0, size - 1))
 
-    def _frames(self, run: Run) -> Iterator[list[np.ndarray]]:
-        """The arrays of one frame after the other."""
+    def _frames(self, run: Run) -> Iterator[list[np.ndarray] | None]:
+        """The arrays of one frame after the other; None where the frame is not in the file."""
         for start in range(0, run.frames, FLUSH):
             stop = min(start + FLUSH, run.frames)
-            rows = run.frame_rows(self._names, start, stop, self._like)
-            for k in range(stop - start):
-                yield [array[k, ...] for array in rows]
+            kept = run.kept(start, stop)
+            if kept.all():
+                rows = run.frame_rows(self._names, start, stop, self._like)
+                yield from ([array[k, ...] for array in rows] for k in range(stop - start))
+                continue
+            for k, there in enumerate(kept, start):
+                yield [a[0, ...] for a in run.frame_rows(self._names, k, k + 1, self._like)] if there else None
 
     def _actions(self, run: Run) -> Iterator[np.ndarray]:
         like = np.zeros(self.env.action_space.shape, np.float32)
@@ -212,8 +227,8 @@ class Replayer:
 
 
 def replay(file: str | os.PathLike, by: str = "action", check: bool = True, **options: Any) -> Replayed:
-    """Replays all runs of a file. Arguments and errors as of `Replayer`."""
-    with Recording(file) as recording:
+    """Replays all runs of a file, or of demonstrations that ship. Arguments and errors as of `Replayer`."""
+    with Recording(find_recording(file)) as recording:
         return Replayer(recording, by, **options)(check)
 
 
