@@ -87,7 +87,7 @@ def finish(
             warnings=lines,
             object_warnings={name: lines for name, lines in per_object.items() if lines},
             skipped=skipped,
-            timings=timings,
+            timings=timings if options.timed else {},
             rooms=rooms,
             encrypted=[name for name, model_built in built.items() if model_built.encrypted],
         )

@@ -38,7 +38,7 @@ class ConvertOptions:
       assets: folder that gets `meshes/` and `textures/`, relative to the output's, so that many scenes can share them.
       keep_hovering: start loose objects exactly where the source has them, even in mid-air.
       jobs: processes. cache: use the caches of decompositions and of finished outputs.
-      report: write report.json and report.html.
+      report: write report.json and report.html. timed: they tell how long each stage took, which is never the same.
       strict: take warnings for errors, and leave no output.
       mesh_root, package_path: of an object: a folder below which its meshes may lie, although it is not above the URDF;
         folders in which packages (`package://`) are looked for first.
@@ -62,6 +62,7 @@ class ConvertOptions:
     jobs: int = 1
     cache: bool = True
     report: bool = True
+    timed: bool = True
     strict: bool = False
     mesh_root: pathlib.Path | None = None
     package_path: tuple[pathlib.Path, ...] = ()

@@ -6,51 +6,14 @@ import contextlib
 import dataclasses
 import pathlib
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from ig2mj.cli.convert_common import DEFAULTS, Common, Flag, options_of
+
 if TYPE_CHECKING:
-    from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.base.outcome import Outcome
-
-Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff, tyro.conf.arg(help_behavior_hint="")]
-
-COLOURS = Literal["auto", "source", "category"]
-
-
-@dataclasses.dataclass(frozen=True)
-class Common:
-    """What all conversions take.
-
-    Attributes:
-      jobs: processes that work side by side: on the models of a scene, on the parts of a single object.
-      seed: seeds convex decomposition, and chooses models that a scene names "random".
-      max_hulls: most convex pieces per link. A link of more than 16 gets as few as keep the error of its volume under
-        15 % and its openings open.
-      max_hull_vertices: most vertices per piece.
-      bullet_inertia: inertia of each link's box, as Bullet computes it, instead of that of its hulls.
-      colours: of visuals without a texture: the source's, or household ones by category; auto prefers the source's,
-        unless every object of a scene is of one flat colour.
-      no_cache: convert anew even if nothing has changed, and keep nothing for the next time.
-      strict: take warnings for errors: exit status 2, and no output.
-      no_report: no checks, no report.json and report.html.
-      json: print what was done as JSON.
-    """
-
-    jobs: int = 1
-    seed: int = 0
-    max_hulls: int = 64
-    max_hull_vertices: int = 32
-    bullet_inertia: Flag = False
-    colours: COLOURS = "auto"
-    no_cache: Flag = False
-    strict: Flag = False
-    no_report: Flag = False
-    json: Flag = False
-
-
-DEFAULTS = Common()
 
 #: Exit status of a conversion that left models out (`--skip-missing`).
 SKIPPED = 3
@@ -89,7 +52,7 @@ def convert_scene(
     """
     from ig2mj_converters.conversion import convert_scene as convert
 
-    options = _options(
+    options = options_of(
         common,
         fixed_furniture=fixed_furniture,
         only_rooms=only_rooms or None,
@@ -129,7 +92,7 @@ def convert_object(
     """
     from ig2mj_converters.conversion import convert_object as convert
 
-    options = _options(common, mesh_root=mesh_root, package_path=package_path)
+    options = options_of(common, mesh_root=mesh_root, package_path=package_path)
     with _progress(f"converting {urdf.name}") as options_with:
         outcome = convert(urdf, category, out, model=model, bounding_box=bbox, options=options_with(options))
     return _tell(outcome, out, "object.xml", common.json)
@@ -156,53 +119,13 @@ def convert_robot(
     """
     from ig2mj_converters.convert_robot import convert_robot as convert
 
-    options = _options(common, mesh_root=mesh_root, package_path=package_path)
+    options = options_of(common, mesh_root=mesh_root, package_path=package_path)
     with _progress(f"converting {urdf.name}") as options_with:
         outcome = convert(urdf, out, name=name, options=options_with(options))
     return _tell(outcome, out, "object.xml", common.json)
 
 
 SUBCOMMANDS = {"scene": convert_scene, "object": convert_object, "robot": convert_robot}
-
-
-def _options(common: Common, **of_command: Any) -> ConvertOptions:
-    """Conversion options from the command line, and the renderer for the report's pictures."""
-    from ig2mj_converters.base.options import ConvertOptions
-
-    from ig2mj.errors import InputError
-
-    for name, least in (("jobs", 1), ("max_hulls", 1), ("max_hull_vertices", 8)):
-        if (given := getattr(common, name)) < least:
-            element = "--" + name.replace("_", "-")
-            raise InputError("command line", f"is {given}, must be at least {least}", element=element)
-    return ConvertOptions(
-        jobs=common.jobs,
-        seed=common.seed,
-        max_hulls=common.max_hulls,
-        max_hull_vertices=common.max_hull_vertices,
-        bullet_inertia=common.bullet_inertia,
-        colours=common.colours,
-        cache=not common.no_cache,
-        report=not common.no_report,
-        strict=common.strict,
-        renderer=None if common.no_report else _render,
-        view=None if common.no_report else _free_view,
-        **of_command,
-    )
-
-
-def _render(*arguments: Any, **options: Any) -> Any:
-    """`ig2mj.viewer.offscreen.render`, imported when there is something to draw."""
-    from ig2mj.viewer.offscreen import render
-
-    return render(*arguments, **options)
-
-
-def _free_view(*arguments: Any, **options: Any) -> Any:
-    """`ig2mj.viewer.offscreen.FreeView`, likewise."""
-    from ig2mj.viewer.offscreen import FreeView
-
-    return FreeView(*arguments, **options)
 
 
 @contextlib.contextmanager

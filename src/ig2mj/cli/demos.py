@@ -9,6 +9,7 @@ import tyro
 
 from ig2mj.cli.demos_folder import metrics
 from ig2mj.cli.demos_replay import export, replay
+from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures
 
 
 def collect(
@@ -25,6 +26,9 @@ def collect(
     seed: int = 0,
     split: str = "train",
     pool_size: int = 0,
+    jobs: int = 1,
+    cluster: Cluster = None,
+    resume: Resume = False,
 ) -> int:
     """Play a scripted expert, and write its successful episodes as HDF5, for `ig2mj train --demos`.
 
@@ -42,41 +46,64 @@ def collect(
       seed: of start states and noise.
       split: start states: train or held_out.
       pool_size: start states; 0: as many as the split has.
+      jobs: processes, each with worlds of its own.
+      cluster: do it on a Ray cluster: its address, or auto.
+      resume: go on with a collection that was broken off.
     """
-    import sys
-
+    from ig2mj.cli.files import check_folder_of
+    from ig2mj.cluster.pieces import Where, run
+    from ig2mj.cluster.work import Work
     from ig2mj.envs.experts import expert_of
+    from ig2mj.envs.pieces import shared_pool
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.errors import Ig2mjError, UnknownNameError
-    from ig2mj.learn.demos import DemoWriter, collect_demos
+    from ig2mj.learn.demo_pieces import collection_pieces, join_demos
     from ig2mj.learn.perception import MODES
 
     if obs not in MODES:
         raise UnknownNameError("kind of observation", obs, MODES)
     if episodes < 1 or worlds < 1:
         raise Ig2mjError(f"--episodes {episodes}, --worlds {worlds}: at least one of each is needed")
+    if jobs < 0:
+        raise Ig2mjError(f"--jobs {jobs}: 0 takes one process per processor, else at least one is needed")
+    check_folder_of(out)
     names = VECTORS if obs == "state" else (*VECTORS, "rgb", "depth")
-    played = make(
-        env, robot, worlds, engine, grasping, observations=names, split=split, pool_size=pool_size or None
-    )  # fmt: skip
-
-    def progress(kept: int, of: int) -> None:
-        if kept % max(of // 10, 1) == 0 or kept == of:
-            print(f"{kept} of {of} episodes", file=sys.stderr)
-
-    with DemoWriter(out, played) as writer:
-        found = collect_demos(
-            played,
-            expert_of(played),
-            writer,
-            episodes,
-            seed=seed,
-            noise=noise,
-            disturbed=disturbed,
-            progress=progress,
-        )
-    print(f"{out}: {found['kept']} episodes; {found['failed']} more failed and are left out")
-    return 0
+    settings = {
+        "env": env,
+        "robot": robot,
+        "grasping": grasping,
+        "engine": engine,
+        "worlds": worlds,
+        "observations": list(names),
+        "split": split,
+        "pool_size": pool_size or None,
+        "noise": noise,
+        "disturbed": disturbed,
+    }
+    first = make(env, robot, 1, "native", grasping, observations=VECTORS, split=split, pool_size=pool_size or None)
+    expert_of(first)  # errors before any work
+    first.close()
+    where, title = Where(jobs, cluster, resume), f"demonstrations of {env}"
+    starts = {"task": env, "split": split, "count": pool_size or None}
+    work = Work(
+        "ig2mj.learn.demo_pieces:collect_piece",
+        title,
+        collection_pieces(settings, episodes, seed),
+        shared_pool(**starts) if cluster is not None else {},
+        ("ig2mj.envs.pieces:start_states", starts),
+        gpu=engine != "native",
+    )
+    request = {"command": "demos collect", "episodes": episodes, "seed": seed, **settings}
+    with opened(out, request, where) as journal, follow(title, where) as report:
+        store, failed = run(work, where, journal, report)
+        parts = (store.get(piece.name) for piece in work.pieces if piece.name not in failed)
+        kept, lost = join_demos(parts, out) if len(failed) < len(work.pieces) else (0, 0)
+        if not failed:
+            journal.finish()
+    tell_failures(failed, len(work.pieces))
+    if kept:
+        print(f"{out}: {kept} episodes; {lost} more failed and are left out")
+    return 1 if failed else 0
 
 
 SUBCOMMANDS = {"collect": collect, "replay": replay, "export": export, "metrics": metrics}

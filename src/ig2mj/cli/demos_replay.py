@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
+from ig2mj.cli.pieces import Cluster, Resume
+
 if TYPE_CHECKING:
     from ig2mj.demos.reader import Run
     from ig2mj.demos.replay import Replayed
@@ -22,6 +24,8 @@ def replay(
     out: pathlib.Path | None = None,
     threads: int = 0,
     jobs: int = 1,
+    cluster: Cluster = None,
+    resume: Resume = False,
 ) -> int:
     """Replay a recording of an environment (`ig2mj rollout --record FILE`), or all recordings of a folder.
 
@@ -35,10 +39,14 @@ def replay(
       out: HDF5 of the observations; default: FILE with .sensors.h5.
       threads: that the native engine steps worlds on; 0: one per processor.
       jobs: processes, each with a recording of its own.
+      cluster: do it on a Ray cluster, run by run: its address, or auto.
+      resume: go on with a replay that was broken off there.
     """
     import sys
 
     from ig2mj.cli.demos_folder import files_of, of_files
+    from ig2mj.cli.demos_pieces import replay_in_pieces
+    from ig2mj.cluster.pieces import Where
     from ig2mj.demos.replay import MODES
     from ig2mj.errors import Ig2mjError, UnknownNameError
 
@@ -50,6 +58,11 @@ def replay(
     if len(files) > 1 and (video is not None or out is not None):
         raise Ig2mjError("--video and --out are of one recording: name a file")
     names = tuple(name.strip() for name in sensors.split(",") if name.strip())
+    if cluster is not None or resume:
+        if video is not None:
+            raise Ig2mjError("--video is made on this machine: leave --cluster and --resume out")
+        where = Where(jobs, cluster, resume)
+        return max(replay_in_pieces(one, by, check, names, out, threads, where) for one in files)
     status = 0
     for one, done in of_files(_replayed, files, jobs, by, check, video, names, out, threads):
         if isinstance(done, Ig2mjError):

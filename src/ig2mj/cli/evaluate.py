@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import pathlib
 from typing import Annotated
 
 import tyro
+
+from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures
 
 WORLDS = {"native": 8}
 """So many worlds unless another number is asked for; on the others as many as episodes, up to `PURE_WORLDS`."""
@@ -22,6 +25,10 @@ def run(
     grasping: str | None = None,
     pool_size: int = 0,
     drawn: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    jobs: int = 1,
+    cluster: Cluster = None,
+    out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    resume: Resume = False,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
     """Tell how often a policy succeeds, each start state played once.
@@ -36,61 +43,96 @@ def run(
       grasping: only for a policy of this way of grasping.
       pool_size: start states; 0: as many as the split has.
       drawn: actions are drawn from the policy's distribution, as in training, instead of its middle.
+      jobs: processes, each with worlds of its own; natively one world is stepped on each processor in any case.
+      cluster: do it on a Ray cluster: its address, or auto.
+      out: file for the JSON object; needed for --resume.
+      resume: go on with an evaluation that was broken off.
       json: print one JSON object.
     """
+    import contextlib
     import json as form
+    import time
 
     import jax
 
-    from ig2mj.envs.registry import make
-    from ig2mj.envs.rollout import play
+    from ig2mj.cluster.pieces import Where, run
+    from ig2mj.cluster.work import Work
+    from ig2mj.envs.pieces import shared_pool
     from ig2mj.errors import Ig2mjError
-    from ig2mj.learn.evaluate import acting, summary
+    from ig2mj.learn.evaluate import evaluation_pieces, summary
     from ig2mj.learn.policies import Policy
     from ig2mj.learn.shipped import find_policy
 
-    if episodes < 1:
-        raise Ig2mjError(f"--episodes {episodes}: at least one is needed")
+    if episodes < 1 or jobs < 0:
+        raise Ig2mjError(f"--episodes {episodes}, --jobs {jobs}: at least one is needed")
+    if resume and out is None:
+        raise Ig2mjError("--resume needs --out, the file beside which the finished pieces are")
     file = find_policy(policy)
     loaded = Policy.load(file)
     depends = loaded.card["depends"]
     if engine is None:
         engine = "warp" if jax.default_backend() == "gpu" else "native"
     count = worlds or min(episodes, WORLDS.get(engine, PURE_WORLDS))
-    env = make(
-        depends["task"],
-        robot or depends["robot"],
-        count,
-        engine,
-        grasping or depends["grasping"],
-        observations=loaded.observations,
-        paper_rl=loaded.card.get("paper_rl", False),
-        split=split,
-        pool_size=pool_size or None,
-    )
-    played = play(env, acting(loaded, env, file, drawn=drawn), episodes, in_order=True)
-    found, metrics = summary(played), env.metrics(played.state)
-    result = {
-        "env": env.task.name,
-        "robot": env.robot,
-        "grasping": env.grasping,
-        "agent": str(policy),
-        "weights": loaded.weights_digest,
-        "paper_rl": loaded.card.get("paper_rl", False),
-        "split": split,
-        "drawn": drawn,
+    settings = {
+        "file": str(file),
+        "task": depends["task"],
+        "robot": robot or depends["robot"],
+        "grasping": grasping or depends["grasping"],
         "engine": engine,
         "worlds": count,
-        **found,
-        "overflow": metrics["overflow"],
-        "non_finite": metrics["not_finite"],
+        "observations": list(loaded.observations),
+        "paper_rl": loaded.card.get("paper_rl", False),
+        "split": split,
+        "pool_size": pool_size or None,
+        "drawn": drawn,
     }
+    where, title = Where(jobs, cluster, resume), f"evaluating {policy}"
+    starts = (depends["task"], split, pool_size or None)
+    shared = {"policy": file.read_bytes(), **(shared_pool(*starts) if cluster is not None or jobs != 1 else {})}
+    work = Work(
+        "ig2mj.learn.evaluate:evaluate_piece",
+        title,
+        evaluation_pieces(settings, episodes),
+        shared,
+        ("ig2mj.envs.pieces:start_states", dict(zip(("task", "split", "count"), starts, strict=True))),
+        gpu=engine != "native" and jax.default_backend() == "gpu",
+    )
+    began = time.monotonic()
+    with contextlib.ExitStack() as stack:
+        request = {"command": "evaluate", "episodes": episodes, "weights": loaded.weights_digest, **settings}
+        journal = stack.enter_context(opened(out, request, where)) if out is not None else None
+        store, failed = run(work, where, journal, stack.enter_context(follow(title, where)))
+        done = [form.loads(store.get(piece.name)) for piece in work.pieces if piece.name not in failed]
+        seconds = time.monotonic() - began
+        tell_failures(failed, len(work.pieces))
+        if not done:
+            return 1
+        found = summary(done)
+        result = {
+            "env": depends["task"],
+            "robot": settings["robot"],
+            "grasping": settings["grasping"],
+            "agent": str(policy),
+            "weights": loaded.weights_digest,
+            "paper_rl": settings["paper_rl"],
+            "split": split,
+            "drawn": drawn,
+            "engine": engine,
+            "worlds": count,
+            **found,
+        }
+        if out is not None:
+            out.write_text(form.dumps(result) + "\n", encoding="utf-8")  # the same bytes wherever it was done
+        if journal is not None and not failed:
+            journal.finish()
+    result["steps_per_second"] = round(sum(d["steps"] for d in done) / max(seconds, 1e-9), 1)
     if json:
         print(form.dumps(result))
     else:
         low, high = found["success_low"], found["success_high"]
         print(
-            f"{env.task.name}, {env.robot}, {env.grasping}: {found['success_rate']:.1%} of {episodes} episodes succeed "
-            f"({low:.1%} to {high:.1%} with 95 % confidence), mean return {found['mean_return']:.3f}"
+            f"{result['env']}, {result['robot']}, {result['grasping']}: {found['success_rate']:.1%} of "
+            f"{found['episodes']} episodes succeed ({low:.1%} to {high:.1%} with 95 % confidence), mean return "
+            f"{found['mean_return']:.3f}"
         )
-    return 0
+    return 1 if failed else 0

@@ -14,13 +14,16 @@ import time
 from collections.abc import Callable
 from typing import Protocol, runtime_checkable
 
-from ig2mj import errors
 from ig2mj.cluster.journal import Journal, Memory
 from ig2mj.cluster.work import Answer, Piece, Work
-from ig2mj.errors import ClusterError
+from ig2mj.errors import ClusterError, EngineError, Ig2mjError, StateError
 
 RETRIES = 2
 """Times that a failed piece is tried again. What the user did wrong is wrong every time and is not tried again."""
+
+
+SIMPLE = {kind.__name__: kind for kind in (EngineError, StateError, ClusterError)}
+"""Errors that are made of their message alone."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,7 +129,7 @@ def run(
                     store.put(answer.name, answer.result)
                     continue
                 if answer.all_fail:
-                    raise getattr(errors, answer.kind, ClusterError)(answer.error)
+                    raise answer.cause or SIMPLE.get(answer.kind, Ig2mjError)(answer.error)
                 tries[answer.name] += 1
                 if answer.again and tries[answer.name] <= RETRIES:
                     todo.append(by_name[answer.name])

@@ -9,6 +9,7 @@ from __future__ import annotations
 import collections
 import concurrent.futures
 import concurrent.futures.process
+import dataclasses
 import multiprocessing
 import multiprocessing.connection
 import os
@@ -118,4 +119,4 @@ def _end_with_parent() -> None:
 
 
 def _do_here(function: str, piece: Piece) -> Answer:
-    return do(function, piece, _shared)
+    return dataclasses.replace(do(function, piece, _shared), cause=None)  # not all errors can be sent

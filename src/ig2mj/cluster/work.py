@@ -44,7 +44,8 @@ class Work:
 @dataclasses.dataclass(frozen=True)
 class Answer:
     """What came of a piece: its bytes, or in `error` one line. `again`: another try may help.
-    `kind`: the class of the error, where it is one of `ig2mj.errors`. `all_fail`: it is no fault of this piece's."""
+    `kind`: the class of the error, where it is one of `ig2mj.errors`. `all_fail`: it is no fault of this piece's.
+    `cause`: the error itself, where the piece was done in this process."""
 
     name: str
     result: bytes = b""
@@ -52,6 +53,7 @@ class Answer:
     kind: str = ""
     again: bool = False
     all_fail: bool = False
+    cause: Exception | None = None
 
 
 class WholeRunError(Exception):
@@ -74,7 +76,7 @@ def do(function: str, piece: Piece, shared: Mapping[str, bytes]) -> Answer:
     try:
         return Answer(piece.name, found(function)(**piece.arguments, **options))
     except WholeRunError as e:
-        return Answer(piece.name, error=str(e), kind=type(e.cause).__name__, all_fail=True)
+        return Answer(piece.name, error=str(e), kind=type(e.cause).__name__, all_fail=True, cause=e.cause)
     except Ig2mjError as e:
         return Answer(piece.name, error=" ".join(str(e).split()), kind=type(e).__name__)
     except Exception as e:

@@ -41,15 +41,22 @@ class Played:
 
 
 def play(
-    env: Environment, act: Act, episodes: int, seed: int = 0, in_order: bool = False, watch: Watch | None = None
+    env: Environment,
+    act: Act,
+    episodes: int,
+    seed: int = 0,
+    in_order: bool = False,
+    watch: Watch | None = None,
+    first: int = 0,
 ) -> Played:
     """Plays episodes.
 
     Args:
       act: who acts. seed: of the start states that are drawn.
       in_order: begin with the rows of the environment's pool, each once; again from the first where there are fewer.
+      first: of these rows.
     """
-    return _in_order(env, act, episodes, seed, watch) if in_order else _drawn(env, act, episodes, seed, watch)
+    return _in_order(env, act, episodes, seed, watch, first) if in_order else _drawn(env, act, episodes, seed, watch)
 
 
 def _drawn(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None) -> Played:
@@ -71,12 +78,12 @@ def _drawn(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | 
     return Played(success, in_hand, total, steps, time.monotonic() - began, state)
 
 
-def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None) -> Played:
+def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None, start: int = 0) -> Played:
     size, worlds = env.core.starts.pool.size, env.num_worlds
     success, in_hand, total = [], [], []
     steps, began, state = 0, time.monotonic(), None
     for first in range(0, episodes, worlds):
-        state = env.start_from(np.arange(first, first + worlds) % size, seed)
+        state = env.start_from((start + first + np.arange(worlds)) % size, seed)
         _look(watch, state)
         going, won, holding = np.ones(worlds, bool), np.zeros(worlds, bool), np.zeros(worlds, bool)
         running = np.zeros(worlds)

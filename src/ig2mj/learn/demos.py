@@ -81,6 +81,10 @@ class DemoWriter:
         self.runs += 1
         self._file.flush()
 
+    def note(self, name: str, value: int) -> None:
+        """An attribute of the file, for people."""
+        self._file.attrs[name] = value
+
     def __enter__(self) -> DemoWriter:
         return self
 

@@ -1,15 +1,27 @@
-"""How good a policy is: `ig2mj.envs.rollout.play` from every start state in turn, and how sure the rate is."""
+"""How good a policy is: `ig2mj.envs.rollout.play` from every start state in turn, and how sure the rate is.
+
+An evaluation is done in pieces (`ig2mj.cluster.pieces`), each of as many episodes as there are worlds.
+"""
 
 from __future__ import annotations
 
+import functools
+import json
 import math
+import pathlib
+import tempfile
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
 import numpy as np
 
+from ig2mj.cluster.work import Piece, WholeRunError
 from ig2mj.envs.environment import Environment
-from ig2mj.envs.rollout import Act, Played
+from ig2mj.envs.pieces import keep_pool
+from ig2mj.envs.registry import make
+from ig2mj.envs.rollout import Act, play
+from ig2mj.errors import Ig2mjError
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy
 
@@ -33,18 +45,21 @@ def acting(policy: Policy, env: Environment, file: object, *, drawn: bool = Fals
     return act
 
 
-def summary(played: Played) -> dict[str, Any]:
-    """Rates and means; the success with the limits of its 95 % interval."""
-    count, successes = len(played.success), sum(played.success)
+def summary(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Rates and means over what pieces gave; the success with the limits of its 95 % interval."""
+    success, in_hand, total = (
+        [x for r in results for x in r[name]] for name in ("success", "success_in_hand", "total")
+    )
+    count, successes = len(success), sum(success)
     low, high = wilson(successes, count)
     return {
         "episodes": count,
         "success_rate": successes / count,
         "success_low": round(low, 4),
         "success_high": round(high, 4),
-        "success_in_hand_rate": sum(played.success_in_hand) / count,
-        "mean_return": float(np.mean(played.total)),
-        "steps_per_second": round(played.steps / played.seconds, 1),
+        "success_in_hand_rate": sum(in_hand) / count,
+        "mean_return": float(np.mean(total)),
+        **{name: sum(r[name] for r in results) for name in ("overflow", "non_finite")},
     }
 
 
@@ -54,3 +69,83 @@ def wilson(successes: int, count: int, z: float = 1.96) -> tuple[float, float]:
     middle = (rate + z * z / (2 * count)) / (1 + z * z / count)
     half = z * math.sqrt(rate * (1 - rate) / count + z * z / (4 * count**2)) / (1 + z * z / count)
     return max(middle - half, 0.0), min(middle + half, 1.0)
+
+
+def evaluation_pieces(settings: Mapping[str, Any], episodes: int) -> list[Piece]:
+    """Pieces of an evaluation. `settings`: the arguments of `evaluate_piece` but `first`, `episodes` and `shared`."""
+    worlds = settings["worlds"]
+    starts = range(0, episodes, worlds)
+    return [
+        Piece(f"episodes_{first:07d}", {**settings, "first": first, "episodes": min(worlds, episodes - first)})
+        for first in starts
+    ]
+
+
+def evaluate_piece(
+    file: str,
+    task: str,
+    robot: str,
+    grasping: str,
+    engine: str,
+    worlds: int,
+    observations: list[str],
+    paper_rl: bool,
+    split: str,
+    pool_size: int | None,
+    drawn: bool,
+    first: int,
+    episodes: int,
+    shared: Mapping[str, bytes],
+) -> bytes:
+    """Episodes from the start states `first` on, as JSON: how each ended, and what went wrong.
+
+    Args:
+      file: of the policy, for messages.
+      shared: "policy", a policy's file, and where another machine made them the start states. The others: of
+        `ig2mj.make`, and of `acting`.
+    """
+    try:
+        keep_pool(shared, task, split, pool_size)
+        made = (task, robot, grasping, engine, worlds, tuple(observations), paper_rl, split, pool_size)
+        env, policy = _environment(*made), _policy(shared["policy"])
+        acts = acting(policy, env, file, drawn=drawn, seed=first // worlds)
+    except Ig2mjError as e:
+        raise WholeRunError(e) from e
+    played = play(env, acts, episodes, in_order=True, first=first)
+    metrics = env.metrics(played.state)
+    found = {"success": played.success, "success_in_hand": played.success_in_hand, "total": played.total}
+    trouble = {"overflow": metrics["overflow"], "non_finite": metrics["not_finite"]}
+    return json.dumps({**found, "steps": played.steps, **trouble}).encode()
+
+
+@functools.lru_cache(maxsize=1)
+def _environment(
+    task: str,
+    robot: str,
+    grasping: str,
+    engine: str,
+    worlds: int,
+    observations: tuple[str, ...],
+    paper_rl: bool,
+    split: str,
+    pool_size: int | None,
+) -> Environment:
+    return make(
+        task,
+        robot,
+        worlds,
+        engine,
+        grasping,
+        observations=observations,
+        paper_rl=paper_rl,
+        split=split,
+        pool_size=pool_size,
+    )
+
+
+@functools.lru_cache(maxsize=1)
+def _policy(content: bytes) -> Policy:
+    with tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:
+        file = pathlib.Path(folder) / "policy.npz"
+        file.write_bytes(content)
+        return Policy.load(file)

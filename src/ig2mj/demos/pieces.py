@@ -1,0 +1,135 @@
+"""Replays in pieces (`ig2mj.cluster.pieces`): one run of each world at a time, as `Replayer` does it."""
+
+from __future__ import annotations
+
+import functools
+import json
+import pathlib
+import tempfile
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ig2mj.cluster.work import Piece, WholeRunError
+from ig2mj.demos.reader import Recording, Run
+from ig2mj.demos.replay import Replayer
+from ig2mj.envs.environment import EnvState
+from ig2mj.envs.pieces import keep_pool
+from ig2mj.envs.registry import VECTORS
+from ig2mj.errors import Ig2mjError
+
+TOLD = "told"
+"""Attribute of a piece's file: what came of the replay, as JSON."""
+
+RECORDING = "recording"
+"""Name of the recording among the bytes that pieces share, where they are done on other machines."""
+
+
+def replay_pieces(recording: Recording, settings: Mapping[str, Any]) -> list[Piece]:
+    """Pieces of a replay. `settings`: the arguments of `replay_piece` but `runs` and `shared`."""
+    layers: list[list[str]] = []
+    depth: dict[int, int] = {}
+    for run in recording.runs:
+        if run.frames:
+            at = depth.get(run.world, 0)
+            depth[run.world] = at + 1
+            if at == len(layers):
+                layers.append([])
+            layers[at].append(run.name)
+    return [Piece(f"runs_{n:06d}", {**settings, "runs": names}) for n, names in enumerate(layers)]
+
+
+def replay_piece(
+    file: str,
+    by: str,
+    check: bool,
+    sensors: list[str],
+    threads: int,
+    starts: dict[str, Any],
+    runs: list[str],
+    shared: Mapping[str, bytes] | None = None,
+) -> bytes:
+    """Replays some runs; an HDF5 file with what came of it, and the observations that were asked for.
+
+    Args:
+      sensors: names of observations. starts: arguments of `shared_pool`. The others: of `Replayer`.
+    """
+    import h5py
+
+    try:
+        keep_pool(shared or {}, **starts)
+        replayer = _replayer(file, by, tuple(sensors), threads, (shared or {}).get(RECORDING))
+    except Ig2mjError as e:
+        raise WholeRunError(e) from e
+    wanted = [run for run in replayer.recording.runs if run.name in set(runs)]
+    with tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:
+        out = pathlib.Path(folder) / "piece.h5"
+        with h5py.File(out, "w") as opened:
+            watcher = Observing(opened, sensors)
+            done = replayer(check, watcher.see if sensors else None, wanted)
+            told = {"runs": done.runs, "frames": done.frames, "differences": [str(d) for d in done.differences]}
+            opened.attrs[TOLD] = json.dumps({**told, "warnings": replayer.warnings})
+        return out.read_bytes()
+
+
+class Observing:
+    """Observations of all runs: `/run_000000/<name>` [T + 1, ...], written frame by frame."""
+
+    def __init__(self, opened: Any, names: Sequence[str]):
+        """`opened`: an HDF5 file."""
+        self._opened, self._names = opened, names
+
+    def see(self, state: EnvState, runs: Mapping[int, Run], frame: int) -> None:
+        """Writes a frame of each run that goes on."""
+        for world, run in runs.items():
+            for name in self._names:
+                row, path = np.asarray(state.obs[name])[world], f"{run.name}/{name}"
+                if path not in self._opened:
+                    self._opened.create_dataset(
+                        path, (run.frames, *row.shape), row.dtype, chunks=(1, *row.shape), compression="gzip"
+                    )
+                self._opened[path][frame] = row
+
+
+def join_replays(parts: Iterable[bytes], out: pathlib.Path | None) -> dict[str, Any]:
+    """What came of all pieces; with `out` their observations in one file. Raises OSError."""
+    import h5py
+
+    found: dict[str, Any] = {"runs": 0, "frames": 0, "differences": [], "warnings": []}
+    beside = None if out is None else out.with_name(f".{out.name}.part")
+    whole = None if beside is None else h5py.File(beside, "w")
+    if whole is not None:
+        whole.attrs["format"] = "ig2mj observations"
+    with tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:
+        for packed in parts:
+            part = pathlib.Path(folder) / "part.h5"
+            part.write_bytes(packed)
+            with h5py.File(part, "r") as opened:
+                told = json.loads(str(opened.attrs[TOLD]))
+                found = {
+                    **{k: found[k] + told[k] for k in ("runs", "frames", "differences")},
+                    "warnings": told["warnings"],
+                }
+                for name in sorted(opened) if whole is not None else ():
+                    opened.copy(opened[name], whole, name)
+    if whole is not None and beside is not None and out is not None:
+        whole.close()
+        beside.replace(out)
+    return found
+
+
+@functools.lru_cache(maxsize=1)
+def _replayer(file: str, by: str, sensors: tuple[str, ...], threads: int, content: bytes | None) -> Replayer:
+    options: dict[str, Any] = {"threads": threads} if threads else {}
+    if content is not None:
+        folder = tempfile.TemporaryDirectory(prefix="ig2mj-")
+        path = pathlib.Path(folder.name) / pathlib.Path(file).name
+        path.write_bytes(content)
+        replayer = Replayer(Recording(path), by, observations=sensors or VECTORS, **options)
+        _folders.append(folder)  # as long as the process
+        return replayer
+    return Replayer(Recording(file), by, observations=sensors or VECTORS, **options)
+
+
+_folders: list[tempfile.TemporaryDirectory] = []

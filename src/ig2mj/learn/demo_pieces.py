@@ -1,0 +1,92 @@
+"""Demonstrations in pieces (`ig2mj.cluster.pieces`): each plays an expert for some episodes from a seed of its own, and
+gives a file; the files of all pieces become one, run after run.
+"""
+
+from __future__ import annotations
+
+import pathlib
+import tempfile
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ig2mj.cluster.work import Piece
+from ig2mj.envs.experts import expert_of
+from ig2mj.envs.pieces import keep_pool
+from ig2mj.envs.registry import make
+from ig2mj.learn.demos import DemoWriter, collect_demos
+
+PIECE = 32
+"""Episodes of a piece."""
+
+FAILED = "failed"
+"""Attribute of a file: episodes that failed and are left out."""
+
+
+def collection_pieces(settings: Mapping[str, Any], episodes: int, seed: int) -> list[Piece]:
+    """Pieces of a collection. `settings`: the arguments of `collect_piece` but `episodes`, `seed` and `shared`."""
+    found = []
+    for number, first in enumerate(range(0, episodes, PIECE)):
+        own = seed if number == 0 else int(np.random.SeedSequence([seed, number]).generate_state(1)[0] >> 1)
+        arguments = {**settings, "episodes": min(PIECE, episodes - first), "seed": own}
+        found.append(Piece(f"episodes_{first:07d}", arguments))
+    return found
+
+
+def collect_piece(
+    env: str,
+    robot: str | None,
+    grasping: str | None,
+    engine: str,
+    worlds: int,
+    observations: list[str],
+    split: str,
+    pool_size: int | None,
+    noise: float,
+    disturbed: float,
+    episodes: int,
+    seed: int,
+    shared: Mapping[str, bytes] | None = None,
+) -> bytes:
+    """A file of demonstrations. Arguments: of `ig2mj.make` and of `collect_demos`.
+
+    Raises:
+      Ig2mjError: nearly all episodes fail.
+    """
+    keep_pool(shared or {}, env, split, pool_size)
+    played = make(
+        env, robot, worlds, engine, grasping, observations=observations, split=split, pool_size=pool_size
+    )  # fmt: skip
+    with tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:
+        file = pathlib.Path(folder) / "demos.h5"
+        with DemoWriter(file, played) as writer:
+            found = collect_demos(
+                played, expert_of(played), writer, episodes, seed=seed, noise=noise, disturbed=disturbed
+            )
+            writer.note(FAILED, found[FAILED])
+        return file.read_bytes()
+
+
+def join_demos(parts: Iterable[bytes], file: pathlib.Path) -> tuple[int, int]:
+    """Writes the runs of all parts to one file; how many there are, and how many episodes failed. Raises OSError."""
+    import h5py
+
+    runs = failed = 0
+    beside = file.with_name(f".{file.name}.part")
+    with h5py.File(beside, "w") as whole, tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:
+        for packed in parts:
+            part = pathlib.Path(folder) / "part.h5"
+            part.write_bytes(packed)
+            with h5py.File(part, "r") as opened:
+                failed += int(str(opened.attrs[FAILED]))
+                if not whole.attrs:
+                    for name, value in opened.attrs.items():
+                        whole.attrs[name] = value
+                for name in sorted(opened):
+                    opened.copy(opened[name], whole, f"run_{runs:06d}")
+                    runs += 1
+        if runs:
+            whole.attrs[FAILED] = failed
+    beside.replace(file)
+    return runs, failed

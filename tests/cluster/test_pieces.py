@@ -1,0 +1,150 @@
+"""Pieces of work on this machine: the same results in any order, retries, reasons, journals."""
+
+from __future__ import annotations
+
+import json
+import pathlib
+import sys
+
+import pytest
+
+from ig2mj.cluster.journal import Journal
+from ig2mj.cluster.pieces import Status, Where, run
+from ig2mj.cluster.versions import difference, versions
+from ig2mj.cluster.work import Piece, Work
+from ig2mj.errors import ClusterError, EngineError, InputError
+
+HERE = pathlib.Path(__file__).parent
+
+
+@pytest.fixture(autouse=True)
+def functions_are_found(monkeypatch):
+    monkeypatch.syspath_prepend(str(HERE))
+    monkeypatch.setenv("PYTHONPATH", str(HERE))
+    yield
+    sys.modules.pop("piece_functions", None)
+
+
+def work(count: int = 5, function: str = "digest", shared: dict[str, bytes] | None = None, **arguments) -> Work:
+    pieces = [Piece(f"piece_{n}", {"number": n, **arguments}) for n in range(count)]
+    return Work(f"piece_functions:{function}", "testing", pieces, shared or {})
+
+
+def everything(work: Work, where: Where = Where(), **options) -> tuple[list[bytes | None], dict[str, str]]:  # noqa: B008
+    store, failed = run(work, where, **options)
+    return [None if p.name in failed else store.get(p.name) for p in work.pieces], failed
+
+
+def test_the_same_results_here_and_on_two_processes():
+    wanted = work(shared={"file": b"content"})
+    here, failed = everything(wanted)
+    assert not failed and len(set(here)) == 5
+    assert everything(wanted, Where(jobs=2)) == (here, {})
+
+
+@pytest.mark.parametrize(
+    ("how", "tries", "reason"),
+    [
+        ("bug", 3, "ValueError: a bug of two lines"),
+        ("disk", 3, "OSError: [Errno 28] No space left on device: '/data/x'"),
+        ("input", 1, "the object is broken"),
+    ],
+)
+def test_what_fails_is_told_with_its_reason_while_the_others_finish(tmp_path, how, tries, reason):
+    results, failed = everything(work(function="failing", how=how, folder=str(tmp_path)))
+    assert results == [b"0", b"1", None, b"3", b"4"]
+    assert failed == {"piece_2": reason}
+    assert len(list(tmp_path.glob("try-*"))) == tries, "the user's mistakes are not tried again"
+
+
+def test_a_second_try_helps(tmp_path):
+    results, failed = everything(work(function="failing", how="once", folder=str(tmp_path)))
+    assert results[2] == b"at last" and not failed
+
+
+def test_a_process_that_dies_costs_its_piece_alone(tmp_path):
+    results, failed = everything(work(function="failing", how="death", folder=str(tmp_path)), Where(jobs=2))
+    assert results == [b"0", b"1", None, b"3", b"4"]
+    assert failed == {"piece_2": "the process that did it died"}
+    assert len(list(tmp_path.glob("try-*"))) == 3
+
+
+def test_what_would_fail_everywhere_ends_the_run(tmp_path):
+    with pytest.raises(EngineError, match="the scene does not come to rest"):
+        everything(work(function="failing", how="all", folder=str(tmp_path)))
+
+
+def test_progress_counts_and_foretells(tmp_path):
+    told: list[Status] = []
+    everything(work(function="failing", how="input", folder=str(tmp_path)), report=told.append)
+    assert (told[0].done, told[0].failed, told[0].running, told[0].total) == (0, 0, 1, 5)
+    assert (told[-1].done, told[-1].failed, told[-1].running) == (4, 1, 0)
+    assert told[0].seconds_left is None and told[-1].seconds_left == 0
+    assert str(Status(3, 1, 2, 9, 3725.0)) == "1 failed, 2 running, 1:02:05 left"
+
+
+class Killed(Exception):
+    """Stands for a kill of the driver."""
+
+
+def test_a_killed_run_goes_on_where_it_stopped(tmp_path):
+    out, wanted, count = tmp_path / "pool.npz", work(note=str(tmp_path)), []
+
+    def die_after_three(status: Status) -> None:
+        if status.done == 3:
+            raise Killed
+
+    with pytest.raises(Killed), Journal(out, {"rows": 5}) as journal:
+        run(wanted, Where(), journal, die_after_three)
+    with (tmp_path / "pool.npz.pieces" / "done.jsonl").open("a") as lines:
+        lines.write('{"name": "piece_4", "sha2')  # half a line, as a kill leaves it
+    with pytest.raises(InputError, match="a run of this was broken off .--resume goes on with it"):
+        Journal(out, {"rows": 5})
+    with pytest.raises(InputError, match="the run that was broken off had rows = 5, and here it is 6"):
+        Journal(out, {"rows": 6}, resume=True)
+    before = set(tmp_path.glob("*-*"))
+    with Journal(out, {"rows": 5}, resume=True) as journal:
+        count, failed = everything(wanted, store=journal)
+        journal.finish()
+    assert count == everything(work())[0] and not failed
+    assert len(set(tmp_path.glob("*-*")) | before) == 5 and len(before) == 3, "finished pieces were not done again"
+    assert not (tmp_path / "pool.npz.pieces").exists()
+
+
+def test_a_result_that_is_damaged_is_made_again(tmp_path):
+    out, wanted = tmp_path / "pool.npz", work()
+    with Journal(out, {}) as journal:
+        first, _ = everything(wanted, store=journal)
+    (tmp_path / "pool.npz.pieces" / "piece_1.bin").write_bytes(b"half")
+    with Journal(out, {}, resume=True) as journal:
+        assert "piece_1" not in journal.names() and len(journal.names()) == 4
+        assert everything(wanted, store=journal)[0] == first
+
+
+def test_two_runs_with_one_output_the_second_refuses(tmp_path):
+    with (
+        Journal(tmp_path / "a.npz", {}),
+        pytest.raises(ClusterError, match=r"a.npz: process \d+ on .* is writing there; wait for it"),
+    ):
+        Journal(tmp_path / "a.npz", {}, resume=True)
+
+
+def test_results_can_be_delivered_at_once(tmp_path):
+    placed: dict[str, bytes] = {}
+
+    def journal(resume: bool = False) -> Journal:
+        return Journal(tmp_path, {}, resume, placed.__setitem__, lambda name: name in placed)
+
+    with journal() as first:
+        run(work(), Where(), first)
+    assert len(placed) == 5 and json.loads((tmp_path / ".pieces" / "request.json").read_text()) == {}
+    placed.pop("piece_3")
+    with journal(resume=True) as second:
+        assert len(second.names()) == 4, "what has gone since is made again"
+
+
+def test_versions_are_compared_by_name():
+    own = versions()
+    assert difference(own, dict(own)) is None
+    assert difference(own, {**own, "numpy": "1.0"}) == f"numpy 1.0, and here it is {own['numpy']}"
+    assert difference(own, {**own, "ig2mj": "0.0.9"}).startswith("ig2mj 0.0.9, and here it is 0.")

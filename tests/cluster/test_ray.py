@@ -1,0 +1,155 @@
+"""Pieces of work on a real Ray cluster of two nodes of one processor each: the same bytes, also where a node dies."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import threading
+
+import pytest
+from tiny_dataset import write_dataset
+
+from ig2mj.cluster import ray_nodes
+from ig2mj.cluster.pieces import Status, Where, run
+from ig2mj.cluster.work import Piece, Work
+from ig2mj.errors import ClusterError
+
+pytest.importorskip("ray")
+
+HERE = pathlib.Path(__file__).parent
+CONDITION = "(on_top apple_0 breakfast_table_0)"
+
+
+def ig2mj(cluster, folder: pathlib.Path, *words: str) -> subprocess.CompletedProcess:
+    """The command in a process of its own; the cluster's address last where it is wanted."""
+    command = [sys.executable, "-m", "ig2mj", *words]
+    environment = {**cluster.environment, "PYTHONPATH": os.environ.get("PYTHONPATH", "")}
+    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=500)
+
+
+def pieces(count: int, **arguments) -> Work:
+    found = [Piece(f"piece_{n:03d}", {"number": n, **arguments}) for n in range(count)]
+    return Work("piece_functions:digest", "testing", found, {"file": b"shared content"})
+
+
+@pytest.fixture
+def joined(ray_cluster, monkeypatch):
+    """This process is a driver of the cluster while the test runs."""
+    monkeypatch.syspath_prepend(str(HERE))
+    monkeypatch.setenv("PYTHONPATH", ray_cluster.environment["PYTHONPATH"])
+    return ray_cluster
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_node_that_dies_costs_nothing(joined, tmp_path):
+    """The second node is killed by its process while both work: every piece comes out, with the bytes of one process."""
+    import ray
+
+    local, _ = run(pieces(30))
+    ray.init(address=joined.address, namespace="ig2mj", logging_level="ERROR", log_to_driver=False)
+    try:
+        wait_for_nodes(ray, 2)
+        wanted, killed = pieces(30, seconds=0.3, note=str(tmp_path)), []
+
+        def kill_once(status: Status) -> None:
+            if status.done >= 6 and not killed:
+                killed.append(status.done)
+                threading.Thread(target=joined.kill_node).start()
+
+        store, failed = run(wanted, Where(cluster=joined.address), report=kill_once)
+        assert killed and not failed
+        assert [store.get(p.name) for p in wanted.pieces] == [local.get(p.name) for p in wanted.pieces]
+        workers = {file.name.split("-")[1] for file in tmp_path.iterdir()}
+        assert len(workers) >= 2, "both nodes worked"
+        wait_for_nodes(ray, 1)
+    finally:
+        ray.shutdown()
+        joined.add_node()
+
+
+def wait_for_nodes(ray, count: int) -> None:
+    import time
+
+    until = time.monotonic() + 120
+    while sum(node["Alive"] for node in ray.nodes()) != count:
+        assert time.monotonic() < until
+        time.sleep(0.5)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_pool_has_the_same_bytes_on_one_process_and_on_two_nodes(ray_cluster, tmp_path):
+    words = ("sample", "small_home", CONDITION, "--count", "4", "--out")
+    here = ig2mj(ray_cluster, tmp_path, *words, "here.npz", "--jobs", "1")
+    there = ig2mj(ray_cluster, tmp_path, *words, "there.npz", "--cluster", ray_cluster.address)
+    assert here.returncode == there.returncode == 0, here.stderr + there.stderr
+    assert (tmp_path / "here.npz").read_bytes() == (tmp_path / "there.npz").read_bytes()
+    assert sorted(f.name for f in tmp_path.iterdir()) == ["here.npz", "there.npz"], "the journals went"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_a_dataset_has_the_same_bytes_and_what_is_broken_is_listed(ray_cluster, tmp_path):
+    root = write_dataset(tmp_path / "dataset")
+    broken = next(iter(sorted(root.glob("objects/*/*/*.urdf"))))
+    broken.write_text("<robot")
+    words = ("convert", "dataset", str(root), "--no-cache", "--no-report", "--out")
+    here = ig2mj(ray_cluster, tmp_path, *words, "here", "--jobs", "1")
+    there = ig2mj(ray_cluster, tmp_path, *words, "there", "--cluster", ray_cluster.address)
+    name = broken.parent.relative_to(root).as_posix()
+    for done in (here, there):
+        assert done.returncode == 1, done.stderr
+        assert f"  {name}: " in done.stderr and "--resume tries them again" in done.stderr
+    shutil.rmtree(tmp_path / "here" / ".pieces")
+    shutil.rmtree(tmp_path / "there" / ".pieces")
+    files = [
+        {f.relative_to(top): f.read_bytes() for f in top.rglob("*") if f.is_file()}
+        for top in (tmp_path / "here", tmp_path / "there")
+    ]
+    assert files[0] == files[1] and sum(f.name == "manifest.json" for f in files[0]) > 3
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_a_node_without_the_files_or_with_another_version_is_told_before_any_work(joined, tmp_path, monkeypatch):
+    import ray
+
+    note = tmp_path / "note"
+    note.mkdir()
+    wanted = pieces(3, note=str(note))
+    ray.init(address=joined.address, namespace="ig2mj", logging_level="ERROR", log_to_driver=False)
+    try:
+        wait_for_nodes(ray, 2)
+        file = tmp_path / "scene.xml"
+        file.write_text("here")
+        other = Work(wanted.function, "", wanted.pieces, check=("piece_functions:node_files", {"path": str(file)}))
+        monkeypatch.setattr(ray_nodes, "told", lambda check: "what this machine has")
+        with pytest.raises(ClusterError, match=r"node .* has other files than this machine"):
+            run(other, Where(cluster=joined.address))
+        gone = Work(wanted.function, "", wanted.pieces, check=("piece_functions:node_files", {"path": "/no/such"}))
+        with pytest.raises(ClusterError, match=r"node .*: .*No such file or directory: '/no/such'"):
+            run(gone, Where(cluster=joined.address))
+        monkeypatch.undo()
+        monkeypatch.setattr(ray_nodes, "versions", lambda: {"ig2mj": "9.9 (abc)"})
+        with pytest.raises(ClusterError, match=r"node .* has ig2mj .*, and here it is 9.9"):
+            run(wanted, Where(cluster=joined.address))
+        assert not list(note.iterdir()), "no piece was begun"
+    finally:
+        ray.shutdown()
+
+
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("127.0.0.1:9", "--cluster 127.0.0.1:9: nobody answers there .Connection refused"),
+        ("nonsense", "an address is HOST:PORT"),
+        ("host:port", "an address is HOST:PORT"),
+    ],
+)
+def test_an_address_where_nobody_is(address, said):
+    with pytest.raises(ClusterError, match=said):
+        run(pieces(1), Where(cluster=address))
