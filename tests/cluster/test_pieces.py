@@ -98,7 +98,7 @@ def test_a_killed_run_goes_on_where_it_stopped(tmp_path):
         run(wanted, Where(), journal, die_after_three)
     with (tmp_path / "pool.npz.pieces" / "done.jsonl").open("a") as lines:
         lines.write('{"name": "piece_4", "sha2')  # half a line, as a kill leaves it
-    with pytest.raises(InputError, match="a run of this was broken off .--resume goes on with it"):
+    with pytest.raises(InputError, match=r"a run of this was broken off \(--resume goes on with it"):
         Journal(out, {"rows": 5})
     with pytest.raises(InputError, match="the run that was broken off had rows = 5, and here it is 6"):
         Journal(out, {"rows": 6}, resume=True)

@@ -46,7 +46,7 @@ def joined(ray_cluster, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_a_node_that_dies_costs_nothing(joined, tmp_path):
-    """The second node is killed by its process while both work: every piece comes out, with the bytes of one process."""
+    """The second node is killed while both work: every piece comes out, with the bytes of one process."""
     import ray
 
     local, _ = run(pieces(30))

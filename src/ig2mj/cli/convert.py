@@ -1,4 +1,4 @@
-"""`ig2mj convert scene|object|robot`: iGibson scenes, URDF objects and robots to MJCF."""
+"""`ig2mj convert scene|object|robot|dataset`: iGibson scenes, URDF objects and robots to MJCF."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from ig2mj.cli.convert_common import DEFAULTS, Common, Flag, options_of
+from ig2mj.cli.convert_dataset import convert_dataset
 
 if TYPE_CHECKING:
     from ig2mj_converters.base.outcome import Outcome
@@ -125,7 +126,7 @@ def convert_robot(
     return _tell(outcome, out, "object.xml", common.json)
 
 
-SUBCOMMANDS = {"scene": convert_scene, "object": convert_object, "robot": convert_robot}
+SUBCOMMANDS = {"scene": convert_scene, "object": convert_object, "robot": convert_robot, "dataset": convert_dataset}
 
 
 @contextlib.contextmanager
