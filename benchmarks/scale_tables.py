@@ -192,7 +192,7 @@ def tables(args: argparse.Namespace) -> str:
     head = ["CookingMeat on one H200", "agent steps/s", "GPU hours", f"at {args.price:g} an hour"]
     parts += ["### A billion agent steps", table(head, rows)]
     assumed = (
-        f"Forecasts (~) take {args.inside:g} GB/s between the {HOST} GPUs of a host, {args.between:g} GB/s between hosts "
+        f"Forecasts (~) take {args.inside:g} GB/s between a host's {HOST} GPUs, {args.between:g} GB/s between hosts "
         f"and {1e6 * LATENCY:g} us for each doubling of the number of GPUs; nothing of them is measured."
     )
     return "\n\n".join([*parts, assumed])
