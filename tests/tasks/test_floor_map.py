@@ -50,7 +50,21 @@ def test_distances_are_looked_up_between_cells_and_the_next_point_is_in_sight(fl
     assert float(way[0]) == pytest.approx(0.47, abs=0.02)
     assert float(ahead[0, 0]) < -0.2 and float(ahead[0, 1]) == pytest.approx(-0.35, abs=0.01)
     assert float(way[1]) == pytest.approx(0.62, abs=0.08)
-    assert float(ahead[1, 1]) < -0.1  # up and around, not through the wall to the left
+    assert abs(float(ahead[1, 1])) > 0.1  # around an end of the wall, not through it to the left
+
+
+def test_the_next_point_can_be_driven_to_straight(floor):
+    """Also at the ends of the wall, where the point nearest to the goal would lead into a corner."""
+    goal = np.array([[3, 3]])
+    pos = floor.centres(floor.cells).astype(np.float32)
+    pos = pos[pos[:, 0] > 0.1]  # right of the wall
+    row = np.zeros(len(pos), int)
+    _, ahead = look_up(floor.distances(goal), row, pos, floor.origin, floor.resolution)
+    for share in (0.35, 0.55, 0.75, 1.0):
+        places = pos + share * (np.asarray(ahead) - pos)
+        columns, rows = np.floor((places - floor.origin) / floor.resolution).astype(int).T
+        assert floor.free[rows, columns].all(), share
+    assert (np.linalg.norm(np.asarray(ahead) - pos, axis=1) > 0.05).all()
 
 
 def test_off_the_map_there_is_no_way(floor):

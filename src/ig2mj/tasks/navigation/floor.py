@@ -29,6 +29,10 @@ STRAIGHT = 0.9
 SHORTCUT = 0.1
 """m by which the straight line to a cell may be shorter than the way on the map: rounding to cells."""
 
+CLEAR_AT = (0.35, 0.55, 0.75)
+"""Shares of the straight line to the next point of the way at which the floor must be free: at a corner the nearest
+point in sight would lead into it."""
+
 _STEPS = np.array([(0, 1), (1, 0), (1, 1), (1, -1), (1, 2), (2, 1), (1, -2), (2, -1)])
 """Rows and columns; the opposite ones are the same edges."""
 
@@ -132,6 +136,13 @@ def look_up(
     near = np.flatnonzero(np.abs(offsets).max(1) <= 1)
     distance = (ahead + apart)[:, near].min(1)
     in_sight = ahead + apart >= distance[:, None] - SHORTCUT  # what is nearer to the goal than that is behind a wall
+    in_sight &= jnp.isfinite(ahead)
+    clear = in_sight
+    for share in CLEAR_AT:
+        between = jnp.floor((pos[:, None] + share * (middle - pos[:, None]) - origin) / resolution)
+        on = jnp.clip(between[..., ::-1].astype(jnp.int32), 0, np.array([height - 1, width - 1]))
+        clear &= jnp.isfinite(jnp.asarray(fields)[row[:, None], on[..., 0], on[..., 1]])
+    in_sight = jnp.where(clear.any(1, keepdims=True), clear, in_sight)  # a robot that touches something may see none
     best = jnp.argmin(jnp.where(in_sight, ahead + STRAIGHT * apart, jnp.inf), axis=1)
     point = jnp.take_along_axis(middle, best[:, None, None], axis=1)[:, 0]
     return distance, jnp.where(jnp.isfinite(ahead.min(1))[:, None], point, pos)
