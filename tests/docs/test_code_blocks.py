@@ -32,6 +32,7 @@ PARSED_ONLY = {
     "ig2mj rollout PointNavigation --robot-urdf": "needs a robot of the reader's",
     "ig2mj rollout CookingMeat --agent expert": "samples start states for a minute; run by tests of its own",
     "ig2mj demos": "needs what the lines before it make",
+    "ig2mj vr": "waits for a person",
     "ig2mj calibrate": "takes minutes on a CPU",
     "ig2mj homes build": "takes minutes; run by `make homes-check`",
     "ig2mj homes pictures": "needs what the lines before it make",

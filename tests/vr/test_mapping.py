@@ -59,7 +59,7 @@ def test_devices_where_the_robot_is_move_nothing():
 
 def test_head_and_hands_are_reached_in_one_action_while_the_body_moves_below_the_head():
     now = robot()
-    head = Pose.of(np.add(now.body.pos, (0.1, 0.15, 0.5)), turned(z=110) * turned(y=25))
+    head = Pose.of(np.add(now.body.pos, (0.1, 0.15, 0.5)), turned(z=105) * turned(y=25))
     hands = tuple(
         Hand(Pose.of(np.add((now.body * h).pos, (0.05, 0.1, 0.1)), turned(x=20) * (now.body * h).turn))
         for h in now.hands
@@ -69,7 +69,7 @@ def test_head_and_hands_are_reached_in_one_action_while_the_body_moves_below_the
     assert apart(after.body * after.eye, head) == pytest.approx((0, 0), abs=1e-9)
     for k in range(2):
         assert apart(after.body * after.hands[k], hands[k].pose) == pytest.approx((0, 0), abs=1e-9)
-    assert after.body.turn.as_euler("xyz", degrees=True) == pytest.approx((0, 0, 110), abs=1e-6)
+    assert after.body.turn.as_euler("xyz", degrees=True) == pytest.approx((0, 0, 105), abs=1e-6)
 
 
 def test_far_targets_are_reached_on_a_straight_way_within_the_limits_of_a_frame():
@@ -83,6 +83,23 @@ def test_far_targets_are_reached_on_a_straight_way_within_the_limits_of_a_frame(
             assert np.abs(action[k + 3 : k + 6]).max() <= MAX_TURN + 1e-9
         now = carried_out(now, action)
     assert apart(now.body * now.hands[1], hand) == pytest.approx((0, 0), abs=1e-6)
+
+
+def test_looking_around_drags_no_hand_along():
+    """Hands that are stretched out stay where they are while the body follows the head."""
+    now, memory = robot(), Memory()
+    hands = tuple(Hand(Pose.of((now.body * Pose.of((0.6, y, 0.1), turned())).pos, turned())) for y in (0.2, -0.2))
+    start = dataclasses.replace(frame_at_rest(now), hands=(hands[0], hands[1]))
+    for _ in range(3):
+        action, memory = action_of(start, now, memory)
+        now = carried_out(now, action)
+    around = dataclasses.replace(start, head=Pose.of(start.head.pos, turned(z=200)))
+    for _ in range(8):
+        action, memory = action_of(around, now, memory)
+        now = carried_out(now, action)
+        for k in range(2):
+            assert apart(now.body * now.hands[k], hands[k].pose) == pytest.approx((0, 0), abs=1e-6)
+    assert heading(now.body) == pytest.approx(math.radians(-160))
 
 
 @pytest.mark.parametrize("pitch", [0, 80, -80, 100])

@@ -7,16 +7,16 @@ import time
 
 import numpy as np
 import pytest
+from apple_on_table import APPLE_ON_TABLE
 from chromium import HEAD, PLACE, STICK, chromium, wear_headset
 from scipy.spatial.transform import Rotation
 
 from ig2mj.agents.humanoid.frames import HAND_QUAT
 from ig2mj.demos import Recording, Replayer
-from ig2mj.tasks.points import At, Hand
-from ig2mj.tasks.task import Acts, Task
 from ig2mj.vr.frames import Pose
 from ig2mj.vr.mapping import heading
 from ig2mj.vr.page_source import PagePoses
+from ig2mj.vr.recorded import RecordedPoses
 from ig2mj.vr.server import PAGE, THREE, HomePage
 from ig2mj.vr.session import Session, person_environment
 from ig2mj.vr.xr_axes import grip_of_hand, to_xr
@@ -27,19 +27,6 @@ pytestmark = [
     pytest.mark.skipif(not (PAGE / THREE).is_file(), reason="needs three.js (`make web`)"),
 ]
 
-APPLE_ON_TABLE = Task(
-    name="AppleOnTable",
-    summary="Put the apple on the coffee table.",
-    home="birch",
-    objects=("apple",),
-    start=("(on_top apple_0 armchair_0)",),
-    near=(),
-    goal="(on_top apple_0 coffee_table_0)",
-    objects_of_interest=("apple_0",),
-    distances=((Hand(0), At("apple_0")), (At("apple_0"), At("coffee_table_0"))),
-    robots={"humanoid": Acts((1.9, -1.0, 0.55), yaw=90.0)},
-    grasping="assisted",
-)
 HEAD_AT = (0.0, 1.6, 0.0)
 """XR's axes: the person's head, who turns it and walks by the stick."""
 
@@ -143,9 +130,9 @@ class Person:
 
 def test_a_person_in_a_headset_puts_an_apple_on_the_table_and_the_recording_replays(env, tmp_path, pytestconfig):
     source, stop = PagePoses(stale=30.0), threading.Event()
-    file = tmp_path / "visit.h5"
     pictures = pytestconfig.rootpath / "out" / "vr"
     pictures.mkdir(parents=True, exist_ok=True)
+    file = pictures / "visit.h5"
     with chromium(640, 360) as page, Session(env, source, file, row=0) as session:
         driving = threading.Thread(target=session.run, kwargs={"stop": stop})
         driving.start()
@@ -154,7 +141,7 @@ def test_a_person_in_a_headset_puts_an_apple_on_the_table_and_the_recording_repl
                 wear_headset(page)
                 page.goto(served.server.url)
                 page.wait_for_function("ig2mj.ready")
-                page.click("#enter")
+                page.dispatch_event("#enter", "click")
                 page.wait_for_function("ig2mj.views == 2")  # a picture for each eye
                 page.wait_for_function("ig2mj.pictures > 3")
                 person = Person(page, session, source)
@@ -206,6 +193,19 @@ def test_a_person_in_a_headset_puts_an_apple_on_the_table_and_the_recording_repl
         assert heads.shape[1:] == (8,)
         done = Replayer(recording, env=env)(check=True)
         assert done.differences == [] and done.frames == run.frames > 100
+        actions = np.concatenate(
+            [run.rows("steps/action", k, min(k + 200, run.frames - 1)) for k in range(0, run.frames - 1, 200)]
+        )
+    again = RecordedPoses(file)  # the devices say it again, and the same comes of it
+    with Session(env, again, tmp_path / "again.h5", row=0) as session:
+        while not again.over:
+            session.step()
+    with Recording(tmp_path / "again.h5") as recording:
+        (same,) = recording.runs
+        assert same.attributes["success"] is True and same.frames == run.frames
+        for k in range(0, run.frames - 1, 200):
+            rows = same.rows("steps/action", k, min(k + 200, run.frames - 1))
+            assert np.array_equal(rows, actions[k : k + 200])
 
 
 def test_slow_physics_never_slows_the_head(env, monkeypatch):
@@ -219,7 +219,7 @@ def test_slow_physics_never_slows_the_head(env, monkeypatch):
                 wear_headset(page)
                 page.goto(served.server.url)
                 page.wait_for_function("ig2mj.ready")
-                page.click("#enter")
+                page.dispatch_event("#enter", "click")
                 page.wait_for_function("ig2mj.views == 2")
 
                 def rates() -> tuple[float, float, float]:
@@ -245,5 +245,5 @@ def test_slow_physics_never_slows_the_head(env, monkeypatch):
             stop.set()
             driving.join()
     assert slow_steps < 3.4
-    assert slow_pictures > 0.75 * pictures
-    assert slow_poses > 0.75 * poses and slow_poses > 5 * slow_steps
+    assert slow_pictures > 0.6 * pictures
+    assert slow_poses > 0.6 * poses and slow_poses > 5 * slow_steps

@@ -10,7 +10,7 @@ import tyro
 if TYPE_CHECKING:
     from ig2mj.vr.session import Session
 
-DEVICES = ("page", "recorded")
+DEVICES = ("page", "openxr", "recorded")
 
 
 def run(
@@ -35,8 +35,8 @@ def run(
     Args:
       task: CookingMeat, or activity/cleaning_windows (`ig2mj list-envs`); one that the humanoid can do.
       record: HDF5 of everything that happens and of what your devices say, for `ig2mj demos replay`.
-      device: page: a page for the headset's browser (WebXR), or for mouse and keyboard; recorded: devices say again
-        what they said in --poses.
+      device: page: a page for the headset's browser (WebXR), or for mouse and keyboard; openxr: a headset of this
+        machine; recorded: devices say again what they said in --poses.
       poses: recording whose devices are played.
       host: address to serve the page on; default: this machine alone. Others need --token and, for headsets,
         --certificate.
@@ -72,6 +72,10 @@ def run(
     env = _environment(task, grasping, pool_size, row)
     if device == "page":
         return _serve(env, access, common, seconds, timing)
+    if device == "openxr":
+        from ig2mj.vr.openxr.session import run_headset
+
+        return _ended(run_headset(env, common, seconds, timing), common)
     assert poses is not None
     return _repeat(env, poses, common)
 

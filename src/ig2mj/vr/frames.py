@@ -192,4 +192,4 @@ def _pose(row: Float[np.ndarray, "8"]) -> Pose | None:
     size = float(np.linalg.norm(row[4:]))
     if not math.isclose(size, 1.0, abs_tol=1e-3):
         raise ValueError(f"a quaternion has length {size:g}")
-    return Pose(row[1:4], row[4:] / size)
+    return Pose(row[1:4], row[4:])  # as it is, so that the same action comes of it

@@ -28,6 +28,11 @@ TOGGLE_SECONDS = 1.0
 PRESSED = 0.5
 """From here on a squeeze counts."""
 
+BODY_TURN = 1.0 / 3.0
+"""rad by which the body is turned in a frame: what it can turn in 1/30 s (`humanoid.controller.MAX_TURN_RATE`). With
+iGibson's 1 rad a hand that is stretched out would have to go further in the body's frame than its own limit lets it,
+and would be dragged along whenever somebody looks around."""
+
 LEVEL = 0.05
 """Horizontal length of the head's right below which it has no heading: it lies on its side."""
 
@@ -151,7 +156,7 @@ def _switched(frame: PoseFrame, memory: Memory) -> Memory:
 def _body_step(now: Pose, desired: Pose) -> tuple[Float[np.ndarray, "6"], Pose]:
     """Of the body, in its present frame; and where that brings it, as the controller reckons."""
     delta = now.inverse() * desired
-    move, turn = _limited(delta.pos), _limited_turn(delta.turn)
+    move, turn = _limited(delta.pos), _limited_turn(delta.turn, BODY_TURN)
     new = now * Pose.of(move, turn)
     low, high = BODY_Z
     new = dataclasses.replace(new, pos=np.array([*new.pos[:2], float(np.clip(new.pos[2], low, high))]))
@@ -170,10 +175,10 @@ def _limited(move: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
     return move * min(1.0, MAX_MOVE / max(float(np.abs(move).max()), 1e-12))
 
 
-def _limited_turn(turn: Rotation) -> Rotation:
-    """At most `MAX_TURN`, about the same axis; its roll, pitch and yaw are then no larger either."""
+def _limited_turn(turn: Rotation, most: float = MAX_TURN) -> Rotation:
+    """At most so much, about the same axis; its roll, pitch and yaw are then no larger either."""
     angle = turn.magnitude()
-    return turn if angle <= MAX_TURN else Rotation.from_rotvec(turn.as_rotvec() * (MAX_TURN / angle))
+    return turn if angle <= most else Rotation.from_rotvec(turn.as_rotvec() * (most / angle))
 
 
 def _yaw_of(pose: Pose) -> float:

@@ -1,0 +1,1 @@
+"""Headsets by OpenXR, through pyopenxr (extra `xr`)."""

@@ -1,0 +1,174 @@
+"""`StereoPictures`: a home drawn for both eyes with OpenGL, without a display and without physics.
+
+    pictures = StereoPictures(scene, 1296, 1440)
+    pictures.draw(track.at(), eyes)
+    left, right = pictures.read()
+
+Poses of bodies come from whoever has them (`vr.track`); nothing is simulated here. One thread makes, uses and closes
+it: OpenGL belongs to that thread.
+"""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import math
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, UInt8
+from scipy.spatial.transform import Rotation
+
+from ig2mj.process.opengl import use_opengl
+from ig2mj.scene.scene import Scene
+from ig2mj.viewer.offscreen import VISIBLE_GROUPS
+from ig2mj.vr.frames import Pose
+
+WIDTH, HEIGHT = 1296, 1440
+"""Pixels of each eye (spec/robots_tasks_sensors.md section 4.1)."""
+
+NEAR, FAR = 0.1, 30.0
+"""m (spec 4.1)."""
+
+SAMPLES = 4
+"""Of each pixel."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Eye:
+    """One eye: its pose in the world (x forward, z up), and angles of view, rad: left and down are negative."""
+
+    pose: Pose
+    left: float
+    right: float
+    up: float
+    down: float
+
+
+def eyes_of(head: Pose, apart: float = 0.063, across: float = math.radians(98)) -> tuple[Eye, Eye]:
+    """Two eyes of a head in the world whose devices do not say where its eyes are.
+
+    Args:
+      apart: m between the eyes. across: rad, angle of view to both sides.
+    """
+    half = across / 2
+    high = math.atan(math.tan(half) * HEIGHT / WIDTH)
+    left, right = (Pose.of(head.pos + head.turn.apply((0.0, y, 0.0)), head.turn) for y in (apart / 2, -apart / 2))
+    return Eye(left, -half, half, high, -high), Eye(right, -half, half, high, -high)
+
+
+class StereoPictures:
+    """See the module's text. Attributes: width, height: pixels of one eye. context: MuJoCo's OpenGL context."""
+
+    def __init__(self, scene: Scene, width: int = WIDTH, height: int = HEIGHT, samples: int = SAMPLES):
+        """Uploads the home.
+
+        Raises:
+          MissingDependencyError: no OpenGL without a display works here.
+        """
+        use_opengl()
+        from mujoco.rendering.classic import gl_context
+
+        self.width, self.height, self._copy = width, height, None
+        self._model = model = copy.copy(scene.model)
+        model.vis.global_.offwidth, model.vis.global_.offheight = 2 * width, height
+        model.vis.quality.offsamples = samples
+        own = model.geom_bodyid == scene.tables.agent_body[0] if len(scene.tables.agent_body) else False
+        model.geom_rgba[own, 3] = 0.0  # nobody sees their own head from inside
+        model.geom_matid[own] = -1
+        self._data = scene.start_data()
+        mujoco.mj_forward(model, self._data)
+        self._geoms = np.flatnonzero(np.isin(model.geom_group, VISIBLE_GROUPS))
+        self._turns = Rotation.from_quat(np.roll(model.geom_quat[self._geoms], -1, axis=1))
+        self.context = gl_context.GLContext(2 * width, height)
+        self.context.make_current()
+        self.renderer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self.renderer)
+        self._option, self._camera = mujoco.MjvOption(), mujoco.MjvCamera()
+        for group in range(mujoco.mjNGROUP):
+            self._option.geomgroup[group] = group in VISIBLE_GROUPS
+        self._scene = mujoco.MjvScene(model, maxgeom=2 * model.ngeom + 5000)
+        self._whole = mujoco.MjrRect(0, 0, 2 * width, height)
+
+    def resize(self, width: int, height: int) -> None:
+        """Another size of each eye's picture."""
+        self.width, self.height = width, height
+        mujoco.mjr_resizeOffscreen(2 * width, height, self.renderer)
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self.renderer)
+        self._whole = mujoco.MjrRect(0, 0, 2 * width, height)
+
+    def draw(self, poses: Float[np.ndarray, "B 7"], eyes: tuple[Eye, Eye]) -> None:
+        """Draws both eyes, the left one on the left half.
+
+        Args:
+          poses: of all bodies, world: position, w-x-y-z.
+        """
+        self._place(poses)
+        scene = self._scene
+        category = mujoco.mjtCatBit.mjCAT_ALL
+        mujoco.mjv_updateScene(self._model, self._data, self._option, None, self._camera, category, scene)
+        scene.stereo = mujoco.mjtStereo.mjSTEREO_SIDEBYSIDE
+        for number, eye in enumerate(eyes):
+            _aim(scene.camera[number], eye)
+        mujoco.mjr_render(self._whole, scene, self.renderer)
+
+    def read(self) -> UInt8[np.ndarray, "2 h w 3"]:
+        """The pictures drawn last, left and right."""
+        pixels = np.empty((self.height, 2 * self.width, 3), np.uint8)
+        mujoco.mjr_readPixels(pixels, None, self._whole, self.renderer)
+        pixels = pixels[::-1]
+        return np.stack([pixels[:, : self.width], pixels[:, self.width :]])
+
+    def copy_to(self, texture: int, eye: int) -> None:
+        """Copies the picture of eye 0 or 1 into a texture of OpenGL of the same size, which the context owns."""
+        from OpenGL import GL
+
+        assert self.renderer is not None
+        if self._copy is None:
+            self._copy = int(GL.glGenFramebuffers(1))
+        left, right = eye * self.width, (eye + 1) * self.width
+        GL.glBindFramebuffer(GL.GL_DRAW_FRAMEBUFFER, self._copy)
+        GL.glFramebufferTexture2D(GL.GL_DRAW_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0, GL.GL_TEXTURE_2D, texture, 0)
+        source = self.renderer.offFBO
+        if self.renderer.offSamples:  # several samples are first made one, in a buffer of the same size
+            GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, source)
+            GL.glBindFramebuffer(GL.GL_DRAW_FRAMEBUFFER, self.renderer.offFBO_r)
+            area = (0, 0, 2 * self.width, self.height)
+            GL.glBlitFramebuffer(*area, *area, GL.GL_COLOR_BUFFER_BIT, GL.GL_NEAREST)
+            source = self.renderer.offFBO_r
+            GL.glBindFramebuffer(GL.GL_DRAW_FRAMEBUFFER, self._copy)
+        GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, source)
+        GL.glBlitFramebuffer(
+            left, 0, right, self.height, 0, 0, self.width, self.height, GL.GL_COLOR_BUFFER_BIT, GL.GL_NEAREST
+        )
+        mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self.renderer)
+
+    def finish(self) -> None:
+        """Returns when everything is drawn."""
+        mujoco.mjr_finish()
+
+    def close(self) -> None:
+        """Lets go of OpenGL; may be called twice."""
+        if self.renderer is not None:
+            self.renderer.free()
+            self.context.free()
+            self.renderer = None
+
+    def _place(self, poses: Float[np.ndarray, "B 7"]) -> None:
+        """Where the geoms are, from where their bodies are."""
+        model, data, geoms = self._model, self._data, self._geoms
+        bodies = model.geom_bodyid[geoms]
+        turns = Rotation.from_quat(np.roll(poses[bodies, 3:], -1, axis=1).astype(np.float64))
+        data.geom_xpos[geoms] = poses[bodies, :3] + turns.apply(model.geom_pos[geoms])
+        data.geom_xmat[geoms] = (turns * self._turns).as_matrix().reshape(-1, 9)
+
+
+def _aim(camera: mujoco.MjvGLCamera, eye: Eye) -> None:
+    camera.pos[:] = eye.pose.pos
+    camera.forward[:] = eye.pose.turn.apply((1.0, 0.0, 0.0))
+    camera.up[:] = eye.pose.turn.apply((0.0, 0.0, 1.0))
+    left, right, up, down = (NEAR * math.tan(angle) for angle in (eye.left, eye.right, eye.up, eye.down))
+    camera.frustum_center, camera.frustum_width = (left + right) / 2, (right - left) / 2
+    camera.frustum_bottom, camera.frustum_top = down, up
+    camera.frustum_near, camera.frustum_far = NEAR, FAR
+    camera.orthographic = 0
