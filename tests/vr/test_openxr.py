@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import os
 import subprocess
 import sys
@@ -10,7 +11,8 @@ import mujoco
 import numpy as np
 import pytest
 
-pytest.importorskip("xr", reason="needs pyopenxr (extra xr)", exc_type=ImportError)
+if importlib.util.find_spec("xr") is None:  # not imported here: `load_xr` does, and undoes what that does to PyOpenGL
+    pytest.skip("needs pyopenxr (extra xr)", allow_module_level=True)
 
 from openxr_runtime import EXTENSIONS, PERIOD, Runtime, build_stub
 from rotations import turned
