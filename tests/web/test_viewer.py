@@ -167,6 +167,17 @@ def test_a_message_that_no_page_sends_is_recognised(message):
         check_message(message)
 
 
+def test_an_element_takes_only_values_of_its_own_kind():
+    def update(value) -> bytes:
+        return msgspec.msgpack.encode({"type": "GuiUpdateMessage", "uuid": "u", "updates": {"value": value}})
+
+    for old, good, bad in ((1.5, 2, "2"), (True, False, 1), ("a", "b", 1), ((0.0, 1.0), [1, 2], [1])):
+        assert check_message(update(good), {"u": old}.get)
+        with pytest.raises(ValueError):
+            check_message(update(bad), {"u": old}.get)
+    assert check_message(update(1), {}.get) is False  # an element that is gone: dropped
+
+
 def test_a_page_cannot_publish_the_server_to_others():
     assert check_message(msgspec.msgpack.encode({"type": "ShareUrlRequest"})) is False
 

@@ -215,9 +215,20 @@ class Environment:
         batch = self.core.load(self.core.start(as_seed(seed)), chosen.physics, chosen.states)
         return self.resume(batch, rows)
 
-    def resume(self, batch: Batch, rows: Int[np.ndarray, "W"]) -> EnvState:
-        """The state of worlds that someone else has put where they are, in episodes of these rows of the pool."""
-        return self._begun(batch, jnp.ones(self.num_worlds, bool), None, jnp.asarray(rows, jnp.int32))
+    def resume(
+        self,
+        batch: Batch,
+        rows: Int[np.ndarray, "W"],
+        mask: Bool[Array, "W"] | None = None,
+        before: EnvState | None = None,
+    ) -> EnvState:
+        """The state of worlds that someone else has put where they are, in episodes of these rows of the pool.
+
+        Args:
+          mask, before: only these worlds were put somewhere; the others go on from that state. None: all were.
+        """
+        chosen = jnp.ones(self.num_worlds, bool) if mask is None else jnp.asarray(mask)
+        return self._begun(batch, chosen, before, jnp.asarray(rows, jnp.int32))
 
     def reset_fn(self, state: EnvState, mask: Bool[Array, "W"]) -> EnvState:
         """`reset` of the masked worlds, not compiled."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
+import jax
 import mujoco
 import numpy as np
 
@@ -110,7 +111,8 @@ class Home:
         if begin is not None:
             self._batch = begin(core, self._batch)
         world = self._batch.world
-        self._first = core.engine.snapshot(world.physics), world.states
+        states = jax.tree.map(np.array, world.states)  # copies: a step may use up what it was given
+        self._first = core.engine.snapshot(world.physics), states
         core.prepare(world.physics, world.states)
 
     def step(self) -> None:
@@ -166,7 +168,7 @@ class Acting:
         core, batch = self.env.core, self._state.batch
         chosen = core.starts.pool.rows(np.full(self.num_worlds, row))
         batch = core.load(batch, chosen.physics, chosen.states, mask)
-        self._state = self.env.resume(batch, np.full(self.num_worlds, row))
+        self._state = self.env.resume(batch, np.full(self.num_worlds, row), mask, self._state)
 
     def shot(self, world: int, jump: bool = False) -> Shot:
         state, now = self._state, self._state.batch.world

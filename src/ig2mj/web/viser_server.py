@@ -54,8 +54,13 @@ _IGNORED = frozenset({"ShareUrlRequest", "ShareUrlDisconnect", "LocalStorageGetI
 _STARTING = threading.Lock()
 
 
-def check_message(message: str | bytes) -> bool:
-    """Whether a page's message gets through to viser. Raises ValueError for what no page of ours sends."""
+def check_message(message: str | bytes, element: Callable[[str], Any] | None = None) -> bool:
+    """Whether a page's message gets through to viser. Raises ValueError for what no page of ours sends.
+
+    Args:
+      element: the present value of an element of the panel, by uuid; None where there is no such one. A page may give
+        it another value of the same kind.
+    """
     if not isinstance(message, bytes):
         raise ValueError("text")
     try:
@@ -72,12 +77,30 @@ def check_message(message: str | bytes) -> bool:
             updates = fields.get("updates")
             if not isinstance(fields.get("uuid"), str) or not isinstance(updates, dict) or set(updates) - {"value"}:
                 raise ValueError("no update")
-            if not isinstance(updates.get("value"), (bool, int, float, str, list)):
-                raise ValueError("no value")
+            if element is not None:
+                return _is_like(updates.get("value"), element(fields["uuid"]))
         else:
             msgspec.convert(fields, _FROM_PAGES[kind])
     except (msgspec.MsgspecError, RecursionError, TypeError, OverflowError) as e:
         raise ValueError("malformed") from e
+    return True
+
+
+def _is_like(new: Any, old: Any) -> bool:
+    """Whether an element is there. Raises ValueError where the new value is of another kind than the old one."""
+    if old is None:
+        return False
+    numbers = (int, float)
+    if isinstance(old, bool) or isinstance(new, bool):
+        fits = isinstance(old, bool) and isinstance(new, bool)
+    elif isinstance(old, numbers):
+        fits = isinstance(new, numbers)
+    elif isinstance(old, tuple):
+        fits = isinstance(new, list) and len(new) == len(old) and all(map(_is_like, new, old))
+    else:
+        fits = isinstance(new, type(old))
+    if not fits:
+        raise ValueError("value")
     return True
 
 
@@ -113,7 +136,8 @@ def start_viser(access: Access, title: str) -> tuple[viser.ViserServer, Gate]:
     Raises:
       Ig2mjError: the port is taken.
     """
-    gate = Gate(access, check_message)
+    elements: list[Callable[[str], Any]] = []
+    gate = Gate(access, lambda message: check_message(message, elements[0] if elements else None))
     listening = access.listen()
 
     class Serve(websockets.asyncio.server.serve):
@@ -135,7 +159,13 @@ def start_viser(access: Access, title: str) -> tuple[viser.ViserServer, Gate]:
                 made = viser.ViserServer(access.host, access.port, label=title, verbose=False)
         finally:
             module.websockets = real
+    elements.append(lambda uuid: _value_of(made, uuid))
     return made, gate
+
+
+def _value_of(server: viser.ViserServer, uuid: str) -> Any:
+    handle = server.gui._gui_input_handle_from_uuid.get(uuid)
+    return None if handle is None else handle._impl.value
 
 
 def stop_viser(server: viser.ViserServer) -> None:
