@@ -2,9 +2,10 @@
 
     python benchmarks/native_step.py [--objects 60] [--scene FOLDER] [--seconds 3] [--json FILE]
 
-Four cases: everything asleep; a hand that hovers (always awake); a hand that pushes objects about, back to the start
-every three seconds; a batch of worlds on threads. "physics" is MuJoCo alone, taking the same four physics steps;
-"engine" adds touching, forces, boxes and poses; "awake" is the mean number of objects awake.
+Six cases: everything asleep; a hand, or the humanoid, that stands still (always awake); a hand, or the humanoid's right
+one, that pushes objects about, back to the start every three seconds; a batch of worlds on threads. "physics" is MuJoCo
+alone, taking the same four physics steps; "engine" adds touching, forces, boxes and poses; "awake" is the mean
+number of objects awake.
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from rich.table import Table
 
 import ig2mj
 from ig2mj.agents.floating_hand import FloatingHand, hand_ctrl
+from ig2mj.agents.humanoid import Humanoid
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import EngineError
 
@@ -151,6 +153,22 @@ def sweep(step: int) -> np.ndarray:
     return hand_ctrl((0.45 * np.sin(step / 25), 0.2 * np.sin(step / 9), -min(0.16, 0.01 * step)))
 
 
+RIGHT_HAND = 22
+"""Place of the right hand's position (x, y, z, world frame) among the humanoid's controls."""
+
+
+def held(scene: ig2mj.Scene) -> np.ndarray:
+    """Controls with which the humanoid stays where it starts."""
+    return np.array(scene.model.key_ctrl[0])
+
+
+def swept(scene: ig2mj.Scene, step: int) -> np.ndarray:
+    """The same, with the right hand on `sweep`'s way."""
+    ctrl = held(scene)
+    ctrl[RIGHT_HAND : RIGHT_HAND + 3] = np.array([0.0, 0.0, 1.1]) + sweep(step)[:3]
+    return ctrl
+
+
 def main(args: Args) -> None:
     console = Console(width=100)
     with tempfile.TemporaryDirectory() as temporary:
@@ -158,11 +176,15 @@ def main(args: Args) -> None:
         plain = ig2mj.load_scene(folder)
         high = ig2mj.load_scene(folder, agents=[FloatingHand(pos=(0, 0, 5))])
         low = ig2mj.load_scene(folder, agents=[FloatingHand(pos=(0, 0, 1.1))])
+        far = ig2mj.load_scene(folder, agents=[Humanoid(pos=(0.0, 0.0, 5.0))])
+        near = ig2mj.load_scene(folder, agents=[Humanoid(pos=(0.0, 0.75, 0.7))])
     rows = []
     for case, scene, ctrl in (
         ("asleep", plain, None),
         ("hand hovers", high, lambda _: np.zeros(high.model.nu)),
         ("hand pushes", low, sweep),
+        ("humanoid stands", far, lambda _: held(far)),
+        ("humanoid pushes", near, lambda step: swept(near, step)),
     ):
         engine, physics = settled(scene)
         awake: list[int] = []

@@ -3,8 +3,8 @@
     python benchmarks/states_step.py [--objects 60] [--worlds 64 512] [--json FILE]
 
 One world beside the native engine (microseconds per control step, on one core): everything asleep; one object that
-moves; the same without states. Many worlds (microseconds per world and step of the one jitted function that also runs
-on a GPU).
+moves, with a goal that asks where it is and without one; the same without states. Many worlds (microseconds per world
+and step of the one jitted function that also runs on a GPU).
 """
 
 from __future__ import annotations
@@ -89,6 +89,7 @@ def one_world(scene: ig2mj.Scene, rules: Rules, seconds: float) -> list[Row]:
     moved[1].body_pos[0, scene.tables.object_root[loose[0]]] += 1e-3
 
     still, cooling, moving, beside = (Stepped(rules) for _ in range(4))
+    aimless = Stepped(Rules(rules.model, initial=rules.initial))
     # Not a number never equals the one before: this world never settles, as one in which something cools.
     cooling.states = cooling.states.replace(temperature=cooling.states.temperature.at[0, loose[0]].set(jnp.nan))
 
@@ -108,6 +109,7 @@ def one_world(scene: ig2mj.Scene, rules: Rules, seconds: float) -> list[Row]:
             "states and goal, nothing moves": lambda: still.step(view),
             "states and goal, a thing cools": lambda: cooling.step(view),
             "states and goal, one thing moves": lambda: moving.step(moved[moving.count % 2]),
+            "states without a goal, one thing moves": lambda: aimless.step(moved[aimless.count % 2]),
         },
         seconds,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax
 import numpy as np
 import pytest
-from robot_world import RobotWorld
+from robot_world import GraspingWorld, RobotWorld
 from scipy.spatial.transform import Rotation
 
 import ig2mj
@@ -14,6 +14,7 @@ from ig2mj.agents.fetch import Fetch
 from ig2mj.agents.humanoid import Humanoid, HumanoidController
 from ig2mj.agents.humanoid.frames import FINGER_CLOSED, HAND_POS, THUMB_CLOSED
 from ig2mj.agents.humanoid.robot import BODY
+from ig2mj.engine.base import Write
 from ig2mj.errors import UnknownNameError
 
 HALF = np.sqrt(0.5)
@@ -122,6 +123,33 @@ def test_a_hand_goes_no_further_than_its_reach_and_a_reset_brings_it_back(tiny_h
     world.act(right_hand_reset=1)
     world.act(times=10)
     assert world.body("humanoid_right_hand") - world.body("humanoid") == pytest.approx(HAND_POS[1], abs=5e-3)
+
+
+@pytest.mark.parametrize("engine", ["native", pytest.param("warp", marks=pytest.mark.slow)])
+def test_a_hand_that_stayed_behind_is_put_back_at_once(tiny_home_folder, engine):
+    """Beyond its reach only: a nearer one is pulled, since a hand that jumps could land inside something."""
+    world = GraspingWorld(tiny_home_folder, Humanoid(pos=OUTSIDE), engine=engine)
+    simulation, model = world.simulation, world.scene.model
+
+    def leave_behind(distance: float) -> None:
+        mask, qpos = np.zeros((1, model.nq), bool), np.zeros((1, model.nq))
+        joint = model.joint("humanoid_right_hand_x")
+        mask[0, joint.qposadr[0]], qpos[0, joint.qposadr[0]] = True, world.body("humanoid")[0] + distance
+        simulation._write(Write(qpos_mask=mask, qpos=qpos))
+
+    for distance, jumps in ((2.5, True), (0.8, False)):
+        leave_behind(distance)
+        before = simulation.view
+        action = np.zeros((1, 28), np.float32)
+        action[0, world.controller.action_names.index("right_hand_reset")] = 1.0
+        _, state = simulation.core.control(action, before, simulation.robots.controllers)
+        physics = simulation.core.hand_resets.act(simulation.physics, before, action, state)
+        after = np.asarray(simulation.engine.view(physics).agent.hand_pos)[0, 1]
+        moved = np.linalg.norm(after - np.asarray(before.agent.hand_pos)[0, 1])
+        assert moved == (pytest.approx(2.4, abs=0.05) if jumps else 0.0)
+        if jumps:
+            assert after - world.body("humanoid") == pytest.approx(HAND_POS[1], abs=1e-4)
+        simulation.physics = physics
 
 
 def test_no_axis_pulls_with_more_than_its_force(tiny_home_folder):

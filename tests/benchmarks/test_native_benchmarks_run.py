@@ -16,6 +16,7 @@ pytest.importorskip("matplotlib", reason="plots need matplotlib (extra: bench)")
 import homes_at_hand
 import idle_a6
 import idle_robot
+import idle_robots
 import made_dataset
 import states_share
 import timing
@@ -119,3 +120,15 @@ def test_states_share_runs(home, tmp_path) -> None:
     for row in rows:
         assert 0 <= row["share"] < 1
     result(tmp_path, "states_share")
+
+
+@pytest.mark.slow
+def test_idle_robots_run_in_the_scene_and_far_away(home, tmp_path) -> None:
+    args = idle_robots.Args(
+        homes=(str(home.folder),), robots=("fetch",), rest_steps=30, rounds=1, seconds=0.02, pictures=False,
+        work=tmp_path, out=tmp_path,
+    )  # fmt: skip
+    rows = idle_robots.main(args)
+    assert [(row["robot"], row["far"]) for row in rows] == [(None, False), ("fetch", False), ("fetch", True)]
+    assert all(row["rates"]["ig2mj"]["steps_per_cpu_s"] > 10 for row in rows)
+    result(tmp_path, "idle_robots")

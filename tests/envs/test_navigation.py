@@ -2,27 +2,15 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import numpy as np
 import pytest
+from navigating import column, drive, small
 
 import ig2mj
 from ig2mj.errors import UnknownNameError
-from ig2mj.tasks.navigation.task import NAVIGATION
 from ig2mj.testing import api_test
 
 ROWS = 8
-
-
-def small(name: str, **changes):
-    """The task in the smallest home."""
-    return dataclasses.replace(NAVIGATION[name], home="small_home", **changes)
-
-
-def column(env, state, *names):
-    at = [env.privileged_names.index(name) for name in names]
-    return np.asarray(state.obs["privileged_state"])[:, at]
 
 
 @pytest.fixture(scope="module")
@@ -33,13 +21,6 @@ def point():
 
 def test_every_promise_is_kept(point):
     api_test(point)
-
-
-def drive(env, state):
-    """Turns to the next point of the way, and drives on when it is ahead."""
-    x, y = column(env, state, "ahead_x", "ahead_y").T
-    angle = np.arctan2(y, x)
-    return np.stack([np.where(np.abs(angle) < 0.5, 0.8, 0.0), np.clip(angle, -0.3, 0.3)], 1).astype(np.float32)
 
 
 def test_who_follows_the_way_arrives(point):

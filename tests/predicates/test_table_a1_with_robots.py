@@ -68,6 +68,28 @@ def test_reach_room_contact_and_field_of_view_of_each_robot(home_with_map, name)
     assert not outside.predicate("in_fov_of_agent", "ball"), "behind it"
 
 
+def test_of_two_agents_in_one_home_either_counts(home_with_map):
+    """The humanoid stands before the ball, Fetch before the cabinet, with the can in its gripper."""
+    humanoid = Humanoid(pos=(-1.0, 0.6, 0.6), quat=(HALF, 0.0, 0.0, -HALF))
+    fetch = Fetch(pos=(0.4, -1.1, 0.0), quat=(np.cos(0.4), 0.0, 0.0, np.sin(0.4)))
+    world = GraspingWorld(home_with_map, humanoid, mode="sticky", others=(fetch,))
+    simulation = world.simulation
+    simulation.step(count=3)
+    for name in ("ball", "cabinet"):
+        assert simulation.predicate("in_reach_of_agent", name), name
+        assert simulation.predicate("in_fov_of_agent", name), name
+        assert simulation.predicate("in_same_room_as_agent", name), name
+    assert simulation.predicate("in_contact_with", "fetch", "floor")
+    assert not simulation.predicate("in_contact_with", "humanoid", "floor")
+    assert not simulation.predicate("in_contact_with", "humanoid", "fetch")
+    put_into_hand(world, "fetch_gripper_link", "can")
+    simulation.forward()
+    assert simulation.predicate("in_hand_of_agent", "can") and not simulation.predicate("in_hand_of_agent", "ball")
+    assert simulation.robots.holding == {
+        "humanoid_left_hand": None, "humanoid_right_hand": None, "fetch_gripper_link": "can"
+    }  # fmt: skip
+
+
 def test_a_turtlebot_that_drives_into_a_ball_touches_it(tiny_home_folder):
     simulation = standing(tiny_home_folder, "turtlebot", -1.0, -0.3, turn=-90.0)
     touched = []

@@ -112,9 +112,10 @@ def _changed(view, rng):
     return name, replace_fields(view, {name: array})
 
 
+@pytest.mark.parametrize("goal", [GOAL, "(and (cooked fish) (soaked rag))"])
 @pytest.mark.parametrize("seed", range(3))
-def test_whatever_changes_in_the_view_is_seen(seed):
-    model, program, reference = _rules()
+def test_whatever_changes_in_the_view_is_seen(seed, goal):
+    model, program, reference = _rules(goal)
     rng, stepper, ours, view = np.random.default_rng(seed), StateStepper(program), _start(model), VIEWS[0]
     seen, theirs = set(), ours
     for k in range(300):
@@ -227,3 +228,23 @@ def test_the_short_way_computes_all_that_the_second_part_of_an_update_changes():
     program, states = StateProgram(HOME.model()), initial_states(HOME.model(), 1)
     names = [tuple(key.name for key in path) for path, _ in jax.tree_util.tree_flatten_with_path(states)[0]]
     assert [names[place] for place in program.heats] == [(name,) for name in HEAT_FIELDS]
+
+
+def test_what_moves_without_mattering_is_no_work_for_the_states():
+    """The knife and the fish are pushed about, far from the oven that is on; in it the fish is warmed."""
+    model, program, reference = _rules("(cooked fish)")
+    stepper, view = StateStepper(program), VIEWS[0]
+    ours = theirs = _start(model).replace(toggled_on=jnp.zeros((1, 7), bool).at[0, HOME.index["oven"]].set(True))
+    for _ in range(3):
+        ours, _, _ = stepper.step(ours, view)
+        theirs, _, _ = reference(theirs, view)
+    whole, moves = stepper._kept, []
+    assert whole is not None
+    for k in range(6):
+        fish = (3, 0.01 * k, 1) if k < 5 else (0, 0, 0)
+        view = jax.tree.map(np.asarray, HOME.view({"knife": (20 - 0.1 * k, 0, 0), "fish": fish}, fingers=AWAY))
+        ours, _, status = stepper.step(ours, view)
+        theirs, _, expected = reference(theirs, view)
+        _assert_same(ours, theirs, status, expected, k)
+        moves.append(stepper._kept is whole)
+    assert moves == [True] * 5 + [False]

@@ -26,6 +26,7 @@ from ig2mj.engine.model_fields import ModelFields
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
+from ig2mj.scene.scene import Scene
 from ig2mj.scene.tables import SceneTables
 
 PHYSICS_TIMESTEP = 1 / 120
@@ -101,13 +102,14 @@ class Engine(Protocol):
       name: "native", "warp" or "jax".
       pure: the methods are pure functions that JAX can trace (see the module's text).
       num_worlds: W.
-      tables: constants of the scene.
+      scene, tables: what is simulated, and its constants.
       substeps, timestep: a control step is `substeps` physics steps of `timestep` seconds.
     """
 
     name: str
     pure: bool
     num_worlds: int
+    scene: Scene
     tables: SceneTables
     substeps: int
     timestep: float

@@ -188,7 +188,8 @@ def with_eyes_later(view: PhysicsView, eyes: Callable[[], tuple[Array, Array]]) 
     new, agent = object.__new__(PhysicsView), object.__new__(AgentView)
     new.__dict__.update(view.__dict__)
     agent.__dict__.update({name: array for name, array in view.agent.__dict__.items() if name not in EYES})
-    agent.__dict__["_later"] = lambda name: eyes()[EYES.index(name)] if name in EYES else getattr(view.agent, name)
+    others = view.agent.__dict__.get("_later", view.agent.__getattribute__)
+    agent.__dict__["_later"] = lambda name: eyes()[EYES.index(name)] if name in EYES else others(name)
     new.__dict__["agent"] = agent
     return new
 

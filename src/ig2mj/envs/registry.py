@@ -24,6 +24,7 @@ from ig2mj.envs.names import NAMES, NAMESPACE, activity_name, short_name
 from ig2mj.envs.observations import Observer, check_names
 from ig2mj.envs.setups import Control, setup_activity, setup_bddl, setup_navigation
 from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.process import run_programs_inline
 from ig2mj.sensors.base import SensorOptions
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.tasks.activities import ACTIVITIES
@@ -115,6 +116,8 @@ def make(
         raise UnknownNameError("grasping mode", mode, MODES)
     if worlds < 1:
         raise EngineError(f"worlds = {worlds}: an environment has at least one")
+    if engine in (None, "native"):
+        run_programs_inline()
     control = Control(whole_actions, period)
     if isinstance(task, NavigationTask):
         setup = setup_navigation(task, robot, split, pool_size, control)
@@ -127,7 +130,7 @@ def make(
     scene, rules, controllers = setup.scene, setup.rules, setup.controllers
     physics = make_engine(engine, scene, worlds, **options)
     hands = None if mode == "physical" else Grasping(scene, mode, setup.mittens)
-    core = Core(physics, rules, setup.pool, controllers, hands)
+    core = Core(physics, rules, setup.pool, controllers, hands, hand_resets=whole_actions or None)
     settings = sensors or SensorOptions()
     if image_size is not None:
         settings = dataclasses.replace(settings, width=image_size, height=image_size)

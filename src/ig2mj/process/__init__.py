@@ -8,7 +8,7 @@ or earlier by whoever wants to; a second call does nothing. What the user has de
     then also `jax_persistent_cache_min_compile_time_secs`, 0.1 s.
   - JAX's monitoring gets two listeners: long compilations are reported on stderr.
 
-`run_programs_inline` (a simulation of one world):
+`run_programs_inline` (a simulation of one world; batches and environments, unless of another engine than the native):
   - JAX's option `jax_cpu_enable_async_dispatch` is off: small CPU programs run in the calling thread. Not where the
     variable JAX_CPU_ENABLE_ASYNC_DISPATCH is set.
 

@@ -65,7 +65,10 @@ class RobotsOfWorld:
             raise ActionError("an action is of finite numbers")
         view = self._simulation.view
         for _ in range(count):
+            simulation = self._simulation
             ctrl, self.controllers = self._core.control(row[None], view, self.controllers)
+            resets = self._core.hand_resets
+            simulation.physics = resets.act(simulation.physics, view, row[None], self.controllers)
             view = self._simulation.step(np.asarray(ctrl, np.float64)[0], self._steps)
         return view
 

@@ -144,7 +144,7 @@ class Simulation(Recorded):
     def core(self) -> Core:
         """What steps this world."""
         rules = None if self.state_options is None else Rules.of_scene(self.scene, self.state_options)
-        return Core(self.engine, rules, None, controllers_of(self.scene, ACTION_PERIOD), self._grasping)
+        return Core(self.engine, rules, None, controllers_of(self.scene, ACTION_PERIOD), self._grasping, True)
 
     @property
     def robots(self) -> RobotsOfWorld:

@@ -34,7 +34,6 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.agents.base import Controller
 from ig2mj.agents.grasping import Grasping
 from ig2mj.engine.base import Engine, Physics, Write
-from ig2mj.engine.health import Health
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.predicates.compile import GoalStatus
@@ -42,6 +41,7 @@ from ig2mj.states.world import ExtendedStates, Swap, WorldState
 from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.eyes import Eyes
+from ig2mj.worlds.hand_resets import HandResets
 from ig2mj.worlds.hands import Hands
 from ig2mj.worlds.lazy.of_view import OfView
 from ig2mj.worlds.lazy.stepper import StateStepper
@@ -71,6 +71,7 @@ class Core:
         pool: Pool | None = None,
         controllers: Sequence[Controller] = (),
         grasping: Grasping | None = None,
+        hand_resets: bool | None = None,
     ):
         """Binds an engine to the rules of its scene.
 
@@ -80,16 +81,22 @@ class Core:
           controllers: one for each robot of the scene, in the order of its actuators; actions go through them. Without
             any, an action is MuJoCo's controls.
           grasping: how hands take hold of objects; None: by friction alone.
+          hand_resets: hands that are asked back jump where they are out of reach; None: not on a pure engine, whose
+            programs it makes larger.
         """
         self.engine, self.rules, self.controllers = engine, rules, tuple(controllers)
         self.grasping, self.hands = grasping, Hands(engine, grasping, self.controllers)
         self.eyes = Eyes(engine, self.controllers)
+        resets = not engine.pure if hand_resets is None else hand_resets
+        self.hand_resets = HandResets(engine, self.controllers, resets)
         self.action_low = np.concatenate([np.zeros(0), *(c.action_low for c in self.controllers)])
         self.action_high = np.concatenate([np.zeros(0), *(c.action_high for c in self.controllers)])
         self.starts = Starts(engine, rules.initial if rules is not None else None, pool)
         self._physics_step = engine.step  # a world at rest steps in under 2 us: even looking up a name counts
         self._control = self._of_view(self._control_fn)
-        self._count, self._chosen = jax.jit(self._count_fn), jax.jit(chosen)
+        seconds = engine.substeps * engine.timestep
+        self._count = jax.jit(lambda *now: guards.counted(*now, floor=self.starts.floor, seconds=seconds))
+        self._chosen = jax.jit(chosen)
         if engine.pure:
             self.advance, self.grasp = jax.jit(self.advance_fn), jax.jit(self.hands.act)
             self._step = jax.jit(self.step_fn, donate_argnums=0)
@@ -126,8 +133,7 @@ class Core:
     def step_fn(self, batch: Batch, action: Float[Array, "W n"] | None = None) -> tuple[Batch, GoalStatus]:
         """`step`, not compiled."""
         if self.controllers and action is not None:
-            action, controllers = self._control(batch.world.view, action, batch.controllers)
-            batch = dataclasses.replace(batch, controllers=controllers)
+            batch, action = self._acted(batch, action)
         return self._control_step(batch, action)
 
     def hold_fn(self, batch: Batch, action: Float[Array, "W n"], steps: int) -> tuple[Batch, GoalStatus]:
@@ -137,8 +143,7 @@ class Core:
         calls it in 4 times `steps`, and MJX keeps a CUDA graph of each.
         """
         if self.controllers:
-            action, controllers = self._control(batch.world.view, action, batch.controllers)
-            batch = dataclasses.replace(batch, controllers=controllers)
+            batch, action = self._acted(batch, action)
         if not self.engine.pure:
             batch, status = self._control_step(batch, action)
             for _ in range(steps - 1):
@@ -151,6 +156,15 @@ class Core:
 
         batch, each = jax.lax.scan(body, batch, None, steps)
         return batch, GoalStatus(*(field[-1] for field in each))
+
+    def _acted(self, batch: Batch, action: Float[Array, "W n"]) -> tuple[Batch, Float[Array, "W nu"]]:
+        """What controllers make of an action."""
+        world = batch.world
+        ctrl, controllers = self._control(world.view, action, batch.controllers)
+        physics = self.hand_resets.act(world.physics, world.view, action, controllers)
+        return dataclasses.replace(
+            batch, world=dataclasses.replace(world, physics=physics), controllers=controllers
+        ), ctrl
 
     def _control_step(self, batch: Batch, ctrl: Float[Array, "W nu"] | None) -> tuple[Batch, GoalStatus]:
         """One control step of MuJoCo's controls."""
@@ -233,20 +247,6 @@ class Core:
         asked = jnp.split(action, sizes, axis=-1)
         done = [c.control(a, view, s) for c, a, s in zip(self.controllers, asked, states, strict=True)]
         return jnp.concatenate([ctrl for ctrl, _ in done], axis=-1), tuple(state for _, state in done)
-
-    def _count_fn(
-        self,
-        step: Int[Array, "W"],
-        time: Float[Array, "W"],
-        flags: Int[Array, "W"],
-        troubles: Int[Array, "W K"],
-        health: Health,
-        object_com: Float[Array, "W O 3"],
-    ) -> tuple[Int[Array, "W"], Float[Array, "W"], Int[Array, "W"], Int[Array, "W K"]]:
-        """Clocks and guards after a step."""
-        now = guards.check(health, object_com, self.starts.floor)
-        seconds = jnp.float32(self.engine.substeps * self.engine.timestep)
-        return step + 1, time + seconds, flags | now, troubles + guards.count(now & ~flags)
 
     def _no_rules(self, states: States, view: PhysicsView) -> Outcome:
         return Outcome(states, None, self._no_status)

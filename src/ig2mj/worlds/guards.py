@@ -62,6 +62,22 @@ def count(flags: Int[Array, "W"]) -> Int[Array, "W K"]:
     return jnp.stack([(flags & int(flag)) != 0 for flag in Flag], axis=-1).astype(jnp.int32)
 
 
+def counted(
+    step: Int[Array, "W"],
+    time: Float[Array, "W"],
+    flags: Int[Array, "W"],
+    troubles: Int[Array, "W K"],
+    health: Health,
+    object_com: Float[Array, "W O 3"],
+    *,
+    floor: Float[Array, "O"],
+    seconds: float,
+) -> tuple[Int[Array, "W"], Float[Array, "W"], Int[Array, "W"], Int[Array, "W K"]]:
+    """Clocks and guards after a control step of so many seconds; `floor` as of `check`."""
+    now = check(health, object_com, floor)
+    return step + 1, time + jnp.float32(seconds), flags | now, troubles + count(now & ~flags)
+
+
 def metrics(counts: Int[Array, "W K"]) -> dict[str, int]:
     """Sums over worlds, by the flags' names in lower case."""
     totals = np.asarray(counts).sum(0)

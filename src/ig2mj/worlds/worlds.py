@@ -23,6 +23,7 @@ from ig2mj.engine.registry import make_engine
 from ig2mj.engine.view import Array
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus
 from ig2mj.predicates.logic import Expression
+from ig2mj.process import run_programs_inline
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.states.model import DEFAULTS
 from ig2mj.states.options import StateOptions
@@ -68,6 +69,8 @@ class Worlds:
           EngineError: the engine cannot run this scene. UnknownNameError: no such mode of grasping. Others: as
           `load_scene` and `compile_expression`.
         """
+        if engine in (None, "native"):
+            run_programs_inline()
         self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
         if engine is None:
             engine = "warp" if jax.default_backend() == "gpu" else "native"
@@ -75,7 +78,7 @@ class Worlds:
             engine = make_engine(engine, self.scene, num_worlds, **options)
         rules = Rules.of_scene(self.scene, states).with_goal(goal)
         controllers = controllers_of(self.scene, engine.substeps * engine.timestep)
-        self.core = Core(engine, rules, pool, controllers, grasping_of(self.scene, grasping))
+        self.core = Core(engine, rules, pool, controllers, grasping_of(self.scene, grasping), True)
 
     @property
     def engine(self) -> Engine:

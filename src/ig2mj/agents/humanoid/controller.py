@@ -9,7 +9,8 @@
 
 Poses of hands and eye are remembered as targets in the body's frame, so that a zero action holds them there; the body
 has none, so that a zero action leaves it where it has come to. Turns are about the axes of the body's frame. A reset
-above 0 brings a hand's target back to where the hand is at rest.
+above 0 brings a hand's target back to where the hand is at rest; a hand that is out of its arm's reach, because
+something holds it back, is put there at once (`ig2mj.worlds.hand_resets`).
 
 Axes: W worlds, 2 hands (left, right), 10 finger joints of a hand.
 """
@@ -108,6 +109,11 @@ class HumanoidController:
                 for h in HANDS
             ]
         )
+        palms = [f"{name}_{h}" for h in HANDS]
+        self.reset_numbers: np.ndarray = np.array([self.action_names.index(f"{h}_reset") for h in HANDS])
+        self.hand_qposadr: np.ndarray = tables.agent_joint_qposadr[
+            [[tables.agent_joint_names.index(f"{palm}_{axis}") for axis in "xyz"] for palm in palms]
+        ]
         self._flags = grasp_flags
         flag = ("is_grasping",) if grasp_flags else ()
         self.proprioception_names: tuple[str, ...] = (
@@ -180,6 +186,14 @@ class HumanoidController:
         base = view.agent.base_pos[:, self.agent], view.agent.base_quat[:, self.agent]
         camera = jnp.asarray(CAMERA_QUAT, jnp.float32)
         return compose(*base, state.eye_pos, quat_multiply(state.eye_quat, jnp.broadcast_to(camera, (1, 4))))
+
+    def out_of_reach(self, view: PhysicsView, state: HumanoidState) -> tuple[Bool[Array, "W 2"], Float[Array, "W 2 3"]]:
+        """Hands farther from their shoulders than an arm is long, and where they are pulled to (world frame, m)."""
+        base = view.agent.base_pos[:, [self.agent]], view.agent.base_quat[:, [self.agent]]
+        upright = jnp.broadcast_to(jnp.array([1.0, 0.0, 0.0, 0.0]), (1, 2, 4))
+        shoulders, _ = compose(*base, jnp.asarray(SHOULDER_POS, jnp.float32)[None], upright)
+        far = length(view.agent.hand_pos[:, self._hands] - shoulders) > HAND_REACH + 10 * REACH_SLACK
+        return far, self.ghosts(view, state)[1]
 
     def ghosts(
         self, view: PhysicsView, state: HumanoidState

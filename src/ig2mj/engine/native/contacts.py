@@ -116,23 +116,25 @@ class ForcePlan:
     def add_links(self, contacts: StepContacts, link_force: np.ndarray) -> bool:
         """Raises forces [L, O] (N) to those of a physics step, of the largest single contact, as in iGibson's slicer
         (spec/states.md 10.1); says whether any was found."""
-        own, other, normal = self._normals(contacts, LINK)
+        own, other, normal, _ = self._normals(contacts, LINK)
         np.maximum.at(link_force, (self.layout.link_of_geom[own], self.geom_object[other]), normal)
         return len(own) > 0
 
     def of_fingers(self, steps: list[StepContacts]) -> np.ndarray:
         """Forces [F, Y] (N) of a control step: of each physics step the sum over the contacts of a finger with a
         graspable body, of all of them the largest."""
-        largest = np.zeros(self.shape, np.float32)
-        for contacts in steps:
-            own, other, normal = self._normals(contacts, FINGER)
-            total = np.zeros_like(largest)
-            np.add.at(total, (self.layout.finger_of_geom[own], self.layout.graspable_of_geom[other]), normal)
-            np.maximum(largest, total, out=largest)
-        return largest
+        if not steps:
+            return np.zeros(self.shape, np.float32)
+        number = np.repeat(np.arange(len(steps)), [len(contacts.meets) for contacts in steps])
+        own, other, normal, row = self._normals(_joined(steps), FINGER)
+        total = np.zeros((len(steps), *self.shape), np.float32)
+        finger, body = self.layout.finger_of_geom[own], self.layout.graspable_of_geom[other]
+        np.add.at(total, (number[row], finger, body), normal)
+        return total.max(0)
 
-    def _normals(self, contacts: StepContacts, kind: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of contacts of a kind that act: the geom that presses, the one pressed on, the normal force (N)."""
+    def _normals(self, contacts: StepContacts, kind: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Of contacts of a kind that act: the geom that presses, the one pressed on, the normal force (N); which of the
+        contacts they are."""
         sides = [((contacts.meets & (kind << shift)) != 0) & (contacts.address >= 0) for shift in (0, _SECOND)]
         row, side = np.stack(sides, 1).nonzero()
         address = contacts.address[row]
@@ -142,7 +144,20 @@ class ForcePlan:
             for k in range(1, int(edges.max(initial=0))):
                 more = edges > k
                 normal = normal + np.where(more, contacts.force[np.where(more, address + k, 0)], 0.0)
-        return contacts.geom[row, side], contacts.geom[row, 1 - side], normal
+        return contacts.geom[row, side], contacts.geom[row, 1 - side], normal, row
+
+
+def _joined(steps: list[StepContacts]) -> StepContacts:
+    """The contacts of all steps one after the other, as of one step."""
+    if len(steps) == 1:
+        return steps[0]
+    first = np.cumsum([0, *(len(contacts.force) for contacts in steps[:-1])])
+    address = [np.where(c.address >= 0, c.address + at, c.address) for c, at in zip(steps, first, strict=True)]
+    return StepContacts(
+        *(np.concatenate([getattr(c, name) for c in steps]) for name in ("meets", "geom")),
+        np.concatenate(address),
+        *(np.concatenate([getattr(c, name) for c in steps]) for name in ("dim", "force")),
+    )
 
 
 class FingerForces:

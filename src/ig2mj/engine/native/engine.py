@@ -191,6 +191,8 @@ class NativeEngine:
             own_fields=check_names(model_fields),
             substeps=substeps,
         )
+        free = np.concatenate([self.layout.object_dofadr[self.layout.object_dofadr >= 0], self.layout.extra_dofadr])
+        self._free_dofs = free[:, None].astype(int) + np.arange(3)
         self._masks = [Masks(self._statics.vicinity, slot.model) for slot in self._slots]
         self._shares = np.array_split(np.arange(num_worlds), self.threads)
         self._pool = ThreadPoolExecutor(self.threads, "ig2mj-native") if self.threads > 1 else None
@@ -254,15 +256,19 @@ class NativeEngine:
 
     def health(self, physics: NativePhysics) -> Health:
         """What went wrong in each world; see `ig2mj.engine.health`. C MuJoCo's buffers grow: nothing overflows."""
-        layout = self.layout
-        free = np.concatenate([layout.object_dofadr[layout.object_dofadr >= 0], layout.extra_dofadr])
-        velocity = np.array([world.data.qvel[free[:, None] + np.arange(3)] for world in physics.worlds], np.float32)
-        positions = np.array([world.data.qpos for world in physics.worlds])
+        count = self.num_worlds
+        velocity = np.empty((count, *self._free_dofs.shape), np.float32)
+        positions = np.empty((count, self._slots[0].model.nq))
+        wrong = np.zeros(count, bool)
+        for row, world in enumerate(physics.worlds):
+            velocity[row], positions[row] = world.data.qvel[self._free_dofs], world.data.qpos
+            wrong[row] = world.wrong_controls
+        squares = np.einsum("wnk,wnk->wn", velocity, velocity)
         return Health(
-            overflow=np.zeros(self.num_worlds, np.int32),
-            finite=np.asarray(np.isfinite(positions).all(1) & np.isfinite(velocity).all((1, 2))),
-            top_speed=np.sqrt(np.square(velocity).sum(-1).max(1, initial=0.0)),
-            wrong_controls=np.array([world.wrong_controls for world in physics.worlds]),
+            overflow=np.zeros(count, np.int32),
+            finite=np.isfinite(positions).all(1) & np.isfinite(velocity).all((1, 2)),
+            top_speed=np.sqrt(squares.max(1, initial=0.0)),
+            wrong_controls=wrong,
         )
 
     def snapshot(self, physics: NativePhysics) -> Snapshot:

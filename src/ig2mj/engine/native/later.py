@@ -185,7 +185,7 @@ class Agents:
         velocity = self._raw["cvel"].take(bodies, 1)
         lever = self._pos.take(bodies, 1) - self._raw["subtree_com"].take(self._plan.roots[bodies], 1)
         angular = velocity[..., :3]
-        self._made[f"{part}_linvel"] = (velocity[..., 3:] + np.cross(angular, lever)).astype(np.float32)
+        self._made[f"{part}_linvel"] = (velocity[..., 3:] + _cross(angular, lever)).astype(np.float32)
         self._made[f"{part}_angvel"] = angular.astype(np.float32)
 
     _make_angvel = _make_linvel
@@ -203,11 +203,18 @@ def of_owners(touching: np.ndarray, starts: np.ndarray, axis: int) -> np.ndarray
     return np.logical_or.reduceat(touching, starts, axis)
 
 
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Cross products of vectors [..., 3]; NumPy's own takes five times as long for a few."""
+    ax, ay, az = a[..., 0], a[..., 1], a[..., 2]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], -1)
+
+
 def _rotate(quat: np.ndarray, vector: np.ndarray) -> np.ndarray:
     """Vectors [..., 3] rotated by w-x-y-z quaternions [..., 4]."""
     w, u = quat[..., :1], quat[..., 1:]
-    twice = 2 * np.cross(u, vector)
-    return vector + w * twice + np.cross(u, twice)
+    twice = 2 * _cross(u, vector)
+    return vector + w * twice + _cross(u, twice)
 
 
 def _multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
@@ -215,4 +222,4 @@ def _multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     w, v = p[..., :1], p[..., 1:]
     s, u = q[..., :1], q[..., 1:]
     real = w * s - (v * u).sum(-1, keepdims=True)
-    return np.concatenate([real, w * u + s * v + np.cross(v, u)], -1)
+    return np.concatenate([real, w * u + s * v + _cross(v, u)], -1)

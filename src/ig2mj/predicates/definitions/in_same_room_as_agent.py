@@ -23,9 +23,10 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
     tables, view = context.model.tables, context.view
     if view.agent.base_pos.shape[1] == 0:
         return "there is no agent"
-    room = int(room_at(tables, jnp.asarray(view.agent.base_pos)[world, 0, :2]))
+    rooms = [int(room_at(tables, place[:2])) for place in jnp.asarray(view.agent.base_pos)[world]]
+    agents = ", ".join(tables.room_names[room] if room >= 0 else "no room" for room in rooms)
     where = ", ".join(rooms_of(tables, view, arguments[0], world)) or "no room"
-    return f"it is in {where}, the agent in {tables.room_names[room] if room >= 0 else 'no room'}"
+    return f"it is in {where}, {'the agent' if len(rooms) == 1 else 'agents'} in {agents}"
 
 
 IN_SAME_ROOM_AS_AGENT = Predicate(

@@ -40,7 +40,7 @@ def thresholds(model: StateModel) -> Float[np.ndarray, "J"]:
     return _between(model, tables.openable_closed, tables.openable_open)
 
 
-def _other_thresholds(model: StateModel) -> Float[np.ndarray, "J"]:
+def other_thresholds(model: StateModel) -> Float[np.ndarray, "J"]:
     """The same, seen from the open end."""
     return _between(model, model.tables.openable_open, model.tables.openable_closed)
 
@@ -57,7 +57,7 @@ def is_open(model: StateModel, joint_pos: Float[Array, "W J"]) -> Bool[Array, "W
     opened = _any_of_object(model, joints_open(model, jnp.asarray(joint_pos)))
     if not model.paper and np.any(tables.object_both_sides):
         direction = np.sign(tables.openable_closed - tables.openable_open)
-        from_other_side = direction * (jnp.asarray(joint_pos) - _other_thresholds(model)) > 0
+        from_other_side = direction * (jnp.asarray(joint_pos) - other_thresholds(model)) > 0
         opened &= ~tables.object_both_sides | _any_of_object(model, from_other_side)
     return opened & model.parameters.has("openable")
 

@@ -65,7 +65,8 @@ class StateProgram:
     Attributes:
       heat: one step of temperatures, jitted. heats: places of what it makes among the states' leaves.
       gives: places of the leaves that a whole step makes; the others it hands through. view_reads: fields of the view
-      that a whole step depends on. Both are known from the first step on. rows: bodies whose poses matter.
+      that a whole step depends on; goal_reads: those of the goal itself. All three are known from the first step on.
+      rows: bodies whose poses matter.
     """
 
     _of_rules: ClassVar[weakref.WeakKeyDictionary] = weakref.WeakKeyDictionary()  # Rules -> {worlds: StateProgram}
@@ -86,6 +87,7 @@ class StateProgram:
         self._empty_memo, self._memo_structure = jax.tree.flatten(self.plan.empty_memo(num_worlds))
         self.heat = jax.jit(self._heat_step)
         self.view_reads: tuple[str, ...] = ()
+        self.goal_reads: frozenset[str] = frozenset()
         self.gives: list[int] = []
         self._takes: list[int] = []
         self._whole = None
@@ -151,7 +153,24 @@ class StateProgram:
             return self._whole_step(every, [named[name] for name in FIELDS], memo)
 
         self._takes, self.view_reads = takes, tuple(reads)
+        self.goal_reads = self._reads_of_goal(leaves, fields, memo)
         self._whole = jax.jit(whole)
+
+    def _reads_of_goal(self, leaves: list[Array], fields: list[Array], memo: list[Array]) -> frozenset[str]:
+        """Fields of the view on which the goal depends, but through what the step makes of the states."""
+        if self.goal is None:
+            return frozenset()
+        if self.goal.queries:
+            return frozenset(FIELDS)
+        goal = self.goal
+
+        def facts(leaves: list[Array], fields: list[Array], memo: list[Array]) -> Array:
+            view = assemble(dict(zip(FIELDS, fields, strict=True)))
+            relations, _ = self.plan.evaluate_changed(view, jax.tree.unflatten(self._memo_structure, memo))
+            return goal.literals.facts(goal.context(jax.tree.unflatten(self.structure, leaves), view, relations))
+
+        matters = inputs_that_matter(jax.make_jaxpr(facts)(leaves, fields, memo).jaxpr)
+        return frozenset(name for name, used in zip(FIELDS, matters[len(leaves) :], strict=False) if used)
 
     def _whole_step(self, leaves: list[Array], fields: list[Array], memo: list[Array]) -> tuple:
         """`Found` as a plain tuple; notes which leaves of the states it makes."""

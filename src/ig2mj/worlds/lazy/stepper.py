@@ -7,7 +7,8 @@ is cut up (`ig2mj.worlds.lazy.program`), with the same functions and bitwise the
 - the whole step, where the states are others than those of the last step, where the last step changed more than
   temperatures, or where the view differs in anything that a step depends on. Relations come from a memo
   (`ig2mj.states.relations.plan`).
-- temperatures and what follows from them, where neither is so: then this step would change nothing else either.
+- temperatures and what follows from them, where neither is so, or where what differs cannot matter
+  (`ig2mj.worlds.lazy.relevance`): then this step would change nothing else either.
 - nothing, where the last step did not change temperatures.
 
 An agent that is awake makes a new view in every step. What states depend on is therefore compared, byte by byte, field
@@ -27,6 +28,7 @@ from ig2mj.predicates.compile import GoalStatus
 from ig2mj.states.definitions import toggled_on
 from ig2mj.states.world import ExtendedStates, Swap
 from ig2mj.worlds.lazy.program import BODY_FIELDS, Found, StateProgram
+from ig2mj.worlds.lazy.relevance import Relevance
 from ig2mj.worlds.rules import Outcome, Rules
 
 LOOK_EVERY = 30
@@ -50,6 +52,7 @@ class StateStepper:
         self._seen: list[Array] = []  # fields read, as last seen; and their bytes at the last whole step, once needed
         self._bytes: list[bytes | None] = []
         self._fingers_away = False
+        self._relevance: Relevance | None = None
 
     @classmethod
     def of(cls, rules: Rules, num_worlds: int) -> StateStepper:
@@ -67,7 +70,8 @@ class StateStepper:
 
     def _says_the_same(self, view: PhysicsView) -> bool:
         """Whether the view has all that a step depends on as it was at the last whole step."""
-        rows = self.program.rows
+        rows, changed, relevance = self.program.rows, [], self._relevance
+        assert relevance is not None, "there was a whole step"
         for k, name in enumerate(self.program.view_reads):
             now = read_field(view, name)
             seen = self._seen[k]
@@ -82,8 +86,13 @@ class StateStepper:
             if before is None:
                 before = self._bytes[k] = seen[:, chosen].tobytes()
             if now[:, chosen].tobytes() != before:
-                return False
-            self._seen[k] = now
+                if name in relevance.exact:
+                    return False
+                changed.append(name)
+            else:
+                self._seen[k] = now
+        if changed and not relevance.same(view, changed):
+            return False
         self._view = view
         return True
 
@@ -116,6 +125,9 @@ class StateStepper:
         self._kept = None
         if quiet and not program.model.options.contact_heat_rate:
             self._kept = found
+            if self._relevance is None:
+                self._relevance = Relevance(program.model, program.goal_reads)
+            self._relevance.begin(new, view, program.view_reads)
             self._seen = [read_field(view, name) for name in program.view_reads]
             self._bytes = [None] * len(self._seen)
             self._fingers_away = "agent.finger_pos" in program.view_reads and self._away(view)

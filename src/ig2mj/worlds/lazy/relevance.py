@@ -1,0 +1,212 @@
+"""`Relevance`: whether what moved since the last whole step of the states can matter to them.
+
+A door that swings, a chair that is pushed: neither heats anything, nor opens or closes, nor is under a tap. Where that
+can be told from a few numbers the next step is that of temperatures alone. Every answer errs on the safe side: no is
+only said where no rounding could turn it into a yes. What is looked at is what each part of a step reads of the view:
+
+| part | reads | matters unless |
+|---|---|---|
+| switches | fingers, buttons | the same buttons are pressed |
+| slicing | forces of links | they are the same |
+| water | everything | no drop is out |
+| cleaning | what tools touch, poses of both | tools touch the same, and neither has moved |
+| heat | sources that are on | the same objects are within their distance; what is in their box rests there |
+| open, closed | joints | each is on the same side of its threshold |
+| goal | its own fields | they are the same |
+
+Axes: W worlds, O objects, S heat sources, T objects with a temperature, B sources that heat what is inside them,
+K buttons.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+import numpy as np
+from jaxtyping import Bool
+
+from ig2mj.engine.view import Array, PhysicsView, read_field
+from ig2mj.states.definitions import open, toggled_on
+from ig2mj.states.model import StateModel
+from ig2mj.states.relations.plan import BOX_SLACK
+from ig2mj.states.update import EVENTS
+from ig2mj.states.world import ExtendedStates
+
+EXACT = frozenset({"link_force"})
+"""Fields of which every change matters."""
+
+KNOWN = frozenset({"toggled_on", "sliced", "water_source", "wetness", "dust", "stain"})
+"""States whose updates the table above covers. Where there is another, everything matters."""
+
+MARGIN = 1e-3
+"""m by which a place must be clear of a limit; far beyond any rounding within a home."""
+
+
+class Relevance:
+    """The question for one scene's states; `begin` with a whole step, then `same` for views after it.
+
+    Attributes:
+      exact: fields of which every change matters.
+    """
+
+    def __init__(self, model: StateModel, goal_reads: Collection[str]):
+        """`goal_reads`: fields of the view that the goal depends on, but through states."""
+        self._model, self.exact = model, EXACT | set(goal_reads)
+        p, tables = model.parameters, model.tables
+        self._tools = np.asarray(p.tool_object, int)
+        self._thermal = np.flatnonzero(p.thermal)
+        pieces = [tables.piece_body[tables.piece_object == o] for o in range(tables.num_objects)]
+        self._bodies = [np.union1d(np.flatnonzero(tables.body_object == o), own) for o, own in enumerate(pieces)]
+        self._links = [np.flatnonzero(tables.link_object == o) for o in range(tables.num_objects)]
+        self._covered = {spec.name for spec in EVENTS} <= KNOWN
+        self._thresholds = open.thresholds(model), open.other_thresholds(model)
+        self._base: dict[str, np.ndarray] = {}
+        self._states: ExtendedStates | None = None
+        self._dry = self._ready = False
+
+    def begin(self, states: ExtendedStates, view: PhysicsView, reads: Collection[str]) -> None:
+        """After a whole step that changed no more than temperatures.
+
+        Args:
+          reads: fields of the view that the states depend on.
+        """
+        self._base = {}
+        for name in reads:
+            field = read_field(view, name)
+            if isinstance(field, np.ndarray):
+                self._base[name] = field
+        self._states, self._ready = states, False
+
+    def same(self, view: PhysicsView, changed: Collection[str]) -> bool:
+        """Whether a whole step would do no more now than temperatures do.
+
+        Args:
+          changed: fields that differ from those of the last whole step; all others of its `reads` are the same.
+        """
+        if not self._covered or self.exact.intersection(changed) or any(name not in self._base for name in changed):
+            return False
+        now = {name: read_field(view, name) for name in changed}
+        if not all(isinstance(field, np.ndarray) for field in now.values()):
+            return False
+        if not self._ready:
+            self._prepare()
+        return (
+            self._dry
+            and self._opens_alike(now)
+            and self._cleans_alike(now)
+            and self._heats_alike(now)
+            and self._switches_alike(now)
+        )
+
+    def _prepare(self) -> None:
+        """What is looked at, from the states of the last whole step; on the host."""
+        states, model = self._states, self._model
+        assert states is not None
+        self._dry, self._ready = not np.asarray(states.water.active).any(), True
+        self._open = self._opened(self._base["joint_pos"]) if "joint_pos" in self._base else None
+        p = model.parameters
+        on = ~p.heat_requires_toggled_on | np.asarray(states.toggled_on)[:, p.heat_object]
+        on = np.flatnonzero((on & (p.heat_requires_inside | (p.heat_link >= 0))).any(0))
+        self._near_sources = on[~p.heat_requires_inside[on]]
+        self._boxed_sources = np.unique(p.heat_object[on[p.heat_requires_inside[on]]])
+        self._reached: Bool[np.ndarray, "W O S"] | None = None
+        self._clear_before: Bool[np.ndarray, "T B"] | None = None
+        self._pressed: Bool[np.ndarray, "W K"] | None = None
+        touched = np.zeros(model.tables.num_objects, bool)
+        if len(self._tools) and "touching" in self._base:
+            of_tools: np.ndarray = np.any(self._base["touching"][:, self._tools], axis=0)
+            touched = np.any(of_tools, axis=0)
+            touched[self._tools[np.any(of_tools, axis=1)]] = True
+        moved = np.flatnonzero(touched)
+        self._clean_bodies = np.concatenate([np.zeros(0, int), *(self._bodies[o] for o in moved)]).astype(int)
+        self._clean_links = np.concatenate([np.zeros(0, int), *(self._links[o] for o in moved)])
+
+    def _opened(self, joint_pos: np.ndarray) -> np.ndarray:
+        """On which side of both thresholds each joint is."""
+        near, far = self._thresholds
+        return np.stack([joint_pos > near, joint_pos < near, joint_pos > far, joint_pos < far])
+
+    def _opens_alike(self, now: Mapping[str, Array]) -> bool:
+        if "joint_pos" not in now:
+            return True
+        return self._open is not None and np.array_equal(self._opened(np.asarray(now["joint_pos"])), self._open)
+
+    def _cleans_alike(self, now: Mapping[str, Array]) -> bool:
+        tools = self._tools
+        if not len(tools):
+            return True
+        for name in ("touching", "awake"):
+            if name in now and not np.array_equal(now[name][:, tools], self._base[name][:, tools]):
+                return False
+        for name in ("body_pos", "body_quat", "link_pos", "link_quat"):
+            rows = self._clean_bodies if name.startswith("body") else self._clean_links
+            if len(rows) and name in now and not np.array_equal(now[name][:, rows], self._base[name][:, rows]):
+                return False
+        return True
+
+    def _heats_alike(self, now: Mapping[str, Array]) -> bool:
+        if len(self._near_sources) and not now.keys().isdisjoint(("object_com", "link_pos")):
+            if self._reached is None:
+                before = self._within(self._base.get("object_com"), self._base.get("link_pos"))
+                if before is None:
+                    return False
+                self._reached = before
+            within = self._within(*(now.get(name, self._base.get(name)) for name in ("object_com", "link_pos")))
+            if within is None or not np.array_equal(within, self._reached):
+                return False
+        if not len(self._boxed_sources) or now.keys().isdisjoint(
+            ("object_com", "aabb_low", "aabb_high", "body_pos", "body_quat")
+        ):
+            return True
+        if self._clear_before is None:
+            self._clear_before = self._outside(self._base)
+        clear = self._outside({**self._base, **now})
+        if clear is None or self._clear_before is None:
+            return False
+        obj, box = np.nonzero(~(clear & self._clear_before))
+        return not len(obj) or self._unmoved(now, self._thermal[obj], self._boxed_sources[box])
+
+    def _within(self, com: Array | None, link: Array | None) -> Bool[np.ndarray, "W O S"] | None:
+        """Which warm objects are within the distance of each source that is on; None where it is too close to say."""
+        if com is None or link is None:
+            return None
+        p, sources = self._model.parameters, self._near_sources
+        offset = com[:, self._thermal, None] - link[:, None, p.heat_link[sources]]
+        distance = np.sqrt(np.square(offset).sum(-1))
+        beyond = distance - p.heat_distance[sources]
+        return beyond <= 0 if (np.abs(beyond) > MARGIN).all() else None
+
+    def _outside(self, fields: Mapping[str, Array]) -> Bool[np.ndarray, "T B"] | None:
+        """Which warm objects are in no world in the box of each source that heats what is inside it."""
+        if any(name not in fields for name in ("object_com", "aabb_low", "aabb_high")):
+            return None
+        com, low, high = (np.asarray(fields[name]) for name in ("object_com", "aabb_low", "aabb_high"))
+        slack, boxes = BOX_SLACK + MARGIN, self._boxed_sources
+        points = com[:, self._thermal, None]
+        clear = (points < low[:, None, boxes] - slack) | (points > high[:, None, boxes] + slack)
+        return clear.any(-1).all(0) | (self._thermal[:, None] == boxes)
+
+    def _unmoved(self, now: Mapping[str, Array], objects: np.ndarray, boxes: np.ndarray) -> bool:
+        """These objects' centres and the bodies of these boxes are where they were."""
+        bodies = np.unique(np.concatenate([self._bodies[o] for o in boxes]))
+        rows = {"object_com": objects, "aabb_low": boxes, "aabb_high": boxes, "body_pos": bodies, "body_quat": bodies}
+        return all(
+            np.array_equal(now[name][:, chosen], self._base[name][:, chosen])
+            for name, chosen in rows.items()
+            if name in now
+        )
+
+    def _switches_alike(self, now: Mapping[str, Array]) -> bool:
+        if "agent.finger_pos" not in self._base or now.keys().isdisjoint(("agent.finger_pos", "link_pos")):
+            return True
+        if self._pressed is None:
+            self._pressed = self._presses(self._base)
+        pressed = self._presses({**self._base, **now})
+        return pressed is not None and self._pressed is not None and np.array_equal(pressed, self._pressed)
+
+    def _presses(self, fields: Mapping[str, Array]) -> Bool[np.ndarray, "W K"] | None:
+        """Which buttons a finger is near enough to press; None where that is too close to say."""
+        buttons = np.asarray(fields["link_pos"])[:, self._model.buttons, None]
+        offset = np.asarray(fields["agent.finger_pos"])[:, None] - buttons
+        beyond = np.sqrt(np.square(offset).sum(-1)) - toggled_on.BUTTON_DISTANCE
+        return (beyond <= 0).any(-1) if (np.abs(beyond) > MARGIN).all() else None

@@ -1,0 +1,27 @@
+"""What tests of navigation share: the tasks in the smallest home, and a driver that follows the way."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from ig2mj.tasks.navigation.task import NAVIGATION
+
+
+def small(name: str, **changes):
+    """The task in the smallest home."""
+    return dataclasses.replace(NAVIGATION[name], home="small_home", **changes)
+
+
+def column(env, state, *names):
+    """These numbers of the privileged state, [W, n]."""
+    at = [env.privileged_names.index(name) for name in names]
+    return np.asarray(state.obs["privileged_state"])[:, at]
+
+
+def drive(env, state):
+    """Turns to the next point of the way, and drives on when it is ahead."""
+    x, y = column(env, state, "ahead_x", "ahead_y").T
+    angle = np.arctan2(y, x)
+    return np.stack([np.where(np.abs(angle) < 0.5, 0.8, 0.0), np.clip(angle, -0.3, 0.3)], 1).astype(np.float32)
