@@ -165,7 +165,7 @@ def held(scene: ig2mj.Scene) -> np.ndarray:
 def swept(scene: ig2mj.Scene, step: int) -> np.ndarray:
     """The same, with the right hand on `sweep`'s way."""
     ctrl = held(scene)
-    ctrl[RIGHT_HAND : RIGHT_HAND + 3] = np.array([0.0, 0.0, 1.1]) + sweep(step)[:3]
+    ctrl[RIGHT_HAND : RIGHT_HAND + 3] = np.array([0.0, 0.0, 1.02]) + sweep(step)[:3]
     return ctrl
 
 
