@@ -13,6 +13,7 @@ from tiny_home import home_manifest, write_tiny_home
 
 import ig2mj
 from ig2mj.agents import Fetch, Humanoid, TurtleBot
+from ig2mj.errors import Ig2mjError
 from ig2mj.scene import manifest as mf
 
 HALF = np.sqrt(0.5)
@@ -81,7 +82,8 @@ def test_of_two_agents_in_one_home_either_counts(home_with_map):
         assert simulation.predicate("in_same_room_as_agent", name), name
     assert simulation.predicate("in_contact_with", "fetch", "floor")
     assert not simulation.predicate("in_contact_with", "humanoid", "floor")
-    assert not simulation.predicate("in_contact_with", "humanoid", "fetch")
+    with pytest.raises(Ig2mjError, match="of two agents"):
+        simulation.predicate("in_contact_with", "humanoid", "fetch")
     put_into_hand(world, "fetch_gripper_link", "can")
     simulation.forward()
     assert simulation.predicate("in_hand_of_agent", "can") and not simulation.predicate("in_hand_of_agent", "ball")
