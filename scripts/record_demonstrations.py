@@ -21,7 +21,7 @@ from ig2mj.demos.thin import write_thin
 from ig2mj.envs.experts import expert_of
 from ig2mj.tasks.experts.expert import PLANS
 
-EPISODES, WORLDS, SEED = 32, 4, 14
+EPISODES, WORLDS, ROWS, SEED = 32, 4, 40, 14
 NOISE, DISTURBED, LENGTH = 0.1, 0.02, 5
 """Deviation of the noise; share of the steps at which a disturbance begins, and its steps."""
 
@@ -30,7 +30,7 @@ FOLDER = pathlib.Path(__file__).resolve().parents[1] / "demonstrations"
 
 def episodes_of(task: str, file: pathlib.Path) -> None:
     """Plays until enough episodes have succeeded."""
-    env = ig2mj.make(task, robot="humanoid", worlds=WORLDS, engine="native")
+    env = ig2mj.make(task, robot="humanoid", worlds=WORLDS, engine="native", pool_size=ROWS)
     expert, rng, size = expert_of(env), np.random.default_rng(SEED), env.action_space.shape[0]
     wild, left, succeeded = np.zeros((WORLDS, size)), np.zeros(WORLDS, int), 0
     with record(env, file, devices={"expert": np.zeros((WORLDS, size), np.float32)}) as played:

@@ -39,15 +39,16 @@ class EpisodeFilms:
             self._place = {**self._place, "file_index": self._place["file_index"] + 1}
             if self._place["file_index"] == 1000:
                 self._place = {"chunk_index": self._place["chunk_index"] + 1, "file_index": 0}
-        if self._container is None:
-            self._open(*pictures.shape[1:3])
         import av
 
+        if self._container is None:
+            self._open(*pictures.shape[1:3])
+        container: Any = self._container
         start = self._frames / self._fps
         for picture in pictures:
             frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
             frame.pts, self._frames = self._frames, self._frames + 1
-            self._container.mux(self._stream.encode(frame))
+            container.mux(self._stream.encode(frame))
         return self._place, start
 
     def close(self) -> None:

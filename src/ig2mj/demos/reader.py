@@ -95,7 +95,7 @@ class Run:
     def kept(self, start: int, stop: int) -> np.ndarray:
         """Which of these frames are there: of a thin recording only the first and the last (`ig2mj.demos.thin`)."""
         of_world = [k for name, k in self._recording.columns.items() if name.startswith("frames/")]
-        return (self.index(start, stop)[:, of_world[:1]] >= 0).all(1)
+        return np.all(self.index(start, stop)[:, of_world[:1]] >= 0, axis=1, keepdims=True)[:, 0]
 
     def index(self, start: int, stop: int) -> np.ndarray:
         """[stop - start, C] rows that these frames have in the file's arrays; -1: none. Raises InputError."""

@@ -74,7 +74,7 @@ def test_a_policy_that_pytorch_clones_is_as_good_as_ours(tmp_path):
     for k, layer in enumerate(layers):
         arrays |= {f"w{k}": layer.weight.T, f"b{k}": layer.bias}
     np.savez(tmp_path / "policy.npz", **{name: array.detach().numpy() for name, array in arrays.items()})
-    found = json.loads(run("tests/interop/play_policy.py", TASK, tmp_path / "policy.npz").splitlines()[-1])
+    found = json.loads(run("tests/interop/support/play_policy.py", TASK, tmp_path / "policy.npz").splitlines()[-1])
     ours = int(run("examples/imitate.py", TASK).split("; ")[-1].split()[0])
     assert found["episodes"] == 32
     assert found["success"] >= ours - 4, (found, ours)
