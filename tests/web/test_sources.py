@@ -9,6 +9,7 @@ pytest.importorskip("viser")
 
 import ig2mj
 from ig2mj.demos import Recording, record
+from ig2mj.demos.thin import write_thin
 from ig2mj.envs.experts import expert_of
 from ig2mj.web.recorded import Recorded
 from ig2mj.web.runner import Runner
@@ -64,6 +65,18 @@ def test_every_frame_of_a_recording_is_shown_as_it_was(file):
         assert source.frame == source.frames - 1
         source.seek(-3)
         assert source.frame == 0
+
+
+def test_a_thin_recording_shows_the_same_frames(file, tmp_path):
+    thin = tmp_path / "thin.h5"
+    with Recording(file[0]) as recording:
+        write_thin(recording, thin, recording.runs[:2])
+    with Recording(thin) as recording:
+        source = Recorded(recording)
+        for frame in (4, 5, 2, 6, 0):
+            source.seek(frame)
+            if frame < len(file[1]) and frame < 6:
+                np.testing.assert_array_equal(source.shot(0).body_pos, file[1][frame])
 
 
 def test_a_recording_plays_to_its_end_and_from_the_start_again(file):

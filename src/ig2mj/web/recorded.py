@@ -1,12 +1,17 @@
-"""Recordings of environments as something to look at: every frame as it was written, with a time line."""
+"""Recordings of environments as something to look at: every frame as it was written, with a time line.
+
+Of thin recordings, such as those that ship, the frames between the first and the last one are not in the file: they
+come out again when the actions are taken from the frame before, or from the first one where someone goes back.
+"""
 
 from __future__ import annotations
 
 import mujoco
 import numpy as np
 
-from ig2mj.demos.reader import Recording
+from ig2mj.demos.reader import Recording, Run
 from ig2mj.demos.replay import Replayer
+from ig2mj.demos.writer import FLUSH
 from ig2mj.errors import InputError
 from ig2mj.web.shots import Shot, shot_of
 from ig2mj.web.sources import rules_of
@@ -24,7 +29,10 @@ class Recorded:
         self._runs = [run for run in recording.runs if run.frames]
         if not self._runs:
             raise InputError(recording.file, "has no run with frames")
-        self._replayer = Replayer(recording, "state")
+        if "task" not in recording.header:
+            raise InputError(recording.file, "is no recording of an environment", fix="`Simulation.replay` replays it")
+        whole = all(run.kept(k, min(k + FLUSH, run.frames)).all() for run in self._runs for k in _starts(run))
+        self._replayer = Replayer(recording, "state" if whole else "action")
         env = self._replayer.env
         rules = rules_of(env.core)
         self.scene, self.model, self.goal = env.scene, rules.model, rules.goal
@@ -32,6 +40,7 @@ class Recorded:
         self.warnings = self._replayer.warnings
         self.runs = [_title(k, run.attributes) for k, run in enumerate(self._runs)]
         self.run, self.frame = 0, 0
+        self._at = (0, -1)  # run and frame of the state
         self.frames = self._runs[0].frames
         self.seek(0)
 
@@ -40,8 +49,23 @@ class Recorded:
             self.run = run
         shown = self._runs[self.run]
         self.frames = shown.frames
-        self.frame = min(max(frame, 0), shown.frames - 1)
-        self._state = self._replayer.at(shown, self.frame)
+        frame = min(max(frame, 0), shown.frames - 1)
+        if shown.kept(frame, frame + 1)[0]:
+            self._state = self._replayer.at(shown, frame)
+        else:
+            before = self._at[1] if self._at[0] == self.run else -1
+            if not 0 <= before <= frame:
+                before, self._state = 0, self._replayer.at(shown, 0)
+            for k in range(before, frame):
+                self._act(shown, k)
+        self.frame, self._at = frame, (self.run, frame)
+
+    def _act(self, run: Run, step: int) -> None:
+        """Takes an action of the run in its world; the other worlds do nothing."""
+        env = self._replayer.env
+        action = np.zeros((env.num_worlds, *env.action_space.shape), np.float32)
+        action[run.world] = run.rows("steps/action", step, step + 1, action[0])[0]
+        self._state = env.step(self._state, action)
 
     def step(self) -> None:
         if self.frame < self.frames - 1:
@@ -62,6 +86,10 @@ class Recorded:
 
     def mujoco(self, world: int) -> tuple[mujoco.MjModel, mujoco.MjData] | None:
         return None
+
+
+def _starts(run: Run) -> range:
+    return range(0, run.frames, FLUSH)
 
 
 def _title(number: int, attributes: dict) -> str:
