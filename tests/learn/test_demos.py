@@ -12,7 +12,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from small_envs import PointMass
+from small_envs import PointMass, SeenPointMass
 
 from ig2mj.errors import InputError
 from ig2mj.learn.bc import BC, BCConfig, begin_as_clone, clone
@@ -66,6 +66,12 @@ def test_a_clone_does_what_the_expert_does(recorded):
         episodes += int(np.asarray(state.terminated | state.truncated).sum())
         success += int(np.asarray(state.terminated).sum())
     assert success > 0.9 * episodes > 10
+
+
+def test_demonstrations_without_pictures_are_refused_where_pictures_are_seen(recorded):
+    _, file = recorded
+    with pytest.raises(InputError, match=r"holds no rgb and no depth.*--obs rgbd"):
+        load_demos(file, Perception(SeenPointMass.observation_spaces, "rgbd"))
 
 
 def test_broken_and_foreign_files_are_refused_with_run_and_field(recorded, tmp_path):

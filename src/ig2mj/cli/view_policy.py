@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import pathlib
 
+ROWS = 32
+"""Start states to begin with: the first ones of the held-out split, since all of them take a minute to sample."""
+
 
 def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -> None:
     """Shows a policy in one native world, at held-out start states.
@@ -13,7 +16,7 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
       row: of the held-out start states, to begin with.
 
     Raises:
-      UnknownNameError, InputError: there is no such policy. Ig2mjError: there is no such row.
+      UnknownNameError, InputError: there is no such policy. Ig2mjError: no row has this number.
     """
     import sys
 
@@ -24,9 +27,12 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
     from ig2mj.learn.evaluate import acting
     from ig2mj.learn.policies import Policy
     from ig2mj.learn.shipped import find_policy
+    from ig2mj.tasks.pools import COUNT
     from ig2mj.viewer.acting import STEP_TIME, ActingWorld
     from ig2mj.viewer.interactive import launch
 
+    if not 0 <= row < COUNT["held_out"]:
+        raise Ig2mjError(f"--row {row}: the held-out start states are 0 to {COUNT['held_out'] - 1}")
     file = find_policy(name)
     policy = Policy.load(file)
     depends = policy.card["depends"]
@@ -39,10 +45,9 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
         observations=policy.observations,
         paper_rl=policy.card.get("paper_rl", False),
         split="held_out",
+        pool_size=max(ROWS, row + 1),
     )
-    act, size = acting(policy, env, file), env.core.starts.pool.size
-    if not 0 <= row < size:
-        raise Ig2mjError(f"--row {row}: the held-out start states are 0 to {size - 1}")
+    act = acting(policy, env, file)
     if video is not None:
         from ig2mj.showcase.episode_film import EpisodeFilm
 

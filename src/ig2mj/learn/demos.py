@@ -183,6 +183,11 @@ def load_demos(file: str | os.PathLike, perception: Perception, world: Mapping[s
       InputError: no such file, one of another kind or environment, or a broken one; names the run and the field.
     """
     path = pathlib.Path(file)
+    _, spaces = about(path)
+    missing = [name for name in perception.names if name not in spaces]
+    if missing:
+        fix = "`ig2mj demos collect --obs rgbd` records pictures; `ig2mj train --algo sac --expert` needs no file"
+        raise InputError(path, f"holds no {' and no '.join(missing)}", fix=fix)
     parts = list(_runs(path, perception, world))
     if not parts:
         raise InputError(path, "holds no run", fix=_MEND)
