@@ -74,7 +74,7 @@ def mujoco_of(row: Snapshot, model: mujoco.MjModel, tables: SceneTables) -> tupl
     return model, data
 
 
-def own_device() -> jax.Device:
+def own_device() -> Any:
     """Where models and data are put: MJX itself takes the first device of all processes, which may be another one's."""
     return jax.local_devices()[0]
 
