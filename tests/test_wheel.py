@@ -67,6 +67,14 @@ def test_shipped_homes_come_with_the_wheel_and_open_from_any_folder(installed, t
     assert int(count) == len(list((ROOT / "scenes_mjcf").glob("*/manifest.json")))
 
 
+def test_the_page_of_a_headset_comes_with_the_wheel(installed):
+    """Its own files; three.js too, where `make web` has fetched it."""
+    made, packed = ROOT / "src" / "ig2mj" / "vr" / "page", installed / "ig2mj" / "vr" / "page"
+    names = {f.relative_to(made).as_posix() for f in made.rglob("*") if f.is_file()}
+    assert names == {f.relative_to(packed).as_posix() for f in packed.rglob("*") if f.is_file()}
+    assert {"index.html", "main.js", "home.js"} <= names
+
+
 def test_a_picture_of_a_shipped_home_from_any_folder(installed, tmp_path):
     command = [sys.executable, "-m", "ig2mj", "view", "small_home", "--picture", "p.png"]
     run(*command, "--size", "64", "48", cwd=tmp_path, PYTHONPATH=str(installed))

@@ -45,11 +45,14 @@ def chromium(width: int, height: int) -> Iterator[Any]:
         browser = started.chromium.launch(executable_path=program, args=arguments)
         page = browser.new_page(viewport={"width": width, "height": height})
         errors: list[str] = []
+        strangers: list[str] = []
+        here = ("http://127.0.0.1:", "ws://127.0.0.1:", "blob:", "data:", "about:")
+        page.on("request", lambda request: None if request.url.startswith(here) else strangers.append(request.url))
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.set_default_timeout(120_000)
         yield page
         browser.close()
-        assert errors == []
+        assert errors == [] and strangers == []  # nothing is loaded from other hosts
 
 
 def wear_headset(page: Any) -> None:

@@ -11,6 +11,8 @@ import pathlib
 import sys
 
 import numpy as np
+from apple_on_table import APPLE_ON_TABLE
+from scipy.spatial.transform import Rotation
 
 from ig2mj.agents.humanoid.frames import MAX_MOVE, MAX_TURN
 from ig2mj.vr.frames import SHAPES, Pose, from_arrays
@@ -67,7 +69,7 @@ def write(recording: pathlib.Path, file: pathlib.Path) -> None:
         qpos, state = rows("frames/physics/agents/qpos"), "frames/controllers/0"
         parts = {
             "action": rows("steps/action")[chosen],
-            "body": qpos[chosen, :7].astype(np.float32),
+            "body": np.concatenate([qpos[chosen, :3], turned(qpos[chosen, 3:7])], axis=1).astype(np.float32),
             "eye": np.concatenate([rows(f"{state}/eye_pos"), rows(f"{state}/eye_quat")], axis=1)[chosen],
             "robot_hands": np.concatenate([rows(f"{state}/hand_pos"), rows(f"{state}/hand_quat")], axis=2)[chosen],
             "robot_triggers": rows(f"{state}/trigger")[chosen],
@@ -75,6 +77,12 @@ def write(recording: pathlib.Path, file: pathlib.Path) -> None:
         }
     file.parent.mkdir(parents=True, exist_ok=True)
     np.savez_compressed(file, **parts)
+
+
+def turned(ball: np.ndarray) -> np.ndarray:
+    """Orientations of the body, w-x-y-z: its ball joint turns it from how it stood at the start."""
+    start = Rotation.from_euler("z", APPLE_ON_TABLE.acts("humanoid").yaw, degrees=True)
+    return np.roll((start * Rotation.from_quat(np.roll(ball, -1, axis=1))).as_quat(), 1, axis=1)
 
 
 if __name__ == "__main__":

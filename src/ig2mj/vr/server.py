@@ -60,7 +60,7 @@ class HomePage:
         self._welcome = json.dumps(_welcome(session))
         self._pages: list[ServerConnection] = []
         self.rates: dict[ServerConnection, Rate] = {}
-        self.server = PageServer(access, Pages(files), self._talk, decode, LARGEST)
+        self.server = PageServer(access, Pages(files), self._talk, _is_message, LARGEST)
 
     @property
     def rate(self) -> Rate | None:
@@ -180,6 +180,12 @@ def _looks(looks: Looks, session: Session, timed: bool) -> dict[str, Any]:
         "attached": session.memory.attached,
         "timing": {name: round(value, 2) for name, value in session.timing.summary().items()} if timed else {},
     }
+
+
+def _is_message(message: str | bytes) -> bool:
+    """True; raises ValueError for what no page sends."""
+    decode(message)
+    return True
 
 
 def _row(pose: Pose) -> list[float]:

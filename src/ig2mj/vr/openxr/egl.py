@@ -48,7 +48,7 @@ class EglGraphics:
         if not found:
             raise EngineError("pictures for a headset need EGL (MUJOCO_GL=egl)")
         library = ctypes.CDLL("libEGL.so.1")
-        address = ctypes.cast(library.eglGetProcAddress, ctypes.c_void_p).value
+        address = ctypes.cast(library.eglGetProcAddress, ctypes.c_void_p)
         made = xr.GraphicsBindingEGLMNDX()
         made.get_proc_address = ctypes.cast(address, type(made.get_proc_address))
         made.display, made.context = EGL.eglGetCurrentDisplay(), found
