@@ -8,9 +8,11 @@ import warp as wp
 from mujoco.mjx.third_party import mujoco_warp
 
 from ig2mj.engine.warp import kernels, patches
+from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.engine.warp.patches import pins
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile
+from ig2mj.scene.scene import load_scene
 
 pytestmark = pytest.mark.skipif(bool(pins.mismatches()), reason=f"our kernels do not fit: {pins.mismatches()}")
 
@@ -70,3 +72,9 @@ def test_a_step_launches_no_other_kernels():
         mujoco_warp.step(put, data)
     assert len(launched) > 40
     assert launched <= noted
+
+
+@pytest.mark.slow
+def test_an_engine_loads_the_kernels_of_its_scene():
+    engine = WarpEngine(load_scene("small_home"), 2)
+    assert engine.load_kernels(workers=2) > 40

@@ -83,16 +83,18 @@ class WarpEngine(MjxEngine):
         self._worlds_of_buffers = num_worlds
         if initial is None and not holds_everything(self.profile, scene.model):
             initial = settle(scene)
-        if wp.is_cuda_available():
-            self.load_kernels(scene.model)
         super().__init__(scene, num_worlds, initial=initial, **options)
 
-    def load_kernels(self, model: mujoco.MjModel, workers: int | None = None) -> int:
-        """Compiles the kernels of a step side by side, if this machine has not yet; how many modules were loaded."""
-        model = self._host_model(model)
-        with kernels.once(model, self.profile, self.own_kernels) as first:
-            launches = kernels.launches_of_step(model, self.profile, self.own_kernels) if first else []
-            return kernels.load(launches, workers=workers)
+    def load_kernels(self, workers: int | None = None) -> int:
+        """Compiles and loads the kernels of a step side by side; how many modules they are.
+
+        The first step does it, too, but one after the other.
+
+        Args:
+          workers: threads; None: one for each processor of this process.
+        """
+        launches = kernels.launches_of_step(self.host_model, self.profile, self.own_kernels)
+        return kernels.load(launches, workers=workers)
 
     def usage(self, physics: MjxPhysics) -> Usage:
         """How full the buffers were in the last physics step."""

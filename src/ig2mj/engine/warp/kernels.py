@@ -7,11 +7,8 @@ what they need is then compiled and loaded by as many threads as there are proce
 
 from __future__ import annotations
 
-import contextlib
-import hashlib
 import os
-import pathlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -106,16 +103,3 @@ def load(launches: list[Launch], device: str | None = None, workers: int | None 
     for block_dim, modules in by_size.items():
         wp.force_load(device or wp.get_device(), list(modules), block_dim=block_dim, max_workers=threads)
     return sum(map(len, by_size.values()))
-
-
-@contextlib.contextmanager
-def once(model: mujoco.MjModel, profile: EngineProfile, own: bool) -> Iterator[bool]:
-    """Tells whether the kernels of such a scene still have to be compiled on this machine, and notes that they were."""
-    sizes = repr((model.nv, model.nbody, model.ngeom, model.neq, profile, own)).encode()
-    about = f"{wp.__version__} {mujoco.__version__} {wp.get_device().arch}".encode()
-    geoms = model.geom_type.tobytes() + model.geom_dataid.tobytes()
-    folder = pathlib.Path(str(wp.config.kernel_cache_dir))
-    mark = folder / f"ig2mj_{hashlib.sha256(sizes + about + geoms).hexdigest()[:16]}"
-    yield not mark.exists()
-    with contextlib.suppress(OSError):
-        mark.touch()
