@@ -156,6 +156,16 @@ def plotted(rows: Sequence[dict[str, Any]], longest: float, file: pathlib.Path) 
     figure.savefig(file, dpi=130)
 
 
+def kept(rows: Sequence[dict[str, Any]], longest: float, folder: pathlib.Path) -> None:
+    """Writes what there is so far."""
+    folder.mkdir(parents=True, exist_ok=True)
+    with (folder / "figure_5b.csv").open("w", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(rows)
+    plotted(rows, longest, folder / "figure_5b.png")
+
+
 def main() -> None:
     """Measures, and writes a table (CSV) and a plot."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
@@ -191,12 +201,7 @@ def main() -> None:
                 row |= {"runs": len(won), "demonstrations": len(shown), "pairs": pairs, "loss_apart": round(loss, 5)}
                 rows.append(row)
                 print(rows[-1], flush=True)
-    args.out.mkdir(parents=True, exist_ok=True)
-    with (args.out / "figure_5b.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-    plotted(rows, longest, args.out / "figure_5b.png")
+            kept(rows, longest, args.out)
     print(f"{results.command()}: {time.process_time() - began:.0f} s of processor time")
 
 

@@ -13,5 +13,7 @@
 | `iteration` | a rollout and what is learned from it, on one device or on several |
 | `train`, `checkpoints`, `log` | the loop around an algorithm; what survives a kill; CSV and TensorBoard |
 | `labels`, `demos` | what should be done in a state; demonstrations as HDF5 |
-| `policies`, `evaluate` | policy files, and how good they are |
+| `guidance` | an expert that begins episodes and corrects an actor, ever less |
+| `policies`, `shipped`, `evaluate` | policy files, those that ship with the project, and how good they are |
+| `memory` | how many worlds fit into a device |
 """

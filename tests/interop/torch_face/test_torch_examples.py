@@ -1,4 +1,4 @@
-"""The examples with PyTorch and Stable-Baselines3 train in native worlds, as a user would run them, only shorter."""
+"""The examples with PyTorch, Stable-Baselines3 and skrl train in native worlds, as users run them, only shorter."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import torch
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3] / "examples"))
 
 import sb3_ppo
+import skrl_ppo
 import torch_loop
 
 import ig2mj
@@ -60,3 +61,10 @@ def test_what_was_seen_last_goes_to_stable_baselines3():
     last = np.stack([info["terminal_observation"] for info in infos])
     assert last.shape == obs.shape == first.shape
     assert np.allclose(last[:, -1], 0.0, atol=0.4) and not np.array_equal(last, obs)
+
+
+def test_skrl_trains():
+    agent = skrl_ppo.trained(TASK, WORLDS, 64, engine="native", pool_size=8)
+    before, after = skrl_ppo.Policy, agent.models["policy"]
+    assert isinstance(after, before) and all(torch.isfinite(p).all() for p in after.parameters())
+    assert (after.log_std != -1.0).any()  # it has learnt
