@@ -115,6 +115,12 @@ def test_two_of_it_have_names_of_their_own(folder, home):
     assert scene.model.body("other_upper").id > scene.model.body("rover_hand").id
 
 
+def test_a_robot_that_is_fixed_does_not_navigate(folder):
+    with pytest.raises(EngineError, match="fixed to the floor"):
+        ig2mj.make("PointNavigation", robot=UrdfRobot.load(folder, {"base": "fixed"}), pool_size=1)
+
+
+@pytest.mark.slow
 def test_a_fixed_base_stays(folder, home):
     robot = UrdfRobot.load(folder, {"base": "fixed", "start": {"lift": 0.4}}).at(-1.0, 0.5, 0.0)
     world = GraspingWorld(home, robot)
@@ -122,8 +128,6 @@ def test_a_fixed_base_stays(folder, home):
     world.act(times=5, shoulder_pan=1.0)
     np.testing.assert_allclose(world.body("rover"), [-1.0, 0.5, 0.0], atol=1e-6)
     assert world.proprioception()["lift_qpos"] == pytest.approx(0.4, abs=0.02)
-    with pytest.raises(EngineError, match="fixed to the floor"):
-        ig2mj.make("PointNavigation", robot=robot, pool_size=1)
 
 
 @pytest.mark.parametrize(

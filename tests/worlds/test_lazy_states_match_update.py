@@ -112,8 +112,11 @@ def _changed(view, rng):
     return name, replace_fields(view, {name: array})
 
 
-@pytest.mark.parametrize("goal", [GOAL, "(and (cooked fish) (soaked rag))"])
-@pytest.mark.parametrize("seed", range(3))
+ONLY_STATES = "(and (cooked fish) (soaked rag))"
+"""A goal that asks nothing of where things are: then most of what moves cannot matter."""
+
+
+@pytest.mark.parametrize(("seed", "goal"), [(0, GOAL), (1, GOAL), (2, GOAL), (0, ONLY_STATES), (1, ONLY_STATES)])
 def test_whatever_changes_in_the_view_is_seen(seed, goal):
     model, program, reference = _rules(goal)
     rng, stepper, ours, view = np.random.default_rng(seed), StateStepper(program), _start(model), VIEWS[0]
