@@ -3,9 +3,9 @@
     python benchmarks/ray_scaling.py [--rows 24] [--out benchmarks/results/scaling/ray.json]
 
 The nodes are started on this machine, each held to a processor of its own. Twice the rows are sampled on twice the
-nodes. Where others use the machine's processors as well, wall time says little: the processor time that each row costs
-on its node is told beside it, and weak scaling by it is what two undisturbed processors would give, apart from the
-time in which a node waits for the next piece (`idle`, of the sum of both).
+nodes. Where others use the machine's processors as well, wall time says little (the load average is told); the
+processor time that a row costs on its node is told beside it: twice the ratio of both is the most that weak scaling
+can be. Each run is added to the file.
 """
 
 from __future__ import annotations
@@ -99,16 +99,17 @@ def main() -> None:
             process.terminate()
             process.wait()
     one, two = rows
-    by_processor = 2 * one["processor_seconds_per_row"] / two["processor_seconds_per_row"]
+    ratio = 2 * one["processor_seconds_per_row"] / two["processor_seconds_per_row"]
     found = {
         "rows": rows,
         "weak_scaling_by_wall_time": round(two["rows_per_second"] / one["rows_per_second"], 3),
-        "weak_scaling_by_processor_time": round(by_processor * (1 - two["idle"]) / (1 - one["idle"]), 3),
+        "processor_time_ratio": round(ratio, 3),
         "load_average": os.getloadavg(),
         "machine": machine(-1),
     }
     args.out.parent.mkdir(parents=True, exist_ok=True)
-    args.out.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
+    runs = json.loads(args.out.read_text())["runs"] if args.out.exists() else []
+    args.out.write_text(json.dumps({"runs": [*runs, found]}, indent=1) + "\n", encoding="utf-8")
     print(json.dumps(found))
 
 

@@ -112,10 +112,13 @@ class Journal:
             known = json.loads(file.read_text(encoding="utf-8"))
         except (OSError, ValueError) as e:
             raise InputError(file, f"cannot be read: {e}", fix=f"remove {self.folder}") from e
-        for name in {**known, **self._request}:
-            if known.get(name) != self._request.get(name):
-                was, now = (json.dumps(r.get(name))[:80] for r in (known, self._request))
-                raise InputError(self.out, f"the run that was broken off had {name} = {was}, and here it is {now}")
+        known, wanted = _flat(known), _flat(self._request)
+        for name in {**known, **wanted}:
+            if known.get(name) != wanted.get(name):
+                was, now = (json.dumps(r.get(name))[:80] for r in (known, wanted))
+                fix = f"to begin anew, remove {self.folder}"
+                problem = f"the run that was broken off had {name} = {was}, and here it is {now}"
+                raise InputError(self.out, problem, fix=fix)
 
     def _read(self) -> None:
         with contextlib.suppress(FileNotFoundError):
@@ -168,3 +171,11 @@ class Journal:
 
     def __exit__(self, *error: object) -> None:
         self._unlock()
+
+
+def _flat(request: Mapping[str, Any]) -> dict[str, Any]:
+    """The same with what is inside of tables by its own name, as "versions.numpy"."""
+    found: dict[str, Any] = {}
+    for name, value in request.items():
+        found |= {f"{name}.{k}": v for k, v in value.items()} if isinstance(value, dict) else {name: value}
+    return found
