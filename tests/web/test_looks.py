@@ -36,7 +36,7 @@ def test_what_is_as_at_the_start_looks_plain(world):
 
 def test_warmth_and_cold_colour_an_object_more_and_more(world):
     weights = []
-    for degrees in (30.0, 60.0, 69.0):
+    for degrees in (23.5, 40.0, 69.0):
         world.set_state("temperature", "apple", degrees)
         weights.append(0.0 if look(world, "apple") is None else look(world, "apple").weight)
     assert weights == sorted(weights) and weights[0] == 0 and weights[-1] > 0 and look(world, "apple").colour == HOT

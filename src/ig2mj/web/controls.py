@@ -90,6 +90,7 @@ class Controls:
                 if event.client is not None and run.value in names:
                     runner.seek(0, names.index(run.value))
 
+        self._line_seen = timeline.frame
         self._line = gui.add_slider("Frame", 0, max(timeline.frames - 1, 1), 1, timeline.frame)
 
         @self._line.on_update
@@ -173,8 +174,9 @@ class Controls:
         last = max(timeline.frames - 1, 1)
         if self._line.max != last:
             self._line.max = last
-        if self._runner.playing and self._line.value != timeline.frame:
-            self._line.value = min(timeline.frame, last)
+        shown, self._line_seen = self._line_seen, self._line.value
+        if self._line.value != timeline.frame and (self._runner.playing or self._line.value == shown):
+            self._line.value = self._line_seen = min(timeline.frame, last)  # nobody moves it just now
 
     def _set(self, handle: Any, text: str) -> None:
         """Sends a text only where it changed."""

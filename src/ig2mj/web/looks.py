@@ -56,9 +56,10 @@ def looks_of(model: StateModel, states: ExtendedStates, row: int, colours: str =
 
 
 def _heat(temperature: float) -> float:
-    """-1 (as cold as it gets) .. 0 (room temperature) .. 1 (as hot as it gets), in steps."""
+    """-1 (as cold as it gets) .. 0 (room temperature) .. 1 (as hot as it gets), in steps; a little shows soon."""
     end = HOTTEST if temperature > AMBIENT_TEMPERATURE else COLDEST
     share = (temperature - AMBIENT_TEMPERATURE) / abs(end - AMBIENT_TEMPERATURE)
+    share = float(np.sign(share) * np.sqrt(abs(share)))
     return float(np.clip(np.trunc(share * LEVELS) / LEVELS, -1, 1)) if np.isfinite(share) else 0.0
 
 
