@@ -39,6 +39,7 @@ from ig2mj.demos.writer import FLUSH
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.registry import VECTORS, find_task, make
 from ig2mj.errors import EngineError, InputError
+from ig2mj.tasks.task import Task
 
 MODES = ("action", "state")
 
@@ -233,12 +234,18 @@ def replay(file: str | os.PathLike, by: str = "action", check: bool = True, **op
 
 
 def _environment(recording: Recording, observations: Sequence[str], options: dict[str, Any]) -> Environment:
-    """The environment that a file was recorded in, with a pool of no more than it needs."""
+    """The environment that a file was recorded in.
+
+    Runs begin at frames of their own. Of a pool only navigation's tasks need more, which is where to go; to sample
+    hundreds of an activity's start states would take minutes.
+    """
     task = find_task(recording.value("task", str))
     made = recording.value("made_with", dict)
     robot, grasping = recording.value("robot", str), recording.value("grasping", str)
     worlds, engine = recording.value("worlds", int), recording.value("engine", str)
     if not 0 < worlds <= 65536:
         raise InputError(recording.file, f"is {worlds}", element="attribute worlds")
+    if isinstance(task, Task):
+        made["pool_size"] = 1
     env = make(task, robot, worlds, engine, grasping, observations=observations, **(made | options))
     return env.with_horizon(recording.value("horizon", int))
