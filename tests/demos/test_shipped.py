@@ -1,0 +1,68 @@
+"""Demonstrations that ship: small, of every activity, of successes, and replayed to the last byte."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from ig2mj.demos import Recording, Replayer, find_recording, shipped
+from ig2mj.demos.origin import origin_of_machine
+from ig2mj.demos.shipped import folder
+from ig2mj.errors import UnknownNameError
+from ig2mj.tasks.experts.expert import PLANS
+
+MEGABYTES = 10
+
+
+def test_there_are_32_successes_of_each_activity_in_ten_megabytes():
+    assert shipped() == sorted(PLANS)
+    assert sum(file.stat().st_size for file in folder().iterdir()) < MEGABYTES * 1e6
+    for name in shipped():
+        with Recording(find_recording(name)) as recording:
+            assert recording.header["task"] == name and recording.header["robot"] == "humanoid"
+            assert len(recording.runs) == 32
+            for run in recording.runs:
+                assert run.attributes["success"] and run.attributes["terminated"]
+                action, label = run.all_rows("steps/action"), run.all_rows("steps/devices/expert")
+                assert len(action) == run.frames - 1 and np.abs(action).max() <= 1
+                assert (action != label).any()  # disturbed
+                assert run.all_rows("steps/success").tolist() == [False] * (len(action) - 1) + [True]
+
+
+def test_a_name_that_does_not_ship_is_an_error_with_near_matches():
+    with pytest.raises(UnknownNameError, match="GraspingBook"):
+        find_recording("GraspingBok")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", sorted(PLANS))
+def test_they_replay_by_state_and_where_the_processor_is_the_same_by_action(name):
+    with Recording(find_recording(name)) as recording:
+        replayer, ends = Replayer(recording, "state"), []
+
+        def watch(state, now, frame):
+            ends.extend(bool(np.asarray(state.status.holds)[w]) for w, run in now.items() if frame == run.frames - 1)
+
+        replayer(watch=watch)
+        assert ends == [True] * 32
+        runs = recording.runs[:8]
+        done = Replayer(recording, env=replayer.env)(check=True, runs=runs)
+        here = origin_of_machine()
+        if all(recording.header[key] == here[key] for key in ("processor", "processor_features", "jax")):
+            assert done.differences == []
+        assert done.runs == 8
+
+
+@pytest.mark.slow
+def test_the_example_clones_a_policy_that_succeeds(repository):
+    command = [sys.executable, "examples/imitate.py", "GraspingBook"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=repository)
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout.split("; ")[-1].split()[0]) >= 24, done.stdout
+
+
+def test_the_example_has_60_lines(repository):
+    assert len((repository / "examples" / "imitate.py").read_text().splitlines()) <= 60
