@@ -76,6 +76,7 @@ def test_a_reset_looks_ahead_again(looked):
     assert np.asarray(status.holds).tolist() == [True, True]
 
 
+@pytest.mark.slow
 def test_a_simulation_asks_where_the_head_looks(scene):
     simulation = ig2mj.Simulation(scene)
     assert simulation.predicate("in_fov_of_agent", "ball")
