@@ -15,6 +15,7 @@ from apple_on_table import APPLE_ON_TABLE
 from scipy.spatial.transform import Rotation
 
 from ig2mj.agents.humanoid.frames import MAX_MOVE, MAX_TURN
+from ig2mj.demos import Recording
 from ig2mj.vr.frames import SHAPES, Pose, from_arrays
 from ig2mj.vr.mapping import Robot
 
@@ -50,15 +51,8 @@ def _pose(row: np.ndarray) -> Pose:
 
 def write(recording: pathlib.Path, file: pathlib.Path) -> None:
     """Takes parts: the start, the way to the apple, the grasp, turning with it, and letting go."""
-    import h5py
-
-    with h5py.File(recording) as opened:
-        run = opened["run_000000"]
-
-        def rows(name: str) -> np.ndarray:
-            array = run[name]
-            return np.asarray(array if len(array) > 1 else np.repeat(array, len(run["steps/action"]), axis=0))
-
+    with Recording(recording) as opened:
+        rows = opened.runs[0].all_rows
         trigger = np.flatnonzero(np.diff(rows("steps/devices/triggers")[:, 1]))
         stick = np.flatnonzero(np.abs(rows("steps/devices/sticks")).sum((1, 2)))
         turning = np.flatnonzero(np.abs(rows("steps/action")[:, 5]) > 0.3)

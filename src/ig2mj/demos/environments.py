@@ -120,6 +120,7 @@ class RecordedEnvironment(Environment):
             self._rows = FrameRows(self.core.engine, self._worlds, state)
             steps = ["action", "reward/total", "terminated", "truncated", "success"]
             steps += [f"reward/{name}" for name in self.objective.terms]
+            steps += [f"devices/{name}" for name in self._device_names]
             names = (self._rows.own, self._rows.batched, steps)
             self.writer = RunWriter(self._file, origin_of(self._inner), *names, self._worlds)
             weakref.finalize(self, self.writer.close)
@@ -130,6 +131,7 @@ class RecordedEnvironment(Environment):
         if rows is None:
             rows = np.asarray(pick_rows(jnp.asarray(state.batch.world.key), self.core.starts.pool.size))
         episode = np.asarray(state.batch.episode)
+        self._succeeded[begun] = False
         runs = {w: {"episode": int(episode[w]), "row": int(rows[w]), **about} for w in begun}
         self.writer.begin(runs, *self._rows(state))
         return state
@@ -138,12 +140,15 @@ class RecordedEnvironment(Environment):
         """A frame of all worlds, and the ends of runs."""
         assert self.writer is not None
         terms = (state.info[f"reward/{name}"] for name in self.objective.terms)
-        steps = [state.reward, state.terminated, state.truncated, state.info["success"], *terms]
+        said = (self.devices[name] for name in self._device_names)
+        steps = [state.reward, state.terminated, state.truncated, state.info["success"], *terms, *said]
         if self.pure:
             steps = [np.array(array) for array in steps]
         self.writer.add(*self._rows(state), [action, *steps])
         terminated, truncated = np.asarray(state.terminated), np.asarray(state.truncated)
-        if terminated.any() or truncated.any():
+        if self._past_success:
+            self._succeeded |= np.asarray(state.info["success"])
+        elif terminated.any() or truncated.any():
             success = np.asarray(state.info["success"])
             for world in self._worlds:
                 if terminated[world] or truncated[world]:
