@@ -20,7 +20,7 @@ def apart(world: GraspingWorld) -> float:
 def fingers_around_the_can(home, **options) -> GraspingWorld:
     world = GraspingWorld(home, Fetch(**BESIDE_TABLE), **options)
     world.gripper_to(can(world) + np.array([0, 0, 0.2]), 25, gripper=1.0)
-    world.gripper_to(can(world) + np.array([0, 0, 0.03]), 12, gripper=1.0)
+    world.gripper_to(can(world) + np.array([0, 0, 0.045]), 12, gripper=1.0)
     return world
 
 

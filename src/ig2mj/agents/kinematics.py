@@ -77,6 +77,7 @@ def inverse(
     iterations: int = 6,
     damping: float = 0.05,
     posture: float = 0.02,
+    ease: Float[np.ndarray, "J"] | None = None,
 ) -> Float[Array, "W J"]:
     """Joint positions that bring the tip to a pose, by damped least squares; a fixed number of steps, within limits.
 
@@ -84,8 +85,11 @@ def inverse(
       q: where to begin. pos, quat: wanted, in the base's frame.
       rest: posture that the joints return to as far as the tip is not moved by it.
       damping: of the least squares (m and rad alike). posture: share of the way to `rest` in an iteration.
+      ease: weight of each joint's movement, the larger the more of it; None: all alike. The pose that is reached does
+        not depend on it, only which joints make it.
     """
     low, high = jnp.asarray(chain.lower, q.dtype), jnp.asarray(chain.upper, q.dtype)
+    readily = jnp.ones(q.shape[-1], q.dtype) if ease is None else jnp.asarray(ease, q.dtype)
 
     def step(q: Float[Array, "W J"], _: None) -> tuple[Float[Array, "W J"], None]:
         tip, turned, jacobian = forward(chain, q)
@@ -93,8 +97,9 @@ def inverse(
         error = jnp.concatenate([pos - tip, turn], axis=-1)
         back = posture * (jnp.asarray(rest, q.dtype) - q)
         left = error - jnp.einsum("...ij,...j->...i", jacobian, back)
-        square = jnp.einsum("...ij,...kj->...ik", jacobian, jacobian) + damping**2 * jnp.eye(6, dtype=q.dtype)
-        q = q + back + jnp.einsum("...ij,...i->...j", jacobian, solve_positive(square, left))
+        eased = jacobian * readily
+        square = jnp.einsum("...ij,...kj->...ik", eased, jacobian) + damping**2 * jnp.eye(6, dtype=q.dtype)
+        q = q + back + jnp.einsum("...ij,...i->...j", eased, solve_positive(square, left))
         return jnp.clip(q, low, high), None
 
     return jax.lax.scan(step, q, None, length=iterations)[0]

@@ -21,6 +21,6 @@ SLICING_FRUIT = Task(
     distances=((Hand(0), At("carving_knife_0")), (At("carving_knife_0"), At("apple_0"))),
     robots={
         "humanoid": Acts((2.3, 0.05, 0.55), hands=RIGHT, weights=HUMANOID_WEIGHTS),
-        "fetch": Acts((2.3, 0.0, 0.015)),
+        "fetch": Acts((2.28, -0.12, 0.015), yaw=-15.0),
     },
 )

@@ -1,4 +1,4 @@
-"""Cleaning Stained Shelf: take the towel from above, and draw it flat over the board from stain to stain."""
+"""Cleaning Stained Shelf: take the towel from above, and press it flat on one stain after the other."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from jaxtyping import Float
 from ig2mj.engine.view import Array
 from ig2mj.states.definitions import stain
 from ig2mj.states.particles import world_normals, world_positions
-from ig2mj.tasks.experts.motion import Wish, levelled, where, wish
+from ig2mj.tasks.experts.motion import Wish, levelled, over, where, wish
 from ig2mj.tasks.experts.reaching import take
 from ig2mj.tasks.experts.sight import Sight
 
@@ -18,8 +18,11 @@ TOWEL, SHELF = "hand_towel_0", "shelf_2"
 PRESS = 0.01
 """m below the board that the towel's underside goes for."""
 
-LIFT = 0.005
-"""m above the board at which the towel does not touch it yet."""
+LIFT = 0.02
+"""m above the board on the way to the next stain: an arm that drags what it presses down is held back by friction."""
+
+WITHIN, BLEND = 0.06, 0.03
+"""m from the towel's middle within which a stain is under it, and over which the towel comes down to that."""
 
 FACING_UP = 0.7
 """Smallest z of the normal of a stain that a flat towel wipes."""
@@ -29,7 +32,9 @@ def plan(see: Sight) -> list[Wish]:
     """One hand."""
     towel, (low, _) = see.com(TOWEL), see.box(TOWEL)
     board = see.box(SHELF)[1][:, 2]
-    move = jnp.concatenate([(_nearest(see, towel) - towel)[:, :2], (board - PRESS - low[:, 2])[:, None]], axis=1)
+    underside = jnp.concatenate([towel[:, :2], low[:, 2:]], axis=1)
+    goal = jnp.concatenate([_nearest(see, towel)[:, :2], board[:, None] - PRESS], axis=1)
+    move = over(underside, goal, board + LIFT, near=WITHIN, blend=BLEND)
     return [where(see.holds(TOWEL), wish(move, levelled(see.quat(TOWEL)), close=True), take(see, TOWEL))]
 
 
