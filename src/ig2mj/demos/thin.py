@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import pathlib
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,7 +20,7 @@ from ig2mj.demos.writer import FLUSH, FORMAT, FORMAT_VERSION, PACKED
 
 
 def write_thin(recording: Recording, file: str | os.PathLike, runs: Sequence[Run], **attributes: Any) -> None:
-    """Writes some runs of a recording, numbered anew in their order.
+    """Writes some runs of a recording, numbered anew in their order; the file appears when it is complete.
 
     Args:
       attributes: added to the file's.
@@ -36,7 +37,9 @@ def write_thin(recording: Recording, file: str | os.PathLike, runs: Sequence[Run
         places[1:-1, of_world] = -1
         parts.append(places)
     index = np.concatenate(parts)
-    with h5py.File(file, "w", libver=("v108", "v108")) as out:
+    place = pathlib.Path(file)
+    unfinished = place.with_name(f".{place.name}.{os.getpid()}.part")
+    with h5py.File(unfinished, "w", libver=("v108", "v108")) as out:
         about = {"format": FORMAT, "version": FORMAT_VERSION, "columns": json.dumps(names)}
         for name, value in (recording.header | about | attributes).items():
             out.attrs[name] = value
@@ -56,3 +59,4 @@ def write_thin(recording: Recording, file: str | os.PathLike, runs: Sequence[Run
                 group.attrs[name] = value
             group.attrs["parts"] = np.array([[first, run.frames]])
             first += run.frames
+    unfinished.replace(place)

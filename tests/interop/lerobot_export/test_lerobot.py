@@ -26,7 +26,7 @@ def filmed(tmp_path_factory):
 
 def test_lerobots_loader_reads_every_step_and_its_pictures(filmed):
     info = json.loads((filmed / "meta/info.json").read_text())
-    data = LeRobotDataset("ig2mj/test", root=filmed)
+    data = LeRobotDataset("ig2mj/test", root=filmed, video_backend="pyav")  # torchcodec wants the system's FFmpeg
     assert (data.num_episodes, data.num_frames, data.fps) == (2, info["total_frames"], 10)
     assert data.meta.camera_keys == ["observation.images.rgb"]
     lengths = [data.meta.episodes[k]["length"] for k in range(2)]
@@ -45,7 +45,9 @@ def test_lerobots_loader_reads_every_step_and_its_pictures(filmed):
 
 def test_windows_of_actions_stay_in_their_episode(filmed):
     """Policies such as ACT ask for the next steps' actions."""
-    data = LeRobotDataset("ig2mj/test", root=filmed, delta_timestamps={"action": [k / 10 for k in range(8)]})
+    data = LeRobotDataset(
+        "ig2mj/test", root=filmed, video_backend="pyav", delta_timestamps={"action": [k / 10 for k in range(8)]}
+    )
     last = data.meta.episodes[0]["length"] - 1
     item = data[last]
     assert item["action"].shape[0] == 8 and item["action_is_pad"].tolist() == [False] + [True] * 7
