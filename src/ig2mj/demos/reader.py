@@ -117,6 +117,8 @@ class Run:
         array, places = recording.arrays[name], index[:, column].astype(np.int64)
         if like is not None and (array.shape[1:] != like.shape or array.dtype != like.dtype):
             raise self.broken(name, f"is {array.dtype}{list(array.shape[1:])}, must be {like.dtype}{list(like.shape)}")
+        if name.startswith("frames/") and (places == -1).any():
+            raise self.broken(name, "is not of every frame: the recording has first and last frames only")
         if len(places) and not 0 <= places.min() <= places.max() < len(array):
             raise self.broken(name, f"has {len(array)} rows, and the index names others")
         known, inverse = np.unique(places, return_inverse=True)

@@ -4,8 +4,8 @@
         /demo_0           attribute: num_samples
             /actions /rewards /dones /states [T, ...]   /obs/<name> /next_obs/<name> [T, ...]
 
-`states` are the frames' `qpos` and `qvel`, for people; what a world goes on from is in the recording. Runs of a single
-frame are left out.
+`states` are the frames' `qpos` and `qvel`, for people; thin recordings have none. What a world goes on from is in the
+recording. Runs of a single frame are left out.
 
 Axis: T steps of a run.
 """
@@ -61,9 +61,14 @@ def _write(group: Any, run: Run, seen: dict[str, np.ndarray]) -> None:
     ends = [run.all_rows(f"steps/{name}") for name in ("terminated", "truncated")]
     group["actions"], group["rewards"] = steps["action"], steps["reward/total"]
     group["dones"] = (ends[0] | ends[1]).astype(np.int64)
-    parts = [f"frames/physics/{part}/{name}" for name in ("qpos", "qvel") for part in ("scene", "agents")]
-    group["states"] = np.concatenate([run.all_rows(name)[:-1] for name in parts], axis=1)
+    if run.kept(1, 2).all():  # a thin recording has none
+        _write_states(group, run)
     for name, array in seen.items():
         packed = {"compression": "gzip", "compression_opts": 1} if array.ndim > 2 else {}
         group.create_dataset(f"obs/{name}", data=array[:-1], **packed)
         group.create_dataset(f"next_obs/{name}", data=array[1:], **packed)
+
+
+def _write_states(group: Any, run: Run) -> None:
+    parts = [f"frames/physics/{part}/{name}" for name in ("qpos", "qvel") for part in ("scene", "agents")]
+    group["states"] = np.concatenate([run.all_rows(name)[:-1] for name in parts], axis=1)
