@@ -1,12 +1,14 @@
 """Warp kernels that cost what is awake, not what could be: changes to MuJoCo Warp 3.17.0 for households.
 
-Nearly everything in a home sleeps, but five parts of MuJoCo Warp's step cost as if nothing did. Engines of ours run
+Nearly everything in a home sleeps, but six parts of MuJoCo Warp's step cost as if nothing did. Engines of ours run
 these in their place; results are the same up to rounding:
 
 - The factorisations of the compacted solver run over the buffer (`nvmax`, sized for the worst moment of the busiest
   world) though the rest of it is identity. Here they stop after the degrees of freedom awake in each world.
 - The same for filling those matrices.
-- The broad phase of collision detection goes through all pairs of geoms (`broadphase`).
+- The broad phase of collision detection goes through all pairs of geoms (`broadphase`). Its pairs are sorted by type
+  here (`sorted_pairs`).
+- One thread of each world puts its trees to sleep, one after the other (`sleeping`).
 - Gravity compensation is launched for every (world, body, degree of freedom). Here it is for every (world, body).
 - The velocity stage runs again at the end of a step with sleep, only to renew derived quantities (`cvel`,
   `qfrc_bias`) that the next step computes anew from positions and velocities. Here they are those of the step's
