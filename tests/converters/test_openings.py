@@ -80,6 +80,7 @@ def as_groups(meshes):
                                  enumerate(meshes)], grouped=True)  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_dishwasher_rack_of_90_wires_gets_the_pieces_that_it_needs():
     """Wires cannot be merged for nothing: what the budget does not give is told, with the number that would do."""
     coarse, usual, enough = (

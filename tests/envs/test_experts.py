@@ -48,6 +48,7 @@ def test_every_expert_belongs_to_an_activity():
     assert set(PLANS) <= set(ACTIVITIES)
 
 
+@pytest.mark.slow
 def test_an_expert_is_a_pure_function_of_each_world():
     """It may be traced, and what it does in a world does not depend on other worlds or on what it saw before."""
     env = ig2mj.make("CookingMeat", worlds=4, engine="native", split="held_out", pool_size=4)

@@ -19,6 +19,7 @@ def point():
     return ig2mj.make(task, worlds=4, pool_size=ROWS, observations=("proprioception", "privileged_state", "task_obs"))
 
 
+@pytest.mark.slow
 def test_every_promise_is_kept(point):
     api_test(point)
 

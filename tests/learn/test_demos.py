@@ -50,6 +50,7 @@ def test_runs_are_whole_episodes_that_end_with_success(recorded):
     assert not np.allclose(demos.label, demos.action)
 
 
+@pytest.mark.slow
 def test_a_clone_does_what_the_expert_does(recorded):
     env, file = recorded
     world, spaces = about(file)

@@ -12,6 +12,7 @@ from ig2mj.viewer.film import ffmpeg_program
 from ig2mj.viewer.offscreen import default_backend
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(default_backend() == "warp", reason="the ray caster takes seconds for a picture")
 def test_a_film_shows_one_episode_and_its_end(tmp_path):
     import subprocess

@@ -52,6 +52,7 @@ def test_the_known_hashes_are_of_the_present_pools():
     assert known <= files
 
 
+@pytest.mark.slow
 def test_a_small_pool_has_no_known_hash(cache):
     pool_of(TASK, count=2)
     file = pool_file(TASK, bare_scene(TASK), count=2)
