@@ -66,7 +66,7 @@ def test_every_block_says_what_it_is():
         f"{page.relative_to(ROOT)}: {text.splitlines()[0]}"
         for page in PAGES
         for _, language, text in blocks(page)
-        if language not in ("python", "sh", "lisp", "text", "json", "xml")
+        if language not in ("python", "sh", "lisp", "text", "json", "toml", "xml")
     ]
     assert not unknown, "\n".join(unknown)
     assert with_python and with_commands

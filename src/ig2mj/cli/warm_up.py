@@ -32,15 +32,15 @@ def run(
       out: the cache's folder; default: the user's own, or IG2MJ_CACHE_DIR.
       json: print one JSON object.
     """
-    import os
     import sys
     import time
 
     began = time.perf_counter()
-    from ig2mj.process.compilation import CACHE_VARIABLE, cache_folder
+    from ig2mj.process.compilation import cache_folder
+    from ig2mj.process.settings import keep_compiled_in
 
     if out is not None:
-        os.environ[CACHE_VARIABLE] = str(out.expanduser().resolve())
+        keep_compiled_in(out)
     seconds = _timed(what, worlds, robot, observations, engine)
     seconds["all"] = time.perf_counter() - began
     folder = cache_folder()

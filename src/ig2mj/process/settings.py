@@ -70,6 +70,16 @@ def use_processor_only() -> None:
     jax.config.update("jax_platforms", "cpu")
 
 
+def keep_compiled_in(folder: pathlib.Path) -> None:
+    """Compiled kernels and programs of this process are kept in this folder; before the first engine is made."""
+    os.environ[CACHE_VARIABLE] = str(folder.expanduser().resolve())
+
+
+def name_opengl_platform() -> None:
+    """PyOpenGL is for the platform that this process draws with, EGL where it does not draw yet, if nobody decided."""
+    os.environ.setdefault("PYOPENGL_PLATFORM", used_gl() or "egl")
+
+
 @functools.cache
 def prepare_warp() -> None:
     """Warp reports compilation as the rest of ig2mj does, keeps kernels where IG2MJ_CACHE_DIR says, and is repaired."""

@@ -91,7 +91,7 @@ def sample_open(
     end = tables.openable_open if value else tables.openable_closed
     if value and not model.paper:
         both_sides = tables.object_both_sides[tables.openable_object]
-        end = np.where(both_sides, _other_thresholds(model), end)
+        end = np.where(both_sides, other_thresholds(model), end)
     share = 1.0 if fully else uniform(place, joint_pos.shape, SHARE[0], SHARE[1])
     target = thresholds(model) + share * (end - thresholds(model))
     return xp.where(moves, target, joint_pos).astype(np.float32), moves

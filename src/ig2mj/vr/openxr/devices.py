@@ -14,7 +14,6 @@ from __future__ import annotations
 import contextlib
 import ctypes
 import dataclasses
-import os
 import queue
 import time
 from typing import Any, Protocol, runtime_checkable
@@ -23,7 +22,7 @@ import numpy as np
 
 from ig2mj.errors import EngineError, MissingDependencyError
 from ig2mj.install_hint import pip_install_extra
-from ig2mj.process.settings import used_gl
+from ig2mj.process.settings import name_opengl_platform
 from ig2mj.vr.frames import Gaze, Hand, PoseFrame
 from ig2mj.vr.openxr import actions
 from ig2mj.vr.stereo import Eye
@@ -73,7 +72,7 @@ def load_xr() -> Any:
     On Linux it makes PyOpenGL one of GLX, with which MuJoCo can no longer draw by EGL; that is undone.
     """
     try:
-        os.environ.setdefault("PYOPENGL_PLATFORM", used_gl() or "egl")
+        name_opengl_platform()
         import OpenGL.EGL  # both before xr, so that they are made for this platform
         import OpenGL.GL
         import OpenGL.platform
