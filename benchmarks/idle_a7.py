@@ -256,16 +256,11 @@ def main(args: Args) -> list[dict[str, Any]]:
                 rows.append(measure(home, place, args, backend))
     settings = {"image": SIZE, "rest_steps": args.rest_steps, "rounds": args.rounds, "block_s": args.seconds}
     folder = results.save("idle_a7", CORE, settings | {"opengl": backend}, rows, tables(rows), args.out)
-    series = {
-        label: [row["rates"][name]["steps_per_cpu_s"] if name in row["rates"] else None for row in rows]
-        for name, label in LABELS.items()
-        if any(name in row["rates"] for row in rows)
-    }
     plots.grouped_bars(
         folder / "plot.png",
         "Idle homes, one core",
         [_label(row) for row in rows],
-        series,
+        plots.rates(rows, LABELS),
         "steps of 1/30 s per second of one core",
     )
     return rows

@@ -145,16 +145,11 @@ def main(args: Args) -> list[dict[str, Any]]:
     ]
     settings = {"image": SIZE, "rest_steps": args.rest_steps, "rounds": args.rounds, "opengl": backend}
     folder = results.save("idle_robots", CORE, settings, rows, tables, args.out)
-    series = {
-        text: [row["rates"][name]["steps_per_cpu_s"] if name in row["rates"] else None for row in rows]
-        for name, text in LABELS.items()
-        if any(name in row["rates"] for row in rows)
-    }
     plots.grouped_bars(
         folder / "plot.png",
         "Idle robots, one core",
         [label(row) for row in rows],
-        series,
+        plots.rates(rows, LABELS),
         "steps of 1/30 s per second of one core",
     )
     return rows

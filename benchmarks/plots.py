@@ -40,6 +40,15 @@ def grouped_bars(
     plt.close(figure)
 
 
+def rates(rows: Sequence[Mapping], labels: Mapping[str, str]) -> dict[str, list[float | None]]:
+    """Steps a second of one core by label, for `grouped_bars`: one number for each row that has it."""
+    return {
+        label: [row["rates"][name]["steps_per_cpu_s"] if name in row["rates"] else None for row in rows]
+        for name, label in labels.items()
+        if any(name in row["rates"] for row in rows)
+    }
+
+
 def stacked_bars(
     file: pathlib.Path, title: str, groups: Sequence[str], parts: Mapping[str, Sequence[float]], ylabel: str
 ) -> None:

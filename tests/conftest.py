@@ -66,6 +66,19 @@ def shared_data() -> Path:
     return folder
 
 
+@pytest.fixture(scope="module")
+def gpu():
+    """Everything of a file that uses this runs on the first CUDA device."""
+    import jax
+
+    try:
+        device = jax.devices("cuda")[0]
+    except RuntimeError:
+        pytest.skip("JAX sees no CUDA device; on a machine that has one: make test-gpu")
+    with jax.default_device(device):
+        yield device
+
+
 @pytest.fixture(scope="session")
 def tiny_home_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Folder of a small home in the project's format, see tests/tiny_home.py."""

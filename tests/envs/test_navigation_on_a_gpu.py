@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import jax
 import numpy as np
 import pytest
 from navigating import column, drive, small
@@ -11,20 +10,9 @@ import ig2mj
 from ig2mj.sensors.base import SensorOptions
 from ig2mj.testing import api_test
 
-pytestmark = [pytest.mark.gpu, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.gpu, pytest.mark.timeout(900), pytest.mark.usefixtures("gpu")]
 
 WORLDS, ROWS = 32, 16
-
-
-@pytest.fixture(scope="module", autouse=True)
-def gpu():
-    """Everything of this file runs on the first CUDA device."""
-    try:
-        device = jax.devices("cuda")[0]
-    except RuntimeError:
-        pytest.skip("JAX sees no CUDA device; on a machine that has one: make test-gpu")
-    with jax.default_device(device):
-        yield device
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import jax
 import numpy as np
 import pytest
 from perceiving import Perceiving
@@ -11,7 +10,7 @@ from ig2mj.agents.fetch import Fetch
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.engine.base import Write
 
-pytestmark = [pytest.mark.gpu, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.gpu, pytest.mark.timeout(900), pytest.mark.usefixtures("gpu")]
 
 WORLDS = 64
 LASERS = ("scan", "lidar", "occupancy_grid")
@@ -19,17 +18,6 @@ OPTIONS = {"scan_rays": 121, "scan_angle": 240.0, "lidar_columns": 40}
 SIDES = {"scan": 1e-3, "lidar": 5e-3, "occupancy_grid": 0.1}
 SHARE = {"scan": 0.98, "lidar": 0.98, "occupancy_grid": 0.98}
 """How near a reading has to be to the native one, and what share of them: rays that graze an edge may miss it."""
-
-
-@pytest.fixture(scope="module", autouse=True)
-def gpu():
-    """Everything of this file runs on the first CUDA device."""
-    try:
-        device = jax.devices("cuda")[0]
-    except RuntimeError:
-        pytest.skip("JAX sees no CUDA device; on a machine that has one: make test-gpu")
-    with jax.default_device(device):
-        yield device
 
 
 def alike(native: np.ndarray, warp: np.ndarray, name: str) -> bool:

@@ -128,6 +128,15 @@ class Person:
             time.sleep(pause)
 
 
+def enter(page, served) -> None:
+    """Opens the page in a headset that is not there, and enters: a picture for each eye."""
+    wear_headset(page)
+    page.goto(served.server.url)
+    page.wait_for_function("ig2mj.ready")
+    page.dispatch_event("#enter", "click")
+    page.wait_for_function("ig2mj.views == 2")
+
+
 def test_a_person_in_a_headset_puts_an_apple_on_the_table_and_the_recording_replays(env, tmp_path, pytestconfig):
     source, stop = PagePoses(stale=30.0), threading.Event()
     pictures = pytestconfig.rootpath / "out" / "vr"
@@ -138,11 +147,7 @@ def test_a_person_in_a_headset_puts_an_apple_on_the_table_and_the_recording_repl
         driving.start()
         try:
             with HomePage(session, source, access_for(None, 0)) as served:
-                wear_headset(page)
-                page.goto(served.server.url)
-                page.wait_for_function("ig2mj.ready")
-                page.dispatch_event("#enter", "click")
-                page.wait_for_function("ig2mj.views == 2")  # a picture for each eye
+                enter(page, served)
                 page.wait_for_function("ig2mj.pictures > 3")
                 person = Person(page, session, source)
                 person.until(lambda: session.memory.body is not None)
@@ -216,11 +221,7 @@ def test_slow_physics_never_slows_the_head(env, monkeypatch):
         driving.start()
         try:
             with HomePage(session, source, access_for(None, 0)) as served:
-                wear_headset(page)
-                page.goto(served.server.url)
-                page.wait_for_function("ig2mj.ready")
-                page.dispatch_event("#enter", "click")
-                page.wait_for_function("ig2mj.views == 2")
+                enter(page, served)
 
                 def rates() -> tuple[float, float, float]:
                     before, steps, start = (

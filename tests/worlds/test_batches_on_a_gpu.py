@@ -27,20 +27,9 @@ from ig2mj.simulation import Simulation
 from ig2mj.states.model import StateModel
 from ig2mj.worlds import Core, Rules
 
-pytestmark = [pytest.mark.gpu, pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.gpu, pytest.mark.timeout(900), pytest.mark.usefixtures("gpu")]
 
 HOME, WORLDS, STEPS = "aspen", 256, 240
-
-
-@pytest.fixture(scope="module", autouse=True)
-def gpu():
-    """Everything of this file runs on the first CUDA device."""
-    try:
-        device = jax.devices("cuda")[0]
-    except RuntimeError:
-        pytest.skip("JAX sees no CUDA device; on a machine that has one: make test-gpu")
-    with jax.default_device(device):
-        yield device
 
 
 @pytest.fixture(scope="module")

@@ -90,6 +90,7 @@ def _replayed(
     out: pathlib.Path | None,
     threads: int,
 ) -> Replayed:
+    from ig2mj.demos.pieces import Observing
     from ig2mj.demos.reader import Recording
     from ig2mj.demos.replay import Replayer
     from ig2mj.envs.registry import VECTORS
@@ -102,7 +103,7 @@ def _replayed(
             if video is not None:
                 watchers.append(_Filming(video, replayer.env))
             if names:
-                watchers.append(_Observing(out or file.with_suffix(".sensors.h5"), names))
+                watchers.append(Observing.into(out or file.with_suffix(".sensors.h5"), names))
 
             def watch(state: EnvState, runs: dict[int, Run], frame: int) -> None:
                 for watcher in watchers:
@@ -162,28 +163,3 @@ class _Filming:
 
     def close(self) -> None:
         self._film.close()
-
-
-class _Observing:
-    """Observations of all runs: `/run_000000/<name>` [T + 1, ...], written frame by frame."""
-
-    def __init__(self, file: pathlib.Path, names: tuple[str, ...]):
-        import h5py
-
-        self._opened, self._names = h5py.File(file, "w"), names
-        self._opened.attrs["format"] = "ig2mj observations"
-
-    def see(self, state: EnvState, runs: dict[int, Run], frame: int) -> None:
-        import numpy as np
-
-        for world, run in runs.items():
-            for name in self._names:
-                row, path = np.asarray(state.obs[name])[world], f"{run.name}/{name}"
-                if path not in self._opened:
-                    self._opened.create_dataset(
-                        path, (run.frames, *row.shape), row.dtype, chunks=(1, *row.shape), compression="gzip"
-                    )
-                self._opened[path][frame] = row  # pyright: ignore[reportIndexIssue]
-
-    def close(self) -> None:
-        self._opened.close()

@@ -80,6 +80,15 @@ class Observing:
         """`opened`: an HDF5 file."""
         self._opened, self._names = opened, names
 
+    @classmethod
+    def into(cls, file: pathlib.Path, names: Sequence[str]) -> Observing:
+        """With a new file of its own."""
+        import h5py
+
+        opened = h5py.File(file, "w")
+        opened.attrs["format"] = "ig2mj observations"
+        return cls(opened, names)
+
     def see(self, state: EnvState, runs: Mapping[int, Run], frame: int) -> None:
         """Writes a frame of each run that goes on."""
         for world, run in runs.items():
@@ -90,6 +99,10 @@ class Observing:
                         path, (run.frames, *row.shape), row.dtype, chunks=(1, *row.shape), compression="gzip"
                     )
                 self._opened[path][frame] = row
+
+    def close(self) -> None:
+        """Closes the file."""
+        self._opened.close()
 
 
 def join_replays(parts: Iterable[bytes], out: pathlib.Path | None) -> dict[str, Any]:

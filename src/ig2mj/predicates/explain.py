@@ -19,13 +19,21 @@ if TYPE_CHECKING:
     from ig2mj.predicates.compile import CompiledExpression
 
 
-def explain(compiled: CompiledExpression, states: ExtendedStates, view: PhysicsView, world: int = 0) -> str:
-    """Readable text about one world: one line when the expression holds, else what is missing."""
+def truth_in(
+    compiled: CompiledExpression, states: ExtendedStates, view: PhysicsView, world: int
+) -> tuple[Context, dict[Atom, bool]]:
+    """What one world is like, and which atoms of the expression hold in it."""
     states, view = jax.tree.map(lambda leaf: np.asarray(leaf)[world : world + 1], (states, view))
     questions = compiled.questions or Questions.of(compiled.model)
     context = Context(compiled.model, states, view, questions.relations(states, view))
     truth = np.asarray(compiled.literals.combine(questions.facts(compiled.literals, states, view), states.sliced))[0]
     table = dict(zip(compiled.atoms, truth.tolist(), strict=True))
+    return context, table
+
+
+def explain(compiled: CompiledExpression, states: ExtendedStates, view: PhysicsView, world: int = 0) -> str:
+    """Readable text about one world: one line when the expression holds, else what is missing."""
+    context, table = truth_in(compiled, states, view, world)
     if value_of(compiled.ground, table):
         return f"{logic.text(compiled.source)} holds."
     lines = [f"{logic.text(compiled.source)} does not hold. Missing:"]

@@ -5,15 +5,10 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING
 
-import jax
-import numpy as np
-
 from ig2mj.engine.view import PhysicsView
 from ig2mj.predicates import logic
-from ig2mj.predicates.base import Context
-from ig2mj.predicates.explain import pairs_found, reason_of, value_of
+from ig2mj.predicates.explain import pairs_found, reason_of, truth_in, value_of
 from ig2mj.predicates.logic import And, Atom, Exactly, Expression, Not, Or, Pairing
-from ig2mj.predicates.questions import Questions
 from ig2mj.states.world import ExtendedStates
 
 if TYPE_CHECKING:
@@ -45,11 +40,7 @@ class Part:
 
 def tree(compiled: CompiledExpression, states: ExtendedStates, view: PhysicsView, world: int = 0) -> Part:
     """The expression in one world, without quantifiers: they are written out for the scene's objects."""
-    states, view = jax.tree.map(lambda leaf: np.asarray(leaf)[world : world + 1], (states, view))
-    questions = compiled.questions or Questions.of(compiled.model)
-    context = Context(compiled.model, states, view, questions.relations(states, view))
-    truth = np.asarray(compiled.literals.combine(questions.facts(compiled.literals, states, view), states.sliced))[0]
-    table = dict(zip(compiled.atoms, truth.tolist(), strict=True))
+    context, table = truth_in(compiled, states, view, world)
     reason = reason_of(compiled, context)
 
     def part(e: Expression, wanted: bool) -> Part:

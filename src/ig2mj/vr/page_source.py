@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
-import threading
 import time
 from collections.abc import Callable
 
 from ig2mj.vr.desktop import DesktopPoses
-from ig2mj.vr.frames import PlayArea, Pose, PoseFrame
+from ig2mj.vr.fed_poses import FedPoses
+from ig2mj.vr.frames import PoseFrame
 from ig2mj.vr.messages import Desktop, Devices
-from ig2mj.vr.play_area import brought_to, moved
+from ig2mj.vr.play_area import moved
 
 STALE = 1.0
 """s of silence of a headset: its browser stops drawing, and so telling, when it is taken off."""
@@ -18,21 +17,16 @@ STALE = 1.0
 Pulse = Callable[[int, float, float], None]
 
 
-class PagePoses:
-    """A `PoseSource` that pages feed. All methods may be called from any thread.
-
-    Attributes: area: where the play area is now.
-    """
+class PagePoses(FedPoses):
+    """A `PoseSource` that pages feed. All methods may be called from any thread."""
 
     def __init__(self, stale: float = STALE) -> None:
         """Nobody is there. `stale`: s without news from a headset after which nobody wears it."""
+        super().__init__()
         self._stale = stale
-        self._lock = threading.Lock()
         self._desktop: DesktopPoses | None = None
-        self._frame: PoseFrame | None = None
         self._heard = self._advanced = 0.0
         self._pulse: Pulse | None = None
-        self.area = PlayArea()
 
     # From pages.
 
@@ -78,17 +72,9 @@ class PagePoses:
     # For the session.
 
     def poll(self) -> PoseFrame | None:
-        """The newest frame; None while nobody is there."""
+        """The newest frame, after what sticks and keys have done; None while nobody is there."""
         self.advance()
-        with self._lock:
-            return None if self._frame is None else dataclasses.replace(self._frame, area=self.area)
-
-    def stand_at(self, body: Pose) -> PoseFrame | None:
-        """See `PoseSource`."""
-        with self._lock:
-            if self._frame is not None and self._frame.head is not None:
-                self.area = brought_to(self.area, self._frame.head, body)
-        return self.poll()
+        return super().poll()
 
     def pulse(self, hand: int, strength: float, seconds: float) -> None:
         """See `PoseSource`."""

@@ -154,9 +154,11 @@ def _joined(steps: list[StepContacts]) -> StepContacts:
     first = np.cumsum([0, *(len(contacts.force) for contacts in steps[:-1])])
     address = [np.where(c.address >= 0, c.address + at, c.address) for c, at in zip(steps, first, strict=True)]
     return StepContacts(
-        *(np.concatenate([getattr(c, name) for c in steps]) for name in ("meets", "geom")),
-        np.concatenate(address),
-        *(np.concatenate([getattr(c, name) for c in steps]) for name in ("dim", "force")),
+        meets=np.concatenate([c.meets for c in steps]),
+        geom=np.concatenate([c.geom for c in steps]),
+        address=np.concatenate(address),
+        dim=np.concatenate([c.dim for c in steps]),
+        force=np.concatenate([c.force for c in steps]),
     )
 
 

@@ -266,7 +266,7 @@ class NativeEngine:
         squares = np.einsum("wnk,wnk->wn", velocity, velocity)
         return Health(
             overflow=np.zeros(count, np.int32),
-            finite=np.isfinite(positions).all(1) & np.isfinite(velocity).all((1, 2)),
+            finite=np.asarray(np.isfinite(positions).all(1) & np.isfinite(velocity).all((1, 2))),
             top_speed=np.sqrt(squares.max(1, initial=0.0)),
             wrong_controls=wrong,
         )

@@ -13,22 +13,22 @@ import time
 from typing import Any
 
 from ig2mj.envs.environment import Environment
-from ig2mj.vr.frames import PlayArea, Pose, PoseFrame
+from ig2mj.vr.fed_poses import FedPoses
+from ig2mj.vr.frames import PoseFrame
 from ig2mj.vr.openxr.devices import Frame, Headset
 from ig2mj.vr.openxr.egl import EglGraphics
-from ig2mj.vr.play_area import brought_to, moved
+from ig2mj.vr.play_area import moved
 from ig2mj.vr.session import Session
 from ig2mj.vr.stereo import Eye
 
 
-class OpenXRPoses:
-    """A `PoseSource`: the devices of a `Headset`, fed by its loop. Attributes: area: where the play area is."""
+class OpenXRPoses(FedPoses):
+    """A `PoseSource`: the devices of a `Headset`, fed by its loop."""
 
     def __init__(self, headset: Headset):
         """Nobody is there before the first frame."""
-        self._headset, self._lock = headset, threading.Lock()
-        self._frame: PoseFrame | None = None
-        self.area = PlayArea()
+        super().__init__()
+        self._headset = headset
 
     def feed(self, frame: PoseFrame | None) -> None:
         """What devices say now; None: the session does not run."""
@@ -37,18 +37,6 @@ class OpenXRPoses:
                 last = self._frame.time if self._frame is not None else frame.time
                 self.area = moved(self.area, frame, frame.time - last)
             self._frame = frame
-
-    def poll(self) -> PoseFrame | None:
-        """The newest frame."""
-        with self._lock:
-            return None if self._frame is None else dataclasses.replace(self._frame, area=self.area)
-
-    def stand_at(self, body: Pose) -> PoseFrame | None:
-        """See `PoseSource`."""
-        with self._lock:
-            if self._frame is not None and self._frame.head is not None:
-                self.area = brought_to(self.area, self._frame.head, body)
-        return self.poll()
 
     def pulse(self, hand: int, strength: float, seconds: float) -> None:
         """See `PoseSource`."""

@@ -6,8 +6,7 @@ these in their place; results are the same up to rounding:
 - The factorisations of the compacted solver run over the buffer (`nvmax`, sized for the worst moment of the busiest
   world) though the rest of it is identity. Here they stop after the degrees of freedom awake in each world.
 - The same for filling those matrices.
-- The broad phase of collision detection goes through all pairs of geoms (`broadphase`). Its pairs are sorted by type
-  here (`sorted_pairs`).
+- The broad phase of collision detection goes through all pairs of geoms (`broadphase`).
 - One thread of each world puts its trees to sleep, one after the other (`sleeping`).
 - Gravity compensation is launched for every (world, body, degree of freedom). Here it is for every (world, body).
 - The velocity stage runs again at the end of a step with sleep, only to renew derived quantities (`cvel`,

@@ -5,7 +5,7 @@ a home of 60 objects with 600 colliding geoms that is more than half of its phys
 new. Here each kinematic tree that is awake gets a box around the bounding spheres of its geoms (`_boxes`); geoms whose
 spheres reach into one of a world's boxes become its candidates (`_candidates`); awake geoms and candidates are held
 against each other, spheres first, then by MuJoCo Warp's own filter (`_pairs_kernel`). The pairs found are the same, in
-another order; then they are sorted by the types of their geoms (`sorted_pairs`).
+another order.
 """
 
 # Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
@@ -19,8 +19,6 @@ from typing import Any, no_type_check
 import warp as wp
 from mujoco.mjx.third_party.mujoco_warp._src import collision_driver, types
 from mujoco.mjx.third_party.mujoco_warp._src.math import upper_tri_index
-
-from ig2mj.engine.warp.patches.sorted_pairs import sort_pairs
 
 LANES = 32
 """Threads that share the candidates of one world."""
@@ -239,7 +237,7 @@ def _pairs_kernel(
 
 
 def awake_broadphase(m: Any, d: Any, ctx: Any, awake_prev: Any = None) -> None:
-    """Finds pairs of geoms that may touch, where at least one is awake, sorted by the types of their geoms.
+    """Finds pairs of geoms that may touch, where at least one is awake.
 
     Args:
       m, d, ctx: MuJoCo Warp's model, data and collision context. The model must have sleep on, no explicit contact
@@ -293,7 +291,6 @@ def awake_broadphase(m: Any, d: Any, ctx: Any, awake_prev: Any = None) -> None:
         ],
         outputs=[d.ncollision, ctx.collision_pair, ctx.collision_pairid, ctx.collision_worldid],
     )
-    sort_pairs(m, d, ctx)
 
 
 def serves(m: Any) -> bool:

@@ -44,8 +44,6 @@ PINS: dict[str, dict[str, str]] = {
         "_broadphase_filter": "41a3e719defc2bbb",
         "_mesh_missing": "ba0b184b9e6feeb6",
         "_add_geom_pair": "a263137856fb448b",
-        "create_collision_context": "17130b8ffb859316",
-        "_narrowphase": "ee2ccd9e09b5570d",
     },
     "third_party.mujoco_warp._src.sleep": {
         "sleep": "26f96a277dece2bd",
