@@ -65,3 +65,13 @@ def test_a_pool_of_the_usual_size_is_made_anew_byte_for_byte(cache):
     pool_of(task, jobs=2)
     file = pool_file(task, bare_scene(task))
     assert pool_hash(file) == known_hash(file)
+
+
+def test_hashes_are_collected_in_the_form_of_those_on_file(tmp_path):
+    from ig2mj.cli.sample_task import note_hash
+
+    file = tmp_path / "out" / "hashes.json"
+    for name, digest in (("b.npz", "2"), ("a.npz", "1"), ("b.npz", "3")):
+        note_hash(file, name, digest)
+    assert file.read_text() == json.dumps({"a.npz": "1", "b.npz": "3"}, indent=1) + "\n"
+    assert HASHES.read_text() == json.dumps(json.loads(HASHES.read_text()), indent=1) + "\n"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import pathlib
 from typing import TYPE_CHECKING, Annotated
 
 import tyro
@@ -16,6 +18,7 @@ def run(
     count: int = 0,
     jobs: int = 0,
     anew: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    hashes: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
 ) -> int:
     """Sample the start states of an environment, and keep them where `ig2mj.make` finds them.
 
@@ -28,35 +31,65 @@ def run(
       count: rows; 0: 512 for training, 1000 held out.
       jobs: processes; 0: one per processor.
       anew: sample them even if they are there.
+      hashes: JSON file that gets the hashes of the pools, one after the other, by the names of their files; in the form
+        of the hashes that come with ig2mj (src/ig2mj/tasks/pool_hashes.json). What it has already stays.
     """
     from ig2mj.envs.registry import find_task
     from ig2mj.errors import Ig2mjError, UnknownNameError
     from ig2mj.tasks.activities import ACTIVITIES
-    from ig2mj.tasks.pools import SEEDS
+    from ig2mj.tasks.pools import COUNT
     from ig2mj.tasks.task import Task
 
     if count < 0 or jobs < 0:
         raise Ig2mjError(f"--count {count}, --jobs {jobs}: neither can be negative")
     if task == "all":
-        return max(_keep(each, part, count, jobs, anew) for each in ACTIVITIES.values() for part in SEEDS)
+        return _keep([(each, part) for part in COUNT for each in ACTIVITIES.values()], count, jobs, anew, hashes)
     found = find_task(task)
     if not isinstance(found, Task):
         raise UnknownNameError("task with a pool of start states", task, ACTIVITIES)
-    return _keep(found, split, count, jobs, anew)
+    return _keep([(found, split)], count, jobs, anew, hashes)
 
 
-def _keep(task: Task, split: str, count: int, jobs: int, anew: bool) -> int:
-    """Samples one pool unless it is there; 1 where it is not the one of the known hash."""
+def _keep(wanted: list[tuple[Task, str]], count: int, jobs: int, anew: bool, hashes: pathlib.Path | None) -> int:
+    """Samples the pools that are not there, side by side; 1 where one is not that of the known hash."""
+    import concurrent.futures
+    import contextlib
+
     from ig2mj.cli.printing import add_bar, progress_bar
-    from ig2mj.tasks.pools import bare_scene, known_hash, pool_file, pool_hash, pool_of
+    from ig2mj.tasks.pools import bare_scene, known_hash, pool_file, pool_hash, pool_of, sampling_processes
 
-    file = pool_file(task, bare_scene(task), split, count or None)
-    if anew:
-        file.unlink(missing_ok=True)
-    with progress_bar() as bar:
-        report = add_bar(bar, f"start states of {task.name}")
-        pool = pool_of(task, split, count or None, jobs=jobs, progress=lambda made, wanted: report("", made, wanted))
-    digest, known = pool_hash(file), known_hash(file)
-    note = "" if known is None else ", the known hash" if known == digest else f", NOT THE KNOWN HASH {known}"
-    print(f"{file}: {pool.size} start states of {task.name} ({split}), sha256 {digest}{note}")
-    return int(known is not None and known != digest)
+    status = 0
+    with contextlib.ExitStack() as stack:
+        workers = None if jobs == 1 else stack.enter_context(sampling_processes(jobs))
+        bar = stack.enter_context(progress_bar())
+
+        def make(task: Task, split: str) -> tuple[pathlib.Path, int]:
+            file = pool_file(task, bare_scene(task), split, count or None)
+            if anew:
+                file.unlink(missing_ok=True)
+            report = add_bar(bar, f"start states of {task.name} ({split})")
+            pool = pool_of(
+                task,
+                split,
+                count or None,
+                progress=lambda made, wanted: report("", made, wanted),
+                workers=workers,
+            )
+            return file, pool.size
+
+        threads = stack.enter_context(concurrent.futures.ThreadPoolExecutor(1 if jobs == 1 else len(wanted)))
+        for (task, split), (file, size) in zip(wanted, threads.map(lambda pair: make(*pair), wanted), strict=True):
+            digest, known = pool_hash(file), known_hash(file)
+            note = "" if known is None else ", the known hash" if known == digest else f", NOT THE KNOWN HASH {known}"
+            print(f"{file}: {size} start states of {task.name} ({split}), sha256 {digest}{note}", flush=True)
+            if hashes is not None:
+                note_hash(hashes, file.name, digest)
+            status |= int(known is not None and known != digest)
+    return status
+
+
+def note_hash(hashes: pathlib.Path, name: str, digest: str) -> None:
+    """Adds a pool's hash to a JSON file of such hashes, or replaces the one of the same name."""
+    known = json.loads(hashes.read_text()) if hashes.exists() else {}
+    hashes.parent.mkdir(parents=True, exist_ok=True)
+    hashes.write_text(json.dumps(dict(sorted({**known, name: digest}.items())), indent=1) + "\n")

@@ -7,12 +7,17 @@ condition or version of the sampler's rules is another file.
 
 from __future__ import annotations
 
+import collections
+import concurrent.futures
+import contextlib
 import hashlib
 import json
+import multiprocessing
 import os
 import pathlib
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Generator
 
 import jax
 import numpy as np
@@ -20,6 +25,7 @@ from jaxtyping import Bool
 
 from ig2mj.engine.registry import make_engine
 from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.process import use_processor_only
 from ig2mj.process.compilation import cache_folder
 from ig2mj.sampling.many import sample
 from ig2mj.scene.scene import Scene, load_scene
@@ -51,9 +57,14 @@ Progress = Callable[[int, int], None]
 """Called with the number of rows made and wanted."""
 
 
+_loading = threading.Lock()
+"""Pools may be made in threads (`ig2mj sample-task all`); MuJoCo does not promise that two may parse XML at a time."""
+
+
 def bare_scene(task: Task) -> Scene:
     """The task's household without a robot."""
-    return load_scene(task.home, objects=task.objects)
+    with _loading:
+        return load_scene(task.home, objects=task.objects)
 
 
 def pool_of(
@@ -63,13 +74,14 @@ def pool_of(
     *,
     jobs: int = 1,
     progress: Progress = lambda made, wanted: None,
+    workers: concurrent.futures.Executor | None = None,
 ) -> Pool:
     """The pool, read from the cache or made now.
 
     Args:
       split: "train" or "held_out". count: rows; None: `COUNT`.
       jobs: processes; 0: one per processor. More than one needs a script that may be imported (the guard
-        `if __name__ == "__main__"`).
+        `if __name__ == "__main__"`). workers: processes that several pools share (`sampling_processes`), instead.
 
     Raises:
       UnknownNameError: no such split. EngineError: its start states cannot be sampled.
@@ -83,7 +95,7 @@ def pool_of(
         f"{task.name})",
         file=sys.stderr,
     )
-    pool = make_pool(task, split, count, scene=scene, jobs=jobs, progress=progress)
+    pool = make_pool(task, split, count, scene=scene, jobs=jobs, progress=progress, workers=workers)
     file.parent.mkdir(parents=True, exist_ok=True)
     beside = file.with_name(f".{os.getpid()}-{file.name}")
     save_pool(pool, beside, scene, {"task": task.name, "split": split, "conditions": list(task.start)})
@@ -121,25 +133,65 @@ def make_pool(
     scene: Scene | None = None,
     jobs: int = 1,
     progress: Progress = lambda made, wanted: None,
+    workers: concurrent.futures.Executor | None = None,
 ) -> Pool:
     """Samples the pool anew: the same rows for any number of processes. Arguments and errors as `pool_of`."""
     if split not in SEEDS:
         raise UnknownNameError("split", split, SEEDS)
     scene = bare_scene(task) if scene is None else scene
-    wanted, made, pools = count or COUNT[split], 0, []
-    for k in range(MAX_CHUNKS):
-        drawn = sample(scene, task.start, CHUNK, SEEDS[split] + k, jobs=jobs).pool
-        if drawn is not None:
-            good = np.flatnonzero(_near(task, scene, drawn))
-            if len(good):
-                pools.append(drawn.rows(good))
-                made += len(good)
-        progress(min(made, wanted), wanted)
-        if made >= wanted:
-            return stack(pools).rows(np.arange(wanted))
-        if k == 7 and not made:
-            break
-    raise EngineError(f"{task.name}: of {(k + 1) * CHUNK} start states only {made} of {wanted} have all within reach")
+    wanted, made, pools, tried = count or COUNT[split], 0, [], 0
+    processes = jobs or os.cpu_count() or 1
+    with contextlib.ExitStack() as stack_of:
+        if workers is None and processes > 1:
+            workers = stack_of.enter_context(sampling_processes(processes))
+        for drawn in stack_of.enter_context(contextlib.closing(_chunks(task, split, scene, workers, wanted))):
+            tried += 1
+            if drawn is not None:
+                pools.append(drawn)
+                made += drawn.size
+            progress(min(made, wanted), wanted)
+            if made >= wanted:
+                return stack(pools).rows(np.arange(wanted))
+            if tried == 8 and not made:
+                break
+    raise EngineError(f"{task.name}: of {tried * CHUNK} start states only {made} of {wanted} have all within reach")
+
+
+def sampling_processes(jobs: int) -> concurrent.futures.Executor:
+    """Processes that sample parts of pools; 0: one per processor. Close it, or use it in a `with`."""
+    context = multiprocessing.get_context("spawn")  # forking a process that has threads can hang
+    return concurrent.futures.ProcessPoolExecutor(jobs or os.cpu_count(), context, initializer=use_processor_only)
+
+
+def _chunks(
+    task: Task, split: str, scene: Scene, workers: concurrent.futures.Executor | None, wanted: int
+) -> Generator[Pool | None, None, None]:
+    """The good rows of one seed after the other, in order; None: there was none."""
+    if workers is None:
+        for k in range(MAX_CHUNKS):
+            yield _chunk(task, scene, SEEDS[split] + k)
+        return
+    ahead = collections.deque[concurrent.futures.Future[Pool | None]]()
+    submitted, most = 0, 2 * -(-wanted // CHUNK)  # begun before they are known to be needed
+    try:
+        while submitted < MAX_CHUNKS or ahead:
+            while submitted < MAX_CHUNKS and len(ahead) < most:
+                ahead.append(workers.submit(_chunk, task, None, SEEDS[split] + submitted))
+                submitted += 1
+            yield ahead.popleft().result()
+    finally:
+        for future in ahead:
+            future.cancel()
+
+
+def _chunk(task: Task, scene: Scene | None, seed: int) -> Pool | None:
+    """Of `CHUNK` rows of a seed those in which every object is where the task wants it."""
+    scene = bare_scene(task) if scene is None else scene
+    drawn = sample(scene, task.start, CHUNK, seed).pool
+    if drawn is None:
+        return None
+    good = np.flatnonzero(_near(task, scene, drawn))
+    return drawn.rows(good) if len(good) else None
 
 
 def _near(task: Task, scene: Scene, pool: Pool) -> Bool[np.ndarray, "P"]:

@@ -1,0 +1,38 @@
+"""The table of the experts: made of rows, in step with its page, and parts that were played are not played again."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+import experts
+
+
+def row(**changes) -> dict:
+    base = {"task": "CookingMeat", "robot": "fetch", "grasping": "mitten", "first": 0, "count": 25, "failed": []}
+    return base | {"date": "2026-11-22"} | changes
+
+
+def test_parts_of_a_case_are_added_up():
+    lines = experts.table([row(failed=[3]), row(first=25), row(robot="humanoid", failed=[0, 1])])
+    assert lines[0] == "| | humanoid, mitten | fetch, mitten |"
+    assert "| CookingMeat | 23 of 25 | 49 of 50 |" in lines
+    assert "| BimanualPickAndPlace | - | takes no part |" in lines
+
+
+def test_of_two_rows_of_one_part_the_later_counts(tmp_path):
+    file = tmp_path / "rows.jsonl"
+    file.write_text("".join(json.dumps(r) + "\n" for r in (row(failed=[1]), row(first=25), row(failed=[1, 2]))))
+    assert [r["failed"] for r in experts.read_rows(file)] == [[1, 2], []]
+
+
+def test_the_page_has_the_table_of_the_rows():
+    """Write it with `python benchmarks/experts.py --table`."""
+    text = experts.PAGE.read_text(encoding="utf-8")
+    assert experts.page_with(text, experts.read_rows(experts.ROWS)) == text
+
+
+def test_every_held_out_state_is_in_one_part():
+    options = argparse.Namespace(tasks=["SlicingFruit"], robots=["fetch"], grasping=["mitten"], episodes=60, worlds=25)
+    played = [n for part in experts.parts(options) for n in range(part.first, part.first + part.count)]
+    assert sorted(played) == list(range(60))
