@@ -20,6 +20,12 @@ from ig2mj.scene.scene import Scene
 MOVED = 0.02
 """Metres from where an object lay at the start."""
 
+OUTSIDE, UNDER_FLOOR = 50.0, -0.02
+"""Metres from the origin along an axis, and in height, beyond which an object's centre of mass is lost."""
+
+MOST_LOST = 1e-3
+"""Share of worlds that may have lost an object in a row that counts."""
+
 LEAST = 0.1
 """Share of control steps in which the hand must touch a loose object, on average, for worlds to count as disturbed."""
 
@@ -56,6 +62,12 @@ class Watch:
         """Loose objects that lie elsewhere now, per world on average."""
         way = np.linalg.norm(np.asarray(after) - np.asarray(before), axis=-1)[:, self.loose]
         return float((way > MOVED).sum(1).mean())
+
+    def lost(self, com: Float[Array, "W O 3"]) -> int:
+        """Worlds in which a loose object is outside the house or below its floor."""
+        place = np.asarray(com)[:, self.loose]
+        gone = (np.abs(place) > OUTSIDE).any(-1) | (place[..., 2] < UNDER_FLOOR)
+        return int(gone.any(1).sum())
 
 
 def geoms_of(scene: Scene) -> tuple[Bool[np.ndarray, "G"], Bool[np.ndarray, "G"]]:

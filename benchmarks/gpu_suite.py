@@ -37,11 +37,14 @@ FEWEST_SECONDS = 45.0
 
 @dataclasses.dataclass(frozen=True)
 class Job:
-    """A process: its name, its words after `python`, and the seconds it may take."""
+    """A process: its name, its words after `python`, the seconds it may take, what its environment has besides, and the
+    Python that runs it."""
 
     name: str
     words: tuple[str, ...]
     limit: float = 300.0
+    env: dict[str, str] = dataclasses.field(default_factory=dict)
+    python: str = sys.executable
 
 
 @dataclasses.dataclass
@@ -148,8 +151,8 @@ class Runner:
     def _begin(self, job: Job) -> None:
         log = (self.out / "logs" / f"{job.name}.txt").open("w")
         # Memory as needed, not all of the device for the first; in a group of its own, to be ended with its children.
-        env = {**os.environ, "XLA_PYTHON_CLIENT_PREALLOCATE": "false"}
-        words = ["nice", "-n", "5", sys.executable, *job.words]
+        env = {**os.environ, "XLA_PYTHON_CLIENT_PREALLOCATE": "false", **job.env}
+        words = ["nice", "-n", "5", job.python, *job.words]
         process = subprocess.Popen(words, stdout=log, stderr=subprocess.STDOUT, env=env, start_new_session=True)
         log.close()
         self._running.append((job, process, min(self.end, time.monotonic() + job.limit)))

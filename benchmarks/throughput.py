@@ -4,8 +4,9 @@
 
 A control step is four physics steps of 1/120 s, the view, all extended states, guards and a goal of up to ten literals,
 in one jitted function under `lax.scan`; a floating hand pushes objects about unless `--idle`. Every row says what the
-hand really did (`benchmarks/disturbance.py`) and how many worlds overflowed or lost their numbers: a row with any, or a
-disturbed one whose hand touches nothing, does not count (`counts` is false).
+hand really did (`benchmarks/disturbance.py`), how many worlds overflowed or lost their numbers, and in how many an
+object left the house. A row with any of the first two or more than one in a thousand of the last does not count
+(`counts` is false), nor does a disturbed one whose hand touches nothing.
 
 Several of these may run at once (`gpu_suite.py`): what is timed runs under a lock, everything else beside each other.
 """
@@ -28,11 +29,12 @@ import numpy as np
 import results
 import warp as wp
 from batch_case import HAND_DOFS, Case
-from disturbance import LEAST, Watch, join, summary
+from disturbance import LEAST, MOST_LOST, Watch, join, summary
 from kernel_times import profiled
 
 from ig2mj.calibration.pushing import push, start_pushing
 from ig2mj.engine.health import CAPACITY, Overflow
+from ig2mj.engine.warp import patches
 from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.sensors.batch_camera import BatchCamera
 from ig2mj.worlds import Core, Rules
@@ -46,17 +48,37 @@ CALLS, LEAST_CALLS, CALL_SECONDS = 4, 2, 15.0
 SIZE = 128
 """Pixels a side of the pictures."""
 
+AGENT_STEP = 3
+"""Control steps of an agent step, of which `--what agent` takes one picture."""
+
+ENGINES = {"ig2mj": contextlib.nullcontext, "mujoco_warp": patches.upstream_kernels}
+"""Whose functions run on the device: with ours in place of some of MuJoCo Warp's, or MuJoCo Warp's alone."""
+
 
 def run(
-    case: Case, num_worlds: int, disturbed: bool, what: str, lock: pathlib.Path | None, kernels: int = 0, **solver: int
+    case: Case,
+    num_worlds: int,
+    disturbed: bool,
+    what: str,
+    lock: pathlib.Path | None,
+    kernels: int = 0,
+    side_by_side: bool = False,
+    **solver: int,
 ) -> dict:
-    """Times one batch. The first call is not counted. `kernels`: so many of the longest are printed afterwards."""
+    """Times one batch. The first call is not counted.
+
+    Args:
+      kernels: so many of the longest are printed afterwards. side_by_side: kernels are compiled by several threads
+        before the first step (`WarpEngine.load_kernels`). solver: limits of iterations.
+    """
     start = time.time()
     scene, model = case.scene, case.model
     profile = case.profile.for_worlds(num_worlds)
     engine = WarpEngine(
         scene, num_worlds, profile=profile, initial=jax.tree.map(lambda a: a[0], case.pool.physics), **solver
     )
+    if side_by_side:
+        engine.load_kernels()
     worlds = Core(engine, Rules(model, case.goal), case.pool)
     watch, seconds = Watch(engine), engine.substeps * engine.timestep
     call, carry = program(case, worlds, watch, disturbed, what)
@@ -97,14 +119,18 @@ def run(
         "overflow_bits": _bits(overflow),
         "iteration_limits": int(((overflow & int(Overflow.ITERATIONS | Overflow.LS_ITERATIONS)) != 0).sum()),
         "non_finite": int((~np.asarray(engine.health(batch.world.physics).finite)).sum()),
+        "lost_object_worlds": watch.lost(carry[2]),
         **memory(num_worlds),
         "profile": [profile.awake_dofs, profile.constraints, profile.contacts, profile.convex_contacts],
         "mean_seen": float(np.asarray(seen).mean()),
-        "troubles": worlds.metrics(batch) if what in ("full", "camera") else {},
+        "troubles": worlds.metrics(batch) if what in ("full", "camera", "agent") else {},
     }
+    if what == "agent":
+        row["agent_steps_per_s"] = round(row["control_steps_per_s"] / AGENT_STEP)
     if profile_row:
         row["kernels"] = profile_row
     sound = row["capacity_overflows"] == 0 and row["non_finite"] == 0
+    sound = sound and row["lost_object_worlds"] <= MOST_LOST * num_worlds
     row["counts"] = sound and (not disturbed or row["hand_contact_share"] >= LEAST)
     return row
 
@@ -114,7 +140,7 @@ def program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str, 
     engine = watch.engine
     seconds = engine.substeps * engine.timestep
     camera = None
-    if what == "camera":
+    if what in ("camera", "agent"):
         camera = BatchCamera(engine, case.model, [case.eye], width=SIZE, height=SIZE, depth=True)
 
     def control(batch, pusher, com, palm):
@@ -128,10 +154,18 @@ def program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str, 
         batch, status = worlds.step_fn(batch, pusher.ctrl)
         seen = status.fraction.mean()
         view, physics = batch.world.view, batch.world.physics
-        if camera is not None:
-            images = camera(physics, view, batch.world.states)
-            seen += images.rgb.astype(jnp.float32).mean() + images.depth.mean()
+        if what == "camera":
+            seen += picture(batch)
         return (batch, pusher, view.object_com, view.agent.base_pos[:, 0]), (seen, watch.step(physics))
+
+    def picture(batch):
+        assert camera is not None
+        images = camera(batch.world.physics, batch.world.view, batch.world.states)
+        return images.rgb.astype(jnp.float32).mean() + images.depth.mean()
+
+    def agent(carry, _):
+        carry, (seen, acts) = jax.lax.scan(full, carry, None, AGENT_STEP)
+        return carry, (seen + picture(carry[0]), acts)
 
     def physics(carry, _):
         """Of the view only what the hand needs, unless the whole of it is asked for."""
@@ -147,8 +181,13 @@ def program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str, 
             watch.step(state),
         )
 
-    body = physics if what in ("physics", "view") else full
-    call = jax.jit(lambda carry: jax.lax.scan(body, carry, None, steps), donate_argnums=0)
+    def several(carry):
+        if what != "agent":
+            return jax.lax.scan(physics if what in ("physics", "view") else full, carry, None, steps)
+        carry, out = jax.lax.scan(agent, carry, None, steps // AGENT_STEP)
+        return carry, jax.tree.map(lambda a: a.reshape(-1, *a.shape[2:]), out)  # [agent steps, 3, ...] in a row
+
+    call = jax.jit(several, donate_argnums=0)
     batch = jax.block_until_ready(worlds.start(0))
     pusher = start_pushing(case.reach, engine.num_worlds, case.scene.model.nu)
     # Copies: what is donated must not be in the batch as well.
@@ -208,8 +247,12 @@ def main() -> None:
         "--what",
         nargs="+",
         default=["full"],
-        choices=["physics", "view", "full", "camera"],
-        help="full: with states, guards and goal; the others for comparison",
+        choices=["physics", "view", "full", "camera", "agent"],
+        help="full: with states, guards and goal; camera: and a picture a control step; agent: and one in three",
+    )
+    parser.add_argument("--engine", default="ig2mj", choices=ENGINES, help="mujoco_warp: without our kernels")
+    parser.add_argument(
+        "--side-by-side", action="store_true", help="compile kernels side by side, before the first step"
     )
     parser.add_argument("--iterations", type=int, nargs="+", default=[0], help="solver limits to try; 0: the engine's")
     parser.add_argument("--pool", type=int, default=16, help="rows of initial states")
@@ -225,7 +268,11 @@ def main() -> None:
             for what in args.what:
                 for limit in args.iterations:
                     solver = {"iterations": limit, "ls_iterations": limit} if limit else {}
-                    row = run(case, worlds, not args.idle, what, args.lock, args.kernels, **solver)
+                    with ENGINES[args.engine]():
+                        row = run(
+                            case, worlds, not args.idle, what, args.lock, args.kernels, args.side_by_side, **solver
+                        )
+                    row = {"engine": args.engine} | row
                     row |= {"ready_s": case.seconds, "label": args.label, **device()}
                     results.keep_row(row, args.rows)
 
