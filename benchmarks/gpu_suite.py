@@ -84,7 +84,7 @@ def throughputs(homes: dict[str, str], out: pathlib.Path, most: int) -> list[Job
         words = [str(HERE / "throughput.py"), homes[home], "--worlds", *map(str, counts), "--what", what, *common]
         words += ["--idle"] if idle else []
         words += ["--label", label] if label else []
-        size = f"{min(counts)}..{max(counts)}" if len(counts) > 1 else f"{counts[0]}"
+        size = f"{min(counts)}..{max(counts)}" if len(counts) > 1 else f"{min(counts)}"
         return Job("-".join([home, "idle" if idle else "disturbed", what, size, *label.split()]), tuple(words))
 
     small, middle = (1, 4, 16, 64), (256, 1024, 4096)

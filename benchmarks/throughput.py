@@ -63,7 +63,7 @@ def run(
     lock: pathlib.Path | None,
     kernels: int = 0,
     side_by_side: bool = False,
-    **solver: int,
+    **solver: Any,
 ) -> dict:
     """Times one batch. The first call is not counted.
 
@@ -161,7 +161,7 @@ def program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str, 
     def picture(batch):
         assert camera is not None
         images = camera(batch.world.physics, batch.world.view, batch.world.states)
-        return images.rgb.astype(jnp.float32).mean() + images.depth.mean()
+        return jnp.asarray(images.rgb, jnp.float32).mean() + jnp.asarray(images.depth).mean()
 
     def agent(carry, _):
         carry, (seen, acts) = jax.lax.scan(full, carry, None, AGENT_STEP)
@@ -239,7 +239,7 @@ def device() -> dict[str, str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("homes", nargs="+")
     parser.add_argument("--worlds", type=int, nargs="+", default=[4096])
     parser.add_argument("--idle", action="store_true", help="no hand, nothing moves")

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-import torch
+import torch  # pyright: ignore[reportMissingImports]
 
 TRAVEL_SPEED, PUSH_SPEED, CLOSE, PUSH_SECONDS = 1.0, 0.5, 0.25, 0.8
 PAST, OVER, FOLLOW, GONE_DOWN, LEASH, ARRIVED, IMPATIENCE = 0.15, 0.06, 0.4, 0.1, 0.1, 0.02, 4
@@ -50,8 +50,8 @@ class TorchHand:
         Args:
           com: [W N 3], centres of mass of the objects in reach. palm: [W 3]. draw: [W 2] in 0..1; None: drawn here.
         """
-        if draw is None:
-            draw = torch.rand((len(self.row), 2), device=com.device)
+        draw = torch.rand((len(self.row), 2), device=com.device) if draw is None else draw
+        assert draw is not None
         here = self.ctrl[:, :3] + self.start
         _, near = self._place(com, self.goal)
         enough = self.pushes & ((self.left <= 0) | ~near)

@@ -23,7 +23,7 @@ from typing import Any
 import genesis_absent
 import genesis_scene
 import numpy as np
-import torch
+import torch  # pyright: ignore[reportMissingImports]
 from genesis_hand import TorchHand
 
 TIMESTEP, SUBSTEPS = 1 / 120, 4
@@ -52,7 +52,7 @@ class Batch:
     def __init__(self, folder: pathlib.Path, worlds: int, variant: str, cpu: bool, row: Row):
         """Loads and builds; what is known goes into `row`."""
         genesis_absent.put_in_place()
-        import genesis as gs
+        import genesis as gs  # pyright: ignore[reportMissingImports]
 
         self.gs, self.worlds, self.cpu = gs, worlds, cpu
         flags = variant.split("+")

@@ -6,6 +6,7 @@ import argparse
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 import genesis_export
 import genesis_scene
@@ -55,11 +56,12 @@ def test_an_exported_home_keeps_every_geom_that_collides(exported):
 
 
 def test_the_hand_in_torch_does_what_the_hand_in_jax_does(exported):
-    torch = pytest.importorskip("torch", reason="Genesis' hand is written in torch")
+    torch: Any = pytest.importorskip("torch", reason="Genesis' hand is written in torch")
     from genesis_hand import TorchHand
 
     written = json.loads((exported / "home.json").read_text())
-    reach = Reach(**{k: np.asarray(v) if isinstance(v, list) else v for k, v in written["reach"].items()})
+    fields: dict[str, Any] = {k: np.asarray(v) if isinstance(v, list) else v for k, v in written["reach"].items()}
+    reach = Reach(**fields)
     worlds, seconds, objects = 8, 1 / 30, len(written["reach"]["objects"])
     names = [written["centre_of_mass"][name] for name in written["in_reach"]]
     com = np.broadcast_to(np.array(names, np.float32), (worlds, objects, 3)).copy()
