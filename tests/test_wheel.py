@@ -53,6 +53,7 @@ def run(*command: object, cwd: pathlib.Path, **variables: str) -> subprocess.Com
     return done
 
 
+@pytest.mark.slow
 def test_shipped_homes_come_with_the_wheel_and_open_from_any_folder(installed, tmp_path):
     code = (
         "import ig2mj, ig2mj.scene.paths as paths\n"

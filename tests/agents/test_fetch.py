@@ -137,7 +137,7 @@ def test_an_unknown_pose_or_list_is_named():
         Fetch(proprioception="experiment")
 
 
-@pytest.mark.parametrize("up", [1.0, -1.0])
+@pytest.mark.parametrize("up", [pytest.param(1.0, marks=pytest.mark.slow), -1.0])
 def test_the_slow_trunk_does_not_slow_down_the_arm(up):
     """The trunk's limit is 0.1 m/s; a full command is a goal 0.2 m ahead."""
     world = RobotWorld("small_home", Fetch(pos=START))

@@ -74,6 +74,7 @@ def test_an_open_mitten_of_fetch_sticks(tiny_home_folder):
     assert can(world)[2] > start[2] + 0.05
 
 
+@pytest.mark.slow
 def test_what_is_held_goes_along_when_fetch_drives(tiny_home_folder):
     world = fingers_around_the_can(tiny_home_folder)
     world.act(times=4, gripper=-1.0)

@@ -99,6 +99,7 @@ def test_grasps_are_saved_restored_and_reset(at_cabinet, tmp_path):
     np.testing.assert_allclose(held.local, world.grasps.local, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_two_agents_in_one_home_hold_and_touch_for_themselves(tiny_home_folder):
     fetch = Fetch(pos=(0.75, -0.6, 0.0), quat=(0.0, 0.0, 0.0, 1.0))
     world = GraspingWorld(tiny_home_folder, Humanoid(**FACING_TABLE), mode="sticky", others=(fetch,))
@@ -133,6 +134,7 @@ def test_actions_are_checked(at_cabinet, tiny_home):
         ig2mj.Worlds(at_cabinet.scene, grasping="mitten", engine="native")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["native", pytest.param("warp", marks=pytest.mark.slow)])
 def test_a_batch_takes_hold_world_by_world(tiny_home_folder, engine):
     """Two worlds go on from one state in which a hand is over the can; only in one it is told to close."""

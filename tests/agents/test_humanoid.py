@@ -55,7 +55,7 @@ def test_turns_of_a_hand_are_about_the_axes_of_the_body(tiny_home_folder, compat
     assert (wanted.inv() * turned).magnitude() < 1e-2
 
 
-@PRESETS
+@pytest.mark.parametrize("compat", ["paper", pytest.param("igibson", marks=pytest.mark.slow)])
 def test_a_body_that_walks_in_circles_neither_tilts_nor_loses_its_hands(tiny_home_folder, compat):
     """Spec 1.4, test 3, at our steps of 1/120 s: 1,800 actions of 0.1 m and one degree, which are five full turns."""
     robot = Humanoid(pos=OUTSIDE, quat=QUARTER_LEFT, compat=compat)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import mink
 import mujoco
 import numpy as np
+import pytest
 
 from ig2mj.agents.fetch import Fetch
 from ig2mj.agents.fetch.figures import CHAIN, CHAIN_JOINTS, JOINTS, start_positions
@@ -45,6 +46,7 @@ def by_mink(pos: np.ndarray, quat: np.ndarray) -> np.ndarray:
     return np.array([configuration.q[int(j.qposadr[0])] for j in own], np.float32)
 
 
+@pytest.mark.slow
 def test_ours_and_minks_bring_the_gripper_to_the_same_pose():
     pos, quat = goals(8)
     ours = np.asarray(inverse(CHAIN, np.tile(REST, (len(pos), 1)), pos, quat, REST, iterations=STEPS))

@@ -52,6 +52,18 @@ def commands(text: str) -> list[list[str]]:
     return [words for line in lines if (words := shlex.split(line, comments=True))]
 
 
+LONG = {"demonstrations", "environments", "experts", "sensors", "batches"}
+"""Pages whose blocks take ten seconds or more together: run by `make test-slow`."""
+
+
+def cases(pages: list[pathlib.Path]) -> list:
+    """The pages as parameters, the long ones marked."""
+    return [
+        pytest.param(page, id=page.relative_to(ROOT).as_posix(), marks=[pytest.mark.slow] if page.stem in LONG else [])
+        for page in pages
+    ]
+
+
 def ids(pages: list[pathlib.Path]) -> list[str]:
     return [page.relative_to(ROOT).as_posix() for page in pages]
 
@@ -72,7 +84,7 @@ def test_every_block_says_what_it_is():
     assert with_python and with_commands
 
 
-@pytest.mark.parametrize("page", with_python, ids=ids(with_python))
+@pytest.mark.parametrize("page", cases(with_python))
 def test_the_python_of_a_page_runs_from_top_to_bottom(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     run_python(page, without=GPU)
@@ -96,7 +108,7 @@ def run_python(page: pathlib.Path, without: str) -> None:
             exec(compile("\n" * line + text, str(page), "exec"), names)
 
 
-@pytest.mark.parametrize("page", with_commands, ids=ids(with_commands))
+@pytest.mark.parametrize("page", cases(with_commands))
 def test_the_commands_of_a_page_run_or_parse(page, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     targets = set(re.findall(r"^([\w-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))

@@ -71,6 +71,7 @@ def test_a_floors_contacts_point_up(tilt: float):
     assert np.abs(frame @ frame.transpose(0, 2, 1) - np.eye(3)).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_what_lies_outside_either_geom_is_dropped_and_the_rest_is_kept():
     put, worlds, qpos = _things_on_a_floor(0.0)
     qpos[:, 3:] = [1, 0, 0, 0]

@@ -84,6 +84,7 @@ def test_what_cannot_be_done_is_refused_by_name(env):
         env.step(env.reset(0), np.zeros((2, 7)))
 
 
+@pytest.mark.slow
 def test_any_sensor_is_an_observation():
     """The paper's RGB-D from the head, flow that begins anew with an episode, noise that belongs to world and step."""
     names = ("privileged_state", "rgb", "depth", "scan", "optical_flow")

@@ -21,6 +21,7 @@ def played(name: str, robot: str, rows: int, worlds: int = 4) -> float:
     return float(np.mean(play(env, expert_of(env), rows, in_order=True).success))
 
 
+@pytest.mark.slow
 def test_the_humanoid_cooks_the_meat():
     assert played("CookingMeat", "humanoid", 4) == 1.0
 

@@ -39,6 +39,7 @@ def time_left(obs):
     return pytest.approx(obs["privileged_state"][:, -1], abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:.*Box observation space:UserWarning")  # vectors have no bounds
 def test_gymnasium_s_checker_is_content():
     env = gymnasium.make(ID, pool_size=ROWS)

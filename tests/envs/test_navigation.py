@@ -24,6 +24,7 @@ def test_every_promise_is_kept(point):
     api_test(point)
 
 
+@pytest.mark.slow
 def test_who_follows_the_way_arrives(point):
     state = point.reset(3)
     over, paid = np.zeros(4, bool), np.zeros(4)

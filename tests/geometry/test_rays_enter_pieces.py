@@ -154,6 +154,7 @@ def test_rigid_motion_changes_nothing(shapes, seed):
         assert _grazes(shapes, k, pos, quat, origins[r], directions[r])
 
 
+@pytest.mark.slow
 def test_gradients_of_entries_are_finite_and_right(shapes):
     """Moving the origin along the ray brings the entry nearer at the same rate; also where other rays miss."""
     rng = np.random.default_rng(3)

@@ -51,7 +51,7 @@ def plain_entries(house, origins, directions, lengths, inflate=0.0) -> np.ndarra
     return np.stack(found, axis=1)
 
 
-@pytest.mark.parametrize("inflate", [0.0, 0.00175])
+@pytest.mark.parametrize("inflate", [pytest.param(0.0, marks=pytest.mark.slow), 0.00175])
 def test_planned_lines_agree_with_plain_rays_both_ways(house, inflate):
     tables, body_pos, body_quat = house
     origins = (np.random.default_rng(1).normal(size=(W, len(PAIR_TARGETS), 3)) * 0.2).astype(np.float32)

@@ -72,6 +72,7 @@ def test_a_time_limit_is_no_end(kind, env_kind):
         assert (action < -0.2).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pure", [True, False])
 def test_an_expert_that_answers_in_any_state_is_imitated(pure):
     """Also by a loop in which the expert is asked outside of compiled programs."""
@@ -87,6 +88,7 @@ def test_an_expert_that_answers_in_any_state_is_imitated(pure):
     assert result.row["success"] > 0.9  # the expert itself acts no more since half of the run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pure", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_an_expert_begins_episodes_and_leaves_them_to_the_policy(pure):
     """Without it the same run reaches a third; the success reported is of episodes without the expert."""

@@ -54,7 +54,9 @@ def standing(home, name: str, x: float, y: float, turn: float = 0.0) -> ig2mj.Si
     return simulation
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize(
+    "name", ["humanoid", *(pytest.param(n, marks=pytest.mark.slow) for n in ROBOTS if n != "humanoid")]
+)
 def test_reach_room_contact_and_field_of_view_of_each_robot(home_with_map, name):
     """In reach: less than 2 m from the base. The ball is at (-1, -1), the cabinet at (1.5, 0)."""
     near = standing(home_with_map, name, -1.0, 0.6, turn=-90.0)
@@ -109,7 +111,7 @@ def nearest_finger(simulation: ig2mj.Simulation, point: np.ndarray) -> float:
     return float(np.linalg.norm(fingers - point, axis=1).min())
 
 
-@pytest.mark.parametrize("name", ["humanoid", "fetch"])
+@pytest.mark.parametrize("name", ["humanoid", pytest.param("fetch", marks=pytest.mark.slow)])
 def test_a_finger_within_ten_centimetres_of_the_button_flips_it_at_the_fifth_step(tiny_home_folder, name):
     """Table A.4, spec/states.md section 9: and flips it back no sooner than after it has left."""
     at = {"humanoid": (-0.78, 1.72), "fetch": (-1.05, 1.73)}[name]
@@ -150,7 +152,7 @@ def put_into_hand(world: GraspingWorld, hand: str, name: str) -> None:
     robots.held = robots._core.hands.read(world.simulation.physics)
 
 
-@pytest.mark.parametrize("name", ["humanoid", "fetch"])
+@pytest.mark.parametrize("name", ["humanoid", pytest.param("fetch", marks=pytest.mark.slow)])
 def test_a_held_knife_cuts_the_apple_under_its_blade(tmp_path, name):
     """Table A.4: more than 10 N on the blade. The apple is heavy, so that it does not roll away under it."""
     home = write_tiny_home(tmp_path / "home")

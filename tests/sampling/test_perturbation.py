@@ -27,6 +27,7 @@ def test_loose_objects_are_neither_fixed_nor_halves_nor_parked(tiny_home):
     assert names == {"box", "book", "knife", "apple", "ball", "can", "rod", "pan", "sponge"}
 
 
+@pytest.mark.slow
 def test_only_those_that_may_move_do_and_only_so_far(tiny_home, view):
     loose = loose_objects(tiny_home.tables)
     write = jax.device_get(perturb(tiny_home.tables, loose, view, keys(40), 0.5))

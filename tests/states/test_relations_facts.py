@@ -161,6 +161,7 @@ def test_section_19_1_the_memo_notices_that_something_turned():
     assert not bool(below[0, 0])
 
 
+@pytest.mark.slow
 def test_the_memo_gives_what_a_fresh_computation_gives():
     plan = PLAN["paper"]
     fresh = EVALUATE["paper"]

@@ -46,6 +46,7 @@ def looked(request, scene):
     return worlds, batch, seen_at_first, np.asarray(status.holds)
 
 
+@pytest.mark.slow
 def test_the_eye_of_the_view_is_the_controllers(looked):
     worlds, batch, _, _ = looked
     view = batch.world.view
