@@ -3,10 +3,10 @@
     python benchmarks/scale_tables.py [--write] [--price 3.0] [--inside 300] [--between 25]
 
 Measured: speeds and memory of one H200 (results/throughput, results/environments, results/learning), two GPUs of a host
-(results/multi_gpu), weak scaling (results/scaling/rows.jsonl, where `scaling.py` has been run), sizes
-(results/scaling/sizes.json, `scale_sizes.py`). For more GPUs than were measured a table is a forecast: worlds do not
-talk to each other, and what an update adds is an all-reduce of the gradients at the given bandwidths. Forecasts are
-marked with ~.
+(results/multi_gpu), weak scaling (results/scaling/rows.jsonl, where `scaling.py` has been run), time to success
+(results/scaling/time_to_success.jsonl, `time_to_success.py`), sizes (results/scaling/sizes.json, `scale_sizes.py`). For
+more GPUs than were measured a table is a forecast: worlds do not talk to each other, and what an update adds is an
+all-reduce of the gradients at the given bandwidths. Forecasts are marked with ~.
 """
 
 from __future__ import annotations
@@ -88,6 +88,15 @@ def scaling() -> dict[str, dict[int, tuple[float, str]]]:
     return found
 
 
+def solved() -> dict[str, dict[int, dict[str, Any]]]:
+    """Trainings until 95 % succeed: task -> GPUs -> the last row."""
+    found: dict[str, dict[int, dict[str, Any]]] = {}
+    for row in lines(RESULTS / "scaling" / "time_to_success.jsonl"):
+        if "seconds" in row:
+            found.setdefault(row["task"], {})[row["gpus"]] = row
+    return found
+
+
 def exchange(gpus: int, sizes: dict[str, int], inside: float, between: float) -> float:
     """Seconds of an update's all-reduce. `inside`, `between`: GB/s within a host and between two."""
     if gpus == 1:
@@ -100,6 +109,12 @@ def forecast(gpus: int, one: dict[str, float], sizes: dict[str, int], args: argp
     """Agent steps a second of the learner: each GPU does what one does, and waits for every update's gradients."""
     alone = 1.0 / one["updates"]  # seconds of an update, with its share of the worlds' steps
     return gpus * one["learner"] * alone / (alone + exchange(gpus, sizes, args.inside, args.between))
+
+
+def success(row: dict[str, Any]) -> str:
+    """A training's time and steps, or how far it came."""
+    steps = f"{row['seconds']:.0f} s, {amount(row['env_steps'])} steps"
+    return steps if row["solved"] else f"{steps}: {100 * (row['success'] or 0.0):.0f} %"
 
 
 def table(columns: list[str], rows: list[list[str]]) -> str:
@@ -145,6 +160,11 @@ def tables(args: argparse.Namespace) -> str:
             for case, known in seen.items()
         ]
         parts += ["### Weak scaling measured", table(["case", *(f"{n} GPUs" for n in every)], rows)]
+    if runs := solved():
+        every = sorted({n for of_task in runs.values() for n in of_task})
+        rows = [[task, *(success(known[n]) if n in known else "" for n in every)] for task, known in runs.items()]
+        head = ["task", *(f"{n} GPU{'s' if n > 1 else ''}" for n in every)]
+        parts += ["### Seconds of training until 95 % of the episodes succeed", table(head, rows)]
     rows = []
     for gpus in GPUS:
         rate = one["updates"] / (1 + one["updates"] * exchange(gpus, learner, args.inside, args.between))

@@ -16,23 +16,22 @@ time. Every row says how many worlds overflowed or lost their numbers; a row wit
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import json
-import os
 import pathlib
 import socket
-import subprocess
-import sys
-import threading
 import time
 from typing import Annotated, Any, Literal
 
 import results
 import tyro
+from waiting import Process, end_all
 
 HERE = pathlib.Path(__file__).resolve().parent
 WORK = HERE.parent / "out" / "benchmarks"
+
+SLACK = 4.0
+"""Seconds beyond `seconds` that a measurement may take: whole calls are counted, two at least."""
 
 Case = Literal["made_60", "birch_pictures", "learner"]
 
@@ -42,12 +41,12 @@ class Args:
     """What to measure."""
 
     gpus: tuple[int, ...] = (1, 2)
-    """Numbers of GPUs; the first of them is what the others are compared with, and should be 1."""
+    """Numbers of GPUs; the others are compared with the first, which should be 1."""
     cases: tuple[Case, ...] = ("made_60", "birch_pictures", "learner")
     seconds: float = 8.0
     """Of a measurement, about."""
     limit: float = 330.0
-    """Seconds for everything; what is not ready by then is left out."""
+    """Seconds for everything; rows are kept as they come, and what there was no time for says so."""
     rows: pathlib.Path | None = None
     """Rows are added to this file, as JSON lines."""
     logs: pathlib.Path = WORK / "scaling"
@@ -56,34 +55,6 @@ class Args:
     """Folder with `<home>/engine_profile.json`, for the simulator."""
     cpu: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Small shares on CPU devices, to try the benchmark itself."""
-
-
-@dataclasses.dataclass
-class Process:
-    """A worker, and the lines it says."""
-
-    opened: subprocess.Popen
-    log: pathlib.Path
-    ready: dict[str, Any] | None = None
-
-    def hear(self, word: str) -> dict[str, Any] | None:
-        """Waits for the line that begins with a word; None: the process has ended."""
-        assert self.opened.stdout is not None
-        for line in self.opened.stdout:
-            if line.startswith(word):
-                return json.loads(line[len(word) :])
-        return None
-
-    def tell(self, seconds: float) -> None:
-        """To measure for so long."""
-        assert self.opened.stdin is not None
-        with contextlib.suppress(BrokenPipeError):
-            self.opened.stdin.write(json.dumps({"seconds": seconds}) + "\n")
-            self.opened.stdin.flush()
-
-    def last_words(self) -> str:
-        """The end of what it said on standard error."""
-        return " ".join(self.log.read_text(errors="replace").split())[-300:]
 
 
 @dataclasses.dataclass
@@ -113,24 +84,18 @@ def settings_of(case: str, args: Args) -> tuple[str, dict[str, Any]]:
 def start(case: str, count: int, args: Args) -> list[Process]:
     """The processes of a group, each with a GPU of its own."""
     word, settings = settings_of(case, args)
-    args.logs.mkdir(parents=True, exist_ok=True)
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     found = []
     for k in range(count):
-        environment = {**os.environ, "XLA_PYTHON_CLIENT_PREALLOCATE": "false", "CUDA_VISIBLE_DEVICES": str(k)}
+        environment = {"XLA_PYTHON_CLIENT_PREALLOCATE": "false", "CUDA_VISIBLE_DEVICES": str(k)}
         if args.cpu:
             environment["JAX_PLATFORMS"] = "cpu"
         if word == "learner" and count > 1:
             environment["JAX_COORDINATOR_ADDRESS"] = f"127.0.0.1:{port}"
             environment["JAX_NUM_PROCESSES"], environment["JAX_PROCESS_ID"] = str(count), str(k)
-        log = args.logs / f"{case}-{count}-{k}.log"
-        words = [sys.executable, str(HERE / "scaling_worker.py"), word, json.dumps(settings)]
-        with log.open("w") as said:
-            opened = subprocess.Popen(
-                words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=said, text=True, env=environment
-            )
-        found.append(Process(opened, log))
+        words = [str(HERE / "scaling_worker.py"), word, json.dumps(settings)]
+        found.append(Process(words, args.logs / f"{case}-{count}-{k}.log", environment))
     return found
 
 
@@ -145,46 +110,35 @@ def groups(args: Args) -> list[Group]:
     return made
 
 
-def make_ready(made: list[Group], until: float) -> None:
-    """Waits until all processes are ready, or the time is over."""
-
-    def wait(process: Process) -> None:
-        process.ready = process.hear("READY")
-
-    threads = [threading.Thread(target=wait, args=(p,), daemon=True) for g in made for p in g.processes]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(max(until - time.monotonic(), 0.0))
-
-
-def measure(group: Group, number: int, args: Args) -> dict[str, Any]:
-    """One row: the first `number` processes of a group at the same time."""
+def measure(group: Group, number: int, args: Args, until: float) -> dict[str, Any]:
+    """One row: the first `number` processes of a group at the same time. `until`: then it is given up."""
     chosen = group.processes[:number]
-    row: dict[str, Any] = {"case": group.case, "gpus": number}
-    silent = [p for p in chosen if p.ready is None]
-    if silent:
-        return {**row, "counts": False, "error": f"not ready: {silent[0].last_words()}"}
+    row: dict[str, Any] = {"case": group.case, "gpus": number, "of": args.gpus[0]}
+    late = [p for p in chosen if p.ready is None]
+    if late:
+        return {**row, "counts": False, "error": f"not ready, {late[0].trouble()}"}
+    if time.monotonic() > until:
+        return {**row, "counts": False, "error": "no time was left"}
     for process in chosen:
-        process.tell(args.seconds)
-    done = [process.hear("DONE") for process in chosen]
-    told = [d for d in done if d is not None]
-    if len(told) < number:
-        dead = next(p for p, d in zip(chosen, done, strict=True) if d is None)
-        return {**row, "counts": False, "error": dead.last_words()}
-    seconds = max(d["seconds"] for d in told)
-    troubles = {name: sum(d[name] for d in told) for name in ("overflow", "non_finite")}
+        process.tell({"seconds": args.seconds})
+    done = [process.hear("DONE", until) for process in chosen]
+    answers = [d for d in done if d is not None]
+    if len(answers) < number:
+        silent = next(p for p, d in zip(chosen, done, strict=True) if d is None)
+        return {**row, "counts": False, "error": f"no answer, {silent.trouble()}"}
+    seconds = max(d["seconds"] for d in answers)
+    troubles = {name: sum(d[name] for d in answers) for name in ("overflow", "non_finite")}
     row |= {
         "worlds": number * settings_of(group.case, args)[1]["worlds"],
-        "steps_per_s": round(sum(d["steps"] for d in told) / seconds, 1),
+        "steps_per_s": round(sum(d["steps"] for d in answers) / seconds, 1),
         "seconds": round(seconds, 2),
-        "fastest_over_slowest": round(min(d["seconds"] for d in told) / seconds, 3),
+        "fastest_over_slowest": round(min(d["seconds"] for d in answers) / seconds, 3),
         **troubles,
-        "counts": not any(troubles.values()) and all(d.get("finite", True) for d in told),
+        "counts": not any(troubles.values()) and all(d.get("finite", True) for d in answers),
         **(chosen[0].ready or {}),
     }
-    if "updates" in told[0]:
-        row["updates_per_s"] = round(told[0]["updates"] / seconds, 2)
+    if "updates" in answers[0]:
+        row["updates_per_s"] = round(answers[0]["updates"] / seconds, 2)
     return row
 
 
@@ -196,26 +150,24 @@ def main(args: Args) -> None:
 
         write_home(WORK / "made_60", 60)
     made = groups(args)
+    every = [p for g in made for p in g.processes]
     try:
-        make_ready(made, until - 4 * args.seconds)
+        # nothing is timed while something else compiles; what is not ready when the rest needs its time is left out
+        rounds = sum(len(g.numbers) for g in made)
+        latest = max(until - rounds * (SLACK + args.seconds), time.monotonic())
+        for process in every:
+            process.wait_until_ready(latest)
         alone: dict[str, float] = {}
         for group in made:
             for number in group.numbers:
-                row = measure(group, number, args)
-                if row.get("steps_per_s"):
-                    alone.setdefault(group.case, row["steps_per_s"] / number)
+                row = measure(group, number, args, min(until, time.monotonic() + 5 * args.seconds + 20.0))
+                if number == args.gpus[0] and row["counts"]:
+                    alone[group.case] = row["steps_per_s"] / number
+                if group.case in alone and "steps_per_s" in row:
                     row["weak_scaling"] = round(row["steps_per_s"] / alone[group.case], 3)
-                row["of"] = args.gpus[0]
                 results.keep_row({**row, "settings": settings_of(group.case, args)[1]}, args.rows)
     finally:
-        for process in (p for g in made for p in g.processes):
-            with contextlib.suppress(BrokenPipeError, AttributeError):
-                process.opened.stdin.close()  # pyright: ignore[reportOptionalMemberAccess]
-        for process in (p for g in made for p in g.processes):
-            try:
-                process.opened.wait(20)
-            except subprocess.TimeoutExpired:
-                process.opened.kill()
+        end_all(every)
 
 
 if __name__ == "__main__":

@@ -25,9 +25,20 @@ class RayCluster:
     environment: dict[str, str]
     second: subprocess.Popen | None = None
 
-    def add_node(self) -> None:
-        """A second node."""
-        self.second = node(self.environment, "--address", self.address)
+    def add_node(self, **variables: str) -> None:
+        """A second node. `variables`: of its environment, beside those of the first."""
+        self.second = node({**self.environment, **variables}, "--address", self.address)
+
+    def wait_for_nodes(self, count: int) -> None:
+        """Until so many nodes are alive, as a process of its own sees it."""
+        code = f"import ray; ray.init(address={self.address!r}, log_to_driver=False, logging_level='ERROR'); "
+        code += "print(sum(n['Alive'] for n in ray.nodes()))"
+
+        def there() -> bool:
+            asked = subprocess.run([sys.executable, "-c", code], env=self.environment, capture_output=True, text=True)
+            return asked.stdout.split()[-1:] == [str(count)]
+
+        wait_for(there, 120)
 
     def kill_node(self) -> None:
         """Kills the second node: the process that was started, and those that it started, which are its session."""

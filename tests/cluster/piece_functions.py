@@ -38,6 +38,16 @@ def failing(number: int, how: str, folder: str) -> bytes:
     return b"%d" % number
 
 
+def on_disk(number: int, note: str) -> bytes:
+    """The number, which is written first to the file that this node's variable PIECES_DISK names."""
+    file = os.environ.get("PIECES_DISK", "/dev/null")
+    if file == "/dev/full":
+        (pathlib.Path(note) / f"full-{number}-{time.monotonic_ns()}").touch()
+    time.sleep(0.2)
+    pathlib.Path(file).write_text(str(number))
+    return b"%d" % number
+
+
 def node_files(path: str) -> str:
     """A check: what a file of this machine holds."""
     return pathlib.Path(path).read_text()

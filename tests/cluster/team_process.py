@@ -98,6 +98,39 @@ def learn(team: Team, out: str, iterations: int, resume: bool, seconds: float = 
     return {"iteration": result.iteration, "env_steps": result.row["env_steps"], "stopped": result.stopped}
 
 
+def turns(team: Team) -> dict:
+    """Makes an environment as `ig2mj train` does, and one iteration on a point mass: who sampled, who compiled when."""
+    import jax
+    import numpy as np
+    from small_envs import PointMass
+
+    from ig2mj.envs.registry import make
+    from ig2mj.learn.iteration import AXIS, ManyDevices
+    from ig2mj.learn.perception import Perception
+    from ig2mj.learn.ppo import PPO, PPOConfig
+    from ig2mj.tasks import pools
+
+    sampled, sample = [], pools.make_pool
+    pools.make_pool = lambda *given, **named: sampled.append(1) or sample(*given, **named)
+    with team.turns():
+        make("GraspingBook", None, 1, "native", pool_size=2)
+    ppo = PPO(Perception(PointMass.observation_spaces), 2, PPOConfig(length=4, parts=1, epochs=1), AXIS)
+    step = ManyDevices(PointMass(4), ppo, jax.devices(), team)
+    learner, memory = step.place(ppo.init(jax.random.PRNGKey(0)), step.memory())
+    plays, times, collect = step.begin(0), [], step._collect
+
+    def timed(*given: object) -> object:
+        times.append(time.time())
+        found = jax.block_until_ready(collect(*given))
+        times.append(time.time())
+        return found
+
+    step._collect = timed
+    for k in range(2):
+        learner, memory, plays, *_ = step(learner, memory, plays, np.asarray(jax.random.PRNGKey(k)), 0.0, True)
+    return {"sampled": len(sampled), "times": times}
+
+
 def main() -> None:
     task, out = sys.argv[1:3]
     team = Team.join(place_of(os.environ), patience=60.0)
@@ -105,10 +138,7 @@ def main() -> None:
         if task == "gradient":
             found = gradient(team)
         elif task == "turns":
-            began = time.time()
-            with team.turns():
-                time.sleep(0.5 if team.first else 0.0)
-                found = {"began": began, "seconds": time.time() - began}
+            found = turns(team)
         else:
             found = learn(team, out, int(task.split("-")[1]), "resume" in task, 60.0 if "long" in task else 0.0)
     print("RESULT" + json.dumps({"rank": team.rank, **found}), flush=True)

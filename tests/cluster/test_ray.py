@@ -71,6 +71,29 @@ def test_a_node_that_dies_costs_nothing(joined, tmp_path):
         joined.add_node()
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_full_disk_on_one_node_fails_its_pieces_and_not_the_run(joined, tmp_path):
+    """The second node writes to a full device. A piece fails only where each of its three tries fell to that node."""
+    import ray
+
+    joined.kill_node()
+    joined.add_node(PIECES_DISK="/dev/full")
+    ray.init(address=joined.address, namespace="ig2mj", logging_level="ERROR", log_to_driver=False)
+    try:
+        wait_for_nodes(ray, 2)
+        asked = [Piece(f"piece_{n:03d}", {"number": n, "note": str(tmp_path)}) for n in range(12)]
+        store, failed = run(Work("piece_functions:on_disk", "testing", asked), Where(cluster=joined.address))
+        assert set(store.names()) | set(failed) == {p.name for p in asked} and len(store.names()) >= 4
+        assert all(store.get(p.name) == b"%d" % p.arguments["number"] for p in asked if p.name not in failed)
+        assert {reason.split(": ", 1)[1] for reason in failed.values()} <= {"[Errno 28] No space left on device"}
+        assert list(tmp_path.glob("full-*")), "the full disk was met"
+    finally:
+        ray.shutdown()
+        joined.kill_node()
+        joined.add_node()
+
+
 def wait_for_nodes(ray, count: int) -> None:
     import time
 

@@ -107,6 +107,18 @@ def test_a_run_goes_on_with_another_number_of_devices(tmp_path):
     assert [r["iteration"] for r in third] == [20, 20] and third[1]["env_steps"] == 32 * 2 * 20
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_the_first_process_samples_and_compiles_while_the_others_wait(tmp_path, monkeypatch):
+    monkeypatch.setenv("IG2MJ_CACHE_DIR", str(tmp_path / "cache"))
+    first, second = results("turns", tmp_path, 2)
+    assert (first["sampled"], second["sampled"]) == (1, 0), "start states are sampled once"
+    assert len(list((tmp_path / "cache" / "pools").glob("GraspingBook-*.npz"))) == 1
+    assert len(first["times"]) == len(second["times"]) == 4
+    assert second["times"][0] >= first["times"][1], "the second begins when the first has compiled"
+    assert second["times"][2] < first["times"][3] and first["times"][2] < second["times"][3], "then both step at once"
+
+
 def test_a_team_of_one_waits_for_nobody():
     team = Team()
     assert team.first and team.barrier("x", 7) == 7

@@ -10,6 +10,7 @@ import subprocess
 
 import pytest
 import yaml
+from parsed_commands import parse_only
 
 from ig2mj.cli import train
 from ig2mj.cluster.place import place_of
@@ -50,6 +51,29 @@ def instructions(text: str) -> list[tuple[str, str]]:
     return [
         (name, rest.strip()) for name, _, rest in (line.partition(" ") for line in whole.splitlines() if line.strip())
     ]
+
+
+def commands(name: str) -> list[list[str]]:
+    """All of an example's commands `ig2mj ...`, also those in comments, with the values that variables default to."""
+    text = (FOLDER / name).read_text()
+    text = re.sub(r"\\\n#?", " ", text)
+    text = re.sub(r"\$\{\w+:-([^}]*)\}", r"\1", text)
+    found = [m[1] for m in re.finditer(r"(?:^|[\s\"])(ig2mj (?:[a-z-]+) [^\n]*)", text) if "--" in m[1]]
+    return [shlex.split(line)[1:] for line in found]
+
+
+@pytest.mark.parametrize(("name", "count"), [("Dockerfile", 1), ("raycluster.yaml", 1), ("train.slurm", 1)])
+def test_the_commands_of_the_examples_are_parsed(name, count, monkeypatch):
+    found = commands(name)
+    assert len(found) == count
+    for words in found:
+        assert parse_only(words, monkeypatch) == 0, words
+
+
+def test_the_command_of_the_job_is_parsed(monkeypatch):
+    (container,) = documents("train-job.yaml")["Job"]["spec"]["template"]["spec"]["containers"]
+    first, *words = [*container["command"], *container["args"]]
+    assert first == "ig2mj" and parse_only(words, monkeypatch) == 0
 
 
 def test_the_slurm_script_is_a_script_that_trains():

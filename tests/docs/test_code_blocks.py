@@ -7,6 +7,7 @@ import re
 import shlex
 
 import pytest
+from parsed_commands import parse_only
 
 from ig2mj import cli
 from ig2mj.predicates.parse import parse
@@ -128,29 +129,6 @@ def test_the_commands_of_a_page_run_or_parse(page, tmp_path, monkeypatch, capsys
             else:
                 assert words[0] == "python", line
                 assert (ROOT / words[1]).is_file(), line
-
-
-def parse_only(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:
-    """Exit status of a command whose function does nothing."""
-    import tyro
-
-    from ig2mj.cli import parsing
-
-    real = tyro.cli
-
-    def parse_arguments(function, **options):
-        quiet = lambda *args, **given: 0  # noqa: E731  tyro reads the signature that is put on it
-        quiet.__name__, quiet.__doc__, quiet.__annotations__ = (
-            function.__name__,
-            function.__doc__,
-            function.__annotations__,
-        )
-        quiet.__signature__ = function.__signature__  # type: ignore[attr-defined]
-        return real(quiet, **options)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(parsing.tyro, "cli", parse_arguments)
-        return cli.call(words)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=ids(PAGES))

@@ -19,8 +19,8 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from small_envs import PointMass
 
-from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
-from ig2mj.learn.checkpoints import Checkpoints
+from ig2mj.errors import ClusterError, Ig2mjError, InputError, UnknownNameError
+from ig2mj.learn.checkpoints import Checkpoints, only_run
 from ig2mj.learn.networks import Actor
 from ig2mj.learn.options import configured
 from ig2mj.learn.perception import Perception
@@ -101,6 +101,16 @@ def test_another_runs_checkpoint_is_refused_with_what_differs(done):
         train(env, algorithm(env, gamma=0.5), Run(iterations=30, out=out, resume=True, quiet=True))
     with pytest.raises(Ig2mjError, match="holds a run already"):
         train(env, algorithm(env), Run(iterations=30, out=out, quiet=True))
+
+
+def test_a_second_run_with_one_folder_refuses(tmp_path):
+    env = PointMass(8)
+    with (
+        only_run(tmp_path),
+        pytest.raises(ClusterError, match=rf"{tmp_path.name}: process {os.getpid()} on .* is writing there"),
+    ):
+        train(env, algorithm(env), Run(iterations=1, out=tmp_path, quiet=True))
+    assert train(env, algorithm(env), Run(iterations=1, out=tmp_path, quiet=True)).iteration == 1
 
 
 def test_numbers_that_are_lost_stop_the_run_with_the_last_good_checkpoint(tmp_path):

@@ -10,17 +10,16 @@ Nothing in it is pickled; a piece counts as finished only if its bytes have the 
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import hashlib
 import json
 import os
 import pathlib
 import shutil
-import socket
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
-from ig2mj.errors import ClusterError, InputError
+from ig2mj.cluster.locks import hold
+from ig2mj.errors import InputError
 
 Deliver = Callable[[str, bytes], None]
 """Puts the bytes of a finished piece, by its name, where they belong."""
@@ -73,26 +72,12 @@ class Journal:
         self._request = json.loads(json.dumps(dict(request)))
         self._deliver, self._there, self._done = deliver, there, {}
         self.folder.mkdir(exist_ok=True)
-        self._lock = self._locked()
+        self._lock = hold(self.folder / "lock", self.out)
         try:
             self._begin(resume)
         except BaseException:
             self._unlock()
             raise
-
-    def _locked(self) -> Any:
-        opened = (self.folder / "lock").open("a+")
-        try:
-            fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            opened.seek(0)
-            who = opened.read().strip() or "another run"
-            opened.close()
-            raise ClusterError(f"{self.out}: {who} is writing there; wait for it, or choose another place") from None
-        opened.truncate(0)
-        opened.write(f"process {os.getpid()} on {socket.gethostname()}")
-        opened.flush()
-        return opened
 
     def _begin(self, resume: bool) -> None:
         file = self.folder / "request.json"

@@ -22,7 +22,7 @@ from jaxtyping import Int
 
 from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError
-from ig2mj.learn.checkpoints import Checkpoints
+from ig2mj.learn.checkpoints import TAKEN, Checkpoints, only_run
 from ig2mj.learn.demos import Demos
 from ig2mj.learn.labels import Imitation
 from ig2mj.learn.log import Log
@@ -123,15 +123,22 @@ def clone(algorithm: BC, demos: Demos, run: Run, depends: Mapping[str, Any] | No
       What was learned, and the last row of the report.
 
     Raises:
-      Ig2mjError: the loss is not finite.
+      Ig2mjError: the loss is not finite, or the run's folder has a run already, or another run is writing there.
     """
-    depends = {**(depends or {}), "algorithm": "bc", "settings": dataclasses.asdict(algorithm.config)}
+    with only_run(run.out):
+        return _clone(algorithm, demos, run, depends or {})
+
+
+def _clone(algorithm: BC, demos: Demos, run: Run, depends: Mapping[str, Any]) -> tuple[Any, dict]:
+    depends = {**depends, "algorithm": "bc", "settings": dataclasses.asdict(algorithm.config)}
     key = jax.random.PRNGKey(run.seed)
     learner = algorithm.init(key, demos)
     checkpoints, log = (Checkpoints(run.out) if run.out is not None else None), Log(run.out, quiet=run.quiet)
     if run.resume and checkpoints is not None:
         found = checkpoints.newest({"learner": learner}, depends)
         learner = found[0]["learner"] if found is not None else learner
+    elif checkpoints is not None and checkpoints.numbers():
+        raise Ig2mjError(f"{run.out} {TAKEN}")
     rows = np.arange(demos.reward.shape[0])
     apart = (rows // STRETCH) % APART == APART - 1 if len(rows) >= STRETCH * APART else rows % APART == 0
     training, testing = jnp.asarray(rows[~apart]), jnp.asarray(rows[apart])

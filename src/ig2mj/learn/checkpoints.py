@@ -6,22 +6,44 @@ renamed; the newest three are kept. A broken one is passed over for the one befo
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import pathlib
 import shutil
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import jax
 import numpy as np
 
+from ig2mj.cluster.locks import hold
 from ig2mj.cluster.team import Team
 from ig2mj.errors import InputError
 
 KEPT = 3
 """Checkpoints of a run that stay."""
+
+
+TAKEN = "holds a run already: take --resume to go on with it, or another --out"
+"""What is said of a folder with checkpoints where a new run is to begin."""
+
+
+@contextlib.contextmanager
+def only_run(out: str | os.PathLike | None) -> Iterator[None]:
+    """While this lasts no other run can have the folder `out`, which is made. None: there is no folder.
+
+    Raises:
+      ClusterError: another run has it.
+    """
+    if out is None:
+        yield
+        return
+    folder = pathlib.Path(out)
+    folder.mkdir(parents=True, exist_ok=True)
+    with hold(folder / ".lock", folder):
+        yield
 
 
 class Checkpoints:

@@ -173,7 +173,7 @@ class ManyDevices:
             losses = jax.lax.pmean({**losses, "all_finite": 1.0 * finite(learner)}, AXIS)
             return learner, memory, jax.tree.map(lambda a: jax.lax.psum(a[0], AXIS), sums), losses, clock
 
-        self._collect, self._compiled = jax.jit(collect, donate_argnums=1), None
+        self._collect, self._compiled = jax.jit(collect, donate_argnums=1), False
         kinds: list[Any] = []
 
         def leaves() -> list[Any]:
@@ -211,7 +211,7 @@ class ManyDevices:
     def begin(self, seed: int) -> Any:
         """All worlds at the start of an episode, in one batch for each device of this process."""
         env, noise = self._env, self._algorithm.noise
-        plays = self._each(lambda k: begin(env, noise(env.num_worlds), seed + (self._first + k) * APART))
+        plays = self._first_then_each(lambda k: begin(env, noise(env.num_worlds), seed + (self._first + k) * APART))
         return [jax.device_put(play, device) for play, device in zip(plays, self._devices, strict=True)]
 
     def place(self, learner: Any, memory: Any) -> tuple[Any, Any]:
@@ -233,7 +233,16 @@ class ManyDevices:
         play_key, learn_key = jax.random.split(key)
         keys = np.asarray(jax.random.split(play_key, self._count))[self._first :]
         began = time.perf_counter()
-        done = self._each(lambda k: jax.block_until_ready(self._collect(self._part(learner, k), plays[k], keys[k])))
+
+        def collect(k: int) -> Any:
+            return jax.block_until_ready(self._collect(self._part(learner, k), plays[k], keys[k]))
+
+        if self._compiled:
+            done = self._each(collect)
+        else:
+            with self._team.turns():  # the first process compiles, the others find its programs in the cache
+                done = self._first_then_each(collect)
+            self._compiled = True
         spent = time.perf_counter() - began
         rollout, sums = ([one[k] for one in done] for k in (1, 2))
         learner, memory, sums, losses, told = self.learn(
@@ -281,14 +290,20 @@ class ManyDevices:
         sharding = NamedSharding(self._mesh, PartitionSpec(*[None] * axis, AXIS))
         return jax.make_array_from_single_device_arrays(shape, sharding, list(pieces))
 
-    def _each(self, act: Callable[[int], Any]) -> list[Any]:
-        """Runs something for every device, on its own thread with that device as the default."""
+    def _each(self, act: Callable[[int], Any], begin: int = 0) -> list[Any]:
+        """Runs something for every device from `begin` on, on its own thread with that device as the default."""
 
         def on(k: int) -> Any:
             with jax.default_device(self._devices[k]):
                 return act(k)
 
-        return list(self._threads.map(on, range(len(self._devices))))
+        return list(self._threads.map(on, range(begin, len(self._devices))))
+
+    def _first_then_each(self, act: Callable[[int], Any]) -> list[Any]:
+        """The same for what is not compiled yet: the others find the first one's program in JAX's cache."""
+        with jax.default_device(self._devices[0]):
+            first = act(0)
+        return [first, *self._each(act, 1)]
 
 
 def finite(tree: Any) -> Array:

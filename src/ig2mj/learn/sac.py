@@ -56,7 +56,9 @@ class SACConfig:
       held: longest time that exploration noise is held, in steps.
       head_start: updates of the critics before the actor learns, where it begins as a clone of demonstrations.
       guided: share of the run over which an expert helps. reach: steps of an episode that it acts at most, at first.
-      disturbance: deviation of what is added to its actions. copy: weight of its labels in the actor's loss, at first.
+      disturbance: deviation of what is added to its actions.
+      copy: weight of its labels in the actor's loss, at first. copied: share of the run over which that falls to 0.
+      trust: 1: labels count only where critics value them more than the actor's action (Nair et al. 2018); 0: always.
       guess: weight of the actor's guess of the privileged state from its features, from pixels.
       lr: learning rate, falling to `last_lr` along a cosine over the run.
       actor, critic: sizes of the layers. net: encoder ("small" or "paper").
@@ -82,6 +84,8 @@ class SACConfig:
     reach: int = 120
     disturbance: float = 0.1
     copy: float = 5.0
+    copied: float = 0.7
+    trust: int = 0
     guess: float = 1.0
     lr: float = 3e-4
     last_lr: float = 1e-4
@@ -294,11 +298,10 @@ class SAC:
         sample_key, target_key, actor_key = jax.random.split(key, 3)
         size = share_of(c.batch, self.axis)
         batch = memory.replay.sample(sample_key, c.every * size, c.horizon, c.gamma)
+        late = True
         if memory.demos is not None:
             batch = self._with_demos(batch, memory.demos, sample_key, progress)
             late = learner.updates >= c.head_start
-        else:
-            late = True
         batch = dataclasses.replace(batch, reward=batch.reward * memory.scale.factor(c.largest))
         action, density, _, _ = self._draw(learner.actor, learner.moments, batch.after, target_key)  # of all at once
         alpha = jnp.exp(learner.log_alpha)
@@ -364,20 +367,24 @@ class SAC:
             seen = Seen(seen.vector, shifted(seen.picture, p.picture_shape, shift_key))
         alpha = jnp.exp(learner.log_alpha)
 
+        def value(action: Array) -> Float[Array, "B"]:
+            logits: Any = self.critic.apply({"params": learner.critic}, normal, action)
+            return (jax.nn.softmax(logits) @ self._support).mean(0)
+
         def loss(actor: Any) -> tuple[Array, dict[str, Array]]:
             action, density, guess, middle = self._draw(actor, learner.moments, seen, draw_key)
-            logits: Any = self.critic.apply({"params": learner.critic}, normal, action)
-            q = (jax.nn.softmax(logits) @ self._support).mean(0)
-            total, found = (alpha * density - q).mean(), {"entropy": -density.mean()}
+            total, found = (alpha * density - value(action)).mean(), {"entropy": -density.mean()}
             if guess.shape[-1]:
                 found["guess_loss"] = jnp.square(guess - normal[:, p.actor_size :]).mean()
                 total += c.guess * found["guess_loss"]
             if batch.label.shape[-1]:
-                found["copy_loss"] = jnp.square(middle - batch.label).mean()
-                total += c.copy * share(learner.progress, c.guided) * found["copy_loss"]
+                apart = jnp.square(middle - batch.label).mean(-1)
+                counts = 1.0 * (value(batch.label) > value(middle)) if c.trust else jnp.ones_like(apart)
+                found |= {"copy_loss": apart.mean(), "copied": counts.mean()}
+                total += c.copy * share(learner.progress, c.copied) * (counts * apart).mean()
             return total, found
 
-        (value, found), slope = jax.value_and_grad(loss, has_aux=True)(learner.actor)
+        (total, found), slope = jax.value_and_grad(loss, has_aux=True)(learner.actor)
         step, actor_opt = self._adam.update(average(slope, self.axis), learner.actor_opt)
         actor = jax.tree.map(lambda a, s: a - rate * s, learner.actor, step)
         lack = average(found["entropy"] - self._entropy, self.axis)  # more entropy than wanted lowers its weight
@@ -389,4 +396,4 @@ class SAC:
             log_alpha=learner.log_alpha - rate * step,  # pyright: ignore[reportOperatorIssue]
             alpha_opt=alpha_opt,
         )
-        return learner, {"actor_loss": value, **found}
+        return learner, {"actor_loss": total, **found}

@@ -23,7 +23,7 @@ import numpy as np
 
 from ig2mj.cluster.team import Team
 from ig2mj.errors import Ig2mjError
-from ig2mj.learn.checkpoints import Checkpoints, newest, same, whole
+from ig2mj.learn.checkpoints import TAKEN, Checkpoints, newest, only_run, same, whole
 from ig2mj.learn.collect import TrainingEnv
 from ig2mj.learn.iteration import Algorithm, ManyDevices, OneDevice
 from ig2mj.learn.log import Log
@@ -115,6 +115,7 @@ def train(
     devices: Sequence[Any] = (),
     team: Team | None = None,
     kept: Callable[[Any, dict[str, Any]], None] | None = None,
+    compiled: Callable[[], None] | None = None,
 ) -> Result:
     """Trains.
 
@@ -125,15 +126,31 @@ def train(
         knows the axis (`iteration.ManyDevices`).
       team: the processes whose devices they are; the first one reads and writes the run's folder. None: this one alone.
       kept: called by the first process after every checkpoint with what was learned and the last report.
+      compiled: called once, when everything is compiled and before the clock begins.
 
     Raises:
-      Ig2mjError: a loss is not finite, or nothing can be resumed.
+      Ig2mjError: a loss is not finite, nothing can be resumed, or another run has the folder.
     """
+    team = team or Team()
+    with only_run(run.out if team.first else None):
+        return _train(env, algorithm, run, depends, learner, devices, team, kept, compiled)
+
+
+def _train(
+    env: TrainingEnv,
+    algorithm: Algorithm,
+    run: Run,
+    depends: Mapping[str, Any] | None,
+    learner: Any,
+    devices: Sequence[Any],
+    team: Team,
+    kept: Callable[[Any, dict[str, Any]], None] | None,
+    compiled: Callable[[], None] | None,
+) -> Result:
     depends = {**(depends or {}), "algorithm": algorithm.name, "settings": dataclasses.asdict(algorithm.config)}
     key = jax.random.PRNGKey(run.seed)
     first_key, key = jax.random.split(key)
     learner = algorithm.init(first_key) if learner is None else learner
-    team = team or Team()
     step: Any = ManyDevices(env, algorithm, devices, team) if devices else OneDevice(env, algorithm, run.programs)
     memory = step.memory()
     checkpoints = Checkpoints(run.out) if run.out is not None else None
@@ -151,7 +168,7 @@ def train(
             resumed = True
             log.forget_after(clock)
     elif team.barrier("is the folder free", checkpoints is not None and bool(checkpoints.numbers())):
-        raise Ig2mjError(f"{run.out} holds a run already: take --resume to go on with it, or another --out")
+        raise Ig2mjError(f"{run.out} {TAKEN}")
 
     learner, memory = step.place(same(learner, team), memory)
     with team.turns():
@@ -182,6 +199,8 @@ def train(
         told = losses.pop("clock")
         took = time.monotonic() - began
         if done == 0:
+            if compiled is not None:
+                compiled()
             compile_s, logged = took, time.monotonic()
             window.began, zero = logged, logged - clock
         else:
