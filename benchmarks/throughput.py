@@ -214,7 +214,7 @@ def exclusive(lock: pathlib.Path | None) -> Iterator[None]:
 
 def memory(num_worlds: int) -> dict[str, float]:
     """Most device memory of this process so far, JAX's and Warp's own, MB per world. 0 on a CPU."""
-    of_jax = (jax.devices()[0].memory_stats() or {}).get("peak_bytes_in_use", 0)
+    of_jax = (jax.local_devices()[0].memory_stats() or {}).get("peak_bytes_in_use", 0)
     of_warp = wp.get_mempool_used_mem_high(wp.get_device("cuda:0")) if wp.is_cuda_available() else 0
     return {
         "peak_device_MB_per_world": round((of_jax + of_warp) / num_worlds / 1e6, 3),
