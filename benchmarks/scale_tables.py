@@ -219,7 +219,7 @@ def tables(args: argparse.Namespace) -> str:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
     parser.add_argument("--write", action="store_true", help="put them into docs/scale.md")
     parser.add_argument("--price", type=float, default=3.0, help="of an hour of a GPU, in your currency")
     parser.add_argument("--inside", type=float, default=300.0, help="GB/s between GPUs of a host")
