@@ -5,10 +5,11 @@
     logical             predicates that hold at one of the two and not at the other
     ways                metres that base and hands travelled, and the box in the base's frame that hands reached
     grasping            share of frames in which each hand holds something
-    gaze                what the eye's axis meets: share of frames by object, fixations, mean turn (rad/s)
+    gaze                what the gaze meets: share of frames by object, fixations, mean turn (rad/s)
 
-What the eye's axis meets stands for a gaze that nobody measured. Source: iGibson 2.0's `igibson/metrics`, which lets
-the world settle before it compares; a settled world here has stood still for `SETTLE` control steps.
+Where an eye tracker was there (`devices/gaze`), its gaze is taken, and `measured` is true; else the axis of the robot's
+eye stands for it. Source: iGibson 2.0's `igibson/metrics`, which lets the world settle before it compares; a settled
+world here has stood still for `SETTLE` control steps.
 
 Axes: T steps of a run, H hands.
 """
@@ -22,7 +23,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.demos.gaze import Rays, measured_rays, statistics
 from ig2mj.demos.reader import Recording, Run
 from ig2mj.demos.replay import Replayer
 from ig2mj.demos.shipped import find_recording
@@ -55,11 +56,11 @@ def metrics_of(file: str | os.PathLike, settle: int = SETTLE, env: Environment |
         replayer = Replayer(recording, "state", env=env)
         measured = _Measuring(replayer.env, settle)
         runs = [run for run in recording.runs if run.frames > 1]
-        watched: dict[str, _Watched] = {}
+        watched = {run.name: _Watched(measured_rays(run)) for run in runs}
 
         def watch(state: EnvState, now: dict[int, Run], frame: int) -> None:
             for world, run in now.items():
-                watched.setdefault(run.name, _Watched()).see(measured, state, world)
+                watched[run.name].see(measured, state, world, frame)
 
         replayer(watch=watch, runs=runs)
         found: dict[str, dict[str, Any]] = {}
@@ -67,7 +68,7 @@ def metrics_of(file: str | os.PathLike, settle: int = SETTLE, env: Environment |
             start, end = (measured.settled(replayer.all_at(now, place)) for place in ("first", "last"))
             for world, run in now.items():
                 about = {"file": str(file), "run": run.name, "frames": run.frames, "success": bool(_success(run))}
-                own = watched[run.name].result(measured.scene)
+                own = watched[run.name].result(measured)
                 found[run.name] = about | own | _disarrangement(measured, start, end, world)
         return [found[run.name] for run in runs]
 
@@ -78,17 +79,18 @@ def _success(run: Run) -> bool:
 
 @dataclasses.dataclass
 class _Watched:
-    """What is noted of every frame of a run."""
+    """What is noted of every frame of a run; with the gaze that was measured in it."""
 
+    rays: Rays | None
     score: list[float] = dataclasses.field(default_factory=list)
     base: list[np.ndarray] = dataclasses.field(default_factory=list)
     hands: list[np.ndarray] = dataclasses.field(default_factory=list)
     reached: list[np.ndarray] = dataclasses.field(default_factory=list)
     holds: list[np.ndarray] = dataclasses.field(default_factory=list)
-    gaze: list[str] = dataclasses.field(default_factory=list)
+    gaze: list[str | None] = dataclasses.field(default_factory=list)
     axis: list[np.ndarray] = dataclasses.field(default_factory=list)
 
-    def see(self, measuring: _Measuring, state: EnvState, world: int) -> None:
+    def see(self, measuring: _Measuring, state: EnvState, world: int, frame: int) -> None:
         view = state.batch.world.view
         agent, turn = view.agent, _matrix(np.asarray(view.agent.base_quat)[world, 0])
         base, hands = np.asarray(agent.base_pos)[world, 0], np.asarray(agent.hand_pos)[world]
@@ -97,16 +99,17 @@ class _Watched:
         self.hands.append(hands)
         self.reached.append((hands - base) @ turn)
         self.holds.append(np.asarray(view.held)[world].any(1))
-        axis = -_matrix(np.asarray(agent.eye_quat)[world, 0])[:, 2]
-        self.axis.append(axis)
-        self.gaze.append(measuring.met(state, world, np.asarray(agent.eye_pos)[world, 0], axis))
+        if self.rays is None:
+            ray = np.asarray(agent.eye_pos)[world, 0], -_matrix(np.asarray(agent.eye_quat)[world, 0])[:, 2]
+        else:
+            ray = self.rays.at(frame)
+        self.axis.append(np.zeros(3) if ray is None else ray[1])
+        self.gaze.append(None if ray is None else measuring.met(state, world, *ray))
 
-    def result(self, scene: Scene) -> dict[str, Any]:
+    def result(self, measuring: _Measuring) -> dict[str, Any]:
+        scene = measuring.scene
         hands = [scene.model.body(int(b)).name for b in scene.tables.hand_body]
-        reached, holds, axis = np.stack(self.reached), np.stack(self.holds), np.stack(self.axis)
-        turns = np.arccos(np.clip((axis[1:] * axis[:-1]).sum(1), -1, 1))
-        seen = {name: self.gaze.count(name) / len(self.gaze) for name in dict.fromkeys(self.gaze)}
-        changes = sum(a != b for a, b in zip(self.gaze[1:], self.gaze, strict=False))
+        reached, holds = np.stack(self.reached), np.stack(self.holds)
         box = {h: [reached[:, k].min(0).tolist(), reached[:, k].max(0).tolist()] for k, h in enumerate(hands)}
         return {
             "goal": {
@@ -122,11 +125,7 @@ class _Watched:
             },
             "workspace": box,
             "grasping": {name: float(holds[:, k].mean()) for k, name in enumerate(hands)},
-            "gaze": {
-                "objects": dict(sorted(seen.items(), key=lambda pair: -pair[1])),
-                "fixations": 1 + changes,
-                "mean_turn": float(turns.mean() / ACTION_PERIOD) if len(turns) else 0.0,
-            },
+            "gaze": statistics(self.gaze, self.axis, measuring.env.period, self.rays is not None),
         }
 
 
@@ -137,7 +136,7 @@ class _Measuring:
         rules = env.core.rules
         assert rules is not None
         self.env, self.scene, self.model = env, env.scene, rules.model
-        steps = ACTION_PERIOD / (env.core.engine.substeps * env.core.engine.timestep)
+        steps = env.period / (env.core.engine.substeps * env.core.engine.timestep)
         self._settle = round(settle / steps)
         self._questions = Questions(rules.model, env.num_worlds)
         tables = env.scene.tables
