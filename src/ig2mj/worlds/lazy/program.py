@@ -1,10 +1,11 @@
 """`StateProgram`: a scene's states and goal as compiled functions for stepping from the host.
 
-The functions are those of `ig2mj.states.update`, cut in two: `whole`, everything, and `heat`, temperatures and what
-follows from them where nothing else can change. Calling a compiled function from the host costs a microsecond for
-every array that goes in or out, as much as the work itself. So `whole` is traced first, and then takes just the arrays
-on which its results depend and gives just those that it makes. What it takes is also what has to be looked at to see
-whether anything can change at all (`StateProgram.view_reads`).
+The functions are those of `ig2mj.states.update`, cut in three: `events`, everything but temperatures; `rest`,
+temperatures and the goal, which follow from them; and `heat`, the same where nothing that the goal reads of the view
+has changed. Calling a compiled function from the host costs a microsecond for every array that goes in or out, as much
+as the work itself. So `events` and `rest` are traced first, and then take just the arrays on which their results depend
+and give just those that they make. What they take is also what has to be looked at to see whether anything can change
+at all (`StateProgram.view_reads`).
 
 Axes: W worlds, O objects, S heat sources, I facts.
 """
@@ -13,7 +14,8 @@ from __future__ import annotations
 
 import dataclasses
 import weakref
-from typing import ClassVar, NamedTuple, TypeVar
+from collections.abc import Callable
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import jax
 import jax.numpy as jnp
@@ -40,23 +42,43 @@ FIRST_MOVED = ("object_com", "touching", "joint_pos", "link_force")
 BODY_FIELDS = ("body_pos", "body_quat")
 
 
-class Found(NamedTuple):
-    """What `whole` gives.
+class Events(NamedTuple):
+    """What `StateProgram.events` gives.
 
     Attributes:
       leaves: of the states, at the places `StateProgram.gives`. swap: mask, pos, quat; None where nothing can be cut.
-      status: the goal's fields. acts: source on object [W, O, S]. facts: of the goal [W, I].
-      flags: whether the step changed nothing but temperatures, whether it asks for teleports, and whether it changed no
-      temperature. memo: of relations, flat.
+      acts: source on object [W, O, S]. flags: whether nothing changed, and whether it asks for teleports.
+      memo: of relations, flat.
     """
 
     leaves: list[Array]
     swap: tuple[Array, Array, Array] | None
-    status: tuple[Array, Array, Array] | None
     acts: Bool[Array, "W O S"]
-    facts: Bool[Array, "W I"]
-    flags: Bool[Array, "3"]
+    flags: Bool[Array, "2"]
     memo: list[Array]
+
+
+class Rest(NamedTuple):
+    """What `StateProgram.rest` gives.
+
+    Attributes:
+      leaves: of the states, at the places `StateProgram.heats`. status: the goal's fields; None without a goal.
+      facts: of the goal [W, I]. same: whether no temperature has changed. memo: of the goal's relations, flat.
+    """
+
+    leaves: list[Array]
+    status: tuple[Array, Array, Array] | None
+    facts: Bool[Array, "W I"]
+    same: Bool[Array, ""]
+    memo: list[Array]
+
+
+class _Traced(NamedTuple):
+    """A compiled function of some of the states' leaves and fields of the view, and which."""
+
+    call: Callable[..., tuple]
+    takes: list[int]
+    reads: tuple[str, ...]
 
 
 class StateProgram:
@@ -64,8 +86,8 @@ class StateProgram:
 
     Attributes:
       heat: one step of temperatures, jitted. heats: places of what it makes among the states' leaves.
-      gives: places of the leaves that a whole step makes; the others it hands through. view_reads: fields of the view
-      that a whole step depends on; goal_reads: those of the goal itself. All three are known from the first step on.
+      gives: places of the leaves that `events` makes; the others it hands through. event_reads, goal_reads: fields of
+      the view on which events depend, and the goal itself; view_reads: both. All are known from the first step on.
       rows: bodies whose poses matter.
     """
 
@@ -78,19 +100,22 @@ class StateProgram:
           goal: evaluated at the end of every step.
         """
         self.model, self.goal, self.num_worlds = model, goal, num_worlds
-        self.plan = RelationPlan.build(model, [*queries(model), *(goal.queries if goal else [])])
+        self.plan = RelationPlan.build(model, queries(model))
         template = initial_states(model, num_worlds)
         self._template = template
         named, self.structure = jax.tree_util.tree_flatten_with_path(template)
         self._paths = [tuple(key.name for key in path) for path, _ in named]
         self.heats = [self._paths.index((name,)) for name in ("temperature", "max_temperature")]
         self._empty_memo, self._memo_structure = jax.tree.flatten(self.plan.empty_memo(num_worlds))
+        goal_memo = goal.plan.empty_memo(num_worlds) if goal is not None else ()
+        self._empty_goal_memo, self._goal_memo_structure = jax.tree.flatten(goal_memo)
         self.heat = jax.jit(self._heat_step)
         self.view_reads: tuple[str, ...] = ()
+        self.event_reads: frozenset[str] = frozenset()
         self.goal_reads: frozenset[str] = frozenset()
         self.gives: list[int] = []
-        self._takes: list[int] = []
-        self._whole = None
+        self._events: _Traced | None = None
+        self._rest: _Traced | None = None
         self.rows = _object_bodies(model)
 
     @classmethod
@@ -101,21 +126,33 @@ class StateProgram:
             made[num_worlds] = cls(rules.model, rules.goal, num_worlds)
         return made[num_worlds]
 
-    def empty_memo(self) -> list[Array]:
-        """A memo that knows nothing yet, flat."""
-        return self._empty_memo
+    def empty_memos(self) -> tuple[list[Array], list[Array]]:
+        """Memos of `events` and of `rest` that know nothing yet, flat."""
+        return self._empty_memo, self._empty_goal_memo
 
-    def whole(self, leaves: list[Array], view: PhysicsView, memo: list[Array]) -> Found:
-        """One step of everything.
+    def events(self, leaves: list[Array], view: PhysicsView, memo: list[Array]) -> Events:
+        """One step of everything but temperatures and the goal.
 
         Args:
           leaves: all leaves of the states. memo: the last step's.
         """
-        if self._whole is None:
-            self._trace(leaves, view, memo)
-            assert self._whole is not None
-        taken = [leaves[i] for i in self._takes]
-        return Found(*self._whole(taken, [read_field(view, name) for name in self.view_reads], memo))
+        if self._events is None:
+            self._events = self._trace(self._events_step, leaves, view, memo)
+            self.event_reads = frozenset(self._events.reads)
+        return Events(*self._called(self._events, leaves, view, memo))
+
+    def rest(self, leaves: list[Array], acts: Bool[Array, "W O S"], view: PhysicsView, memo: list[Array]) -> Rest:
+        """One step of temperatures, and the goal after it.
+
+        Args:
+          leaves: all leaves of the states, those of `events` among them. acts: of `events`. memo: the last call's.
+        """
+        if self._rest is None:
+            self._rest = self._trace(self._rest_step, leaves, view, memo, acts)
+            self.goal_reads = frozenset(self._rest.reads)
+            every = self.event_reads | self.goal_reads
+            self.view_reads = tuple(sorted(every, key=lambda name: (name not in FIRST_MOVED, FIELDS.index(name))))
+        return Rest(*self._called(self._rest, leaves, view, memo, acts))
 
     def with_leaves(self, states: ExtendedStates, places: list[int], leaves: list[Array]) -> ExtendedStates:
         """A copy of the states in which the leaves at some places are others.
@@ -136,61 +173,58 @@ class StateProgram:
                 fields[name] = leaf
         return new
 
-    def _trace(self, leaves: list[Array], view: PhysicsView, memo: list[Array]) -> None:
+    def _called(self, program: _Traced, leaves: list[Array], view: PhysicsView, *more: Any) -> tuple:
+        taken = [leaves[i] for i in program.takes]
+        return program.call(taken, [read_field(view, name) for name in program.reads], *more)
+
+    def _trace(self, step: Callable[..., tuple], leaves: list[Array], view: PhysicsView, *more: Any) -> _Traced:
+        """A function of leaves, fields of the view and others, compiled for what matters of the first two."""
         fields = [read_field(view, name) for name in FIELDS]
-        matters = inputs_that_matter(jax.make_jaxpr(self._whole_step)(leaves, fields, memo).jaxpr)
-        read = [name for name, used in zip(FIELDS, matters[len(leaves) :], strict=False) if used]
+        matters = inputs_that_matter(jax.make_jaxpr(step)(leaves, fields, *more).jaxpr)
+        reads = tuple(name for name, used in zip(FIELDS, matters[len(leaves) :], strict=False) if used)
         takes = [i for i in range(len(leaves)) if matters[i]]
-        reads = sorted(read, key=lambda name: (name not in FIRST_MOVED, FIELDS.index(name)))
         blank_leaves: list[Array] = [np.zeros(leaf.shape, leaf.dtype) for leaf in leaves]
         blank_fields: dict[str, Array] = {n: np.zeros(f.shape, f.dtype) for n, f in zip(FIELDS, fields, strict=True)}
 
-        def whole(taken: list[Array], seen: list[Array], memo: list[Array]) -> tuple:
+        def call(taken: list[Array], seen: list[Array], *more: Any) -> tuple:
             every = list(blank_leaves)
             for place, leaf in zip(takes, taken, strict=True):
                 every[place] = leaf
             named = {**blank_fields, **dict(zip(reads, seen, strict=True))}
-            return self._whole_step(every, [named[name] for name in FIELDS], memo)
+            return step(every, [named[name] for name in FIELDS], *more)
 
-        self._takes, self.view_reads = takes, tuple(reads)
-        self.goal_reads = self._reads_of_goal(leaves, fields, memo)
-        self._whole = jax.jit(whole)
+        return _Traced(jax.jit(call), takes, reads)
 
-    def _reads_of_goal(self, leaves: list[Array], fields: list[Array], memo: list[Array]) -> frozenset[str]:
-        """Fields of the view on which the goal depends, but through what the step makes of the states."""
-        if self.goal is None:
-            return frozenset()
-        if self.goal.queries:
-            return frozenset(FIELDS)
-        goal = self.goal
-
-        def facts(leaves: list[Array], fields: list[Array], memo: list[Array]) -> Array:
-            view = assemble(dict(zip(FIELDS, fields, strict=True)))
-            relations, _ = self.plan.evaluate_changed(view, jax.tree.unflatten(self._memo_structure, memo))
-            return goal.literals.facts(goal.context(jax.tree.unflatten(self.structure, leaves), view, relations))
-
-        matters = inputs_that_matter(jax.make_jaxpr(facts)(leaves, fields, memo).jaxpr)
-        return frozenset(name for name, used in zip(FIELDS, matters[len(leaves) :], strict=False) if used)
-
-    def _whole_step(self, leaves: list[Array], fields: list[Array], memo: list[Array]) -> tuple:
-        """`Found` as a plain tuple; notes which leaves of the states it makes."""
+    def _events_step(self, leaves: list[Array], fields: list[Array], memo: list[Array]) -> tuple:
+        """`Events` as a plain tuple; notes which leaves of the states it makes."""
         states: ExtendedStates = jax.tree.unflatten(self.structure, leaves)
         view = assemble(dict(zip(FIELDS, fields, strict=True)))
         before: Memo = jax.tree.unflatten(self._memo_structure, memo)
         relations, after_memo = self.plan.evaluate_changed(view, before)
         after, swap, acts = events(self.model, states, view, relations)
-        same = [jnp.all(a == b) for a, b in zip(leaves, jax.tree.leaves(after), strict=True) if a is not b]
-        new = heat(self.model, after, acts, view.touching)
-        facts, status = jnp.zeros((view.object_com.shape[0], 0), bool), None
+        made = jax.tree.leaves(after)
+        self.gives = [i for i, (a, b) in enumerate(zip(leaves, made, strict=True)) if a is not b]
+        same = [jnp.all(leaves[i] == made[i]) for i in self.gives]
+        flags = jnp.stack([jnp.all(jnp.array(same)), jnp.any(swap.mask)])
+        cuts = (swap.mask, swap.pos, swap.quat) if swap.mask.shape[1] else None
+        return [made[i] for i in self.gives], cuts, acts, flags, jax.tree.leaves(after_memo)
+
+    def _rest_step(
+        self, leaves: list[Array], fields: list[Array], memo: list[Array], acts: Bool[Array, "W O S"]
+    ) -> tuple:
+        """`Rest` as a plain tuple."""
+        states: ExtendedStates = jax.tree.unflatten(self.structure, leaves)
+        view = assemble(dict(zip(FIELDS, fields, strict=True)))
+        new = heat(self.model, states, acts, view.touching)
+        facts, status, after_memo = jnp.zeros((view.object_com.shape[0], 0), bool), None, ()
         if self.goal is not None:
+            before: Memo = jax.tree.unflatten(self._goal_memo_structure, memo)
+            relations, after_memo = self.goal.plan.evaluate_changed(view, before)
             facts = self.goal.literals.facts(self.goal.context(new, view, relations))
             status = _status_fields(self.goal.status_of(facts, new))
-        cold = jnp.all(new.temperature == after.temperature) & jnp.all(new.max_temperature == after.max_temperature)
-        flags = jnp.stack([jnp.all(jnp.array(same)), jnp.any(swap.mask), cold])
-        made = jax.tree.leaves(new)
-        self.gives = [i for i, (a, b) in enumerate(zip(leaves, made, strict=True)) if a is not b]
-        cuts = (swap.mask, swap.pos, swap.quat) if swap.mask.shape[1] else None
-        return [made[i] for i in self.gives], cuts, status, acts, facts, flags, jax.tree.leaves(after_memo)
+        pairs = ((states.temperature, new.temperature), (states.max_temperature, new.max_temperature))
+        same = jnp.all(jnp.stack([jnp.all(a == b) for a, b in pairs]))
+        return [new.temperature, new.max_temperature], status, facts, same, jax.tree.leaves(after_memo)
 
     def _heat_step(
         self,

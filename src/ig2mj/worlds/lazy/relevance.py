@@ -12,7 +12,6 @@ only said where no rounding could turn it into a yes. What is looked at is what 
 | cleaning | what tools touch, poses of both | tools touch the same, and neither has moved |
 | heat | sources that are on | the same objects are within their distance; what is in their box rests there |
 | open, closed | joints | each is on the same side of its threshold |
-| goal | its own fields | they are the same |
 
 Axes: W worlds, O objects, S heat sources, T objects with a temperature, B sources that heat what is inside them,
 K buttons.
@@ -49,9 +48,8 @@ class Relevance:
       exact: fields of which every change matters.
     """
 
-    def __init__(self, model: StateModel, goal_reads: Collection[str]):
-        """`goal_reads`: fields of the view that the goal depends on, but through states."""
-        self._model, self.exact = model, EXACT | set(goal_reads)
+    def __init__(self, model: StateModel):
+        self._model, self.exact = model, EXACT
         p, tables = model.parameters, model.tables
         self._tools = np.asarray(p.tool_object, int)
         self._thermal = np.flatnonzero(p.thermal)

@@ -5,10 +5,11 @@ Worlds beside the native engine mostly lie still, and there even an operation on
 is cut up (`ig2mj.worlds.lazy.program`), with the same functions and bitwise the same results:
 
 - the whole step, where the states are others than those of the last step, where the last step changed more than
-  temperatures, or where the view differs in anything that a step depends on. Relations come from a memo
-  (`ig2mj.states.relations.plan`).
-- temperatures and what follows from them, where neither is so, or where what differs cannot matter
-  (`ig2mj.worlds.lazy.relevance`): then this step would change nothing else either.
+  temperatures, or where the view differs in anything that can matter to them (`ig2mj.worlds.lazy.relevance`). Relations
+  come from a memo (`ig2mj.states.relations.plan`).
+- temperatures and the goal, where only what the goal itself reads of the view differs: then this step would change
+  nothing else.
+- temperatures and what follows from them, where that does not differ either.
 - nothing, where the last step did not change temperatures.
 
 An agent that is awake makes a new view in every step. What states depend on is therefore compared, byte by byte, field
@@ -20,6 +21,8 @@ Axes: W worlds.
 
 from __future__ import annotations
 
+import enum
+
 import jax
 import numpy as np
 
@@ -27,7 +30,7 @@ from ig2mj.engine.view import Array, PhysicsView, read_field
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.states.definitions import toggled_on
 from ig2mj.states.world import ExtendedStates, Swap
-from ig2mj.worlds.lazy.program import BODY_FIELDS, Found, StateProgram
+from ig2mj.worlds.lazy.program import BODY_FIELDS, StateProgram
 from ig2mj.worlds.lazy.relevance import Relevance
 from ig2mj.worlds.rules import Outcome, Rules
 
@@ -35,18 +38,27 @@ LOOK_EVERY = 30
 """Steps of temperatures between two looks whether they still change; a look costs microseconds."""
 
 
+class News(enum.Enum):
+    """What of a view can matter that was not so at the last whole step."""
+
+    NONE = enum.auto()
+    GOAL = enum.auto()  # to the goal, and not to the states
+    EVENTS = enum.auto()
+
+
 class StateStepper:
     """Steps states beside an engine that hands out the same arrays while nothing moves (the native one)."""
 
     def __init__(self, program: StateProgram):
-        """Begins with an empty memo."""
+        """Begins with empty memos."""
         self.program = program
         self._no_status = GoalStatus.empty(program.num_worlds)
-        self._memo = program.empty_memo()
+        self._memo, self._goal_memo = program.empty_memos()
         self._view: PhysicsView | None = None
         self._step: Outcome | None = None
         self._leaves: list[Array] = []
-        self._kept: Found | None = None
+        self._acts: Array | None = None  # which source acts on what; None where there must be a whole step next
+        self._whole_facts = self._facts = np.zeros((program.num_worlds, 0), bool)  # of the last whole step; now
         self._settled = False
         self._heat_steps = 0
         self._seen: list[Array] = []  # fields read, as last seen; and their bytes at the last whole step, once needed
@@ -64,15 +76,26 @@ class StateStepper:
         last = self._step
         if last is None or states is not last.states:
             return self._everything(states, jax.tree.leaves(states), view)
-        if self._kept is None or (view is not self._view and not self._says_the_same(view)):
+        if self._acts is None:
             return self._everything(states, self._leaves, view)
-        return last if self._settled else self._heat(last, self._kept)
+        if view is not self._view:
+            news = self._news(view)
+            if news is News.EVENTS:
+                return self._everything(states, self._leaves, view)
+            self._view = view
+            if news is News.GOAL:
+                return self._temperatures_and_goal(last.states, self._acts, view)
+            if self._facts is not self._whole_facts:  # all is again as it was then
+                self._facts = self._whole_facts
+                return self._heat(last, self._acts)
+        return last if self._settled else self._heat(last, self._acts)
 
-    def _says_the_same(self, view: PhysicsView) -> bool:
-        """Whether the view has all that a step depends on as it was at the last whole step."""
-        rows, changed, relevance = self.program.rows, [], self._relevance
+    def _news(self, view: PhysicsView) -> News:
+        """What differs from the last whole step, of all that a step depends on."""
+        program, rows, changed, relevance = self.program, self.program.rows, [], self._relevance
         assert relevance is not None, "there was a whole step"
-        for k, name in enumerate(self.program.view_reads):
+        news = News.NONE
+        for k, name in enumerate(program.view_reads):
             now = read_field(view, name)
             seen = self._seen[k]
             if now is seen:
@@ -80,29 +103,29 @@ class StateStepper:
             if name == "agent.finger_pos" and self._fingers_away and self._away(view):
                 continue
             if not isinstance(now, np.ndarray) or not isinstance(seen, np.ndarray):
-                return False  # on a device: to fetch it would take as long as the step
+                return News.EVENTS  # on a device: to fetch it would take as long as the step
             chosen = rows if name in BODY_FIELDS else slice(None)
             before = self._bytes[k]
             if before is None:
                 before = self._bytes[k] = seen[:, chosen].tobytes()
-            if now[:, chosen].tobytes() != before:
-                if name in relevance.exact:
-                    return False
-                changed.append(name)
-            else:
+            if now[:, chosen].tobytes() == before:
                 self._seen[k] = now
-        if changed and not relevance.same(view, changed):
-            return False
-        self._view = view
-        return True
+                continue
+            if name in program.goal_reads:
+                news = News.GOAL
+            if name in program.event_reads:
+                if name in relevance.exact:
+                    return News.EVENTS
+                changed.append(name)
+        return News.EVENTS if changed and not relevance.same(view, changed) else news
 
     def _away(self, view: PhysicsView) -> bool:
         return isinstance(view.agent.finger_pos, np.ndarray) and toggled_on.all_out_of_reach(self.program.model, view)
 
-    def _heat(self, last: Outcome, kept: Found) -> Outcome:
+    def _heat(self, last: Outcome, acts: Array) -> Outcome:
         states = last.states
         warm, hottest, status = self.program.heat(
-            states.temperature, states.max_temperature, states.sliced, kept.acts, kept.facts
+            states.temperature, states.max_temperature, states.sliced, acts, self._facts
         )
         if self._heat_steps % LOOK_EVERY == 0:
             before, after = jax.device_get(((states.temperature, states.max_temperature), (warm, hottest)))
@@ -113,25 +136,40 @@ class StateStepper:
         self._step = Outcome(states, None, self._status(status))
         return self._step
 
+    def _temperatures_and_goal(self, states: ExtendedStates, acts: Array, view: PhysicsView) -> Outcome:
+        program = self.program
+        rest = program.rest(self._leaves, acts, view, self._goal_memo)
+        self._goal_memo, self._facts = rest.memo, rest.facts
+        if not self._settled:
+            states = program.with_leaves(states, program.heats, rest.leaves)
+            self._put(program.heats, rest.leaves)
+        self._step = Outcome(states, None, self._status(rest.status))
+        return self._step
+
     def _everything(self, states: ExtendedStates, leaves: list[Array], view: PhysicsView) -> Outcome:
         program = self.program
-        found = program.whole(leaves, view, self._memo)
-        self._leaves = leaves
-        self._put(program.gives, found.leaves)
-        new = program.with_leaves(states, program.gives, found.leaves)
-        quiet, swapped, self._settled = np.asarray(found.flags).tolist()
-        self._memo, self._view, self._heat_steps = found.memo, view, 0
-        self._step = Outcome(new, None, self._status(found.status))
-        self._kept = None
+        events = program.events(leaves, view, self._memo)
+        self._leaves, self._memo = leaves, events.memo
+        self._put(program.gives, events.leaves)
+        rest = program.rest(leaves, events.acts, view, self._goal_memo)
+        self._put(program.heats, rest.leaves)
+        self._goal_memo, self._whole_facts = rest.memo, rest.facts
+        self._facts = self._whole_facts
+        new = program.with_leaves(states, [*program.gives, *program.heats], [*events.leaves, *rest.leaves])
+        quiet, swapped = np.asarray(events.flags).tolist()
+        self._view, self._heat_steps = view, 0
+        self._step = Outcome(new, None, self._status(rest.status))
+        self._acts = None
         if quiet and not program.model.options.contact_heat_rate:
-            self._kept = found
+            self._acts, self._settled = events.acts, bool(np.asarray(rest.same))
             if self._relevance is None:
-                self._relevance = Relevance(program.model, program.goal_reads)
-            self._relevance.begin(new, view, program.view_reads)
+                self._relevance = Relevance(program.model)
+            self._relevance.begin(new, view, program.event_reads)
             self._seen = [read_field(view, name) for name in program.view_reads]
             self._bytes = [None] * len(self._seen)
-            self._fingers_away = "agent.finger_pos" in program.view_reads and self._away(view)
-        return self._step._replace(swap=Swap(*found.swap)) if swapped and found.swap else self._step
+            fingers = "agent.finger_pos" in program.view_reads and "agent.finger_pos" not in program.goal_reads
+            self._fingers_away = fingers and self._away(view)
+        return self._step._replace(swap=Swap(*events.swap)) if swapped and events.swap else self._step
 
     def _status(self, fields: tuple[Array, Array, Array] | None) -> GoalStatus:
         return self._no_status if fields is None else GoalStatus(*fields)
