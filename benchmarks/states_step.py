@@ -3,7 +3,7 @@
     python benchmarks/states_step.py [--objects 60] [--worlds 64 512] [--json FILE]
 
 One world beside the native engine (microseconds per control step, on one core): everything asleep; one object that
-moves, with a goal that asks where it is and without one; the same without states. Many worlds (microseconds per world
+moves, which the goal is about or not; without a goal; physics without states. Many worlds (microseconds per world
 and step of the one jitted function that also runs on a GPU).
 """
 
@@ -27,6 +27,7 @@ from stateful_home import GOAL, write_stateful_home
 
 import ig2mj
 from ig2mj.engine.native.engine import NativeEngine
+from ig2mj.engine.view import PhysicsView
 from ig2mj.predicates import compile_expression
 from ig2mj.process import run_programs_inline
 from ig2mj.states import StateModel, initial_states
@@ -84,11 +85,20 @@ def one_world(scene: ig2mj.Scene, rules: Rules, seconds: float) -> list[Row]:
     for _ in range(SETTLE_STEPS):
         physics, view = engine.step(physics)
     loose = np.flatnonzero(~scene.tables.object_fixed)
-    moved = [jax.tree.map(np.copy, view) for _ in range(2)]
-    moved[1].object_com[0, loose[0]] += 1e-3  # one object moves a millimetre, back and forth
-    moved[1].body_pos[0, scene.tables.object_root[loose[0]]] += 1e-3
+    named = scene.object_index("thing_3")  # the goal asks what it is on
+    assert loose[0] != named
 
-    still, cooling, moving, beside = (Stepped(rules) for _ in range(4))
+    def pushed(obj: int) -> list[PhysicsView]:
+        """Two views between which one object moves a millimetre, back and forth."""
+        two = [jax.tree.map(np.copy, view) for _ in range(2)]
+        body = scene.tables.object_root[obj]
+        for name, row in (("object_com", obj), ("object_pos", obj), ("aabb_low", obj), ("aabb_high", obj)):
+            getattr(two[1], name)[0, row] += 1e-3
+        two[1].body_pos[0, body] += 1e-3
+        return two
+
+    moved, moved_named = pushed(int(loose[0])), pushed(named)
+    still, cooling, moving, moving_named, beside = (Stepped(rules) for _ in range(5))
     aimless = Stepped(Rules(rules.model, initial=rules.initial))
     # Not a number never equals the one before: this world never settles, as one in which something cools.
     cooling.states = cooling.states.replace(temperature=cooling.states.temperature.at[0, loose[0]].set(jnp.nan))
@@ -107,9 +117,10 @@ def one_world(scene: ig2mj.Scene, rules: Rules, seconds: float) -> list[Row]:
             "native engine with view, asleep": physics_alone,
             "the same with states and goal": with_physics,
             "states and goal, nothing moves": lambda: still.step(view),
-            "states and goal, a thing cools": lambda: cooling.step(view),
-            "states and goal, one thing moves": lambda: moving.step(moved[moving.count % 2]),
-            "states without a goal, one thing moves": lambda: aimless.step(moved[aimless.count % 2]),
+            "states and goal, an object cools": lambda: cooling.step(view),
+            "states and goal, one object moves": lambda: moving.step(moved[moving.count % 2]),
+            "the same, the goal is about it": lambda: moving_named.step(moved_named[moving_named.count % 2]),
+            "states without a goal, one object moves": lambda: aimless.step(moved[aimless.count % 2]),
         },
         seconds,
     )
@@ -121,7 +132,7 @@ class Stepped:
     def __init__(self, rules: Rules):
         self.stepper, self.states, self.count = StateStepper.of(rules, 1), rules.initial, 0
 
-    def step(self, view: ig2mj.engine.view.PhysicsView) -> bool:
+    def step(self, view: PhysicsView) -> bool:
         self.states, _, status = self.stepper.step(self.states, view)
         self.count += 1
         return bool(np.asarray(status.holds)[0])

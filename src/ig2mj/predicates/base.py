@@ -84,7 +84,9 @@ class Predicate:
       name: snake_case. arguments: what each argument is; an agent's index is the number of objects plus its own.
         evaluate: truth for argument tuples. ability: without it the first argument's answer is False.
         aliases: other names (iGibson's, BDDL's tokens, the paper's). queries: relations it needs. why: for people, the
-        numbers behind the answer in one world. per_object: see `of_states`.
+        numbers behind the answer in one world. per_object: see `of_states`. of_arguments: of all that a view says of
+        objects, an answer depends on what it says of the argument objects only, their links, bodies, pieces and
+        contacts, and of floors, which stay; what else moves changes no answer.
     """
 
     name: str
@@ -95,6 +97,7 @@ class Predicate:
     queries: Queries = no_queries
     why: Why | None = None
     per_object: OfStates | None = None
+    of_arguments: bool = False
 
     @classmethod
     def of_states(cls, of_states: OfStates, **fields: Any) -> Predicate:

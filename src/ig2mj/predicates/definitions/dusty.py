@@ -31,6 +31,7 @@ DUSTY = Predicate(
     name="dusty",
     arguments=("object",),
     evaluate=_evaluate,
+    of_arguments=True,
     ability="dustyable",
     why=_why,
 )

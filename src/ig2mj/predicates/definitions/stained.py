@@ -31,6 +31,7 @@ STAINED = Predicate(
     name="stained",
     arguments=("object",),
     evaluate=_evaluate,
+    of_arguments=True,
     ability="stainable",
     why=_why,
 )

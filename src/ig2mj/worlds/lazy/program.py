@@ -30,6 +30,7 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Memo, RelationPlan
 from ig2mj.states.update import events, heat, queries
 from ig2mj.states.world import ExtendedStates
+from ig2mj.worlds.lazy.goal_rows import GoalRows
 from ig2mj.worlds.rules import Rules
 
 T = TypeVar("T")
@@ -88,7 +89,7 @@ class StateProgram:
       heat: one step of temperatures, jitted. heats: places of what it makes among the states' leaves.
       gives: places of the leaves that `events` makes; the others it hands through. event_reads, goal_reads: fields of
       the view on which events depend, and the goal itself; view_reads: both. All are known from the first step on.
-      rows: bodies whose poses matter.
+      rows: bodies whose poses matter. goal_rows: what of its fields the goal can depend on.
     """
 
     _of_rules: ClassVar[weakref.WeakKeyDictionary] = weakref.WeakKeyDictionary()  # Rules -> {worlds: StateProgram}
@@ -116,7 +117,7 @@ class StateProgram:
         self.gives: list[int] = []
         self._events: _Traced | None = None
         self._rest: _Traced | None = None
-        self.rows = _object_bodies(model)
+        self.rows, self.goal_rows = _object_bodies(model), GoalRows(model, goal)
 
     @classmethod
     def of(cls, rules: Rules, num_worlds: int) -> StateProgram:

@@ -111,7 +111,7 @@ class StateStepper:
             if now[:, chosen].tobytes() == before:
                 self._seen[k] = now
                 continue
-            if name in program.goal_reads:
+            if name in program.goal_reads and news is News.NONE and not program.goal_rows.same(name, now, seen):
                 news = News.GOAL
             if name in program.event_reads:
                 if name in relevance.exact:
