@@ -18,6 +18,6 @@ SOAKING_TOWEL = Task(
     distances=((Hand(0), At("bath_towel_0")), (At("bath_towel_0"), Water("sink_0"))),
     robots={
         "humanoid": Acts((2.95, -2.95, 0.55), yaw=-45.0, hands=RIGHT, weights=HUMANOID_WEIGHTS),
-        "fetch": Acts((2.75, -2.9, 0.0), yaw=-30.0),
+        "fetch": Acts((2.78, -2.92, 0.0), yaw=-60.0),
     },
 )

@@ -89,6 +89,20 @@ def horizontal(direction: Float[Array, "W 3"]) -> Float[Array, "W 3"]:
     return jnp.cross(direction, flat / jnp.maximum(length(flat), 1e-6)[:, None])
 
 
+def outward(quat: Float[Array, "W 4"], offset: Float[Array, "W 3"]) -> Float[Array, "W 3"]:
+    """The rotation vector about the vertical by which a gripper comes to point away from the robot's middle.
+
+    An arm reaches farthest so. With the orientation that it had ahead of the robot it does not reach far to the side.
+
+    Args:
+      quat: of the gripper, whose x axis points ahead. offset: from the robot's middle to it.
+    """
+    ahead = quat_rotate(quat, jnp.array([1.0, 0.0, 0.0]))
+    across = ahead[:, 0] * offset[:, 1] - ahead[:, 1] * offset[:, 0]
+    along = ahead[:, 0] * offset[:, 0] + ahead[:, 1] * offset[:, 1]
+    return jnp.zeros_like(offset).at[:, 2].set(jnp.arctan2(across, along))
+
+
 def where(condition: Bool[Array, "W"], then: Wish, otherwise: Wish) -> Wish:
     """One wish where the condition holds, else the other."""
 

@@ -6,8 +6,9 @@ import jax.numpy as jnp
 from jaxtyping import Float
 
 from ig2mj.engine.view import Array
-from ig2mj.tasks.experts.motion import RISE, Wish, around, levelled, where, wish
-from ig2mj.tasks.experts.reaching import take
+from ig2mj.geometry.poses import length
+from ig2mj.tasks.experts.motion import RISE, Wish, around, levelled, outward, where, wish
+from ig2mj.tasks.experts.reaching import take, take_at
 from ig2mj.tasks.experts.sight import Sight
 from ig2mj.tasks.points import WATER_BELOW, Water
 
@@ -31,6 +32,9 @@ CARRY = 0.18
 OUTSIDE = 0.42
 """m from the middle of the robot's body that the towel passes it."""
 
+EDGE = 0.1
+"""m from the towel's middle towards the robot at which Fetch takes it."""
+
 
 def plan(see: Sight) -> list[Wish]:
     """One hand. The tap's front is where the robot stands: +y in its home."""
@@ -44,7 +48,19 @@ def plan(see: Sight) -> list[Wish]:
     go = jnp.clip(1.5 - rise / RISE, 0.0, 1.0)
     move = jnp.stack([-beside * go, (back - ahead) * go, rise], axis=1)
     move = around(towel, move, see.base_pos(), OUTSIDE)
-    return [where(see.holds(TOWEL), wish(move, levelled(see.quat(TOWEL)), close=True), take(see, TOWEL))]
+    turn, get = levelled(see.quat(TOWEL)), take(see, TOWEL)
+    if see.robot == "fetch":
+        turn += outward(see.hand_quat(), see.grip() - see.base_pos())
+        get = take_at(see, _near_edge(see))
+    return [where(see.holds(TOWEL), wish(move, turn, close=True), get)]
+
+
+def _near_edge(see: Sight) -> Float[Array, "W 3"]:
+    """A point of the towel's upper side, nearer to the robot than its middle: what sticks out lengthens the arm."""
+    low, high = see.box(TOWEL)
+    middle = jnp.asarray(0.5 * (low + high)).at[:, 2].set(high[:, 2])
+    away = (middle - see.base_pos()) * jnp.array([1.0, 1.0, 0.0])
+    return middle - EDGE * away / length(away)[:, None]
 
 
 def _share(off: Float[Array, "W"]) -> Float[Array, "W"]:
