@@ -117,6 +117,10 @@ class MjxEngine(abc.ABC):
     @abc.abstractmethod
     def _with_sleep(self, data: mjx.Data, asleep: Int[Array, "W T"], awake: Bool[Array, "W T"]) -> mjx.Data: ...
 
+    def _replaced(self, data: mjx.Data, chosen: Bool[Array, "W"]) -> mjx.Data:
+        """The data with a note that positions of these worlds were replaced, where an engine needs one."""
+        return data
+
     @abc.abstractmethod
     def _overflow(self, data: mjx.Data) -> Int[Array, "W"]: ...
 
@@ -264,7 +268,7 @@ class MjxEngine(abc.ABC):
         fields = {name: put(snapshot.whole(name), getattr(data, name)) for name in STATE_FIELDS}
         data = data.replace(**fields, time=put(snapshot.time, data.time))
         asleep = put(snapshot.tree_asleep, self._tree_asleep(data))
-        data = self._with_sleep(data, asleep, asleep < 0)
+        data = self._replaced(self._with_sleep(data, asleep, asleep < 0), chosen)
         return dataclasses.replace(
             physics,
             data=self._kinematics(data),

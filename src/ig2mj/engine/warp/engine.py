@@ -28,6 +28,7 @@ from ig2mj.engine.native.settle import settle
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.engine.warp import kernels, patches
+from ig2mj.engine.warp.patches.flags import REPLACED
 from ig2mj.engine.warp.patches.ignored import encode
 from ig2mj.engine.warp.profile import EngineProfile, fit, holds_everything, profile_of_scene
 from ig2mj.errors import EngineError
@@ -160,7 +161,14 @@ class WarpEngine(MjxEngine):
 
     def _with_sleep(self, data: mjx.Data, asleep: Int[Array, "W T"], awake: Bool[Array, "W T"]) -> mjx.Data:
         # A sleeping tree that is marked awake is woken, with its island, by the next forward pass.
-        return data.tree_replace({"_impl.tree_asleep": asleep, "_impl.tree_awake": awake.astype(jnp.int32)})
+        before = data._impl.tree_awake  # what `ig2mj.engine.warp.patches.resting` noted of trees that sleep stays
+        flags = jnp.where(awake, 1, jnp.where(before > 1, before, 0))
+        return data.tree_replace({"_impl.tree_asleep": asleep, "_impl.tree_awake": flags.astype(jnp.int32)})
+
+    def _replaced(self, data: mjx.Data, chosen: Bool[Array, "W"]) -> mjx.Data:
+        flags = data._impl.tree_awake
+        new = jnp.where(chosen[:, None] & (flags != 1), REPLACED, flags)
+        return data.tree_replace({"_impl.tree_awake": new.astype(jnp.int32)})
 
     def _overflow(self, data: mjx.Data) -> Int[Array, "W"]:
         return data._impl.overflow

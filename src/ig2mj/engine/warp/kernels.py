@@ -32,7 +32,7 @@ def launches_of(act: Callable[[], Any]) -> list[Launch]:
     default = 256  # Warp's
 
     def launch(kernel: wp.Kernel, *args: Any, block_dim: int = default, **kwargs: Any) -> None:
-        found[kernel, block_dim] = None
+        found[patches.launched(kernel), block_dim] = None
 
     def capture_while(condition: Any, while_body: Callable, stream: Any = None, **kwargs: Any) -> None:
         while_body(**kwargs)
@@ -83,7 +83,7 @@ def launches_of_step(model: mujoco.MjModel, profile: EngineProfile, own: bool) -
         mujoco_warp.step(put, data)
         mujoco_warp.forward(put, data)
 
-    with patches.awake_kernels() if own else patches.upstream_kernels():
+    with patches.engine_kernels() if own else patches.upstream_kernels():
         return launches_of(act)
 
 

@@ -37,11 +37,21 @@ import threading
 import warnings
 from collections.abc import Iterator
 
+import warp as wp
+
 from ig2mj.engine.warp.patches import pins
 from ig2mj.engine.warp.patches.programs import traced_with
 from ig2mj.engine.warp.patches.replacements import KERNELS
 
-__all__ = ["awake_kernels", "fit", "for_new_engines", "traced_with", "upstream_kernels"]
+__all__ = [
+    "awake_kernels",
+    "engine_kernels",
+    "fit",
+    "for_new_engines",
+    "launched",
+    "traced_with",
+    "upstream_kernels",
+]
 
 _here = threading.local()
 _lock = threading.Lock()
@@ -84,6 +94,28 @@ def awake_kernels() -> Iterator[None]:
     """
     with KERNELS.entered(fit()):
         yield
+
+
+@contextlib.contextmanager
+def engine_kernels() -> Iterator[None]:
+    """Likewise, and steps pass over what rests (`ig2mj.engine.warp.patches.resting`), which data of engines allow."""
+    with awake_kernels():
+        if not KERNELS.active:
+            yield
+            return
+        from ig2mj.engine.warp.patches.resting import noted
+
+        with noted():
+            yield
+
+
+def launched(kernel: wp.Kernel) -> wp.Kernel:
+    """The kernel that is launched now, in this thread, in place of one of MuJoCo Warp's; that one where it stays."""
+    if not KERNELS.active:
+        return kernel
+    from ig2mj.engine.warp.patches.launching import substituted
+
+    return substituted(kernel, ())[0]
 
 
 @contextlib.contextmanager

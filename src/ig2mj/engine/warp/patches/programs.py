@@ -32,9 +32,11 @@ _registrations = ScopedReplacement()
 def _choosing(function: Callable[..., Any], own: bool) -> Callable[..., Any]:
     """The function with MuJoCo Warp's functions chosen while it runs. The same one each time, so that MJX finds it."""
 
+    from ig2mj.engine.warp.patches.resting import noted  # not before: it needs names that may not exist
+
     @functools.wraps(function)
     def run(*args: Any, **kwargs: Any) -> Any:
-        with KERNELS.entered(own):
+        with KERNELS.entered(own), noted() if own else contextlib.nullcontext():
             return function(*args, **kwargs)
 
     return run

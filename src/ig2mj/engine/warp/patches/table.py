@@ -1,11 +1,29 @@
 """Which function of MuJoCo Warp each of ours stands in for. Imported only where the pinned version is installed."""
 
 import functools
+import os
 
-from mujoco.mjx.third_party.mujoco_warp._src import collision_driver, forward, passive, solver
+import warp as wp
+from mujoco.mjx.third_party.mujoco_warp._src import (
+    collision_convex,
+    collision_driver,
+    forward,
+    passive,
+    smooth,
+    solver,
+)
 from mujoco.mjx.third_party.mujoco_warp._src import sleep as sleep_module
 
-from ig2mj.engine.warp.patches import collision, compact_solver, gravity, sleeping, velocity
+from ig2mj.engine.warp.patches import (
+    branches,
+    collision,
+    compact_solver,
+    gravity,
+    launching,
+    resting,
+    sleeping,
+    velocity,
+)
 
 OWN = {
     (solver, "_cholesky_factorize_solve"): compact_solver.cholesky_factorize_solve,
@@ -20,3 +38,25 @@ OWN = {
     (forward, "fwd_velocity"): velocity.fwd_velocity,
     (sleep_module, "sleep"): sleeping.sleep,
 }
+
+ON_TRIAL = {
+    "branches": {
+        (collision_convex, "ccd_kernel_builder"): branches.ccd_kernel_builder,
+        (collision_driver, "convex_narrowphase"): branches.convex_narrowphase,
+        (collision_driver, "_narrowphase"): branches.narrowphase,
+    },
+    "resting": {
+        (sleep_module, "wake"): resting.wake,
+        (sleep_module, "update_sleep"): resting.update_sleep,
+        (forward, "forward"): resting.forward,
+        (smooth, "crb"): resting.crb,
+        (smooth, "factor_solve_i"): resting.factor_solve_i,
+    },
+}
+"""Functions whose gain is not measured yet: they run where IG2MJ_KERNELS names their group."""
+
+for _group in filter(None, os.environ.get("IG2MJ_KERNELS", "").split(",")):
+    OWN |= ON_TRIAL[_group]
+    OWN[wp, "launch"] = launching.launch
+    if _group == "resting":
+        launching.add(resting.substitute)

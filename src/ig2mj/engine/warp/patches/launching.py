@@ -1,0 +1,59 @@
+"""What a launch of MuJoCo Warp's becomes while our functions run: another kernel, another stream, or itself.
+
+Parts of this package that change launches rather than functions register here: `add` a function that is given a kernel
+and its inputs, and answers with what to launch in their place, or None.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import warp as wp
+
+from ig2mj.engine.warp.patches.replacements import original
+
+Substitute = tuple[wp.Kernel, list[Any]]
+"""A kernel, and its inputs."""
+
+Branch = Callable[[wp.Kernel, Sequence[Any]], "wp.Stream | None"]
+"""The stream that a kernel is launched on; None: the present one."""
+
+_here = threading.local()
+_substitutes: list[Callable[[wp.Kernel, Sequence[Any]], Substitute | None]] = []
+
+
+def add(substitute: Callable[[wp.Kernel, Sequence[Any]], Substitute | None]) -> None:
+    """From now on launches of ours ask this function."""
+    _substitutes.append(substitute)
+
+
+def substituted(kernel: wp.Kernel, inputs: Sequence[Any]) -> Substitute:
+    """What is launched in place of a kernel with these inputs."""
+    for substitute in _substitutes:
+        found = substitute(kernel, inputs)
+        if found is not None:
+            return found
+    return kernel, list(inputs)
+
+
+@contextlib.contextmanager
+def branching(branch: Branch) -> Iterator[None]:
+    """Inside the block this thread's launches go to the streams that the function names."""
+    _here.branch = branch
+    try:
+        yield
+    finally:
+        _here.branch = None
+
+
+def launch(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any] = (), *args: Any, **kwargs: Any) -> Any:
+    """In place of `warp.launch`."""
+    kernel, inputs = substituted(kernel, inputs)
+    branch: Branch | None = getattr(_here, "branch", None)
+    stream = branch(kernel, inputs) if branch else None
+    if stream is not None:
+        kwargs["stream"] = stream
+    return original(wp, "launch")(kernel, dim, inputs, *args, **kwargs)

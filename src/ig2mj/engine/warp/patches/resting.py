@@ -1,0 +1,332 @@
+"""Positions and velocities of what rests are not computed anew.
+
+MuJoCo Warp computes the pose of every body and geom, inertias, velocities and bias forces of every world in every step,
+though nearly everything sleeps. What depends on positions and velocities alone stays as it is while a tree sleeps, and
+lies in the same arrays in the next step. So the kernels that compute it (`GUARDED`) pass over bodies whose kinematic
+root has no tree that is live, in `live` [world, body].
+
+A tree is live when a step begins if it is awake, or if it fell asleep in the last step: then its velocity became zero
+and its position changed after the last step's kinematics. `tree_awake` says so from one step to the next:
+`FELL_ASLEEP`, or `REPLACED` where the engine put other positions in place of a world's (`WarpEngine._replaced`), in
+which case everything of that world is computed. Within a step it is 0 or 1, as upstream. A tree that wakes in the
+course of a step has not moved.
+"""
+
+# Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
+# pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
+# pyright: reportGeneralTypeIssues=false, reportOperatorIssue=false, reportPrivateUsage=false
+
+import contextlib
+import functools
+import inspect
+import threading
+from collections.abc import Iterator, Sequence
+from typing import Any, no_type_check
+
+import warp as wp
+from mujoco.mjx.third_party.mujoco_warp._src import forward as forward_module
+from mujoco.mjx.third_party.mujoco_warp._src import sleep as sleep_module
+from mujoco.mjx.third_party.mujoco_warp._src import smooth, types
+
+from ig2mj.engine.warp.patches.flags import FELL_ASLEEP, REPLACED
+from ig2mj.engine.warp.patches.guarded import guarded
+from ig2mj.engine.warp.patches.replacements import original
+
+AWAKE, ASLEEP, STATIC = (int(getattr(types.SleepState, name)) for name in ("AWAKE", "ASLEEP", "STATIC"))
+
+_here = threading.local()
+
+
+@wp.func
+@no_type_check
+def _rests(live: wp.array2d[int], world: int, root: int) -> bool:
+    return live[world, root] == 0 and live[world, 0] == 0
+
+
+@wp.func
+@no_type_check
+def _rests_or_ends(live: wp.array2d[int], world: int, root: int, parent: int) -> bool:
+    """Likewise; and what goes from roots to the world is not added up, where the world's own sum is not begun anew."""
+    return live[world, 0] == 0 and (live[world, root] == 0 or parent == 0)
+
+
+def _body(index: str) -> str:
+    return f"_rests(live, worldid, live_root[{index}])"
+
+
+LEAF = "body_branches[body_branch_start[branchid + 1] - 1]"
+UPWARD = "_rests_or_ends(live, worldid, live_root[body_tree_[nodeid]], body_parentid[body_tree_[nodeid]])"
+
+GUARDED = {
+    "_kinematics_branch": _body(LEAF),
+    "_compute_body_matrices": _body("bodyid"),
+    "_compute_body_inertial_frames": _body("bodyid"),
+    "_geom_local_to_global": _body("geom_bodyid[geomid]"),
+    "_site_local_to_global": _body("site_bodyid[siteid]"),
+    "_subtree_com_init": _body("bodyid"),
+    "_subtree_com_acc": UPWARD,
+    "_subtree_div": _body("bodyid"),
+    "_cinert": _body("bodyid"),
+    "_cdof": _body("jnt_bodyid[jntid]"),
+    "_crb_accumulate": UPWARD,
+    "_comvel_branch": _body(LEAF),
+    "_cacc_branch": _body(LEAF),
+    "_cfrc": _body("bodyid"),
+    "_cfrc_backward": UPWARD,
+    "_qfrc_bias": _body("dof_bodyid[dofid]"),
+}
+"""Kernels of `smooth`, and where each has nothing to do."""
+
+
+@functools.cache
+def _guarded_by_kernel() -> dict[wp.Kernel, wp.Kernel]:
+    names = {"_rests": _rests, "_rests_or_ends": _rests_or_ends}
+    arguments = {"live": wp.array2d[int], "live_root": wp.array[int]}
+    kernels = {getattr(smooth, name): condition for name, condition in GUARDED.items()}
+    return {
+        kernel: guarded(kernel, condition, arguments, names, module=__name__ + ".smooth")
+        for kernel, condition in kernels.items()
+    }
+
+
+def substitute(kernel: wp.Kernel, inputs: Sequence[Any]) -> tuple[wp.Kernel, list[Any]] | None:
+    """The guarded kernel with its inputs, in a step that passes over what rests."""
+    flags, awake = getattr(_here, "flags", None), getattr(_here, "awake", None)
+    if awake and kernel.key.startswith(SOLVE):
+        return _guarded_solve(kernel), [*awake, *inputs]
+    if not flags:
+        return None
+    own = _guarded_by_kernel().get(kernel)
+    return None if own is None else (own, [*flags, *inputs])
+
+
+SOLVE = "_small_cholesky_factorize_solve_block"
+"""Makes a kernel that solves for the accelerations of small trees, for their number of degrees of freedom."""
+
+NO_ACCELERATION = """for i in range(wp.static(block_size)):
+    x_out[worldid, block_dof[blk] + i] = 0.0
+return"""
+
+
+@functools.cache
+def _guarded_solve(kernel: wp.Kernel) -> wp.Kernel:
+    size = inspect.getclosurevars(kernel.func).nonlocals["block_size"]
+    return guarded(
+        kernel,
+        "tree_awake[worldid, dof_tree[block_dof[blk]]] == 0",
+        {"tree_awake": wp.array2d[int], "dof_tree": wp.array[int]},
+        {},
+        NO_ACCELERATION,
+        f"{__name__}.solve_{size}",
+    )
+
+
+def factor_solve_i(m: Any, d: Any, *arguments: Any) -> None:
+    """As upstream; trees that sleep are passed over, and do not accelerate."""
+    _here.awake = [d.tree_awake, m.dof_treeid] if m.opt.enableflags & types.EnableBit.SLEEP else None
+    try:
+        original(smooth, "factor_solve_i")(m, d, *arguments)
+    finally:
+        _here.awake = None
+
+
+@wp.kernel(enable_backward=False)
+@no_type_check
+def _begin(
+    begins: bool,
+    steps: bool,
+    static_awake: int,
+    ntree: int,
+    nbody: int,
+    body_rootid: wp.array[int],
+    body_mocapid: wp.array[int],
+    body_treeid: wp.array[int],
+    dof_bodyid: wp.array[int],
+    tree_dofadr: wp.array[int],
+    tree_asleep: wp.array2d[int],
+    tree_awake: wp.array2d[int],
+    ntree_awake: wp.array[int],
+    nbody_awake: wp.array[int],
+    body_awake: wp.array2d[int],
+    body_awake_ind: wp.array2d[int],
+    nv_awake: wp.array[int],
+    dof_awake_ind: wp.array2d[int],
+    live: wp.array2d[int],
+):
+    """Threads of a world: its trees, then its bodies, then its degrees of freedom."""
+    world, k = wp.tid()
+    if k < ntree:
+        before = tree_awake[world, k]
+        awake = tree_asleep[world, k] < 0
+        if awake:
+            tree_awake[world, k] = 1
+            wp.atomic_add(ntree_awake, world, 1)
+        elif begins or before == 0:
+            tree_awake[world, k] = 0
+        elif before == 1:
+            tree_awake[world, k] = wp.static(FELL_ASLEEP)
+        if steps:
+            if awake or before == wp.static(FELL_ASLEEP):
+                live[world, body_rootid[dof_bodyid[tree_dofadr[k]]]] = 1
+            if before == wp.static(REPLACED):
+                live[world, 0] = 1
+    elif k < ntree + nbody:
+        body = k - ntree
+        tree = body_treeid[body]
+        state = int(wp.static(ASLEEP))
+        if tree >= 0:
+            if tree_asleep[world, tree] < 0:
+                state = int(wp.static(AWAKE))
+        elif body_mocapid[body_rootid[body]] >= 0:
+            state = int(wp.static(AWAKE))
+            if steps:
+                live[world, body_rootid[body]] = 1
+        elif static_awake != 0:
+            state = int(wp.static(AWAKE))
+        else:
+            state = int(wp.static(STATIC))
+        body_awake[world, body] = state
+        if state != wp.static(ASLEEP):
+            body_awake_ind[world, wp.atomic_add(nbody_awake, world, 1)] = body
+    else:
+        dof = k - ntree - nbody
+        tree = body_treeid[dof_bodyid[dof]]
+        if tree >= 0 and tree_asleep[world, tree] < 0:
+            dof_awake_ind[world, wp.atomic_add(nv_awake, world, 1)] = dof
+
+
+def update_sleep(m: Any, d: Any, flg_staticawake: int = 0) -> None:
+    """What is awake, from `tree_asleep`: two launches in place of upstream's four. At the beginning of a step also what
+    is live."""
+    begins = getattr(_here, "begins", False)
+    steps = begins and getattr(_here, "steps", False) and _serves(m)
+    _here.begins = False
+    live = wp.zeros((d.nworld, m.nbody), dtype=int) if steps else d.body_awake
+    wp.launch(
+        sleep_module._zero_sleep_counters,
+        dim=d.nworld,
+        outputs=[d.ntree_awake, d.nbody_awake, d.nv_awake],
+    )
+    wp.launch(
+        _begin,
+        dim=(d.nworld, m.ntree + m.nbody + m.nv),
+        inputs=[
+            begins,
+            steps,
+            flg_staticawake,
+            m.ntree,
+            m.nbody,
+            m.body_rootid,
+            m.body_mocapid,
+            m.body_treeid,
+            m.dof_bodyid,
+            m.tree_dofadr,
+            d.tree_asleep,
+        ],
+        outputs=[
+            d.tree_awake,
+            d.ntree_awake,
+            d.nbody_awake,
+            d.body_awake,
+            d.body_awake_ind,
+            d.nv_awake,
+            d.dof_awake_ind,
+            live,
+        ],
+    )
+    if steps:
+        _here.flags = [live, m.body_rootid]
+
+
+def _serves(m: Any) -> bool:
+    """Flexible bodies and tendons depend on the positions of several trees."""
+    return m.nflex == 0 and m.ntendon == 0
+
+
+def wake(m: Any, d: Any) -> None:
+    """As upstream; a forward pass begins with it."""
+    original(sleep_module, "wake")(m, d)
+    _here.begins = True
+
+
+@contextlib.contextmanager
+def noted() -> Iterator[None]:
+    """Inside the block this thread's steps pass over what rests. Their data's `tree_awake` must say `REPLACED` where
+    the arrays that depend on positions and velocities were not computed by a step or a forward pass."""
+    before = getattr(_here, "noted", False)
+    _here.noted = True
+    try:
+        yield
+    finally:
+        _here.noted = before
+
+
+def forward(m: Any, d: Any) -> None:
+    """The forward pass of a step. (One by itself, after something was changed, computes everything.)"""
+    _here.steps = getattr(_here, "noted", False)
+    try:
+        original(forward_module, "forward")(m, d)
+    finally:
+        _here.steps, _here.flags = False, None
+
+
+@wp.kernel(enable_backward=False)
+@no_type_check
+def _begin_composite(
+    live: wp.array2d[int], live_root: wp.array[int], cinert: wp.array2d[types.vec10], crb: wp.array2d[types.vec10]
+):
+    world, body = wp.tid()
+    if not _rests(live, world, live_root[body]):
+        crb[world, body] = cinert[world, body]
+
+
+@wp.kernel(enable_backward=False)
+@no_type_check
+def _inertia(
+    live: wp.array2d[int],
+    live_root: wp.array[int],
+    dof_bodyid: wp.array[int],
+    dof_parentid: wp.array[int],
+    dof_armature: wp.array2d[float],
+    M_rownnz: wp.array[int],
+    M_rowadr: wp.array[int],
+    cdof: wp.array2d[wp.spatial_vector],
+    crb: wp.array2d[types.vec10],
+    inertia: wp.array2d[float],
+):
+    """The row of a degree of freedom: its ancestors' entries from the last one, which is its own, backward."""
+    world, dof = wp.tid()
+    body = dof_bodyid[dof]
+    if _rests(live, world, live_root[body]):
+        return
+    first = M_rowadr[dof]
+    place = first + M_rownnz[dof] - 1
+    momentum = smooth.math.inert_vec(crb[world, body], cdof[world, dof])
+    own = dof_armature[world % dof_armature.shape[0], dof]
+    ancestor = dof
+    while ancestor >= 0:
+        inertia[world, place] = own + wp.dot(cdof[world, ancestor], momentum)
+        own = 0.0
+        place -= 1
+        ancestor = dof_parentid[ancestor]
+    while place >= first:
+        inertia[world, place] = 0.0
+        place -= 1
+
+
+def crb(m: Any, d: Any) -> None:
+    """Inertias of subtrees and the inertia matrix, of what is live; as upstream outside of steps."""
+    flags = getattr(_here, "flags", None)
+    if not flags:
+        original(smooth, "crb")(m, d)
+        return
+    wp.launch(_begin_composite, dim=(d.nworld, m.nbody), inputs=[*flags, d.cinert], outputs=[d.crb])
+    for bodies in reversed(m.body_tree):
+        wp.launch(
+            smooth._crb_accumulate,
+            dim=(d.nworld, bodies.size),
+            inputs=[m.body_parentid, d.crb, bodies],
+            outputs=[d.crb],
+        )
+    dofs = [m.dof_bodyid, m.dof_parentid, m.dof_armature, m.M_rownnz, m.M_rowadr]
+    wp.launch(_inertia, dim=(d.nworld, m.nv), inputs=[*flags, *dofs, d.cdof, d.crb], outputs=[d.M])
