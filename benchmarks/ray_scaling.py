@@ -1,11 +1,13 @@
-"""Weak scaling of work in pieces: rows of `ig2mj sample` a second on one and on two Ray nodes of one processor each.
+"""Weak scaling of work in pieces on one and on two Ray nodes of one processor each: rows of `ig2mj sample` and episodes
+of `ig2mj demos collect` a second.
 
-    python benchmarks/ray_scaling.py [--rows 24] [--out benchmarks/results/scaling/ray.json]
+    python benchmarks/ray_scaling.py [--rows 40] [--batches 4] [--out benchmarks/results/scaling/ray.json]
 
-The nodes are started on this machine, each held to a processor of its own. Twice the rows are sampled on twice the
-nodes. Where others use the machine's processors as well, wall time says little (the load average is told); the
-processor time that a row costs on its node is told beside it: twice the ratio of both is the most that weak scaling
-can be. Each run is added to the file.
+The nodes are started on this machine, each held to a processor of its own. Twice the pieces are done on twice the
+nodes; a node's first piece, in which it loads and compiles, does not count. Where others use the machine's processors
+as well, wall time says little (the load average is told); the processor time that a piece costs on its node is told
+beside it: twice the ratio of both is the most that weak scaling can be. Each run is added to the file. Takes about six
+minutes on two processors.
 """
 
 from __future__ import annotations
@@ -18,28 +20,58 @@ import shutil
 import subprocess
 import sys
 import time
+from collections.abc import Mapping
+from typing import Any
 
 from results import machine
 
 from ig2mj.cluster.pieces import Where, run
-from ig2mj.cluster.work import Piece, Work
+from ig2mj.cluster.work import Piece, Work, found
+from ig2mj.envs.pieces import shared_pool
+from ig2mj.learn.demo_pieces import collection_pieces
 from ig2mj.sampling.conditions import read_conditions
 from ig2mj.sampling.many import row_work
 from ig2mj.scene.scene import load_scene
 
 OUT = pathlib.Path(__file__).parent / "results" / "scaling" / "ray.json"
 
-CONDITIONS = ("(on_top apple_0 breakfast_table_0)", "(inside fish_0 fridge_0)")
+HOME, CONDITIONS = "birch", ("(on_top apple_0 breakfast_table_0)", "(inside fish_0 fridge_0)")
+
+TASK, EPISODES = "GraspingBook", 16
+"""Demonstrations: the task, and episodes of a piece."""
 
 
-def timed_row(**arguments: object) -> bytes:
-    """A row, and when it was begun and ended, what processor time it took, and who did it."""
-    from ig2mj.sampling.many import row_piece
-
+def timed(function: str, arguments: dict[str, Any], shared: Mapping[str, bytes] | None = None) -> bytes:
+    """Does a piece; when it was begun and ended, what processor time it took, and who did it."""
     began, spent = time.time(), time.process_time()
-    row_piece(**arguments)  # pyright: ignore[reportArgumentType]
-    found = {"began": began, "ended": time.time(), "processor": time.process_time() - spent, "who": os.getpid()}
-    return json.dumps(found).encode()
+    found(function)(**arguments, **({"shared": shared} if shared else {}))
+    about = {"began": began, "ended": time.time(), "processor": time.process_time() - spent, "who": os.getpid()}
+    return json.dumps(about).encode()
+
+
+def sampled_rows(count: int) -> Work:
+    """Rows of a pool, a piece each."""
+    return row_work(load_scene(HOME), read_conditions(CONDITIONS), range(count), 0)
+
+
+def demonstrations(count: int) -> Work:
+    """Episodes of an expert, `EPISODES` a piece."""
+    settings = {
+        "env": TASK,
+        "robot": None,
+        "grasping": None,
+        "engine": "native",
+        "worlds": 4,
+        "observations": ["proprioception", "privileged_state"],
+        "split": "train",
+        "pool_size": 32,
+        "noise": 0.1,
+        "disturbed": 0.1,
+    }
+    pieces = [
+        Piece(f"piece_{n:03d}", p.arguments) for n in range(count) for p in collection_pieces(settings, EPISODES, n)
+    ]
+    return Work("ig2mj.learn.demo_pieces:collect_piece", "demonstrations", pieces, shared_pool(TASK, "train", 32))
 
 
 def node(core: int, *words: str) -> subprocess.Popen:
@@ -53,64 +85,69 @@ def node(core: int, *words: str) -> subprocess.Popen:
     return subprocess.Popen(command, env=environment, stdout=quiet, stderr=quiet, start_new_session=True)
 
 
-def measure(address: str, nodes: int, rows: int) -> dict[str, float]:
-    """Rows a second, by the wall and by processor time. Loading the scene on each node is done before."""
-    scene = load_scene("small_home")
-    plain = row_work(scene, read_conditions(CONDITIONS), range(nodes * (rows + 4)), 0)
-    pieces = [Piece(p.name, p.arguments) for p in plain.pieces]
-    work = Work("ray_scaling:timed_row", "rows", pieces, check=plain.check)
-    store, failed = run(work, Where(cluster=address))
+def measure(address: str, nodes: int, work: Work) -> dict[str, float]:
+    """Pieces a second, by the wall and by processor time; those count that are begun when every node has done one."""
+    pieces = [Piece(p.name, {"function": work.function, "arguments": dict(p.arguments)}) for p in work.pieces]
+    store, failed = run(
+        Work("ray_scaling:timed", "pieces", pieces, work.shared, check=work.check), Where(cluster=address)
+    )
     assert not failed, failed
     done = sorted((json.loads(store.get(p.name)) for p in pieces), key=lambda d: d["began"])
     first = {who: min(d["ended"] for d in done if d["who"] == who) for who in {d["who"] for d in done}}
-    counted = [d for d in done if d["began"] >= max(first.values())]  # every node has loaded the scene
+    counted = [d for d in done if d["began"] >= max(first.values())]
+    assert len(first) == nodes and counted, f"{len(first)} of {nodes} nodes took part"
     wall = max(d["ended"] for d in counted) - min(d["began"] for d in counted)
     busy = sum(d["ended"] - d["began"] for d in counted)
     return {
         "nodes": nodes,
-        "rows": len(counted),
-        "workers": len(first),
-        "rows_per_second": round(len(counted) / wall, 4),
-        "processor_seconds_per_row": round(sum(d["processor"] for d in counted) / len(counted), 4),
+        "pieces": len(counted),
+        "pieces_per_second": round(len(counted) / wall, 4),
+        "processor_seconds_per_piece": round(sum(d["processor"] for d in counted) / len(counted), 4),
+        "seconds_per_piece": round(busy / len(counted), 4),
         "idle": round(max(1.0 - busy / (wall * nodes), 0.0), 4),
     }
 
 
+def compared(one: dict[str, float], two: dict[str, float]) -> dict[str, Any]:
+    """Weak scaling of a kind of work."""
+    ratio = 2 * one["processor_seconds_per_piece"] / two["processor_seconds_per_piece"]
+    wall = two["pieces_per_second"] / one["pieces_per_second"]
+    return {"nodes": [one, two], "weak_scaling_by_wall_time": round(wall, 3), "processor_time_ratio": round(ratio, 3)}
+
+
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--rows", type=int, default=24, help="of one node")
+    parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
+    parser.add_argument("--rows", type=int, default=40, help="rows of one node")
+    parser.add_argument("--batches", type=int, default=4, help="pieces of demonstrations of one node")
     parser.add_argument("--port", type=int, default=7443)
     parser.add_argument("--out", type=pathlib.Path, default=OUT)
     args = parser.parse_args()
     here = str(pathlib.Path(__file__).resolve().parent)
     os.environ["PYTHONPATH"] = f"{here}:{os.environ.get('PYTHONPATH', '')}"
-    address, started, rows = f"127.0.0.1:{args.port}", [], []
+    kinds = {"rows": (sampled_rows, args.rows, 4), "demonstrations": (demonstrations, args.batches, 1)}
+    address, started = f"127.0.0.1:{args.port}", []
+    measured: dict[str, list[dict[str, float]]] = {kind: [] for kind in kinds}
     try:
-        started.append(node(0, "--head", "--port", str(args.port), "--include-dashboard", "false"))
-        time.sleep(20)
-        rows.append(measure(address, 1, args.rows))
-        print(json.dumps(rows[-1]), flush=True)
-        started.append(node(1, "--address", address))
-        time.sleep(20)
-        rows.append(measure(address, 2, args.rows))
-        print(json.dumps(rows[-1]), flush=True)
+        for nodes in (1, 2):
+            place = ("--address", address) if started else ("--head", "--port", str(args.port))
+            started.append(node(nodes - 1, *place, *(() if nodes == 2 else ("--include-dashboard", "false"))))
+            time.sleep(20)
+            for kind, (work, count, warm_up) in kinds.items():
+                measured[kind].append(measure(address, nodes, work(nodes * (count + warm_up))))
+                print(json.dumps({"kind": kind, **measured[kind][-1]}), flush=True)
     finally:
         for process in reversed(started):
             process.terminate()
             process.wait()
-    one, two = rows
-    ratio = 2 * one["processor_seconds_per_row"] / two["processor_seconds_per_row"]
-    found = {
-        "rows": rows,
-        "weak_scaling_by_wall_time": round(two["rows_per_second"] / one["rows_per_second"], 3),
-        "processor_time_ratio": round(ratio, 3),
+    result = {
+        **{kind: compared(*rows) for kind, rows in measured.items()},
         "load_average": os.getloadavg(),
         "machine": machine(-1),
     }
     args.out.parent.mkdir(parents=True, exist_ok=True)
     runs = json.loads(args.out.read_text())["runs"] if args.out.exists() else []
-    args.out.write_text(json.dumps({"runs": [*runs, found]}, indent=1) + "\n", encoding="utf-8")
-    print(json.dumps(found))
+    args.out.write_text(json.dumps({"runs": [*runs, result]}, indent=1) + "\n", encoding="utf-8")
+    print(json.dumps(result))
 
 
 if __name__ == "__main__":

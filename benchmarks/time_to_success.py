@@ -80,7 +80,7 @@ def start(task: str, gpus: tuple[int, ...], args: Args) -> Planned:
     share, count = (2 if args.cpu else 1024), len(gpus)
     settings: dict[str, Any] = {
         "env": task,
-        "engine": "jax" if args.cpu else "warp",
+        "engine": "warp",
         "obs": "state" if args.cpu else "rgbd",
         "worlds": share * count,
         "minutes": args.seconds / 60,

@@ -26,7 +26,8 @@ def test_a_recorded_expert_is_cloned_and_judged(tmp_path, capsys):
     assert found["success_low"] <= found["success_rate"] <= found["success_high"]
     assert found["success_rate"] >= 0.75
     assert call(["rollout", "CookingMeat", "--agent", str(run / "policy.npz"), "--worlds", "4", *episodes]) == 0
-    assert json.loads(capsys.readouterr().out)["success_rate"] >= 0.75
+    played = json.loads(capsys.readouterr().out)
+    assert played["success_rate"] >= 0.75 and set(played) <= set(found), "evaluate has the keys of rollout"
     assert call(["evaluate", str(run), "--worlds", "1", "--episodes", "1", *POOL, "--robot", "fetch"]) == 2
     assert 'is for robot = "humanoid", and here it is "fetch"' in capsys.readouterr().err
 
@@ -56,3 +57,20 @@ def test_a_training_that_does_not_fit_ends_in_one_line(tmp_path, capsys, monkeyp
     assert call([*arguments, "--engine", "native"]) == 2
     (line,) = [text for text in capsys.readouterr().err.splitlines() if "memory" in text]
     assert "8 worlds" in line and "--worlds 4" in line
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_a_training_leaves_reports_checkpoints_a_policy_and_films(tmp_path, capsys):
+    """A film of a held-out episode while it trains, and one at its end; a second run with the folder is refused."""
+    run = tmp_path / "run"
+    settings = ["--worlds", "2", *POOL, "--engine", "native", "--out", str(run), "--set", "updates=1", "batch=32"]
+    assert call(["train", "GraspingBook", "--minutes", "0.2", "--videos", "0.1", *settings]) == 0
+    assert capsys.readouterr().out.strip() == str(run / "policy.npz")
+    films = sorted((run / "videos").glob("*.mp4"))
+    logs = "\n".join(log.read_text()[-500:] for log in (run / "videos").glob("*.log"))
+    assert films and all(film.stat().st_size > 2000 and film.with_suffix(".npz").exists() for film in films), logs
+    assert (run / "progress.csv").exists() and list(run.glob("events.out.tfevents.*"))
+    assert [f.name for f in (run / "checkpoints").iterdir()]
+    assert call(["train", "GraspingBook", "--minutes", "0.2", *settings]) == 2
+    assert "holds a run already: take --resume" in capsys.readouterr().err

@@ -26,7 +26,7 @@ from ig2mj.learn.options import configured
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy, depends_on
 from ig2mj.learn.ppo import PPO, PPOConfig
-from ig2mj.learn.sac import SACConfig
+from ig2mj.learn.sac import SAC, SACConfig
 from ig2mj.learn.train import Run, train
 
 CONFIG = PPOConfig(length=4, parts=1, epochs=1, actor=(16,), critic=(16,))
@@ -150,6 +150,26 @@ def test_a_killed_run_goes_on(tmp_path):
     assert result.row["env_steps"] == (newest + 5) * 4 * 8
     seconds = [float(r["seconds"]) for r in rows(tmp_path)]
     assert seconds == sorted(seconds)
+
+
+@pytest.mark.slow
+def test_a_buffer_that_was_kept_needs_no_filling(tmp_path):
+    """With it updates go on at once; without it the policy plays 100 steps of every world before."""
+    env = PointMass(8)
+    config = SACConfig(updates=2, batch=32, capacity=2000, actor=(16,), critic=(16,), atoms=11)
+    sac = SAC(Perception(env.observation_spaces), 2, config)
+
+    def updates(kept: bool, iterations: int, resume: bool) -> int:
+        out = tmp_path / str(kept)
+        run = Run(5.0, iterations=iterations, out=out, save_buffer=kept, resume=resume, quiet=True)
+        return int(train(env, sac, run).learner.updates)
+
+    before = updates(True, 20, False)
+    assert updates(False, 20, False) == before > 0
+    each = before // (20 - sac.warm_up(False))
+    assert updates(True, 32, True) - before == each * (12 - 2)
+    assert updates(False, 32, True) == before, "it still fills"
+    assert updates(False, 32 + sac.warm_up(True) + 3, True) - before == each * 3, "each start fills anew"
 
 
 def test_a_policy_file_acts_as_what_was_trained(done, tmp_path):

@@ -70,7 +70,7 @@ class Checkpoints:
         shutil.rmtree(beside, ignore_errors=True)
         beside.mkdir()
         with _checkpointer() as writer:
-            writer.save(beside / "arrays", _leaves(tree))
+            writer.save(beside / "arrays", _full(_leaves(tree)))
         (beside / "meta.json").write_text(json.dumps(meta, indent=1), encoding="utf-8")
         if target.exists():
             shutil.rmtree(target)
@@ -108,13 +108,14 @@ class Checkpoints:
                 continue
             refuse_difference(folder, meta["depends"], depends)
             try:
+                expected = _leaves(like)
                 with _checkpointer() as reader:
-                    leaves = reader.restore(folder / "arrays", _leaves(like))
+                    leaves = {**expected, **reader.restore(folder / "arrays", _full(expected))}
             except Exception as e:  # what orbax raises for half a file has no type of its own
                 why = " ".join(str(e).split())[:120]
                 print(f"{folder}: broken ({why}); the checkpoint before it is taken", file=sys.stderr)
                 continue
-            arrays = [np.asarray(leaves[name]) for name in _leaves(like)]
+            arrays = [np.asarray(leaves[name]) for name in expected]
             return jax.tree.unflatten(jax.tree.structure(like), arrays), meta
         return None
 
@@ -176,6 +177,11 @@ def _leaves(tree: Any) -> dict[str, np.ndarray]:
         return np.asarray(array) if there else np.empty(array.shape, array.dtype)
 
     return {jax.tree_util.keystr(path): read(a) for path, a in jax.tree_util.tree_leaves_with_path(tree)}
+
+
+def _full(leaves: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Without arrays that have no number, such as pictures of a run without any: orbax refuses them."""
+    return {name: array for name, array in leaves.items() if array.size}
 
 
 def refuse_difference(
