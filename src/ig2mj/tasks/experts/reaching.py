@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from ig2mj.engine.view import Array
 from ig2mj.geometry.poses import length
-from ig2mj.tasks.experts.motion import Wish, over, wish
+from ig2mj.tasks.experts.motion import Wish, outward, over, wish
 from ig2mj.tasks.experts.sight import Sight
 
 CLEARANCE = 0.12
@@ -18,6 +18,12 @@ CLOSING = 0.05
 
 BELOW = 0.03
 """m below its top that the hand goes for: what lies there stops it."""
+
+FAR, BLEND = 0.62, 0.1
+"""m from the robot's middle beyond which Fetch's gripper turns outwards, and over which it comes to do so."""
+
+ASIDE = 0.8
+"""rad that it may then point aside: turned wholly outwards over a low table, the elbow comes down onto its edge."""
 
 
 def take(see: Sight, name: str, hand: int = 0) -> Wish:
@@ -32,3 +38,12 @@ def take_at(see: Sight, place: Float[Array, "W 3"], hand: int = 0) -> Wish:
     down = jnp.array([0.0, 0.0, BELOW], jnp.float32)
     grip = see.grip(hand)
     return wish(over(grip, place - down, place[:, 2] + CLEARANCE), close=length(grip - place) < CLOSING)
+
+
+def far_out(see: Sight, goal: Float[Array, "W 3"], hand: int = 0) -> Float[Array, "W 3"]:
+    """The rotation vector by which a gripper comes to point away from the robot, where its goal is far from it."""
+    away = jnp.asarray(goal) - see.base_pos()
+    near = 1.0 - jnp.clip((length(away[:, :2]) - FAR) / BLEND, 0.0, 1.0)
+    turn = outward(see.hand_quat(hand), see.grip(hand) - see.base_pos())
+    allowed = (ASIDE + (jnp.pi - ASIDE) * near)[:, None]
+    return turn - jnp.clip(turn, -allowed, allowed)

@@ -10,7 +10,7 @@ from ig2mj.engine.view import Array
 from ig2mj.geometry.poses import length, quat_rotate
 from ig2mj.scene.tables import LinkKind
 from ig2mj.tasks.experts.motion import Wish, horizontal, over, where, wish
-from ig2mj.tasks.experts.reaching import take_at
+from ig2mj.tasks.experts.reaching import far_out, take_at
 from ig2mj.tasks.experts.sight import Sight
 
 KNIFE, FRUIT = "carving_knife_0", "apple_0"
@@ -47,10 +47,14 @@ def plan(see: Sight) -> list[Wish]:
     turn += horizontal(along)
     depth = jnp.where(left < 0.2, top - PRESS, top + CLEARANCE)
     goal = jnp.concatenate([fruit[:, :2], depth[:, None]], axis=1)
+    take = take_at(see, handle)
+    if see.robot == "fetch":
+        turn += far_out(see, goal)
+        take = Wish(take.move, far_out(see, handle), take.close)
     cut = wish(over(blade, goal, top + CLEARANCE, near=EXACT, blend=EXACT), turn, close=True)
     done = jnp.asarray(see.states.sliced)[:, see.scene.object_index(FRUIT)]
     still = wish(jnp.zeros_like(handle), close=True)
-    return [where(done, still, where(see.holds(KNIFE), cut, take_at(see, handle)))]
+    return [where(done, still, where(see.holds(KNIFE), cut, take))]
 
 
 def _edge_down(edge: Float[Array, "W 3"]) -> tuple[Float[Array, "W 3"], Float[Array, "W"]]:
