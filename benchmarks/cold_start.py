@@ -1,0 +1,112 @@
+"""Seconds until the first step of a batch, by phase, and which kernels were compiled after those compiled beforehand.
+
+    python benchmarks/cold_start.py birch --worlds 4096 --cache /tmp/new          # cold: the folder must not exist
+    python benchmarks/cold_start.py birch --worlds 4096 --cache /tmp/new --again  # warm
+
+A process of its own measures: imports, making the worlds, kernels (`WarpEngine.load_kernels`), start, first and second
+step. Kernels and XLA's programs are kept in the folder (IG2MJ_CACHE_DIR), and so is what CUDA's driver compiles.
+`missed` names the modules of Warp that no phase but a step compiled: there should be none.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import pathlib
+import subprocess
+import sys
+import time
+
+
+def measure(what: str, worlds: int, beforehand: bool, cache: pathlib.Path) -> dict:
+    """Phases of this process, which began just now."""
+    times, names = [time.perf_counter()], []
+    modules: list[set[str]] = []
+
+    def tick(name: str) -> None:
+        times.append(time.perf_counter())
+        names.append(name)
+        modules.append({folder.name for folder in (cache / "warp").rglob("wp_*") if folder.is_dir()})
+
+    import jax
+    import numpy as np
+
+    import ig2mj
+    from ig2mj.engine.warp.engine import WarpEngine
+    from ig2mj.envs.names import activity_name, short_name
+
+    tick("imports")
+    is_home = short_name(what) is None and activity_name(what) is None
+    if is_home:
+        batch = ig2mj.Worlds(what, worlds, "warp")
+        engine = batch.engine
+    else:
+        env = ig2mj.make(what, worlds=worlds, engine="warp")
+        engine = env.core.engine
+    tick("making")
+    if beforehand:
+        assert isinstance(engine, WarpEngine)
+        engine.load_kernels()
+        tick("kernels")
+    if is_home:
+        state = jax.block_until_ready(batch.start(0))
+        tick("start")
+        for step in ("first step", "second step"):
+            state = jax.block_until_ready(batch.step(state))
+            tick(step)
+    else:
+        state = jax.block_until_ready(env.reset(0))
+        tick("start")
+        action = np.zeros((worlds, *env.action_space.shape), np.float32)
+        for step in ("first step", "second step"):
+            state = jax.block_until_ready(env.step_autoreset(state, action))
+            tick(step)
+    seconds = {name: round(end - begin, 2) for name, begin, end in zip(names, times, times[1:], strict=False)}
+    known = modules[names.index("kernels")] if beforehand else set()
+    return {
+        "what": what,
+        "worlds": worlds,
+        "beforehand": beforehand,
+        "to_first_step_s": round(sum(v for k, v in seconds.items() if k != "second step"), 1),
+        "seconds": seconds,
+        "modules": [len(m) for m in modules],
+        "missed": sorted(modules[-1] - known) if beforehand else [],
+        "cores": len(os.sched_getaffinity(0)),
+        "device": str(jax.devices()[0].device_kind),
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("what", help="a home or an environment")
+    parser.add_argument("--worlds", type=int, default=4096)
+    parser.add_argument("--cache", type=pathlib.Path, required=True, help="folder for everything compiled")
+    parser.add_argument("--again", action="store_true", help="with what an earlier run left there")
+    parser.add_argument("--one-by-one", action="store_true", help="kernels as steps need them, one after the other")
+    parser.add_argument("--label", default="", help="a remark for the row")
+    parser.add_argument("--rows", type=pathlib.Path, help="the row is added to this file, as a JSON line")
+    parser.add_argument("--inside", action="store_true", help=argparse.SUPPRESS)
+    args = parser.parse_args()
+    if args.inside:
+        print("ROW " + json.dumps(measure(args.what, args.worlds, not args.one_by_one, args.cache)), flush=True)
+        return
+    if args.cache.exists() and not args.again:
+        raise SystemExit(f"error: {args.cache} exists, so this would be no cold start; name another folder, or --again")
+    env = {**os.environ, "IG2MJ_CACHE_DIR": str(args.cache.resolve()), "CUDA_CACHE_PATH": str(args.cache / "cuda")}
+    env.pop("JAX_COMPILATION_CACHE_DIR", None)
+    env.pop("WARP_CACHE_PATH", None)
+    began = time.time()
+    done = subprocess.run([sys.executable, *sys.argv, "--inside"], env=env, stdout=subprocess.PIPE, text=True)
+    line = next((line for line in done.stdout.splitlines() if line.startswith("ROW ")), None)
+    if line is None:
+        raise SystemExit(f"error: no row; the process ended with {done.returncode}")
+    row = json.loads(line[4:]) | {"case": "again" if args.again else "cold", "label": args.label}
+    row["process_s"] = round(time.time() - began, 1)
+    import results
+
+    results.keep_row(row, args.rows)
+
+
+if __name__ == "__main__":
+    main()
