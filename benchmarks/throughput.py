@@ -231,6 +231,7 @@ def _bits(overflow: np.ndarray) -> dict[str, int]:
 def device() -> dict[str, str]:
     """What this ran on."""
     return {
+        "kernels_on_trial": os.environ.get("IG2MJ_KERNELS", ""),
         "device": str(jax.devices()[0].device_kind),
         "jax": jax.__version__,
         "warp": wp.__version__,

@@ -16,6 +16,7 @@ import warp as wp
 from mujoco.mjx.third_party import mujoco_warp
 
 from ig2mj.engine.warp import patches
+from ig2mj.engine.warp.patches import scratch
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile
 
@@ -62,6 +63,23 @@ def launches_of(act: Callable[[], Any]) -> list[Launch]:
     return list(found)
 
 
+def scratch_of_step(model: mujoco.MjModel, profile: EngineProfile, num_worlds: int, device: Any) -> int:
+    """Bytes for the arrays that a step of our functions makes on a CUDA device, at most at a time.
+
+    Measured with one world; nearly all are as long as there are worlds.
+    """
+    counter = scratch.Counter(device.get_allocator())
+    act = _step_of_one_world(model, profile)
+
+    def counted() -> None:
+        with wp.ScopedAllocator(device, counter):
+            act()
+
+    with patches.engine_kernels():
+        launches_of(counted)
+    return int(scratch.ROOM * counter.most * num_worlds) + scratch.ALIGNMENT * counter.arrays
+
+
 def launches_of_step(model: mujoco.MjModel, profile: EngineProfile, own: bool) -> list[Launch]:
     """The kernels of a step and of a forward pass of one world.
 
@@ -69,6 +87,12 @@ def launches_of_step(model: mujoco.MjModel, profile: EngineProfile, own: bool) -
       profile: buffer sizes; some kernels are compiled for them. own: with our functions in place of some of MuJoCo
         Warp's (`ig2mj.engine.warp.patches`).
     """
+    act = _step_of_one_world(model, profile)
+    with patches.engine_kernels() if own else patches.upstream_kernels():
+        return launches_of(act)
+
+
+def _step_of_one_world(model: mujoco.MjModel, profile: EngineProfile) -> Callable[[], None]:
     put = mujoco_warp.put_model(model)
     data = mujoco_warp.make_data(
         model,
@@ -83,8 +107,7 @@ def launches_of_step(model: mujoco.MjModel, profile: EngineProfile, own: bool) -
         mujoco_warp.step(put, data)
         mujoco_warp.forward(put, data)
 
-    with patches.engine_kernels() if own else patches.upstream_kernels():
-        return launches_of(act)
+    return act
 
 
 def load(launches: list[Launch], device: str | None = None, workers: int | None = None) -> int:

@@ -56,7 +56,7 @@ ON_TRIAL = {
 """Functions whose gain is not measured yet: they run where IG2MJ_KERNELS names their group."""
 
 for _group in filter(None, os.environ.get("IG2MJ_KERNELS", "").split(",")):
-    OWN |= ON_TRIAL[_group]
+    OWN |= ON_TRIAL.get(_group, {})  # "scratch" replaces no function
     OWN[wp, "launch"] = launching.launch
     if _group == "resting":
         launching.add(resting.substitute)
