@@ -61,7 +61,8 @@ def trained(task: str, worlds: int, steps: int, **options: Any) -> PPO:
     settings.experiment.write_interval = settings.experiment.checkpoint_interval = 0
     memory = RandomMemory(memory_size=settings.rollouts, num_envs=worlds, device=env.device)
     agent = PPO(models=models, memory=memory, **spaces, device=env.device, cfg=settings)
-    SequentialTrainer(env=env, agents=agent, cfg={"timesteps": steps, "headless": True}).train()
+    training = {"timesteps": steps, "headless": True, "close_environment_at_exit": False}
+    SequentialTrainer(env=env, agents=agent, cfg=training).train()
     return agent
 
 
