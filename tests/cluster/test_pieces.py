@@ -121,6 +121,16 @@ def test_a_result_that_is_damaged_is_made_again(tmp_path):
         assert everything(wanted, store=journal)[0] == first
 
 
+def test_a_run_that_finished_nothing_is_begun_anew(tmp_path):
+    """Whether it failed, as for want of a cluster, or was killed."""
+    with pytest.raises(ClusterError), Journal(tmp_path / "a.npz", {"rows": 1}):
+        raise ClusterError("nobody answers")
+    assert not list(tmp_path.iterdir())
+    Journal(tmp_path / "a.npz", {"rows": 1})._unlock()  # as a kill leaves it
+    with Journal(tmp_path / "a.npz", {"rows": 2}) as journal:
+        assert not journal.names()
+
+
 def test_two_runs_with_one_output_the_second_refuses(tmp_path):
     with (
         Journal(tmp_path / "a.npz", {}),

@@ -176,3 +176,17 @@ def test_a_node_without_the_files_or_with_another_version_is_told_before_any_wor
 def test_an_address_where_nobody_is(address, said):
     with pytest.raises(ClusterError, match=said):
         run(pieces(1), Where(cluster=address))
+
+
+def test_commands_ask_for_the_cluster_before_they_do_anything(tmp_path, monkeypatch, capsys):
+    from ig2mj.cli import call
+
+    monkeypatch.setenv("IG2MJ_CACHE_DIR", str(tmp_path / "cache"))
+    for words in (
+        ["sample", "small_home", CONDITION, "--out", str(tmp_path / "a.npz")],
+        ["demos", "collect", "GraspingBook", "--out", str(tmp_path / "a.h5")],
+    ):
+        assert call([*words, "--cluster", "127.0.0.1:9"]) == 2
+        error = capsys.readouterr().err
+        assert error.count("\n") == 1 and "127.0.0.1:9: nobody answers there" in error, words
+    assert not list(tmp_path.iterdir()), "nothing was made"

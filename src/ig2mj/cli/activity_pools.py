@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures
+from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures, where_of
 
 if TYPE_CHECKING:
     from ig2mj.tasks.bddl.binding import Binding
@@ -48,7 +48,6 @@ def sample(
     """
     from ig2mj.cli.bindings import binding_as_text, find_homes
     from ig2mj.cli.files import check_folder_of
-    from ig2mj.cluster.pieces import Where
     from ig2mj.errors import Ig2mjError
     from ig2mj.tasks.bddl.definitions import load_activity
     from ig2mj.tasks.bddl.start import first_that_works, fitting, sample_start
@@ -61,11 +60,11 @@ def sample(
     activity = load_activity(name, behavior1k)
     file = out or pathlib.Path(f"{activity.name}.npz")
     check_folder_of(file)
+    where = where_of(jobs, cluster, resume)
     bound, errors = fitting(activity, find_homes(scene))
     if not bound:
         raise Ig2mjError(" ".join(line.strip() for line in binding_as_text(None, [], errors)))
     binding, loaded = first_that_works(bound, seed, scene)
-    where = Where(jobs, cluster, resume)
     request = {"command": "activity sample", "activity": name, "scene": loaded.digest, "rows": count, "seed": seed}
     with opened(file, request, where) as journal, follow(f"sampling in {loaded.name}", where) as report:
         done = sample_start(binding, loaded, count, seed, where=where, journal=journal, report=report)

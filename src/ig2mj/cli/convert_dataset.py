@@ -18,7 +18,7 @@ from typing import Annotated, Any
 import tyro
 
 from ig2mj.cli.convert_common import DEFAULTS, Common, Flag, options_of
-from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures
+from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures, where_of
 
 MARK = "manifest.json"
 """The file that every finished folder of the output has."""
@@ -48,7 +48,7 @@ def convert_dataset(
       cluster: do it on a Ray cluster: its address, or auto.
       resume: go on with a run that was broken off.
     """
-    from ig2mj.cluster.pieces import Where, run
+    from ig2mj.cluster.pieces import run
     from ig2mj.cluster.work import Piece, Work
     from ig2mj.errors import InputError
 
@@ -59,11 +59,11 @@ def convert_dataset(
         raise InputError(dataset, what, fix="give the root of a dataset, with scenes/ or objects/ in it")
     if out.exists() and not out.is_dir():
         raise InputError(out, "is a file", element="--out", fix="name a folder")
+    where = where_of(common.jobs, cluster, resume)
     options_of(common)  # bad numbers are told before any work
     out.mkdir(parents=True, exist_ok=True)
     chosen = {"skip_missing": skip_missing, "fixed_furniture": fixed_furniture}
     settings = {**dataclasses.asdict(common), "jobs": 1, "json": False}
-    where = Where(common.jobs, cluster, resume)
     pieces = [Piece(name, {"root": str(root), "name": name, "common": settings, "chosen": chosen}) for name in names]
     check = ("ig2mj.cli.convert_dataset:digest_of", {"root": str(root)})
     title = f"converting {root.name}"

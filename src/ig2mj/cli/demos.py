@@ -9,7 +9,7 @@ import tyro
 
 from ig2mj.cli.demos_folder import metrics
 from ig2mj.cli.demos_replay import export, replay
-from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures
+from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures, where_of
 
 
 def collect(
@@ -51,7 +51,7 @@ def collect(
       resume: go on with a collection that was broken off.
     """
     from ig2mj.cli.files import check_folder_of
-    from ig2mj.cluster.pieces import Where, run
+    from ig2mj.cluster.pieces import run
     from ig2mj.cluster.work import Work
     from ig2mj.envs.experts import expert_of
     from ig2mj.envs.pieces import shared_pool
@@ -67,6 +67,7 @@ def collect(
     if jobs < 0:
         raise Ig2mjError(f"--jobs {jobs}: 0 takes one process per processor, else at least one is needed")
     check_folder_of(out)
+    where = where_of(jobs, cluster, resume)
     names = VECTORS if obs == "state" else (*VECTORS, "rgb", "depth")
     settings = {
         "env": env,
@@ -83,7 +84,7 @@ def collect(
     first = make(env, robot, 1, "native", grasping, observations=VECTORS, split=split, pool_size=pool_size or None)
     expert_of(first)  # errors before any work
     first.close()
-    where, title = Where(jobs, cluster, resume), f"demonstrations of {env}"
+    title = f"demonstrations of {env}"
     starts = {"task": env, "split": split, "count": pool_size or None}
     work = Work(
         "ig2mj.learn.demo_pieces:collect_piece",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from ig2mj.cli.pieces import Cluster, Resume
+from ig2mj.cli.pieces import Cluster, Resume, where_of
 
 if TYPE_CHECKING:
     from ig2mj.demos.reader import Run
@@ -46,7 +46,6 @@ def replay(
 
     from ig2mj.cli.demos_folder import files_of, of_files
     from ig2mj.cli.demos_pieces import replay_in_pieces
-    from ig2mj.cluster.pieces import Where
     from ig2mj.demos.replay import MODES
     from ig2mj.errors import Ig2mjError, UnknownNameError
 
@@ -61,7 +60,7 @@ def replay(
     if cluster is not None or resume:
         if video is not None:
             raise Ig2mjError("--video is made on this machine: leave --cluster and --resume out")
-        where = Where(jobs, cluster, resume)
+        where = where_of(jobs, cluster, resume)
         return max(replay_in_pieces(one, by, check, names, out, threads, where) for one in files)
     status = 0
     for one, done in of_files(_replayed, files, jobs, by, check, video, names, out, threads):

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import tyro
 
-from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures
+from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures, where_of
 
 WORLDS = {"native": 8}
 """So many worlds unless another number is asked for; on the others as many as episodes, up to `PURE_WORLDS`."""
@@ -55,7 +55,7 @@ def run(
 
     import jax
 
-    from ig2mj.cluster.pieces import Where, run
+    from ig2mj.cluster.pieces import run
     from ig2mj.cluster.work import Work
     from ig2mj.envs.pieces import shared_pool
     from ig2mj.errors import Ig2mjError
@@ -86,7 +86,7 @@ def run(
         "pool_size": pool_size or None,
         "drawn": drawn,
     }
-    where, title = Where(jobs, cluster, resume), f"evaluating {policy}"
+    where, title = where_of(jobs, cluster, resume), f"evaluating {policy}"
     starts = (depends["task"], split, pool_size or None)
     shared = {"policy": file.read_bytes(), **(shared_pool(*starts) if cluster is not None or jobs != 1 else {})}
     work = Work(

@@ -28,6 +28,17 @@ LISTED = 20
 """Failed pieces that are listed by name."""
 
 
+def where_of(jobs: int, cluster: str | None, resume: bool) -> Where:
+    """Where pieces are to be done. Raises ClusterError where the cluster does not answer, before anything is made."""
+    from ig2mj.cluster.pieces import Where
+
+    if cluster is not None:
+        from ig2mj.cluster.ray_nodes import check_address
+
+        check_address(cluster)
+    return Where(jobs, cluster, resume)
+
+
 def opened(
     out: pathlib.Path, request: Mapping[str, Any], where: Where, deliver: Deliver | None = None, **options: Any
 ) -> Journal:

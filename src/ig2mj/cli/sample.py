@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from ig2mj.cli.pieces import Cluster, Resume
+from ig2mj.cli.pieces import Cluster, Resume, where_of
 
 if TYPE_CHECKING:
     from ig2mj.cluster.pieces import Where
@@ -48,7 +48,6 @@ def run(
       json: print the result as JSON.
     """
     from ig2mj.cli.files import check_folder_of
-    from ig2mj.cluster.pieces import Where
     from ig2mj.errors import Ig2mjError
     from ig2mj.scene.scene import load_scene
 
@@ -62,12 +61,13 @@ def run(
         raise Ig2mjError('give conditions, such as "(on_top apple_0 breakfast_table_0)", or --disturb')
     file = out or pathlib.Path("pool.npz")
     check_folder_of(file)
+    where = where_of(jobs, cluster, resume)
     loaded = load_scene(scene, objects=add)
     if disturb:
         if cluster is not None or resume:
             raise Ig2mjError("--disturb: each state goes on from the one before, on this machine's threads (--jobs)")
         return _disturb(loaded, count, file, seed, share, jobs)
-    return _sample(loaded, conditions, count, file, seed, Where(jobs, cluster, resume), json)
+    return _sample(loaded, conditions, count, file, seed, where, json)
 
 
 def _disturb(loaded, count: int, file: pathlib.Path, seed: int, share: float, jobs: int) -> int:

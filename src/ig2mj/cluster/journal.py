@@ -81,7 +81,7 @@ class Journal:
 
     def _begin(self, resume: bool) -> None:
         file = self.folder / "request.json"
-        if file.exists():
+        if (self.folder / "done.jsonl").exists():  # else there is nothing to go on with
             if not resume:
                 fix = f"--resume goes on with it; to begin anew, remove {self.folder}"
                 raise InputError(self.out, "a run of this was broken off", fix=fix)
@@ -155,6 +155,8 @@ class Journal:
         return self
 
     def __exit__(self, *error: object) -> None:
+        if not self._done:
+            self.finish()  # nothing to go on with
         self._unlock()
 
 

@@ -162,20 +162,32 @@ def _about(check: tuple[str, dict[str, Any]] | None) -> tuple[dict[str, str], st
         return versions(), "", " ".join(str(e).split()) or type(e).__name__
 
 
+def check_address(address: str) -> None:
+    """Whether somebody answers at the address of a cluster; "auto" is known only when we connect.
+
+    Raises:
+      ClusterError: nobody does. ModuleNotFoundError: there is no Ray here.
+    """
+    import ray  # noqa: F401
+
+    if address == "auto":
+        return
+    parsed = urllib.parse.urlsplit(address if "://" in address else f"//{address}")
+    try:
+        host, port = parsed.hostname, parsed.port
+    except ValueError:
+        host = port = None
+    if not host or not port:
+        raise ClusterError(f"--cluster {address}: an address is HOST:PORT (or ray://HOST:PORT), or auto")
+    try:
+        socket.create_connection((host, port), REACH).close()
+    except OSError as e:
+        raise ClusterError(f"--cluster {address}: nobody answers there ({e.strerror or e})") from e
+
+
 def _connect(ray: Any, address: str) -> None:
     """Raises ClusterError."""
-    if address != "auto":
-        parsed = urllib.parse.urlsplit(address if "://" in address else f"//{address}")
-        try:
-            host, port = parsed.hostname, parsed.port
-        except ValueError:
-            host = port = None
-        if not host or not port:
-            raise ClusterError(f"--cluster {address}: an address is HOST:PORT (or ray://HOST:PORT), or auto")
-        try:
-            socket.create_connection((host, port), REACH).close()
-        except OSError as e:
-            raise ClusterError(f"--cluster {address}: nobody answers there ({e.strerror or e})") from e
+    check_address(address)
     try:
         ray.init(address=address, namespace="ig2mj", logging_level="ERROR", log_to_driver=False)
     except ConnectionError as e:
