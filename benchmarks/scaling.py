@@ -88,7 +88,11 @@ def start(case: str, count: int, args: Args) -> list[Process]:
         port = free.getsockname()[1]
     found = []
     for k in range(count):
-        environment = {"XLA_PYTHON_CLIENT_PREALLOCATE": "false", "CUDA_VISIBLE_DEVICES": str(k)}
+        environment = {
+            "XLA_PYTHON_CLIENT_PREALLOCATE": "false",
+            "CUDA_VISIBLE_DEVICES": str(k),
+            "PYTHONFAULTHANDLER": "1",
+        }
         if args.cpu:
             environment["JAX_PLATFORMS"] = "cpu"
         if word == "learner" and count > 1:

@@ -42,6 +42,9 @@ class SmallEnv:
     def action_space(self) -> Space:
         return Space((self.size,), np.float32, -1.0, 1.0)
 
+    def serve(self, devices):
+        """Nothing to make ready."""
+
     def reset(self, seed: int) -> State:
         return self._start(jax.random.PRNGKey(seed))
 

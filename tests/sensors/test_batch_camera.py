@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import gc
 import pathlib
 
 import engine_bench
@@ -158,6 +159,37 @@ def shoot(engine, model, physics):
     call = jax.jit(camera.__call__)
     view = engine.view(physics)
     return lambda states, now=physics: jax.tree.map(np.asarray, call(now, view, states))
+
+
+@pytest.mark.slow
+def test_a_compiled_program_goes_on_when_its_camera_is_gone(engine, model, physics):
+    """What the ray caster keeps belongs to the camera in MJX; freed, a GPU would read memory of something else."""
+    camera = BatchCamera(engine, model, ["front"], width=8, height=8, particles=0)
+    view, states = engine.view(physics), initial_states(model, 2)
+    call = jax.jit(lambda: camera(physics, view, states).rgb).lower().compile()
+    before = np.asarray(call())
+    del camera
+    jax.clear_caches()
+    gc.collect()
+    np.testing.assert_array_equal(np.asarray(call()), before)
+
+
+@pytest.mark.gpu
+def test_programs_on_a_second_device_see_the_same(scene, model):
+    devices = [d for d in jax.local_devices() if d.platform == "gpu"][:2]
+    if len(devices) < 2:
+        pytest.skip("needs two GPUs")
+    with jax.default_device(devices[0]):
+        engine = WarpEngine(scene, 2)
+        camera = BatchCamera(engine, model, ["front"], width=WIDTH, height=HEIGHT, particles=0)
+        camera.serve(devices)
+        physics, states = engine.reset(), initial_states(model, 2)
+    seen = []
+    for device in devices:
+        with jax.default_device(device):
+            now = jax.device_put(physics, device)
+            seen.append(np.asarray(jax.jit(lambda now: camera(now, engine.view(now), states).rgb)(now)))
+    np.testing.assert_array_equal(seen[0], seen[1])
 
 
 @pytest.mark.slow

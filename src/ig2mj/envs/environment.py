@@ -19,7 +19,7 @@ Axes: W worlds, n numbers of an action.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import jax
@@ -112,6 +112,10 @@ class Environment:
     def pure(self) -> bool:
         """`step_fn`, `step_autoreset_fn` and `reset_fn` may be part of a compiled program."""
         return self.core.engine.pure
+
+    def serve(self, devices: Sequence[Any]) -> None:
+        """Makes ready for programs on other devices of this process, before they are compiled: pictures need it."""
+        self._observer.serve(devices)
 
     @property
     def action_space(self) -> Space:

@@ -59,6 +59,10 @@ class Observer:
         self.spaces = {name: every[name] for name in names}
         self._keys = jax.jit(step_keys)
 
+    def serve(self, devices: Sequence[Any]) -> None:
+        """See `SensorSuite.serve`."""
+        self._sensors.serve(devices)
+
     def vectors(
         self,
         view: PhysicsView,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import jax
@@ -44,6 +44,8 @@ class TrainingEnv(Protocol):
 
     @property
     def action_space(self) -> Any: ...
+
+    def serve(self, devices: Sequence[Any]) -> None: ...
 
     def reset(self, seed: int) -> Any: ...
 

@@ -11,6 +11,7 @@ Axes: W worlds, C cameras, Y rows, X columns, G geoms of the scene, S slots.
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -18,6 +19,7 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+import warp as wp
 from jaxtyping import Float, Int
 from mujoco import mjx
 
@@ -37,6 +39,10 @@ from ig2mj.states.world import ExtendedStates
 
 TILE = 8
 """Pixels a side of what a block of 64 threads sees: a third faster than rows of 64 pixels."""
+
+_KEPT: weakref.WeakKeyDictionary[Engine, list[Any]] = weakref.WeakKeyDictionary()
+"""What the ray caster keeps, for as long as the engine whose worlds it sees: a compiled program that outlives its
+`BatchCamera` goes on using it, and nobody else would hold it."""
 
 
 class BatchCamera:
@@ -94,10 +100,8 @@ class BatchCamera:
         data = mujoco.MjData(host)
         mujoco.mj_forward(host, data)
         self._template = mjx.put_data(host, data, own_device(), impl="warp", naconmax=1, naccdmax=1, njmax=1)
-        self._context = mjx.create_render_context(
-            host,
+        self._settings: dict[str, Any] = dict(
             nworld=engine.num_worlds,
-            devices=list(devices) if devices else None,
             cam_res=[(width, height)] * len(cameras) + [(len(s.rays), 1) for s in self._sectors],
             render_rgb=self._for_each(rgb, False),
             render_depth=self._for_each(depth, True),
@@ -108,8 +112,25 @@ class BatchCamera:
             use_shadows=shadows,
             enable_backface_culling=cull_backfaces,
         )
+        self._make_context(list(devices) if devices else None)
+
+    def serve(self, devices: Sequence[Any]) -> None:
+        """Makes ready for programs on other devices of this process, too; before they are compiled.
+
+        The ray caster keeps its tree and its pictures in memory of its own on each device. Without this, only programs
+        on the first device find them.
+        """
+        names = list(dict.fromkeys(str(wp.device_from_jax(device)) for device in devices))
+        if names != self._served:
+            self._make_context(names)
+
+    def _make_context(self, devices: list[str] | None) -> None:
+        """What the ray caster keeps, on each device. What compiled programs know of stays as long as the engine."""
+        self._context = mjx.create_render_context(self._host, devices=devices, **self._settings)
+        _KEPT.setdefault(self.engine, []).append(self._context)
+        self._served = devices or [str(wp.get_device())]
         if self._sectors:
-            set_rays(self._context, self._sectors, len(cameras) * width * height)
+            set_rays(self._context, self._sectors, len(self.cameras) * self.width * self.height)
         self._handle = self._context.pytree()
         self._check_addresses()
         self._tiled = self._order_rays()

@@ -101,6 +101,11 @@ class SensorSuite:
             return BatchCamera(engine, self._setup.model, cameras, **settings)
         raise EngineError(f"the {engine.name} engine makes no pictures and casts no rays (take 'native' or 'warp')")
 
+    def serve(self, devices: Sequence[Any]) -> None:
+        """Makes ready for programs on other devices of this process, before they are compiled (`BatchCamera.serve`)."""
+        if self._camera is not None and self._pure:
+            self._camera.serve(devices)  # type: ignore[attr-defined]  pure cameras are batched ones
+
     @property
     def noisy(self) -> bool:
         """Readings need keys."""
