@@ -53,7 +53,7 @@ def measure(what: str, worlds: int, beforehand: bool, cache: pathlib.Path) -> di
         state = jax.block_until_ready(batch.start(0))
         tick("start")
         for step in ("first step", "second step"):
-            state = jax.block_until_ready(batch.step(state))
+            state, _ = jax.block_until_ready(batch.step(state))
             tick(step)
     else:
         state = jax.block_until_ready(env.reset(0))

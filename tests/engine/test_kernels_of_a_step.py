@@ -75,6 +75,20 @@ def test_a_step_launches_no_other_kernels():
 
 
 @pytest.mark.slow
-def test_an_engine_loads_the_kernels_of_its_scene():
+def test_an_engine_loads_the_kernels_of_its_scene_and_its_first_step_no_others(monkeypatch):
+    """The very modules: what is compiled depends on settings of the model and on sizes of buffers."""
+    loaded, really = [], wp.Module.load
+
+    def load(module, *args, **kwargs):
+        before = len(module.execs)
+        result = really(module, *args, **kwargs)
+        if len(module.execs) > before:
+            loaded.append(module.name)
+        return result
+
+    monkeypatch.setattr(wp.Module, "load", load)
     engine = WarpEngine(load_scene("small_home"), 2)
     assert engine.load_kernels(workers=2) > 40
+    loaded.clear()
+    engine.step(engine.reset())
+    assert set(loaded) <= {"mujoco.mjx.warp.ffi"}  # has no kernels

@@ -31,7 +31,7 @@ from ig2mj.engine.view import Array
 from ig2mj.engine.warp import kernels, patches
 from ig2mj.engine.warp.patches import scratch
 from ig2mj.engine.warp.patches.flags import REPLACED
-from ig2mj.engine.warp.patches.ignored import encode
+from ig2mj.engine.warp.patches.ignored import DROP, encode
 from ig2mj.engine.warp.profile import EngineProfile, fit, holds_everything, profile_of_scene
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_warp
@@ -99,7 +99,10 @@ class WarpEngine(MjxEngine):
         Args:
           workers: threads; None: one for each processor of this process.
         """
-        launches = kernels.launches_of_step(self.host_model, self.profile, self.own_kernels)
+        warns = int(self.model.opt._impl.warn_overflow)
+        launches = kernels.launches_of_step(self.host_model, self.profile, self.own_kernels, warns)
+        if self._filters and len(self.tables.hand_body):
+            launches.append((DROP, 256))  # pyright: ignore[reportArgumentType]
         return kernels.load(launches, workers=workers)
 
     def usage(self, physics: MjxPhysics) -> Usage:

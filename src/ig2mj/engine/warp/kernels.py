@@ -69,7 +69,7 @@ def scratch_of_step(model: mujoco.MjModel, profile: EngineProfile, num_worlds: i
     Measured with one world; nearly all are as long as there are worlds.
     """
     counter = scratch.Counter(device.get_allocator())
-    act = _step_of_one_world(model, profile)
+    act = _step_of_one_world(model, profile, 0)
 
     def counted() -> None:
         with wp.ScopedAllocator(device, counter):
@@ -80,20 +80,21 @@ def scratch_of_step(model: mujoco.MjModel, profile: EngineProfile, num_worlds: i
     return int(scratch.ROOM * counter.most * num_worlds) + scratch.ALIGNMENT * counter.arrays
 
 
-def launches_of_step(model: mujoco.MjModel, profile: EngineProfile, own: bool) -> list[Launch]:
+def launches_of_step(model: mujoco.MjModel, profile: EngineProfile, own: bool, warns: int = 0) -> list[Launch]:
     """The kernels of a step and of a forward pass of one world.
 
     Args:
       profile: buffer sizes; some kernels are compiled for them. own: with our functions in place of some of MuJoCo
-        Warp's (`ig2mj.engine.warp.patches`).
+        Warp's (`ig2mj.engine.warp.patches`). warns: the engine's `opt.warn_overflow`.
     """
-    act = _step_of_one_world(model, profile)
+    act = _step_of_one_world(model, profile, warns)
     with patches.engine_kernels() if own else patches.upstream_kernels():
         return launches_of(act)
 
 
-def _step_of_one_world(model: mujoco.MjModel, profile: EngineProfile) -> Callable[[], None]:
+def _step_of_one_world(model: mujoco.MjModel, profile: EngineProfile, warns: int) -> Callable[[], None]:
     put = mujoco_warp.put_model(model)
+    put.opt.warn_overflow = int(warns)  # printing is compiled in or left out
     data = mujoco_warp.make_data(
         model,
         nworld=1,
@@ -123,6 +124,12 @@ def load(launches: list[Launch], device: str | None = None, workers: int | None 
     by_size: dict[int, dict[wp.Module, None]] = {}
     for kernel, block_dim in launches:
         by_size.setdefault(block_dim, {})[kernel.module] = None
+    on = wp.get_device(device)
+    # Names in the cache contain a hash of the module. Functions that several modules share change when one of them is
+    # built, and with them the others' hashes: without this a module built beside others was not found again.
     for block_dim, modules in by_size.items():
-        wp.force_load(device or wp.get_device(), list(modules), block_dim=block_dim, max_workers=threads)
+        for module in modules:
+            module.get_module_hash(1 if on.is_cpu else block_dim)
+    for block_dim, modules in by_size.items():
+        wp.force_load(on, list(modules), block_dim=block_dim, max_workers=threads)
     return sum(map(len, by_size.values()))

@@ -48,6 +48,10 @@ def _drop(
                     geom[contact] = wp.vec2i(-1, -1)  # and wakes nothing
 
 
+DROP = _drop
+"""The kernel that takes ignored contacts out, where there are hands."""
+
+
 def drop_ignored(m: Any, d: Any) -> None:
     """Takes ignored contacts of all worlds out; after collision detection."""
     if m.npair or m.flg_adhesion or not m.pair_adhesion.shape[1]:
