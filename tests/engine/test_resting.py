@@ -84,7 +84,7 @@ def test_a_step_that_passes_over_what_rests_is_the_same_to_the_bit():
     own.tree_awake.assign(np.where(flags == 0, REPLACED, flags).astype(np.int32))
     ctrl, awake, fell = np.zeros((2, model.nu), np.float32), [], 0
     for step in range(160):
-        ctrl[:, 0] = np.array([0.1, 0.4]) * min(1.0, step / 50)
+        ctrl[:, 0] = np.array([0.1, 0.4]) * (min(1.0, step / 50) if step < 60 else 0.0)
         for data, kernels in ((own, engine_kernels), (plain, awake_kernels)):
             data.ctrl.assign(ctrl)
             with kernels():

@@ -304,7 +304,7 @@ def _inertia(
     momentum = smooth.math.inert_vec(crb[world, body], cdof[world, dof])
     own = dof_armature[world % dof_armature.shape[0], dof]
     ancestor = dof
-    while ancestor >= 0:
+    while ancestor >= 0 and place >= first:  # of a free body about its centre of mass only the diagonal is stored
         inertia[world, place] = own + wp.dot(cdof[world, ancestor], momentum)
         own = 0.0
         place -= 1
