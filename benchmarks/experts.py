@@ -36,10 +36,8 @@ PAGE = ROOT / "docs" / "experts.md"
 BEGIN, END = "<!-- begin: python benchmarks/experts.py --table -->", "<!-- end of the table -->"
 """Lines of the page between which the table stands."""
 
-GRASPING = ("mitten", "assisted", "physical")
-
-WORTH = {"mitten": 0, "physical": 1, "assisted": 2}
-"""What is measured first, in case time does not suffice."""
+GRASPING = ("mitten", "physical", "assisted")
+"""Modes in the order in which they are measured, in case time does not suffice."""
 
 ONE_THREAD = {
     "JAX_PLATFORMS": "cpu",
@@ -49,7 +47,7 @@ ONE_THREAD = {
 """Of each process, so that many of them share a machine."""
 
 
-Key = tuple[str, str, str, int, int]
+Key = tuple[str, str, str, int, int, int]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,11 +60,12 @@ class Part:
     first: int
     count: int
     episodes: int
+    variant: int = 0
 
     @property
     def key(self) -> Key:
         """What its row in the rows' file begins with."""
-        return self.task, self.robot, self.grasping, self.first, self.count
+        return self.task, self.robot, self.grasping, self.first, self.count, self.variant
 
 
 def parts(options: argparse.Namespace) -> list[Part]:
@@ -74,14 +73,15 @@ def parts(options: argparse.Namespace) -> list[Part]:
     from ig2mj.tasks.activities import ACTIVITIES
 
     found = [
-        Part(name, robot, grasping, first, min(options.worlds, options.episodes - first), options.episodes)
+        Part(name, robot, grasping, first, min(options.worlds, options.episodes - first), options.episodes, variant)
         for name, task in ACTIVITIES.items()
         for robot in task.robots
         for grasping in options.grasping
+        for variant in options.variants
         for first in range(0, options.episodes, options.worlds)
         if name in options.tasks and robot in options.robots
     ]
-    return sorted(found, key=lambda part: (WORTH[part.grasping], part.first))
+    return sorted(found, key=lambda part: (part.variant > 0, GRASPING.index(part.grasping), part.first))
 
 
 def play_part(part: Part) -> dict[str, Any]:
@@ -91,18 +91,19 @@ def play_part(part: Part) -> dict[str, Any]:
     from ig2mj.envs.rollout import play
     from ig2mj.tasks.activities import ACTIVITIES
     from ig2mj.tasks.pools import bare_scene, pool_file
+    from ig2mj.tasks.variants import variant
 
     began, pool = time.process_time(), min_pool(part.episodes)
-    env = ig2mj.make(
-        part.task, part.robot, part.count, "native", part.grasping, split="held_out", pool_size=pool, threads=1
-    )
+    settings = {"split": "held_out", "pool_size": pool, "variant": part.variant, "threads": 1}
+    env = ig2mj.make(part.task, part.robot, part.count, "native", part.grasping, **settings)
     done = play(env, expert_of(env), part.count, in_order=True, first=part.first)
     metrics = env.metrics(done.state)
-    task = ACTIVITIES[part.task]
+    task = variant(ACTIVITIES[part.task], part.variant)
     return {
         "task": part.task,
         "robot": part.robot,
         "grasping": part.grasping,
+        "variant": part.variant,
         "first": part.first,
         "count": part.count,
         "failed": [part.first + k for k, good in enumerate(done.success) if not good],
@@ -121,16 +122,18 @@ def min_pool(episodes: int) -> int:
     return max(32, episodes)
 
 
-def make_pools(names: list[str], episodes: int, jobs: int) -> None:
+def make_pools(names: list[str], variants: list[int], episodes: int, jobs: int) -> None:
     """Samples the pools that are not in the cache, side by side."""
     from ig2mj.tasks.activities import ACTIVITIES
     from ig2mj.tasks.pools import pool_of, sampling_processes
+    from ig2mj.tasks.variants import variant
 
+    tasks = [variant(ACTIVITIES[name], number) for name in names for number in variants]
     with (
         sampling_processes(jobs) as workers,
-        concurrent.futures.ThreadPoolExecutor(len(names)) as threads,
+        concurrent.futures.ThreadPoolExecutor(len(tasks)) as threads,
     ):
-        list(threads.map(lambda n: pool_of(ACTIVITIES[n], "held_out", min_pool(episodes), workers=workers), names))
+        list(threads.map(lambda task: pool_of(task, "held_out", min_pool(episodes), workers=workers), tasks))
 
 
 def _process(part: Part, end: float) -> dict[str, Any]:
@@ -158,31 +161,31 @@ def read_rows(file: pathlib.Path) -> list[dict[str, Any]]:
 
 
 def _key(row: dict[str, Any]) -> Key:
-    return row["task"], row["robot"], row["grasping"], row["first"], row["count"]
+    return row["task"], row["robot"], row["grasping"], row["first"], row["count"], row.get("variant", 0)
 
 
 def table(rows: list[dict[str, Any]]) -> list[str]:
-    """Lines of Markdown: a row for each activity, a column for each robot and mode of grasping."""
+    """Lines of Markdown: a row for each activity and variant, a column for each robot and mode of grasping."""
     from ig2mj.tasks.activities import ACTIVITIES
 
-    sums: dict[tuple[str, str, str], list[int]] = {}
+    sums: dict[tuple[str, int, str, str], list[int]] = {}
     for row in rows:
-        total = sums.setdefault((row["task"], row["robot"], row["grasping"]), [0, 0])
+        total = sums.setdefault((row["task"], row.get("variant", 0), row["robot"], row["grasping"]), [0, 0])
         total[0] += row["count"] - len(row["failed"])
         total[1] += row["count"]
     columns = [(robot, grasping) for robot in ("humanoid", "fetch") for grasping in GRASPING]
-    columns = [c for c in columns if any(key[1:] == c for key in sums)]
+    columns = [c for c in columns if any(key[2:] == c for key in sums)]
     if not columns:
         return ["Nothing was measured yet."]
     lines = ["| | " + " | ".join(f"{robot}, {grasping}" for robot, grasping in columns) + " |"]
     lines.append("|---|" + "--:|" * len(columns))
-    for name, task in ACTIVITIES.items():
+    for name, number in [(name, number) for number in sorted({key[1] for key in sums}) for name in ACTIVITIES]:
         cells = []
         for robot, grasping in columns:
-            good, played = sums.get((name, robot, grasping), (0, 0))
-            absent = "takes no part" if robot not in task.robots else "-"
+            good, played = sums.get((name, number, robot, grasping), (0, 0))
+            absent = "takes no part" if robot not in ACTIVITIES[name].robots else "-"
             cells.append(f"{good} of {played}" if played else absent)
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+        lines.append(f"| {name}{f', variant {number}' if number else ''} | " + " | ".join(cells) + " |")
     return lines
 
 
@@ -207,7 +210,8 @@ def measure(options: argparse.Namespace) -> int:
     todo = [part for part in parts(options) if part.key not in there]
     if todo:
         names = dict.fromkeys(part.task for part in todo)
-        numbers = ["--episodes", str(options.episodes), "--jobs", str(options.jobs)]
+        numbers = ["--episodes", str(options.episodes), "--jobs", str(options.jobs), "--variants"]
+        numbers += map(str, options.variants)
         command = [sys.executable, __file__, "--pools", *numbers, "--tasks", *names]
         with contextlib.suppress(subprocess.TimeoutExpired):
             subprocess.run(command, env=os.environ | ONE_THREAD, timeout=60 * options.minutes)
@@ -230,7 +234,8 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--tasks", nargs="*", help="default: all six")
     parser.add_argument("--robots", nargs="*", default=["humanoid", "fetch"])
-    parser.add_argument("--grasping", nargs="*", default=list(GRASPING), choices=[*GRASPING, "sticky"])
+    parser.add_argument("--grasping", nargs="*", default=list(GRASPING), choices=GRASPING)
+    parser.add_argument("--variants", nargs="*", type=int, default=[0], help="of the objects; 0: the task's own")
     parser.add_argument("--episodes", type=int, default=200, help="held-out states of each case")
     parser.add_argument("--worlds", type=int, default=25, help="episodes of a part, side by side in one process")
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
@@ -256,7 +261,7 @@ def main() -> int:
     if unknown:
         parser.error(f"no such tasks: {', '.join(sorted(unknown))}; there are {', '.join(ACTIVITIES)}")
     if options.pools:
-        make_pools(options.tasks, options.episodes, options.jobs)
+        make_pools(options.tasks, options.variants, options.episodes, options.jobs)
         return 0
     return measure(options)
 

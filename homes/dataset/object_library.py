@@ -1,8 +1,8 @@
 """The object library: converted models that can be added to any home when it is loaded (`load_scene(objects=...)`).
 
-One model of every category that is not fixed to a house, the first but for `MODELS`: more of a category are copies of
-it. All that an activity may place somewhere is there, also what homes have fixed but BEHAVIOR places; beds, sinks and
-cabinets belong to homes.
+One model of every category that is not fixed to a house, the first but for `MODELS`; the categories that the six
+activities are about have three (`ig2mj.tasks.variants`). All that an activity may place somewhere is there, also what
+homes have fixed but BEHAVIOR places; beds, sinks and cabinets belong to homes.
 """
 
 from __future__ import annotations
@@ -20,7 +20,10 @@ ASSETS = "../../.."
 PLACED = ("car", "christmas_tree", "christmas_tree_decorated", "grill", "painting", "pool")
 """Fixed where a home has them, but activities put them anywhere: free in the library."""
 
-MODELS = {"carton": (2,), "shelf": (14,)}
+VARIED = ("apple", "bath_towel", "carving_knife", "cauldron", "hand_towel", "notebook", "steak")
+"""What the six activities are about: three models of each."""
+
+MODELS = {"carton": (2,), "shelf": (14,), **dict.fromkeys(VARIED, (0, 1, 2))}
 """Numbers of the models where it is not the first alone. The roomiest carton holds what activities pack; the shelf is a
 board for a wall, which no home has."""
 

@@ -15,6 +15,7 @@ def row(**changes) -> dict:
 
 def test_parts_of_a_case_are_added_up():
     lines = experts.table([row(failed=[3]), row(first=25), row(robot="humanoid", failed=[0, 1])])
+    assert "| CookingMeat, variant 1 | - | 25 of 25 |" in experts.table([row(variant=1), row(robot="humanoid")])
     assert lines[0] == "| | humanoid, mitten | fetch, mitten |"
     assert "| CookingMeat | 23 of 25 | 49 of 50 |" in lines
     assert "| BimanualPickAndPlace | - | takes no part |" in lines
@@ -33,6 +34,8 @@ def test_the_page_has_the_table_of_the_rows():
 
 
 def test_every_held_out_state_is_in_one_part():
-    options = argparse.Namespace(tasks=["SlicingFruit"], robots=["fetch"], grasping=["mitten"], episodes=60, worlds=25)
+    options = argparse.Namespace(
+        tasks=["SlicingFruit"], robots=["fetch"], grasping=["mitten"], variants=[0], episodes=60, worlds=25
+    )
     played = [n for part in experts.parts(options) for n in range(part.first, part.first + part.count)]
     assert sorted(played) == list(range(60))

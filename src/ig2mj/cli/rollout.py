@@ -31,6 +31,7 @@ def run(
     split: str = "train",
     held_out: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     pool_size: int = 0,
+    variant: int = 0,
     video: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     record: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     format: str = "ig2mj",
@@ -54,6 +55,7 @@ def run(
       split: start states: train or held_out.
       held_out: held-out start states, the first EPISODES of them, each played once.
       pool_size: start states; 0: as many as the split has.
+      variant: of the activity's objects: 1 and 2 are other models of the same categories.
       video: film of the first episode of the first world (.mp4, .gif), or five of its frames side by side (.png, .jpg);
         needs OpenGL and the native engine.
       record: HDF5 of everything that happens in all worlds, for `ig2mj demos replay`.
@@ -89,6 +91,7 @@ def run(
         paper_rl=paper_rl,
         split=split,
         pool_size=pool_size or None,
+        variant=variant,
     )
     if record is not None:
         from ig2mj.demos import record as recorded
@@ -122,6 +125,7 @@ def run(
         "grasping": played.grasping,
         "agent": agent,
         "paper_rl": paper_rl,
+        "variant": variant,
         "engine": played.core.engine.name,
         "worlds": worlds,
         "episodes": episodes,

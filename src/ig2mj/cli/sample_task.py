@@ -18,6 +18,7 @@ def run(
     count: int = 0,
     jobs: int = 0,
     anew: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    variant: int = 0,
     hashes: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
 ) -> int:
     """Sample the start states of an environment, and keep them where `ig2mj.make` finds them.
@@ -31,6 +32,7 @@ def run(
       count: rows; 0: 512 for training, 1000 held out.
       jobs: processes; 0: one per processor.
       anew: sample them even if they are there.
+      variant: of the activity's objects: 1 and 2 are other models of the same categories.
       hashes: JSON file that gets the hashes of the pools, one after the other, by the names of their files; in the form
         of the hashes that come with ig2mj (src/ig2mj/tasks/pool_hashes.json). What it has already stays.
     """
@@ -39,15 +41,17 @@ def run(
     from ig2mj.tasks.activities import ACTIVITIES
     from ig2mj.tasks.pools import COUNT
     from ig2mj.tasks.task import Task
+    from ig2mj.tasks.variants import variant as task_variant
 
     if count < 0 or jobs < 0:
         raise Ig2mjError(f"--count {count}, --jobs {jobs}: neither can be negative")
     if task == "all":
-        return _keep([(each, part) for part in COUNT for each in ACTIVITIES.values()], count, jobs, anew, hashes)
+        tasks = [task_variant(each, variant) for each in ACTIVITIES.values()]
+        return _keep([(each, part) for part in COUNT for each in tasks], count, jobs, anew, hashes)
     found = find_task(task)
     if not isinstance(found, Task):
         raise UnknownNameError("task with a pool of start states", task, ACTIVITIES)
-    return _keep([(found, split)], count, jobs, anew, hashes)
+    return _keep([(task_variant(found, variant), split)], count, jobs, anew, hashes)
 
 
 def _keep(wanted: list[tuple[Task, str]], count: int, jobs: int, anew: bool, hashes: pathlib.Path | None) -> int:

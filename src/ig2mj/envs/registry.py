@@ -31,6 +31,7 @@ from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.bddl.task import BddlTask, bddl_task
 from ig2mj.tasks.navigation.task import NAVIGATION, NavigationTask
 from ig2mj.tasks.task import Task
+from ig2mj.tasks.variants import variant as task_variant
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.pool import Pool
 
@@ -79,6 +80,7 @@ def make(
     sensors: SensorOptions | None = None,
     whole_actions: bool = False,
     period: float = ACTION_PERIOD,
+    variant: int = 0,
     **options: Any,
 ) -> Environment:
     """Makes an environment.
@@ -103,6 +105,8 @@ def make(
       whole_actions: an action has every number of the robot's controller, 1 being its limit, not only the hands that
         the task moves: for people and their devices.
       period: seconds of an agent step, a whole number of control steps of 1/30 s.
+      variant: of an activity's objects: other models of the same categories (`ig2mj.tasks.variants`); 0: its own. Each
+        has pools of start states of its own.
       options: go to the engine.
 
     Raises:
@@ -110,6 +114,10 @@ def make(
       EngineError: the engine cannot do what is asked.
     """
     task = name if isinstance(name, AnyTask) else find_task(name)
+    if variant:
+        if not isinstance(task, Task):
+            raise EngineError(f"variant {variant} of {task.name}: only the paper's activities have variants")
+        task = task_variant(task, variant)
     robot = next(iter(task.robots)) if robot is None else robot
     mode = task.grasping if grasping is None else grasping
     if mode not in MODES:
@@ -142,4 +150,6 @@ def make(
     env.made_with = {"paper_rl": paper_rl, "split": split, "pool_size": setup.pool.size, **options}
     if control != Control():
         env.made_with |= {"whole_actions": whole_actions, "period": period}
+    if variant:
+        env.made_with["variant"] = variant
     return env

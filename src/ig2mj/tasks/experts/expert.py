@@ -76,7 +76,8 @@ class Expert:
 
     def __call__(self, view: PhysicsView, states: ExtendedStates) -> Float[Array, "W n"]:
         """The action of every world, -1 to 1."""
-        see = Sight(view, states, self._scene, self._model, self.robot, self._hands, self._grips)
+        things = self.task.objects_of_interest
+        see = Sight(view, states, self._scene, self._model, self.robot, things, self._hands, self._grips)
         base = jnp.asarray(view.agent.base_quat)[:, 0]
         return jnp.concatenate([self._action(base, wish) for wish in self._plan(see)], axis=1)
 

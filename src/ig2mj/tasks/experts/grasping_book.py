@@ -8,10 +8,9 @@ from ig2mj.tasks.experts.motion import Wish, where, wish
 from ig2mj.tasks.experts.reaching import take
 from ig2mj.tasks.experts.sight import Sight
 
-BOOK = "notebook_0"
-
 
 def plan(see: Sight) -> list[Wish]:
     """One hand: to the notebook, and up."""
+    (book,) = see.objects
     up = jnp.zeros_like(see.hand_pos()).at[:, 2].set(0.1)
-    return [where(see.holds(BOOK), wish(up, close=True), take(see, BOOK))]
+    return [where(see.holds(book), wish(up, close=True), take(see, book))]

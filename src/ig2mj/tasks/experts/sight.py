@@ -26,7 +26,8 @@ class Sight:
     """All worlds of a scene as they are now; positions in the world frame, m.
 
     Attributes:
-      robot: name of the robot that acts. hands: numbers of the acting hands among all hands of the scene.
+      robot: name of the robot that acts. objects: names of what the task is about, the first object first.
+      hands: numbers of the acting hands among all hands of the scene.
       grips: [H, 3] grasp point of every hand in the hand's frame.
     """
 
@@ -35,6 +36,7 @@ class Sight:
     scene: Scene
     model: StateModel
     robot: str
+    objects: tuple[str, ...]
     hands: tuple[int, ...]
     grips: Float[np.ndarray, "H 3"]
 

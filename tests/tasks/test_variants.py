@@ -1,0 +1,46 @@
+"""Variants of activities: other models of the same categories, in a household that lacks nothing."""
+
+from __future__ import annotations
+
+import pytest
+
+from ig2mj.errors import EngineError
+from ig2mj.tasks.activities import ACTIVITIES
+from ig2mj.tasks.experts.expert import PLANS
+from ig2mj.tasks.points import At
+from ig2mj.tasks.pools import bare_scene, pool_file
+from ig2mj.tasks.variants import variant, variants
+
+
+@pytest.mark.parametrize("name", ACTIVITIES)
+def test_every_activity_has_three_models_of_what_it_is_about(name):
+    task = ACTIVITIES[name]
+    assert variants(task) == 3 and variant(task, 0) is task
+    with pytest.raises(EngineError, match="0 to 2"):
+        variant(task, 3)
+
+
+def test_the_added_objects_are_of_another_model_under_the_same_names():
+    scenes = [bare_scene(variant(ACTIVITIES["SlicingFruit"], n)) for n in (0, 1)]
+    assert scenes[0].object_names == scenes[1].object_names
+    assert [a.model for a in scenes[1].additions] == ["apple_01", "carving_knife_01"]
+
+
+def test_a_book_is_added_where_the_homes_own_is_meant():
+    task = variant(ACTIVITIES["GraspingBook"], 2)
+    assert task.objects == ("notebook/notebook_02",) and task.objects_of_interest == ("notebook_1",)
+    assert task.start == ("(on_top notebook_1 coffee_table_0)",) and task.near[0].object == "notebook_1"
+    assert task.distances[0][1] == At("notebook_1") and "notebook_0" not in task.goal
+    assert task.robots == ACTIVITIES["GraspingBook"].robots and task.name in PLANS
+    assert {"notebook_0", "notebook_1"} <= set(bare_scene(task).object_names)
+
+
+def test_the_board_stays_on_its_wall_and_the_towel_is_another():
+    own, other = ACTIVITIES["CleaningStainedShelf"], variant(ACTIVITIES["CleaningStainedShelf"], 1)
+    assert own.objects[1] == other.objects[1] and other.objects[0] == "hand_towel/hand_towel_01"
+
+
+def test_each_variant_has_its_own_pool():
+    task = ACTIVITIES["CookingMeat"]
+    files = {pool_file(t, bare_scene(t)).name for t in (task, variant(task, 1), variant(task, 2))}
+    assert len(files) == 3
