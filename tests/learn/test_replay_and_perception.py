@@ -14,11 +14,14 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from small_envs import PointMass, SeenPointMass
 
+from ig2mj.errors import Ig2mjError
 from ig2mj.learn.collect import Transition
 from ig2mj.learn.evaluate import wilson
-from ig2mj.learn.networks import projected
+from ig2mj.learn.networks import Encoder, projected
 from ig2mj.learn.perception import FAR, Perception, Seen, shrunk
+from ig2mj.learn.policies import Policy, PolicyMismatch, depends_on, perception_of
 from ig2mj.learn.replay import Replay
+from ig2mj.learn.sac import SAC, SACConfig
 
 GAMMA = 0.5
 
@@ -97,3 +100,25 @@ def test_the_interval_of_a_rate_is_that_of_the_textbook():
     """Wilson's interval of 8 in 10: 0.490 to 0.943 (by hand from its formula)."""
     assert wilson(8, 10) == pytest.approx((0.490, 0.943), abs=1e-3)
     assert wilson(10, 10)[1] == 1.0
+
+
+def test_a_policy_sees_pictures_in_the_size_it_was_trained_on():
+    env = SeenPointMass(2)
+    perception = Perception(env.observation_spaces, "rgbd", 16)
+    sac = SAC(perception, 2, SACConfig(actor=(8,), critic=(8,)))
+    policy = Policy.of(sac, sac.init(jax.random.PRNGKey(0)), depends_on(env, perception), {})
+    again = perception_of(policy, env.observation_spaces)
+    assert again.picture_shape == (16, 16, 4)
+    assert policy.actor(again)(env.reset(0).obs).shape == (2, 2)
+    with pytest.raises(PolicyMismatch, match="picture"):
+        policy.check(env, Perception(env.observation_spaces, "rgbd"))
+    with pytest.raises(Ig2mjError, match="32 pixels cannot be averaged down to 12"):
+        Perception(env.observation_spaces, "rgbd", 12)
+
+
+@pytest.mark.parametrize("side", [32, 64, 128])
+def test_an_encoder_ends_with_four_by_four_pixels(side):
+    shape = jax.eval_shape(
+        Encoder((side, side, 4)).init, jax.random.PRNGKey(0), jnp.zeros((1, side * side * 4), jnp.uint8)
+    )
+    assert shape["params"]["Dense_0"]["kernel"].shape == (4 * 4 * 64, 50)

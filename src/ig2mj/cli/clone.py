@@ -11,6 +11,7 @@ def train_from_demos(
     robot: str | None,
     grasping: str | None,
     obs: str,
+    pixels: int,
     minutes: float,
     seed: int,
     out: pathlib.Path | None,
@@ -39,7 +40,7 @@ def train_from_demos(
     for name, wanted in (("task", short_name(env) or env), ("robot", robot), ("grasping", grasping)):
         if wanted is not None and world[name] != wanted:
             raise InputError(demos, f"is of {name} {world[name]}, not {wanted}")
-    perception = Perception(spaces, obs)
+    perception = Perception(spaces, obs, pixels)
     runs = load_demos(demos, perception)
     config = configured(BCConfig(), changes)
     algorithm = BC(perception, runs.action.shape[1], config)

@@ -21,6 +21,7 @@ def run(
     robot: str | None = None,
     grasping: str | None = None,
     obs: str = "state",
+    pixels: int = 32,
     engine: str | None = None,
     worlds: int = 0,
     minutes: float = 10.0,
@@ -46,6 +47,7 @@ def run(
       robot: humanoid, fetch or turtlebot; default: the first that the task lists.
       grasping: mitten, assisted, sticky or physical; default: mitten for activities.
       obs: state (proprioception and privileged state) or rgbd (what the paper's agents see).
+      pixels: height and width that the pictures of 128x128 are averaged down to for the networks.
       engine: native, warp or jax; default: warp on a GPU, else native.
       worlds: how many play at once; 0: 2048, natively 16.
       minutes: of training; compiling is not counted.
@@ -101,7 +103,7 @@ def run(
     if algo == "bc":
         from ig2mj.cli.clone import train_from_demos
 
-        return train_from_demos(env, demos, robot, grasping, obs, minutes, seed, out, resume, set)
+        return train_from_demos(env, demos, robot, grasping, obs, pixels, minutes, seed, out, resume, set)
     if demos is not None and algo != "sac":
         raise Ig2mjError(f"--demos: {algo} takes none (bc and sac do)")
     if expert and algo != "sac":
@@ -129,7 +131,7 @@ def run(
                 paper_rl=paper_rl,
                 pool_size=pool_size or None,
             )
-        perception = Perception(world.observation_spaces, obs)
+        perception = Perception(world.observation_spaces, obs, pixels)
         shown = load_demos(demos, perception, world_of(world)) if demos is not None else None
         algorithm = made(config, perception, world, shown, AXIS if shared else None, expert)
         if out is None:

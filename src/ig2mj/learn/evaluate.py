@@ -22,8 +22,7 @@ from ig2mj.envs.pieces import keep_pool
 from ig2mj.envs.registry import make
 from ig2mj.envs.rollout import Act, play
 from ig2mj.errors import Ig2mjError
-from ig2mj.learn.perception import Perception
-from ig2mj.learn.policies import Policy
+from ig2mj.learn.policies import Policy, perception_of
 
 
 def acting(policy: Policy, env: Environment, file: object, *, drawn: bool = False, seed: int = 0) -> Act:
@@ -35,7 +34,7 @@ def acting(policy: Policy, env: Environment, file: object, *, drawn: bool = Fals
     Raises:
       InputError: the policy is for something else.
     """
-    perception = Perception(env.observation_spaces, policy.card["depends"]["mode"])
+    perception = perception_of(policy, env.observation_spaces)
     policy.check(env, perception, file)
     choose, keys = jax.jit(policy.actor(perception, drawn=drawn)), np.random.default_rng(seed)
 

@@ -5,6 +5,7 @@ Axes: B samples, n numbers of an action, K atoms.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import flax.linen as nn
@@ -40,8 +41,8 @@ class Trunk(nn.Module):
 class Encoder(nn.Module):
     """Features of pictures.
 
-    `small`: three convolutions (32, 64, 64) of stride 2 and 50 numbers between -1 and 1, as in Squint. `paper`: three
-    convolutions and 256 numbers (iGibson 2.0, appendix A.3).
+    `small`: convolutions of stride 2 until 4x4 pixels are left, for 32x32 pixels three (32, 64, 64), and 50 numbers
+    between -1 and 1, as in Squint. `paper`: three convolutions and 256 numbers (iGibson 2.0, appendix A.3).
     """
 
     shape: tuple[int, int, int]
@@ -50,7 +51,8 @@ class Encoder(nn.Module):
     @nn.compact
     def __call__(self, picture: UInt8[Array, "B q"]) -> Float[Array, "B f"]:
         x = picture.reshape(-1, *self.shape).astype(jnp.float32) / 255.0 - 0.5
-        for channels in (32, 64, 64):
+        halvings = 3 if self.net == "paper" else max(3, math.ceil(math.log2(self.shape[0] / 4)))
+        for channels in (32, *[64] * (halvings - 1)):
             x = nn.relu(nn.Conv(channels, (3, 3), strides=2, padding="SAME")(x))
         x = x.reshape(x.shape[0], -1)
         if self.net == "paper":

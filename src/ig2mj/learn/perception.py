@@ -28,7 +28,7 @@ MODES = ("state", "rgbd")
 PRIVILEGED = "privileged_state"
 
 SIZE = 32
-"""Pixels, height and width, that pictures are averaged down to."""
+"""Pixels, height and width, that pictures are averaged down to if nothing else is said."""
 
 FAR = 3.0
 """m: depth beyond this is white. All six activities are within reach of an arm."""
@@ -74,7 +74,7 @@ class Perception:
             if not self._pictures:
                 raise Ig2mjError("pixels are wanted, but the environment observes neither rgb nor depth")
             side = spaces[self._pictures[0]].shape[0]
-            if side % size:
+            if size < 1 or side % size:
                 raise Ig2mjError(f"pictures of {side} pixels cannot be averaged down to {size}")
             self.picture_shape = (size, size, sum(spaces[n].shape[-1] for n in self._pictures))
         elif not self.vector_size:

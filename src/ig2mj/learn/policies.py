@@ -27,7 +27,7 @@ from ig2mj.errors import InputError, PolicyMismatch
 from ig2mj.learn.checkpoints import refuse_difference
 from ig2mj.learn.moments import Moments
 from ig2mj.learn.networks import Actor
-from ig2mj.learn.perception import Perception
+from ig2mj.learn.perception import SIZE, Perception
 
 FORMAT_VERSION = 1
 
@@ -56,6 +56,12 @@ def depends_of(world: Mapping[str, Any], perception: Perception) -> dict[str, An
     found["picture"] = perception.picture_shape and list(perception.picture_shape)
     found["privileged"] = list(world["privileged"]) if perception.mode == "state" else []
     return found
+
+
+def perception_of(policy: Policy, spaces: Mapping[str, Any]) -> Perception:
+    """How a policy sees an environment's observations: as in its training."""
+    depends = policy.card["depends"]
+    return Perception(spaces, depends["mode"], depends["picture"][0] if depends["picture"] else SIZE)
 
 
 def depends_on(env: Any, perception: Perception) -> dict[str, Any]:
