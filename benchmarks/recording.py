@@ -1,4 +1,5 @@
-"""What recording costs: processor time of an agent step with and without it, in turns, and bytes an hour of one world.
+"""What recording costs: processor time of an agent step with and without it, in turns, and bytes an hour of one world;
+and what a replay by state costs, beside drawing its pictures.
 
     python benchmarks/recording.py [--task CookingMeat] [--turns 10]
 
@@ -6,7 +7,7 @@ Every turn plays the same actions from the same start, plainly and recorded, so 
 bit. Processor time is that of all threads of the process, writing and compression included; of all turns the quickest
 counts, since other programs on the machine only ever add to it. Sizes are those of files with a whole number of
 flushes, at 10 frames a second (agent steps) and at 30 (`period=1 / 30`, as people drive), for random actions that are
-held for half a second, and for the task's expert.
+held for half a second, and for the task's expert. Pictures are 128 x 128 pixels, colour and depth.
 """
 
 from __future__ import annotations
@@ -22,10 +23,11 @@ import numpy as np
 from results import keep_row, machine
 
 import ig2mj
-from ig2mj.demos import record
+from ig2mj.demos import Recording, Replayer, record
 from ig2mj.demos.writer import FLUSH
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.experts import expert_of
+from ig2mj.envs.registry import VECTORS
 
 Act = Callable[[EnvState], np.ndarray]
 
@@ -80,6 +82,29 @@ def size(env: Environment, act: Act, frames: int, file: pathlib.Path) -> float:
     return file.stat().st_size / frames / env.period * 3600 / 1e6
 
 
+def replayed(file: pathlib.Path, frames: int) -> dict[str, float]:
+    """Milliseconds of processor time of a frame that is replayed by state: without and with pictures, and of the
+    pictures alone, drawn again and again of the last frame."""
+    found = {}
+    for name, observations in (("ms_without", VECTORS), ("ms_with_pictures", ("rgb", "depth"))):
+        with Recording(file) as recording:
+            replayer = Replayer(recording, "state", observations=observations)
+            at: list[float] = []
+            replayer(watch=lambda state, now, frame, at=at: at.append(time.process_time()))
+            times = np.diff(at[: frames + 1])
+            found[name] = round(1000 * float(np.median(times)), 3)
+            if "rgb" not in observations:
+                continue
+            state = replayer.at(recording.runs[0], 1)
+            env, drawn = replayer.env, []
+            for _ in range(30):
+                began = time.process_time()
+                env.resume(state.batch, np.zeros(1, int))
+                drawn.append(time.process_time() - began)
+            found["ms_pictures_alone"] = round(1000 * float(np.median(drawn)), 3)
+    return found
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--task", default="CookingMeat")
@@ -108,6 +133,7 @@ def main() -> None:
             )
         expert = expert_of(env)
         sizes["expert, 10 frames/s"] = size(env, lambda state: np.asarray(expert(state)), frames, folder / "size.h5")
+        row["replay_by_state"] = replayed(folder / "size.h5", 200)
         row["megabytes_an_hour"] = {name: round(value, 1) for name, value in sizes.items()}
     keep_row(row | {"machine": machine(-1)}, args.out)
 

@@ -22,7 +22,7 @@ from typing import Any
 
 import numpy as np
 
-from ig2mj.demos.columns import Column, Packer, Rows, gathered
+from ig2mj.demos.columns import Column, Rows, gathered, held
 from ig2mj.engine.native.recorded import Cut
 from ig2mj.errors import InputError
 
@@ -97,7 +97,6 @@ class RunWriter:
         index = {"chunks": (FLUSH, max(len(names), 1)), "maxshape": (None, len(names))}
         self._index = self._opened.create_dataset("index", (0, len(names)), np.int32, **index, **PACKED)
         self._names, self._columns, self._arrays = names, [Column() for _ in names], [None] * len(names)
-        self._packers: dict[int, Packer] = {}  # 0: of frames, 1: of steps
         self._pending: list[_Frame] = []
         self._open: dict[int, list[_Run]] = {world: [] for world in worlds}  # the last one may go on
         self._written = self._bytes = self.runs = 0
@@ -116,13 +115,13 @@ class RunWriter:
             about = {"world": world, "frames": 0, "ended": False, **attributes}
             self._open[world].append(_Run(group, about, [], len(self._pending)))
             self.runs += 1
-        self._put(_Frame(own, self._packed(0, batched), None, set(worlds)))
+        self._put(_Frame(own, held(batched), None, set(worlds)))
 
     def add(self, own: Sequence[Sequence[Any]], batched: Sequence[Any], step: Sequence[Any]) -> None:
         """The next frame of all runs that go on, and the step [W, ...] that led to it."""
         going = {world for world, runs in self._open.items() if runs and runs[-1].stops < 0}
         if going:
-            self._put(_Frame(own, self._packed(0, batched), self._packed(1, step), going))
+            self._put(_Frame(own, held(batched), held(step), going))
 
     def end(self, world: int, **attributes: Any) -> None:
         """Ends the run of a world, if there is one."""
@@ -145,12 +144,6 @@ class RunWriter:
 
     def __exit__(self, *error: object) -> None:
         self.close()
-
-    def _packed(self, kind: int, arrays: Sequence[Any]) -> list[Any]:
-        packer = self._packers.get(kind)
-        if packer is None:
-            packer = self._packers[kind] = Packer(arrays)
-        return packer(arrays)
 
     def _put(self, frame: _Frame) -> None:
         if not self._pending:
@@ -182,9 +175,9 @@ class RunWriter:
         index = np.full((sum(map(len, taken.values())), len(self._names)), -1, np.int32)
         offsets = dict(zip(taken, np.cumsum([0, *map(len, taken.values())]), strict=False))
         begins = {w: np.searchsorted(taken[w], [r.starts for r in self._open[w] if r.starts >= 0]) for w in taken}
-        everywhere = self._packers[0].rows([f.batched for f in frames])
+        everywhere = [gathered(a) for a in zip(*(f.batched for f in frames), strict=True)]
         with_step = np.array([k for k, f in enumerate(frames) if f.step is not None], int)
-        steps = self._packers[1].rows([f.step for f in frames if f.step is not None]) if len(with_step) else []
+        steps = [gathered(a) for a in zip(*(f.step for f in frames if f.step is not None), strict=True)]
         for number, world in enumerate(self._worlds):
             if not len(taken[world]):
                 continue

@@ -31,6 +31,12 @@ MOVED = 1e-5
 ROBOT_HEIGHT, ROBOT_DISTANCE = 0.8, 4.5
 """Metres: what a page looks at first where there is a robot, and from how far."""
 
+SKY, GROUND, SUN = (255, 255, 255), (170, 165, 160), (255, 250, 240)
+"""Colours of the light from above, from below, and of the sun."""
+
+SKY_LIGHT, SUN_LIGHT, SUN_FROM = 2.6, 1.6, (3.0, -4.0, 8.0)
+"""three.js's intensities, with which a white wall is just not white, and where the sun stands."""
+
 BUILDING = frozenset({"walls", "floors", "ceilings"})
 """Categories that no click is for: they are behind everything."""
 
@@ -75,8 +81,11 @@ class Stage:
 
     def _prepare(self) -> None:
         scene = self._server.scene
-        scene.configure_environment_map("studio", environment_intensity=0.32)
-        scene.configure_default_lights(enabled=True, cast_shadow=False)
+        # No environment map: where a browser draws in software, preparing one takes longer than all the rest.
+        scene.configure_environment_map(None)
+        scene.configure_default_lights(enabled=False)
+        scene.add_light_hemisphere("/light/sky", sky_color=SKY, ground_color=GROUND, intensity=SKY_LIGHT)
+        scene.add_light_directional("/light/sun", color=SUN, intensity=SUN_LIGHT, position=SUN_FROM, cast_shadow=False)
         colour = np.round(np.array(BACKGROUND[:3]) * 255).astype(np.uint8)
         scene.set_background_image(np.tile(colour, (4, 4, 1)), format="png")
         scene.world_axes.visible = False
