@@ -60,7 +60,8 @@ def cost(env: Environment, steps: int, turns: int, folder: pathlib.Path) -> dict
         env_recorded.writer.close()
         return time.process_time() - began
 
-    plain(), recorded(0)
+    plain()
+    recorded(0)
     times = np.array([(plain(), recorded(k)) for k in range(turns)]) * 1000 / steps
     best, shares = times.min(0), times[:, 1] / times[:, 0] - 1
     return {
