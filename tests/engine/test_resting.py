@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import jax
 import jax.numpy as jnp
 import mujoco
@@ -17,6 +19,7 @@ from ig2mj.scene.scene import load_scene
 
 pytestmark = [
     pytest.mark.skipif(bool(pins.mismatches()), reason=f"our kernels do not fit: {pins.mismatches()}"),
+    pytest.mark.skipif("resting" not in os.environ.get("IG2MJ_KERNELS", ""), reason="these kernels are on trial"),
     pytest.mark.slow,
 ]
 

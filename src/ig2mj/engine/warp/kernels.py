@@ -32,8 +32,8 @@ def launches_of(act: Callable[[], Any]) -> list[Launch]:
     found: dict[Launch, None] = {}
     default = 256  # Warp's
 
-    def launch(kernel: wp.Kernel, *args: Any, block_dim: int = default, **kwargs: Any) -> None:
-        found[patches.launched(kernel), block_dim] = None
+    def launch(kernel: wp.Kernel, dim: Any, *args: Any, block_dim: int = default, **kwargs: Any) -> None:
+        found[patches.launched(kernel, dim), block_dim] = None
 
     def capture_while(condition: Any, while_body: Callable, stream: Any = None, **kwargs: Any) -> None:
         while_body(**kwargs)

@@ -36,6 +36,7 @@ import functools
 import threading
 import warnings
 from collections.abc import Iterator
+from typing import Any
 
 import warp as wp
 
@@ -109,13 +110,13 @@ def engine_kernels() -> Iterator[None]:
             yield
 
 
-def launched(kernel: wp.Kernel) -> wp.Kernel:
+def launched(kernel: wp.Kernel, dim: Any = 1) -> wp.Kernel:
     """The kernel that is launched now, in this thread, in place of one of MuJoCo Warp's; that one where it stays."""
     if not KERNELS.active:
         return kernel
     from ig2mj.engine.warp.patches.launching import substituted
 
-    return substituted(kernel, ())[0]
+    return substituted(kernel, dim, ())[0]
 
 
 @contextlib.contextmanager

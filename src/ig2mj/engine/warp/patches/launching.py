@@ -1,7 +1,7 @@
 """What a launch of MuJoCo Warp's becomes while our functions run: another kernel, another stream, or itself.
 
-Parts of this package that change launches rather than functions register here: `add` a function that is given a kernel
-and its inputs, and answers with what to launch in their place, or None.
+Parts of this package that change launches rather than functions register here: `add` a function that is given a
+kernel, its dimensions and its inputs, and answers with what to launch in their place, or None.
 """
 
 from __future__ import annotations
@@ -15,28 +15,30 @@ import warp as wp
 
 from ig2mj.engine.warp.patches.replacements import original
 
-Substitute = tuple[wp.Kernel, list[Any]]
-"""A kernel, and its inputs."""
+Launch = tuple[wp.Kernel, Any, list[Any]]
+"""A kernel, its dimensions, and its inputs."""
+
+Substitute = Callable[[wp.Kernel, Any, Sequence[Any]], Launch | None]
 
 Branch = Callable[[wp.Kernel, Sequence[Any]], "wp.Stream | None"]
 """The stream that a kernel is launched on; None: the present one."""
 
 _here = threading.local()
-_substitutes: list[Callable[[wp.Kernel, Sequence[Any]], Substitute | None]] = []
+_substitutes: list[Substitute] = []
 
 
-def add(substitute: Callable[[wp.Kernel, Sequence[Any]], Substitute | None]) -> None:
+def add(substitute: Substitute) -> None:
     """From now on launches of ours ask this function."""
     _substitutes.append(substitute)
 
 
-def substituted(kernel: wp.Kernel, inputs: Sequence[Any]) -> Substitute:
-    """What is launched in place of a kernel with these inputs."""
+def substituted(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any]) -> Launch:
+    """What is launched in place of this."""
     for substitute in _substitutes:
-        found = substitute(kernel, inputs)
+        found = substitute(kernel, dim, inputs)
         if found is not None:
             return found
-    return kernel, list(inputs)
+    return kernel, dim, list(inputs)
 
 
 @contextlib.contextmanager
@@ -51,7 +53,7 @@ def branching(branch: Branch) -> Iterator[None]:
 
 def launch(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any] = (), *args: Any, **kwargs: Any) -> Any:
     """In place of `warp.launch`."""
-    kernel, inputs = substituted(kernel, inputs)
+    kernel, dim, inputs = substituted(kernel, dim, inputs)
     branch: Branch | None = getattr(_here, "branch", None)
     stream = branch(kernel, inputs) if branch else None
     if stream is not None:

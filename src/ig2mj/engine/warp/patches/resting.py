@@ -30,6 +30,7 @@ from mujoco.mjx.third_party.mujoco_warp._src import smooth, types
 
 from ig2mj.engine.warp.patches.flags import FELL_ASLEEP, REPLACED
 from ig2mj.engine.warp.patches.guarded import guarded
+from ig2mj.engine.warp.patches.launching import Launch
 from ig2mj.engine.warp.patches.replacements import original
 
 AWAKE, ASLEEP, STATIC = (int(getattr(types.SleepState, name)) for name in ("AWAKE", "ASLEEP", "STATIC"))
@@ -89,15 +90,15 @@ def _guarded_by_kernel() -> dict[wp.Kernel, wp.Kernel]:
     }
 
 
-def substitute(kernel: wp.Kernel, inputs: Sequence[Any]) -> tuple[wp.Kernel, list[Any]] | None:
+def substitute(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any]) -> Launch | None:
     """The guarded kernel with its inputs, in a step that passes over what rests."""
     flags, awake = getattr(_here, "flags", None), getattr(_here, "awake", None)
     if awake and kernel.key.startswith(SOLVE):
-        return _guarded_solve(kernel), [*awake, *inputs]
+        return _guarded_solve(kernel), dim, [*awake, *inputs]
     if not flags:
         return None
     own = _guarded_by_kernel().get(kernel)
-    return None if own is None else (own, [*flags, *inputs])
+    return None if own is None else (own, dim, [*flags, *inputs])
 
 
 SOLVE = "_small_cholesky_factorize_solve_block"

@@ -19,6 +19,7 @@ from ig2mj.engine.warp.patches import (
     collision,
     compact_solver,
     gravity,
+    lanes,
     launching,
     resting,
     sleeping,
@@ -55,8 +56,10 @@ ON_TRIAL = {
 }
 """Functions whose gain is not measured yet: they run where IG2MJ_KERNELS names their group."""
 
+SUBSTITUTES = {"resting": resting.substitute, "lanes": lanes.substitute}
+
 for _group in filter(None, os.environ.get("IG2MJ_KERNELS", "").split(",")):
-    OWN |= ON_TRIAL.get(_group, {})  # "scratch" replaces no function
+    OWN |= ON_TRIAL.get(_group, {})  # "scratch" and "lanes" replace no functions
     OWN[wp, "launch"] = launching.launch
-    if _group == "resting":
-        launching.add(resting.substitute)
+    if _group in SUBSTITUTES:
+        launching.add(SUBSTITUTES[_group])
