@@ -40,7 +40,8 @@ class Process:
                 text=True,
                 env={**os.environ, **environment},
             )
-        threading.Thread(target=self._read, daemon=True).start()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
 
     def wait_until_ready(self, until: float) -> bool:
         """Waits for its first line, until a time of `time.monotonic`."""
@@ -75,6 +76,9 @@ class Process:
 
     def trouble(self) -> str:
         """Why it has not answered: that it still runs or how it ended, and the end of its standard error."""
+        if not self._reader.is_alive():  # it has closed its output, and is about to end
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self._opened.wait(5.0)
         status = self._opened.poll()
         state = "still at work" if status is None else f"ended with {status}"
         return f"{state}: {' '.join(self._log.read_text(errors='replace').split())[-300:]}"
@@ -93,11 +97,13 @@ class Process:
         except subprocess.TimeoutExpired:
             self._opened.kill()
             self._opened.wait()
+        self._reader.join(1.0)
 
     def _read(self) -> None:
         assert self._opened.stdout is not None
-        for line in self._opened.stdout:
-            self._lines.put(line)
+        with self._opened.stdout as lines:
+            for line in lines:
+                self._lines.put(line)
         self._lines.put(None)
 
 

@@ -31,14 +31,9 @@ class RayCluster:
 
     def wait_for_nodes(self, count: int) -> None:
         """Until so many nodes are alive, as a process of its own sees it."""
-        code = f"import ray; ray.init(address={self.address!r}, log_to_driver=False, logging_level='ERROR'); "
-        code += "print(sum(n['Alive'] for n in ray.nodes()))"
-
-        def there() -> bool:
-            asked = subprocess.run([sys.executable, "-c", code], env=self.environment, capture_output=True, text=True)
-            return asked.stdout.split()[-1:] == [str(count)]
-
-        wait_for(there, 120)
+        code = f"import ray, time; ray.init(address={self.address!r}, log_to_driver=False, logging_level='ERROR')\n"
+        code += f"while sum(n['Alive'] for n in ray.nodes()) != {count}: time.sleep(0.5)"
+        subprocess.run([sys.executable, "-c", code], env=self.environment, capture_output=True, check=True, timeout=180)
 
     def kill_node(self) -> None:
         """Kills the second node: the process that was started, and those that it started, which are its session."""

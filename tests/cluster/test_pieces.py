@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 import pathlib
+import subprocess
 import sys
+import time
 
 import pytest
 
@@ -109,6 +112,29 @@ def test_a_killed_run_goes_on_where_it_stopped(tmp_path):
     assert count == everything(work())[0] and not failed
     assert len(set(tmp_path.glob("*-*")) | before) == 5 and len(before) == 3, "finished pieces were not done again"
     assert not (tmp_path / "pool.npz.pieces").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_a_command_that_was_killed_goes_on_to_the_same_bytes(tmp_path):
+    """SIGKILL of `ig2mj sample`, then `--resume`: rows that were finished are not sampled again."""
+    words = ["sample", "small_home", "(on_top apple_0 breakfast_table_0)", "--count", "12", "--out"]
+    command = [sys.executable, "-m", "ig2mj", *words]
+    done, deadline = tmp_path / "killed.npz.pieces" / "done.jsonl", time.monotonic() + 300
+    where = {"cwd": tmp_path, "env": {**os.environ, "JAX_PLATFORMS": "cpu"}}
+    with subprocess.Popen([*command, "killed.npz"], **where, stderr=subprocess.DEVNULL) as driver:
+        while not done.exists() or len(done.read_text().splitlines()) < 3:
+            assert driver.poll() is None and time.monotonic() < deadline
+            time.sleep(0.01)
+        driver.kill()
+    finished = len(done.read_text().splitlines())
+    assert not (tmp_path / "killed.npz").exists() and finished < 12
+    refused = subprocess.run([*command, "killed.npz"], **where, capture_output=True, text=True)
+    assert refused.returncode == 2 and "--resume goes on with it" in refused.stderr
+    for file, more in (("killed.npz", ["--resume"]), ("whole.npz", [])):
+        subprocess.run([*command, file, *more], **where, check=True, capture_output=True)
+    assert (tmp_path / "killed.npz").read_bytes() == (tmp_path / "whole.npz").read_bytes()
+    assert not done.parent.exists()
 
 
 def test_a_result_that_is_damaged_is_made_again(tmp_path):

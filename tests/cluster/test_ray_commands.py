@@ -36,11 +36,11 @@ def done(process: subprocess.Popen) -> str:
     return said
 
 
-def at_work(group: int) -> bool:
-    """Whether a process of this group does a piece: Ray gives it the task's name."""
+def at_work(session: int) -> bool:
+    """Whether a process of this session does a piece: Ray gives it the task's name."""
     for entry in pathlib.Path("/proc").iterdir():
         try:
-            own = entry.name.isdigit() and os.getpgid(int(entry.name)) == group
+            own = entry.name.isdigit() and os.getsid(int(entry.name)) == session
             if own and (entry / "cmdline").read_bytes().startswith(b"ray::_task"):
                 return True
         except OSError:  # it has just ended
@@ -50,9 +50,9 @@ def at_work(group: int) -> bool:
 
 def with_a_death(cluster, folder: pathlib.Path, *words: str) -> str:
     """Runs a command on the cluster, whose second node is killed as soon as it does a piece of it."""
+    assert cluster.second is not None
     process = command(cluster, folder, *words, "--cluster", cluster.address)
     try:
-        assert cluster.second is not None
         until = time.monotonic() + 600
         while not at_work(cluster.second.pid):
             assert process.poll() is None, process.communicate()[1][-3000:]
@@ -64,7 +64,9 @@ def with_a_death(cluster, folder: pathlib.Path, *words: str) -> str:
         return done(process)
     finally:
         process.kill()
-        process.wait()
+        process.communicate()
+        if cluster.second.poll() is None:
+            cluster.kill_node()
         cluster.add_node()
         cluster.wait_for_nodes(2)
 

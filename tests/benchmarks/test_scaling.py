@@ -1,0 +1,81 @@
+"""Weak scaling: what is told of processes that are slow, die or overflow, and what their speeds are compared with."""
+
+from __future__ import annotations
+
+import json
+import pathlib
+
+import pytest
+
+pytest.importorskip("tyro")
+
+import scale_tables
+import scaling
+from waiting import Process
+
+WORKER = """
+import json, sys
+about = json.loads(sys.argv[1])
+if about["late"]:
+    sys.stdin.read()
+    sys.exit()
+print("READY " + json.dumps({"device": "a device"}), flush=True)
+for line in sys.stdin:
+    if about["dies"]:
+        sys.exit("it died")
+    row = {"seconds": 2.0, "steps": about["steps"], "overflow": about["overflow"], "non_finite": 0}
+    print("DONE " + json.dumps(row), flush=True)
+"""
+
+GOOD = {"late": False, "dies": False, "steps": 100, "overflow": 0}
+
+
+def measured(tmp_path: pathlib.Path, monkeypatch, workers: dict[str, list[dict]], **options) -> list[dict]:
+    """Rows of a run in which the processes of each case are these."""
+    script = tmp_path / "worker.py"
+    script.write_text(WORKER)
+
+    def start(case: str, count: int, args: scaling.Args) -> list[Process]:
+        about = workers[case if case != "learner" else f"learner-{count}"]
+        return [
+            Process([str(script), json.dumps(a)], tmp_path / f"{case}-{count}-{k}", {}) for k, a in enumerate(about)
+        ]
+
+    monkeypatch.setattr(scaling, "start", start)
+    rows = tmp_path / "rows.jsonl"
+    cases = tuple(sorted({name.split("-")[0] for name in workers}))
+    scaling.main(scaling.Args(gpus=(1, 2), cases=cases, seconds=0.1, rows=rows, logs=tmp_path, **options))
+    return [json.loads(line) for line in rows.read_text().splitlines()]
+
+
+def test_speeds_are_compared_with_one_gpu(tmp_path, monkeypatch):
+    slow = {**GOOD, "steps": 90}
+    rows = measured(tmp_path, monkeypatch, {"birch_pictures": [GOOD, slow]}, limit=30.0)
+    assert [(r["gpus"], r["steps_per_s"], r["weak_scaling"]) for r in rows] == [(1, 50.0, 1.0), (2, 95.0, 1.9)]
+    assert all(r["counts"] and r["device"] == "a device" for r in rows)
+    monkeypatch.setattr(scale_tables, "RESULTS", tmp_path)
+    for name in ("scaling", "multi_gpu"):
+        (tmp_path / name).mkdir()
+    (tmp_path / "scaling" / "rows.jsonl").write_text("\n".join(map(json.dumps, [*rows, {**rows[1], "counts": False}])))
+    two = {"devices": 2, "speedup": 1.99, "device": "another"}
+    (tmp_path / "multi_gpu" / "result.json").write_text(json.dumps(two))
+    assert scale_tables.scaling()["birch_pictures"] == {1: (1.0, "a device"), 2: (1.9, "a device")}
+
+
+def test_a_row_that_overflowed_counts_not_and_is_no_measure_for_others(tmp_path, monkeypatch):
+    rows = measured(tmp_path, monkeypatch, {"birch_pictures": [{**GOOD, "overflow": 3}, GOOD]}, limit=30.0)
+    assert [(r["counts"], r["overflow"]) for r in rows] == [(False, 3), (False, 3)]
+    assert not any("weak_scaling" in r for r in rows)
+
+
+def test_what_dies_or_is_late_costs_its_own_rows(tmp_path, monkeypatch):
+    workers = {
+        "birch_pictures": [GOOD, {**GOOD, "dies": True}],
+        "learner-1": [{**GOOD, "late": True}],
+        "learner-2": [GOOD, GOOD],
+    }
+    rows = {(r["case"], r["gpus"]): r for r in measured(tmp_path, monkeypatch, workers, limit=4 * 4.1 + 2.0)}
+    assert rows["birch_pictures", 1]["weak_scaling"] == 1.0
+    assert "no answer, ended with 1: it died" in rows["birch_pictures", 2]["error"]
+    assert "not ready, still at work" in rows["learner", 1]["error"]
+    assert rows["learner", 2]["counts"] and "weak_scaling" not in rows["learner", 2], "there is no row of one GPU"
