@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from ig2mj.sampling import drop
-from ig2mj.sampling.columns import Window
-from ig2mj.sampling.drop import rest_at
+from ig2mj.sampling.columns import CELL, Window
+from ig2mj.sampling.drop import MARGIN, Balance, rest_at
 from ig2mj.sampling.many import make_sampler
 from ig2mj.sampling.possible import possible_origins
 from ig2mj.scene.scene import load_scene
@@ -65,3 +65,27 @@ def test_what_is_found_is_among_what_is_possible(query, name, support):
         possible = possible_origins(level, shape, supports, cells.rows, cells.cols, full).ravel()
         assert (possible | ~found).all()
         assert not possible.all(), "some cells are ruled out"
+
+
+def in_polygon(contact, place):
+    """Row by row: the widest angle without contact, seen from the origin."""
+    corners = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]]) * CELL / 2
+    found = []
+    for touches in contact:
+        seen = (place[touches][:, None] + corners).reshape(-1, 2)
+        angles = np.sort(np.arctan2(seen[:, 1], seen[:, 0]))
+        gaps = np.diff(angles, append=angles[:1] + 2 * np.pi)
+        found.append(len(angles) > 0 and bool(gaps.max() <= np.pi - MARGIN))
+    return np.array(found)
+
+
+@pytest.mark.parametrize("cells", [30, 400])
+@pytest.mark.parametrize("share", [0.0, 0.005, 0.03, 0.3, 1.0])
+def test_balance_is_no_wide_angle_without_contact(cells, share):
+    rng = np.random.default_rng(7)
+    side = int(cells**0.5) + 1
+    grid = np.stack(np.meshgrid(np.arange(side), np.arange(side)), -1).reshape(-1, 2)[:cells] * CELL
+    for shift in (0.0, side * CELL * 0.45):  # the centre of mass in the middle, and near the rim
+        place = grid - grid.mean(0) + rng.normal(0, 0.003, 2) + shift
+        contact = rng.random((200, cells)) < share
+        assert Balance(place)(contact).tolist() == in_polygon(contact, place).tolist()

@@ -37,6 +37,12 @@ MARGIN = 0.35
 CHUNK = 300_000
 """Cells looked at together: they fit a processor's cache."""
 
+SPARSE = 0.1
+"""Share of cells that touch up to which they are sorted one by one."""
+
+SOME_CELLS = 64
+"""Cells, by angle, that are asked first where many touch."""
+
 FIRST_CELLS = 48
 """Cells of the object, spread over it, that are looked at first."""
 
@@ -96,6 +102,7 @@ def rest_at(
         free = (found[:, None] + over[cells] + HEADROOM <= ceiling[at]).all(1)
         return found, free & ~blocked[at].any(1)
 
+    balance = Balance(place)
     left_over = np.arange(len(row))
     if len(under) > 2 * FIRST_CELLS:  # a few cells rule out most places
         some = np.linspace(0, len(under) - 1, FIRST_CELLS).astype(int)
@@ -113,7 +120,7 @@ def rest_at(
         level_base = np.all(bears[:, base] & (gap[:, base] <= LEVEL_BASE), axis=1)
         if support == "full":
             sound &= level_base
-        stays = _balanced(contact[sound], place)
+        stays = balance(contact[sound])
         balanced[places[sound]] = stays
         full[places[sound]] = stays & level_base[sound]
     return Rest(row, col, height, clear, full, balanced)
@@ -124,23 +131,52 @@ def _chunks(places: Int[np.ndarray, "N"], cells: int) -> list[Int[np.ndarray, "M
     return [places[k : k + step] for k in range(0, max(len(places), 1), step)]
 
 
-def _balanced(contact: Bool[np.ndarray, "N P"], place: Float[np.ndarray, "P 2"]) -> Bool[np.ndarray, "N"]:
-    """Whether the origin lies inside the polygon of each row's contact cells: no angle without contact is too wide."""
-    corners = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]]) * CELL / 2
-    place = (place[:, None] + corners).reshape(-1, 2)
-    contact = np.repeat(contact, 4, axis=1)
-    angle = np.arctan2(place[:, 1], place[:, 0])
-    order = np.argsort(angle)
-    angle = angle[order]
-    touched = contact[:, order]
-    count = touched.sum(1)
-    index = np.arange(len(angle))
-    last = np.maximum.accumulate(np.where(touched, index, -1), axis=1)
-    previous = np.concatenate([np.full((len(touched), 1), -1), last[:, :-1]], 1)
-    gap = np.where(touched & (previous >= 0), angle - angle[np.maximum(previous, 0)], 0.0).max(1, initial=0.0)
-    first = touched.argmax(1)
-    around = angle[first] + 2 * np.pi - angle[np.maximum(last[:, -1], 0)]
-    return (count > 0) & (np.maximum(gap, around) <= np.pi - MARGIN)
+class Balance:
+    """Whether an object's centre of mass is above the polygon of the cells in which it touches.
+
+    It is where no angle without contact, seen from the centre, is too wide. Angles are those of the cells' corners.
+    """
+
+    def __init__(self, place: Float[np.ndarray, "P 2"]):
+        """`place`: of the cells' middles, in metres, seen from the centre of mass."""
+        corners = np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]]) * CELL / 2
+        seen = (place[:, None] + corners).reshape(-1, 2)
+        angle = np.arctan2(seen[:, 1], seen[:, 0])
+        self._cell_corners = np.argsort(angle)
+        """Corners by angle: 4 times the number of the cell, and which corner."""
+        self._angle = angle[self._cell_corners]
+        self._rank = np.empty(len(angle), int)
+        self._rank[self._cell_corners] = np.arange(len(angle))
+        self._some = self._cell_corners[:: max(1, len(angle) // SOME_CELLS)] // 4
+        self._of_some = Balance(place[self._some]) if len(place) > 4 * SOME_CELLS else None
+
+    def __call__(self, contact: Bool[np.ndarray, "N P"]) -> Bool[np.ndarray, "N"]:
+        """For each row of cells that touch."""
+        dense = bool(np.count_nonzero(contact) > SPARSE * contact.size)
+        if dense and self._of_some is not None:  # what a few cells hold, more of them do
+            found = self._of_some(contact[:, self._some])
+            found[~found] = self._by_angles(contact[~found], dense)
+            return found
+        return self._by_angles(contact, dense)
+
+    def _by_angles(self, contact: Bool[np.ndarray, "N P"], dense: bool) -> Bool[np.ndarray, "N"]:
+        if dense or not contact.size:
+            row, index = np.nonzero(contact[:, self._cell_corners // 4])
+        else:
+            row, cell = np.nonzero(contact)
+            count = len(self._angle)
+            key = np.sort((row[:, None] * count + self._rank.reshape(-1, 4)[cell]).ravel())
+            row, index = np.divmod(key, count)
+        found = np.zeros(len(contact), bool)
+        if not len(row):
+            return found
+        angle = self._angle[index]
+        begins = np.flatnonzero(np.diff(row, prepend=-1))
+        ends = np.append(begins[1:], len(row)) - 1
+        gap = np.diff(angle, prepend=angle[0])
+        gap[begins] = angle[begins] + 2 * np.pi - angle[ends]
+        found[row[begins]] = np.maximum.reduceat(gap, begins) <= np.pi - MARGIN
+        return found
 
 
 def origin(shape: Footprint, row: int, col: int, height: float) -> Float[np.ndarray, "3"]:
