@@ -1,4 +1,8 @@
-"""Gravity compensation, launched for every (world, body) and not for every degree of freedom of the scene besides."""
+"""Gravity compensation, launched for every (world, body) and not for every degree of freedom of the scene besides.
+
+A body's force acts on the degrees of freedom that move it: its own and those of its ancestors, each naming the one
+before it.
+"""
 
 # Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
 # pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
@@ -22,6 +26,9 @@ def _gravity_compensation(
     body_rootid: wp.array[int],
     body_mass: wp.array2d[float],
     body_gravcomp: wp.array2d[float],
+    body_dofadr: wp.array[int],
+    body_dofnum: wp.array[int],
+    dof_parentid: wp.array[int],
     dof_bodyid: wp.array[int],
     body_isdofancestor: wp.array2d[int],
     xipos: wp.array2d[wp.vec3],
@@ -39,14 +46,18 @@ def _gravity_compensation(
         return
     force = -gravity[world % gravity.shape[0]] * body_mass[world % body_mass.shape[0], body] * share
     place = xipos[world, body]
-    for dof in range(dof_bodyid.shape[0]):
-        if body_isdofancestor[body, dof] != 0:
-            along, _turn = support.jac_dof(
-                body_parentid, body_rootid, dof_bodyid, body_isdofancestor, subtree_com, cdof, place, body, dof, world
-            )
-            wp.atomic_add(qfrc_gravcomp[world], dof, wp.dot(along, force))
-            if jnt_actgravcomp[dof_jntid[dof]] == 0:  # else the actuators carry it
-                wp.atomic_add(qfrc_passive[world], dof, wp.dot(along, force))
+    mover = int(body)  # the nearest with degrees of freedom
+    while mover > 0 and body_dofnum[mover] == 0:
+        mover = body_parentid[mover]
+    dof = body_dofadr[mover] + body_dofnum[mover] - 1
+    while mover > 0 and dof >= 0:
+        along, _turn = support.jac_dof(
+            body_parentid, body_rootid, dof_bodyid, body_isdofancestor, subtree_com, cdof, place, body, dof, world
+        )
+        wp.atomic_add(qfrc_gravcomp[world], dof, wp.dot(along, force))
+        if jnt_actgravcomp[dof_jntid[dof]] == 0:  # else the actuators carry it
+            wp.atomic_add(qfrc_passive[world], dof, wp.dot(along, force))
+        dof = dof_parentid[dof]
 
 
 def passive_forces(m: Any, d: Any) -> None:
@@ -66,6 +77,9 @@ def passive_forces(m: Any, d: Any) -> None:
             m.body_rootid,
             m.body_mass,
             m.body_gravcomp,
+            m.body_dofadr,
+            m.body_dofnum,
+            m.dof_parentid,
             m.dof_bodyid,
             m.body_isdofancestor,
             d.xipos,
