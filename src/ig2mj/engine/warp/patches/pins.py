@@ -18,6 +18,12 @@ PACKAGE, VERSION = "mujoco-mjx", "3.17.0"
 
 PINS: dict[str, dict[str, str]] = {
     "third_party.mujoco_warp._src.solver": {
+        "solve": "912386ccde41ccd7",
+        "solve_compact": "3887036be85651f9",
+        "_update_constraint_efc": "79e7db8aa6997aa0",
+        "_update_constraint_init_qfrc_constraint_sparse": "449bef4651746db1",
+        "_linesearch_jv_fused_kernel": "40771bb5985fb651",
+        "_solve_init_jaref_kernel": "dd1bd58e3023cbc3",
         "_cholesky_factorize_solve": "5f04c3acf13da87e",
         "_update_gradient_init_h_sparse": "714103269c06d40b",
         "smooth_solve_compact": "5c766f3a108dfa8a",
@@ -76,6 +82,11 @@ PINS: dict[str, dict[str, str]] = {
         "com_vel": "5577a22d3dfd5a4a",
         "rne": "f902eaf6cb1cdd17",
     },
+    "third_party.mujoco_warp._src.island": {
+        "compute_island_mapping": "fe5e841f8006d45b",
+        "update_active_dofs": "d205427d16fd9850",
+        "island": "4541f2df6693e8e7",
+    },
     "third_party.mujoco_warp._src.sleep": {
         "wake": "23ae1cd60ab11d16",
         "_wake_kernel": "d5fd98cce5c3a3ad",
@@ -91,6 +102,7 @@ PINS: dict[str, dict[str, str]] = {
         "_build_cycles": "d9907205cea19db8",
     },
     "third_party.mujoco_warp._src.forward": {
+        "fwd_acceleration": "6804a319165bbf7d",
         "_advance": "54efaa99438929bd",
         "fwd_velocity": "28c856716bb4645a",
         "forward": "24421d5832eceeca",

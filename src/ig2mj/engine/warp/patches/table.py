@@ -8,6 +8,7 @@ from mujoco.mjx.third_party.mujoco_warp._src import (
     collision_convex,
     collision_driver,
     forward,
+    island,
     passive,
     smooth,
     solver,
@@ -23,6 +24,7 @@ from ig2mj.engine.warp.patches import (
     launching,
     resting,
     sleeping,
+    spared,
     velocity,
 )
 
@@ -52,6 +54,12 @@ ON_TRIAL = {
         (forward, "forward"): resting.forward,
         (smooth, "crb"): resting.crb,
         (smooth, "factor_solve_i"): resting.factor_solve_i,
+    },
+    "spared": {
+        (island, "compute_island_mapping"): spared.compute_island_mapping,
+        (island, "update_active_dofs"): spared.update_active_dofs,
+        (forward, "fwd_acceleration"): spared.fwd_acceleration,
+        (solver, "solve"): spared.solve,
     },
 }
 """Functions whose gain is not measured yet: they run where IG2MJ_KERNELS names their group."""

@@ -1,0 +1,43 @@
+"""What a step does for nobody: left out.
+
+- Islands' own numbering of degrees of freedom and constraints, nine kernels after the solver: they serve solvers that
+  work island by island, which neither ours nor MuJoCo Warp's compacted one does. Which trees form an island, which
+  sleeping needs, is another function's.
+- The list of awake degrees of freedom is made before the smooth accelerations and again before the constraints are
+  solved; nothing wakes or falls asleep between.
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+from mujoco.mjx.third_party.mujoco_warp._src import forward, island, solver
+
+from ig2mj.engine.warp.patches.replacements import original
+
+_here = threading.local()
+
+
+def compute_island_mapping(m: Any, d: Any) -> None:
+    """Nothing."""
+
+
+def fwd_acceleration(m: Any, d: Any, factorize: bool = False) -> None:
+    """As upstream; a solver that follows finds the list of awake degrees of freedom."""
+    original(forward, "fwd_acceleration")(m, d, factorize)
+    _here.listed = d
+
+
+def solve(m: Any, d: Any) -> None:
+    """As upstream."""
+    try:
+        original(solver, "solve")(m, d)
+    finally:
+        _here.listed = None
+
+
+def update_active_dofs(m: Any, d: Any) -> None:
+    """As upstream, unless it was just done."""
+    if getattr(_here, "listed", None) is not d:
+        original(island, "update_active_dofs")(m, d)
