@@ -15,9 +15,9 @@ from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.experts.expert import PLANS
 
 
-def played(name: str, robot: str, rows: int, worlds: int = 4) -> float:
+def played(name: str, robot: str, rows: int, worlds: int = 4, grasping: str | None = None) -> float:
     """Share of the first held-out states that the expert solves, each played once."""
-    env = ig2mj.make(name, robot, worlds, "native", split="held_out", pool_size=rows)
+    env = ig2mj.make(name, robot, worlds, "native", grasping, split="held_out", pool_size=rows)
     return float(np.mean(play(env, expert_of(env), rows, in_order=True).success))
 
 
@@ -45,6 +45,21 @@ LEAST = {
 @pytest.mark.parametrize(("name", "robot"), LEAST)
 def test_experts_solve_held_out_states(name, robot):
     assert played(name, robot, 48, worlds=16) >= LEAST[name, robot]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "robot", "grasping"),
+    [
+        ("GraspingBook", "fetch", "physical"),
+        ("GraspingBook", "humanoid", "physical"),
+        ("CleaningStainedShelf", "fetch", "physical"),
+        ("CookingMeat", "fetch", "physical"),
+        ("SoakingTowel", "fetch", "assisted"),
+    ],
+)
+def test_experts_also_solve_tasks_without_mittens(name, robot, grasping):
+    assert played(name, robot, 16, worlds=16, grasping=grasping) >= 0.8
 
 
 def test_every_expert_belongs_to_an_activity():

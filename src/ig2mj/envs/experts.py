@@ -27,7 +27,7 @@ def make_expert(env: Environment) -> Expert:
     rules = env.core.rules
     if not isinstance(env.task, Task) or rules is None:
         raise UnknownNameError("task with an expert", env.task.name, PLANS)
-    return Expert(env.task, env.robot, env.scene, rules.model, closing=env.grasping != "mitten")
+    return Expert(env.task, env.robot, env.scene, rules.model, env.grasping)
 
 
 def expert_of(env: Environment) -> Callable[[EnvState], Float[Array, "W n"]]:

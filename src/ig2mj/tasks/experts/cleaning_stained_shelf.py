@@ -10,6 +10,7 @@ from ig2mj.engine.view import Array
 from ig2mj.states.definitions import stain
 from ig2mj.states.particles import world_normals, world_positions
 from ig2mj.tasks.experts.motion import Wish, levelled, over, where, wish
+from ig2mj.tasks.experts.pushing import draw
 from ig2mj.tasks.experts.reaching import take
 from ig2mj.tasks.experts.sight import Sight
 
@@ -31,6 +32,8 @@ FACING_UP = 0.7
 def plan(see: Sight) -> list[Wish]:
     """One hand."""
     towel, (low, _) = see.com(TOWEL), see.box(TOWEL)
+    if see.physical:
+        return [draw(see, TOWEL, _nearest(see, towel))]
     board = see.box(SHELF)[1][:, 2]
     underside = jnp.concatenate([towel[:, :2], low[:, 2:]], axis=1)
     goal = jnp.concatenate([_nearest(see, towel)[:, :2], board[:, None] - PRESS], axis=1)

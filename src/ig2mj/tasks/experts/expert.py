@@ -54,10 +54,11 @@ class Expert:
     """An expert of one task for one robot. Calling it is pure and may be traced.
 
     Attributes:
-      task, robot: what is done by whom. closing: actions have a number for each hand that closes it.
+      task, robot: what is done by whom. grasping: mode; except with mittens actions have a number for each hand that
+        closes it.
     """
 
-    def __init__(self, task: Task, robot: str, scene: Scene, model: StateModel, closing: bool = False):
+    def __init__(self, task: Task, robot: str, scene: Scene, model: StateModel, grasping: str = "mitten"):
         """
         Args:
           scene: with the robot. model: of the scene's states.
@@ -67,7 +68,7 @@ class Expert:
         """
         if task.name not in PLANS:
             raise UnknownNameError("task with an expert", task.name, PLANS)
-        self.task, self.robot, self.closing = task, robot, closing
+        self.task, self.robot, self.grasping = task, robot, grasping
         self._plan, self._scene, self._model = PLANS[task.name], scene, model
         own = np.flatnonzero(scene.tables.hand_agent == 0)
         self._hands = tuple(int(own[h]) for h in task.acts(robot).hands)
@@ -76,8 +77,17 @@ class Expert:
 
     def __call__(self, view: PhysicsView, states: ExtendedStates) -> Float[Array, "W n"]:
         """The action of every world, -1 to 1."""
-        things = self.task.objects_of_interest
-        see = Sight(view, states, self._scene, self._model, self.robot, things, self._hands, self._grips)
+        see = Sight(
+            view,
+            states,
+            self._scene,
+            self._model,
+            self.robot,
+            self.task.objects_of_interest,
+            self._hands,
+            self._grips,
+            self.grasping == "physical",
+        )
         base = jnp.asarray(view.agent.base_quat)[:, 0]
         return jnp.concatenate([self._action(base, wish) for wish in self._plan(see)], axis=1)
 
@@ -85,7 +95,7 @@ class Expert:
         """Of one hand: in the base's frame, slowed down evenly where a number would be beyond 1."""
         parts = [_limited(quat_rotate_inverse(base, wish.move) / STEP[self.robot])]
         parts.append(_limited(quat_rotate_inverse(base, wish.turn) / TURN_STEP))
-        if self.closing:
+        if self.grasping != "mitten":
             opens = -1.0 if self.robot == "humanoid" else 1.0
             parts.append(jnp.where(wish.close, -opens, opens)[:, None])
         return jnp.concatenate(parts, axis=1)

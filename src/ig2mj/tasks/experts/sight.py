@@ -28,7 +28,7 @@ class Sight:
     Attributes:
       robot: name of the robot that acts. objects: names of what the task is about, the first object first.
       hands: numbers of the acting hands among all hands of the scene.
-      grips: [H, 3] grasp point of every hand in the hand's frame.
+      grips: [H, 3] grasp point of every hand in the hand's frame. physical: nothing holds but friction.
     """
 
     view: PhysicsView
@@ -39,6 +39,7 @@ class Sight:
     objects: tuple[str, ...]
     hands: tuple[int, ...]
     grips: Float[np.ndarray, "H 3"]
+    physical: bool = False
 
     def hand_pos(self, hand: int = 0) -> Float[Array, "W 3"]:
         """Palm or end effector; `hand` counts the acting hands."""
@@ -55,6 +56,16 @@ class Sight:
     def holds(self, name: str, hand: int = 0) -> Bool[Array, "W"]:
         """Whether an acting hand holds an object."""
         return jnp.asarray(self.view.held)[:, self.hands[hand], self.scene.object_index(name)]
+
+    def pressed(self, name: str) -> Float[Array, "W"]:
+        """N with which all fingers press on an object."""
+        tables = self.scene.tables
+        bodies = np.flatnonzero(tables.graspable_object == self.scene.object_index(name))
+        return jnp.asarray(self.view.agent.finger_force)[:, :, bodies].sum((1, 2))
+
+    def touches(self, name: str) -> Bool[Array, "W"]:
+        """Whether any part of the robot touches an object."""
+        return jnp.asarray(self.view.agent.touching)[:, 0, self.scene.object_index(name)]
 
     def base_quat(self) -> Float[Array, "W 4"]:
         """Orientation of the robot's base."""
