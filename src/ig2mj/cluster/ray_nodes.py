@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import functools
 import socket
+import sys
 import urllib.parse
 from typing import Any
 
@@ -39,8 +40,11 @@ class RayNodes:
 
         self._ray, self._work = ray, work
         self._mine = not ray.is_initialized()
+        self._quiet = contextlib.ExitStack()
         if self._mine:
             _connect(ray, address)
+            # Ray prints what happens to nodes on standard output, where a command's result belongs
+            self._quiet.enter_context(contextlib.redirect_stdout(sys.stderr))
         try:
             nodes = _alive(ray)
             self._shared = {name: ray.put(content) for name, content in work.shared.items()}
@@ -130,6 +134,7 @@ class RayNodes:
                     self._ray.cancel(ref, force=True)
         if self._mine:
             self._ray.shutdown()
+        self._quiet.close()
 
 
 def _task(
