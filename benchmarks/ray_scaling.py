@@ -35,7 +35,9 @@ from ig2mj.scene.scene import load_scene
 
 OUT = pathlib.Path(__file__).parent / "results" / "scaling" / "ray.json"
 
-HOME, CONDITIONS = "birch", ("(on_top apple_0 breakfast_table_0)", "(inside fish_0 fridge_0)")
+HOME, OBJECTS = "birch", ("apple", "carving_knife")
+
+CONDITIONS = ("(on_top apple_0 coffee_table_0)", "(on_top carving_knife_0 coffee_table_0)")
 
 TASK, EPISODES = "GraspingBook", 16
 """Demonstrations: the task, and episodes of a piece."""
@@ -51,7 +53,7 @@ def timed(function: str, arguments: dict[str, Any], shared: Mapping[str, bytes] 
 
 def sampled_rows(count: int) -> Work:
     """Rows of a pool, a piece each."""
-    return row_work(load_scene(HOME), read_conditions(CONDITIONS), range(count), 0)
+    return row_work(load_scene(HOME, objects=OBJECTS), read_conditions(CONDITIONS), range(count), 0)
 
 
 def demonstrations(count: int) -> Work:

@@ -102,7 +102,7 @@ def _replayed(
             if video is not None:
                 watchers.append(_Filming(video, replayer.env))
             if names:
-                watchers.append(Observing.into(out or file.with_suffix(".sensors.h5"), names))
+                watchers.append(Observing.into(out or file.with_suffix(".sensors.h5"), names, recording))
 
             def watch(state: EnvState, runs: dict[int, Run], frame: int) -> None:
                 for watcher in watchers:

@@ -22,6 +22,9 @@ from ig2mj.errors import Ig2mjError
 TOLD = "told"
 """Attribute of a piece's file: what came of the replay, as JSON."""
 
+FORMAT = "ig2mj observations"
+"""Of files of observations."""
+
 RECORDING = "recording"
 """Name of the recording among the bytes that pieces share, where they are done on other machines."""
 
@@ -78,16 +81,16 @@ class Observing:
 
     def __init__(self, opened: Any, names: Sequence[str]):
         """`opened`: an HDF5 file."""
-        self._opened, self._names = opened, names
+        self._opened, self._names, self._file, self._order = opened, names, None, []
 
     @classmethod
-    def into(cls, file: pathlib.Path, names: Sequence[str]) -> Observing:
-        """With a new file of its own."""
+    def into(cls, file: pathlib.Path, names: Sequence[str], recording: Recording) -> Observing:
+        """With a new file of its own, which has the same bytes as one that `join_replays` puts together."""
         import h5py
 
-        opened = h5py.File(file, "w")
-        opened.attrs["format"] = "ig2mj observations"
-        return cls(opened, names)
+        found = cls(h5py.File(_beside(file, "frames"), "w"), names)
+        found._file, found._order = file, [piece.arguments["runs"] for piece in replay_pieces(recording, {})]
+        return found
 
     def see(self, state: EnvState, runs: Mapping[int, Run], frame: int) -> None:
         """Writes a frame of each run that goes on."""
@@ -101,8 +104,19 @@ class Observing:
                 self._opened[path][frame] = row
 
     def close(self) -> None:
-        """Closes the file."""
+        """Closes the file. One of its own is copied run by run: how its frames came is not to be seen in it."""
+        import h5py
+
         self._opened.close()
+        if self._file is None:
+            return
+        beside, frames = _beside(self._file, "part"), _beside(self._file, "frames")
+        with h5py.File(beside, "w") as whole, h5py.File(frames, "r") as opened:
+            whole.attrs["format"] = FORMAT
+            for names in self._order:
+                _copy(opened, whole, set(names) & set(opened))
+        frames.unlink()
+        beside.replace(self._file)
 
 
 def join_replays(parts: Iterable[bytes], out: pathlib.Path | None) -> dict[str, Any]:
@@ -110,10 +124,10 @@ def join_replays(parts: Iterable[bytes], out: pathlib.Path | None) -> dict[str, 
     import h5py
 
     found: dict[str, Any] = {"runs": 0, "frames": 0, "differences": [], "warnings": []}
-    beside = None if out is None else out.with_name(f".{out.name}.part")
+    beside = None if out is None else _beside(out, "part")
     whole = None if beside is None else h5py.File(beside, "w")
     if whole is not None:
-        whole.attrs["format"] = "ig2mj observations"
+        whole.attrs["format"] = FORMAT
     with tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:
         for packed in parts:
             part = pathlib.Path(folder) / "part.h5"
@@ -124,12 +138,22 @@ def join_replays(parts: Iterable[bytes], out: pathlib.Path | None) -> dict[str, 
                     **{k: found[k] + told[k] for k in ("runs", "frames", "differences")},
                     "warnings": told["warnings"],
                 }
-                for name in sorted(opened) if whole is not None else ():
-                    opened.copy(opened[name], whole, name)
+                if whole is not None:
+                    _copy(opened, whole, set(opened))
     if whole is not None and beside is not None and out is not None:
         whole.close()
         beside.replace(out)
     return found
+
+
+def _beside(file: pathlib.Path, what: str) -> pathlib.Path:
+    return file.with_name(f".{file.name}.{what}")
+
+
+def _copy(opened: Any, whole: Any, names: set[str]) -> None:
+    """Runs of one HDF5 file into another."""
+    for name in sorted(names):
+        opened.copy(opened[name], whole, name)
 
 
 @functools.lru_cache(maxsize=1)
