@@ -48,16 +48,29 @@ def origin_of(env: Environment) -> dict[str, Any]:
 
 def origin_of_scene(scene: Scene) -> dict[str, Any]:
     """Of a household with its robots."""
-    binary = np.zeros(mujoco.mj_sizeModel(scene.model), np.uint8)
-    mujoco.mj_saveModel(scene.model, None, binary)
     additions = [a.wanted for a in scene.additions]
     return {
         "scene": scene.name,
         "scene_hash": scene.digest,
-        "model_hash": _hash(binary.data),
+        "model_hash": model_hash(scene.model),
         "objects": json.dumps(list(scene.object_names)),
         "additions": json.dumps(additions),
     }
+
+
+def model_hash(model: mujoco.MjModel) -> str:
+    """Of all that a compiled model is but the places of its files, which are others in another folder."""
+    hashed = hashlib.blake2b(digest_size=16)
+    for part in (model, model.opt, model.stat):
+        for name in sorted(n for n in dir(part) if not n.startswith("_") and not n.endswith("_pathadr")):
+            value = getattr(part, name)
+            if isinstance(value, np.ndarray):
+                hashed.update(f"{name} {value.dtype} {value.shape}".encode())
+                hashed.update(np.ascontiguousarray(value).data)
+            elif part is not model and isinstance(value, int | float):
+                hashed.update(f"{name} {value!r}".encode())
+    hashed.update(model.names)
+    return hashed.hexdigest()
 
 
 def origin_of_machine() -> dict[str, Any]:
