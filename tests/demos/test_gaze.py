@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import ig2mj
-from ig2mj.demos import Recording, record
+from ig2mj.demos import Recording, Replayer, record
 from ig2mj.demos.gaze import measured_rays, statistics
 from ig2mj.demos.metrics import metrics_of
 from ig2mj.errors import InputError
@@ -57,6 +57,25 @@ def test_metrics_take_the_measured_gaze_and_say_so(env, looked):
     assert gaze["measured"] is True and gaze["tracked"] == pytest.approx(3 / 5)
     assert gaze["objects"]["steak_0"] == pytest.approx(2 / 3) and gaze["fixations"] == 2
     assert gaze["mean_turn"] == 0.0  # before and after the gap nothing can be said
+
+
+@pytest.mark.slow
+def test_replayed_by_state_the_view_looks_where_the_head_looked(env, tmp_path):
+    file, turn, looks = tmp_path / "head.h5", np.zeros((1, 28), np.float32), []
+    turn[0, env.action_names.index("eye_yaw")] = 1.0
+    with record(env, file) as played:
+        state = played.reset(0)
+        for _ in range(6):
+            state = played.step(state, turn)
+            looks.append(np.array(state.batch.world.view.agent.eye_quat)[0, 0])
+    assert np.abs(looks[-1] - looks[0]).max() > 0.1
+    found = []
+    with Recording(file) as recording:
+        replayer = Replayer(recording, "state", env=env)
+        replayer(watch=lambda state, now, k: found.append(np.array(state.batch.world.view.agent.eye_quat)[0, 0]))
+        alone = replayer.at(recording.runs[0], 6)  # in worlds of its own, not in those of the frame before
+    assert np.stack(found[1:]) == pytest.approx(np.stack(looks), abs=1e-6)
+    assert np.array_equal(np.asarray(alone.batch.world.view.agent.eye_quat)[0, 0], found[-1])
 
 
 @pytest.mark.slow

@@ -93,7 +93,7 @@ class _Watched:
     def see(self, measuring: _Measuring, state: EnvState, world: int, frame: int) -> None:
         view = state.batch.world.view
         agent, turn = view.agent, _matrix(np.asarray(view.agent.base_quat)[world, 0])
-        base, hands = np.asarray(agent.base_pos)[world, 0], np.asarray(agent.hand_pos)[world]
+        base, hands = np.array(agent.base_pos)[world, 0], np.array(agent.hand_pos)[world]
         self.score.append(float(np.asarray(state.status.fraction)[world]))
         self.base.append(base)
         self.hands.append(hands)

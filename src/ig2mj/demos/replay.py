@@ -44,7 +44,8 @@ from ig2mj.tasks.task import Task
 MODES = ("action", "state")
 
 Watch = Callable[[EnvState, dict[int, Run], int], None]
-"""Called with the environment's state, the run of each world that is replayed, and the number of the frame."""
+"""Called with the environment's state, the run of each world that is replayed, and the number of the frame. The next
+frame uses the state up: what shall be kept is copied."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -127,14 +128,17 @@ class Replayer:
             found += self._by_action(now, check, watch) if self.by == "action" else self._by_state(now, watch)
         return Replayed(sum(1 for r in wanted if r.frames), frames, found, self.warnings)
 
-    def at(self, run: Run, frame: int) -> EnvState:
+    def at(self, run: Run, frame: int, used: EnvState | None = None) -> EnvState:
         """The environment at a frame of a run as it was written; every world stands where that one did.
+
+        Args:
+          used: an earlier state that nobody steps any more; its worlds are put there.
 
         Raises:
           InputError: an array of the file is broken.
         """
         rows = run.frame_rows(self._names, frame, frame + 1, self._like)
-        return self._put({run.world: [array[0, ...] for array in rows]}, {run.world: run})
+        return self._put({run.world: [array[0, ...] for array in rows]}, {run.world: run}, used)
 
     def rounds(self, runs: Sequence[Run]) -> Iterator[dict[int, Run]]:
         """Runs that are replayed beside each other, by their worlds."""
@@ -183,12 +187,13 @@ class Replayer:
     def _by_state(self, now: dict[int, Run], watch: Watch | None) -> list[Difference]:
         readers = {world: self._frames(run) for world, run in now.items()}
         last: dict[int, list[np.ndarray]] = {}
+        state = None
         for k in range(max(run.frames for run in now.values())):
             there = {world: rows for world, reader in readers.items() if (rows := next(reader, None)) is not None}
             if not there:
                 continue
             last |= there
-            state = self._put(last, now)
+            state = self._put(last, now, state)
             if watch is not None:
                 watch(state, {w: now[w] for w in there}, k)
         return []
@@ -198,14 +203,14 @@ class Replayer:
             raise run.broken("frames", "has no first frame")
         return rows
 
-    def _put(self, rows: dict[int, list[np.ndarray]], now: dict[int, Run]) -> EnvState:
+    def _put(self, rows: dict[int, list[np.ndarray]], now: dict[int, Run], used: EnvState | None = None) -> EnvState:
         """The environment at these frames; worlds that are not replayed stand where the first does."""
         some = next(iter(rows.values()))
         each = [rows.get(world, some) for world in range(self.env.num_worlds)]
         frame: Frame = jax.tree.unflatten(self._tree, stacked(each))
         size = self.env.core.starts.pool.size
         begun = [now[w].row if w in now else 0 for w in range(self.env.num_worlds)]
-        return resumed(self.env, frame, np.clip(begun, 0, size - 1))
+        return resumed(self.env, frame, np.clip(begun, 0, size - 1), used)
 
     def _frames(self, run: Run) -> Iterator[list[np.ndarray] | None]:
         """The arrays of one frame after the other; None where the frame is not in the file."""

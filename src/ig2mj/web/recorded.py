@@ -12,6 +12,7 @@ import numpy as np
 from ig2mj.demos.reader import Recording, Run
 from ig2mj.demos.replay import Replayer
 from ig2mj.demos.writer import FLUSH
+from ig2mj.envs.environment import EnvState
 from ig2mj.errors import InputError
 from ig2mj.web.shots import Shot, shot_of
 from ig2mj.web.sources import rules_of
@@ -36,11 +37,12 @@ class Recorded:
         env = self._replayer.env
         rules = rules_of(env.core)
         self.scene, self.model, self.goal = env.scene, rules.model, rules.goal
-        self.num_worlds, self.rows, self.period = 1, 0, 0.1
+        self.num_worlds, self.rows, self.period = 1, 0, env.period
         self.warnings = self._replayer.warnings
         self.runs = [_title(k, run.attributes) for k, run in enumerate(self._runs)]
         self.run, self.frame = 0, 0
         self._at = (0, -1)  # run and frame of the state
+        self._state: EnvState | None = None
         self.frames = self._runs[0].frames
         self.seek(0)
 
@@ -51,7 +53,7 @@ class Recorded:
         self.frames = shown.frames
         frame = min(max(frame, 0), shown.frames - 1)
         if shown.kept(frame, frame + 1)[0]:
-            self._state = self._replayer.at(shown, frame)
+            self._state = self._replayer.at(shown, frame, self._state)
         else:
             before = self._at[1] if self._at[0] == self.run else -1
             if not 0 <= before <= frame:
@@ -65,6 +67,7 @@ class Recorded:
         env = self._replayer.env
         action = np.zeros((env.num_worlds, *env.action_space.shape), np.float32)
         action[run.world] = run.rows("steps/action", step, step + 1, action[0])[0]
+        assert self._state is not None
         self._state = env.step(self._state, action)
 
     def step(self) -> None:
@@ -75,6 +78,7 @@ class Recorded:
         self.seek(0)
 
     def shot(self, world: int, jump: bool = False) -> Shot:
+        assert self._state is not None
         now, run = self._state.batch.world, self._runs[self.run]
         facts = [("frame", f"{self.frame} of {self.frames - 1}")]
         if self.frame and "reward/total" in run.step_names:
