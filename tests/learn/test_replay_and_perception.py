@@ -17,6 +17,7 @@ from small_envs import PointMass, SeenPointMass
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.collect import Transition
 from ig2mj.learn.evaluate import wilson
+from ig2mj.learn.moments import RewardScale
 from ig2mj.learn.networks import Encoder, projected
 from ig2mj.learn.perception import FAR, Perception, Seen, shrunk
 from ig2mj.learn.policies import Policy, PolicyMismatch, depends_on, perception_of
@@ -60,6 +61,17 @@ def test_success_has_no_value_after_it_and_a_cut_has_that_of_what_was_seen_last(
     for first, discount, after in ((2, 0, 4.5), (4, 0, 4.5), (5, GAMMA**2, 6.5), (102, GAMMA**3, 104.5)):
         assert samples.discount[start == first] == pytest.approx(discount), first
         assert samples.after.vector[start == first, 0] == pytest.approx(after), first
+
+
+@pytest.mark.parametrize(("worlds", "counts"), [(16, True), (1024, False)])
+def test_one_thrown_object_of_many_does_not_make_all_rewards_small(worlds, counts):
+    """A return 100 times the others, in one world: of many worlds it is left out, of few it may be the only success."""
+    reward, no = jnp.full((2, worlds), 0.5), jnp.zeros((2, worlds), bool)
+    before = RewardScale.initial(worlds).update(reward, no, 0.9)
+    after = before.update(reward.at[0, 3].set(100.0), no, 0.9)
+    least, usual = 5.0 / 110.0, float(before.factor(5.0))
+    assert float(after.factor(5.0)) == pytest.approx(least, rel=0.2) if counts else float(after.factor(5.0)) > usual / 4
+    assert RewardScale.initial(worlds).update(reward.at[:, : worlds // 8].set(3.0), no, 0.9).largest > 5
 
 
 def test_a_picture_is_averaged_over_areas_and_no_depth_is_far_away():

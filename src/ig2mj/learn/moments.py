@@ -50,12 +50,18 @@ class Moments:
         return jnp.clip((values - self.mean[:size]) / deviation, -LIMIT, LIMIT)
 
 
+RARE = 500
+"""Worlds of which one may have a return of any size before it counts."""
+
+
 @struct.dataclass
 class RewardScale:
     """How large discounted returns are, for rewards of a common size.
 
     Attributes:
-      running: return of each world so far, discounted forwards. var: of it. largest: its largest absolute value.
+      running: return of each world so far, discounted forwards. var: of it.
+      largest: its largest absolute value, of all but one world in `RARE`: a thing that physics throws across the house
+        would otherwise make all other rewards too small to tell apart, for the rest of the run.
     """
 
     running: Float[Array, "W"]
@@ -78,7 +84,8 @@ class RewardScale:
             return jnp.where(now[1], 0.0, running), running
 
         running, returns = jax.lax.scan(step, self.running, (reward, done))
-        square, largest = average(jnp.square(returns).mean(), axis), jnp.abs(returns).max()
+        sizes = jnp.sort(jnp.abs(returns).max(0))
+        square, largest = average(jnp.square(returns).mean(), axis), sizes[-1 - len(sizes) // RARE]
         if axis is not None:
             largest = jax.lax.pmax(largest, axis)
         share = reward.shape[0] / (self.count + reward.shape[0])
