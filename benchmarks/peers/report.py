@@ -118,9 +118,10 @@ def written(rows: list[Row]) -> str:
         f"{word} {newest[word]}" for word in ("jax", "warp", "mujoco", "genesis", "torch") if word in newest
     )
     text = [f"Control steps a second, physics alone ({machines}; {versions}):", "", *table(rows, physics), ""]
-    if any(row["what"] != "physics" for row in rows):
+    whole = {(row["scene"], row["worlds"]) for row in rows if row["what"] != "physics"}
+    if whole:
         text += ["Ours with what comes on top (agent steps a second are a third of the last column):", ""]
-        text += [*table(rows, ours), ""]
+        text += [*table([row for row in rows if (row["scene"], row["worlds"]) in whole], ours), ""]
     text += ["![Control steps a second of ig2mj, MuJoCo Warp and Genesis](peers.png)", ""]
     text += ["<details><summary>What each row did</summary>", "", *details(rows), "", "</details>"]
     return "\n".join(text)

@@ -53,23 +53,24 @@ def test_a_step_launches_no_other_kernels():
     model = mujoco.MjModel.from_xml_string(SCENE)
     profile = EngineProfile(awake_dofs=13, constraints=100, contacts=40, convex_contacts=20)
     noted = {kernel.key for kernel, _ in kernels.launches_of_step(model, profile, own=True)}
-    launched, really = set(), wp.launch
-
-    def launch(kernel, *args, **kwargs):
-        launched.add(kernel.key)
-        return really(kernel, *args, **kwargs)
-
-    def launch_tiled(kernel, *args, **kwargs):
-        launched.add(kernel.key)
-        return really_tiled(kernel, *args, **kwargs)
-
-    really_tiled = wp.launch_tiled
-    watched = ScopedReplacement()
-    watched.add({(wp, "launch"): launch, (wp, "launch_tiled"): launch_tiled})
+    launched = set()
     put = mujoco_warp.put_model(model)
     data = mujoco_warp.make_data(model, nworld=2, naconmax=80, naccdmax=40, njmax=100, nvmax=13)
-    with patches.awake_kernels(), watched.entered():
-        mujoco_warp.step(put, data)
+    with patches.engine_kernels():
+        really, really_tiled = wp.launch, wp.launch_tiled
+
+        def launch(kernel, dim, *args, **kwargs):
+            launched.add(patches.launched(kernel, dim).key)
+            return really(kernel, dim, *args, **kwargs)
+
+        def launch_tiled(kernel, *args, **kwargs):
+            launched.add(kernel.key)
+            return really_tiled(kernel, *args, **kwargs)
+
+        watched = ScopedReplacement()
+        watched.add({(wp, "launch"): launch, (wp, "launch_tiled"): launch_tiled})
+        with watched.entered():
+            mujoco_warp.step(put, data)
     assert len(launched) > 40
     assert launched <= noted
 

@@ -2,24 +2,22 @@
 
 from __future__ import annotations
 
-import os
-
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
 from mujoco.mjx.third_party import mujoco_warp
+from mujoco.mjx.third_party.mujoco_warp._src import sleep
 
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.warp.engine import WarpEngine
-from ig2mj.engine.warp.patches import awake_kernels, engine_kernels, pins
+from ig2mj.engine.warp.patches import awake_kernels, engine_kernels, pins, upstream_kernels
 from ig2mj.engine.warp.patches.flags import FELL_ASLEEP, REPLACED
 from ig2mj.scene.scene import load_scene
 
 pytestmark = [
     pytest.mark.skipif(bool(pins.mismatches()), reason=f"our kernels do not fit: {pins.mismatches()}"),
-    pytest.mark.skipif("resting" not in os.environ.get("IG2MJ_KERNELS", ""), reason="these kernels are on trial"),
     pytest.mark.slow,
 ]
 
@@ -100,6 +98,27 @@ def test_a_step_that_passes_over_what_rests_is_the_same_to_the_bit():
     assert awake[0].tolist() == [3, 3]
     assert max(a[0] for a in awake) == 3 and max(a[1] for a in awake) >= 9, "one arm stops short, the other pushes"
     assert fell >= 1, "something falls asleep again"
+
+
+def test_forces_and_velocities_wake_the_trees_that_upstream_wakes():
+    model = mujoco.MjModel.from_xml_string(SCENE)
+    start = mujoco.MjData(model)
+    mujoco.mj_step(model, start, nstep=240)
+    put = mujoco_warp.put_model(model)
+    worlds = model.nbody + 2 * model.nv
+    own, upstream = (mujoco_warp.put_data(model, start, nworld=worlds, naconmax=640, njmax=60) for _ in range(2))
+    force, push, speed = np.zeros((worlds, model.nbody, 6)), np.zeros((worlds, model.nv)), np.zeros((worlds, model.nv))
+    force[np.arange(model.nbody), np.arange(model.nbody), 1] = 1e-3
+    push[model.nbody + np.arange(model.nv), np.arange(model.nv)] = -1e-3
+    speed[model.nbody + model.nv + np.arange(model.nv), np.arange(model.nv)] = 1e-3
+    for data, kernels in ((own, engine_kernels), (upstream, upstream_kernels)):
+        for name, value in (("xfrc_applied", force), ("qfrc_applied", push), ("qvel", speed)):
+            getattr(data, name).assign(value.astype(np.float32))
+        with kernels():
+            sleep.wake(put, data)
+    woken = own.tree_asleep.numpy()
+    assert np.array_equal(woken, upstream.tree_asleep.numpy())
+    assert (woken[0] >= 0).sum() == model.ntree - 1 and (woken < 0).sum() > worlds, "the arm alone; then others"
 
 
 def test_positions_that_a_load_puts_in_place_reach_the_geoms_of_what_sleeps():

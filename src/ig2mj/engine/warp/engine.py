@@ -8,7 +8,6 @@ sleeping state.
 from __future__ import annotations
 
 import functools
-import os
 import sys
 from typing import Any
 
@@ -29,7 +28,6 @@ from ig2mj.engine.native.settle import settle
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.engine.warp import kernels, patches
-from ig2mj.engine.warp.patches import scratch
 from ig2mj.engine.warp.patches.flags import REPLACED
 from ig2mj.engine.warp.patches.ignored import DROP, encode
 from ig2mj.engine.warp.profile import EngineProfile, fit, holds_everything, profile_of_scene
@@ -87,9 +85,6 @@ class WarpEngine(MjxEngine):
         if initial is None and not holds_everything(self.profile, scene.model):
             initial = settle(scene)
         super().__init__(scene, num_worlds, initial=initial, **options)
-        device = wp.get_device()
-        if self.own_kernels and device.is_cuda and "scratch" in os.environ.get("IG2MJ_KERNELS", ""):
-            scratch.reserve(device, kernels.scratch_of_step(self.host_model, self.profile, num_worlds, device))
 
     def load_kernels(self, workers: int | None = None) -> int:
         """Compiles and loads the kernels of a step side by side; how many modules they are.

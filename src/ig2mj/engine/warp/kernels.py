@@ -16,7 +16,6 @@ import warp as wp
 from mujoco.mjx.third_party import mujoco_warp
 
 from ig2mj.engine.warp import patches
-from ig2mj.engine.warp.patches import scratch
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile
 
@@ -61,23 +60,6 @@ def launches_of(act: Callable[[], Any]) -> list[Launch]:
     with noted.entered():
         act()
     return list(found)
-
-
-def scratch_of_step(model: mujoco.MjModel, profile: EngineProfile, num_worlds: int, device: Any) -> int:
-    """Bytes for the arrays that a step of our functions makes on a CUDA device, at most at a time.
-
-    Measured with one world; nearly all are as long as there are worlds.
-    """
-    counter = scratch.Counter(device.get_allocator())
-    act = _step_of_one_world(model, profile, 0)
-
-    def counted() -> None:
-        with wp.ScopedAllocator(device, counter):
-            act()
-
-    with patches.engine_kernels():
-        launches_of(counted)
-    return int(scratch.ROOM * counter.most * num_worlds) + scratch.ALIGNMENT * counter.arrays
 
 
 def launches_of_step(model: mujoco.MjModel, profile: EngineProfile, own: bool, warns: int = 0) -> list[Launch]:

@@ -1,14 +1,21 @@
 """Warp kernels that cost what is awake, not what could be: changes to MuJoCo Warp 3.17.0 for households.
 
-Nearly everything in a home sleeps, but six parts of MuJoCo Warp's step cost as if nothing did. Engines of ours run
+Nearly everything in a home sleeps, but many parts of MuJoCo Warp's step cost as if nothing did. Engines of ours run
 these in their place; results are the same up to rounding:
 
 - The factorisations of the compacted solver run over the buffer (`nvmax`, sized for the worst moment of the busiest
   world) though the rest of it is identity. Here they stop after the degrees of freedom awake in each world.
 - The same for filling those matrices.
+- Poses, inertias, velocities and bias forces of all bodies are computed in every step. Here those of bodies that sleep
+  stay as they are (`resting`).
+- Constraint rows and entries of the Hessian have a thread for each that fits into a buffer, in every iteration of the
+  solver. Here a few threads of each world go through those that there are (`lanes`).
 - The broad phase of collision detection goes through all pairs of geoms (`broadphase`).
+- The kernels of convex pairs follow each other, and each waits for its slowest pair. Here they run side by side
+  (`branches`).
 - One thread of each world puts its trees to sleep, one after the other (`sleeping`).
 - Gravity compensation is launched for every (world, body, degree of freedom). Here it is for every (world, body).
+- Islands get a numbering that nobody reads (`spared`).
 - The velocity stage runs again at the end of a step with sleep, only to renew derived quantities (`cvel`,
   `qfrc_bias`) that the next step computes anew from positions and velocities. Here they are those of the step's
   beginning, as they are without sleep.
@@ -77,9 +84,11 @@ def fit() -> bool:
 
 @functools.cache
 def _fill() -> None:
-    from ig2mj.engine.warp.patches.table import OWN  # not before: its modules need names that may not exist
+    from ig2mj.engine.warp.patches import launching  # not before: its modules need names that may not exist
+    from ig2mj.engine.warp.patches.table import OWN, SUBSTITUTES
 
     KERNELS.add(OWN)
+    launching.replace_by(SUBSTITUTES)
 
 
 def for_new_engines() -> bool:

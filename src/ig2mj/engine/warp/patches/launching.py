@@ -1,7 +1,7 @@
 """What a launch of MuJoCo Warp's becomes while our functions run: another kernel, another stream, or itself.
 
-Parts of this package that change launches rather than functions register here: `add` a function that is given a
-kernel, its dimensions and its inputs, and answers with what to launch in their place, or None.
+Parts of this package that change launches rather than functions have a function that is given a kernel, its dimensions
+and its inputs, and answers with what to launch in their place, or None.
 """
 
 from __future__ import annotations
@@ -27,9 +27,9 @@ _here = threading.local()
 _substitutes: list[Substitute] = []
 
 
-def add(substitute: Substitute) -> None:
-    """From now on launches of ours ask this function."""
-    _substitutes.append(substitute)
+def replace_by(substitutes: Sequence[Substitute]) -> None:
+    """From now on launches of ours ask these functions, in this order."""
+    _substitutes[:] = substitutes
 
 
 def substituted(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any]) -> Launch:

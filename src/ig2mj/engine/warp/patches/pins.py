@@ -50,6 +50,7 @@ PINS: dict[str, dict[str, str]] = {
         "_broadphase_filter": "41a3e719defc2bbb",
         "_mesh_missing": "ba0b184b9e6feeb6",
         "_add_geom_pair": "a263137856fb448b",
+        "convex_narrowphase": "52e00b5313fab852",
         "_narrowphase": "ee2ccd9e09b5570d",
     },
     "third_party.mujoco_warp._src.collision_convex": {

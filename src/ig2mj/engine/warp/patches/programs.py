@@ -20,7 +20,6 @@ from mujoco.mjx.warp import ffi
 from ig2mj.engine.warp.patches import pins
 from ig2mj.engine.warp.patches.replacements import KERNELS
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
-from ig2mj.engine.warp.patches.scratch import used
 
 REGISTER = "jax_callable_variadic_tuple"
 """Name of MJX's function that registers another with XLA."""
@@ -37,10 +36,7 @@ def _choosing(function: Callable[..., Any], own: bool) -> Callable[..., Any]:
 
     @functools.wraps(function)
     def run(*args: Any, **kwargs: Any) -> Any:
-        if not own:
-            with KERNELS.entered(False):
-                return function(*args, **kwargs)
-        with KERNELS.entered(), noted(), used():
+        with KERNELS.entered(own), noted() if own else contextlib.nullcontext():
             return function(*args, **kwargs)
 
     return run

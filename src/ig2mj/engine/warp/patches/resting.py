@@ -35,6 +35,8 @@ from ig2mj.engine.warp.patches.replacements import original
 
 AWAKE, ASLEEP, STATIC = (int(getattr(types.SleepState, name)) for name in ("AWAKE", "ASLEEP", "STATIC"))
 
+NEVER, FULLY_AWAKE = int(types.SleepPolicy.AUTO_NEVER), int(sleep_module.K_AWAKE_VAL)
+
 _here = threading.local()
 
 
@@ -244,9 +246,49 @@ def _serves(m: Any) -> bool:
     return m.nflex == 0 and m.ntendon == 0
 
 
+@wp.kernel(enable_backward=False)
+@no_type_check
+def _wake(
+    nbody: int,
+    ntree: int,
+    body_treeid: wp.array[int],
+    dof_bodyid: wp.array[int],
+    tree_dofadr: wp.array[int],
+    tree_dofnum: wp.array[int],
+    tree_sleep_policy: wp.array[int],
+    qvel: wp.array2d[float],
+    qfrc_applied: wp.array2d[float],
+    xfrc_applied: wp.array2d[wp.spatial_vector],
+    tree_awake: wp.array2d[int],
+    tree_asleep: wp.array2d[int],
+):
+    world, tree = wp.tid()
+    if tree_asleep[world, tree] < 0:
+        return
+    wakes = tree_awake[world, tree] == 1 or tree_sleep_policy[tree] == wp.static(NEVER)
+    first = tree_dofadr[tree]
+    for dof in range(first, first + tree_dofnum[tree]):
+        if qvel[world, dof] != 0.0 or qfrc_applied[world, dof] != 0.0:
+            wakes = True
+    for body in range(dof_bodyid[first], nbody):  # a tree's bodies follow each other
+        if body_treeid[body] != tree:
+            break
+        force = xfrc_applied[world, body]
+        if wp.dot(force, force) != 0.0:
+            wakes = True
+    if wakes:
+        sleep_module._wake_tree(ntree, world, tree, wp.static(FULLY_AWAKE), tree_asleep)
+
+
 def wake(m: Any, d: Any) -> None:
-    """As upstream; a forward pass begins with it."""
-    original(sleep_module, "wake")(m, d)
+    """As upstream, where a thread goes through all bodies for those of its tree; a forward pass begins with it."""
+    trees, forces = [m.tree_dofadr, m.tree_dofnum, m.tree_sleep_policy], [d.qvel, d.qfrc_applied, d.xfrc_applied]
+    wp.launch(
+        _wake,
+        dim=(d.nworld, m.ntree),
+        inputs=[m.nbody, m.ntree, m.body_treeid, m.dof_bodyid, *trees, *forces, d.tree_awake],
+        outputs=[d.tree_asleep],
+    )
     _here.begins = True
 
 

@@ -1,7 +1,6 @@
 """Which function of MuJoCo Warp each of ours stands in for. Imported only where the pinned version is installed."""
 
 import functools
-import os
 
 import warp as wp
 from mujoco.mjx.third_party.mujoco_warp._src import (
@@ -40,34 +39,20 @@ OWN = {
     (forward, "_advance"): velocity.advance,
     (forward, "fwd_velocity"): velocity.fwd_velocity,
     (sleep_module, "sleep"): sleeping.sleep,
+    (sleep_module, "wake"): resting.wake,
+    (sleep_module, "update_sleep"): resting.update_sleep,
+    (forward, "forward"): resting.forward,
+    (smooth, "crb"): resting.crb,
+    (smooth, "factor_solve_i"): resting.factor_solve_i,
+    (collision_convex, "ccd_kernel_builder"): branches.ccd_kernel_builder,
+    (collision_driver, "convex_narrowphase"): branches.convex_narrowphase,
+    (collision_driver, "_narrowphase"): branches.narrowphase,
+    (island, "compute_island_mapping"): spared.compute_island_mapping,
+    (island, "update_active_dofs"): spared.update_active_dofs,
+    (forward, "fwd_acceleration"): spared.fwd_acceleration,
+    (solver, "solve"): spared.solve,
+    (wp, "launch"): launching.launch,
 }
 
-ON_TRIAL = {
-    "branches": {
-        (collision_convex, "ccd_kernel_builder"): branches.ccd_kernel_builder,
-        (collision_driver, "convex_narrowphase"): branches.convex_narrowphase,
-        (collision_driver, "_narrowphase"): branches.narrowphase,
-    },
-    "resting": {
-        (sleep_module, "wake"): resting.wake,
-        (sleep_module, "update_sleep"): resting.update_sleep,
-        (forward, "forward"): resting.forward,
-        (smooth, "crb"): resting.crb,
-        (smooth, "factor_solve_i"): resting.factor_solve_i,
-    },
-    "spared": {
-        (island, "compute_island_mapping"): spared.compute_island_mapping,
-        (island, "update_active_dofs"): spared.update_active_dofs,
-        (forward, "fwd_acceleration"): spared.fwd_acceleration,
-        (solver, "solve"): spared.solve,
-    },
-}
-"""Functions whose gain is not measured yet: they run where IG2MJ_KERNELS names their group."""
-
-SUBSTITUTES = {"resting": resting.substitute, "lanes": lanes.substitute}
-
-for _group in filter(None, os.environ.get("IG2MJ_KERNELS", "").split(",")):
-    OWN |= ON_TRIAL.get(_group, {})  # "scratch" and "lanes" replace no functions
-    OWN[wp, "launch"] = launching.launch
-    if _group in SUBSTITUTES:
-        launching.add(SUBSTITUTES[_group])
+SUBSTITUTES = (resting.substitute, lanes.substitute)
+"""Which launches become others (`ig2mj.engine.warp.patches.launching`)."""
