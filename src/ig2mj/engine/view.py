@@ -12,6 +12,8 @@ agents, H hands, F finger links, Y graspable bodies (orders of `SceneTables.agen
 from __future__ import annotations
 
 import dataclasses
+import functools
+import operator
 import typing
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -166,6 +168,16 @@ def axis_sizes(tables: SceneTables, num_worlds: int) -> dict[str, int]:
 def read_field(view: PhysicsView, name: str) -> Array:
     """The array at a path of `SCHEMA`."""
     return getattr(view.agent, name[6:]) if name.startswith("agent.") else getattr(view, name)
+
+
+def read_fields(view: PhysicsView, names: tuple[str, ...]) -> list[Array]:
+    """The arrays at some paths of `SCHEMA`, in one go: natively every microsecond counts."""
+    return [getter(view) for getter in _getters(names)]
+
+
+@functools.cache
+def _getters(names: tuple[str, ...]) -> list[Callable[[PhysicsView], Array]]:
+    return [operator.attrgetter(name) for name in names]
 
 
 def assemble(fields: Mapping[str, Any]) -> PhysicsView:

@@ -95,7 +95,7 @@ class Core:
         self._physics_step = engine.step  # a world at rest steps in under 2 us: even looking up a name counts
         self._control = self._of_view(self._control_fn)
         seconds = engine.substeps * engine.timestep
-        self._count = jax.jit(lambda *now: guards.counted(*now, floor=self.starts.floor, seconds=seconds))
+        self._count = guards.counter(lambda: self.starts.floor, seconds, engine.pure)
         self._chosen = jax.jit(chosen)
         if engine.pure:
             self.advance, self.grasp = jax.jit(self.advance_fn), jax.jit(self.hands.act)

@@ -6,7 +6,9 @@ A flagged world goes on being stepped with the others; whatever it says is not t
 from __future__ import annotations
 
 import enum
+from collections.abc import Callable
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -76,6 +78,23 @@ def counted(
     """Clocks and guards after a control step of so many seconds; `floor` as of `check`."""
     now = check(health, object_com, floor)
     return step + 1, time + jnp.float32(seconds), flags | now, troubles + count(now & ~flags)
+
+
+def counter(floor: Callable[[], Float[np.ndarray, "O"]], seconds: float, pure: bool) -> Callable[..., tuple]:
+    """`counted` of the first six arguments, compiled. Beside an engine that is not pure the program runs only where
+    something is wrong: in nearly every step NumPy tells in a tenth of the time that nothing is."""
+    compiled = jax.jit(lambda *now: counted(*now, floor=floor(), seconds=seconds))
+    if pure:
+        return compiled
+
+    def on_host(step: Array, time: Array, flags: Array, troubles: Array, health: Health, com: Array) -> tuple:
+        speed, height = np.asarray(health.top_speed), np.asarray(com)[..., 2]
+        fine = (speed <= TOP_SPEED).all() and (height >= np.float32(floor())).all() and np.asarray(health.finite).all()
+        if not fine or np.asarray(health.wrong_controls).any() or np.asarray(health.overflow).any():
+            return compiled(step, time, flags, troubles, health, com)
+        return np.asarray(step) + np.int32(1), np.asarray(time) + np.float32(seconds), flags, troubles
+
+    return on_host
 
 
 def metrics(counts: Int[Array, "W K"]) -> dict[str, int]:

@@ -162,8 +162,9 @@ class Grasping:
         pressed, touching = np.asarray(view.agent.finger_force), np.asarray(view.agent.touching)
         if self.mode != "mitten":
             return not pressed.any()
-        targets = self.scene.tables.graspable_object[self._targets]
-        return not (pressed[..., self._targets].any() or touching[..., targets].any())
+        if pressed.any() and pressed[..., self._targets].any():
+            return False
+        return not (touching.any() and touching[..., self.scene.tables.graspable_object[self._targets]].any())
 
     def changed(self, before: GraspState, after: GraspState) -> Bool[Array, "W"]:
         """Worlds whose constraints or dropped contacts are others now: those that `write` is needed for."""

@@ -22,7 +22,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ig2mj.engine.view import SCHEMA, Array, PhysicsView, assemble, read_field
+from ig2mj.engine.view import SCHEMA, Array, PhysicsView, assemble, read_fields
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus
 from ig2mj.predicates.tracing import inputs_that_matter
 from ig2mj.states.initial import initial_states
@@ -176,11 +176,11 @@ class StateProgram:
 
     def _called(self, program: _Traced, leaves: list[Array], view: PhysicsView, *more: Any) -> tuple:
         taken = [leaves[i] for i in program.takes]
-        return program.call(taken, [read_field(view, name) for name in program.reads], *more)
+        return program.call(taken, read_fields(view, program.reads), *more)
 
     def _trace(self, step: Callable[..., tuple], leaves: list[Array], view: PhysicsView, *more: Any) -> _Traced:
         """A function of leaves, fields of the view and others, compiled for what matters of the first two."""
-        fields = [read_field(view, name) for name in FIELDS]
+        fields = read_fields(view, FIELDS)
         matters = inputs_that_matter(jax.make_jaxpr(step)(leaves, fields, *more).jaxpr)
         reads = tuple(name for name, used in zip(FIELDS, matters[len(leaves) :], strict=False) if used)
         takes = [i for i in range(len(leaves)) if matters[i]]

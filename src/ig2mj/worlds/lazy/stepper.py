@@ -26,7 +26,7 @@ import enum
 import jax
 import numpy as np
 
-from ig2mj.engine.view import Array, PhysicsView, read_field
+from ig2mj.engine.view import Array, PhysicsView, read_fields
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.states.definitions import toggled_on
 from ig2mj.states.world import ExtendedStates, Swap
@@ -95,11 +95,11 @@ class StateStepper:
         program, rows, changed, relevance = self.program, self.program.rows, [], self._relevance
         assert relevance is not None, "there was a whole step"
         news = News.NONE
-        for k, name in enumerate(program.view_reads):
-            now = read_field(view, name)
+        for k, now in enumerate(read_fields(view, program.view_reads)):
             seen = self._seen[k]
             if now is seen:
                 continue
+            name = program.view_reads[k]
             if name == "agent.finger_pos" and self._fingers_away and self._away(view):
                 continue
             if not isinstance(now, np.ndarray) or not isinstance(seen, np.ndarray):
@@ -165,7 +165,7 @@ class StateStepper:
             if self._relevance is None:
                 self._relevance = Relevance(program.model)
             self._relevance.begin(new, view, program.event_reads)
-            self._seen = [read_field(view, name) for name in program.view_reads]
+            self._seen = read_fields(view, program.view_reads)
             self._bytes = [None] * len(self._seen)
             fingers = "agent.finger_pos" in program.view_reads and "agent.finger_pos" not in program.goal_reads
             self._fingers_away = fingers and self._away(view)
