@@ -15,6 +15,7 @@ from ig2mj.engine.view import SCHEMA, read_field, replace_fields
 from ig2mj.predicates import compile_expression
 from ig2mj.states import initial_states, update
 from ig2mj.states.definitions import dust
+from ig2mj.states.relations.asked import PairByPair
 from ig2mj.states.update import HEAT_FIELDS
 from ig2mj.worlds.lazy.program import StateProgram
 from ig2mj.worlds.lazy.relevance import EXACT
@@ -125,6 +126,7 @@ ONLY_STATES = "(and (cooked fish) (soaked rag))"
 )
 def test_whatever_changes_in_the_view_is_seen(seed, goal):
     model, program, reference = _rules(goal)
+    assert isinstance(program.goal_plan, PairByPair) == (goal is MANY_RELATIONS)
     rng, stepper, ours, view = np.random.default_rng(seed), StateStepper(program), _start(model), VIEWS[0]
     seen, theirs = set(), ours
     for k in range(300):

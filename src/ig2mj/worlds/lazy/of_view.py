@@ -106,21 +106,25 @@ class OfView:
         fields = read_fields(view, tuple(SCHEMA))
         shapes = [jax.ShapeDtypeStruct(jnp.shape(x), jnp.result_type(x)) for x in [*fields, *leaves]]
 
-        def whole(every: list[Any]) -> Any:
-            others = jax.tree.unflatten(structure, every[len(fields) :])
-            return self._function(assemble(dict(zip(SCHEMA, every[: len(fields)], strict=True))), *others)
+        structures = []
 
-        traced, made = jax.make_jaxpr(whole, return_shape=True)(shapes)
+        def whole(every: list[Any]) -> list[Any]:
+            others = jax.tree.unflatten(structure, every[len(fields) :])
+            made = self._function(assemble(dict(zip(SCHEMA, every[: len(fields)], strict=True))), *others)
+            found, made_structure = jax.tree.flatten(made)
+            structures.append(made_structure)
+            return found
+
+        traced = jax.make_jaxpr(whole)(shapes)
         matters = np.flatnonzero(inputs_that_matter(traced.jaxpr)).tolist()
-        results, made_structure = jax.tree.flatten(made)
-        given, results = _Packing([shapes[i] for i in matters]), _Packing(results)
+        given, results = _Packing([shapes[i] for i in matters]), _Packing(traced.out_avals)
 
         def call(vectors: list[Any]) -> list[jax.Array]:
             every: list[Any] = [None] * len(shapes)
             for i, array in zip(matters, given.taken_apart(vectors), strict=True):
                 every[i] = array
             every = [_blank(s) if x is None else x for x, s in zip(every, shapes, strict=True)]
-            return results.traced(jax.tree.leaves(whole(every)))
+            return results.traced(whole(every))
 
         names = tuple(SCHEMA)
         return _Program(
@@ -129,7 +133,7 @@ class OfView:
             given,
             jax.jit(call),
             results,
-            made_structure,
+            structures[0],
         )
 
 

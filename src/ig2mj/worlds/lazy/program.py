@@ -24,9 +24,11 @@ from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import SCHEMA, Array, PhysicsView, assemble, read_fields
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus
+from ig2mj.predicates.questions import COMPILED_FAST
 from ig2mj.predicates.tracing import inputs_that_matter
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
+from ig2mj.states.relations.asked import PairByPair
 from ig2mj.states.relations.plan import Memo, RelationPlan
 from ig2mj.states.update import events, heat, queries
 from ig2mj.states.world import ExtendedStates
@@ -39,6 +41,10 @@ FIELDS = tuple(SCHEMA)
 
 FIRST_MOVED = ("object_com", "touching", "joint_pos", "link_force")
 """Fields of the view that are looked at first: small, and among them is what changes when anything does."""
+
+MANY = 24
+"""Relations of a goal from which on the goal of one world is compiled fast rather than to be fast: about 8 s of
+compilation are saved, and a step in which something moves that the goal names takes tenths of a millisecond more."""
 
 BODY_FIELDS = ("body_pos", "body_quat")
 
@@ -102,14 +108,16 @@ class StateProgram:
         """
         self.model, self.goal, self.num_worlds = model, goal, num_worlds
         self.plan = RelationPlan.build(model, queries(model))
+        asked = goal.queries if goal is not None else []
+        self._many = num_worlds == 1 and len(set(asked)) > MANY and jax.default_backend() == "cpu"
+        self.goal_plan = (PairByPair if self._many else RelationPlan).build(model, asked)
         template = initial_states(model, num_worlds)
         self._template = template
         named, self.structure = jax.tree_util.tree_flatten_with_path(template)
         self._paths = [tuple(key.name for key in path) for path, _ in named]
         self.heats = [self._paths.index((name,)) for name in ("temperature", "max_temperature")]
         self._empty_memo, self._memo_structure = jax.tree.flatten(self.plan.empty_memo(num_worlds))
-        goal_memo = goal.plan.empty_memo(num_worlds) if goal is not None else ()
-        self._empty_goal_memo, self._goal_memo_structure = jax.tree.flatten(goal_memo)
+        self._empty_goal_memo, self._goal_memo_structure = jax.tree.flatten(self.goal_plan.empty_memo(num_worlds))
         self.heat = jax.jit(self._heat_step)
         self.view_reads: tuple[str, ...] = ()
         self.event_reads: frozenset[str] = frozenset()
@@ -149,7 +157,8 @@ class StateProgram:
           leaves: all leaves of the states, those of `events` among them. acts: of `events`. memo: the last call's.
         """
         if self._rest is None:
-            self._rest = self._trace(self._rest_step, leaves, view, memo, acts)
+            options = COMPILED_FAST if self._many else None
+            self._rest = self._trace(self._rest_step, leaves, view, memo, acts, options=options)
             self.goal_reads = frozenset(self._rest.reads)
             every = self.event_reads | self.goal_reads
             self.view_reads = tuple(sorted(every, key=lambda name: (name not in FIRST_MOVED, FIELDS.index(name))))
@@ -178,7 +187,14 @@ class StateProgram:
         taken = [leaves[i] for i in program.takes]
         return program.call(taken, read_fields(view, program.reads), *more)
 
-    def _trace(self, step: Callable[..., tuple], leaves: list[Array], view: PhysicsView, *more: Any) -> _Traced:
+    def _trace(
+        self,
+        step: Callable[..., tuple],
+        leaves: list[Array],
+        view: PhysicsView,
+        *more: Any,
+        options: dict[str, int | bool] | None = None,
+    ) -> _Traced:
         """A function of leaves, fields of the view and others, compiled for what matters of the first two."""
         fields = read_fields(view, FIELDS)
         matters = inputs_that_matter(jax.make_jaxpr(step)(leaves, fields, *more).jaxpr)
@@ -194,7 +210,7 @@ class StateProgram:
             named = {**blank_fields, **dict(zip(reads, seen, strict=True))}
             return step(every, [named[name] for name in FIELDS], *more)
 
-        return _Traced(jax.jit(call), takes, reads)
+        return _Traced(jax.jit(call, compiler_options=options), takes, reads)
 
     def _events_step(self, leaves: list[Array], fields: list[Array], memo: list[Array]) -> tuple:
         """`Events` as a plain tuple; notes which leaves of the states it makes."""
@@ -220,7 +236,7 @@ class StateProgram:
         facts, status, after_memo = jnp.zeros((view.object_com.shape[0], 0), bool), None, ()
         if self.goal is not None:
             before: Memo = jax.tree.unflatten(self._goal_memo_structure, memo)
-            relations, after_memo = self.goal.plan.evaluate_changed(view, before)
+            relations, after_memo = self.goal_plan.evaluate_changed(view, before)
             facts = self.goal.literals.facts(self.goal.context(new, view, relations))
             status = _status_fields(self.goal.status_of(facts, new))
         pairs = ((states.temperature, new.temperature), (states.max_temperature, new.max_temperature))
