@@ -120,9 +120,20 @@ ONLY_STATES = "(and (cooked fish) (soaked rag))"
 """A goal that asks nothing of where things are: then most of what moves cannot matter."""
 
 
+PAIRS = [(a, b) for a in ("fish", "rag", "knife", "oven") for b in ("oven", "table", "fish", "tap") if a != b]
+MANY_RELATIONS = "(or " + " ".join(f"(on_top {a} {b}) (inside {a} {b})" for a, b in PAIRS) + ")"
+"""Of more relations than are laid out pair by pair in the program."""
+
+
 @pytest.mark.parametrize(
     ("seed", "goal"),
-    [(0, GOAL), *(pytest.param(s, GOAL, marks=pytest.mark.slow) for s in (1, 2)), (0, ONLY_STATES), (1, ONLY_STATES)],
+    [
+        (0, GOAL),
+        *(pytest.param(s, GOAL, marks=pytest.mark.slow) for s in (1, 2)),
+        (0, ONLY_STATES),
+        (1, ONLY_STATES),
+        (0, MANY_RELATIONS),
+    ],
 )
 def test_whatever_changes_in_the_view_is_seen(seed, goal):
     model, program, reference = _rules(goal)
