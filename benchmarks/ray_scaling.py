@@ -88,25 +88,28 @@ def node(core: int, *words: str) -> subprocess.Popen:
 
 
 def measure(address: str, nodes: int, work: Work) -> dict[str, float]:
-    """Pieces a second, by the wall and by processor time; those count that are begun when every node has done one."""
+    """Pieces a second, by the wall and by processor time, from when every node has done one until the first has none."""
     pieces = [Piece(p.name, {"function": work.function, "arguments": dict(p.arguments)}) for p in work.pieces]
     store, failed = run(
         Work("ray_scaling:timed", "pieces", pieces, work.shared, check=work.check), Where(cluster=address)
     )
     assert not failed, failed
-    done = sorted((json.loads(store.get(p.name)) for p in pieces), key=lambda d: d["began"])
-    first = {who: min(d["ended"] for d in done if d["who"] == who) for who in {d["who"] for d in done}}
-    counted = [d for d in done if d["began"] >= max(first.values())]
-    assert len(first) == nodes and counted, f"{len(first)} of {nodes} nodes took part"
-    wall = max(d["ended"] for d in counted) - min(d["began"] for d in counted)
-    busy = sum(d["ended"] - d["began"] for d in counted)
+    done = [json.loads(store.get(p.name)) for p in pieces]
+    ends = {who: [d["ended"] for d in done if d["who"] == who] for who in {d["who"] for d in done}}
+    assert len(ends) == nodes, f"{len(ends)} of {nodes} nodes took part"
+    begin, end = max(map(min, ends.values())), min(map(max, ends.values()))
+    assert end > begin, "too few pieces for so many nodes"
+    spent = [max(min(d["ended"], end) - max(d["began"], begin), 0.0) for d in done]
+    shares = [s / (d["ended"] - d["began"]) for s, d in zip(spent, done, strict=True)]
+    count, busy = sum(shares), sum(spent)
+    processor = sum(s * d["processor"] for s, d in zip(shares, done, strict=True))
     return {
         "nodes": nodes,
-        "pieces": len(counted),
-        "pieces_per_second": round(len(counted) / wall, 4),
-        "processor_seconds_per_piece": round(sum(d["processor"] for d in counted) / len(counted), 4),
-        "seconds_per_piece": round(busy / len(counted), 4),
-        "idle": round(max(1.0 - busy / (wall * nodes), 0.0), 4),
+        "pieces": round(count, 2),
+        "pieces_per_second": round(count / (end - begin), 4),
+        "processor_seconds_per_piece": round(processor / count, 4),
+        "seconds_per_piece": round(busy / count, 4),
+        "idle": round(max(1.0 - busy / ((end - begin) * nodes), 0.0), 4),
     }
 
 
