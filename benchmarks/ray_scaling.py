@@ -88,7 +88,7 @@ def node(core: int, *words: str) -> subprocess.Popen:
 
 
 def measure(address: str, nodes: int, work: Work) -> dict[str, float]:
-    """Pieces a second, by the wall and by processor time, from when every node has done one until the first has none."""
+    """Pieces a second, by the wall and by processor time, between the first piece of every node and the last of any."""
     pieces = [Piece(p.name, {"function": work.function, "arguments": dict(p.arguments)}) for p in work.pieces]
     store, failed = run(
         Work("ray_scaling:timed", "pieces", pieces, work.shared, check=work.check), Where(cluster=address)
