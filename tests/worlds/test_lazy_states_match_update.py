@@ -132,7 +132,7 @@ MANY_RELATIONS = "(or " + " ".join(f"(on_top {a} {b}) (inside {a} {b})" for a, b
         *(pytest.param(s, GOAL, marks=pytest.mark.slow) for s in (1, 2)),
         (0, ONLY_STATES),
         (1, ONLY_STATES),
-        (0, MANY_RELATIONS),
+        pytest.param(0, MANY_RELATIONS, marks=pytest.mark.slow),
     ],
 )
 def test_whatever_changes_in_the_view_is_seen(seed, goal):
@@ -287,12 +287,14 @@ def test_what_the_goal_does_not_name_is_no_work_for_it():
 
 def test_what_matters_to_the_goal_alone_is_no_work_for_the_states():
     """The fish is put on the table, held above it, put back, taken off: the goal follows, and events are left out."""
-    model, program, reference = _rules("(and (on_top fish table) (cooked fish))")
+    model, program, reference = _rules()
     stepper, view = StateStepper(program), VIEWS[0]
     ours = theirs = _start(model).replace(temperature=jnp.full((1, 7), 23.0).at[0, HOME.index["fish"]].set(90.0))
     for _ in range(3):
         ours, _, _ = stepper.step(ours, view)
         theirs, _, _ = reference(theirs, view)
+    assert program.goal is not None
+    atom = [a.predicate for a in program.goal.atoms].index("on_top")
     whole, on_top = stepper._acts, []
     assert whole is not None
     for k, height in enumerate([0.07, 0.07, 0.3, 1.0, 0.07, 1.0, 1.0]):
@@ -303,5 +305,5 @@ def test_what_matters_to_the_goal_alone_is_no_work_for_the_states():
         theirs, _, expected = reference(theirs, view)
         _assert_same(ours, theirs, status, expected, k)
         assert stepper._acts is whole
-        on_top.append(bool(status.literals[0, 0]))
+        on_top.append(bool(status.literals[0, atom]))
     assert on_top == [True, True, False, False, True, False, False]
