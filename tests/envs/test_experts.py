@@ -33,8 +33,9 @@ LEAST = {
     ("BimanualPickAndPlace", "humanoid"): 0.95,
     ("CleaningStainedShelf", "humanoid"): 0.95,
     ("SlicingFruit", "humanoid"): 0.95,
-    ("CookingMeat", "fetch"): 0.9,
-    ("GraspingBook", "fetch"): 0.9,
+    ("CookingMeat", "fetch"): 0.95,
+    ("GraspingBook", "fetch"): 0.95,
+    ("CleaningStainedShelf", "fetch"): 0.95,
     ("SoakingTowel", "fetch"): 0.95,
     ("SlicingFruit", "fetch"): 0.95,
 }

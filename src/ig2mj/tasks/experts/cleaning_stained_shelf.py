@@ -31,12 +31,14 @@ FACING_UP = 0.7
 
 def plan(see: Sight) -> list[Wish]:
     """One hand."""
-    towel, (low, _) = see.com(TOWEL), see.box(TOWEL)
+    towel, (low, high) = see.com(TOWEL), see.box(TOWEL)
     if see.physical:
         return [draw(see, TOWEL, _nearest(see, towel))]
-    board = see.box(SHELF)[1][:, 2]
+    (_, wall, _), (_, _, board) = (jnp.asarray(corner).T for corner in see.box(SHELF))
     underside = jnp.concatenate([towel[:, :2], low[:, 2:]], axis=1)
-    goal = jnp.concatenate([_nearest(see, towel)[:, :2], board[:, None] - PRESS], axis=1)
+    dirt = _nearest(see, towel)
+    nearest_to_wall = wall + 0.5 * (high - low)[:, 1]  # with its edge at the wall the towel covers stains there, too
+    goal = jnp.stack([dirt[:, 0], jnp.maximum(dirt[:, 1], nearest_to_wall), board - PRESS], axis=1)
     move = over(underside, goal, board + LIFT, near=WITHIN, blend=BLEND)
     return [where(see.holds(TOWEL), wish(move, levelled(see.quat(TOWEL)), close=True), take(see, TOWEL))]
 
