@@ -28,6 +28,7 @@ from ig2mj.engine.view import Array
 from ig2mj.errors import EngineError
 from ig2mj.learn.collect import NativeCollector, Play, TrainingEnv, begin, collect_fn
 from ig2mj.learn.perception import Perception
+from ig2mj.learn.solid import parts_of, restored, solid, solid_specs
 
 AXIS = "devices"
 """The axis of devices, over which algorithms average gradients."""
@@ -167,13 +168,6 @@ class ManyDevices:
             )
             return play, rollout, jax.tree.map(lambda a: a[None], sums)
 
-        def learn(learner: Any, memory: Any, rollout: Any, sums: Any, times: Array, key: Array, ready: Array) -> Any:
-            own = jax.random.fold_in(key, jax.lax.axis_index(AXIS))
-            progress, clock = jax.lax.pmax(times[0], AXIS)
-            learner, memory, losses = algorithm.learn(learner, memory, rollout, own, progress, ready)
-            losses = jax.lax.pmean({**losses, "all_finite": 1.0 * finite(learner)}, AXIS)
-            return learner, memory, jax.tree.map(lambda a: jax.lax.psum(a[0], AXIS), sums), losses, clock
-
         self._collect, self._compiled = jax.jit(collect, donate_argnums=1), False
         kinds: list[Any] = []
 
@@ -183,17 +177,35 @@ class ManyDevices:
             return jax.tree.leaves(memory)
 
         specs = self._specs(jax.eval_shape(leaves))
-        self._memory_specs, whole, each = jax.tree.unflatten(kinds[0], specs), PartitionSpec(), PartitionSpec(AXIS)
-        self._learn = jax.jit(
-            jax.shard_map(
-                learn,
-                mesh=self._mesh,
-                in_specs=(whole, self._memory_specs, PartitionSpec(None, AXIS), each, each, whole, whole),
-                out_specs=(whole, self._memory_specs, whole, whole, whole),
-                check_vma=False,
-            ),
-            donate_argnums=(0, 1),
+        self._memory_specs = jax.tree.unflatten(kinds[0], specs)
+        self._learn: Callable[..., tuple] | None = None
+
+    def _program(self, learner: Any, memory: Any, rollout: Any, sums: Any) -> Callable[..., tuple]:
+        """What learns, on all devices at once; of these shapes. It takes and gives trees as `solid` has them."""
+        algorithm, whole, each = self._algorithm, PartitionSpec(), PartitionSpec(AXIS)
+        trees = (learner, memory, rollout, sums)
+        specs = (whole, self._memory_specs, PartitionSpec(None, AXIS), each)
+        parts = [parts_of(tree, of_it, self._count) for tree, of_it in zip(trees, specs, strict=True)]
+        into = [solid_specs(tree, of_it) for tree, of_it in zip(trees, specs, strict=True)]
+
+        def learn(*given: Any) -> tuple:
+            *leaves, times, key, ready = given
+            learner, memory, rollout, sums = (restored(*pair) for pair in zip(parts, leaves, strict=True))
+            own = jax.random.fold_in(key, jax.lax.axis_index(AXIS))
+            progress, clock = jax.lax.pmax(times[0], AXIS)
+            learner, memory, losses = algorithm.learn(learner, memory, rollout, own, progress, ready)
+            losses = jax.lax.pmean({**losses, "all_finite": 1.0 * finite(learner)}, AXIS)
+            total = jax.tree.map(lambda a: jax.lax.psum(a[0], AXIS), sums)
+            return solid(learner), solid(memory), total, losses, clock
+
+        mapped = jax.shard_map(
+            learn,
+            mesh=self._mesh,
+            in_specs=(*into, each, whole, whole),
+            out_specs=(whole, into[1], whole, whole, whole),
+            check_vma=False,
         )
+        return jax.jit(mapped, donate_argnums=(0, 1))
 
     def _specs(self, shapes: Sequence[Any]) -> list[PartitionSpec]:
         """How the arrays of a memory are shared out: [W] and [T, W, ...] by worlds, all others are on every device."""
@@ -275,7 +287,12 @@ class ManyDevices:
         total = jax.tree.map(lambda *a: self._joined(a, 0), *sums)
         row = np.array([[progress, clock]], np.float32)
         times = self._joined([jax.device_put(row, device) for device in self._devices], 0)
-        learner, memory, total, losses, told = self._learn(learner, memory, rollout, total, times, key, np.bool_(ready))
+        trees = (learner, memory, rollout, total)
+        if self._learn is None:
+            self._learn = self._program(*jax.eval_shape(lambda *trees: trees, *trees))
+        leaves = [solid(tree) for tree in trees]
+        learnt, kept, total, losses, told = self._learn(*leaves, times, key, np.bool_(ready))
+        learner, memory = restored(learner, learnt), restored(memory, kept)
         total, losses, told = jax.device_get((total, losses, told))
         return learner, memory, total, losses, float(told)
 
