@@ -68,6 +68,7 @@ def test_shipped_homes_come_with_the_wheel_and_open_from_any_folder(installed, t
     assert int(count) == len(list((ROOT / "scenes_mjcf").glob("*/manifest.json")))
 
 
+@pytest.mark.slow
 def test_the_page_of_a_headset_comes_with_the_wheel(installed):
     """Its own files; three.js too, where `make web` has fetched it."""
     made, packed = ROOT / "src" / "ig2mj" / "vr" / "page", installed / "ig2mj" / "vr" / "page"

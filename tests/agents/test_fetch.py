@@ -54,6 +54,7 @@ def test_masses_and_limits_are_the_makers():
     assert model.actuator("fetch_shoulder_lift").forcerange == pytest.approx([-131.76, 131.76])
 
 
+@pytest.mark.slow
 def test_inverse_kinematics_reaches_near_poses_within_limits():
     q = np.clip(np.random.default_rng(1).normal(REST, 0.2, (50, 8)), CHAIN.lower, CHAIN.upper).astype(np.float32)
     goal, turn, _ = forward(CHAIN, q)
@@ -137,7 +138,8 @@ def test_an_unknown_pose_or_list_is_named():
         Fetch(proprioception="experiment")
 
 
-@pytest.mark.parametrize("up", [pytest.param(1.0, marks=pytest.mark.slow), -1.0])
+@pytest.mark.slow
+@pytest.mark.parametrize("up", [1.0, -1.0])
 def test_the_slow_trunk_does_not_slow_down_the_arm(up):
     """The trunk's limit is 0.1 m/s; a full command is a goal 0.2 m ahead."""
     world = RobotWorld("small_home", Fetch(pos=START))

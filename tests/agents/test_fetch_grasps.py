@@ -24,6 +24,7 @@ def fingers_around_the_can(home, **options) -> GraspingWorld:
     return world
 
 
+@pytest.mark.slow
 def test_fetch_holds_what_its_closing_fingers_touch_and_carries_it(tiny_home_folder):
     world = fingers_around_the_can(tiny_home_folder)
     assert world.held == [None]
@@ -63,6 +64,7 @@ def test_fetch_lifts_by_friction_alone(tiny_home_folder):
     assert can(world)[2] < before[2] + 0.05, "and drops it"
 
 
+@pytest.mark.slow
 def test_an_open_mitten_of_fetch_sticks(tiny_home_folder):
     world = GraspingWorld(tiny_home_folder, Fetch(**BESIDE_TABLE), mode="mitten", targets=["can"])
     start = can(world)

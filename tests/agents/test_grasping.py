@@ -65,7 +65,7 @@ def test_a_hand_takes_hold_when_it_is_more_than_half_closed_and_nothing_jumps(ti
     assert not world.view.held.any()
 
 
-@pytest.mark.parametrize("kilograms", [1, 7])
+@pytest.mark.parametrize("kilograms", [1, pytest.param(7, marks=pytest.mark.slow)])
 def test_what_is_not_too_heavy_is_carried(tmp_path, kilograms):
     world = over_the_can(home_with_can(tmp_path, kilograms))
     world.act(right_hand_trigger=1)
@@ -133,6 +133,7 @@ def test_a_mitten_sticks_to_its_target_at_the_first_touch_for_good(tiny_home_fol
     assert can(world)[2] > 0.7
 
 
+@pytest.mark.slow
 def test_grasps_are_a_pure_function_of_a_batch(tiny_home_folder):
     world = over_the_can(tiny_home_folder)
     world.act(right_hand_trigger=0.7)
@@ -155,6 +156,7 @@ def test_grasps_are_a_pure_function_of_a_batch(tiny_home_folder):
     assert np.asarray(write.ignored_contacts).sum((1, 2)).tolist() == [1, 0, 0]
 
 
+@pytest.mark.slow
 def test_idle_hands_are_those_that_an_update_would_not_change(tiny_home_folder):
     world = over_the_can(tiny_home_folder)
     grasping, empty = world.grasping, world.grasping.initial(1)

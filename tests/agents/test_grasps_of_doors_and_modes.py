@@ -33,7 +33,10 @@ def press_forward(world: GraspingWorld, times: int = 10) -> None:
             return
 
 
-@pytest.mark.parametrize(("joint", "height"), [("cabinet_drawer_slide", 0.6), ("cabinet_door_hinge", 0.25)])
+@pytest.mark.parametrize(
+    ("joint", "height"),
+    [pytest.param("cabinet_drawer_slide", 0.6, marks=pytest.mark.slow), ("cabinet_door_hinge", 0.25)],
+)
 def test_a_sticky_hand_pulls_open_what_it_closes_on(at_cabinet, joint, height):
     """By a connect (spec 1.5, p2p): the link turns freely about the point where it is held."""
     world = at_cabinet

@@ -28,7 +28,7 @@ def rotation(quat) -> Rotation:
     return Rotation.from_quat(np.roll(np.asarray(quat, np.float64), -1))
 
 
-@PRESETS
+@pytest.mark.parametrize("compat", [pytest.param("paper", marks=pytest.mark.slow), "igibson"])
 def test_parts_stay_where_they_are_put(tiny_home_folder, compat):
     """Spec 1.4, test 1: fifty zero actions, 1 cm."""
     world = RobotWorld(tiny_home_folder, Humanoid(pos=OUTSIDE, quat=QUARTER_LEFT, compat=compat))
@@ -55,7 +55,8 @@ def test_turns_of_a_hand_are_about_the_axes_of_the_body(tiny_home_folder, compat
     assert (wanted.inv() * turned).magnitude() < 1e-2
 
 
-@pytest.mark.parametrize("compat", ["paper", pytest.param("igibson", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@PRESETS
 def test_a_body_that_walks_in_circles_neither_tilts_nor_loses_its_hands(tiny_home_folder, compat):
     """Spec 1.4, test 3, at our steps of 1/120 s: 1,800 actions of 0.1 m and one degree, which are five full turns."""
     robot = Humanoid(pos=OUTSIDE, quat=QUARTER_LEFT, compat=compat)
@@ -223,6 +224,7 @@ def test_an_unknown_preset_is_named():
         Humanoid(compat="papers")
 
 
+@pytest.mark.slow
 def test_without_any_control_the_humanoid_stays_at_its_start():
     """Keyframes of a scene without actuators know no controls; the robot's start is what its servos are told first."""
     simulation = ig2mj.Simulation(ig2mj.load_scene("small_home", agents=[Humanoid(pos=(1.65, 0.95, 1.0))]))

@@ -142,6 +142,7 @@ def test_a_box_without_its_lid_is_hollow():
     assert not filled(result, [0, 0, 0.2]).any()
 
 
+@pytest.mark.slow
 def test_a_bowl_of_a_single_sheet_stays_open_within_the_budget(no_coacd):
     bowl = trimesh.creation.icosphere(3, 0.2)
     bowl.update_faces(bowl.triangles_center[:, 2] < 0)

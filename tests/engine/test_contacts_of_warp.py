@@ -101,6 +101,7 @@ def test_what_lies_outside_either_geom_is_dropped_and_the_rest_is_kept():
         (-1e-5, (0, 0, 0.004), False),  # on no face of either
     ],
 )
+@pytest.mark.slow
 def test_only_shallow_contacts_on_a_face_are_set_upright(dist: float, offset: tuple, upright: bool):
     put, worlds, _ = _things_on_a_floor(0.0)
     worlds.qpos.assign(np.tile(np.array([1, 1, HALF[2], 1, 0, 0, 0], np.float32), (WORLDS, 1)))

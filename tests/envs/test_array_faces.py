@@ -23,6 +23,7 @@ def short():
     return ig2mj.make("GraspingBook", worlds=2, pool_size=ROWS).with_horizon(3)
 
 
+@pytest.mark.slow
 def test_numpy_gets_fresh_arrays_and_the_last_observation_of_what_is_over(short):
     env = NumpyEnv(short)
     first, _ = env.reset(seed=0)

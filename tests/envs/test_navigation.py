@@ -56,6 +56,7 @@ def test_the_goal_is_seen_in_polar_coordinates_of_the_base(point):
     assert (way > straight - 0.1).all()
 
 
+@pytest.mark.slow
 def test_who_drives_into_a_wall_pays_for_every_step_of_it(point):
     state = point.reset(2)
     forward = np.tile(np.array([[1.0, 0.0]], np.float32), (4, 1))

@@ -176,6 +176,7 @@ def test_visuals_have_a_material_and_small_textures(root: pathlib.Path):
             assert read_obj(file)
 
 
+@pytest.mark.slow
 def test_same_seed_same_bytes_with_any_number_of_processes(root: pathlib.Path, tmp_path: pathlib.Path):
     build_dataset(tmp_path / "again", only=SOME, jobs=2)
     assert digest(tmp_path / "again") == digest(root)

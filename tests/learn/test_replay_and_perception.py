@@ -118,10 +118,11 @@ def test_a_policy_sees_pictures_in_the_size_it_was_trained_on():
     env = SeenPointMass(2)
     perception = Perception(env.observation_spaces, "rgbd", 16)
     sac = SAC(perception, 2, SACConfig(actor=(8,), critic=(8,)))
-    policy = Policy.of(sac, sac.init(jax.random.PRNGKey(0)), depends_on(env, perception), {})
+    policy = Policy.of(sac, jax.jit(sac.init)(jax.random.PRNGKey(0)), depends_on(env, perception), {})
     again = perception_of(policy, env.observation_spaces)
     assert again.picture_shape == (16, 16, 4)
-    assert policy.actor(again)(env.reset(0).obs).shape == (2, 2)
+    obs = {name: jnp.zeros((2, *space.shape), space.dtype) for name, space in env.observation_spaces.items()}
+    assert jax.eval_shape(policy.actor(again), obs).shape == (2, 2)
     with pytest.raises(PolicyMismatch, match="picture"):
         policy.check(env, Perception(env.observation_spaces, "rgbd"))
     with pytest.raises(Ig2mjError, match="32 pixels cannot be averaged down to 12"):

@@ -54,7 +54,7 @@ def _with_others_elsewhere(view: PhysicsView, other: PhysicsView, objects: tuple
     return assemble(fields)
 
 
-@pytest.mark.parametrize("compat", ["paper", "igibson"])
+@pytest.mark.parametrize("compat", [pytest.param("paper", marks=pytest.mark.slow), "igibson"])
 def test_questions_and_goals_agree_on_every_pair_of_a_cluttered_scene(compat):
     model = HOME.model(compat=compat)
     names = list(HOME.index)

@@ -72,6 +72,7 @@ def test_reach_room_contact_and_field_of_view_of_each_robot(home_with_map, name)
     assert not outside.predicate("in_fov_of_agent", "ball"), "behind it"
 
 
+@pytest.mark.slow
 def test_of_two_agents_in_one_home_either_counts(home_with_map):
     """The humanoid stands before the ball, Fetch before the cabinet, with the can in its gripper."""
     humanoid = Humanoid(pos=(-1.0, 0.6, 0.6), quat=(HALF, 0.0, 0.0, -HALF))

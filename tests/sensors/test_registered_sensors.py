@@ -22,7 +22,9 @@ ROBOTS = {
 }
 
 
-@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize(
+    "robot", ["humanoid", *(pytest.param(r, marks=pytest.mark.slow) for r in ROBOTS if r != "humanoid")]
+)
 def test_every_sensor_keeps_to_its_space(tiny_home_folder, robot):
     world = Perceiving(tiny_home_folder, ROBOTS[robot], worlds=2)
     suite = world.suite(*SENSORS, **OPTIONS)

@@ -178,6 +178,7 @@ def test_the_memo_gives_what_a_fresh_computation_gives():
         assert all((remembered[k] == expected[k]).all() for k in expected)
 
 
+@pytest.mark.slow
 def test_relations_work_for_any_number_of_worlds():
     view = jax.tree.map(
         lambda a, b: jnp.concatenate([a, b]), HOME.view({"ball": (0, 0, 2)}), HOME.view({"ball": (5, 0, 1)})

@@ -20,6 +20,7 @@ def cache(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_a_pool_is_made_once_and_again_byte_for_byte(cache):
     scene = bare_scene(TASK)
     pool = pool_of(TASK, count=3)

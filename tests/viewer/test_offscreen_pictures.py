@@ -40,6 +40,7 @@ def backend(request):
 ABOVE = offscreen.FreeView((0, 0, 0), 3, azimuth=90, elevation=-90, height=2.0)
 
 
+@pytest.mark.slow
 def test_an_orthographic_free_view_is_to_scale(scene, backend):
     seen = offscreen.render(*scene, ABOVE, width=200, height=200, segmentation=True, backend=backend)
     assert seen.dtype == np.int32 and seen.shape == (200, 200)

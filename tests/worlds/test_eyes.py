@@ -59,6 +59,7 @@ def test_the_eye_of_the_view_is_the_controllers(looked):
     np.testing.assert_allclose(view.agent.eye_pos[0], compiled.eye_pos[0], atol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_goal_of_the_field_of_view_is_of_where_the_head_looks(looked):
     """Fetch sees the ball in no world."""
     _, _, at_first, after = looked

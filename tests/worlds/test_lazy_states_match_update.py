@@ -128,7 +128,7 @@ MANY_RELATIONS = "(or " + " ".join(f"(on_top {a} {b}) (inside {a} {b})" for a, b
 @pytest.mark.parametrize(
     ("seed", "goal"),
     [
-        (0, GOAL),
+        pytest.param(0, GOAL, marks=pytest.mark.slow),
         *(pytest.param(s, GOAL, marks=pytest.mark.slow) for s in (1, 2)),
         (0, ONLY_STATES),
         (1, ONLY_STATES),
@@ -285,6 +285,7 @@ def test_what_the_goal_does_not_name_is_no_work_for_it():
         assert stepper._news(later) is news, moved
 
 
+@pytest.mark.slow
 def test_what_matters_to_the_goal_alone_is_no_work_for_the_states():
     """The fish is put on the table, held above it, put back, taken off: the goal follows, and events are left out."""
     model, program, reference = _rules()
