@@ -11,6 +11,7 @@
 | `sac`, `ppo`, `bc`, `dagger` | the algorithms |
 | `collect` | steps of an environment under a policy: one scan on a pure engine, a loop on the native one |
 | `iteration` | a rollout and what is learned from it, on one device or on several |
+| `solid` | trees of arrays as programs over several devices can take them |
 | `train`, `checkpoints`, `log` | the loop around an algorithm; what survives a kill; CSV and TensorBoard |
 | `labels`, `demos` | what should be done in a state; demonstrations as HDF5 |
 | `guidance` | an expert that begins episodes and corrects an actor, ever less |
