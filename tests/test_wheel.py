@@ -25,6 +25,9 @@ sys.meta_path.insert(0, Blocker())
 """A sitecustomize.py that hides two packages of the extras, as in an environment without them."""
 
 
+pytestmark = pytest.mark.slow
+
+
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory) -> pathlib.Path:
     """A folder that the wheel was installed into; built from a copy, so that nothing of an older build gets in."""
@@ -53,7 +56,6 @@ def run(*command: object, cwd: pathlib.Path, **variables: str) -> subprocess.Com
     return done
 
 
-@pytest.mark.slow
 def test_shipped_homes_come_with_the_wheel_and_open_from_any_folder(installed, tmp_path):
     code = (
         "import ig2mj, ig2mj.scene.paths as paths\n"
@@ -68,7 +70,6 @@ def test_shipped_homes_come_with_the_wheel_and_open_from_any_folder(installed, t
     assert int(count) == len(list((ROOT / "scenes_mjcf").glob("*/manifest.json")))
 
 
-@pytest.mark.slow
 def test_the_page_of_a_headset_comes_with_the_wheel(installed):
     """Its own files; three.js too, where `make web` has fetched it."""
     made, packed = ROOT / "src" / "ig2mj" / "vr" / "page", installed / "ig2mj" / "vr" / "page"
@@ -95,7 +96,6 @@ def test_the_demonstration_without_its_extras_gives_the_one_command_that_install
     assert "ig2mj[convert,demo]" in line
 
 
-@pytest.mark.slow
 def test_the_demonstration_runs_from_the_wheel(installed, tmp_path):
     done = run(sys.executable, "-m", "ig2mj", "demo", cwd=tmp_path, PYTHONPATH=str(installed))
     assert (tmp_path / "out" / "demo" / "small_home" / "report.html").is_file(), done.stdout

@@ -75,6 +75,7 @@ def test_small_systems_are_solved():
     )
 
 
+@pytest.mark.slow
 def test_the_gripper_goes_where_it_is_told_and_the_arm_holds_still(tiny_home_folder):
     """A full command is 0.2 m, of which kv = 2 makes a fifth in 0.1 s; orientation stays."""
     world = RobotWorld(tiny_home_folder, Fetch(pos=START))

@@ -79,6 +79,7 @@ def test_what_is_not_too_heavy_is_carried(tmp_path, kilograms):
     assert world.held[1] == "can" and can(world)[2] > before[2] + 0.17
 
 
+@pytest.mark.slow
 def test_forty_kilograms_leave_the_hand_within_a_second(tmp_path):
     """The hand's 300 N are less than the weight, so it stays behind; at 10 cm it lets go."""
     world = over_the_can(home_with_can(tmp_path, 40))

@@ -28,7 +28,8 @@ def rotation(quat) -> Rotation:
     return Rotation.from_quat(np.roll(np.asarray(quat, np.float64), -1))
 
 
-@pytest.mark.parametrize("compat", [pytest.param("paper", marks=pytest.mark.slow), "igibson"])
+@pytest.mark.slow
+@PRESETS
 def test_parts_stay_where_they_are_put(tiny_home_folder, compat):
     """Spec 1.4, test 1: fifty zero actions, 1 cm."""
     world = RobotWorld(tiny_home_folder, Humanoid(pos=OUTSIDE, quat=QUARTER_LEFT, compat=compat))
@@ -186,6 +187,7 @@ def test_the_eye_moves_by_itself_without_mass(tiny_home_folder):
     assert world.scene.model.nv - 11 * 6 == 38 + 2, "no degrees of freedom for it (11 loose objects, two joints)"
 
 
+@pytest.mark.slow
 def test_ghosts_are_shown_for_a_hand_that_cannot_follow(tiny_home_folder):
     world = RobotWorld(tiny_home_folder, Humanoid(pos=OUTSIDE))
     controller = world.controller
@@ -210,6 +212,7 @@ def test_control_is_one_pure_function_of_a_batch(tiny_home_folder):
     assert shapes == [np.shape(leaf) for leaf in jax.tree.leaves(many[1])]
 
 
+@pytest.mark.slow
 def test_two_humanoids_stand_in_one_home(tiny_home_folder):
     other = Humanoid("other", pos=(-1, 1, 0.6), look="blue")
     world = RobotWorld(tiny_home_folder, Humanoid(pos=(-1, 0, 0.6)), others=(other,))
@@ -232,6 +235,7 @@ def test_without_any_control_the_humanoid_stays_at_its_start():
     assert np.asarray(view.agent.base_pos)[0, 0] == pytest.approx([1.65, 0.95, 1.0], abs=0.02)
 
 
+@pytest.mark.slow
 def test_two_robots_stay_at_their_start_in_a_scene_without_keyframes(tiny_home_folder):
     robots = [Fetch(pos=(-1.0, -1.5, 0.0)), Humanoid(pos=(1.65, 0.95, 1.0))]
     scene = ig2mj.load_scene(tiny_home_folder, agents=robots)

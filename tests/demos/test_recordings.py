@@ -64,6 +64,7 @@ def test_a_recording_says_what_it_is_of_and_how_its_runs_ended(env, recorded):
         assert sum(np.broadcast_to(t, 12) for t in terms) == pytest.approx(2 * total, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_by_action_every_byte_of_every_frame_comes_out_the_same_on_another_number_of_threads(recorded):
     with Recording(recorded[0]) as recording:
         replayer = Replayer(recording, threads=1)

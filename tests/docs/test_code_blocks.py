@@ -53,7 +53,7 @@ def commands(text: str) -> list[list[str]]:
     return [words for line in lines if (words := shlex.split(line, comments=True))]
 
 
-LONG = {"demonstrations", "environments", "experts", "sensors", "batches", "sampling", "activities", "index"}
+LONG = {"demonstrations", "environments", "experts", "sensors", "batches", "sampling", "activities", "index", "README"}
 """Pages whose blocks take ten seconds or more together: run by `make test-slow`."""
 
 

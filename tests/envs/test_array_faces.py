@@ -37,6 +37,7 @@ def test_numpy_gets_fresh_arrays_and_the_last_observation_of_what_is_over(short)
     assert np.array_equal(first["privileged_state"], kept)
 
 
+@pytest.mark.slow
 def test_without_autoreset_a_world_that_is_done_is_not_stepped(short):
     env = NumpyEnv(short, autoreset=False)
     with pytest.raises(EngineError, match="reset the environment"):

@@ -67,6 +67,7 @@ def test_who_drives_into_a_wall_pays_for_every_step_of_it(point):
     assert np.asarray(state.info["reward/collision"])[hit] == pytest.approx(-0.1)
 
 
+@pytest.mark.slow
 def test_starts_belong_to_their_split(point):
     others = ig2mj.make(point.task, worlds=4, pool_size=ROWS, split="held_out")
     seen = [np.asarray(env.reset(0).batch.world.view.agent.base_pos) for env in (point, others)]

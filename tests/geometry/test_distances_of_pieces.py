@@ -106,6 +106,7 @@ def test_points_inside_are_at_distance_zero_and_others_at_trimeshs(shapes, seed)
     assert np.all(-depth[expected > 0] <= expected[expected > 0] + 1e-5)
 
 
+@pytest.mark.slow
 @given(SEEDS)
 def test_depth_of_round_pieces_is_the_exact_signed_distance(shapes, seed):
     rng = np.random.default_rng(seed)

@@ -100,6 +100,7 @@ def test_no_pairs_and_no_pieces_are_fine(house):
     assert not np.any(lines_enter_targets(bare, body_pos, body_quat, np.zeros((W, 1, 3)), DIRECTIONS, LENGTHS))
 
 
+@pytest.mark.slow
 def test_a_falling_point_stops_at_the_first_surface_or_at_once_when_inside(house):
     tables, body_pos, body_quat = house
     targets = RayTargets.from_pieces(PAIR_TARGETS, **tables)

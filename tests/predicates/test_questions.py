@@ -98,6 +98,7 @@ def test_what_a_predicate_reads_is_found_by_tracing():
     assert set(questions.reads(PREDICATES["on_top"])) == {f"view.{name}" for name in on_top}
 
 
+@pytest.mark.slow
 def test_a_single_world_is_answered_as_a_batch_is():
     model = HOME.model()
     states, view = initial_states(model, 1), _cluttered(1)

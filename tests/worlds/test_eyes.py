@@ -18,6 +18,9 @@ NEAR_BALL = {"pos": (-1.0, 0.6, 0.6), "quat": (HALF, 0.0, 0.0, -HALF)}
 """Before the ball at (-1, -1), which is in view there."""
 
 
+pytestmark = pytest.mark.slow
+
+
 @pytest.fixture(scope="module")
 def scene(tmp_path_factory):
     home = write_tiny_home(tmp_path_factory.mktemp("eyes") / "home")
@@ -46,7 +49,6 @@ def looked(request, scene):
     return worlds, batch, seen_at_first, np.asarray(status.holds)
 
 
-@pytest.mark.slow
 def test_the_eye_of_the_view_is_the_controllers(looked):
     worlds, batch, _, _ = looked
     view = batch.world.view
@@ -59,7 +61,6 @@ def test_the_eye_of_the_view_is_the_controllers(looked):
     np.testing.assert_allclose(view.agent.eye_pos[0], compiled.eye_pos[0], atol=1e-5)
 
 
-@pytest.mark.slow
 def test_a_goal_of_the_field_of_view_is_of_where_the_head_looks(looked):
     """Fetch sees the ball in no world."""
     _, _, at_first, after = looked
@@ -78,7 +79,6 @@ def test_a_reset_looks_ahead_again(looked):
     assert np.asarray(status.holds).tolist() == [True, True]
 
 
-@pytest.mark.slow
 def test_a_simulation_asks_where_the_head_looks(scene):
     simulation = ig2mj.Simulation(scene)
     assert simulation.predicate("in_fov_of_agent", "ball")

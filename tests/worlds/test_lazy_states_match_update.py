@@ -79,9 +79,8 @@ def _assert_same(ours, theirs, status, expected, where):
         assert np.array_equal(getattr(status, field.name), getattr(expected, field.name)), (where, field.name)
 
 
-@pytest.mark.parametrize(
-    "options", [pytest.param({}, marks=pytest.mark.slow), {"contact_heat_rate": 0.1, "drying_rate": 0.5}]
-)
+@pytest.mark.parametrize("options", [{}, {"contact_heat_rate": 0.1, "drying_rate": 0.5}])
+@pytest.mark.slow
 def test_every_step_is_bitwise_the_same(options):
     model, program, reference = _rules(**options)
     stepper = StateStepper(program)
