@@ -1,7 +1,7 @@
 """Trees of arrays without those that have no elements, for programs over several devices.
 
 XLA for GPUs ends with a segmentation fault while it compiles a `jax.shard_map` that is handed an array without elements
-and does anything with it (seen with JAX 0.10.2 and 0.11.2: Shardy's `ManualComputationUnusedInputsPattern`; a program
+and does anything with it (JAX 0.11.2, not 0.10.2: Shardy's `ManualComputationUnusedInputsPattern`; a program
 for CPUs compiles). Ours have some: pictures where nobody looks, labels where nobody teaches.
 """
 
