@@ -64,7 +64,6 @@ class BatchCamera:
         groups: Sequence[int] = VISIBLE_GROUPS,
         shadows: bool = False,
         cull_backfaces: bool = False,
-        devices: Sequence[str] | None = None,
         rays: Sequence[RayPattern] = (),
     ):
         """Compiles the render model.
@@ -80,7 +79,6 @@ class BatchCamera:
           cull_backfaces: surfaces seen from behind are not there, so that a camera inside a geom sees through it; a
             third more time.
           rays: patterns to cast besides; each call gives the pose of each.
-          devices: Warp's names ("cuda:0", ...) where worlds are shared out over several devices; None: the default one.
 
         Raises:
           EngineError: not the Warp engine, or nothing is to be made. UnknownNameError: no such camera.
@@ -112,7 +110,8 @@ class BatchCamera:
             use_shadows=shadows,
             enable_backface_culling=cull_backfaces,
         )
-        self._make_context(list(devices) if devices else None)
+        self._served = [str(wp.get_device())]
+        self._make_context()
 
     def serve(self, devices: Sequence[Any]) -> None:
         """Makes ready for programs on other devices of this process, too; before they are compiled.
@@ -122,13 +121,13 @@ class BatchCamera:
         """
         names = list(dict.fromkeys(str(wp.device_from_jax(device)) for device in devices))
         if names != self._served:
-            self._make_context(names)
+            self._served = names
+            self._make_context()
 
-    def _make_context(self, devices: list[str] | None) -> None:
+    def _make_context(self) -> None:
         """What the ray caster keeps, on each device. What compiled programs know of stays as long as the engine."""
-        self._context = mjx.create_render_context(self._host, devices=devices, **self._settings)
+        self._context = mjx.create_render_context(self._host, devices=self._served, **self._settings)
         _KEPT.setdefault(self.engine, []).append(self._context)
-        self._served = devices or [str(wp.get_device())]
         if self._sectors:
             set_rays(self._context, self._sectors, len(self.cameras) * self.width * self.height)
         self._handle = self._context.pytree()
