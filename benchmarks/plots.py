@@ -32,7 +32,7 @@ def grouped_bars(
     axes.set_xticks(range(len(groups)), groups)
     if log:
         axes.set_yscale("log")
-        axes.margins(y=0.25)
+    axes.margins(y=0.25)  # room for the values and the legend
     axes.set_ylabel(ylabel)
     axes.set_title(title, fontsize=10)
     axes.legend(fontsize=7, ncols=2)

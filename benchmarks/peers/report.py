@@ -20,6 +20,8 @@ ROOT = HERE.parent.parent
 PAGE, PLOT = ROOT / "docs" / "benchmarks.md", ROOT / "docs" / "peers.png"
 BEGIN, END = "<!-- peers: written by benchmarks/peers/report.py -->", "<!-- /peers -->"
 
+ENGINES = {"ig2mj": "ig2mj", "mujoco_warp": "MuJoCo Warp", "genesis": "Genesis"}
+
 NAMES = {
     ("ig2mj", "", "physics"): "ig2mj",
     ("mujoco_warp", "", "physics"): "MuJoCo Warp as it comes",
@@ -122,7 +124,8 @@ def written(rows: list[Row]) -> str:
     if whole:
         text += ["Ours with what comes on top (agent steps a second are a third of the last column):", ""]
         text += [*table([row for row in rows if (row["scene"], row["worlds"]) in whole], ours), ""]
-    text += ["![Control steps a second of ig2mj, MuJoCo Warp and Genesis](peers.png)", ""]
+    engines = [ENGINES[engine] for engine in ENGINES if any(row["engine"] == engine for row in rows)]
+    text += [f"![Control steps a second of {', '.join(engines)}](peers.png)", ""]
     text += ["<details><summary>What each row did</summary>", "", *details(rows), "", "</details>"]
     return "\n".join(text)
 
