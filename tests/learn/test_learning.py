@@ -15,9 +15,10 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from small_envs import FarReward, FarRewardThatEnds, PointMass
 
-from ig2mj.learn.collect import GUIDED, Advice
+from ig2mj.learn import guidance
+from ig2mj.learn.collect import Advice
 from ig2mj.learn.dagger import Dagger, DaggerConfig
-from ig2mj.learn.guidance import guided, share
+from ig2mj.learn.guidance import guided, share, uncounted
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy, depends_on
 from ig2mj.learn.ppo import PPO, PPOConfig
@@ -90,7 +91,8 @@ def test_an_expert_that_answers_in_any_state_is_imitated(pure):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("pure", [True, pytest.param(False, marks=pytest.mark.slow)])
-def test_an_expert_begins_episodes_and_leaves_them_to_the_policy(pure):
+def test_an_expert_begins_episodes_and_leaves_them_to_the_policy(pure, monkeypatch):
+    monkeypatch.setattr(guidance, "SETTLED", 20)  # this environment's horizon is shorter than the activities'
     """Without it the same run reaches a third; the success reported is of episodes without the expert."""
     env = PointMass(64, pure=pure)
 
@@ -104,16 +106,43 @@ def test_an_expert_begins_episodes_and_leaves_them_to_the_policy(pure):
     assert result.row["copy_loss"] < 0.2
 
 
+def test_the_success_that_is_reported_is_not_too_high_when_the_experts_help_ends():
+    """All worlds begin alone at one moment; successes take 5 to 35 steps, failures 200; half of the episodes fail."""
+    rng = np.random.default_rng(0)
+    worlds, end = 2000, 1000
+    left, wins = np.zeros(worlds, int), np.zeros(worlds, bool)
+    handover, helpless = jnp.zeros((2, worlds), jnp.int32)
+    counted, naive = [], []
+    for step in range(end + 100):
+        over = left == 0
+        limit = jnp.float32(30 if step < end else 0)
+        fresh = np.where(rng.random(worlds) < 0.1, -1, 30 if step < end else 0)
+        handover = jnp.where(over, fresh, handover)
+        wins = np.where(over, (rng.random(worlds) < 0.5) | (np.asarray(handover) > 0), wins)
+        left = np.where(over, np.where(wins, rng.integers(5, 36, worlds), 200), left) - 1
+        apart, helpless = uncounted(handover, helpless, limit)
+        done = left == 0
+        if step >= end - 200:
+            counted.append(wins[done & ~np.asarray(apart)])
+            naive.append(wins[done & ~(np.asarray(handover) > 0)])
+    assert abs(np.concatenate(counted).mean() - 0.5) < 0.06
+    assert np.concatenate(naive).mean() > 0.6
+    for _ in range(200):
+        apart, helpless = uncounted(handover, helpless, jnp.float32(0))
+    assert not np.asarray(apart).any()
+
+
 def test_the_expert_acts_up_to_the_handover_and_less_as_the_run_goes_on():
     action, label = jnp.zeros((1000, 2)), jnp.ones((1000, 2))
     first, nothing = jnp.zeros(1000, jnp.int32), jnp.zeros(1000, jnp.int32)
     key = jax.random.PRNGKey(0)
-    chosen, extra, handover = guided(key, action, Advice(first, label), nothing, jnp.float32(20), 0.0)
-    assert np.array_equal(chosen[:, 0] == 1, handover > 0)
-    assert np.array_equal(extra[GUIDED], handover > 0)
-    assert 0.1 < (np.asarray(handover) == 0).mean() < 0.25 and int(handover.max()) == 20
+    chosen, found, handover = guided(key, action, Advice(first, label), nothing, jnp.float32(20), 0.0)
+    assert np.array_equal(chosen[:, 0] == 1, handover > 0) and np.array_equal(found, label)
+    assert 0.05 < (np.asarray(handover) == -1).mean() < 0.15 and int(handover.max()) == 20
     chosen, _, same = guided(key, action, Advice(first + 10, label), handover, jnp.float32(20), 0.0)
     assert np.array_equal(same, handover)  # drawn once in an episode
     assert np.array_equal(chosen[:, 0] == 1, handover > 10)
+    _, _, late = guided(key, action, Advice(first, label), nothing, jnp.float32(0), 0.0)
+    assert set(np.asarray(late).tolist()) == {-1, 0}  # the same tenth is marked when there is no help any more
     limits = [float(share(jnp.float32(p), 0.5)) for p in (0.0, 0.25, 0.5, 1.0)]
     assert limits == [1.0, 0.5, 0.0, 0.0]

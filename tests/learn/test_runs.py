@@ -20,6 +20,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from small_envs import PointMass
 
 from ig2mj.errors import ClusterError, Ig2mjError, InputError, UnknownNameError
+from ig2mj.learn.best import BEST, LAST, SUCCESS, Best
 from ig2mj.learn.checkpoints import Checkpoints, only_run
 from ig2mj.learn.networks import Actor
 from ig2mj.learn.options import configured
@@ -185,6 +186,25 @@ def test_a_policy_file_acts_as_what_was_trained(done, tmp_path):
     mean, _, _ = trained._look(result.learner.actor, result.learner.moments, trained.perception(obs))
     assert np.abs(action - np.tanh(np.asarray(mean))).max() < 5e-3  # half precision
     loaded.check(env, trained.perception)
+
+
+def test_the_best_policy_of_a_run_is_kept_beside_the_last_one(tmp_path):
+    def policy(success, mark):
+        card = {"format": 1, "depends": {}, "digest": "", "net": {}, SUCCESS: success}
+        return Policy(card, {"mean/bias": np.full(2, mark, np.float32)}, np.zeros(1), np.ones(1))
+
+    def kept():
+        return [float(Policy.load(tmp_path / name).weights["mean/bias"][0]) for name in (BEST, LAST)]
+
+    best = Best(tmp_path, resumed=False)
+    assert best.offer(policy(None, 0)) and best.offer(policy(0.5, 1)) and best.offer(policy(0.9, 2))
+    assert not best.offer(policy(0.8, 3)) and kept() == [2, 3]
+    assert best.offer(policy(0.9, 4)) and kept() == [4, 4]  # as good and later
+    again = Best(tmp_path, resumed=True)
+    assert not again.offer(policy(0.89, 5)) and kept() == [4, 5]
+    assert Best(tmp_path, resumed=False).offer(policy(0.1, 6)) and kept() == [6, 6]  # another run's is of no account
+    (tmp_path / BEST).write_bytes(b"half a fi")
+    assert Best(tmp_path, resumed=True).offer(policy(None, 7)) and kept() == [7, 7]
 
 
 def test_a_policy_for_something_else_is_refused_with_the_pair_that_differs(done, tmp_path):

@@ -84,6 +84,7 @@ def run(
     from ig2mj.errors import Ig2mjError, UnknownNameError
     from ig2mj.learn.algorithms import config_of, made
     from ig2mj.learn.bc import begin_as_clone
+    from ig2mj.learn.best import SUCCESS, Best
     from ig2mj.learn.demos import load_demos
     from ig2mj.learn.iteration import AXIS
     from ig2mj.learn.memory import is_out_of_memory, too_large
@@ -156,13 +157,13 @@ def run(
             "paper_rl": paper_rl,
             "expert": expert,
         }
-        file, films = out / "policy.npz", Films.of(world, out, 60 * videos, paper_rl)
+        best, films = Best(out, resume), Films.of(world, out, 60 * videos, paper_rl)
 
         def kept(learner: Any, row: dict[str, Any]) -> None:
             made_in = {"minutes": round(row["seconds"] / 60, 2), "env_steps": row["env_steps"]}
-            made_in |= {"training_success": row.get("success"), "compile_s": row.get("compile_s")}
-            Policy.of(algorithm, learner, depends_on(world, perception), {**card, **made_in}).save(file)
-            films.offer(file, row["seconds"])
+            made_in |= {SUCCESS: row.get("success"), "compile_s": row.get("compile_s")}
+            best.offer(Policy.of(algorithm, learner, depends_on(world, perception), {**card, **made_in}))
+            films.offer(best.file, row["seconds"])
 
         try:
             result = train(world, algorithm, settings, depends, learner, shared, team, kept)
@@ -172,9 +173,9 @@ def run(
             raise Ig2mjError(too_large(world, algorithm, count, max(len(shared), 1))) from e
         if not team.first:
             return 0
-        films.offer(file, result.row["seconds"], last=True)
-        print(file)
-        print(f"how good it is on states it has not seen: ig2mj evaluate {file}", file=sys.stderr)
+        films.offer(best.file, result.row["seconds"], last=True)
+        print(best.file)
+        print(f"how good it is on states it has not seen: ig2mj evaluate {best.file}", file=sys.stderr)
         return 0
 
 

@@ -3,7 +3,8 @@
 In every episode it acts for a number of steps that is drawn from 0 to a limit, then the policy takes over. The limit
 falls to 0 over the first part of a run, so that the policy's starts move back from near the goal to the start of the
 task: a reverse curriculum (Uchendu et al. 2023, "Jump-Start Reinforcement Learning"). A tenth of the episodes is
-without the expert from the first step of the run on; success is reported of those alone.
+without the expert from the first step of the run on; success is reported of those alone, also for a while after the
+help has ended: of the episodes that all worlds then begin alone the short ones end first, and those succeed.
 
 Axes: W worlds, n numbers of an action.
 """
@@ -12,13 +13,16 @@ from __future__ import annotations
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
-from ig2mj.learn.collect import GUIDED, Advice
+from ig2mj.learn.collect import Advice
 
 ALONE = 0.1
 """Share of the episodes in which the expert has no part."""
+
+SETTLED = 200
+"""Steps without help after which all episodes count: the activities' horizon."""
 
 
 def share(progress: Float[Array, ""], until: float) -> Float[Array, ""]:
@@ -33,22 +37,34 @@ def guided(
     handover: Int[Array, "W"],
     limit: Float[Array, ""],
     noise: float,
-) -> tuple[Float[Array, "W n"], dict[str, Array], Int[Array, "W"]]:
+) -> tuple[Float[Array, "W n"], Float[Array, "W n"], Int[Array, "W"]]:
     """The expert's actions where it still has the episode, the policy's elsewhere.
 
     Args:
-      action: the policy's. handover: step of the running episode at which the policy takes over.
+      action: the policy's. handover: step of the running episode at which the policy takes over; -1 in the episodes
+        that are the policy's from the start, whatever the limit.
       limit: of the steps that the expert acts in a new episode. noise: deviation of what is added to its actions.
 
     Returns:
-      Actions; for the transition the label and whether the expert had a part; the steps of handing over.
+      Actions; the expert's, as labels; the steps of handing over.
     """
     assert advice.label is not None, "guidance needs an expert"
     reach_key, which_key, noise_key = jax.random.split(key, 3)
     drawn = jax.random.randint(reach_key, handover.shape, 0, jnp.round(limit).astype(jnp.int32) + 1)
-    drawn = jnp.where(jax.random.uniform(which_key, handover.shape) < ALONE, 0, drawn)
+    drawn = jnp.where(jax.random.uniform(which_key, handover.shape) < ALONE, -1, drawn)
     handover = jnp.where(advice.steps == 0, drawn, handover)
     label = jnp.clip(advice.label, -1.0, 1.0)
     shaken = jnp.clip(label + noise * jax.random.normal(noise_key, label.shape), -1.0, 1.0)
-    action = jnp.where((advice.steps < handover)[:, None], shaken, action)
-    return action, {"label": label, GUIDED: handover > 0}, handover
+    return jnp.where((advice.steps < handover)[:, None], shaken, action), label, handover
+
+
+def uncounted(
+    handover: Int[Array, "W"], helpless: Int[Array, "W"], limit: Float[Array, ""]
+) -> tuple[Bool[Array, "W"], Int[Array, "W"]]:
+    """Whether a running episode is left out of the success that is reported, and `helpless` after another step.
+
+    Args:
+      helpless: steps of each world since the limit fell to 0.
+    """
+    helpless = jnp.where(jnp.round(limit) > 0, 0, helpless + 1)
+    return (handover >= 0) & (helpless <= SETTLED), helpless

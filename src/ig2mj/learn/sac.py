@@ -31,9 +31,9 @@ from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
-from ig2mj.learn.collect import Advice, Hint, Transition, if_ready
+from ig2mj.learn.collect import GUIDED, Advice, Hint, Transition, if_ready
 from ig2mj.learn.demos import Demos
-from ig2mj.learn.guidance import guided, share
+from ig2mj.learn.guidance import guided, share, uncounted
 from ig2mj.learn.moments import Moments, RewardScale, average, share_of
 from ig2mj.learn.networks import Actor, projected, shifted, twins
 from ig2mj.learn.perception import Perception, Seen, blank
@@ -126,12 +126,13 @@ class SACMemory:
 class Noise:
     """Exploration noise of every world, and for how many more steps it is held.
 
-    `handover`: the step of the episode at which the policy takes over from the expert.
+    `handover`, `helpless`: see `ig2mj.learn.guidance`.
     """
 
     value: Float[Array, "W n"]
     left: Int[Array, "W"]
     handover: Int[Array, "W"]
+    helpless: Int[Array, "W"]
 
 
 class SAC:
@@ -215,16 +216,15 @@ class SAC:
 
     def noise(self, num_worlds: int) -> Noise:
         """Before the first step."""
-        held, handover = jnp.zeros((2, num_worlds), jnp.int32)
-        return Noise(jnp.zeros((num_worlds, self.action_size)), held, handover)
+        held, handover, helpless = jnp.zeros((3, num_worlds), jnp.int32)
+        return Noise(jnp.zeros((num_worlds, self.action_size)), held, handover, helpless)
 
     # How it acts.
 
     def act(
         self, learner: SACLearner, noise: Noise, seen: Seen, key: Array, advice: Advice | None = None
     ) -> tuple[Float[Array, "W n"], dict[str, Array], Noise]:
-        """Actions with noise, each number's held for a time that is drawn from a zeta(2) distribution; the expert's
-        where it still has the episode."""
+        """Actions with noise, held for a time from a zeta(2) distribution; the expert's where it has the episode."""
         noise_key, time_key = jax.random.split(key)
         fresh = jax.random.normal(noise_key, noise.value.shape)
         # the largest k with u < 1 / k has about zeta(2)'s tail: P(at least k) = 1 / k
@@ -235,11 +235,12 @@ class SAC:
         mean, log_std, _ = self._look(learner.actor, learner.moments, seen)
         action = jnp.tanh(mean + jnp.exp(log_std) * value)
         if advice is None or advice.label is None:
-            return action, {}, Noise(value, left, noise.handover)
+            return action, {}, Noise(value, left, noise.handover, noise.helpless)
         limit = self.config.reach * share(learner.progress, self.config.guided)
         noise_key = jax.random.fold_in(key, 1)
-        action, extra, handover = guided(noise_key, action, advice, noise.handover, limit, self.config.disturbance)
-        return action, extra, Noise(value, left, handover)
+        action, label, handover = guided(noise_key, action, advice, noise.handover, limit, self.config.disturbance)
+        apart, helpless = uncounted(handover, noise.helpless, limit)
+        return action, {"label": label, GUIDED: apart}, Noise(value, left, handover, helpless)
 
     def _look(self, actor: Any, moments: Moments, seen: Seen) -> tuple[Array, Array, Array]:
         own = moments.normal(seen.vector[:, : self.perception.actor_size])
