@@ -13,13 +13,16 @@ from __future__ import annotations
 import argparse
 import pathlib
 import time
+from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import results
 from kernel_times import profiled
-from throughput import device, exclusive, memory
+from throughput import device, memory
+from turns import exclusive, preparing
 
 import ig2mj
 from ig2mj.engine.warp.profile import EngineProfile
@@ -31,45 +34,10 @@ CALL = 10
 def run(name: str, num_worlds: int, args: argparse.Namespace) -> dict:
     """One row."""
     began = time.time()
-    options = {"profile": EngineProfile(*args.profile)} if args.profile else {}
-    env = ig2mj.make(
-        name,
-        robot=args.robot,
-        worlds=num_worlds,
-        engine=args.engine,
-        grasping=args.grasping,
-        observations=("proprioception", "privileged_state", *args.observations),
-        pool_size=args.pool_size,
-        **options,
-    )
-    size = env.action_space.shape[0]
-
-    def agent_step(carry, _):
-        state, action, key = carry
-        key, draw, change = jax.random.split(key, 3)
-        new = jax.random.uniform(draw, action.shape, minval=-1.0, maxval=1.0)
-        action = jnp.where(jax.random.bernoulli(change, 1 / args.hold, (num_worlds, 1)), new, action)
-        after = env.step_autoreset_fn(state, action)
-        info = {k: v for k, v in after.info.items() if k != "final_obs"}
-        seen = after.reward.mean(), after.done.mean(), after.info["held"].mean(), after.terminated.mean()
-        return (after.replace(info=info), action, key), seen
-
-    if env.core.engine.pure:
-        program = jax.jit(lambda carry: jax.lax.scan(agent_step, carry, None, CALL), donate_argnums=0)
-    else:
-
-        def program(carry):
-            every = []
-            for _ in range(CALL):
-                carry, seen = agent_step(carry, None)
-                every.append(seen)
-            return carry, tuple(np.stack(each) for each in zip(*every, strict=True))
-
-    state = env.reset(0)
-    carry = (state, jnp.zeros((num_worlds, size)), jax.random.key(1))
-    call = program.lower(carry).compile() if env.core.engine.pure else program
+    with preparing(args.lock, args.patience):
+        env, call, carry = prepared(name, num_worlds, args)
     ready = time.time() - began
-    with exclusive(args.lock):
+    with exclusive(args.lock, args.patience):
         carry, seen = jax.block_until_ready(call(carry))
         times, totals = [], []
         while len(times) < 2 or sum(times) < 60 * args.minutes:
@@ -108,6 +76,48 @@ def run(name: str, num_worlds: int, args: argparse.Namespace) -> dict:
     }
 
 
+def prepared(name: str, num_worlds: int, args: argparse.Namespace) -> tuple[Any, Callable, Any]:
+    """An environment, the compiled function of `CALL` agent steps, and the carry to begin with."""
+    options = {"profile": EngineProfile(*args.profile)} if args.profile else {}
+    env = ig2mj.make(
+        name,
+        robot=args.robot,
+        worlds=num_worlds,
+        engine=args.engine,
+        grasping=args.grasping,
+        observations=("proprioception", "privileged_state", *args.observations),
+        pool_size=args.pool_size,
+        **options,
+    )
+    size = env.action_space.shape[0]
+
+    def agent_step(carry, _):
+        state, action, key = carry
+        key, draw, change = jax.random.split(key, 3)
+        new = jax.random.uniform(draw, action.shape, minval=-1.0, maxval=1.0)
+        action = jnp.where(jax.random.bernoulli(change, 1 / args.hold, (num_worlds, 1)), new, action)
+        after = env.step_autoreset_fn(state, action)
+        info = {k: v for k, v in after.info.items() if k != "final_obs"}
+        seen = after.reward.mean(), after.done.mean(), after.info["held"].mean(), after.terminated.mean()
+        return (after.replace(info=info), action, key), seen
+
+    if env.core.engine.pure:
+        program = jax.jit(lambda carry: jax.lax.scan(agent_step, carry, None, CALL), donate_argnums=0)
+    else:
+
+        def program(carry):
+            every = []
+            for _ in range(CALL):
+                carry, seen = agent_step(carry, None)
+                every.append(seen)
+            return carry, tuple(np.stack(each) for each in zip(*every, strict=True))
+
+    state = env.reset(0)
+    carry = (state, jnp.zeros((num_worlds, size)), jax.random.key(1))
+    call = program.lower(carry).compile() if env.core.engine.pure else program
+    return env, call, carry
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("environments", nargs="+")
@@ -124,6 +134,7 @@ def main() -> None:
     )
     parser.add_argument("--kernels", type=int, default=0, metavar="N", help="print the N longest kernels of a GPU")
     parser.add_argument("--lock", type=pathlib.Path, help="file to lock while timing, as of throughput.py")
+    parser.add_argument("--patience", type=float, default=0.0, help="seconds to wait for others, as of throughput.py")
     parser.add_argument("--rows", type=pathlib.Path, help="rows are added to this file, as JSON lines")
     args = parser.parse_args()
     for name in args.environments:

@@ -15,11 +15,8 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import fcntl
-import os
 import pathlib
 import time
-from collections.abc import Iterator
 from typing import Any
 
 import jax
@@ -31,6 +28,7 @@ import warp as wp
 from batch_case import HAND_DOFS, Case
 from disturbance import LEAST, MOST_LOST, Watch, join, summary
 from kernel_times import profiled
+from turns import exclusive, preparing
 
 from ig2mj.calibration.pushing import push, start_pushing
 from ig2mj.engine.health import CAPACITY, Overflow
@@ -63,29 +61,32 @@ def run(
     lock: pathlib.Path | None,
     kernels: int = 0,
     side_by_side: bool = False,
+    patience: float = 0.0,
     **solver: Any,
 ) -> dict:
     """Times one batch. The first two calls are not counted.
 
     Args:
+      lock, patience: see `turns.exclusive`.
       kernels: so many of the longest are printed afterwards. side_by_side: kernels are compiled by several threads
         before the first step (`WarpEngine.load_kernels`). solver: limits of iterations.
     """
     start = time.time()
     scene, model = case.scene, case.model
     profile = case.profile.for_worlds(num_worlds)
-    engine = WarpEngine(
-        scene, num_worlds, profile=profile, initial=jax.tree.map(lambda a: a[0], case.pool.physics), **solver
-    )
-    if side_by_side:
-        engine.load_kernels()
-    worlds = Core(engine, Rules(model, case.goal), case.pool)
-    watch, seconds = Watch(engine), engine.substeps * engine.timestep
-    call, carry = program(case, worlds, watch, disturbed, what)
-    before = np.array(carry[0].world.view.object_com)
-    compiled = call.lower(carry).compile()
-    compile_seconds = time.time() - start
-    with exclusive(lock):
+    with preparing(lock, patience):
+        engine = WarpEngine(
+            scene, num_worlds, profile=profile, initial=jax.tree.map(lambda a: a[0], case.pool.physics), **solver
+        )
+        if side_by_side:
+            engine.load_kernels()
+        worlds = Core(engine, Rules(model, case.goal), case.pool)
+        watch, seconds = Watch(engine), engine.substeps * engine.timestep
+        call, carry = program(case, worlds, watch, disturbed, what)
+        before = np.array(carry[0].world.view.object_com)
+        compiled = call.lower(carry).compile()
+        compile_seconds = time.time() - start
+    with exclusive(lock, patience):
         start = time.time()
         carry, (seen, acts) = jax.block_until_ready(compiled(carry))
         first = time.time() - start
@@ -197,23 +198,6 @@ def program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str, 
     return call, (batch, pusher, view.object_com + 0.0, view.agent.base_pos[:, 0] + 0.0)
 
 
-@contextlib.contextmanager
-def exclusive(lock: pathlib.Path | None) -> Iterator[None]:
-    """Holds the lock file; others who time something wait. Whoever holds it is served first by the processor."""
-    if lock is None:
-        yield
-        return
-    with lock.open("a") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        nice = os.getpriority(os.PRIO_PROCESS, 0)
-        with contextlib.suppress(PermissionError):
-            os.setpriority(os.PRIO_PROCESS, 0, 0)
-        try:
-            yield
-        finally:
-            os.setpriority(os.PRIO_PROCESS, 0, nice)
-
-
 def memory(num_worlds: int) -> dict[str, float]:
     """Most device memory of this process so far, JAX's and Warp's own, MB per world. 0 on a CPU."""
     of_jax = (jax.local_devices()[0].memory_stats() or {}).get("peak_bytes_in_use", 0)
@@ -262,18 +246,22 @@ def main() -> None:
     parser.add_argument("--kernels", type=int, default=0, metavar="N", help="print the N longest kernels")
     parser.add_argument("--label", default="", help="a remark for the rows")
     parser.add_argument("--lock", type=pathlib.Path, help="file to lock while timing")
+    parser.add_argument(
+        "--patience", type=float, default=0.0, help="seconds to wait for others with this lock that are being compiled"
+    )
     parser.add_argument("--rows", type=pathlib.Path, help="rows are added to this file, as JSON lines")
     args = parser.parse_args()
     for home in args.homes:
-        case = Case(home, not args.idle, args.pool, args.profiles, exclusive(args.lock))
+        alone = None if args.patience else exclusive(args.lock)
+        with preparing(args.lock, args.patience):
+            case = Case(home, not args.idle, args.pool, args.profiles, alone)
         for worlds in args.worlds:
             for what in args.what:
                 for limit in args.iterations:
                     solver = {"iterations": limit, "ls_iterations": limit} if limit else {}
                     with ENGINES[args.engine]():
-                        row = run(
-                            case, worlds, not args.idle, what, args.lock, args.kernels, args.side_by_side, **solver
-                        )
+                        ways = args.lock, args.kernels, args.side_by_side, args.patience
+                        row = run(case, worlds, not args.idle, what, *ways, **solver)
                     row = {"engine": args.engine} | row
                     row |= {"ready_s": case.seconds, "label": args.label, **device()}
                     results.keep_row(row, args.rows)

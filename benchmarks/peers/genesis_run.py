@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-import fcntl
 import json
 import os
 import pathlib
@@ -25,6 +24,10 @@ import genesis_scene
 import numpy as np
 import torch  # pyright: ignore[reportMissingImports]
 from genesis_hand import TorchHand
+
+sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent))
+
+from turns import exclusive, preparing
 
 TIMESTEP, SUBSTEPS = 1 / 120, 4
 STEPS, CALLS, LEAST_CALLS, CALL_SECONDS = 30, 4, 2, 10.0
@@ -191,11 +194,13 @@ def _contacts(written: Row, worlds: int) -> int:
 def run(args: argparse.Namespace, row: Row, keep: Callable[[], None]) -> None:
     """Fills a row; `keep` is called when there is a speed in it."""
     began = time.time()
-    batch = Batch(args.folder, args.worlds, args.variant, args.cpu, row)
-    batch.hand.control_dofs_position(torch.zeros((args.worlds, len(batch.dofs)), device=batch.gs.device), batch.dofs)
-    batch.steps(1, push=False)  # compiles
+    with preparing(args.lock, args.patience):
+        batch = Batch(args.folder, args.worlds, args.variant, args.cpu, row)
+        still = torch.zeros((args.worlds, len(batch.dofs)), device=batch.gs.device)
+        batch.hand.control_dofs_position(still, batch.dofs)
+        batch.steps(1, push=False)  # compiles
     row["compile_s"] = round(time.time() - began, 1)
-    with _exclusive(args.lock):
+    with exclusive(args.lock, args.patience):
         began, rested = time.time(), 1
         while rested < SETTLE_STEPS and time.time() - began < SETTLE_SECONDS:
             batch.steps(1, push=False)
@@ -223,19 +228,6 @@ def run(args: argparse.Namespace, row: Row, keep: Callable[[], None]) -> None:
     row["counts"] = bool(sound and few_lost and row["hand_contact_share"] >= LEAST_TOUCHED)
 
 
-@contextlib.contextmanager
-def _exclusive(lock: pathlib.Path | None) -> Any:
-    """Holds the lock file, as `throughput.exclusive`."""
-    if lock is None:
-        yield
-        return
-    with lock.open("a") as file:
-        fcntl.flock(file, fcntl.LOCK_EX)
-        with contextlib.suppress(OSError):
-            os.setpriority(os.PRIO_PROCESS, 0, 0)  # before those that only compile
-        yield
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("folder", type=pathlib.Path)
@@ -245,6 +237,7 @@ def main() -> None:
     parser.add_argument("--cpu", action="store_true", help="on the processor, to try it")
     parser.add_argument("--label", default="", help="a remark for the row")
     parser.add_argument("--lock", type=pathlib.Path, help="file to lock while timing")
+    parser.add_argument("--patience", type=float, default=0.0, help="seconds to wait for others, as of throughput.py")
     parser.add_argument("--rows", type=pathlib.Path, help="the row is added to this file, as a JSON line")
     args = parser.parse_args()
     row: Row = {"engine": "genesis", "variant": args.variant, "scene": args.folder.name, "worlds": args.worlds}

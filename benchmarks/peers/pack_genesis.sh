@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # Packs Genesis for a CUDA host without a network: what a rigid scene imports, without assets and without what draws.
 #
-#   benchmarks/peers/pack_genesis.sh [DIR=.gen]    (PYTHON: a Python with pip; 43 MB in DIR/parts, a minute or two)
-#   source DIR/parts/unpack.sh                     on the host, which has Python 3.12, torch, numpy and scipy
+#   benchmarks/peers/pack_genesis.sh [DIR=.gen]    (PYTHON: a Python with pip; 40 MB in DIR/parts/0, DIR/parts/1, some minutes)
+#   source DIR/parts/0/unpack.sh                   on the host, which has Python 3.12, torch, numpy and scipy; then
+#   source DIR/parts/1/unpack.sh                   each in any order, together or one after the other: the last one unpacks
 #   source /tmp/genesis/settings.sh                later, once it is unpacked
 #
 # Unpacks into /tmp/genesis (or GENESIS_DIR) and sets GENESIS_PATH for `run.py --genesis-path`. On a host with a network
@@ -10,6 +11,7 @@
 set -euo pipefail
 out=$(mkdir -p "${1:-.gen}" && cd "${1:-.gen}" && pwd)
 python=${PYTHON:-python3}
+PART=${PART:-21M}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
@@ -38,12 +40,21 @@ for wheel in "$work"/wheels/*.whl; do "$python" -m zipfile -e "$wheel" "$work/si
 )
 rm -rf "$out/parts"
 mkdir "$out/parts"
-tar cf - -C "$work/site" . | xz -T2 -6 -c | split -b 29M -d - "$out/parts/site.tar.xz.part."
-cat > "$out/parts/unpack.sh" <<'UNPACK'
+# In parts of at most $PART, each in a folder with the script, so that each can travel by itself.
+tar cf - -C "$work/site" . | xz --x86 --lzma2=preset=9e,dict=160MiB | split -b "$PART" -d -a 1 - "$work/site.tar.xz."
+count=$(ls "$work"/site.tar.xz.* | wc -l)
+for ((k = 0; k < count; k++)); do
+  mkdir "$out/parts/$k"
+  mv "$work/site.tar.xz.$k" "$out/parts/$k/"
+  cat > "$out/parts/$k/unpack.sh" << UNPACK
+count=$count
+UNPACK
+  cat >> "$out/parts/$k/unpack.sh" << 'UNPACK'
 here=$(cd "$(dirname "${BASH_SOURCE[0]}")" && pwd)
-to=${GENESIS_DIR:-/tmp/genesis}
-if [ ! -f "$to/settings.sh" ]; then
-  mkdir -p "$to" && cat "$here"/site.tar.xz.part.* | tar xJf - -C "$to" || echo "Genesis could not be unpacked into $to" >&2
+to=${GENESIS_DIR:-/tmp/genesis} kept=${GENESIS_PARTS:-/tmp/gen}
+mkdir -p "$to" "$kept" && [ -f "$to/settings.sh" ] || cp "$here"/site.tar.xz.* "$kept"
+if [ ! -f "$to/settings.sh" ] && [ "$(ls "$kept" | wc -l)" = "$count" ]; then
+  cat "$kept"/site.tar.xz.* | tar xJf - -C "$to" || { echo "Genesis could not be unpacked into $to" >&2; return 1; }
   # Its compiler asks for the driver by a name that only development packages install.
   if ! ldconfig -p | grep -q 'libcuda\.so '; then
     driver=$(ldconfig -p | sed -n 's/.*libcuda\.so\.1 .*=> //p' | head -1)
@@ -54,7 +65,9 @@ print(next(line.split()[-1] for line in open("/proc/self/maps") if "libcuda.so" 
     [ -n "$driver" ] && mkdir -p "$to/driver" && ln -sf "$driver" "$to/driver/libcuda.so"
   fi
   echo "export GENESIS_PATH=$to LD_LIBRARY_PATH=$to/driver:\${LD_LIBRARY_PATH:-}" > "$to/settings.sh"
+  rm -r "$kept"
 fi
-source "$to/settings.sh"
+if [ -f "$to/settings.sh" ]; then source "$to/settings.sh"; else echo "Genesis: $(ls "$kept" | wc -l) of $count parts are here"; fi
 UNPACK
-du -sh "$out/parts"
+done
+du -sh "$out"/parts/*

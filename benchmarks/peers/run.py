@@ -129,7 +129,8 @@ def genesis(args: argparse.Namespace, device: str, label: str) -> Iterator[gpu_s
 
 def common(args: argparse.Namespace, device: str) -> tuple[str, ...]:
     """Words of all cases of a device: while one of them is timed, the others wait."""
-    return "--rows", str(args.rows), "--lock", str(args.work / f"lock_{device}")
+    lock = ("--lock", str(args.work / f"lock_{device}"), "--patience", str(args.patience))
+    return "--rows", str(args.rows), *lock
 
 
 def on(device: str) -> dict[str, str]:
@@ -158,6 +159,9 @@ def parsed() -> argparse.Namespace:
     parser.add_argument("--genesis-python", help="a Python that has Genesis")
     parser.add_argument("--jobs", type=int, default=0, help="processes of ours at a time; 0: one for four processors")
     parser.add_argument("--genesis-jobs", type=int, default=3, help="Genesis' processes at a time")
+    parser.add_argument(
+        "--patience", type=float, default=0.0, help="seconds for which what is ready waits for what is being compiled"
+    )
     parser.add_argument("--only", nargs="*", default=[], help="only cases whose names contain all of these")
     parser.add_argument("--most-worlds", type=int, default=0, help="no case with more worlds; for a small machine")
     parser.add_argument("--genesis-cpu", action="store_true", help="Genesis on the processor, to try this program")

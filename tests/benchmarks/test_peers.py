@@ -88,7 +88,7 @@ def test_a_case_that_is_measured_is_not_measured_again(tmp_path):
 
     rows = tmp_path / "rows.jsonl"
     rows.write_text(json.dumps({"engine": "ig2mj", "worlds": 8192, "control_steps_per_s": 1} | ROW | {"worlds": 8192}))
-    args = argparse.Namespace(rows=rows, work=tmp_path, most_worlds=0, measured=run.measured(rows))
+    args = argparse.Namespace(patience=0.0, rows=rows, work=tmp_path, most_worlds=0, measured=run.measured(rows))
     names = [job.name for job in run.ours(args, {h: h for h in report.HOMES}, "0")]
     assert "ig2mj-birch-8192-physics" not in names
     assert names[0] == "mujoco_warp-birch-8192-physics" and "ig2mj-birch-8192-full" in names

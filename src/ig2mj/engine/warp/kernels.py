@@ -7,8 +7,10 @@ what they need is then compiled and loaded by as many threads as there are proce
 
 from __future__ import annotations
 
+import contextlib
 import os
-from collections.abc import Callable
+import pathlib
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import mujoco
@@ -112,6 +114,21 @@ def load(launches: list[Launch], device: str | None = None, workers: int | None 
     for block_dim, modules in by_size.items():
         for module in modules:
             module.get_module_hash(1 if on.is_cpu else block_dim)
-    for block_dim, modules in by_size.items():
-        wp.force_load(on, list(modules), block_dim=block_dim, max_workers=threads)
+    with _alone():
+        for block_dim, modules in by_size.items():
+            wp.force_load(on, list(modules), block_dim=block_dim, max_workers=threads)
     return sum(map(len, by_size.values()))
+
+
+@contextlib.contextmanager
+def _alone() -> Iterator[None]:
+    """Programs that start together compile in turn: the others find in the cache what the first has made."""
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError, ImportError):  # where there are no such locks each compiles for itself
+            import fcntl
+
+            folder = pathlib.Path(wp.config.kernel_cache_dir)
+            folder.mkdir(parents=True, exist_ok=True)
+            file = stack.enter_context((folder / ".compiling").open("a"))
+            fcntl.flock(file, fcntl.LOCK_EX)
+        yield
