@@ -127,6 +127,7 @@ def _alone() -> Iterator[None]:
         with contextlib.suppress(OSError, ImportError):  # where there are no such locks each compiles for itself
             import fcntl
 
+            assert wp.config.kernel_cache_dir is not None  # Warp has begun
             folder = pathlib.Path(wp.config.kernel_cache_dir)
             folder.mkdir(parents=True, exist_ok=True)
             file = stack.enter_context((folder / ".compiling").open("a"))
