@@ -78,7 +78,7 @@ def run(name: str, num_worlds: int, args: argparse.Namespace) -> dict:
 
 def prepared(name: str, num_worlds: int, args: argparse.Namespace) -> tuple[Any, Callable, Any]:
     """An environment, the compiled function of `CALL` agent steps, and the carry to begin with."""
-    options = {"profile": EngineProfile(*args.profile)} if args.profile else {}
+    options: dict[str, Any] = {"profile": EngineProfile(*args.profile)} if args.profile else {}
     env = ig2mj.make(
         name,
         robot=args.robot,
@@ -91,12 +91,12 @@ def prepared(name: str, num_worlds: int, args: argparse.Namespace) -> tuple[Any,
     )
     size = env.action_space.shape[0]
 
-    def agent_step(carry, _):
+    def agent_step(carry: Any, _: None) -> Any:
         state, action, key = carry
         key, draw, change = jax.random.split(key, 3)
         new = jax.random.uniform(draw, action.shape, minval=-1.0, maxval=1.0)
         action = jnp.where(jax.random.bernoulli(change, 1 / args.hold, (num_worlds, 1)), new, action)
-        after = env.step_autoreset_fn(state, action)
+        after: Any = env.step_autoreset_fn(state, action)
         info = {k: v for k, v in after.info.items() if k != "final_obs"}
         seen = after.reward.mean(), after.done.mean(), after.info["held"].mean(), after.terminated.mean()
         return (after.replace(info=info), action, key), seen
@@ -119,7 +119,7 @@ def prepared(name: str, num_worlds: int, args: argparse.Namespace) -> tuple[Any,
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("environments", nargs="+")
     parser.add_argument("--robot", default="humanoid")
     parser.add_argument("--grasping", default="mitten")
