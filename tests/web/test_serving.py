@@ -223,3 +223,14 @@ def test_stopping_ends_pages_and_frees_the_port():
             page.recv(timeout=10)
     access_for(None, server.port).listen().close()
     server.stop()
+
+
+def test_files_named_by_their_content_may_be_kept_and_nothing_else():
+    pages = Pages({"": b"page", "a-1.js": b"x" * 1000}, lasting=["a-1.js"])
+    with PageServer(access_for(None, 0), pages, echo) as server:
+        kept = {}
+        for path in ("/", "/a-1.js"):
+            with urllib.request.urlopen(f"{server.url}{path[1:]}", timeout=10) as answer:
+                kept[path] = answer.headers.get_all("Cache-Control"), answer.read()
+    assert kept["/"] == (["no-store"], b"page")
+    assert kept["/a-1.js"] == (["private, max-age=31536000, immutable"], b"x" * 1000)

@@ -25,7 +25,7 @@ import secrets
 import threading
 import time
 import urllib.parse
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Collection, Mapping
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 
@@ -168,11 +168,6 @@ class Gate:
         }
 
 
-def page_headers() -> dict[str, str]:
-    """What every answer says: nothing from other hosts, no guessing of types, no keeping."""
-    return dict(_HEADERS)
-
-
 class GuardedConnection(ServerConnection):
     """A web socket that ends itself when its page sends what no page sends, or too much of it."""
 
@@ -203,12 +198,18 @@ class GuardedConnection(ServerConnection):
 class Pages:
     """Files to serve, all read beforehand: no path of a request ever becomes a path of this machine."""
 
-    def __init__(self, files: Mapping[str, bytes], kinds: Mapping[str, str] | None = None):
-        """`files`: by path without the first slash, "" being the first page; `kinds`: content types."""
-        kinds = kinds or {}
+    def __init__(
+        self, files: Mapping[str, bytes], kinds: Mapping[str, str] | None = None, lasting: Collection[str] = ()
+    ):
+        """Args:
+        files: by path without the first slash, "" being the first page.
+        kinds: content types.
+        lasting: files whose names change with their content: browsers may keep them, and they are packed at once.
+        """
+        kinds, self._lasting = kinds or {}, frozenset(lasting)
         self._plain = {name: body for name, body in files.items()}
         self._kinds = {name: kinds.get(name) or content_type(name or "index.html") for name in files}
-        self._packed: dict[str, bytes] = {}
+        self._packed = {name: _pack(files[name]) for name in self._lasting}
 
     @classmethod
     def of_folder(cls, folder: str | os.PathLike) -> Pages:
@@ -227,13 +228,21 @@ class Pages:
         if name not in self._plain:
             return page(http.HTTPStatus.NOT_FOUND, b"there is no such page", "text/plain")
         body, kind = self._plain[name], self._kinds[name]
-        if "gzip" not in request.headers.get("Accept-Encoding", ""):
-            return page(http.HTTPStatus.OK, body, kind)
-        if name not in self._packed:
-            self._packed[name] = gzip.compress(body, 6, mtime=0)
-        answer = page(http.HTTPStatus.OK, self._packed[name], kind)
-        answer.headers["Content-Encoding"] = "gzip"
+        if "gzip" in request.headers.get("Accept-Encoding", ""):
+            if name not in self._packed:
+                self._packed[name] = _pack(body)
+            answer = page(http.HTTPStatus.OK, self._packed[name], kind)
+            answer.headers["Content-Encoding"] = "gzip"
+        else:
+            answer = page(http.HTTPStatus.OK, body, kind)
+        if name in self._lasting:
+            del answer.headers["Cache-Control"]
+            answer.headers["Cache-Control"] = "private, max-age=31536000, immutable"
         return answer
+
+
+def _pack(body: bytes) -> bytes:
+    return gzip.compress(body, 6, mtime=0)
 
 
 def content_type(name: str) -> str:

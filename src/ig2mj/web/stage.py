@@ -1,7 +1,7 @@
 """What pages see: the home as nodes of viser's scene, of which only what changed is sent.
 
-A body is a frame with what is drawn of it below; a pose is two short messages, geometry is sent once, and again only
-when its object's colour changes. Dust and stains hang on their bodies, so that they move for free.
+A body is a node with its geometry; a pose is two short messages, geometry is sent once, and again only when its
+object's colour changes. Dust and stains hang on their bodies, so that they move for free.
 
 Axis: B bodies.
 """
@@ -76,7 +76,7 @@ class Stage:
         owner = np.asarray(scene.tables.body_object)
         self._object_of = {body: int(owner[body]) for body in range(self._model.nbody)}
         self._prepare()
-        self._frames = {body: self._add_body(body) for body in sorted(self._geoms)}
+        self._nodes = {body: self._add_body(body) for body in sorted(self._geoms)}
         self._view(data)
 
     def _prepare(self) -> None:
@@ -109,21 +109,23 @@ class Stage:
     # Bodies.
 
     def _add_body(self, body: int) -> Any:
+        """One node has the pose and the geometry: a page takes 3 ms of processor time for each."""
         pose: dict[str, Any] = {"position": tuple(self._pos[body]), "wxyz": tuple(self._quat[body])}
-        frame = self._server.scene.add_frame(f"/b{body}", show_axes=False, **pose)
-        self._draw(body, PLAIN)
-        return frame
+        self._plain[body] = glb_of_geoms(self._model, self._geoms[body])
+        shown: dict[str, Any] = {"cast_shadow": False, "receive_shadow": False}
+        node = self._server.scene.add_glb(f"/b{body}", self._plain[body], **pose, **shown)
+        self.sent["geometries"] += 1
+        self._listen(body, node)
+        return node
 
     def _draw(self, body: int, look: Look) -> None:
-        """Sends a body's geometry; in place of the one that is there."""
-        if look == PLAIN and body in self._plain:
-            glb = self._plain[body]
-        else:
-            glb = glb_of_geoms(self._model, self._geoms[body], look)
-        if look == PLAIN:
-            self._plain[body] = glb
-        node = self._server.scene.add_glb(f"/b{body}/look", glb, cast_shadow=False, receive_shadow=False)
+        """Sends a body's geometry anew, with another look."""
+        plain, geoms = self._plain[body], self._geoms[body]
+        self._nodes[body].glb_data = plain if look == PLAIN else glb_of_geoms(self._model, geoms, look)
         self.sent["geometries"] += 1
+
+    def _listen(self, body: int, node: Any) -> None:
+        """Takes clicks on a body, and drags where it can move."""
         obj = self._object_of[body]
         if obj < 0 or self._scene.tables.object_categories[obj] in BUILDING:
             return
@@ -144,11 +146,11 @@ class Stage:
         """Sends the poses that changed, world frame; says how many."""
         good = np.isfinite(pos).all(1) & np.isfinite(quat).all(1)
         moved = good & (np.abs(pos - self._pos).max(1) > MOVED) | good & (np.abs(quat - self._quat).max(1) > MOVED)
-        bodies = [b for b in np.flatnonzero(moved).tolist() if b in self._frames]
+        bodies = [b for b in np.flatnonzero(moved).tolist() if b in self._nodes]
         with self._server.atomic():
             for body in bodies:
-                frame = self._frames[body]
-                frame.position, frame.wxyz = pos[body], quat[body]
+                node = self._nodes[body]
+                node.position, node.wxyz = pos[body], quat[body]
         self._pos[moved], self._quat[moved] = pos[moved], quat[moved]
         self.sent["poses"] += len(bodies)
         return len(bodies)

@@ -1,4 +1,4 @@
-"""viser behind our gate: the one module that knows viser's inside, and the reason why its version is pinned.
+"""viser behind our gate: with `client_page`, what knows viser's inside, and the reason why its version is pinned.
 
 viser has no notion of who may come in: it opens a port for everyone, takes what a page sends for granted, and a page
 may ask it to publish itself on the internet. So its server runs on our socket and behind `Gate`, and of its messages
@@ -23,10 +23,10 @@ import websockets.asyncio.server
 import websockets.datastructures
 import websockets.exceptions
 from websockets.asyncio.server import ServerConnection
-from websockets.http11 import Request, Response
 
 from ig2mj.web.access import Access
-from ig2mj.web.serving import Gate, page_headers
+from ig2mj.web.client_page import client_files
+from ig2mj.web.serving import Gate, Pages
 
 VERSION = "1.1.1"
 """Of viser, that this module was written for and tested with."""
@@ -138,15 +138,16 @@ def start_viser(access: Access, title: str) -> tuple[viser.ViserServer, Gate]:
     """
     elements: list[Callable[[str], Any]] = []
     gate = Gate(access, lambda message: check_message(message, elements[0] if elements else None))
+    files = client_files()
+    pages = Pages(files, lasting=[name for name in files if name])
     listening = access.listen()
 
     class Serve(websockets.asyncio.server.serve):
         """viser's call of websockets' server, on our socket and with the gate's options."""
 
         def __init__(self, handler: Any, host: str, port: int, **options: Any):
-            pages: Callable[[ServerConnection, Request], Response | None] = options["process_request"]
             kept = {"select_subprotocol": options["select_subprotocol"]}
-            super().__init__(handler, sock=listening, **kept, **gate.options(_without_cache(pages)))
+            super().__init__(handler, sock=listening, **kept, **gate.options(pages))
 
     module: Any = infra
     real = module.websockets
@@ -172,19 +173,3 @@ def stop_viser(server: viser.ViserServer) -> None:
     """Ends it, without a word on standard output."""
     with contextlib.redirect_stdout(io.StringIO()):
         server.stop()
-
-
-def _without_cache(
-    pages: Callable[[ServerConnection, Request], Response | None],
-) -> Callable[[ServerConnection, Request], Response | None]:
-    """viser's pages with the headers that every page of ours has."""
-
-    def answer(connection: ServerConnection, request: Request) -> Response | None:
-        response = pages(connection, request)
-        if response is not None:
-            for name, value in page_headers().items():
-                if name not in response.headers:
-                    response.headers[name] = value
-        return response
-
-    return answer
