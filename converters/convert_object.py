@@ -94,7 +94,7 @@ def convert_object(
 def _read(file: pathlib.Path, category: str, name: str, options: ConvertOptions) -> tuple[ObjectModel, Dataset | None]:
     """Reads the URDF, its metadata, and the dataset it lies in, if it does."""
     if not inputs.is_file(file):
-        raise InputError(file, "is no file", element="--urdf", fix="name an object's URDF")
+        raise InputError(file, "is not a file", element="--urdf", fix="name an object's URDF")
     if not name.strip() or not category.strip():
         raise InputError(file, "the object needs a category and a name", element="--category, --model")
     root = _dataset_root(file)

@@ -62,7 +62,7 @@ def shared_data() -> Path:
     """Folder of test data that stands beside the checkout; tests that need it are skipped where it is absent."""
     folder = REPOSITORY.parent / "shared" / "data"
     if not folder.is_dir():
-        pytest.skip(f"needs the test data in {folder}, which is no part of the repository")
+        pytest.skip(f"needs the test data in {folder}, which is not a part of the repository")
     return folder
 
 

@@ -75,7 +75,7 @@ class FileGuard:
         name = filename.strip().replace("\\", "/")
         said = shortened(name)
         if not name or any(ord(c) < 32 for c in name):
-            raise InputError(self.file, f"{shortened(filename)!r} is no file name", element=element)
+            raise InputError(self.file, f"{shortened(filename)!r} is not a file name", element=element)
         scheme = _SCHEME.match(name)
         if scheme and self.dataset:
             raise OutsideError(self.file, f"'{said}' is not below the dataset root", element=element)
@@ -134,7 +134,7 @@ class FileGuard:
 
 def _folder(path: str | os.PathLike, option: str) -> pathlib.Path:
     if not inputs.is_folder(path):
-        raise InputError(path, "is no folder", element=option)
+        raise InputError(path, "is not a folder", element=option)
     return inputs.real_path(path)
 
 

@@ -72,7 +72,7 @@ def content(path: Path) -> bytes:
     """A regular file's bytes. Raises OSError, also for a device or a pipe, on which reading might never end."""
     place = pathlib.Path(path)
     if place.exists() and not place.is_file():
-        raise OSError(errno.EINVAL, "is no regular file", str(place))
+        raise OSError(errno.EINVAL, "is not a regular file", str(place))
     raw = place.read_bytes()
     record = _active.get()
     if record is not None:

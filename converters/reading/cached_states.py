@@ -131,7 +131,7 @@ def _rounded(values: np.ndarray) -> list[float]:
 def _vector(values: Any) -> list[float]:
     vector = np.asarray(values, dtype=float)
     if vector.shape != (3,) or not np.all(np.isfinite(vector)):
-        raise ValueError(f"{values!r} is no position")
+        raise ValueError(f"{values!r} is not a position")
     return _rounded(vector)
 
 

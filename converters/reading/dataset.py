@@ -42,7 +42,7 @@ class Dataset:
         if not inputs.is_folder(self.root / "objects") and not inputs.is_folder(self.root / "scenes"):
             raise InputError(
                 root,
-                "is no dataset root: it has neither objects/ nor scenes/",
+                "is not a dataset root: it has neither objects/ nor scenes/",
                 fix="give the folder that holds VERSION, metadata/, objects/ and scenes/",
             )
         self.warnings: list[str] = []
@@ -209,7 +209,7 @@ class Dataset:
         """A path below the root, whatever the parts say. Raises OutsideError."""
         for part in parts:
             if not part or "/" in part or "\\" in part or part in (".", "..") or "\0" in part:
-                raise OutsideError(self.root, f"'{part}' is no name of a folder", element="/".join(parts))
+                raise OutsideError(self.root, f"'{part}' is not a name of a folder", element="/".join(parts))
         path = self.root.joinpath(*parts)
         if not inputs.real_path(path).is_relative_to(self.root):
             raise OutsideError(path, "a symbolic link leads outside the dataset root", fix="copy the files instead")
@@ -235,7 +235,7 @@ def _check_metadata(model: ObjectModel) -> None:
     """Warns of openable joints that the URDF has not."""
     for joint, _ in model.metadata.openable_joints:
         if joint not in model.joints:
-            model.warnings.append(f"metadata.json: openable joint '{joint}' is no joint of the URDF")
+            model.warnings.append(f"metadata.json: openable joint '{joint}' is not a joint of the URDF")
 
 
 def _filter(scene: SceneDescription, options: SceneOptions) -> None:

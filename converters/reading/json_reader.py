@@ -23,7 +23,7 @@ def decode_json(text: str | bytes, file: object, element: str = "") -> Any:
     except RecursionError as e:
         raise InputError(file, "is JSON that is nested too deeply", element=element) from e
     except ValueError as e:
-        raise InputError(file, f"is no valid JSON: {e}", element=element) from e
+        raise InputError(file, f"is not valid JSON: {e}", element=element) from e
 
 
 def read_json(file: str | os.PathLike, kind: type) -> Any:

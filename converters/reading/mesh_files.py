@@ -93,7 +93,7 @@ def _suffix(file: pathlib.Path) -> str:
     suffix = file.suffix.lower()
     if suffix not in FORMATS:
         raise MeshError(
-            file, f"'{suffix or file.name}' is no mesh format that is read", fix=f"use one of {', '.join(FORMATS)}"
+            file, f"'{suffix or file.name}' is not a supported mesh format", fix=f"use one of {', '.join(FORMATS)}"
         )
     return suffix
 
@@ -292,7 +292,7 @@ def _collada_frame(raw: bytes, file: pathlib.Path) -> tuple[np.ndarray, bytes]:
     if unit is not None and unit.get("meter") is not None:
         metres = parse_number(unit.get("meter").strip())
         if metres is None or metres <= 0:
-            raise MeshError(file, f"unit meter='{unit.get('meter')}' is no positive number")
+            raise MeshError(file, f"unit meter='{unit.get('meter')}' is not a positive number")
         turn[:3, :3] *= metres
     return turn, text.encode()
 
@@ -301,7 +301,7 @@ def _check_gltf_json(raw: bytes, file: pathlib.Path) -> None:
     try:
         json.loads(raw)
     except (ValueError, RecursionError) as e:
-        raise MeshError(file, f"is no glTF: {e}") from e
+        raise MeshError(file, f"is not a glTF file: {e}") from e
 
 
 @contextlib.contextmanager

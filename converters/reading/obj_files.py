@@ -49,7 +49,7 @@ def read_obj(file: pathlib.Path) -> ObjFile:
     if raw.startswith(b"version https://git-lfs"):
         raise MeshError(file, "is a Git LFS pointer, not the mesh", fix="run git lfs pull")
     if b"\0" in raw[:4096]:
-        raise MeshError(file, "is no OBJ: it is not text")
+        raise MeshError(file, "is not an OBJ file: it is not text")
     lines = raw.decode("utf-8", errors="replace").replace("\\\r\n", " ").replace("\\\n", " ").split("\n")
     del raw
     vertices: list[list[str]] = []
@@ -148,7 +148,7 @@ def _polygon(words: list[str], vertices: int, uvs: int, file: pathlib.Path, line
             i = int(first)
             j = int(second) if second else 0
         except ValueError:
-            raise MeshError(file, f"'{word[:40]}' is no corner of a face", element=f"line {line}") from None
+            raise MeshError(file, f"'{word[:40]}' is not a corner of a face", element=f"line {line}") from None
         i = i - 1 if i > 0 else vertices + i
         j = j - 1 if j >= 0 else uvs + j
         if not 0 <= i < vertices or first.strip("+-") in ("0", "00"):

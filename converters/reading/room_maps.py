@@ -69,7 +69,7 @@ def name_rooms(
         if not 1 <= value <= len(room_types):
             raise InputError(
                 file,
-                f"pixel value {value} is no line of room_categories.txt ({len(room_types)} lines)",
+                f"pixel value {value} is not a line of room_categories.txt ({len(room_types)} lines)",
                 element=f"room instance {room}",
             )
         kind = room_types[value - 1]
@@ -149,7 +149,7 @@ def _open(file: pathlib.Path) -> Image.Image:
     except InputError:
         raise
     except Exception as e:  # Pillow raises many kinds for broken images
-        raise InputError(file, f"is no image that can be read: {e}") from e
+        raise InputError(file, f"is not an image that can be read: {e}") from e
 
 
 def _resize_bilinear(image: np.ndarray, side: int) -> np.ndarray:

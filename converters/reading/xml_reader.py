@@ -53,7 +53,7 @@ def read_bytes(file: str | os.PathLike, limit: int) -> bytes:
     except OSError as e:
         raise InputError(file, f"cannot be read: {e.strerror or e}") from e
     except ValueError as e:  # a null byte in the name
-        raise InputError(repr(str(file)), f"is no file name: {e}") from e
+        raise InputError(repr(str(file)), f"is not a file name: {e}") from e
 
 
 def decode_xml(raw: bytes, file: object) -> str:
@@ -73,7 +73,7 @@ def decode_xml(raw: bytes, file: object) -> str:
     text = text.removeprefix("\ufeff")
     start = text.find("<")
     if start < 0:
-        raise InputError(file, "is no XML: it holds no '<'" if text.strip("\0 \r\n\t") else "is empty")
+        raise InputError(file, "is not XML: it holds no '<'" if text.strip("\0 \r\n\t") else "is empty")
     text = "\n" * text.count("\n", 0, start) + text[start:]
     text = _DECLARATION.sub(_only_newlines, text, count=1)
     text = _COMMENT.sub(_only_newlines, text)
@@ -115,7 +115,7 @@ def read_xml(
     try:
         root = etree.fromstring(text.encode("utf-8", errors="replace"), parser)
     except etree.XMLSyntaxError as e:
-        raise InputError(file, f"is no XML: {e.msg}", element=f"line {e.lineno}") from e
+        raise InputError(file, f"is not XML: {e.msg}", element=f"line {e.lineno}") from e
     for entry in parser.error_log:
         if entry.type_name not in _HARMLESS:
             raise InputError(file, f"is broken or truncated XML: {entry.message}", element=f"line {entry.line}")
@@ -123,7 +123,7 @@ def read_xml(
             warnings.append(f"content after the root element (line {entry.line}) was ignored")
     tags = (root_tag,) if isinstance(root_tag, str) else root_tag
     if root is None:
-        raise InputError(file, "is no XML: it has no root element")
+        raise InputError(file, "is not XML: it has no root element")
     if local_name(root) not in tags:
         raise InputError(file, f"the root element is <{local_name(root)}>, not <{tags[0]}>", element=where(root))
     return root
@@ -195,7 +195,9 @@ def numbers(
     values = [parse_number(w) for w in words]
     for word, value in zip(words, values, strict=True):
         if value is None:
-            raise InputError(file, f"{attribute}: '{shortened(word, 40)}' is no finite number", element=where(element))
+            raise InputError(
+                file, f"{attribute}: '{shortened(word, 40)}' is not a finite number", element=where(element)
+            )
     return np.array(values, dtype=float)
 
 

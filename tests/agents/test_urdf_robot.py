@@ -155,7 +155,7 @@ def test_files_that_are_none_are_refused(folder, tmp_path):
         UrdfRobot.load(tmp_path)
     broken = tmp_path / "layout.toml"
     broken.write_text("arm = [")
-    with pytest.raises(InputError, match="is no TOML"):
+    with pytest.raises(InputError, match="is not TOML"):
         UrdfRobot.load(folder, broken)
     json = tmp_path / "layout.json"
     json.write_text('{"arm": ["wrist"]}')

@@ -45,7 +45,7 @@ def test_a_file_of_ones_own(tmp_path, capsys):
     assert set(shown["binding"]["objects"]) == {"apple.n.01_1"}
     file.write_text(text.format("\n(sliced appel.n.01_1)"))
     assert call(["activity", "show", str(file)]) == 2
-    assert "mine.bddl: line 2: 'appel.n.01_1': is no object of :objects" in capsys.readouterr().err
+    assert "mine.bddl: line 2: 'appel.n.01_1': is not an object of :objects" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

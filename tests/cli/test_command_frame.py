@@ -135,6 +135,24 @@ def test_help_tells_defaults_but_not_those_that_say_nothing(command, capsys):
     assert "None" not in out and "--file PATH" in out
 
 
+def test_a_help_text_is_folded_anew_wherever_its_source_breaks_lines(command, capsys):
+    def run(number: int = 7, other: int = 8) -> None:
+        """Does it.
+
+        Args:
+          number: at most
+            15 of them (see
+            there).
+          other: one
+            more.
+        """
+
+    command(run)
+    assert cli.call(["probe", "--help"]) == 0
+    out = " ".join(capsys.readouterr().out.replace("│", " ").split())
+    assert "at most 15 of them (see there). (default: 7)" in out and "one more. (default: 8)" in out
+
+
 def test_nested_commands_are_found_listed_and_corrected(command, capsys):
     def scene(name: str = "a") -> None:
         """Does a scene."""
@@ -152,7 +170,7 @@ def test_nested_commands_are_found_listed_and_corrected(command, capsys):
 
 def test_an_unknown_command_suggests_near_ones(capsys):
     assert cli.call(["doktor"]) == 2
-    assert capsys.readouterr().err == "error: 'doktor' is no command (did you mean doctor?)\n"
+    assert capsys.readouterr().err == "error: 'doktor' is not a command (did you mean doctor?)\n"
     assert cli.call(["zzzz"]) == 2
     assert "`ig2mj --help` lists them" in capsys.readouterr().err
 

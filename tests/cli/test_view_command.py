@@ -72,11 +72,18 @@ def test_contradictions_are_one_line_and_status_2(can_draw, tiny_home_folder, tm
 
 
 @pytest.mark.parametrize(
-    ("file", "says"), [("a.doc", "no kind of picture"), ("none/a.png", "does not exist"), ("a", "no kind of picture")]
+    ("file", "says"),
+    [("a.doc", "not a picture format"), ("none/a.png", "does not exist"), ("a", "not a picture format")],
 )
 def test_a_picture_file_that_cannot_be_written_is_told_before_loading(tiny_home_folder, tmp_path, capsys, file, says):
     assert cli.call(["view", str(tiny_home_folder), "--picture", str(tmp_path / file)]) == 2
     assert says in capsys.readouterr().err
+
+
+def test_a_file_that_is_no_scene_is_named(tmp_path, capsys):
+    (tmp_path / "notes.txt").write_text("hello")
+    assert cli.call(["view", str(tmp_path / "notes.txt")]) == 2
+    assert "notes.txt: is not a file of a converted scene" in capsys.readouterr().err
 
 
 def test_a_missing_scene_is_status_2(tmp_path, capsys):

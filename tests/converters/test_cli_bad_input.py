@@ -70,7 +70,7 @@ def complaint(capsys: pytest.CaptureFixture) -> str:
 CASES: dict[str, tuple[str, str | bytes, str]] = {
     # scene files
     "scene: empty": (SCENE, b"", "is empty"),
-    "scene: no XML": (SCENE, "hello", "no XML"),
+    "scene: no XML": (SCENE, "hello", "not XML"),
     "scene: truncated": (SCENE, WORLD[:40], "line 1.*truncated"),
     "scene: entity expansion": (SCENE, '<!DOCTYPE r [<!ENTITY a "b">]><robot>&a;</robot>', "entities"),
     "scene: external entity": (SCENE, '<!DOCTYPE r [<!ENTITY a SYSTEM "file:///etc/passwd">]><robot/>', "entities"),
@@ -115,7 +115,7 @@ CASES: dict[str, tuple[str, str | bytes, str]] = {
     "urdf: mesh outside": (URDF, OBJECT.format(LINK.format("../../../../x.obj")), "base_link.*outside the dataset"),
     "urdf: mesh absolute": (URDF, OBJECT.format(LINK.format("/etc/passwd")), "base_link.*absolute"),
     "urdf: mesh at an address": (URDF, OBJECT.format(LINK.format("http://x.invalid/c.obj")), "base_link.*dataset root"),
-    "urdf: mesh format unknown": (URDF, OBJECT.format(LINK.format("c.fbx")), "c.fbx.*no mesh format"),
+    "urdf: mesh format unknown": (URDF, OBJECT.format(LINK.format("c.fbx")), "c.fbx.*not a supported mesh format"),
     "urdf: mesh scale zero": (
         URDF, OBJECT.format(LINK.format("c.obj").replace("c.obj\"", 'c.obj" scale="1 0 1"')), "base_link.*flat",
     ),
@@ -131,16 +131,16 @@ CASES: dict[str, tuple[str, str | bytes, str]] = {
     "obj: million faces": (MESH, SQUARE + "f 1 2 3\n" * 1_000_001, "faces.*limit"),
     "obj: Git LFS pointer": (MESH, "version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "git lfs pull"),
     # JSON and images
-    "metadata: broken": (META, '{"bbox_size": [1,', "no valid JSON"),
+    "metadata: broken": (META, '{"bbox_size": [1,', "not valid JSON"),
     "metadata: NaN": (META, '{"bbox_size": [NaN, 1, 1]}', "bbox_size.*not finite"),
     "metadata: size zero": (META, '{"bbox_size": [0, 1, 1]}', "bbox_size.*not positive"),
     "metadata: a list": (META, "[]", "list instead of"),
-    "metadata: deep": (META, "[" * 100_000, "nested too deeply|no valid JSON"),
-    "specs: broken": (SPECS, "{", "no valid JSON"),
+    "metadata: deep": (META, "[" * 100_000, "nested too deeply|not valid JSON"),
+    "specs: broken": (SPECS, "{", "not valid JSON"),
     "specs: negative density": (SPECS, '{"cup": {"density": -1}}', "category 'cup'.*not positive"),
     "overlaps: no pairs": (OVERLAPS, '[["cup_0"]]', "entry 0"),
-    "rooms: no image": (SEMANTIC, b"\x89PNG no", "no image"),
-    "rooms: empty image": (INSTANCES, b"", "no image"),
+    "rooms: no image": (SEMANTIC, b"\x89PNG no", "not an image"),
+    "rooms: empty image": (INSTANCES, b"", "not an image"),
 }  # fmt: skip
 
 
@@ -160,9 +160,9 @@ def test_at_least_forty_kinds_are_tried():
 
 
 ARGUMENTS = {
-    "dataset is no folder": (["--dataset", "/nowhere/at/all"], "no dataset root"),
+    "dataset is not a folder": (["--dataset", "/nowhere/at/all"], "not a dataset root"),
     "scene unknown": (["--scene", "s_in"], "s_int"),
-    "scene leads upwards": (["--scene", "../../etc"], "no name of a folder"),
+    "scene leads upwards": (["--scene", "../../etc"], "not a name of a folder"),
     "scene file missing": (["--urdf", "no.urdf"], "no.urdf"),
     "room unknown": (["--only-rooms", "sauna"], "sauna"),
     "no jobs": (["--jobs", "0"], "--jobs"),

@@ -252,7 +252,7 @@ def test_what_was_not_used_for_longest_goes_first(tmp_path):
 
 def test_pipes_are_not_waited_for(tmp_path):
     os.mkfifo(tmp_path / "pipe.png")
-    with pytest.raises(OSError, match="no regular file"):
+    with pytest.raises(OSError, match="not a regular file"):
         inputs.content(tmp_path / "pipe.png")
 
 

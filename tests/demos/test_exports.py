@@ -162,7 +162,7 @@ def test_foreign_and_tampered_logs_of_igibson_end_in_one_line(recorded, tmp_path
     for spoil, named in (
         (claimed, "physics_data/0/position: claims 1000000000 frames"),
         (short, "physics_data: have"),
-        (outside, "physics_data/0/position: is no table"),
+        (outside, "physics_data/0/position: is not a table"),
     ):
         copy.write_bytes(file.read_bytes())
         with h5py.File(copy, "a") as opened:

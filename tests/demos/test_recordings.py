@@ -231,7 +231,7 @@ def spoil(opened, what, tmp_path):
         ("missing", r"frames/states/temperature: is missing"),
         ("unnamed", r"run_000000/frames/states/temperature: is missing"),
         ("rows", r"run_00000\d/steps/action: has 3 rows, and the index names others"),
-        ("text", r"frames/key: is no array of numbers"),
+        ("text", r"frames/key: is not an array of numbers"),
         ("shape", r"run_000000/frames/states/wetness: is float32\[3\], must be float32\[\d+\]"),
         ("outside", r"frames/flags: is missing"),
         ("claimed", r"run_000001/attribute frames: claims 1000000000 frames, and 13 are there"),

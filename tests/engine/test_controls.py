@@ -32,7 +32,7 @@ def test_wrong_numbers_are_clipped_and_flagged(full, tmp_path, monkeypatch):
     physics, _ = full.run(physics, 20, ctrl)
     assert np.asarray(full.engine.health(physics).wrong_controls).tolist() == [False, True]
     row = full.engine.snapshot(physics)
-    assert np.asarray(row.ctrl) == pytest.approx(np.array([[0.1, 0, 0]] * 2)), "what is no number changes nothing"
+    assert np.asarray(row.ctrl) == pytest.approx(np.array([[0.1, 0, 0]] * 2)), "what is not a number changes nothing"
     ctrl[1] = [np.inf, -1e30, 1e7]
     physics, view = full.run(physics, 1, ctrl)
     assert np.asarray(full.engine.snapshot(physics).ctrl)[1].tolist() == [1e6, -1e6, 1e6]

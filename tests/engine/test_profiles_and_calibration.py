@@ -60,8 +60,8 @@ def test_no_more_can_be_awake_than_there_is(tiny_home):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("awake", "is no engine profile"),
-        ("[]", "is no engine profile"),
+        ("awake", "is not an engine profile"),
+        ("[]", "is not an engine profile"),
         ('{"awake_dofs": 12}', "missing required field `constraints`"),
         ('{"awake_dofs": "x", "constraints": 1, "contacts": 1, "convex_contacts": 1}', "Expected `int`"),
         (
@@ -199,4 +199,6 @@ def test_the_command_names_what_it_cannot_take(capsys):
     assert cli.call(["calibrate"]) != 0
     assert "name at least one scene" in capsys.readouterr().err
     assert cli.call(["calibrate", "aspen", "--rounds", "0"]) != 0
-    assert "--rounds must be at least 1" in capsys.readouterr().err
+    assert "--rounds at least 1" in capsys.readouterr().err
+    assert cli.call(["calibrate", "aspen", "--safety", "nan"]) != 0, "it would ruin a profile that ships"
+    assert "--safety must be finite" in capsys.readouterr().err

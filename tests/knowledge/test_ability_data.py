@@ -285,7 +285,7 @@ def test_heat_source_and_cold_source_together_leave_the_alphabetically_first(tmp
     [
         ("{", "truncated|malformed"),
         ({"categorys": {}}, "categorys"),
-        ({"categories": {"apple": {"sliceabel": {}}}}, "'apple': sliceabel: is no ability"),
+        ({"categories": {"apple": {"sliceabel": {}}}}, "'apple': sliceabel: is not an ability"),
         ({"categories": {"apple": {"sliceable": {"force": 3}}}}, "no parameter 'force'.*slice_force"),
         ({"models": {"apple/a": {"sliceable": {"slice_force": "3"}}}}, "Expected"),
         ({"models": {"oven/a": {"heatSource": {"requires_inside": 1}}}}, "requires_inside.*true or false"),

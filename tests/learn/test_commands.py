@@ -38,9 +38,17 @@ def test_wrong_options_name_what_is_near(capsys):
         (["train", "CookingMeat", "--obs", "rgb"], "near matches: rgbd"),
         (["train", "CookingMeat", "--set", "updatez=3"], "updates"),
         (["train", "CookingMeat", "--algo", "bc"], "needs --demos"),
+        (["train", "CookingMeat", "--minutes", "nan"], "--minutes nan"),
+        (["train", "CookingMeat", "--until", "7"], "--until 7.0: a share"),
+        (["train", "CookingMeat", "--pixels", "0"], "--pixels 0"),
         (["evaluate", "CookingMeet"], "no policy is named"),
         (["evaluate", "no/such.npz"], "there is no such file"),
         (["rollout", "CookingMeat", "--agent", "expart"], "near matches: expert"),
+        (["rollout", "CookingMeat", "--pool-size", "-1"], "at least one start state"),
+        (["rollout", "CookingMeat", "--video", "a.doc"], "not a film format"),
+        (["rollout", "CookingMeat", "--record", "no/such.h5"], "folder no does not exist"),
+        (["demos", "collect", "CookingMeat", "--out", "a.h5", "--noise", "nan"], "--noise nan"),
+        (["demos", "collect", "CookingMeat", "--out", "a.h5", "--disturbed", "4"], "--disturbed 4.0"),
     ):
         assert call(arguments) == 2, arguments
         assert told in capsys.readouterr().err, arguments

@@ -215,7 +215,7 @@ def test_a_policy_for_something_else_is_refused_with_the_pair_that_differs(done,
     with pytest.raises(InputError, match='grasping = "sticky", and here it is ""'):
         policy.check(env, trained.perception)
     (tmp_path / "broken.npz").write_bytes(b"PK\x03\x04nothing")
-    with pytest.raises(InputError, match="is no policy"):
+    with pytest.raises(InputError, match="is not a policy"):
         Policy.load(tmp_path / "broken.npz")
 
 

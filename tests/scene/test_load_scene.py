@@ -130,7 +130,7 @@ def test_a_colliding_plane_is_refused_by_name(tmp_path):
     (tmp_path / "scene.xml").write_text(
         text.replace(box, '<geom name="floor/collision_0" type="plane" size="2 2 0.05" pos="0 0 0"')
     )
-    with pytest.raises(ManifestError, match=r"geom 'floor/collision_0' of scene\.xml: collides and is no box"):
+    with pytest.raises(ManifestError, match=r"geom 'floor/collision_0' of scene\.xml: collides and is not a box"):
         ig2mj.load_scene(tmp_path)
 
 

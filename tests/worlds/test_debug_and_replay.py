@@ -150,8 +150,8 @@ def test_the_command_writes_a_picture_and_a_video(can_draw, dump, bare, tmp_path
     [
         (["--dump", "absent.npz", "--picture", "a.png"], "cannot be read"),
         (["--video", "a.mp4"], "--video belongs to --dump"),
-        (["--dump", "{dump}", "--video", "a.txt"], "is no kind of picture"),
-        (["--dump", "{dump}", "--video", "a.png"], "is no kind of video"),
+        (["--dump", "{dump}", "--video", "a.txt"], "is not a picture format"),
+        (["--dump", "{dump}", "--video", "a.png"], "is not a video format"),
         (["--dump", "{dump}", "--video", "a.gif", "--picture", "a.png"], "goes with one of"),
         (["--dump", "{dump}", "--picture", "a.png", "--seconds", "1"], "without --seconds"),
     ],

@@ -101,26 +101,26 @@ def broken(pool: Pool, file, kind: str, scene: ig2mj.Scene) -> str:
         return "cannot be read"
     if kind == "text":
         file.write_text("pool")
-        return "is no npz archive"
+        return "is not an npz archive"
     if kind == "cut":
         file.write_bytes(data[: len(data) // 2])
-        return "is no npz archive"
+        return "is not an npz archive"
     if kind == "damaged":
         file.write_bytes(bytes(b ^ 0x55 if 400 < k < 900 else b for k, b in enumerate(data)))
         return "damaged"
     if kind == "array":
         with file.open("wb") as out:
             np.save(out, np.zeros(3))
-        return "is no npz archive"
+        return "is not an npz archive"
     if kind == "foreign":
         np.savez(file, a=np.zeros(3))
-        return "is no archive of this project"
+        return "is not an archive of this project"
     if kind == "version":
         save_tree(file, pool, {"kind": "pool", "format_version": 99, "scene": "tiny_home"})
-        return "is no pool of format"
+        return "is not a pool of format"
     if kind == "dump":
         save_tree(file, pool, {"kind": "dump", "format_version": 1, "scene": "tiny_home"})
-        return "is no pool of format"
+        return "is not a pool of format"
     if kind == "scene":
         manifest = copy.copy(scene.manifest)
         manifest.name = "palace"

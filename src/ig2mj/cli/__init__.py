@@ -50,28 +50,28 @@ from ig2mj.install_hint import pip_install_module
 #: Sub-command -> what it does, in the order of `ig2mj --help`. The module is `ig2mj.cli.<sub-command>`, a
 #: hyphen in it an underscore.
 COMMANDS: dict[str, str] = {
-    "demo": "convert the small home, run it, tell what stands where, cook a fish in it",
-    "convert": "turn an iGibson scene, or the URDF of an object or a robot, into MJCF",
+    "demo": "convert a small home, simulate it, cook a fish in it; let a robot cook",
+    "convert": "convert iGibson scenes and URDF objects and robots to MJCF",
     "view": "open a scene in MuJoCo's viewer, or write a picture of it",
-    "web": "show a scene, a task or a recording in the browser, on machines without a display",
+    "web": "show a scene, an environment or a recording in the browser",
     "inspect": "list a scene's objects, joints, abilities and rooms",
     "states": "list the extended states of a scene's objects",
-    "predicates": "tell what holds in a scene, or what an expression still lacks",
+    "predicates": "show which predicates are true of a scene, or what an expression still lacks",
     "calibrate": "measure the batched engine's buffers for a scene",
-    "warm-up": "compile all that a batch of worlds needs, to be kept and taken to other machines",
+    "warm-up": "compile everything a batch of worlds needs, for this or other machines",
     "sample": "sample initial states in which conditions hold, as a pool for batched resets",
-    "activity": "list BEHAVIOR's activities, what each asks for in a home, and sample its starts",
-    "list-envs": "list the environments, and which robots can do what in them",
+    "activity": "list BEHAVIOR's activities, show what each requires, sample its start states",
+    "list-envs": "list the environments and the robots that can do them",
     "play": "drive a robot in an environment by keyboard and mouse",
-    "rollout": "play episodes of an environment, and tell how they ended",
+    "rollout": "play episodes of an environment and report how they ended",
     "train": "train a policy in an environment",
-    "evaluate": "tell how often a policy succeeds from states it has not seen",
-    "policies": "list trained policies that ship, show a model card, add a run as one of them",
+    "evaluate": "measure how often a policy succeeds from start states it has not seen",
+    "policies": "list the trained policies that ship, show their model cards, add one",
     "vr": "do a task yourself, in a headset or with mouse and keyboard",
-    "demos": "collect demonstrations of scripted experts, and replay recordings",
-    "sample-task": "sample an environment's start states, and keep them in the cache",
-    "homes": "build our own dataset of household objects and homes",
-    "doctor": "tell what this machine can run, and how to fix what it cannot",
+    "demos": "collect demonstrations of scripted experts; replay, export and measure recordings",
+    "sample-task": "sample an environment's start states and store them in the cache",
+    "homes": "list, build, convert and draw the homes that come with ig2mj",
+    "doctor": "show what this machine can run, and how to fix what it cannot",
 }
 
 _USAGE = "usage: ig2mj [--debug] [--version] COMMAND ..."
@@ -190,7 +190,7 @@ def _help() -> str:
     lines += [
         "",
         "`ig2mj COMMAND --help` lists a command's options;",
-        "`ig2mj doctor` tells what this machine can run.",
+        "`ig2mj doctor` shows what this machine can run.",
     ]
     return "\n".join(lines)
 
@@ -212,5 +212,5 @@ def _nested_help(name: str, doc: str | None, subcommands: Mapping[str, Callable[
 def _unknown(kind: str, name: str, known: Mapping[str, Any], help_command: str) -> int:
     near = difflib.get_close_matches(name, list(known), n=3, cutoff=0.5)
     hint = f"did you mean {' or '.join(near)}?" if near else f"`{help_command}` lists them"
-    print(f"error: '{name}' is no {kind} ({hint})", file=sys.stderr)
+    print(f"error: '{name}' is not a {kind} ({hint})", file=sys.stderr)
     return 2

@@ -21,7 +21,7 @@ def list_(behavior1k: Flag = False, json: Flag = False) -> None:
     """List the activities, and the shipped homes in which each can be done.
 
     Args:
-      behavior1k: those of BEHAVIOR-1K (fetch them first) instead of BEHAVIOR-100.
+      behavior1k: list BEHAVIOR-1K's activities instead of BEHAVIOR-100's; run `ig2mj activity fetch` first.
       json: print JSON instead of a table.
     """
     from ig2mj.cli.printing import make_table, print_json, stdout_console
@@ -64,7 +64,7 @@ def list_(behavior1k: Flag = False, json: Flag = False) -> None:
 
 
 def show(
-    name: Annotated[str, tyro.conf.Positional],
+    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ACTIVITY")],
     scene: Annotated[str | None, tyro.conf.arg(metavar="HOME")] = None,
     behavior1k: Flag = False,
     pool: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="POOL.npz")] = None,
@@ -72,17 +72,17 @@ def show(
     picture: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     json: Flag = False,
 ) -> int:
-    """Tell what an activity asks for, and which objects of a home play it; or what is still false in a row of a pool.
+    """Show what an activity requires and which objects of a home it uses; or what is still false in a row of a pool.
 
     Exit status 1 when it cannot be bound in the home (without --scene: in any that ships).
 
     Args:
-      name: of the activity, or a BDDL file of your own.
-      scene: the home; default the shipped one in which the least has to be added.
-      behavior1k: of BEHAVIOR-1K instead of BEHAVIOR-100: some names occur in both.
-      pool: of initial states that `ig2mj activity sample` made: tell what of the goal is still false in one.
-      row: of the pool.
-      picture: write a picture of the row, too.
+      name: the activity's name, or a BDDL file of your own.
+      scene: the home; default: the shipped home that needs the fewest additional objects.
+      behavior1k: look the name up in BEHAVIOR-1K instead of BEHAVIOR-100; some names occur in both.
+      pool: a pool made by `ig2mj activity sample`; show which goal conditions are still false in one of its rows.
+      row: which row of the pool.
+      picture: also write a picture of that row.
       json: print JSON instead of text.
     """
     from ig2mj.cli.activity_pools import show_row

@@ -18,7 +18,7 @@ Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
 
 
 def sample(
-    name: Annotated[str, tyro.conf.Positional],
+    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ACTIVITY")],
     scene: Annotated[str | None, tyro.conf.arg(metavar="HOME")] = None,
     count: int = 16,
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="POOL.npz")] = None,
@@ -31,19 +31,20 @@ def sample(
 ) -> int:
     """Sample initial states of an activity, and write them as a pool for batched resets.
 
-    Exit status 0 only if all rows were made; else the reasons are counted. Rows in which the goal holds already are
-    named.
+    The exit status is 0 only if every row was sampled; otherwise the reasons for failure are counted. Rows in which
+    the goal already holds are listed.
 
     Args:
-      name: of the activity, or a BDDL file of your own.
-      scene: the home; default: the shipped one in which the least has to be added, and a start can be sampled.
-      count: rows.
-      out: the file; default: NAME.npz in the working directory.
+      name: the activity's name, or a BDDL file of your own.
+      scene: the home; default: the shipped home that needs the fewest additional objects and where a start can be
+        sampled.
+      count: number of rows.
+      out: output file; default: NAME.npz in the working directory.
       seed: the same seed gives the same pool.
-      jobs: processes; 0: one per processor.
-      cluster: do it on a Ray cluster: its address, or auto.
-      resume: go on with a run that was broken off.
-      behavior1k: of BEHAVIOR-1K instead of BEHAVIOR-100.
+      jobs: number of processes; 0: one per processor.
+      cluster: run on a Ray cluster: its address, or auto.
+      resume: continue an interrupted run.
+      behavior1k: look the name up in BEHAVIOR-1K instead of BEHAVIOR-100.
       json: print the result as JSON.
     """
     from ig2mj.cli.bindings import binding_as_text, find_homes

@@ -10,7 +10,7 @@ import tyro
 
 
 def run(
-    scenes: Annotated[tuple[pathlib.Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="SCENE...")],
+    scenes: Annotated[tuple[pathlib.Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="SCENE...")] = (),
     engine: Literal["auto", "warp", "native"] = "auto",
     worlds: int = 0,
     rounds: int = 6,
@@ -25,25 +25,26 @@ def run(
 
     Args:
       scenes: folders of converted scenes, or names of homes that come with ig2mj.
-      engine: what to measure with; auto takes warp where JAX has a GPU.
-      worlds: measured side by side; 0: 1,024 on warp, 16 on native.
-      rounds: of two simulated seconds each.
-      seed: of the disturbance.
-      safety: factor on all sizes; 0: 1 for warp, 1.4 for native.
-      hand: let a floating hand push objects about.
-      robot: what disturbs the scene: a hand that pushes, or a robot that acts at random, whose profile has its name.
-      out: folder; profiles go to OUT/<scene's name>/ instead of beside the manifests.
+      engine: engine to measure with; auto: warp where JAX has a GPU, else native.
+      worlds: number of worlds measured side by side; 0: 1,024 on warp, 16 on native.
+      rounds: number of rounds, two simulated seconds each.
+      seed: random seed of the disturbance.
+      safety: factor applied to all sizes; 0: 1 for warp, 1.4 for native.
+      hand: let a floating hand push objects around.
+      robot: what disturbs the scene: a pushing hand, or a robot that acts at random (the profile is named after it).
+      out: write profiles to OUT/<scene's name>/ instead of beside the manifests.
       json: print the profiles as JSON, by scene.
     """
-    from ig2mj.calibration.measuring import calibrate
-    from ig2mj.cli.printing import add_bar, print_json, progress_bar, stdout_console
-    from ig2mj.engine.warp.profile import profile_file, save_profile
     from ig2mj.errors import Ig2mjError
 
     if not scenes:
         raise Ig2mjError("name at least one scene: a folder that `ig2mj convert` wrote, or a home that ships")
-    if worlds < 0 or rounds < 1 or safety < 0:
-        raise Ig2mjError("--worlds and --safety must not be negative, --rounds must be at least 1")
+    if worlds < 0 or rounds < 1 or not 0 <= safety < float("inf"):
+        raise Ig2mjError("--worlds and --safety must be finite and not negative, --rounds at least 1")
+    from ig2mj.calibration.measuring import calibrate
+    from ig2mj.cli.printing import add_bar, print_json, progress_bar, stdout_console
+    from ig2mj.engine.warp.profile import profile_file, save_profile
+
     profiles = {}
     for scene in scenes:
         loaded, reach = _with_hand(scene, hand) if robot == "hand" else (_with_robot(scene, robot), None)

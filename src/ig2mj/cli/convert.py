@@ -34,21 +34,22 @@ def convert_scene(
     assets: Annotated[str, tyro.conf.arg(metavar="DIR")] = ".",
     common: Annotated[Common, tyro.conf.OmitArgPrefixes] = DEFAULTS,
 ) -> int:
-    """Converts a scene of a dataset in iGibson's layout: OUT/scene.xml, manifest.json, meshes/, rooms.npz, report.html.
+    """Convert a scene of a dataset in iGibson's layout: OUT/scene.xml, manifest.json, meshes/, rooms.npz, report.html.
 
-    Exit status: 0 converted; 2 bad input, one line on stderr; 3 converted without the models that were missing.
+    Exit status: 0 converted; 2 bad input, one line on stderr; 3 converted, but missing models were skipped.
 
     Args:
       dataset: root of the dataset (holds objects/, scenes/ and metadata/).
       scene: name of a folder in scenes/.
-      out: folder for the result; an earlier result there is replaced when everything went well.
-      urdf: scene file to use instead of the default one.
+      out: output folder; an earlier result there is replaced once the conversion succeeds.
+      urdf: scene file to use instead of the scene's default one.
       skip_missing: leave out models that the dataset lacks.
       fixed_furniture: fix cabinets, shelves, tables and desks to the floor, as BEHAVIOR does.
-      only_rooms: keep objects of these rooms (kitchen_0) or kinds of room (kitchen); building parts always stay.
-      only_categories: keep objects of these categories; building parts always stay.
+      only_rooms: keep objects of these rooms (kitchen_0) or kinds of room (kitchen); building parts are always kept.
+      only_categories: keep objects of these categories; building parts are always kept.
       ceiling_collision: let ceilings collide.
-      keep_hovering: start loose objects exactly where the source has them; by default those in mid-air are let down.
+      keep_hovering: start loose objects exactly where the source has them; by default those in mid-air are lowered
+        onto their support.
       assets: folder for meshes/ and textures/, relative to OUT, that several scenes may share (e.g. "..").
     """
     from ig2mj_converters.conversion import convert_scene as convert
@@ -78,18 +79,18 @@ def convert_object(
     package_path: Annotated[tuple[pathlib.Path, ...], tyro.conf.arg(metavar="DIR")] = (),
     common: Annotated[Common, tyro.conf.OmitArgPrefixes] = DEFAULTS,
 ) -> int:
-    """Converts one URDF object, iGibson's or any other: OUT/object.xml, manifest.json, meshes/, report.html.
+    """Convert one URDF object, iGibson's or any other: OUT/object.xml, manifest.json, meshes/, report.html.
 
     Exit status: 0 converted; 2 bad input, one line on stderr.
 
     Args:
       urdf: the object's URDF.
-      category: what it is, in iGibson's names (apple, fridge, ...): decides what it can do.
-      out: folder for the result; an earlier result there is replaced when everything went well.
-      model: name of the object; default the file's.
-      bbox: wanted size in the axes of its base link, metres; default the size it has.
-      mesh_root: folder below which meshes may lie that the URDF names by ../ or by an absolute path.
-      package_path: folders with the packages of `package://` names.
+      category: its category in iGibson's taxonomy (apple, fridge, ...), which decides its abilities.
+      out: output folder; an earlier result there is replaced once the conversion succeeds.
+      model: name of the object; default: the file's name.
+      bbox: requested size along the axes of the base link, metres; default: the size it has.
+      mesh_root: additional folder from which meshes may be read (URDFs that use ../ or absolute paths).
+      package_path: folders that hold the packages of `package://` names.
     """
     from ig2mj_converters.conversion import convert_object as convert
 
@@ -107,16 +108,16 @@ def convert_robot(
     package_path: Annotated[tuple[pathlib.Path, ...], tyro.conf.arg(metavar="DIR")] = (),
     common: Annotated[Common, tyro.conf.OmitArgPrefixes] = DEFAULTS,
 ) -> int:
-    """Converts a robot's URDF: OUT/object.xml, robot.json, meshes/; for `UrdfRobot.load(OUT)` in Python.
+    """Convert a robot's URDF: OUT/object.xml, robot.json, meshes/; for `UrdfRobot.load(OUT)` in Python.
 
     `ig2mj rollout` and `ig2mj view` take the URDF itself (`--robot-urdf`). Exit status: 0 converted; 2 bad input.
 
     Args:
       urdf: the robot's URDF.
-      out: folder for the result; an earlier result there is replaced when everything went well.
-      name: of the robot; default the file's.
-      mesh_root: folder below which meshes may lie that the URDF names by ../ or by an absolute path.
-      package_path: folders with the packages of `package://` names.
+      out: output folder; an earlier result there is replaced once the conversion succeeds.
+      name: name of the robot; default: the file's name.
+      mesh_root: additional folder from which meshes may be read (URDFs that use ../ or absolute paths).
+      package_path: folders that hold the packages of `package://` names.
     """
     from ig2mj_converters.convert_robot import convert_robot as convert
 

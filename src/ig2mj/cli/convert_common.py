@@ -17,20 +17,20 @@ COLOURS = Literal["auto", "source", "category"]
 
 @dataclasses.dataclass(frozen=True)
 class Common:
-    """What all conversions take.
+    """Options of every conversion.
 
     Attributes:
-      jobs: processes that work side by side: on the models of a scene, on the parts of a single object.
-      seed: seeds convex decomposition, and chooses models that a scene names "random".
-      max_hulls: most convex pieces per link. A link of more than 16 gets as few as keep the error of its volume under
-        15 % and its openings open.
-      max_hull_vertices: most vertices per piece.
-      bullet_inertia: inertia of each link's box, as Bullet computes it, instead of that of its hulls.
-      colours: of visuals without a texture: the source's, or household ones by category; auto prefers the source's,
-        unless every object of a scene is of one flat colour.
-      no_cache: convert anew even if nothing has changed, and keep nothing for the next time.
-      strict: take warnings for errors: exit status 2, and no output.
-      no_report: no checks, no report.json and report.html.
+      jobs: number of processes; they share the models of a scene, or the parts of a single object.
+      seed: random seed of convex decomposition and of models that a scene names "random".
+      max_hulls: largest number of convex pieces per link. Above 16, a link gets the fewest that keep the error of its
+        volume under 15 % and its openings open.
+      max_hull_vertices: largest number of vertices per piece.
+      bullet_inertia: use the inertia of each link's bounding box, as Bullet does, instead of that of its hulls.
+      colours: colours of untextured visuals: the source's, or household colours by category; auto prefers the
+        source's, unless every object of a scene is of one flat colour.
+      no_cache: convert even if nothing has changed, and write nothing to the cache.
+      strict: treat warnings as errors: exit status 2, no output.
+      no_report: skip the checks, report.json and report.html.
       json: print what was done as JSON.
     """
 

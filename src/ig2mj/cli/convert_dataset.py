@@ -36,17 +36,18 @@ def convert_dataset(
 ) -> int:
     """Convert all scenes and all objects of a dataset: OUT/scenes/NAME and OUT/objects/CATEGORY/MODEL.
 
-    What cannot be converted is listed with its reason, while the rest goes on. Exit status: 0 all converted; 1 some
-    were not; 2 bad input.
+    Models and scenes that cannot be converted are listed with the reason, and the others are still converted. Exit
+    status: 0 all converted; 1 some failed; 2 bad input.
 
     Args:
-      dataset: root of the dataset (holds objects/, scenes/ and metadata/); on a cluster every machine sees it there.
-      out: folder for the results; what is converted there already is replaced.
-      only: only these, as scenes/Rs_int or objects/apple or objects/apple/00_0.
-      skip_missing: leave out models that a scene names and the dataset lacks.
+      dataset: root of the dataset (holds objects/, scenes/ and metadata/); on a cluster every machine must see it
+        under this path.
+      out: output folder; earlier results there are replaced.
+      only: convert only these, e.g. scenes/Rs_int, objects/apple or objects/apple/00_0.
+      skip_missing: leave out models that a scene uses but the dataset lacks.
       fixed_furniture: fix cabinets, shelves, tables and desks to the floor, as BEHAVIOR does.
-      cluster: do it on a Ray cluster: its address, or auto.
-      resume: go on with a run that was broken off.
+      cluster: run on a Ray cluster: its address, or auto.
+      resume: continue an interrupted run.
     """
     from ig2mj.cluster.pieces import run
     from ig2mj.cluster.work import Piece, Work

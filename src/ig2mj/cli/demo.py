@@ -21,15 +21,15 @@ def run(
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")] = pathlib.Path("out/demo"),
     jobs: int = 2,
 ) -> int:
-    """Convert the small home, run it, tell what stands where, cook a fish and freeze milk in it; let a robot cook.
+    """Convert a small home, simulate it, cook a fish and freeze milk in it, and let a robot cook a steak.
 
     Leaves DIR/dataset (the source), DIR/small_home (the scene and report.html), DIR/pictures and DIR/cooking
     (temperatures as CSV, JSON and a plot, pictures, a film), and DIR/expert.mp4: in the shipped home birch a scripted
     expert brings a steak to the stove until it is cooked.
 
     Args:
-      out: folder for everything the demo makes.
-      jobs: processes.
+      out: output folder.
+      jobs: number of processes.
     """
     from ig2mj.install_hint import require_extras
 

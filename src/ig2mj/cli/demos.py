@@ -33,22 +33,22 @@ def collect(
     """Play a scripted expert, and write its successful episodes as HDF5, for `ig2mj train --demos`.
 
     Args:
-      env: CookingMeat, or ig2mj/CookingMeat-v0 (`ig2mj list-envs`).
-      out: the file.
-      episodes: how many.
-      robot: humanoid or fetch; default: the first that the task lists.
-      grasping: mitten, assisted, sticky or physical; default: the task's own.
+      env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them).
+      out: output file.
+      episodes: number of successful episodes to collect.
+      robot: humanoid or fetch; default: the task's first robot.
+      grasping: mitten, assisted, sticky or physical; default: the task's.
       obs: state, or rgbd with pictures as well (needs --engine warp).
       engine: native, warp or jax.
-      worlds: how many play at once.
-      noise: deviation of what is added to the expert's actions; the labels have none.
-      disturbed: share of the steps at which five random steps begin, from which the expert finds its way back.
-      seed: of start states and noise.
-      split: start states: train or held_out.
-      pool_size: start states; 0: as many as the split has.
-      jobs: processes, each with worlds of its own.
-      cluster: do it on a Ray cluster: its address, or auto.
-      resume: go on with a collection that was broken off.
+      worlds: number of worlds stepped at once.
+      noise: standard deviation of the noise added to the expert's actions; the labels stay noise-free.
+      disturbed: probability per step that five random steps begin, from which the expert recovers.
+      seed: random seed of start states and noise.
+      split: which start states: train or held_out.
+      pool_size: number of start states; 0: all of the split.
+      jobs: number of processes, each with its own worlds.
+      cluster: run on a Ray cluster: its address, or auto.
+      resume: continue an interrupted collection.
     """
     from ig2mj.cli.files import check_folder_of
     from ig2mj.cluster.pieces import run
@@ -64,6 +64,8 @@ def collect(
         raise UnknownNameError("kind of observation", obs, MODES)
     if episodes < 1 or worlds < 1:
         raise Ig2mjError(f"--episodes {episodes}, --worlds {worlds}: at least one of each is needed")
+    if not 0 <= noise < float("inf") or not 0 <= disturbed <= 1:
+        raise Ig2mjError(f"--noise {noise}, --disturbed {disturbed}: 0 or more, and between 0 and 1")
     if jobs < 0:
         raise Ig2mjError(f"--jobs {jobs}: 0 takes one process per processor, else at least one is needed")
     check_folder_of(out)

@@ -17,13 +17,13 @@ def metrics(
     settle: int = 150,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
-    """Measure recordings: goal score, disarrangement, ways of base and hands, grasping, gaze.
+    """Compute iGibson's metrics of recordings: goal score, disarrangement, travel of base and hands, grasping, gaze.
 
     Args:
       path: a recording, or a folder of them.
-      jobs: processes, each with a recording of its own.
-      settle: control steps before start and end are compared; 0: as they are.
-      json: one JSON object a run on standard output.
+      jobs: number of processes; each takes one recording at a time.
+      settle: control steps to wait before start and end are compared; 0: compare them as recorded.
+      json: print one JSON object per run.
     """
     import json as form
     import sys

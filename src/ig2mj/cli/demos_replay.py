@@ -31,21 +31,22 @@ def replay(
 
     Args:
       file: the recording, or a folder of them.
-      by: action: every action is taken again, natively with the same bytes; state: every frame is loaded as it was
-        written, exact on any machine.
-      check: compare every byte of every frame; status 1 and the first difference of each run where one is not the same.
+      by: action: take every action again (on the native engine the result is byte-identical); state: load every frame
+        as recorded, exact on any machine.
+      check: compare every byte of every frame; print the first difference of each run, exit status 1 if there is one.
       video: film of the first run (.mp4, .gif); needs OpenGL and the native engine.
-      sensors: observations to make that were not recorded, e.g. rgb,depth; written to --out.
-      out: HDF5 of the observations; default: FILE with .sensors.h5.
-      threads: that the native engine steps worlds on; 0: one per processor.
-      jobs: processes, each with a recording of its own.
-      cluster: do it on a Ray cluster, run by run: its address, or auto.
-      resume: go on with a replay that was broken off there.
+      sensors: compute observations that were not recorded, e.g. rgb,depth; written to --out.
+      out: HDF5 file of the observations; default: FILE with the ending .sensors.h5.
+      threads: threads on which the native engine steps worlds; 0: one per processor.
+      jobs: number of processes; each takes one recording at a time.
+      cluster: run on a Ray cluster, one piece per run: its address, or auto.
+      resume: continue an interrupted replay.
     """
     import sys
 
     from ig2mj.cli.demos_folder import files_of, of_files
     from ig2mj.cli.demos_pieces import replay_in_pieces
+    from ig2mj.cli.files import check_film, check_folder_of
     from ig2mj.demos.replay import MODES
     from ig2mj.errors import Ig2mjError, UnknownNameError
 
@@ -56,6 +57,10 @@ def replay(
     files = files_of(file)
     if len(files) > 1 and (video is not None or out is not None):
         raise Ig2mjError("--video and --out are of one recording: name a file")
+    if video is not None:
+        check_film(video)
+    if out is not None:
+        check_folder_of(out)
     names = tuple(name.strip() for name in sensors.split(",") if name.strip())
     if cluster is not None or resume:
         if video is not None:
@@ -121,13 +126,13 @@ def export(
     by: str = "action",
     obs: str = "",
 ) -> int:
-    """Write a recording in the format of another project, with observations made by a replay.
+    """Export a recording to another project's format, with observations computed by a replay.
 
     Args:
       file: the recording (`ig2mj rollout --record FILE`).
-      out: the file to write; a folder for lerobot.
+      out: output file; for lerobot and igibson a folder.
       to: robomimic (HDF5), lerobot (datasets v3.0: parquet and films) or igibson (HDF5).
-      by: action, which compares every byte, or state.
+      by: replay by action (compares every byte) or by state.
       obs: observations, e.g. proprioception,rgb; default: proprioception,privileged_state. igibson has none.
     """
     from ig2mj.demos.exports import EXPORTS

@@ -8,9 +8,9 @@ import tyro
 
 
 def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
-    """Tell what this machine can run, and how to fix what it cannot.
+    """Show what this machine can run, and how to fix what it cannot.
 
-    Exits 0 if everything that ig2mj needs is there, even where optional things are missing; else 1.
+    The exit status is 0 if everything required is present, even if optional parts are missing; otherwise 1.
 
     Args:
       json: print JSON instead of a table.

@@ -31,22 +31,22 @@ def run(
     resume: Resume = False,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
-    """Tell how often a policy succeeds, each start state played once.
+    """Measure how often a policy succeeds; each start state is played once.
 
     Args:
       policy: a file that `ig2mj train` wrote, or the name of one that ships.
-      episodes: how many; the start states of the split are played in their order.
-      split: start states: held_out or train.
+      episodes: number of episodes; the start states of the split are played in order.
+      split: which start states: held_out or train.
       engine: native, warp or jax; default: warp on a GPU, else native.
-      worlds: how many play at once; 0: one for each episode, 1000 at most, natively 8.
-      robot: only for a policy of this robot (its card says which).
-      grasping: only for a policy of this way of grasping.
-      pool_size: start states; 0: as many as the split has.
-      drawn: actions are drawn from the policy's distribution, as in training, instead of its middle.
-      jobs: processes, each with worlds of its own; natively one world is stepped on each processor in any case.
-      cluster: do it on a Ray cluster: its address, or auto.
-      out: file for the JSON object; needed for --resume.
-      resume: go on with an evaluation that was broken off.
+      worlds: number of worlds stepped at once; 0: one per episode, at most 1000 (native: 8).
+      robot: refuse a policy of another robot (the policy's card says which it is for).
+      grasping: refuse a policy of another grasping mode.
+      pool_size: number of start states; 0: all of the split.
+      drawn: draw actions from the policy's distribution, as in training, instead of taking its mean.
+      jobs: number of processes, each with its own worlds (the native engine uses all processors in any case).
+      cluster: run on a Ray cluster: its address, or auto.
+      out: file for the JSON result; needed for --resume.
+      resume: continue an interrupted evaluation.
       json: print one JSON object.
     """
     import contextlib

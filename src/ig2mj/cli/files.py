@@ -21,5 +21,14 @@ def check_picture(file: pathlib.Path, others: Iterable[str] = ()) -> None:
     Image.init()
     endings = {ending for ending, form in Image.registered_extensions().items() if form in Image.SAVE}
     if file.suffix.lower() not in {*endings, *others}:
-        raise InputError(file, "is no kind of picture that can be written", fix="use .png or .jpg")
+        raise InputError(file, "is not a picture format that can be written", fix="use .png or .jpg")
+    check_folder_of(file)
+
+
+def check_film(file: pathlib.Path, others: Iterable[str] = ()) -> None:
+    """The ending must be that of a film, or of `others`, and the folder must be there. Raises InputError."""
+    from ig2mj.viewer.film import FORMATS
+
+    if file.suffix.lower() not in {*FORMATS, *others}:
+        raise InputError(file, "is not a film format that can be written", fix=f"use {' or '.join(FORMATS)}")
     check_folder_of(file)

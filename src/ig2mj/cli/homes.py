@@ -29,11 +29,11 @@ def build(
     """Write a dataset root in iGibson's layout: VERSION, metadata, objects and scenes.
 
     Args:
-      out: dataset root; categories and scenes already there are replaced.
-      seed: of all variation; the same seed gives the same bytes.
-      only: build just these categories, and no homes unless --home names some.
-      home: build just these homes, and of the objects just the categories they need.
-      jobs: processes; default one per core.
+      out: root of the dataset; categories and scenes already there are replaced.
+      seed: random seed of all variation; the same seed gives the same bytes.
+      only: build only these categories, and no homes unless --home names some.
+      home: build only these homes, and only the object categories they need.
+      jobs: number of processes; default: one per core.
       json: print what was built as JSON.
     """
     from ig2mj_homes.dataset.root import build_dataset
@@ -72,15 +72,15 @@ def convert(
 ) -> int:
     """Convert a dataset's homes and the object library into one folder with shared meshes, as scenes_mjcf/ has them.
 
-    Each home's checks are kept as OUT/HOME/checks.json, the library is OUT/objects/CATEGORY/MODEL. Exit status 1 when a
-    check failed.
+    Each home's checks are kept in OUT/HOME/checks.json, the library goes to OUT/objects/CATEGORY/MODEL. The exit
+    status is 1 if a check failed.
 
     Args:
-      dataset: root that `ig2mj homes build` wrote.
-      out: folder for the homes; meshes that nothing in it uses any more are removed from it.
-      home: just these homes, and no objects.
-      jobs: processes.
-      no_cache: convert anew even what has not changed, and keep nothing for the next time.
+      dataset: dataset root written by `ig2mj homes build`.
+      out: output folder; meshes there that nothing uses any more are removed.
+      home: convert only these homes, and no objects.
+      jobs: number of processes.
+      no_cache: convert even what has not changed, and write nothing to the cache.
     """
     from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.conversion import convert_scene
@@ -154,8 +154,8 @@ def list_(
     """List the homes that ship with ig2mj, or the categories of objects that can be built.
 
     Args:
-      objects: list the categories: synset, size, mass, number of models.
-      only: just these categories.
+      objects: list object categories instead: synset, size, mass, number of models.
+      only: list only these categories.
       json: print JSON instead of a table.
     """
     from ig2mj.cli.printing import make_table, print_json, stdout_console
@@ -208,11 +208,11 @@ def sheet(
     """Draw a contact sheet of models; needs OpenGL (see `ig2mj doctor`).
 
     Args:
-      out: the picture.
-      only: just these categories; default all.
-      models: how many models of each category.
-      seed: of all variation.
-      opened: with doors, drawers and lids open.
+      out: output picture.
+      only: draw only these categories; default: all.
+      models: number of models of each category.
+      seed: random seed of all variation.
+      opened: draw doors, drawers and lids open.
       collision: draw the collision hulls instead of the visual meshes.
     """
     from ig2mj_homes.objects.catalogue import build_model
@@ -240,9 +240,9 @@ def pictures(
     """Draw contact sheets of the homes: DIR/homes.jpg, all from above, and DIR/rooms_HOME.jpg, their rooms from inside.
 
     Args:
-      out: folder for the pictures.
-      home: names or folders of homes; default all that ship with ig2mj.
-      rooms: draw the rooms too, one sheet per home.
+      out: output folder.
+      home: names or folders of homes; default: all that ship with ig2mj.
+      rooms: also draw the rooms, one sheet per home.
     """
     from ig2mj.scene.scene import load_scene
     from ig2mj.viewer.home_sheet import from_above, rooms_inside

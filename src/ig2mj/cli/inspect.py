@@ -25,7 +25,7 @@ def run(
 
     Args:
       scene: folder of a converted scene, its scene.xml or manifest.json, or the name of a home that comes with ig2mj.
-      show: which tables.
+      show: which tables to print.
       room: only objects of this room instance, e.g. kitchen_0.
       category: only objects of this category, e.g. fridge.
       json: print JSON instead of tables.

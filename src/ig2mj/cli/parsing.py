@@ -27,7 +27,23 @@ def _with_quiet_defaults(function: Callable[..., Any]) -> Callable[..., Any]:
             hints[name] = Annotated[hints[name], tyro.conf.arg(help_behavior_hint="")]
 
     call = lambda *args, **given: function(*args, **given)  # noqa: E731  a def gets wrapped where types are checked
-    call.__name__, call.__doc__, call.__annotations__ = function.__name__, function.__doc__, hints
+    call.__name__, call.__doc__, call.__annotations__ = function.__name__, _unfolded(function.__doc__ or ""), hints
     parameters = [p.replace(annotation=hints.get(n, p.annotation)) for n, p in signature.parameters.items()]
     call.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     return call
+
+
+def _unfolded(doc: str) -> str:
+    """A docstring whose paragraphs and arguments are one line each: tyro keeps a line break before a digit, and some
+    others, which then stands in the middle of a line of the help."""
+    lines = list[str]()
+    margin = 0
+    for line in inspect.cleandoc(doc).splitlines():
+        indent = len(line) - len(line.lstrip())
+        new = not line.strip() or not lines or not lines[-1].strip() or lines[-1] == "Args:"
+        if new or (indent <= margin and ": " in line and margin > 0):
+            lines.append(line)
+            margin = indent
+        else:
+            lines[-1] += f" {line.strip()}"
+    return "\n".join(lines)

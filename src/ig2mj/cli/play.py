@@ -30,15 +30,16 @@ def run(
     and the right button by a spring of at most 100 N, and pushed with P, as in iGibson's viewer.
 
     Args:
-      env: CookingMeat, or ig2mj/CookingMeat-v0 (`ig2mj list-envs`).
-      robot: humanoid, fetch or turtlebot; default: the first that `ig2mj list-envs` names.
-      robot_urdf: a robot of your own instead, from its URDF.
-      robot_layout: TOML or JSON that says which of its joints drive, reach and grip; default: found from their names.
+      env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them).
+      robot: humanoid, fetch or turtlebot; default: the task's first robot.
+      robot_urdf: URDF of a robot of your own to use instead.
+      robot_layout: TOML or JSON file that assigns its joints to base, arm and gripper; default: guessed from their
+        names.
       grasping: assisted, sticky, physical or mitten; default: assisted where there are hands.
-      seed: of the start states.
-      pool_size: start states; those of an activity are sampled first, which takes a while.
-      record: HDF5 of all runs, for `ig2mj demos replay`; what the mouse does to objects is not in it.
-      keys: print the keys, and do nothing else.
+      seed: random seed of the start states.
+      pool_size: number of start states; an activity's are sampled first, which takes a while.
+      record: HDF5 file to record all runs to, for `ig2mj demos replay`; it lacks what the mouse does to objects.
+      keys: print the keys and exit.
     """
     from ig2mj.viewer.play.keys import BINDINGS
 
@@ -46,14 +47,23 @@ def run(
         for binding in BINDINGS:
             print(f"{binding.shown:16} {binding.command}")
         return 0
+    from ig2mj.cli.files import check_folder_of
     from ig2mj.cli.robot_urdf import check_layout, own_robot
     from ig2mj.envs.registry import find_task, make
+    from ig2mj.errors import UnknownNameError
     from ig2mj.tasks.navigation.task import NavigationTask
+    from ig2mj.viewer.interactive import check_display
     from ig2mj.viewer.play.session import PlaySession, launch
 
+    task = find_task(env)
+    if robot is not None and robot not in task.robots:
+        raise UnknownNameError("robot", robot, task.robots)
+    check_display()
     check_layout(robot_urdf, robot_layout)
+    if record is not None:
+        check_folder_of(record)
     if grasping is None:
-        grasping = "physical" if isinstance(find_task(env), NavigationTask) else "assisted"
+        grasping = "physical" if isinstance(task, NavigationTask) else "assisted"
     made = make(
         env,
         robot if robot_urdf is None else own_robot(robot_urdf, robot_layout, robot),

@@ -36,11 +36,11 @@ def list_(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
     return 0
 
 
-def show(name: Annotated[str, tyro.conf.Positional]) -> int:
+def show(name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")]) -> int:
     """Print a policy's model card.
 
     Args:
-      name: of a policy that ships, or a file that `ig2mj train` wrote.
+      name: name of a policy that ships, or a file written by `ig2mj train`.
     """
     from ig2mj.cli.printing import print_json
     from ig2mj.learn.policies import Policy
@@ -56,18 +56,19 @@ def show(name: Annotated[str, tyro.conf.Positional]) -> int:
 
 
 def add(
-    run: Annotated[pathlib.Path, tyro.conf.Positional],
+    run: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN")],
     evaluation: pathlib.Path,
     name: str | None = None,
     folder: pathlib.Path | None = None,
 ) -> int:
-    """Make a run's policy one that ships, with its model card.
+    """Add a run's policy to those that ship, with its model card.
 
     Args:
       run: the run's folder, or its policy.npz.
-      evaluation: what `ig2mj evaluate RUN --episodes 1000 --json` printed.
-      name: of the policy; default: the task's, with the robot, grasping and observation where they are unusual.
-      folder: where it goes; default: policies/ of this checkout.
+      evaluation: output of `ig2mj evaluate RUN --episodes 1000 --json`.
+      name: name of the policy; default: the task's, followed by robot, grasping and observation where they are
+        unusual.
+      folder: output folder; default: policies/ of this checkout.
     """
     from ig2mj.learn.shipped import CHECKOUT, add_policy
 

@@ -21,19 +21,19 @@ def run(
     strict: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
-    """Tell what holds in a scene, or whether an expression holds and what is missing.
+    """Show which predicates are true of a scene, or whether an expression holds and what is missing.
 
-    Without EXPRESSION: every predicate of one object, and of touching or nested pairs on_top, inside and on_floor. With
-    one, the exit status is 0 where it holds and 1 where it does not. Example:
-    '(and (cooked fish_0) (forall (?p - plate) (on_top ?p table_0)))'.
+    Without EXPRESSION: every unary predicate, and on_top, inside and on_floor of objects that touch or contain each
+    other. With one, the exit status is 0 if it holds and 1 if it does not. Example: '(and (cooked fish_0) (forall (?p
+    - plate) (on_top ?p table_0)))'.
 
     Args:
       scene: folder of a converted scene, its scene.xml, or the name of a home that comes with ig2mj.
       expression: predicates joined by and, or, not, imply, forall, exists, forn, forpairs, fornpairs.
       set: set states first, e.g. toggled_on=stove or temperature=fish=80.
-      seconds: let this much time pass first.
-      compat: rules of the paper, or of iGibson's code where it differs.
-      strict: a predicate of an object that lacks the ability is an error instead of false.
+      seconds: simulate this many seconds first.
+      compat: follow the paper, or iGibson's code where the two differ.
+      strict: report an error, instead of false, for an object that lacks the predicate's ability.
       json: print JSON instead of text.
     """
     from ig2mj.cli.worlds import started

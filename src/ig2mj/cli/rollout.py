@@ -38,35 +38,38 @@ def run(
     paper_rl: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
-    """Play episodes of an environment, and tell how they ended.
+    """Play episodes of an environment and report how they ended.
 
     Args:
-      env: CookingMeat, or ig2mj/CookingMeat-v0 (`ig2mj list-envs`).
-      agent: who acts: zero (nothing moves), random, expert (a script; the six activities have one), or a policy: a file
-        that `ig2mj train` wrote, or the name of one that ships.
-      robot: humanoid, fetch or turtlebot; default: the first that `ig2mj list-envs` names.
-      robot_urdf: a robot of your own instead, from its URDF (docs/environments.md).
-      robot_layout: TOML or JSON that says which of its joints drive, reach and grip; default: found from their names.
-      grasping: mitten, assisted, sticky or physical; default: the task's own.
+      env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them).
+      agent: zero (no motion), random, expert (scripted; the six activities have one), or a policy: a file written by
+        `ig2mj train`, or the name of one that ships.
+      robot: humanoid, fetch or turtlebot; default: the task's first robot.
+      robot_urdf: URDF of a robot of your own to use instead (docs/environments.md).
+      robot_layout: TOML or JSON file that assigns its joints to base, arm and gripper; default: guessed from their
+        names.
+      grasping: mitten, assisted, sticky or physical; default: the task's.
       engine: native, warp or jax; default: warp on a GPU, else native.
-      worlds: how many play at once.
-      episodes: how many are played, in all worlds together.
-      seed: of start states and actions.
-      split: start states: train or held_out.
-      held_out: held-out start states, the first EPISODES of them, each played once.
-      pool_size: start states; 0: as many as the split has.
-      variant: of the activity's objects: 1 and 2 are other models of the same categories.
-      video: film of the first episode of the first world (.mp4, .gif), or five of its frames side by side (.png, .jpg);
-        needs OpenGL and the native engine.
-      record: HDF5 of everything that happens in all worlds, for `ig2mj demos replay`.
-      format: of --record: ig2mj, or igibson: one of iGibson's logs a run besides, in a folder named as FILE.
-      paper_rl: the thresholds that the paper's runs had.
-      json: the last line is one JSON object.
+      worlds: number of worlds stepped at once.
+      episodes: number of episodes, over all worlds.
+      seed: random seed of start states and actions.
+      split: which start states: train or held_out.
+      held_out: play the first EPISODES held-out start states, each once.
+      pool_size: number of start states; 0: all of the split.
+      variant: variant of the activity's objects: 1 and 2 use other models of the same categories.
+      video: film of the first episode of the first world (.mp4, .gif), or five of its frames side by side (.png,
+        .jpg); needs OpenGL and the native engine.
+      record: HDF5 file to record all worlds to, for `ig2mj demos replay`.
+      format: format of --record: ig2mj; or igibson, which also writes one iGibson log per run to a folder named after
+        FILE.
+      paper_rl: use the success thresholds of the paper's experiments.
+      json: print one JSON object as the last line.
     """
     import json as form
 
     import numpy as np
 
+    from ig2mj.cli.files import check_film, check_folder_of
     from ig2mj.cli.robot_urdf import check_layout, own_robot
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.envs.rollout import play
@@ -79,7 +82,12 @@ def run(
     if episodes < 1 or worlds < 1:
         raise Ig2mjError(f"--episodes {episodes}, --worlds {worlds}: at least one of each is needed")
     if video is not None:
+        from ig2mj.showcase.film_strip import ENDINGS
+
+        check_film(video, ENDINGS)
         engine = engine or "native"
+    if record is not None:
+        check_folder_of(record)
     split = "held_out" if held_out else split
     played = make(
         env,

@@ -30,21 +30,21 @@ def run(
     """Sample initial states in which conditions hold, and write them as a pool for batched resets.
 
     A condition is a predicate, its negation, or a conjunction: "(on_top book_0 table_0)", "(not (open fridge_0))". A
-    category in place of a name means any one object of it; plate and plate#2 are two. Exit status 0 only if all rows
-    were made; else the reasons are counted.
+    category in place of a name means any one object of it; plate and plate#2 are two different ones. The exit status
+    is 0 only if every row was sampled; otherwise the reasons for failure are counted.
 
     Args:
       scene: folder of a converted scene, or the name of a home that comes with ig2mj.
-      conditions: what must hold, all together.
-      count: rows.
-      out: the file; default: pool.npz in the working directory.
+      conditions: conditions that must hold together.
+      count: number of rows.
+      out: output file; default: pool.npz in the working directory.
       seed: the same seed gives the same pool.
-      jobs: processes; 0: one per processor.
-      cluster: do it on a Ray cluster: its address, or auto.
-      resume: go on with a run that was broken off.
+      jobs: number of processes; 0: one per processor.
+      cluster: run on a Ray cluster: its address, or auto.
+      resume: continue an interrupted run.
       add: add an object of this category (or category/model) from the object library.
-      disturb: no conditions: shift, turn and drop loose objects at random instead.
-      share: with --disturb: probability that a loose object is moved, per row.
+      disturb: instead of conditions: shift, turn and drop loose objects at random.
+      share: with --disturb: probability that a loose object is moved.
       json: print the result as JSON.
     """
     from ig2mj.cli.files import check_folder_of

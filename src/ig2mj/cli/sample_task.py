@@ -21,20 +21,20 @@ def run(
     variant: int = 0,
     hashes: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
 ) -> int:
-    """Sample the start states of an environment, and keep them where `ig2mj.make` finds them.
+    """Sample the start states of an environment and store them where `ig2mj.make` finds them.
 
-    The same rows for any number of processes and on any machine; the file's hash is printed. Exit status 1 where a pool
-    of the usual size is not, byte for byte, the one whose hash comes with ig2mj.
+    The rows do not depend on the number of processes or the machine; the file's hash is printed. The exit status is 1
+    if a pool of the default size differs from the one whose hash comes with ig2mj.
 
     Args:
-      task: CookingMeat, or ig2mj/CookingMeat-v0; all: of every activity, both splits.
-      split: train, or held_out for evaluation: from other seeds.
-      count: rows; 0: 512 for training, 1000 held out.
-      jobs: processes; 0: one per processor.
-      anew: sample them even if they are there.
-      variant: of the activity's objects: 1 and 2 are other models of the same categories.
-      hashes: JSON file that gets the hashes of the pools, one after the other, by the names of their files; in the form
-        of the hashes that come with ig2mj (src/ig2mj/tasks/pool_hashes.json). What it has already stays.
+      task: e.g. CookingMeat or ig2mj/CookingMeat-v0; all: both splits of every activity.
+      split: train, or held_out for evaluation (other seeds).
+      count: number of rows; 0: 512 for training, 1000 held out.
+      jobs: number of processes; 0: one per processor.
+      anew: sample again even if the pool exists.
+      variant: variant of the activity's objects: 1 and 2 use other models of the same categories.
+      hashes: JSON file to which the pools' hashes are added, keyed by file name, in the form of
+        src/ig2mj/tasks/pool_hashes.json.
     """
     from ig2mj.envs.registry import find_task
     from ig2mj.errors import Ig2mjError, UnknownNameError

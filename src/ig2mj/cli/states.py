@@ -23,15 +23,15 @@ def run(
 ) -> None:
     """List the extended states of a scene's objects.
 
-    Without --object and --state: every object that has one, without poses, boxes and contacts.
+    By default all objects that have extended states are listed, without poses, boxes and contacts.
 
     Args:
       scene: folder of a converted scene, its scene.xml, or the name of a home that comes with ig2mj.
-      object: only these objects, with all of their states.
+      object: only these objects, with all their states.
       state: only these states, e.g. temperature in_contact_objs.
       set: set states first, e.g. toggled_on=stove or temperature=fish=80.
-      seconds: let this much time pass first.
-      compat: rules of the paper, or of iGibson's code where it differs.
+      seconds: simulate this many seconds first.
+      compat: follow the paper, or iGibson's code where the two differ.
       json: print JSON instead of a table.
     """
     from ig2mj.cli.printing import print_json

@@ -39,35 +39,33 @@ def run(
     videos: float = 0.0,
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = (),
 ) -> int:
-    """Train a policy.
+    """Train a policy in an environment.
 
     Args:
-      env: CookingMeat, or ig2mj/CookingMeat-v0 (`ig2mj list-envs`).
+      env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them).
       algo: sac, ppo, bc (from --demos alone), or dagger (a scripted expert corrects the policy).
-      robot: humanoid, fetch or turtlebot; default: the first that the task lists.
+      robot: humanoid, fetch or turtlebot; default: the task's first robot.
       grasping: mitten, assisted, sticky or physical; default: mitten for activities.
-      obs: state (proprioception and privileged state) or rgbd (what the paper's agents see).
-      pixels: height and width that the pictures of 128x128 are averaged down to for the networks.
+      obs: state (proprioception and privileged state) or rgbd (proprioception and pictures, as in the paper).
+      pixels: height and width to which the 128x128 pictures are averaged down for the networks.
       engine: native, warp or jax; default: warp on a GPU, else native.
-      worlds: how many play at once; 0: 2048, natively 16.
-      minutes: of training; compiling is not counted.
-      seed: of everything random.
+      worlds: number of worlds stepped at once; 0: 2048 (native: 16).
+      minutes: minutes of training, not counting compilation.
+      seed: random seed.
       out: folder of the run; default: runs/ENV-ROBOT-GRASPING-ALGO-OBS-SEED.
-      resume: go on from the newest checkpoint in the folder.
-      demos: demonstrations (`ig2mj demos collect`): all that bc learns from; sac begins as their clone and replays
-        them.
-      expert: for sac: the task's scripted expert begins episodes and corrects the policy, ever less, until 70 % of
-        the run are over (--set guided=0.7).
-      save_buffer: checkpoints hold the replay buffer, too; without it a resumed run first plays it full again.
-      until: stop once so large a share of the last episodes succeeds (0.98).
-      programs: of an iteration: 1, or 2 (the worlds' and the learner's, so that both are timed).
-      devices: how many share the worlds and the learning, or all: those of this machine, or of all the processes that
-        were started together (docs/scale.md).
-      paper_rl: the thresholds that the paper's runs had.
-      pool_size: start states; 0: as many as the split has.
-      videos: minutes between two films of a held-out episode, in the folder videos of the run; 0: none. They are made
-        beside the training by a process of low priority, and need OpenGL and ffmpeg.
-      set: settings of the algorithm, as updates=16 or actor=128,128.
+      resume: continue from the newest checkpoint in the folder.
+      demos: file of `ig2mj demos collect`: bc learns from it alone; sac starts as its clone and keeps replaying it.
+      expert: for sac: the task's scripted expert begins episodes and corrects the policy, less and less until 70 % of
+        the run (--set guided=0.7).
+      save_buffer: also store the replay buffer in checkpoints; otherwise a resumed run first refills it.
+      until: stop once this share of the last episodes succeeds, e.g. 0.98.
+      programs: compiled programs per iteration: 1, or 2 to time simulation and learning separately.
+      devices: number of GPUs, or all: those of this machine, or of all processes started together (docs/scale.md).
+      paper_rl: use the success thresholds of the paper's experiments.
+      pool_size: number of start states; 0: all of the split.
+      videos: minutes between two films of a held-out episode, written to the run's folder videos; 0: none. A low-
+        priority process makes them; they need OpenGL and ffmpeg.
+      set: settings of the algorithm, e.g. updates=16 actor=128,128.
     """
     import dataclasses
     import os
@@ -97,8 +95,12 @@ def run(
         raise UnknownNameError("algorithm", algo, ALGORITHMS)
     if obs not in MODES:
         raise UnknownNameError("kind of observation", obs, MODES)
-    if minutes <= 0:
-        raise Ig2mjError(f"--minutes {minutes}: more than 0 is needed")
+    if not 0 < minutes < float("inf") or not 0 <= videos < float("inf"):
+        raise Ig2mjError(f"--minutes {minutes}, --videos {videos}: finite, more than 0, and 0 or more")
+    if until is not None and not 0 < until <= 1:
+        raise Ig2mjError(f"--until {until}: a share is more than 0 and at most 1")
+    if pixels < 1 or 128 % pixels:
+        raise Ig2mjError(f"--pixels {pixels}: a divisor of 128 is needed")
     if devices != "all" and not (devices.isdigit() and int(devices)):
         raise Ig2mjError(f"--devices {devices}: a number from 1 on, or all")
     if algo == "bc":

@@ -44,25 +44,26 @@ def run(
     Args:
       scene: folder of a converted scene, its scene.xml, or the name of a home that comes with ig2mj.
       picture: write this picture file instead of opening a window; needs no display.
-      camera: picture: from this camera of the scene.
-      eye: picture: from this point (metres).
-      target: picture: towards this point (metres).
-      size: picture: width and height in pixels.
-      seconds: let this much time pass before the picture or the window.
+      camera: with --picture: the scene's camera to draw from.
+      eye: with --picture: the point to look from, metres.
+      target: with --picture: the point to look at, metres.
+      size: with --picture: width and height in pixels.
+      seconds: simulate this many seconds first.
       collision: draw the collision geometry instead of the visual one (picture only; key 3 in the window).
       paused: open the window paused.
-      dump: replay the last steps of a world that went wrong, from the file that debug mode wrote; with --picture, the
-        last of them whose numbers are finite.
-      video: write the dump, or an episode of the policy, as a video (.mp4 or .gif; of a policy also as a film strip,
-        .png or .jpg) instead of opening a window.
-      pool: page through the rows of a pool of this scene, with the objects that were added to it: the right arrow turns
-        the page; with --picture, one row.
-      row: the row to begin with.
-      robot_urdf: a robot of your own in the scene, from its URDF (docs/environments.md).
-      robot_layout: TOML or JSON that says which of its joints drive, reach and grip; default: found from their names.
-      robot_at: where it stands (metres) and how far it is turned from the x axis.
-      policy: instead of a scene: a trained policy at work, the name of one that ships (`ig2mj policies list`) or the
-        folder of a run; it begins at held-out start state --row.
+      dump: replay the last steps of a world that went wrong, from the file that debug mode wrote; with --picture, draw
+        the last one whose numbers are finite.
+      video: write the dump, or an episode of the policy, as a video (.mp4, .gif) instead of opening a window; of a
+        policy also as a film strip (.png, .jpg).
+      pool: page through the rows of a pool of this scene, with the objects it adds: the right arrow turns the page;
+        with --picture, draw one row.
+      row: the row of the pool, or the policy's start state, to begin with.
+      robot_urdf: URDF of a robot to add to the scene (docs/environments.md).
+      robot_layout: TOML or JSON file that assigns its joints to base, arm and gripper; default: guessed from their
+        names.
+      robot_at: its position (metres) and its angle from the x axis (degrees).
+      policy: instead of a scene: watch a trained policy, by the name of one that ships (`ig2mj policies list`) or the
+        folder of a run.
     """
     if policy is not None:
         from ig2mj.cli.view_policy import view_policy
@@ -96,6 +97,11 @@ def run(
         return
     import sys
 
+    from ig2mj.scene.paths import model_file
+    from ig2mj.viewer.interactive import check_display
+
+    model_file(scene)
+    check_display()
     print(f"opening {scene}: first the scene is loaded, then the window comes", file=sys.stderr, flush=True)
     from ig2mj.simulation import Simulation
 
@@ -167,7 +173,7 @@ def _replay(scene, dump, picture, video, camera, eye, target, size, seconds, col
     if (picture is not None and video is not None) or seconds > 0:
         raise Ig2mjError("--dump goes with one of --picture and --video, and without --seconds")
     if video is not None and video.suffix.lower() not in VIDEOS:
-        raise Ig2mjError(f"{video}: is no kind of video that can be written (use {' or '.join(VIDEOS)})")
+        raise Ig2mjError(f"{video}: is not a video format that can be written (use {' or '.join(VIDEOS)})")
     replay = Replay(load_scene(scene), dump)
     print(f"{dump}: {len(replay)} steps; {replay.note.get('text', '')}", file=sys.stderr)
     if picture is None and video is None:

@@ -22,18 +22,24 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
 
     import numpy as np
 
+    from ig2mj.cli.files import check_film
     from ig2mj.envs.registry import make
     from ig2mj.errors import Ig2mjError
     from ig2mj.learn.evaluate import acting
     from ig2mj.learn.policies import Policy
     from ig2mj.learn.shipped import find_policy
+    from ig2mj.showcase.film_strip import ENDINGS
     from ig2mj.tasks.pools import COUNT
     from ig2mj.viewer.acting import STEP_TIME, ActingWorld
-    from ig2mj.viewer.interactive import launch
+    from ig2mj.viewer.interactive import check_display, launch
 
     if not 0 <= row < COUNT["held_out"]:
         raise Ig2mjError(f"--row {row}: the held-out start states are 0 to {COUNT['held_out'] - 1}")
     file = find_policy(name)
+    if video is None:
+        check_display()
+    else:
+        check_film(video, ENDINGS)
     policy = Policy.load(file)
     depends = policy.card["depends"]
     env = make(

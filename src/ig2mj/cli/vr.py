@@ -30,25 +30,26 @@ def run(
     seconds: float = 0.0,
     timing: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
-    """Do a task yourself, in a headset or with mouse and keyboard; ends with Ctrl-C.
+    """Do a task yourself, in a headset or with mouse and keyboard. Ctrl-C ends it.
 
     Args:
-      task: CookingMeat, or activity/cleaning_windows (`ig2mj list-envs`); one that the humanoid can do.
-      record: HDF5 of everything that happens and of what your devices say, for `ig2mj demos replay`.
-      device: page: a page for the headset's browser (WebXR), or for mouse and keyboard; openxr: a headset of this
-        machine; recorded: devices say again what they said in --poses.
-      poses: recording whose devices are played.
+      task: a task of the humanoid, e.g. CookingMeat or activity/cleaning_windows (`ig2mj list-envs` names them).
+      record: HDF5 file to record the session and your devices to, for `ig2mj demos replay`.
+      device: page: a web page for a headset's browser (WebXR) or for mouse and keyboard; openxr: a headset attached to
+        this machine; recorded: play back the devices of --poses.
+      poses: the recording whose devices are played back.
       host: address to serve the page on; default: this machine alone. Others need --token and, for headsets,
         --certificate.
-      port: of the page; 0: any free one.
-      token: what the page demands; auto draws one.
-      certificate: your certificate, for HTTPS. key: its key, if it is in a file of its own.
+      port: port of the page; 0: any free port.
+      token: secret that the page asks for; auto: a random one.
+      certificate: PEM file with your certificate, to serve the page by HTTPS.
+      key: PEM file with the certificate's private key, if it is a separate file.
       grasping: assisted, sticky, mitten or physical.
-      seed: of what is random.
-      row: start state; -1: a random one.
-      pool_size: start states; 0: as many as the task has.
-      seconds: end after so long; 0: when you end it.
-      timing: show every two seconds where the time of a frame goes: physics, states, rendering, waiting.
+      seed: random seed.
+      row: number of the start state; -1: a random one.
+      pool_size: number of start states; 0: all that the task has.
+      seconds: end after this many seconds; 0: run until you end it.
+      timing: show every two seconds how a frame's time divides into physics, states, rendering and waiting.
     """
     import math
 

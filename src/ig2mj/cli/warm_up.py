@@ -19,17 +19,17 @@ def run(
 ) -> int:
     """Compile all that a batch of worlds needs, before it is needed.
 
-    Makes the worlds, starts them and steps them once, so that all kernels and programs are in the cache. With --out
-    they are kept in a folder of their own, for other machines with the same card, driver and versions: there set
-    IG2MJ_CACHE_DIR to it.
+    Creates the worlds, starts them and steps them once, so that all kernels and programs are in the cache. With --out
+    they go to a separate folder for other machines with the same GPU, driver and versions: set IG2MJ_CACHE_DIR to it
+    there.
 
     Args:
       what: a home or the folder of a scene, or an environment (`ig2mj list-envs`).
-      worlds: how many; XLA compiles for the number.
-      robot: of an environment; default: the first that `ig2mj list-envs` names.
-      observations: of an environment besides its vectors, as rgb depth.
+      worlds: number of worlds; programs are compiled for this number.
+      robot: for an environment: its robot; default: the task's first.
+      observations: for an environment: observations besides its vectors, e.g. rgb depth.
       engine: native, warp or jax; default: warp on a GPU, else native.
-      out: the cache's folder; default: the user's own, or IG2MJ_CACHE_DIR.
+      out: folder of the cache; default: IG2MJ_CACHE_DIR, or the user's own.
       json: print one JSON object.
     """
     import sys

@@ -32,28 +32,28 @@ def run(
     seed: int = 0,
     paused: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> None:
-    """Show a home, a task or a recording in the browser, and let it run.
+    """Show a scene, an environment or a recording in the browser.
 
     Only this machine can open the page, unless --host and --token are given. Ctrl+C ends it.
 
     Args:
       what: folder of a converted scene, its scene.xml, or the name of a home that comes with ig2mj; or an environment
         (`ig2mj list-envs`); or a recording (`ig2mj rollout --record FILE`).
-      port: of the page; 0: any free one.
+      port: port of the page; 0: any free port.
       host: address to listen on besides this machine's own, e.g. 0.0.0.0; needs --token.
-      token: what the page demands, at least 16 letters and digits; auto draws one.
-      certificate: PEM file; the page is served by HTTPS.
-      key: PEM file of the certificate's private key, where it is not in the same file.
-      goal: scene: an expression that is shown with what is missing, e.g. '(cooked fish_0)'.
-      set: scene: set states first, e.g. toggled_on=stove or temperature=fish=80.
-      pool: scene: rows to start from (`ig2mj sample`).
-      worlds: how many there are; the page shows one of them.
-      engine: native, warp or jax. Objects can be dragged on the native one.
-      agent: task: who acts: zero (nothing moves), random, expert, or a policy: a file that `ig2mj train` wrote, or the
+      token: secret that the page asks for, at least 16 letters and digits; auto: a random one.
+      certificate: PEM file with your certificate, to serve the page by HTTPS.
+      key: PEM file with the certificate's private key, if it is a separate file.
+      goal: for a scene: expression to show, with what it still lacks, e.g. '(cooked fish_0)'.
+      set: for a scene: set states first, e.g. toggled_on=stove or temperature=fish=80.
+      pool: for a scene: pool of start states (`ig2mj sample`).
+      worlds: number of worlds; the page shows one of them.
+      engine: native, warp or jax. Only on native can objects be dragged.
+      agent: for an environment: zero (no motion), random, expert, or a policy: a file written by `ig2mj train`, or the
         name of one that ships.
-      robot: task: humanoid, fetch or turtlebot; default: the first that the task lists.
-      seed: task: of start states and of random actions.
-      paused: begin paused.
+      robot: for an environment: humanoid, fetch or turtlebot; default: the task's first robot.
+      seed: for an environment: random seed of start states and actions.
+      paused: start paused.
     """
     import sys
 

@@ -179,7 +179,7 @@ def read_igibson(file: str | os.PathLike) -> IGibsonLog:
         with h5py.File(path, "r") as opened:
             return _log(path, opened)
     except OSError as e:
-        raise InputError(path, "is no HDF5 file, or a broken one") from e
+        raise InputError(path, "is not an HDF5 file, or a broken one") from e
 
 
 def _log(path: pathlib.Path, opened: Any) -> IGibsonLog:
@@ -188,7 +188,7 @@ def _log(path: pathlib.Path, opened: Any) -> IGibsonLog:
     metadata = {str(k).removeprefix(METADATA): _plain(v) for k, v in opened.attrs.items()}
     group = opened.get("physics_data")
     if not isinstance(group, h5py.Group):
-        raise InputError(path, "is missing", element="physics_data", fix="it is no log of iGibson's")
+        raise InputError(path, "is missing", element="physics_data", fix="it is not an iGibson log")
     known = _names(str(metadata.get("obj_body_id_to_name", "")))
     found: dict[str, dict[str, np.ndarray]] = {kind: {} for kind in ("position", "orientation", "joint_state")}
     names = {str(body): known.get(str(body), str(body)) for body in group}
@@ -226,7 +226,7 @@ def _array(path: pathlib.Path, opened: Any, name: str, width: int | None) -> np.
     link = opened.get(name, getlink=True)
     array = opened.get(name) if isinstance(link, h5py.HardLink) else None
     if not isinstance(array, h5py.Dataset) or array.ndim != 2 or array.dtype.kind not in "fiu":
-        raise InputError(path, "is no table of numbers", element=name)
+        raise InputError(path, "is not a table of numbers", element=name)
     if width is not None and array.shape[1] != width:
         raise InputError(path, f"has {array.shape[1]} numbers a frame, and must have {width}", element=name)
     if array.is_virtual or array.external or array.shape[0] > LONGEST or array.shape[1] > 4096 or not _there(array):

@@ -140,7 +140,7 @@ class Recording:
         try:
             self._opened = h5py.File(path, "r")
         except OSError as e:
-            raise InputError(path, "is no HDF5 file, or a broken one", fix=FIX) from e
+            raise InputError(path, "is not an HDF5 file, or a broken one", fix=FIX) from e
         try:
             self._read()
         except InputError:
@@ -155,7 +155,7 @@ class Recording:
 
         self.header: dict[str, Any] = {name: _plain(value) for name, value in self._opened.attrs.items()}
         if self.header.get("format") != FORMAT or self.header.get("version") != FORMAT_VERSION:
-            raise InputError(self.file, f"is no {FORMAT}, version {FORMAT_VERSION}", element="format", fix=FIX)
+            raise InputError(self.file, f"is not {FORMAT}, version {FORMAT_VERSION}", element="format", fix=FIX)
         for name in ATTRIBUTES:
             if not isinstance(self.header.get(name), str):
                 raise InputError(self.file, "is missing", element=f"attribute {name}", fix=FIX)
@@ -173,7 +173,7 @@ class Recording:
         for name in sorted(set(self._opened) - {"index", "frames", "steps"}):
             group = _hard(self._opened, name)
             if not isinstance(group, h5py.Group):
-                raise InputError(self.file, "is no run", element=name, fix=FIX)
+                raise InputError(self.file, "is not a run", element=name, fix=FIX)
             self.runs.append(Run(self, group))
 
     def _array(self, name: str) -> Any:
@@ -186,7 +186,9 @@ class Recording:
         if not isinstance(array, h5py.Dataset) or array.ndim < 1:
             raise InputError(self.file, "is missing", element=name, fix=FIX)
         if array.is_virtual or array.external or array.dtype.kind not in "biuf":
-            raise InputError(self.file, f"is no array of numbers in this file ({array.dtype})", element=name, fix=FIX)
+            raise InputError(
+                self.file, f"is not an array of numbers in this file ({array.dtype})", element=name, fix=FIX
+            )
         if array.shape[0] and array.size and not _there(array):
             raise InputError(self.file, f"claims {array.shape[0]} rows that are not there", element=name, fix=FIX)
         return array
@@ -207,7 +209,7 @@ class Recording:
             except ValueError:
                 value = None
         if not isinstance(value, kind) or isinstance(value, bool):
-            raise InputError(self.file, f"is no {kind.__name__}", element=f"attribute {name}", fix=FIX)
+            raise InputError(self.file, f"is not of type {kind.__name__}", element=f"attribute {name}", fix=FIX)
         return value
 
     def close(self) -> None:

@@ -94,7 +94,7 @@ class Environment:
         step = core.engine.substeps * core.engine.timestep
         self.period, self._substeps = period, round(period / step)
         if self._substeps < 1 or abs(self._substeps * step - period) > 1e-6:
-            raise EngineError(f"an agent step of {period:g} s is no whole number of control steps of {step:g} s")
+            raise EngineError(f"an agent step of {period:g} s is not a whole number of control steps of {step:g} s")
         self._clean = jax.jit(self._clean_fn)
         self._rows = jax.jit(lambda key: pick_rows(key, core.starts.pool.size))
         compiled = jax.jit if core.engine.pure else OfView

@@ -124,6 +124,8 @@ def make(
         raise UnknownNameError("grasping mode", mode, MODES)
     if worlds < 1:
         raise EngineError(f"worlds = {worlds}: an environment has at least one")
+    if pool_size is not None and pool_size < 1:
+        raise EngineError(f"pool_size = {pool_size}: an environment has at least one start state")
     if engine in (None, "native"):
         run_programs_inline()
     control = Control(whole_actions, period)

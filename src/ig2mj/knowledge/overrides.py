@@ -56,7 +56,9 @@ def load_overrides(path: str | os.PathLike) -> Overrides:
 
 def _check(file: pathlib.Path, element: str, ability: str, parameters: Parameters) -> None:
     if ability not in ABILITIES:
-        raise InputError(file, "is no ability", element=element, fix=f"abilities are {', '.join(sorted(ABILITIES))}")
+        raise InputError(
+            file, "is not an ability", element=element, fix=f"abilities are {', '.join(sorted(ABILITIES))}"
+        )
     known = ABILITIES[ability].defaults
     for name, value in parameters.items():
         if name not in known:

@@ -40,7 +40,7 @@ LONGEST = 100_000
 HOPELESS = 50
 """Failures after which too few successes end a collection."""
 
-_MEND = "`ig2mj demos collect` writes such files"
+_FIX = "`ig2mj demos collect` writes such files"
 
 
 @struct.dataclass
@@ -190,7 +190,7 @@ def load_demos(file: str | os.PathLike, perception: Perception, world: Mapping[s
         raise InputError(path, f"holds no {' and no '.join(missing)}", fix=fix)
     parts = list(_runs(path, perception, world))
     if not parts:
-        raise InputError(path, "holds no run", fix=_MEND)
+        raise InputError(path, "holds no run", fix=_FIX)
     fields = {name: jnp.asarray(np.concatenate([p[name] for p in parts])) for name in parts[0]}
     seen, after = (Seen(fields.pop(f"{k}_vector"), fields.pop(f"{k}_picture")) for k in ("seen", "after"))
     return Demos(seen=seen, after=after, **fields)
@@ -215,16 +215,16 @@ def _opened(path: pathlib.Path) -> Iterator[Any]:
     import h5py
 
     if not path.is_file():
-        raise InputError(path, "there is no such file", fix=_MEND)
+        raise InputError(path, "there is no such file", fix=_FIX)
     try:
         opened = h5py.File(path, "r")
     except OSError as e:
-        raise InputError(path, "is no HDF5 file, or a broken one", fix=_MEND) from e
+        raise InputError(path, "is not an HDF5 file, or a broken one", fix=_FIX) from e
     with opened as found:
         if found.attrs.get("format") != FORMAT or found.attrs.get("version") != FORMAT_VERSION:
-            raise InputError(path, f"is no file of {FORMAT}, version {FORMAT_VERSION}", fix=_MEND)
+            raise InputError(path, f"is not a file of {FORMAT}, version {FORMAT_VERSION}", fix=_FIX)
         if not {"world", "spaces"} <= set(found.attrs):
-            raise InputError(path, "does not say what it is of", element="attributes world and spaces", fix=_MEND)
+            raise InputError(path, "does not say what it is of", element="attributes world and spaces", fix=_FIX)
         yield found
 
 

@@ -128,7 +128,7 @@ class Policy:
             raise InputError(file, "there is no such file") from e
         except Exception as e:  # numpy raises whatever a broken archive makes it stumble over
             fix = "`ig2mj train` writes policies"
-            raise InputError(file, f"is no policy ({type(e).__name__})", fix=fix) from e
+            raise InputError(file, f"is not a policy ({type(e).__name__})", fix=fix) from e
         if card.get("format") != FORMAT_VERSION:
             raise InputError(file, f"has format {card.get('format')}, and {FORMAT_VERSION} is what can be read")
         return cls(card, weights, mean, deviation)

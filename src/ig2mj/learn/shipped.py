@@ -124,7 +124,7 @@ def _read_evaluation(file: pathlib.Path, policy: Policy) -> dict[str, Any]:
         found = json.loads(lines[-1])
         missing = [n for n in ("weights", "split", *EVALUATED) if n not in found]
     except (OSError, ValueError, IndexError, TypeError) as e:
-        raise InputError(file, f"is no evaluation ({type(e).__name__})", fix=fix) from e
+        raise InputError(file, f"is not an evaluation ({type(e).__name__})", fix=fix) from e
     if missing:
         raise InputError(file, "is missing", element=missing[0], fix=fix)
     if found["weights"] != policy.weights_digest:

@@ -66,7 +66,7 @@ def holds(e: Expression, truth: Truth) -> Bool[Array, "W"]:
         case Pairing(count, rows):
             grid = _grid(rows, lambda p: holds(p, truth), truth)
             return truth.xp.minimum(_with_true(grid, 0), _with_true(grid, 1)) >= count
-    raise TypeError(f"{e!r} is no ground expression")
+    raise TypeError(f"{e!r} is not a ground expression")
 
 
 def fraction(e: Expression, truth: Truth) -> Float[Array, "W"]:
@@ -98,7 +98,7 @@ def _score(e: Expression, truth: Truth, wanted: bool) -> Score:
             grid = _grid(rows, lambda p: _score(p, truth, True).value, truth)
             sides = [_sum_of_best(truth.xp.max(grid, axis=axis, initial=0.0), count) for axis in (0, 1)]
             return _quantified(holds(e, truth), truth.xp.minimum(*sides) / max(count, 1), count, wanted)
-    raise TypeError(f"{e!r} is no ground expression")
+    raise TypeError(f"{e!r} is not a ground expression")
 
 
 def _mean(parts: Sequence[Expression], truth: Truth, wanted: bool) -> Score:

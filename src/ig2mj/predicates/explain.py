@@ -73,7 +73,7 @@ def value_of(e: Expression, table: dict[Atom, bool]) -> bool:
         case Pairing(count, rows):
             rows_found, columns_found = pairs_found(rows, table)
             return min(rows_found, columns_found) >= count
-    raise TypeError(f"{e!r} is no ground expression")
+    raise TypeError(f"{e!r} is not a ground expression")
 
 
 def pairs_found(rows, table: dict[Atom, bool]) -> tuple[int, int]:

@@ -181,7 +181,7 @@ def _ground(e: Expression, groups: Callable[[str], Sequence[str]], bound: Mappin
             return Pairing(
                 count, tuple(tuple(None if p is None else _ground(p, groups, bound) for p in row) for row in rows)
             )
-    raise TypeError(f"{e!r} is no expression")
+    raise TypeError(f"{e!r} is not an expression")
 
 
 def _pairs(
@@ -246,7 +246,7 @@ def text(expression: Expression) -> str:
         case Pairing(count, rows):
             flat = " ".join("(" + " ".join("()" if p is None else text(p) for p in row) + ")" for row in rows)
             return f"(pairing {count} {flat})"
-    raise TypeError(f"{expression!r} is no expression")
+    raise TypeError(f"{expression!r} is not an expression")
 
 
 def _quoted(name: str) -> str:

@@ -119,7 +119,9 @@ def _expression(tree: Tree, name: str) -> Expression:
             return logic.ForNPairs(count, first, second, _expression(parts[3], name))
     names = [p for p in parts if isinstance(p, str)]
     if len(names) < len(parts):
-        raise ExpressionError(name, f"'{word}' is no word of the language, so its parts are names", element=_show(tree))
+        raise ExpressionError(
+            name, f"'{word}' is not a word of the language, so its parts are names", element=_show(tree)
+        )
     return logic.Atom(tree[0], tuple(_unquoted(p) for p in names))
 
 

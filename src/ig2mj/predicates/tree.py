@@ -64,6 +64,6 @@ def tree(compiled: CompiledExpression, states: ExtendedStates, view: PhysicsView
             case Pairing(count, rows):
                 inner = tuple(part(p, wanted) for row in rows for p in row if p is not None)
                 return Part(f"{count} pairs, now {min(pairs_found(rows, table))}", holds, wanted, parts=inner)
-        raise TypeError(f"{e!r} is no ground expression")
+        raise TypeError(f"{e!r} is not a ground expression")
 
     return part(compiled.ground, True)

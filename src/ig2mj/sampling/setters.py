@@ -94,7 +94,9 @@ def set_by_name(
         raise AbilityError(lacks(f"state '{kind.name}'", object_name, model, kind.abilities or ()))
     if kind.set is None:
         raise StateError(f"state '{kind.name}' cannot be set (settable: {', '.join(settable())})")
-    if not np.isfinite(value):
+    with np.errstate(over="ignore"):
+        finite = np.isfinite(np.float32(value))  # as states are kept
+    if not finite:
         raise StateError(f"state '{kind.name}' of '{object_name}' cannot be {value}")
     return Change(dataclasses.replace(states, **kind.set(states, mask, value)))
 

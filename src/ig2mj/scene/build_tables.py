@@ -28,12 +28,12 @@ class _Names:
         number = mujoco.mj_name2id(self.model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name)
         if number < 0:
             raise ManifestError(
-                self.file, f"names the {kind} '{name}', which scene.xml does not have", element=element, fix=_MEND
+                self.file, f"names the {kind} '{name}', which scene.xml does not have", element=element, fix=_FIX
             )
         return number
 
 
-_MEND = "manifest.json and scene.xml must come from one conversion: convert the scene again"
+_FIX = "manifest.json and scene.xml must come from one conversion: convert the scene again"
 
 
 def build_tables(
@@ -108,7 +108,7 @@ def _check_fixed(model: mujoco.MjModel, objects: list[ObjectEntry], body_object:
                 if free
                 else "is free in the manifest and has no free joint in scene.xml"
             )
-            raise ManifestError(file, problem, element=f"object '{entry.name}'", fix=_MEND)
+            raise ManifestError(file, problem, element=f"object '{entry.name}'", fix=_FIX)
 
 
 def _openable_columns(model: mujoco.MjModel, objects: list[ObjectEntry], find: _Names) -> dict[str, Any]:
@@ -146,7 +146,7 @@ def _link_columns(
                 assert link.site is not None  # check_manifest
                 found, size = model.site(find("site", link.site, element)), np.zeros(3)
             if body_object[found.bodyid[0]] != number:
-                raise ManifestError(file, "rides on a body of another object", element=element, fix=_MEND)
+                raise ManifestError(file, "rides on a body of another object", element=element, fix=_FIX)
             owner.append(number)
             kinds.append(LinkKind[kind.upper()])
             body.append(found.bodyid[0])
@@ -173,7 +173,7 @@ def _piece_columns(model: mujoco.MjModel, geom_object: np.ndarray, file: object)
     except ValueError as e:
         raise ManifestError(
             file,
-            "collides and is no box, sphere, capsule, cylinder or mesh",
+            "collides and is not a box, sphere, capsule, cylinder or mesh",
             element=f"geom '{e}' of scene.xml",
             fix="use a box for a plane, a mesh for the others",
         ) from e
@@ -209,7 +209,7 @@ def _room_columns(manifest: Manifest, rooms: Rooms | None, file: object) -> dict
         missing = sorted(set(instances) - set(names))
         if missing:
             raise ManifestError(
-                file, f"names rooms that are not on the map: {', '.join(missing)}", element="rooms", fix=_MEND
+                file, f"names rooms that are not on the map: {', '.join(missing)}", element="rooms", fix=_FIX
             )
     index = {name: r for r, name in enumerate(names)}
     annotated = np.zeros((len(manifest.objects), len(names)), bool)

@@ -166,7 +166,7 @@ def load_manifest(path: str | os.PathLike) -> Manifest:
     except msgspec.ValidationError as e:
         raise ManifestError(file, str(e), fix="convert the scene again") from e
     except msgspec.DecodeError as e:
-        raise ManifestError(file, f"is no valid JSON: {e}", fix="convert the scene again") from e
+        raise ManifestError(file, f"is not valid JSON: {e}", fix="convert the scene again") from e
     check_manifest(manifest, file)
     return manifest
 
@@ -198,12 +198,12 @@ def check_manifest(manifest: Manifest, file: object = "manifest.json") -> None:
         joints = {j.name for j in o.joints}
         for part in o.parts:
             if part.object not in known:
-                raise ManifestError(file, f"names the part '{part.object}', which is no object", element=element)
+                raise ManifestError(file, f"names the part '{part.object}', which is not an object", element=element)
         if o.part_of is not None and o.part_of not in known:
-            raise ManifestError(file, f"is part of '{o.part_of}', which is no object", element=element)
+            raise ManifestError(file, f"is part of '{o.part_of}', which is not an object", element=element)
         for opening in o.openable:
             if opening.joint not in joints:
-                raise ManifestError(file, f"openable joint '{opening.joint}' is no joint of it", element=element)
+                raise ManifestError(file, f"openable joint '{opening.joint}' is not a joint of it", element=element)
         for kind, link in o.links.items():
             if (link.site is None) == (link.geom is None):
                 raise ManifestError(file, f"link '{kind}' needs exactly one of site and geom", element=element)

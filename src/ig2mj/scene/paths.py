@@ -19,7 +19,7 @@ SHIPPED_HOMES = next(
 """Homes that come with the project: the folder of a checkout, or the one beside an installed package. `load_scene`
 finds them by their bare names."""
 
-_MEND = "give the folder that `ig2mj convert` wrote"
+_FIX = "give the folder that `ig2mj convert` wrote"
 
 
 def shipped_homes() -> list[str]:
@@ -28,20 +28,25 @@ def shipped_homes() -> list[str]:
 
 
 def scene_folder(path: str | os.PathLike) -> pathlib.Path:
-    """The folder of a converted scene: the path itself, or where that file lies, or the shipped home of that name.
+    """The folder of a converted scene.
+
+    Args:
+      path: that folder, one of its files scene.xml, object.xml or manifest.json, or the name of a home that ships.
 
     Raises:
-      InputError: there is no such path; the message names near matches among the shipped homes.
+      InputError: there is no such path (the message names near matches among the shipped homes), or it is another file.
     """
     path = pathlib.Path(path)
     if path.is_dir():
         return path
     if path.is_file():
+        if path.name not in (*MODEL_FILES, MANIFEST_FILE):
+            raise InputError(path, "is not a file of a converted scene", fix=f"{_FIX}, or its {MODEL_FILES[0]}")
         return path.parent
     bare = len(path.parts) == 1
     if bare and (SHIPPED_HOMES / path).is_dir():
         return SHIPPED_HOMES / path
-    fix = _MEND
+    fix = _FIX
     if bare and (homes := shipped_homes()):
         near = difflib.get_close_matches(path.name, homes, n=3, cutoff=0.5)
         fix += (
@@ -61,4 +66,4 @@ def model_file(path: str | os.PathLike) -> pathlib.Path:
     for name in MODEL_FILES:
         if (folder / name).is_file():
             return folder / name
-    raise InputError(folder, f"holds no {MODEL_FILES[0]}", fix=_MEND)
+    raise InputError(folder, f"holds no {MODEL_FILES[0]}", fix=_FIX)

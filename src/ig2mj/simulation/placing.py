@@ -65,7 +65,7 @@ def joint_address(scene: Scene, name: str) -> int:
     if number < 0:
         raise UnknownNameError("joint", name, [model.joint(j).name for j in range(model.njnt)])
     if mujoco.mjtJoint(int(model.jnt_type[number])) not in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
-        raise PoseError(f"joint '{name}' is no hinge and no slide (use set_object_pose)")
+        raise PoseError(f"joint '{name}' is neither a hinge nor a slide (use set_object_pose)")
     return int(model.jnt_qposadr[number])
 
 
@@ -84,7 +84,7 @@ def _finite(values: Vector, length: int, what: str) -> np.ndarray:
     try:
         array = np.asarray(values, np.float64)
     except (TypeError, ValueError):
-        raise PoseError(f"the {what} is no list of numbers: {values!r}") from None
+        raise PoseError(f"the {what} is not a list of numbers: {values!r}") from None
     if array.shape != (length,):
         raise PoseError(f"the {what} needs {length} numbers, not an array of shape {array.shape}")
     if not np.isfinite(array).all():

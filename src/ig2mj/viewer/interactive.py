@@ -236,10 +236,15 @@ def open_viewer(
             time.sleep(max(0.0, due - time.monotonic()))
 
 
-def _launch(model: mujoco.MjModel, data: mujoco.MjData, key_callback: Callable[[int], None]):
-    """MuJoCo's passive viewer, with one-line errors where there can be no window."""
+def check_display() -> None:
+    """Raises MissingDependencyError where there can be no window, before anything is loaded for one."""
     if sys.platform.startswith("linux") and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise MissingDependencyError(_NO_DISPLAY)
+
+
+def _launch(model: mujoco.MjModel, data: mujoco.MjData, key_callback: Callable[[int], None]):
+    """MuJoCo's passive viewer, with one-line errors where there can be no window."""
+    check_display()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # glfw warns, and then says so again
         import glfw

@@ -155,7 +155,7 @@ def from_arrays(arrays: dict[str, np.ndarray]) -> PoseFrame | None:
     """
     for name, shape in SHAPES.items():
         if name not in arrays or np.shape(arrays[name]) != shape:
-            raise ValueError(f"'{name}' is no array of shape {shape}")
+            raise ValueError(f"'{name}' is not an array of shape {shape}")
         if not np.isfinite(arrays[name]).all():
             raise ValueError(f"'{name}' has a number that is not finite")
     if not any(np.any(arrays[name]) for name in SHAPES):

@@ -115,7 +115,7 @@ def _tls(certificate: str | os.PathLike, key: str | os.PathLike | None) -> ssl.S
         context.load_cert_chain(certificate, key, password=_no_password)
     except (OSError, ssl.SSLError, ValueError) as e:
         fix = "--certificate names a PEM file, and --key that of its private key, without a password"
-        raise InputError(certificate, f"is no certificate with its key: {e}", fix=fix) from e
+        raise InputError(certificate, f"is not a certificate with its key: {e}", fix=fix) from e
     return context
 
 

@@ -31,7 +31,9 @@ class Recorded:
         if not self._runs:
             raise InputError(recording.file, "has no run with frames")
         if "task" not in recording.header:
-            raise InputError(recording.file, "is no recording of an environment", fix="`Simulation.replay` replays it")
+            raise InputError(
+                recording.file, "is not a recording of an environment", fix="`Simulation.replay` replays it"
+            )
         whole = all(run.kept(k, min(k + FLUSH, run.frames)).all() for run in self._runs for k in _starts(run))
         self._replayer = Replayer(recording, "state" if whole else "action")
         env = self._replayer.env

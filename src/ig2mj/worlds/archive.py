@@ -137,16 +137,16 @@ def _open(file: str | os.PathLike | bytes) -> Iterator[Any]:
     try:
         archive = np.load(stream, allow_pickle=False)
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as e:
-        raise InputError("packed arrays" if isinstance(file, bytes) else file, f"is no npz archive: {e}") from e
+        raise InputError("packed arrays" if isinstance(file, bytes) else file, f"is not an npz archive: {e}") from e
     if not hasattr(archive, "files"):  # a single array
-        raise InputError("packed arrays" if isinstance(file, bytes) else file, "is no npz archive")
+        raise InputError("packed arrays" if isinstance(file, bytes) else file, "is not an npz archive")
     with archive:
         yield archive
 
 
 def _header(archive: Any, file: str | os.PathLike) -> dict[str, Any]:
     if HEADER not in archive.files:
-        raise InputError(file, "is no archive of this project", element=HEADER)
+        raise InputError(file, "is not an archive of this project", element=HEADER)
     try:
         return msgspec.json.decode(archive[HEADER].tobytes(), type=dict)
     except (msgspec.DecodeError, ValueError, OSError, zipfile.BadZipFile, zlib.error) as e:

@@ -32,7 +32,7 @@ FORMAT_VERSION = 2
 """1: scene and agents were not separate (`ig2mj.engine.snapshot`)."""
 
 
-_MEND = "make a pool of this scene with `ig2mj sample`"
+_FIX = "make a pool of this scene with `ig2mj sample`"
 
 
 @struct.dataclass
@@ -86,7 +86,7 @@ def load_pool_scene(
     for entry in header.get("additions", ()):
         model = find_model(f"{entry['category']}/{entry['model']}")
         if model.sha256 != entry["sha256"]:
-            raise InputError(file, f"was made with another '{model.category}/{model.model}' added", fix=_MEND)
+            raise InputError(file, f"was made with another '{model.category}/{model.model}' added", fix=_FIX)
         at = entry.get("place")
         wanted.append(Addition(**{**entry, "place": None if at is None else tuple(at)}).wanted)
     return load_scene(header["scene"] if scene is None else scene, agents, wanted)
@@ -108,7 +108,7 @@ def load_pool(file: str | os.PathLike, scene: Scene | None = None) -> Pool:
       InputError: the file is missing, broken, of another scene, or of another format.
     """
     header = _pool_header(file)
-    fix = _MEND
+    fix = _FIX
     if scene is not None and header.get("scene") != scene.name:
         raise InputError(file, f"is a pool of scene '{header.get('scene')}', not of '{scene.name}'", fix=fix)
     if scene is not None and [a["name"] for a in header.get("additions", ())] != [a.name for a in scene.additions]:
@@ -129,5 +129,5 @@ def load_pool(file: str | os.PathLike, scene: Scene | None = None) -> Pool:
 def _pool_header(file: str | os.PathLike) -> dict[str, Any]:
     header = read_header(file)
     if header.get("kind") != "pool" or header.get("format_version") != FORMAT_VERSION:
-        raise InputError(file, f"is no pool of format {FORMAT_VERSION}", fix=_MEND)
+        raise InputError(file, f"is not a pool of format {FORMAT_VERSION}", fix=_FIX)
     return header

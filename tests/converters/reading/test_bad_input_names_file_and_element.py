@@ -56,7 +56,7 @@ URDFS = {
     "underscore in a number": ("{link a <inertial><mass value='1_0'/></inertial>}", "link 'a'.*mass.*1_0"),
     "a mass no float can hold twice": ("{link a <inertial><mass value='1e200'/></inertial>}", "link 'a'.*mass.*1e200"),
     "negative mass": ("{link a <inertial><mass value='-1'/></inertial>}", "link 'a' inertial mass.*negative"),
-    "mass is no number": ("{link a <inertial><mass value='heavy'/></inertial>}", "link 'a' inertial mass.*heavy"),
+    "mass is not a number": ("{link a <inertial><mass value='heavy'/></inertial>}", "link 'a' inertial mass.*heavy"),
     "inertia not finite": (
         "{link a <inertial><mass value='1'/><inertia ixx='inf'/></inertial>}",
         "link 'a' inertial inertia.*ixx",
@@ -94,13 +94,13 @@ URDFS = {
     ),
     "mesh missing": ("{link a {mesh shape/no.obj}}", "link 'a'.*mesh.*shape/no.obj.*does not exist"),
     "mesh name empty": ("{link a <collision><geometry><mesh filename=' '/></geometry></collision>}", "link 'a'.*mesh"),
-    "mesh is a folder": ("{link a {mesh ../m}}", "m.*no mesh format"),
+    "mesh is a folder": ("{link a {mesh ../m}}", "m.*not a supported mesh format"),
     "mesh leaves the dataset": ("{link a {mesh ../../../../secret.obj}}", "link 'a'.*outside the dataset root"),
     "mesh path is absolute": ("{link a {mesh /etc/passwd.obj}}", "link 'a'.*absolute"),
     "mesh path with a drive": ("{link a {mesh C:/x.obj}}", "link 'a'.*absolute"),
     "mesh at an address": ("{link a {mesh https://x.invalid/x.obj}}", "link 'a'.*not below the dataset root"),
     "mesh as file://": ("{link a {mesh file:///etc/passwd}}", "link 'a'.*not below the dataset root"),
-    "mesh of unknown format": ("{link a {mesh shape/c.blend}}", "c.blend.*no mesh format"),
+    "mesh of unknown format": ("{link a {mesh shape/c.blend}}", "c.blend.*not a supported mesh format"),
     "encrypted collision": ("{link a {mesh shape/c.encrypted.obj}}", "link 'a'.*encrypted collision"),
 }
 
@@ -143,10 +143,10 @@ def test_object_urdf(root, make, what):
 
 XML = {
     "empty file": (b"", "is empty"),
-    "zero bytes": (b"\0" * 100, "is empty|no XML"),
-    "no XML": (b"hello world", "no XML"),
+    "zero bytes": (b"\0" * 100, "is empty|not XML"),
+    "no XML": (b"hello world", "not XML"),
     "binary": (bytes(range(256)) * 4, "XML"),
-    "JSON": (b'{"robot": 1}', "no XML"),
+    "JSON": (b'{"robot": 1}', "not XML"),
     "HTML": (b"<html><body>404</body></html>", "root element is <html>"),
     "truncated": (b"<robot><link name='a'><visual>", "line 1.*truncated"),
     "truncated in a tag": (b"<robot>\n<link name='a", "truncated"),
@@ -181,7 +181,7 @@ def test_broken_or_hostile_xml(root, what):
 
 
 METADATA = {
-    "broken JSON": ('{"bbox_size": [1, 1,', "no valid JSON"),
+    "broken JSON": ('{"bbox_size": [1, 1,', "not valid JSON"),
     "a list": ("[1]", "list instead of a dict"),
     "nested too deeply": ("[" * 100_000 + "]" * 100_000, "nested too deeply"),
     "bbox_size of two numbers": ('{"bbox_size": [1, 1]}', "'bbox_size'.*3 numbers"),
@@ -238,7 +238,7 @@ SCENES = {
         LINK.format("") + JOINT.format("fixed", "<origin xyz='0 inf 0'/>" + TO_WORLD),
         "joint 'j' origin.*inf",
     ),
-    "states is no JSON": (LINK.format("states='{'") + JOINT.format("fixed", TO_WORLD), "link 'o'.*'states'.*JSON"),
+    "states is not JSON": (LINK.format("states='{'") + JOINT.format("fixed", TO_WORLD), "link 'o'.*'states'.*JSON"),
     "states is a list": (LINK.format("states='[]'") + JOINT.format("fixed", TO_WORLD), "link 'o'.*'states'|'states'.*"),
     "joint_states is a number": (LINK.format("joint_states='3'") + JOINT.format("fixed", TO_WORLD), "'joint_states'"),
     "joint state infinite": (
@@ -283,7 +283,7 @@ def test_scene_urdf(root, what):
 
 
 ROOTS = {
-    "specs are no JSON": ("metadata/avg_category_specs.json", "{", "no valid JSON"),
+    "specs are no JSON": ("metadata/avg_category_specs.json", "{", "not valid JSON"),
     "specs with density 0": (
         "metadata/avg_category_specs.json",
         '{"cup": {"density": 0}}',
@@ -291,8 +291,8 @@ ROOTS = {
     ),
     "specs entry is a number": ("metadata/avg_category_specs.json", '{"cup": 3}', "category 'cup'"),
     "overlaps are no pairs": ("scenes/S_int/misc/bbox_overlap.json", '[["a"]]', "entry 0.*pair"),
-    "overlaps are no JSON": ("scenes/S_int/misc/bbox_overlap.json", "[", "no valid JSON"),
-    "room map is no image": ("scenes/S_int/layout/floor_semseg_0.png", "PNG?", "no image"),
+    "overlaps are no JSON": ("scenes/S_int/misc/bbox_overlap.json", "[", "not valid JSON"),
+    "room map is not an image": ("scenes/S_int/layout/floor_semseg_0.png", "PNG?", "not an image"),
 }
 
 
@@ -309,7 +309,7 @@ def test_files_of_the_root(root, what):
 
 
 def test_a_root_that_is_none(tmp_path):
-    with pytest.raises(InputError, match=r"no dataset root.*VERSION"):
+    with pytest.raises(InputError, match=r"not a dataset root.*VERSION"):
         Dataset(tmp_path)
 
 
@@ -322,7 +322,7 @@ def test_names_that_do_not_exist_are_told_with_near_ones(root):
         data.scene("S_int", "other.urdf")
     with pytest.raises(InputError, match=r"cup/x.*does not exist.*known models: m"):
         data.model("cup", "x")
-    with pytest.raises(InputError, match=r"'\.\.' is no name"):
+    with pytest.raises(InputError, match=r"'\.\.' is not a name"):
         data.model("..", "x")
 
 

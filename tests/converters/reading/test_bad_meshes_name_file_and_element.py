@@ -29,7 +29,7 @@ OBJS = {
     "face names a vertex that is not there": ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "line 4.*'4'"),
     "face names vertex 0": ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n", "line 4.*'0'"),
     "negative index too far": ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf -4 -1 -2\n", "line 4.*'-4'"),
-    "corner is no number": ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf a b c\n", "line 4.*'a'"),
+    "corner is not a number": ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf a b c\n", "line 4.*'a'"),
     "vertex not a number": ("v 0 0 x\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "line 1.*0 0 x"),
     "vertex NaN": ("v 0 0 0\nv 1 nan 0\nv 0 1 0\nf 1 2 3\n", "line 2.*nan"),
     "vertex infinite": ("v 0 0 0\nv 1 0 0\nv 0 1e999 0\nf 1 2 3\n", "line 3.*1e999"),

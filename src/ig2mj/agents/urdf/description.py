@@ -69,7 +69,7 @@ class Description(msgspec.Struct, frozen=True):
         except OSError as e:
             raise InputError(file, "cannot be read", fix=again) from e
         except (msgspec.DecodeError, msgspec.ValidationError) as e:
-            raise InputError(file, f"is no description of a robot: {e}", fix=again) from e
+            raise InputError(file, f"is not a description of a robot: {e}", fix=again) from e
         if made.format_version != FORMAT_VERSION:
             raise InputError(file, f"has format version {made.format_version}, not {FORMAT_VERSION}", fix=again)
         return made

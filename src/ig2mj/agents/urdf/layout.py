@@ -110,7 +110,7 @@ class Layout:
         except (OSError, UnicodeDecodeError) as e:
             raise InputError(path, "cannot be read", fix="name a TOML or JSON file") from e
         except ValueError as e:
-            raise InputError(path, f"is no {path.suffix.lstrip('.').upper() or 'TOML'}: {e}") from e
+            raise InputError(path, f"is not {path.suffix.lstrip('.').upper() or 'TOML'}: {e}") from e
         return cls.found(robot, given, str(path))
 
 

@@ -172,7 +172,7 @@ def load_profile(folder: str | os.PathLike, model: mujoco.MjModel, name: str = P
     try:
         profile = msgspec.json.decode(file.read_bytes(), type=EngineProfile)
     except msgspec.MsgspecError as e:
-        raise InputError(file, f"is no engine profile: {e}", fix=fix) from e
+        raise InputError(file, f"is not an engine profile: {e}", fix=fix) from e
     for name in ("awake_dofs", "constraints", "contacts", "convex_contacts"):
         if getattr(profile, name) < 1:
             raise InputError(file, "must be at least 1", element=name, fix=fix)

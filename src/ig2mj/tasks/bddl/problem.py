@@ -96,9 +96,11 @@ class _Reader:
             if isinstance(part, Word) and self.tolerates(part, "stands between the sections: ignored"):
                 continue
             if isinstance(part, Word) or not part.parts or not isinstance(head := part.parts[0], Word):
-                raise self.error(part, "is no section", "sections are (problem ...), (:domain ...), (:objects ...) ...")
+                raise self.error(
+                    part, "is not a section", "sections are (problem ...), (:domain ...), (:objects ...) ..."
+                )
             if head.text not in ("problem", ":domain", ":requirements", ":objects", ":init", ":goal"):
-                raise self.error(head, "is no section" + _near(head.text, [":domain", ":objects", ":init", ":goal"]))
+                raise self.error(head, "is not a section" + _near(head.text, [":domain", ":objects", ":init", ":goal"]))
             if head.text in sections:
                 raise self.error(head, "occurs twice")
             sections[head.text] = part
@@ -107,7 +109,7 @@ class _Reader:
                 raise self.error(tree, f"has no section ({name} ...)")
         self.domain = self.only_word(sections[":domain"])
         if self.domain not in PREDICATES:
-            raise self.error(sections[":domain"], f"is no domain that is known ({', '.join(PREDICATES)})")
+            raise self.error(sections[":domain"], f"is not a known domain ({', '.join(PREDICATES)})")
         self.predicates = PREDICATES[self.domain]
         self.read_objects(sections[":objects"])
         init, rooms = [], {}
@@ -131,7 +133,7 @@ class _Reader:
         words = iter(section.parts[1:])
         for part in words:
             if not isinstance(part, Word):
-                raise self.error(part, "is no object", "objects are a list: NAME NAME - SYNSET")
+                raise self.error(part, "is not an object", "objects are a list: NAME NAME - SYNSET")
             if part.text != "-":
                 if part.text in self.names:
                     if self.tolerates(part, "is declared twice: counts once"):
@@ -154,7 +156,7 @@ class _Reader:
         """A condition; `bound`: variable -> its synset. `top`: `inroom` may stand here."""
         if isinstance(tree, Word) or not tree.parts or not isinstance(head := tree.parts[0], Word):
             raise self.error(
-                tree, "is no condition", "a condition is (PREDICATE OBJECT ...) or (and ...), (not ...) ..."
+                tree, "is not a condition", "a condition is (PREDICATE OBJECT ...) or (and ...), (not ...) ..."
             )
         word, parts = head.text, tree.parts[1:]
 
@@ -195,7 +197,7 @@ class _Reader:
 
     def atom(self, tree: Group, head: Word, parts: tuple[Tree, ...], bound: Collection[str], top: bool) -> Atom:
         if head.text not in self.predicates:
-            raise self.error(head, f"is no predicate of domain {self.domain}{_near(head.text, self.predicates)}")
+            raise self.error(head, f"is not a predicate of domain {self.domain}{_near(head.text, self.predicates)}")
         if len(parts) != (wanted := self.predicates[head.text]):
             raise self.error(tree, f"takes {wanted} arguments, has {len(parts)}")
         if head.text == IN_ROOM and not top:
@@ -203,7 +205,7 @@ class _Reader:
         arguments = []
         for number, part in enumerate(parts):
             if not isinstance(part, Word):
-                raise self.error(part, "is no object")
+                raise self.error(part, "is not an object")
             arguments.append(self.argument(part, bound, is_room=head.text == IN_ROOM and number == 1))
         return Atom(head.text, tuple(arguments))
 
@@ -212,22 +214,22 @@ class _Reader:
             return word.text
         name = word.text.removeprefix("?")
         if name not in self.names:
-            kind = "variable of a quantifier around it, and no object" if word.text.startswith("?") else "object"
-            raise self.error(word, f"is no {kind} of :objects{_near(name, self.names)}")
+            kind = "a variable of a quantifier around it, or an object" if word.text.startswith("?") else "an object"
+            raise self.error(word, f"is not {kind} of :objects{_near(name, self.names)}")
         return name
 
     def binding(self, tree: Tree) -> tuple[str, str]:
         match tree:
             case Group((Word(variable), Word("-"), Word(group) as synset)) if variable.startswith("?"):
                 if group not in self.objects:
-                    raise self.error(synset, f"is no synset of :objects{_near(group, self.objects)}")
+                    raise self.error(synset, f"is not a synset of :objects{_near(group, self.objects)}")
                 return variable, group
-        raise self.error(tree, "is no variable with its synset", "write (?x - SYNSET)")
+        raise self.error(tree, "is not a variable with its synset", "write (?x - SYNSET)")
 
     def count(self, tree: Tree) -> int:
         word = tree.parts[0] if isinstance(tree, Group) and len(tree.parts) == 1 else tree
         if not isinstance(word, Word) or not word.text.isdecimal():
-            raise self.error(tree, "is no whole number")
+            raise self.error(tree, "is not a whole number")
         return int(word.text)
 
     def only_word(self, section: Group) -> str:

@@ -218,7 +218,7 @@ def rewrite(e: Expression, rule: AtomRule, bound: Mapping[str, str] | None = Non
             return logic.Pairing(
                 count, tuple(tuple(None if p is None else rewrite(p, rule, bound) for p in row) for row in rows)
             )
-    raise TypeError(f"{e!r} is no expression")
+    raise TypeError(f"{e!r} is not an expression")
 
 
 def groups_of(e: Expression) -> set[str]:

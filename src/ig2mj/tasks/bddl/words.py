@@ -86,7 +86,7 @@ def _lines(e: Expression, indent: str) -> list[str]:
             return _headed(f"exactly {count} of these:", parts, indent)
         case Pairing(count, rows):
             return _headed(f"{count} pairs of these:", [p for row in rows for p in row if p is not None], indent)
-    raise TypeError(f"{e!r} is no expression")
+    raise TypeError(f"{e!r} is not an expression")
 
 
 def _headed(head: str, parts: Sequence[Expression], indent: str) -> list[str]:
