@@ -18,7 +18,7 @@ from ig2mj.errors import Ig2mjError
 from ig2mj.learn.collect import Transition
 from ig2mj.learn.evaluate import wilson
 from ig2mj.learn.moments import RewardScale
-from ig2mj.learn.networks import Encoder, projected
+from ig2mj.learn.networks import Encoder, brightest, projected, shifted
 from ig2mj.learn.perception import FAR, Perception, Seen, shrunk
 from ig2mj.learn.policies import Policy, PolicyMismatch, depends_on, perception_of
 from ig2mj.learn.replay import Replay
@@ -127,6 +127,21 @@ def test_a_policy_sees_pictures_in_the_size_it_was_trained_on():
         policy.check(env, Perception(env.observation_spaces, "rgbd"))
     with pytest.raises(Ig2mjError, match="32 pixels cannot be averaged down to 12"):
         Perception(env.observation_spaces, "rgbd", 12)
+
+
+def test_the_brightest_point_of_a_map_is_found_between_pixels():
+    maps = np.full((2, 5, 9, 2), -30.0, np.float32)
+    maps[0, 0, 8, 0] = maps[0, 4, 2, 1] = maps[0, 4, 3, 1] = 30.0  # one pixel; two beside each other
+    found = np.asarray(brightest(jnp.asarray(maps)))
+    assert np.allclose(found[0], [-1.0, 1.0, 1.0, -0.375], atol=1e-4)  # rows of both channels, then columns
+    assert np.allclose(found[1], 0.0, atol=1e-4)
+
+
+def test_pictures_that_are_not_to_be_moved_stay_as_they_are():
+    picture = jnp.arange(2 * 8 * 8 * 3, dtype=jnp.uint8).reshape(2, -1)
+    assert np.array_equal(shifted(picture, (8, 8, 3), jax.random.PRNGKey(0), 0), picture)
+    moved = shifted(picture, (8, 8, 3), jax.random.PRNGKey(0), 2)
+    assert moved.shape == picture.shape and not np.array_equal(moved, picture)
 
 
 @pytest.mark.parametrize("side", [32, 64, 128])

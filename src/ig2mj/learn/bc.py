@@ -45,7 +45,7 @@ class BCConfig:
     Attributes:
       steps: updates. batch: samples of an update. noise: deviation of what is added to normalized numbers that are
         seen, against copying what was done before.
-      guess: weight of the actor's guess of the privileged state from its features, from pixels.
+      guess: weight of the actor's guess of the privileged state, from pixels. shift: pixels they are moved by at most.
       lr: learning rate, falling to `last_lr` along a cosine. actor: sizes of the layers. net: encoder.
     """
 
@@ -53,6 +53,7 @@ class BCConfig:
     batch: int = 1024
     noise: float = 0.0
     guess: float = 1.0
+    shift: int = 2
     lr: float = 1e-3
     last_lr: float = 1e-5
     actor: tuple[int, ...] = (256, 256, 256)
@@ -172,7 +173,7 @@ def _clone(algorithm: BC, demos: Demos, run: Run, depends: Mapping[str, Any]) ->
 def begin_as_clone(algorithm: Any, demos: Demos, seed: int, steps: int = 2000) -> Any:
     """What another algorithm learns from, where its actor begins as a clone of demonstrations (SAC's `cloned`)."""
     c = algorithm.config
-    config = BCConfig(steps=steps, batch=min(c.batch, 1024), guess=c.guess, actor=c.actor, net=c.net)
+    config = BCConfig(steps=steps, batch=min(c.batch, 1024), guess=c.guess, shift=c.shift, actor=c.actor, net=c.net)
     cloner = BC(algorithm.perception, algorithm.action_size, config)
     learner, _ = clone(cloner, demos, Run(minutes=60.0, seed=seed, quiet=True))
     return algorithm.cloned(algorithm.init(jax.random.PRNGKey(seed)), learner.actor, learner.moments)

@@ -39,9 +39,9 @@ class DaggerConfig:
       capacity: labels that are kept, of all worlds together. warm_up: steps of each world before the first update.
       alone: share of the run after which the expert acts no more. noise: deviation of what is added to actions.
       disturbed: share of the expert's steps in which its action is replaced by a random one.
-      guess: weight of the actor's guess of the privileged state from its features, from pixels.
+      guess: weight of the actor's guess of the privileged state, from pixels. shift: pixels they are moved by at most.
       lr: learning rate, falling to `last_lr` along a cosine over the run.
-      actor: sizes of the layers. net: encoder ("small" or "paper").
+      actor: sizes of the layers. net: encoder (`networks.NETS`).
     """
 
     length: int = 4
@@ -53,6 +53,7 @@ class DaggerConfig:
     noise: float = 0.1
     disturbed: float = 0.1
     guess: float = 1.0
+    shift: int = 2
     lr: float = 1e-3
     last_lr: float = 1e-4
     actor: tuple[int, ...] = (256, 256, 256)

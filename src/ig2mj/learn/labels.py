@@ -79,7 +79,7 @@ class Imitation:
         """`config`: of cloning or DAgger. `axis`: the name of an axis of devices over which gradients are averaged."""
         guess = perception.vector_size - perception.actor_size if perception.picture_shape and config.guess else 0
         self.actor = Actor(action_size, config.actor, perception.picture_shape, config.net, guess)
-        self._perception, self._weight, self._axis = perception, config.guess, axis
+        self._perception, self._weight, self._shift, self._axis = perception, config.guess, config.shift, axis
         self._adam = optax.chain(optax.clip_by_global_norm(10.0), optax.flatten(optax.scale_by_adam()))
 
     def init(self, key: Array) -> tuple[Any, Any]:
@@ -96,7 +96,7 @@ class Imitation:
         normal = moments.normal(seen.vector)
         picture = seen.picture
         if self._perception.picture_shape is not None:
-            picture = shifted(picture, self._perception.picture_shape, key)
+            picture = shifted(picture, self._perception.picture_shape, key, self._shift)
         looked: Any = self.actor.apply({"params": params}, normal[:, : self._perception.actor_size], picture)
         mean, _, guess = looked
         loss = jnp.square(jnp.tanh(mean) - label).mean()

@@ -22,8 +22,12 @@ LOG_STD = (-5.0, 0.0)
 FIRST_STD = 0.3
 """Standard deviation of an untrained actor."""
 
-NETS = ("small", "paper")
+NETS = ("small", "paper", "points")
 """Encoders of pictures."""
+
+
+SHARP = 3.0
+"""Factor of maps before their softmax: without it an untrained softmax is even, and hardly changes."""
 
 
 class Trunk(nn.Module):
@@ -42,7 +46,9 @@ class Encoder(nn.Module):
     """Features of pictures.
 
     `small`: convolutions of stride 2 until 4x4 pixels are left, for 32x32 pixels three (32, 64, 64), and 50 numbers
-    between -1 and 1, as in Squint. `paper`: three convolutions and 256 numbers (iGibson 2.0, appendix A.3).
+    between -1 and 1, as in Squint. `paper`: three convolutions and 256 numbers (iGibson 2.0, appendix A.3). `points`:
+    `small`'s numbers, and where in the picture each of 32 channels is brightest after two halvings (the spatial softmax
+    of Levine et al. 2016), so that the place of a thin object need not be read from four by four coarse cells.
     """
 
     shape: tuple[int, int, int]
@@ -52,12 +58,25 @@ class Encoder(nn.Module):
     def __call__(self, picture: UInt8[Array, "B q"]) -> Float[Array, "B f"]:
         x = picture.reshape(-1, *self.shape).astype(jnp.float32) / 255.0 - 0.5
         halvings = 3 if self.net == "paper" else max(3, math.ceil(math.log2(self.shape[0] / 4)))
-        for channels in (32, *[64] * (halvings - 1)):
+        places = jnp.zeros((x.shape[0], 0))
+        for k, channels in enumerate((32, *[64] * (halvings - 1))):
             x = nn.relu(nn.Conv(channels, (3, 3), strides=2, padding="SAME")(x))
+            if self.net == "points" and k == 1:
+                maps = nn.Conv(32, (3, 3), padding="SAME", name="points")(nn.LayerNorm(name="points_norm")(x))
+                places = brightest(SHARP * maps)
         x = x.reshape(x.shape[0], -1)
         if self.net == "paper":
             return nn.relu(nn.Dense(256)(x))
-        return jnp.tanh(nn.LayerNorm()(nn.Dense(50)(x)))
+        return jnp.concatenate([places, jnp.tanh(nn.LayerNorm()(nn.Dense(50)(x)))], axis=-1)
+
+
+def brightest(maps: Float[Array, "B h w c"]) -> Float[Array, "B 2*c"]:
+    """Row and column, from -1 to 1, of the middle of each channel's softmax over the picture."""
+    count, height, width, channels = maps.shape
+    share = jax.nn.softmax(maps.reshape(count, height * width, channels), axis=1).reshape(maps.shape)
+    row = jnp.einsum("bhwc,h->bc", share, jnp.linspace(-1.0, 1.0, height))
+    column = jnp.einsum("bhwc,w->bc", share, jnp.linspace(-1.0, 1.0, width))
+    return jnp.concatenate([row, column], axis=-1)
 
 
 class Actor(nn.Module):
@@ -129,7 +148,9 @@ class Value(nn.Module):
 
 
 def shifted(picture: UInt8[Array, "B q"], shape: tuple[int, int, int], key: Array, by: int = 2) -> UInt8[Array, "B q"]:
-    """Each picture moved by at most so many pixels, its border repeated (DrQ's augmentation)."""
+    """Each picture moved by at most so many pixels, its border repeated (DrQ's augmentation); by 0, as it is."""
+    if not by:
+        return picture
     count = picture.shape[0]
     padded = jnp.pad(picture.reshape(count, *shape), ((0, 0), (by, by), (by, by), (0, 0)), mode="edge")
     start = jax.random.randint(key, (count, 2), 0, 2 * by + 1)

@@ -59,9 +59,9 @@ class SACConfig:
       disturbance: deviation of what is added to its actions.
       copy: weight of its labels in the actor's loss, at first. copied: share of the run over which that falls to 0.
       trust: 1: labels count only where critics value them more than the actor's action (Nair et al. 2018); 0: always.
-      guess: weight of the actor's guess of the privileged state from its features, from pixels.
+      guess: weight of the actor's guess of the privileged state, from pixels. shift: pixels they are moved by at most.
       lr: learning rate, falling to `last_lr` along a cosine over the run.
-      actor, critic: sizes of the layers. net: encoder ("small" or "paper").
+      actor, critic: sizes of the layers. net: encoder (`networks.NETS`).
     """
 
     length: int = 2
@@ -87,6 +87,7 @@ class SACConfig:
     copied: float = 0.7
     trust: int = 0
     guess: float = 1.0
+    shift: int = 2
     lr: float = 3e-4
     last_lr: float = 1e-4
     actor: tuple[int, ...] = (256, 256, 256)
@@ -177,8 +178,6 @@ class SAC:
         """Updates of an iteration."""
         groups = max(1, self.config.length * self.config.updates // self.config.every)
         return groups * self.config.every
-
-    # What there is at first.
 
     def init(self, key: Array) -> SACLearner:
         """Untrained."""
@@ -365,7 +364,7 @@ class SAC:
         shift_key, draw_key = jax.random.split(key)
         seen, normal = batch.seen, learner.moments.normal(batch.seen.vector)
         if p.picture_shape is not None:
-            seen = Seen(seen.vector, shifted(seen.picture, p.picture_shape, shift_key))
+            seen = Seen(seen.vector, shifted(seen.picture, p.picture_shape, shift_key, c.shift))
         alpha = jnp.exp(learner.log_alpha)
 
         def value(action: Array) -> Float[Array, "B"]:
