@@ -66,8 +66,9 @@ def memory() -> list[tuple[str, int, float]]:
         if good:
             row = max(good, key=lambda r: r["worlds"])
             found.append((title, row["worlds"], row["peak_device_MB_per_world"]))
-    for row in lines(RESULTS / "environments" / "h200.jsonl"):
-        title = f"CookingMeat with a humanoid{', pixels' if row['observations'] else ''}"
+    newest = {bool(row["observations"]): row for row in lines(RESULTS / "environments" / "h200.jsonl")}
+    for pixels, row in newest.items():
+        title = f"CookingMeat with a humanoid{', pixels' if pixels else ''}"
         found.append((title, row["worlds"], row["peak_device_MB_per_world"]))
     return found
 
