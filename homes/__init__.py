@@ -3,12 +3,12 @@
 Nothing here belongs to the run-time: this package writes files that `ig2mj_converters` reads, just as it reads the
 iGibson dataset. It imports `ig2mj.knowledge` and `ig2mj.errors` only.
 
-    shape.py, solids.py, turned.py, vessels.py   bricks: what is seen (meshes) with what is felt (convex hulls)
-    materials.py, textures.py, material_library.py   colours, wood grain, cloth, labels, screens
-    model.py                ObjectBuilder: links, joints, annotated links
-    families/*.py           one file per family of objects; each ends with CATEGORIES, its lines of the catalogue
-    catalogue.py            Entry (size, mass, count, ...) and build_model()
-    writer.py, poses.py, halves.py, specs.py, dataset.py   a model folder, stable poses, halves, the whole dataset
+    shapes/     bricks (visual meshes with convex collision hulls), materials, textures, what moving parts sweep
+    objects/    one file per family of categories, each ending with CATEGORIES, its lines of the catalogue;
+                model.py has ObjectBuilder (links, joints, annotated links), catalogue.py build_model()
+    plans/      a home's rooms, doors, windows, walls and maps
+    furnish/    what stands in which room, and where
+    dataset/    files of models, scenes and the whole dataset; sheet.py draws models
 
 How to add a category: write a function in the family's file and one `Entry` line at its end:
 
@@ -23,6 +23,7 @@ How to add a category: write a function in the family's file and one `Entry` lin
 The rules: the front looks along +x and the object stands on z = 0 around the origin; metres, kilograms; random choices
 only from `b.rng`, alternatives by `b.pick(...)` (cycles by model number); moving parts by `b.hinge/slide/spin`, in the
 object's frame with the joint at 0 = closed; annotated links that the category's abilities need by `b.point/area`
-(tests walk all categories and say what is missing); at most 8 collision hulls on a small object. `Solid.seen()` drops
-the hulls of a detail, `Solid.felt()` its picture. A new file is named in families/__init__.py.
+(tests walk all categories and say what is missing); at most 8 collision hulls on a small object.
+`Solid.visual_only()` drops a detail's hulls, `Solid.collision_only()` its visuals. A new file is listed in
+objects/families.py.
 """

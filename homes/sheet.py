@@ -1,7 +1,7 @@
 """A contact sheet: pictures of models side by side, to see what was built. Uses MuJoCo's C renderer.
 
 Models are drawn straight from the builder (no converter), each in a tile of its own, from the front right above; with
-`opened` every joint stands at its limit; with `felt` the collision hulls are drawn instead of the visuals.
+`opened` every joint stands at its limit; with `collision` the collision hulls are drawn instead of the visuals.
 """
 
 from __future__ import annotations
@@ -21,10 +21,15 @@ PALETTE = ((0.9, 0.4, 0.3), (0.3, 0.6, 0.9), (0.4, 0.8, 0.4), (0.9, 0.8, 0.3), (
 
 
 def contact_sheet(
-    models: Iterable[HouseholdObject], columns: int = 6, *, opened: bool = False, felt: bool = False, turn: float = 35.0
+    models: Iterable[HouseholdObject],
+    columns: int = 6,
+    *,
+    opened: bool = False,
+    collision: bool = False,
+    turn: float = 35.0,
 ) -> Image.Image:
     """One RGB image with a labelled tile per model. turn: azimuth of the viewer from the front, degrees."""
-    tiles = [_tile(model, opened, felt, turn) for model in models]
+    tiles = [_tile(model, opened, collision, turn) for model in models]
     rows = math.ceil(len(tiles) / columns)
     sheet = Image.new("RGB", (columns * TILE, rows * TILE), (255, 255, 255))
     for k, tile in enumerate(tiles):
@@ -32,7 +37,7 @@ def contact_sheet(
     return sheet
 
 
-def _tile(model: HouseholdObject, opened: bool, felt: bool, turn: float) -> Image.Image:
+def _tile(model: HouseholdObject, opened: bool, collision: bool, turn: float) -> Image.Image:
     low, high = model.bounds()
     reach = float(np.linalg.norm(high - low))
     spec = mujoco.MjSpec()
@@ -53,7 +58,7 @@ def _tile(model: HouseholdObject, opened: bool, felt: bool, turn: float) -> Imag
         if joint and joint.kind != "fixed":
             kind = mujoco.mjtJoint.mjJNT_SLIDE if joint.kind == "prismatic" else mujoco.mjtJoint.mjJNT_HINGE
             body.add_joint(name=joint.name, type=kind, axis=list(joint.axis))
-        _draw(spec, body, link, scale, felt)
+        _draw(spec, body, link, scale, collision)
     model_c = spec.compile()
     data = mujoco.MjData(model_c)
     for joint in model.joints:
@@ -73,15 +78,15 @@ def _tile(model: HouseholdObject, opened: bool, felt: bool, turn: float) -> Imag
     return image
 
 
-def _draw(spec: mujoco.MjSpec, body, link, scale: float, felt: bool) -> None:
-    if felt:
+def _draw(spec: mujoco.MjSpec, body, link, scale: float, collision: bool) -> None:
+    if collision:
         for k, points in enumerate(link.hulls):
             mesh = hull_mesh(points)
             name = f"{link.name}_h{k}"
             _mesh_geom(spec, body, name, np.asarray(mesh.vertices) * scale, np.asarray(mesh.faces), None, None)
             body.geoms[-1].rgba = [*PALETTE[k % len(PALETTE)], 1]
         return
-    for k, (material, mesh) in enumerate(link.seen):
+    for k, (material, mesh) in enumerate(link.visuals):
         name = f"{link.name}_{k}"
         look = spec.add_material(name=name, rgba=[*material.rgb, material.alpha], specular=material.shine * 0.5)
         uv = None

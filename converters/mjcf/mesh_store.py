@@ -29,7 +29,6 @@ class MeshStore:
     def __init__(self, spec: mujoco.MjSpec, folder: pathlib.Path):
         self._spec, self._folder = spec, folder
         self._names: dict[str, str] = {}
-        self.bytes_written = 0
 
     def __len__(self) -> int:
         return len(self._names)
@@ -64,7 +63,6 @@ class MeshStore:
             name = f"{file_slug(label)}-{key[:12]}"
             self._folder.mkdir(parents=True, exist_ok=True)
             (self._folder / f"{name}.obj").write_bytes(text)
-            self.bytes_written += len(text)
             asset = self._spec.add_mesh(name=name, file=f"{name}.obj")
             kinds = mujoco.mjtMeshInertia
             asset.inertia = kinds.mjMESH_INERTIA_SHELL if surface else kinds.mjMESH_INERTIA_CONVEX

@@ -24,7 +24,7 @@ SIZE = (280, 220)
 SCENE_SIZE = (960, 640)
 SLOW = 2.0
 """Seconds per picture from which on a renderer is used for the scene only, and objects are drawn."""
-SEEN, COLLIDING, HIDDEN = 0, 1, 5
+SHOWN, HIDDEN = 0, 5
 """Geom groups on the copy of the model that is rendered."""
 PALETTE = np.array(
     [
@@ -116,7 +116,7 @@ class Pictures:
             return None
         m, (width, height) = self.model, size
         m.geom_group[:] = HIDDEN
-        m.geom_group[geoms] = SEEN
+        m.geom_group[geoms] = SHOWN
         low, high = self.boxes[geoms, 0].min(axis=0), self.boxes[geoms, 1].max(axis=0)
         middle, extent = (low + high) / 2, max(float(np.linalg.norm(high - low)), 1e-3)
         keep = (m.stat.extent, m.stat.center.copy(), m.light_active.copy())
@@ -130,7 +130,7 @@ class Pictures:
         )  # fmt: skip
         started = time.perf_counter()
         try:
-            image = renderer(m, self.data, view, width=width, height=height, groups=(SEEN,))
+            image = renderer(m, self.data, view, width=width, height=height, groups=(SHOWN,))
         except Exception as e:  # whatever a driver may raise: the report must not fail for a picture
             self.renderer = None
             self.note = f"rendering failed ({' '.join(str(e).split())[:200]}): pictures are drawings"

@@ -79,10 +79,10 @@ def metadata(model: HouseholdObject) -> dict:
         cloud = np.concatenate(link.hulls)
         box = _box_entry(cloud.min(0), cloud.max(0))
         boxes[link.name] = {"collision": {"axis_aligned": box, "oriented": box}, "visual": None}
-        if link.seen:
-            seen = np.concatenate([mesh.vertices for _, mesh in link.seen])
-            seen_box = _box_entry(seen.min(0), seen.max(0))
-            boxes[link.name]["visual"] = {"axis_aligned": seen_box, "oriented": seen_box}
+        if link.visuals:
+            points = np.concatenate([mesh.vertices for _, mesh in link.visuals])
+            visual_box = _box_entry(points.min(0), points.max(0))
+            boxes[link.name]["visual"] = {"axis_aligned": visual_box, "oriented": visual_box}
     data: dict = {
         "bbox_size": rounded(high - low),
         "base_link_offset": rounded((high + low) / 2),
@@ -195,7 +195,7 @@ class _MaterialNames:
 def _write_visuals(link: LinkBuilder, names: _MaterialNames, folder: pathlib.Path) -> dict[str, str]:
     """Writes one OBJ per material of a link; returns {file name: material class}."""
     by_material: dict[str, tuple[Material, list[Mesh]]] = {}
-    for material, mesh in link.seen:
+    for material, mesh in link.visuals:
         by_material.setdefault(names.name(material), (material, []))[1].append(mesh)
     written = {}
     for k, (name, (material, meshes)) in enumerate(by_material.items()):

@@ -49,7 +49,7 @@ def dishwasher(b: ObjectBuilder) -> None:
         skin=0.003,
         angle=1.5,
     )
-    link.add(block((0.004, y - 0.02, 0.06), (plane + leaf, 0, z - 0.04)).seen(), materials.plain("black"))
+    link.add(block((0.004, y - 0.02, 0.06), (plane + leaf, 0, z - 0.04)).visual_only(), materials.plain("black"))
     # The button belongs to the fixed body's rim above the flap, as meta links must lie on the base link.
     button(b, (plane, 0.35 * y, z), materials.plain("red"), 0.01, "z")
 
@@ -57,12 +57,12 @@ def dishwasher(b: ObjectBuilder) -> None:
 def _rack(
     b: ObjectBuilder, name: str, centre: tuple[float, float, float], size: tuple[float, float, float], wire: Material
 ) -> None:
-    """A wire basket that slides towards +x: five felt plates, drawn as rods."""
+    """A wire basket that slides towards +x: five collision plates, drawn as rods."""
     sx, sy, sz = size
     tall = 0.5 * sz
     link = b.slide(name, centre, (1, 0, 0), 0.85 * sx, openable=False)
     at = (centre[0], centre[1], centre[2] - sz / 2)
-    link.add(tray(sx, sy, tall, 0.006).felt().at(*at), wire)
+    link.add(tray(sx, sy, tall, 0.006).collision_only().at(*at), wire)
     rods = []
     for h in (0.004, tall / 2, tall):
         rods += [rod((-sx / 2, s * sy / 2, h), (sx / 2, s * sy / 2, h), 0.003, 5) for s in (-1, 1)]
@@ -72,7 +72,7 @@ def _rack(
         path = [(-sx / 2, yy, tall), (-sx / 2, yy, 0.004), (-0.1 * sx, yy, 0.004), (-0.1 * sx, yy, 0.9 * tall)]
         path += [(0, yy, 0.004), (sx / 2, yy, 0.004), (sx / 2, yy, tall)]
         rods.append(tube(path, 0.0025, 4, hulls=0))
-    link.add(join(rods).seen().at(*at), wire)
+    link.add(join(rods).visual_only().at(*at), wire)
 
 
 def drum(b: ObjectBuilder, *, washing: bool = True) -> None:
@@ -107,18 +107,18 @@ def drum(b: ObjectBuilder, *, washing: bool = True) -> None:
     r = 0.56 * hole + 0.02
     link.add(cylinder(r, leaf, 20).turned("y", 90).at(plane, 0, middle), body)
     link.add(
-        cylinder(0.72 * r, 0.006, 20).seen().turned("y", 90).at(plane + leaf - 0.002, 0, middle),
+        cylinder(0.72 * r, 0.006, 20).visual_only().turned("y", 90).at(plane + leaf - 0.002, 0, middle),
         materials.plain("navy" if washing else "black", "glass", 0.9),
     )
     link.add(block((0.02, 0.02, 0.1), (plane + leaf + 0.008, -s * 0.85 * r, middle)), materials.metal("chrome"))
     at = z - panel / 2
-    b.add(block((0.004, y - 0.02, panel - 0.03), (plane + 0.001, 0, at)).seen(), materials.plain("light_grey"))
-    b.add(knob(0.03, 0.02).seen().at(plane, 0, at), materials.metal("silver"))
+    b.add(block((0.004, y - 0.02, panel - 0.03), (plane + 0.001, 0, at)).visual_only(), materials.plain("light_grey"))
+    b.add(knob(0.03, 0.02).visual_only().at(plane, 0, at), materials.metal("silver"))
     shown = materials.picture("display", textures.screen(b.rng, (0.02, 0.1, 0.2)), kind="screen")
     b.add(decal(0.18 * y, 0.05).at(plane + 0.004, 0.28 * y, at), shown)
     button(b, (plane + 0.004, -0.33 * y, at), materials.plain("green"))
     if washing:
-        b.add(block((0.006, 0.2 * y, 0.06), (plane + 0.003, -0.38 * y, at)).seen(), body)
+        b.add(block((0.006, 0.2 * y, 0.06), (plane + 0.003, -0.38 * y, at)).visual_only(), body)
 
 
 def coffee_maker(b: ObjectBuilder) -> None:
@@ -132,7 +132,7 @@ def coffee_maker(b: ObjectBuilder) -> None:
     pot = [(0.9 * r, 0.1 * z), (r, 0.3 * z), (0.9 * r, 0.5 * z), (0.6 * r, 0.62 * z)]
     b.add(lathe(pot).at(0.14 * x), materials.glass("glass", 0.4))
     b.add(
-        lathe([(0.88 * r, 0.11 * z), (0.96 * r, 0.3 * z), (0.9 * r, 0.4 * z)]).seen().at(0.14 * x),
+        lathe([(0.88 * r, 0.11 * z), (0.96 * r, 0.3 * z), (0.9 * r, 0.4 * z)]).visual_only().at(0.14 * x),
         materials.plain("brown", "organic"),
     )
     b.add(
@@ -173,7 +173,7 @@ def blender(b: ObjectBuilder) -> None:
         ),
         materials.plain("black"),
     )
-    b.add(knob(0.018, 0.016).seen().at(0.93 * r, 0, 0.16 * z), materials.plain("black"))
+    b.add(knob(0.018, 0.016).visual_only().at(0.93 * r, 0, 0.16 * z), materials.plain("black"))
     b.point("toggle_button", (0.93 * r + 0.016, 0, 0.16 * z))
 
 
@@ -218,14 +218,14 @@ def heater(b: ObjectBuilder) -> None:
     count = max(5, round(y / 0.075))
     for k in range(count):
         yy = (k + 0.5) / count * y - y / 2
-        b.add(soft_box(0.7 * x, 0.6 * y / count, 0.86 * z, 0.02).seen().at(0, yy, 0.1 * z), look)
-    b.add(box(0.7 * x, y, 0.86 * z).felt().at(z=0.1 * z), look)
-    b.add(block((0.3 * x, y * 0.98, 0.03), (0, 0, 0.9 * z)).seen(), look)
+        b.add(soft_box(0.7 * x, 0.6 * y / count, 0.86 * z, 0.02).visual_only().at(0, yy, 0.1 * z), look)
+    b.add(box(0.7 * x, y, 0.86 * z).collision_only().at(z=0.1 * z), look)
+    b.add(block((0.3 * x, y * 0.98, 0.03), (0, 0, 0.9 * z)).visual_only(), look)
     for s in (-1, 1):
         b.add(box(x, 0.05, 0.1 * z).at(0, s * 0.36 * y), materials.plain("black"))
     b.add(soft_box(0.66 * x, 0.04, 0.3 * z).at(0, -y / 2 + 0.01, 0.5 * z), materials.plain("black"))
     b.point("heat_source", (0.0, 0, 0.55 * z))
-    b.add(knob(0.02, 0.015).seen().at(0.4 * x, -y / 2, 0.7 * z), materials.plain("silver"))
+    b.add(knob(0.02, 0.015).visual_only().at(0.4 * x, -y / 2, 0.7 * z), materials.plain("silver"))
     b.point("toggle_button", (0.45 * x, -y / 2, 0.7 * z))
 
 
@@ -247,7 +247,7 @@ def range_hood(b: ObjectBuilder) -> None:
     ]
     b.add(hull(slope), steel)
     b.add(box(0.45 * x, 0.3 * y, 0.66 * z).at(-0.275 * x, 0, 0.34 * z), steel)
-    b.add(box(0.8 * x, 0.8 * y, 0.002).seen().at(z=-0.001), materials.metal("iron"))
+    b.add(box(0.8 * x, 0.8 * y, 0.002).visual_only().at(z=-0.001), materials.metal("iron"))
     button(b, (x / 2, 0.2 * y, low / 2), materials.plain("sky"), 0.01)
 
 

@@ -22,8 +22,8 @@ def bathtub(b: ObjectBuilder) -> None:
     wall = 0.07
     b.add(tray(x, y, top, wall, 0.09), WHITE)
     for s in (-1, 1):
-        b.add(soft_box(x + 0.01, wall + 0.015, 0.03, 0.01).seen().at(0, s * (y - wall) / 2, top - 0.022), WHITE)
-        b.add(soft_box(wall + 0.015, y - wall, 0.03, 0.01).seen().at(s * (x - wall) / 2, 0, top - 0.022), WHITE)
+        b.add(soft_box(x + 0.01, wall + 0.015, 0.03, 0.01).visual_only().at(0, s * (y - wall) / 2, top - 0.022), WHITE)
+        b.add(soft_box(wall + 0.015, y - wall, 0.03, 0.01).visual_only().at(s * (x - wall) / 2, 0, top - 0.022), WHITE)
     if b.pick((True, False)):
         tiles = materials.picture(
             "tiles",
@@ -32,12 +32,12 @@ def bathtub(b: ObjectBuilder) -> None:
             "tile",
         )
         for s in (-1, 1):
-            b.add(block((x, 0.004, top - 0.05), (0, s * (y / 2 + 0.002), (top - 0.05) / 2)).seen(), tiles)
+            b.add(block((x, 0.004, top - 0.05), (0, s * (y / 2 + 0.002), (top - 0.05) / 2)).visual_only(), tiles)
     chrome = materials.metal("chrome")
     b.add(tap(0.12, 0.16).at(-x / 2 + 0.035, 0, top), chrome)
-    b.add(cylinder(0.02, 0.04, 10).seen().at(-x / 2 + 0.035, 0.1, top), chrome)
+    b.add(cylinder(0.02, 0.04, 10).visual_only().at(-x / 2 + 0.035, 0.1, top), chrome)
     b.point("water_sink", (-0.3 * x, 0, 0.09))
-    b.add(cylinder(0.03, 0.003, 12).seen().at(-0.3 * x, 0, 0.09), materials.metal("iron"))
+    b.add(cylinder(0.03, 0.003, 12).visual_only().at(-0.3 * x, 0, 0.09), materials.metal("iron"))
 
 
 def toilet(b: ObjectBuilder) -> None:
@@ -56,8 +56,8 @@ def toilet(b: ObjectBuilder) -> None:
     b.add(_bowl(outline, inner, 0.2, seat).at(cx), WHITE)
     b.add(box(0.12, 0.6 * y, seat - 0.02).at(-x / 2 + tank - 0.02), WHITE)
     b.add(soft_box(tank, y, z - seat, 0.03).at(-x / 2 + tank / 2, 0, seat), WHITE)
-    b.add(soft_box(tank + 0.012, y + 0.01, 0.03, 0.01).seen().at(-x / 2 + tank / 2, 0, z - 0.02), WHITE)
-    b.add(cylinder(0.025, 0.006, 14).seen().at(-x / 2 + tank / 2, 0, z + 0.008), materials.metal("chrome"))
+    b.add(soft_box(tank + 0.012, y + 0.01, 0.03, 0.01).visual_only().at(-x / 2 + tank / 2, 0, z - 0.02), WHITE)
+    b.add(cylinder(0.025, 0.006, 14).visual_only().at(-x / 2 + tank / 2, 0, z + 0.008), materials.metal("chrome"))
     # The lid ends before the cistern, so that it has room there when it stands up.
     rear = 0.036 - bowl_x / 2
     ring_outline = [(max(px * 0.99, rear), py * 0.97) for px, py in outline]
@@ -75,7 +75,7 @@ def toilet(b: ObjectBuilder) -> None:
 
 
 def _bowl(outline, inner, low: float, high: float) -> Solid:
-    """A hollow cup between two outlines, narrower below; seen and felt in ten wedges."""
+    """A hollow cup between two outlines, narrower below; visual and collision in ten wedges."""
     parts = []
     count = len(outline)
     for k in range(0, count, 2):
@@ -101,7 +101,7 @@ def shower(b: ObjectBuilder) -> None:
     b.add(block((0.01, y - 0.04, z - 0.09), (x / 2 - 0.025, 0, (z + 0.09) / 2)), glass)
     b.add(block((x - 0.06, 0.01, z - 0.09), (0, -y / 2 + 0.025, (z + 0.09) / 2)), glass)
     for px, py in ((x / 2 - 0.025, y / 2 - 0.02), (x / 2 - 0.025, -y / 2 + 0.025), (-x / 2 + 0.025, -y / 2 + 0.025)):
-        b.add(rod((px, py, 0.09), (px, py, z), 0.012, 8).seen(), chrome)
+        b.add(rod((px, py, 0.09), (px, py, z), 0.012, 8).visual_only(), chrome)
     wall_x = -x / 2 + 0.03
     b.add(rod((wall_x, 0.1, 0.9), (wall_x, 0.1, z - 0.05), 0.01), chrome)
     b.add(
@@ -113,7 +113,7 @@ def shower(b: ObjectBuilder) -> None:
     b.add(lathe([(0.09, 0), (0.08, 0.012), (0.02, 0.03)], 16).at(wall_x + 0.24, 0.1, z - 0.1), chrome)
     b.add(soft_box(0.05, 0.2, 0.05, 0.015).at(wall_x, 0.1, 1.05), chrome)
     b.point("water_sink", (0, 0, 0.05))
-    b.add(cylinder(0.04, 0.003, 12).seen().at(0, 0, 0.05), materials.metal("iron"))
+    b.add(cylinder(0.04, 0.003, 12).visual_only().at(0, 0, 0.05), materials.metal("iron"))
 
 
 def pool(b: ObjectBuilder) -> None:
@@ -122,7 +122,7 @@ def pool(b: ObjectBuilder) -> None:
     r = x / 2
     look = materials.plain(b.pick(("blue", "teal", "sky")), "plastic", 0.5)
     b.add(turned_vessel([(0.97 * r, 0), (r, 0.4 * z), (r, z)], 0.07, 10, 28, floor=0.02), look)
-    b.add(cylinder(0.9 * r, 0.002, 28).seen().at(z=0.021), materials.plain("sky"))
+    b.add(cylinder(0.9 * r, 0.002, 28).visual_only().at(z=0.021), materials.plain("sky"))
     stripe = sleeve([(1.005 * r, 0.62 * z), (1.005 * r, 0.78 * z)], 28)
     b.add(stripe, materials.plain("white"))
 

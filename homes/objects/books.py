@@ -11,16 +11,18 @@ COVERS = ("dark_red", "navy", "dark_green", "brown", "purple", "teal", "orange",
 
 
 def hardback(b: ObjectBuilder) -> None:
-    """A book lying on its back cover: two boards, a spine and the block of pages; felt as one box."""
+    """A book lying on its back cover: two boards, a spine and the block of pages; collides as one box."""
     x, y, z = b.size
     rgb = materials.tint(b.pick(COVERS), b.rng)
     cloth = materials.plain(rgb, "paper")
     board = 0.003
-    b.add(box(x, y, z).felt(), cloth)
+    b.add(box(x, y, z).collision_only(), cloth)
     for low in (0.0, z - board):
-        b.add(box(x, y, board).seen().at(z=low), cloth)
-    b.add(block((x, board, z), (0, -y / 2 + board / 2, z / 2)).seen(), cloth)
-    b.add(box(x - 0.008, y - 0.008, z - 2 * board).seen().at(0, -0.002, board), materials.plain("paper", "paper"))
+        b.add(box(x, y, board).visual_only().at(z=low), cloth)
+    b.add(block((x, board, z), (0, -y / 2 + board / 2, z / 2)).visual_only(), cloth)
+    b.add(
+        box(x - 0.008, y - 0.008, z - 2 * board).visual_only().at(0, -0.002, board), materials.plain("paper", "paper")
+    )
     front = materials.picture("cover", textures.cover(rgb, b.rng))
     b.add(decal(y, x, "z").at(0, 0, z + 0.0003), front)
 
@@ -30,8 +32,8 @@ def notebook(b: ObjectBuilder) -> None:
     x, y, z = b.size
     rgb = materials.tint(b.pick(("black", "red", "blue", "green", "pink")), b.rng)
     b.add(box(x, y, z), materials.plain("paper", "paper"))
-    b.add(box(x, y, 0.0006).seen().at(z=z), materials.plain(rgb, "paper"))
-    b.add(block((x, 0.006, z + 0.0012), (0, y * 0.38, z / 2)).seen(), materials.plain("black"))
+    b.add(box(x, y, 0.0006).visual_only().at(z=z), materials.plain(rgb, "paper"))
+    b.add(block((x, 0.006, z + 0.0012), (0, y * 0.38, z / 2)).visual_only(), materials.plain("black"))
 
 
 CATEGORIES = [

@@ -51,7 +51,7 @@ def bottle(
     b.add(*band(r, 0.18 * z, (shoulder - 0.08) * z, materials.plain(label, "paper")))
     b.add(*band(r * 1.002, 0.3 * z, 0.36 * z, materials.plain(look, "paper")))
     top = cap or b.rng.choice(("gold", "black", "red", "white"))
-    b.add(cylinder(n * 1.15, 0.09 * z, 12).seen().at(z=0.912 * z), materials.plain(top))
+    b.add(cylinder(n * 1.15, 0.09 * z, 12).visual_only().at(z=0.912 * z), materials.plain(top))
 
 
 def squeeze(b: ObjectBuilder, *, looks: tuple = (("red", "white"),), pump: bool = False) -> None:
@@ -65,7 +65,7 @@ def squeeze(b: ObjectBuilder, *, looks: tuple = (("red", "white"),), pump: bool 
     lid = materials.plain(label if label != look else "white")
     if pump:
         b.add(lathe([(0.2 * y, top), (0.2 * y, top + 0.06 * z)], 12), lid)
-        b.add(lathe([(0.06 * y, top), (0.06 * y, z - 0.03 * z)], 8).seen(), lid)
+        b.add(lathe([(0.06 * y, top), (0.06 * y, z - 0.03 * z)], 8).visual_only(), lid)
         b.add(soft_box(0.55 * x + 0.02, 0.24 * y, 0.035 * z).at(0.2 * x, 0, z - 0.035 * z), lid)
     else:
         b.add(lathe([(0.26 * min(x, y), top - 0.005), (0.22 * min(x, y), z)], 14), lid)
@@ -117,7 +117,7 @@ def tube_bottle(b: ObjectBuilder, *, looks: tuple = (("white", "blue"), ("red", 
                 for s in (-0.6, 0.6)
                 for h in (0, 1.12)
             ]
-        ).seen(),
+        ).visual_only(),
         materials.plain(accent),
     )
 
@@ -155,7 +155,7 @@ def atomizer(b: ObjectBuilder) -> None:
         head,
     )
     b.add(block((0.2 * x, 0.14 * y, 0.05 * z), (0.4 * x, 0, 0.95 * z)), head)
-    b.add(rod((0.1 * x, 0, 0.86 * z), (0.22 * x, 0, 0.66 * z), 0.06 * y, 6).seen(), head)
+    b.add(rod((0.1 * x, 0, 0.86 * z), (0.22 * x, 0, 0.66 * z), 0.06 * y, 6).visual_only(), head)
     b.point("toggle_button", (0.16 * x, 0, 0.76 * z))
 
 
@@ -172,8 +172,8 @@ def carafe(b: ObjectBuilder) -> None:
         (0.42 * r, 0.85 * z),
         (0.6 * r, z),
     ]
-    seen = turned_vessel(profile, 0.004, 6).seen()
-    b.add(seen + disc(0.95 * r, 0, 0.006) + ring(1.0 * r, 0.5 * r, 0, z, 0.006, 7), glass)
+    glass_wall = turned_vessel(profile, 0.004, 6).visual_only()
+    b.add(glass_wall + disc(0.95 * r, 0, 0.006) + ring(1.0 * r, 0.5 * r, 0, z, 0.006, 7), glass)
 
 
 def cruet(b: ObjectBuilder) -> None:
@@ -201,7 +201,7 @@ def pitcher(b: ObjectBuilder) -> None:
     )
     b.add(ear(0.26 * z, 0.005).at(r - 0.12 * x, 0, 0.5 * z), look)
     lip = [(-0.1 * x - 0.85 * r, s * 0.35 * r, z - h) for s in (-1, 1) for h in (0, 0.12 * z)] + [(-x / 2, 0, z)]
-    b.add(hull(lip).seen(), look)
+    b.add(hull(lip).visual_only(), look)
 
 
 def bar_soap(b: ObjectBuilder) -> None:

@@ -97,8 +97,8 @@ def _recentre(link, was: float, now: float) -> None:
     """Moves a drawer's front board (its last hull and mesh) from height `was` to `now`."""
     shift = now - was
     link.hulls[-1] = link.hulls[-1] + np.array([0, 0, shift])
-    material, mesh = link.seen[-1]
-    link.seen[-1] = (material, type(mesh)(mesh.vertices + np.array([0, 0, shift]), mesh.faces, mesh.uv))
+    material, mesh = link.visuals[-1]
+    link.visuals[-1] = (material, type(mesh)(mesh.vertices + np.array([0, 0, shift]), mesh.faces, mesh.uv))
 
 
 def _doors(b, plane, y, span, front, metal, *, glazed: bool = False, handle_low: bool = False) -> None:
@@ -116,7 +116,9 @@ def _doors(b, plane, y, span, front, metal, *, glazed: bool = False, handle_low:
         link = door(b, f"door_{k}", plane, span_y, z, front, handle, metal, left=left, handle_z=at)
         if glazed:
             width = span_y[1] - span_y[0]
-            pane = block((0.004, width * 0.7, height * 0.75), (plane + BOARD, sum(span_y) / 2, sum(z) / 2)).seen()
+            pane = block(
+                (0.004, width * 0.7, height * 0.75), (plane + BOARD, sum(span_y) / 2, sum(z) / 2)
+            ).visual_only()
             link.add(pane, materials.glass("sky", 0.5))
 
 

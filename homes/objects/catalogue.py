@@ -1,6 +1,7 @@
 """Every category that can be built: its real size and mass, the function that builds it, how many models of it.
 
-Families (homes/families/*.py) each export `CATEGORIES`, a list of `Entry`; this module gathers them and builds models.
+Families (files of this folder, listed in families.py) each export `CATEGORIES`, a list of `Entry`; this module gathers
+them and builds models.
 """
 
 from __future__ import annotations

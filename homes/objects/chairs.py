@@ -35,12 +35,12 @@ def straight_chair(b: ObjectBuilder) -> None:
         for k in range(3):
             b.add(block((0.016, y - 2 * leg, 0.05), (x_back, 0, height + (k + 1) * (z - height) / 3 - 0.04)), wood)
     else:
-        felt = block((0.016, y - 2 * leg, z - height - 0.06), (x_back, 0, (z + height) / 2 - 0.01)).felt()
-        b.add(felt, wood)
-        b.add(block((0.02, y - 2 * leg, 0.05), (x_back, 0, z - 0.03)).seen(), wood)
+        hulls = block((0.016, y - 2 * leg, z - height - 0.06), (x_back, 0, (z + height) / 2 - 0.01)).collision_only()
+        b.add(hulls, wood)
+        b.add(block((0.02, y - 2 * leg, 0.05), (x_back, 0, z - 0.03)).visual_only(), wood)
         for k in range(5):
             yy = (k - 2) * (y - 2 * leg) / 5.5
-            b.add(rod((x_back, yy, height), (x_back, yy, z - 0.04), 0.009).seen(), wood)
+            b.add(rod((x_back, yy, height), (x_back, yy, z - 0.04), 0.009).visual_only(), wood)
 
 
 def armchair(b: ObjectBuilder) -> None:
@@ -67,7 +67,9 @@ def padded(b: ObjectBuilder, x: float, y: float, z: float, cloth, wood, seats: i
     for k in range(seats):
         yy = -(y - 2 * arm) / 2 + (k + 0.5) * width
         b.add(soft_box(x - back, width - 0.01, seat - foot - 0.2, 0.04).at(back / 2, yy, foot + 0.2), cloth)
-        b.add(soft_box(0.12, width - 0.02, z - seat - 0.02, 0.05).at(-x / 2 + back + 0.03, yy, seat).seen(), cloth)
+        b.add(
+            soft_box(0.12, width - 0.02, z - seat - 0.02, 0.05).at(-x / 2 + back + 0.03, yy, seat).visual_only(), cloth
+        )
 
 
 def stool(b: ObjectBuilder) -> None:
@@ -121,7 +123,7 @@ def rocking_chair(b: ObjectBuilder) -> None:
         path = [(radius * math.sin(a), yy, 0.02 + radius * (1 - math.cos(a))) for a in angles]
         b.add(tube(path, 0.02, 8, hulls=3), wood)
         # A flat spot in the middle of the runner, on which the chair comes to rest.
-        b.add(block((0.44, 0.036, 0.02), (-0.03, yy, 0.01)).felt(), wood)
+        b.add(block((0.44, 0.036, 0.02), (-0.03, yy, 0.01)).collision_only(), wood)
         b.add(rod((0.2, yy, 0.04), (0.2, yy, seat + 0.2), 0.018), wood)
         b.add(rod((-0.2, yy, 0.04), (-0.25, yy, seat), 0.018), wood)
         b.add(bar((-0.25, yy, seat + 0.2), (0.24, yy, seat + 0.2), 0.045, 0.02), wood)

@@ -97,7 +97,7 @@ def vacuum(b: ObjectBuilder) -> None:
         ),
         body,
     )
-    b.add(cylinder(0.2 * y, 0.3 * z, 14).seen().at(0.16 * x, 0, foot), materials.glass("sky", 0.5))
+    b.add(cylinder(0.2 * y, 0.3 * z, 14).visual_only().at(0.16 * x, 0, foot), materials.glass("sky", 0.5))
     top = (-0.2 * x - lean - 0.02, 0, z - 0.1)
     b.add(rod((-0.15 * x - lean, 0, 0.6 * z), top, 0.014), dark)
     b.add(
@@ -109,7 +109,7 @@ def vacuum(b: ObjectBuilder) -> None:
         ),
         dark,
     )
-    b.add(cylinder(0.018, 0.006, 12).seen().turned("y", 90).at(0.05 * x, 0, 0.55 * z), materials.plain("red"))
+    b.add(cylinder(0.018, 0.006, 12).visual_only().turned("y", 90).at(0.05 * x, 0, 0.55 * z), materials.plain("red"))
     b.point("toggle_button", (0.06 * x, 0, 0.55 * z))
     b.area("cleaning_tool_area", (0.8 * x, 0.96 * y, 0.012), (0.07 * x, 0, 0.006))
 
@@ -148,10 +148,10 @@ def eraser(b: ObjectBuilder) -> None:
     x, y, z = b.size
     b.add(box(0.82 * x, y, z).at(-0.09 * x), materials.plain("white", "rubber"))
     b.add(
-        box(0.55 * x, y * 1.01, z * 1.01).seen().at(-0.2 * x, 0, -0.005 * z),
+        box(0.55 * x, y * 1.01, z * 1.01).visual_only().at(-0.2 * x, 0, -0.005 * z),
         materials.plain(b.pick(("blue", "red", "green")), "paper"),
     )
-    b.add(box(0.18 * x, y, z).at(0.41 * x).seen(), materials.plain("white", "rubber"))
+    b.add(box(0.18 * x, y, z).at(0.41 * x).visual_only(), materials.plain("white", "rubber"))
     b.area("cleaning_tool_area", (0.18 * x, y, z), (0.41 * x, 0, z / 2))
 
 
@@ -182,12 +182,12 @@ def rake(b: ObjectBuilder) -> None:
     b.add(block((0.016, y, 0.016), (x / 2 - 0.01, 0, z - 0.014)), iron)
     for k in range(10):
         yy = (k - 4.5) * y / 9.4
-        b.add(rod((x / 2 - 0.01, yy, z - 0.014), (x / 2, yy, 0), 0.004, 5).seen(), iron)
-    b.add(block((0.012, y, z - 0.02), (x / 2 - 0.006, 0, (z - 0.02) / 2)).felt(), iron)
+        b.add(rod((x / 2 - 0.01, yy, z - 0.014), (x / 2, yy, 0), 0.004, 5).visual_only(), iron)
+    b.add(block((0.012, y, z - 0.02), (x / 2 - 0.006, 0, (z - 0.02) / 2)).collision_only(), iron)
 
 
 def hose(b: ObjectBuilder) -> None:
-    """A coiled garden hose; felt as a ring of wedges."""
+    """A coiled garden hose; collides as a ring of wedges."""
     x, _, z = b.size
     green = materials.plain(b.pick(("green", "dark_green", "yellow")), "rubber", 0.5)
     r = x / 2
@@ -201,7 +201,7 @@ def hose(b: ObjectBuilder) -> None:
             ]
             b.add(tube(path, thick / 2, 6, hulls=0, closed=True), green)
     b.add(ring(r, r, 0, z, 2 * thick, 7), green)
-    b.add(cylinder(0.5 * thick, 0.05, 10).seen().turned("y", 90).at(r - 0.04, 0, z), materials.metal("brass"))
+    b.add(cylinder(0.5 * thick, 0.05, 10).visual_only().turned("y", 90).at(r - 0.04, 0, z), materials.metal("brass"))
 
 
 def mousetrap(b: ObjectBuilder) -> None:
@@ -211,7 +211,7 @@ def mousetrap(b: ObjectBuilder) -> None:
     path = [(0, -0.4 * y, 0.5 * z), (0.4 * x, -0.4 * y, 0.6 * z), (0.4 * x, 0.4 * y, 0.6 * z), (0, 0.4 * y, 0.5 * z)]
     b.add(tube(path, 0.0018, 5, hulls=0), steel)
     b.add(cylinder(0.3 * z, 0.8 * y, 8).at(z=-0.4 * y).turned("x", 90).at(0, 0, 0.7 * z), steel)
-    b.add(box(0.2 * x, 0.3 * y, 0.15 * z).seen().at(-0.25 * x, 0, 0.45 * z), materials.plain("yellow", "metal"))
+    b.add(box(0.2 * x, 0.3 * y, 0.15 * z).visual_only().at(-0.25 * x, 0, 0.45 * z), materials.plain("yellow", "metal"))
     b.point("toggle_button", (-0.25 * x, 0, 0.6 * z))
 
 
@@ -221,8 +221,8 @@ def comb(b: ObjectBuilder) -> None:
     b.add(block((x, 0.35 * y, z), (0, 0.325 * y, z / 2)), look)
     for k in range(18):
         px = (k - 8.5) * x / 18.4
-        b.add(block((0.3 * x / 18, 0.66 * y, 0.7 * z), (px, -0.17 * y, z / 2)).seen(), look)
-    b.add(block((x, 0.65 * y, 0.7 * z), (0, -0.175 * y, z / 2)).felt(), look)
+        b.add(block((0.3 * x / 18, 0.66 * y, 0.7 * z), (px, -0.17 * y, z / 2)).visual_only(), look)
+    b.add(block((x, 0.65 * y, 0.7 * z), (0, -0.175 * y, z / 2)).collision_only(), look)
 
 
 def razor(b: ObjectBuilder) -> None:
@@ -257,7 +257,7 @@ def toothbrush(b: ObjectBuilder) -> None:
         ),
         look,
     )
-    b.add(box(0.15 * x, 0.85 * y, z - low).seen().at(0.415 * x, 0, low), materials.plain("white"))
+    b.add(box(0.15 * x, 0.85 * y, z - low).visual_only().at(0.415 * x, 0, low), materials.plain("white"))
     b.area("cleaning_tool_area", (0.15 * x, 0.85 * y, z - low), (0.415 * x, 0, (z + low) / 2))
 
 
@@ -281,10 +281,10 @@ def hairbrush(b: ObjectBuilder) -> None:
                     (x / 2 - pad * 0.8 + i * pad * 0.15, (j - 1) * 0.22 * y, z),
                     0.0012,
                     4,
-                ).seen(),
+                ).visual_only(),
                 materials.plain("black"),
             )
-    b.add(box(0.7 * pad, 0.6 * y, 0.5 * z).felt().at(x / 2 - pad / 2, 0, 0.5 * z), look)
+    b.add(box(0.7 * pad, 0.6 * y, 0.5 * z).collision_only().at(x / 2 - pad / 2, 0, 0.5 * z), look)
 
 
 def dental_floss(b: ObjectBuilder) -> None:
@@ -292,7 +292,7 @@ def dental_floss(b: ObjectBuilder) -> None:
     look = materials.plain(b.pick(("white", "sky", "mint")), shine=0.6)
     outline = [(-x / 2, -y / 2), (x / 2, -0.3 * y), (x / 2, 0.3 * y), (0.2 * x, y / 2), (-x / 2, y / 2)]
     b.add(prism(outline, z), look)
-    b.add(prism([(0.7 * u, 0.7 * v) for u, v in outline], z * 1.01).seen(), materials.plain("blue"))
+    b.add(prism([(0.7 * u, 0.7 * v) for u, v in outline], z * 1.01).visual_only(), materials.plain("blue"))
 
 
 CATEGORIES = [

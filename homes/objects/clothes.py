@@ -76,7 +76,7 @@ MITTEN = [
 
 
 def garment(b: ObjectBuilder, *, outline: list[tuple[float, float]], kind: str | None = None, layers: int = 2) -> None:
-    """A flat garment lying on its back, collar towards +x; its outline is felt as one box of full size."""
+    """A flat garment lying on its back, collar towards +x; collides as one box of full size."""
     x, y, z = b.size
     turned = outline if _area(outline) > 0 else outline[::-1]
     points = [(u * x, v * y) for u, v in turned]
@@ -85,7 +85,7 @@ def garment(b: ObjectBuilder, *, outline: list[tuple[float, float]], kind: str |
     for k in range(layers):
         shrink = 1 - 0.02 * k
         b.add(extrusion([(u * shrink, v * shrink) for u, v in points], t, []).at(z=k * t), look)
-    b.add(box(x, y, z).felt(), look)
+    b.add(box(x, y, z).collision_only(), look)
 
 
 def _area(points: list[tuple[float, float]]) -> float:
@@ -99,7 +99,7 @@ def folded_pair(b: ObjectBuilder) -> None:
     b.add(soft_box(x, y, 0.5 * z, 0.2 * z), look)
     b.add(soft_box(0.9 * x, 0.94 * y, 0.5 * z, 0.2 * z).at(z=0.5 * z), look)
     for k in range(3):
-        b.add(cylinder(0.006, 0.003, 8).seen().at((k - 1) * 0.2 * x, 0, z - 0.001), materials.plain("white"))
+        b.add(cylinder(0.006, 0.003, 8).visual_only().at((k - 1) * 0.2 * x, 0, z - 0.001), materials.plain("white"))
 
 
 def scarf(b: ObjectBuilder) -> None:
@@ -109,7 +109,7 @@ def scarf(b: ObjectBuilder) -> None:
     b.add(soft_box(x - 0.03, y, z, 0.45 * z), look)
     for k in range(8):
         yy = (k - 3.5) * y / 8.5
-        b.add(rod((x / 2 - 0.03, yy, z / 3), (x / 2, yy, 0.004), 0.004, 5).seen(), look)
+        b.add(rod((x / 2 - 0.03, yy, z / 3), (x / 2, yy, 0.004), 0.004, 5).visual_only(), look)
 
 
 def shoe(b: ObjectBuilder, *, style: str = "trainer") -> None:
@@ -145,17 +145,18 @@ def shoe(b: ObjectBuilder, *, style: str = "trainer") -> None:
             hull(
                 [(px * x, s * 0.17 * y, z * 1.002) for px in (-0.13, -0.42) for s in (-1, 1)]
                 + [(-0.27 * x, 0, 0.9 * z)]
-            ).seen(),
+            ).visual_only(),
             materials.plain("black", "fabric"),
         )
         for k in range(4):
             px, pz = 0.08 + 0.065 * k, 0.8 - 0.09 * k
             b.add(
-                block((0.012, 0.4 * y, 0.006), (px * x, 0, (pz + 0.03) * z)).seen(), materials.plain("white", "fabric")
+                block((0.012, 0.4 * y, 0.006), (px * x, 0, (pz + 0.03) * z)).visual_only(),
+                materials.plain("white", "fabric"),
             )
         for s in (-1, 1):
             b.add(
-                block((0.3 * x, 0.003, 0.12 * z)).seen().turned("y", -25).at(-0.05 * x, s * 0.4 * y, 0.45 * z),
+                block((0.3 * x, 0.003, 0.12 * z)).visual_only().turned("y", -25).at(-0.05 * x, s * 0.4 * y, 0.45 * z),
                 materials.plain("white"),
             )
     else:
@@ -179,11 +180,11 @@ def hat(b: ObjectBuilder) -> None:
     felt = materials.fabric(b.pick(("beige", "black", "navy", "red", "brown")), b.rng)
     r = x / 2
     crown = lathe([(0.52 * r, 0.012), (0.54 * r, 0.3 * z), (0.5 * r, 0.85 * z), (0.4 * r, z)], 20)
-    b.add(crown.seen() + ring(0.53 * r, 0.5 * r, 0.0, 0.92 * z, 0.01, 6), felt)
-    b.add(lathe([(0.98 * r, 0), (r, 0.006), (0.52 * r, 0.014)], 24).seen(), felt)
-    b.add(cylinder(r, 0.008).felt(), felt)
-    b.add(cylinder(0.5 * r, 0.01).felt().at(z=z - 0.01), felt)
-    b.add(lathe([(0.545 * r, 0.014), (0.545 * r, 0.22 * z)], 20).seen(), materials.plain("black", "fabric"))
+    b.add(crown.visual_only() + ring(0.53 * r, 0.5 * r, 0.0, 0.92 * z, 0.01, 6), felt)
+    b.add(lathe([(0.98 * r, 0), (r, 0.006), (0.52 * r, 0.014)], 24).visual_only(), felt)
+    b.add(cylinder(r, 0.008).collision_only(), felt)
+    b.add(cylinder(0.5 * r, 0.01).collision_only().at(z=z - 0.01), felt)
+    b.add(lathe([(0.545 * r, 0.014), (0.545 * r, 0.22 * z)], 20).visual_only(), materials.plain("black", "fabric"))
     del y
 
 
@@ -202,7 +203,7 @@ def glasses(b: ObjectBuilder) -> None:
         ]
         b.add(tube(rim, 0.0025, 5, hulls=0, closed=True), frame)
         b.add(block((x - 0.004, 0.003, 0.008), (0, s * (y / 2 - 0.002), 0.72 * z)), frame)
-    b.add(block((0.004, 0.12 * y, 0.005), (x / 2 - 0.003, 0, 0.65 * z)).seen(), frame)
+    b.add(block((0.004, 0.12 * y, 0.005), (x / 2 - 0.003, 0, 0.65 * z)).visual_only(), frame)
 
 
 def jewel_ring(b: ObjectBuilder, *, gem: bool = True) -> None:
@@ -215,13 +216,13 @@ def jewel_ring(b: ObjectBuilder, *, gem: bool = True) -> None:
     b.add(tube(path, thick, 7, hulls=6, closed=True).at(z=-z / 2).scaled(z=0.5 * z / thick).at(z=z / 2), metal)
     if gem:
         b.add(
-            ball(0.2 * x, 0.2 * x, 0.2 * x, 6).seen().at(r - thick, 0, z / 2 - 0.1 * x),
+            ball(0.2 * x, 0.2 * x, 0.2 * x, 6).visual_only().at(r - thick, 0, z / 2 - 0.1 * x),
             materials.glass(b.pick(("sky", "red", "green")), 0.8),
         )
 
 
 def necklace(b: ObjectBuilder) -> None:
-    """A chain of beads lying in a loop with a pendant; felt as wedges of the ring."""
+    """A chain of beads lying in a loop with a pendant; collides as wedges of the ring."""
     x, y, z = b.size
     beads = (
         materials.metal(b.pick(("gold", "silver")))
@@ -233,19 +234,23 @@ def necklace(b: ObjectBuilder) -> None:
         a = 2 * math.pi * k / 26
         b.add(
             ball(0.7 * z, 0.7 * z, 0.7 * z, 6)
-            .seen()
+            .visual_only()
             .at((rx - z / 2) * math.cos(a) - 0.015, (ry - z / 2) * math.sin(a)),
             beads,
         )
     b.add(
-        lathe([(0.3, 0), (0.5, 0.5), (0.2, 1)], 8).seen().scaled(0.02, 0.02, z).at(x / 2 - 0.012),
+        lathe([(0.3, 0), (0.5, 0.5), (0.2, 1)], 8).visual_only().scaled(0.02, 0.02, z).at(x / 2 - 0.012),
         materials.glass("red", 0.9),
     )
     path = [
         ((rx - z / 2) * math.cos(a) - 0.015, (ry - z / 2) * math.sin(a), z / 2)
         for a in (k * math.pi / 8 for k in range(16))
     ]
-    b.add(tube(path, z / 2, 6, hulls=7, closed=True).felt() + box(0.024, 0.02, z).felt().at(x / 2 - 0.012), beads)
+    b.add(
+        tube(path, z / 2, 6, hulls=7, closed=True).collision_only()
+        + box(0.024, 0.02, z).collision_only().at(x / 2 - 0.012),
+        beads,
+    )
 
 
 def jewel(b: ObjectBuilder) -> None:
@@ -280,7 +285,7 @@ def umbrella(b: ObjectBuilder) -> None:
         .at(x / 2 - 0.03, 0, r),
         cloth_,
     )
-    b.add(rod((x / 2, 0, r), (-x / 2 + crook, 0, r), 0.005, 6).seen(), materials.metal("steel"))
+    b.add(rod((x / 2, 0, r), (-x / 2 + crook, 0, r), 0.005, 6).visual_only(), materials.metal("steel"))
     path = [(-x / 2 + crook + 0.12, 0, r), (-x / 2 + crook, 0, r)] + [
         (-x / 2 + crook - 0.8 * crook * math.sin(a), -0.8 * crook * (1 - math.cos(a)), r)
         for a in (k * math.pi / 6 for k in range(1, 7))

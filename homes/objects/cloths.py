@@ -32,15 +32,15 @@ def spread(b: ObjectBuilder, *, kind: str | None = None, wipes: bool = False) ->
 
 
 def folded(b: ObjectBuilder, *, layers: int = 4, kind: str | None = None, wipes: bool = False) -> None:
-    """A cloth folded to a stack with round edges; felt as one box."""
+    """A cloth folded to a stack with round edges; collides as one box."""
     x, y, z = b.size
     look = cloth(b, kind)
     t = z / layers
     pile = [
-        soft_box(x - 0.003 * (k % 2), y - 0.004 * (k % 3), t, 0.49 * t).seen().at(0.001 * (k % 2), 0, k * t)
+        soft_box(x - 0.003 * (k % 2), y - 0.004 * (k % 3), t, 0.49 * t).visual_only().at(0.001 * (k % 2), 0, k * t)
         for k in range(layers)
     ]
-    b.add(join(pile) + box(x, y, z).felt(), look)
+    b.add(join(pile) + box(x, y, z).collision_only(), look)
     if wipes:
         b.area("cleaning_tool_area", (x * 0.98, y * 0.98, 0.2 * z), (0, 0, 0.1 * z))
 
@@ -52,8 +52,8 @@ def kitchen_roll(b: ObjectBuilder) -> None:
     b.add(
         cylinder(r, z, 20), materials.picture("tissue", textures.tiles((0.96, 0.96, 0.95), (0.90, 0.92, 0.95), 3), 0.1)
     )
-    b.add(cylinder(0.36 * r, z + 0.0006, 12).seen().at(z=-0.0003), materials.plain("cardboard", "paper"))
-    b.add(cylinder(0.3 * r, z + 0.001, 12).seen().at(z=-0.0005), materials.plain("brown", "paper"))
+    b.add(cylinder(0.36 * r, z + 0.0006, 12).visual_only().at(z=-0.0003), materials.plain("cardboard", "paper"))
+    b.add(cylinder(0.3 * r, z + 0.001, 12).visual_only().at(z=-0.0005), materials.plain("brown", "paper"))
     b.area("cleaning_tool_area", (1.3 * r, 1.3 * r, z * 0.98), (0, 0, z / 2))
 
 
@@ -66,9 +66,9 @@ def pillow(b: ObjectBuilder) -> None:
     mesh.vertices[:, 2] = z / 2 + (mesh.vertices[:, 2] - z / 2) * (1 - 0.6 * (u**4).clip(0, 1)) * (
         1 - 0.6 * (v**4).clip(0, 1)
     )
-    b.add(solid.seen(), cloth(b))
+    b.add(solid.visual_only(), cloth(b))
     b.add(
-        box(0.94 * x, 0.94 * y, 0.55 * z).felt().at(z=0.225 * z) + box(0.7 * x, 0.7 * y, z).felt(),
+        box(0.94 * x, 0.94 * y, 0.55 * z).collision_only().at(z=0.225 * z) + box(0.7 * x, 0.7 * y, z).collision_only(),
         materials.plain("white", "fabric"),
     )
 
@@ -80,9 +80,9 @@ def carpet(b: ObjectBuilder) -> None:
     b.add(box(x, y, z), materials.picture("pile", textures.weave(rgb, b.rng), 0.1, "fabric", 0.02))
     frame = materials.plain(materials.tint("cream", b.rng), "fabric", 0.02)
     for s in (-1, 1):
-        b.add(box(0.05, y * 0.9, 0.001).seen().at(s * 0.42 * x, 0, z), frame)
-        b.add(box(x * 0.84 + 0.05, 0.05, 0.001).seen().at(0, s * 0.45 * y, z), frame)
-    b.add(box(0.35 * x, 0.35 * y, 0.0012).seen().turned("z", 45).at(z=z), frame)
+        b.add(box(0.05, y * 0.9, 0.001).visual_only().at(s * 0.42 * x, 0, z), frame)
+        b.add(box(x * 0.84 + 0.05, 0.05, 0.001).visual_only().at(0, s * 0.45 * y, z), frame)
+    b.add(box(0.35 * x, 0.35 * y, 0.0012).visual_only().turned("z", 45).at(z=z), frame)
 
 
 def mat(b: ObjectBuilder) -> None:

@@ -71,7 +71,7 @@ def carton(b: ObjectBuilder) -> None:
     for k, s in enumerate((-1, 1)):
         link = b.hinge(f"flap_{k}", (s * x / 2, 0, z - wall / 2), (0, -1 if s < 0 else 1, 0), 2.2, True)
         link.add(block((x / 2 - 0.001, y, wall), (s * (x / 4 + 0.0005), 0, z - wall / 2)), card)
-        strip = block((x / 2 - 0.003, 0.05, 0.0008), (s * x / 4, 0, z)).seen()
+        strip = block((x / 2 - 0.003, 0.05, 0.0008), (s * x / 4, 0, z)).visual_only()
         link.add(strip, materials.plain((0.80, 0.68, 0.46), "paper"))
 
 
@@ -96,9 +96,9 @@ def chest(b: ObjectBuilder) -> None:
     band = [(px * 1.004, pz + (0.002 if pz > body + 0.01 else 0.0)) for px, pz in top]
     for s in (-1, 1):
         for side in (-1, 1):
-            b.add(block((0.004, 0.04, body), (side * x / 2, s * 0.3 * y, body / 2)).seen(), iron)
-        link.add(_vault(band, 0.04, 0.002).seen().at(0, s * 0.3 * y), iron)
-    link.add(block((0.008, 0.06, 0.06), (x / 2 + 0.003, 0, body + 0.02)).seen(), iron)
+            b.add(block((0.004, 0.04, body), (side * x / 2, s * 0.3 * y, body / 2)).visual_only(), iron)
+        link.add(_vault(band, 0.04, 0.002).visual_only().at(0, s * 0.3 * y), iron)
+    link.add(block((0.008, 0.06, 0.06), (x / 2 + 0.003, 0, body + 0.02)).visual_only(), iron)
 
 
 def _vault(outline: list[tuple[float, float]], y: float, board: float) -> Solid:
@@ -125,7 +125,7 @@ def small_box(b: ObjectBuilder) -> None:
         b, "lid", block((x, y, z - body - 0.001), (0, 0, (z + body + 0.001) / 2)), look, -x / 2, body + 0.001, angle=2.0
     )
     link.add(decal(0.7 * y, 0.5 * x, "z").at(z=z + 0.0004), printed(b, "cream", "orange", (96, 48)))
-    b.add(block((0.006, 0.03, 0.012), (x / 2 + 0.002, 0, body - 0.004)).seen(), materials.metal("silver"))
+    b.add(block((0.006, 0.03, 0.012), (x / 2 + 0.002, 0, body - 0.004)).visual_only(), materials.metal("silver"))
 
 
 def parcel(b: ObjectBuilder) -> None:
@@ -137,7 +137,7 @@ def parcel(b: ObjectBuilder) -> None:
     wall = 0.004
     b.add(tray(x, y, z - wall - 0.001, wall), card)
     link = lid(b, "flap", block((x, y, wall), (0, 0, z - wall / 2)), card, -x / 2, z - wall / 2, angle=2.2)
-    link.add(block((x, 0.04, 0.0008), (0, 0, z)).seen(), materials.plain((0.80, 0.68, 0.46), "paper"))
+    link.add(block((x, 0.04, 0.0008), (0, 0, z)).visual_only(), materials.plain((0.80, 0.68, 0.46), "paper"))
     label = materials.picture("address", textures.paper(b.rng, 6))
     link.add(decal(0.3 * y, 0.4 * x, "z").at(0.1 * x, 0.25 * y, z + 0.0006), label)
 
@@ -151,12 +151,15 @@ def briefcase(b: ObjectBuilder) -> None:
     shift = -grip / 2
     half = 0.55 * z
     b.add(tray(depth, y, half, 0.006).at(shift), hide)
-    cover = _shell(depth, y, z - half - 0.001, 0.006).seen() + block((depth, y, 0.006), (0, 0, z - half - 0.004)).felt()
+    cover = (
+        _shell(depth, y, z - half - 0.001, 0.006).visual_only()
+        + block((depth, y, 0.006), (0, 0, z - half - 0.004)).collision_only()
+    )
     lid(b, "lid", cover.at(shift, 0, half + 0.001), hide, shift - depth / 2, half + 0.001, angle=1.7)
     metal = materials.metal("brass")
     front = shift + depth / 2
     for s in (-1, 1):
-        b.add(block((0.006, 0.04, 0.02), (front + 0.002, s * 0.3 * y, half - 0.012)).seen(), metal)
+        b.add(block((0.006, 0.04, 0.02), (front + 0.002, s * 0.3 * y, half - 0.012)).visual_only(), metal)
     path = [
         (front, -0.07, half - 0.02),
         (front + grip, -0.055, half - 0.02),
@@ -164,7 +167,9 @@ def briefcase(b: ObjectBuilder) -> None:
         (front, 0.07, half - 0.02),
     ]
     b.add(
-        tube(path, 0.008, 6, hulls=0) + block((0.012, 0.12, 0.016), (front + grip - 0.006, 0, half - 0.02)).felt(), hide
+        tube(path, 0.008, 6, hulls=0)
+        + block((0.012, 0.12, 0.016), (front + grip - 0.006, 0, half - 0.02)).collision_only(),
+        hide,
     )
 
 
@@ -195,7 +200,7 @@ def backpack(b: ObjectBuilder) -> None:
     rear = shift - depth / 2
     flap = soft_box(depth + 0.01, y, z - body - 0.002, 0.03).at(shift + 0.005, 0, body + 0.002)
     link = lid(b, "flap", flap, cloth, rear, body + 0.002, angle=1.9)
-    link.add(block((0.006, 0.05, 0.05), (shift + depth / 2 + 0.011, 0, body + 0.01)).seen(), dark)
+    link.add(block((0.006, 0.05, 0.05), (shift + depth / 2 + 0.011, 0, body + 0.01)).visual_only(), dark)
     handle = [p * (1, 1, 1) + (rear + 0.01, 0, z - 0.012) for p in arc(0.035, 0, 180, 7, "yz")]
     b.add(tube(handle, 0.005, 6, hulls=0), dark)
 
@@ -213,11 +218,11 @@ def soft_bag(b: ObjectBuilder, *, roll: bool = True) -> None:
             b.add(tube([(p[0], p[1], min(p[2], z)) for p in path], 0.01, 6, hulls=0), dark)
     else:
         b.add(soft_box(x, y, top, 0.3 * x, 2), cloth)
-        b.add(soft_box(0.02, y * 1.01, 0.6 * top, 0.008).seen().at(x / 2 - 0.004, 0, 0.42 * top), cloth)
+        b.add(soft_box(0.02, y * 1.01, 0.6 * top, 0.008).visual_only().at(x / 2 - 0.004, 0, 0.42 * top), cloth)
         path = [p * (1, 1, (z - 0.9 * top) / (0.46 * y)) + (0, 0, 0.9 * top) for p in arc(0.46 * y, 0, 180, 9, "yz")]
         b.add(tube(path, 0.009, 6, hulls=0), dark)
-    b.add(block((0.006, 0.8 * y, 0.006), (0, 0, top)).seen(), dark)
-    b.add(box(0.3 * x, 0.4 * y, z - top).felt().at(z=top), cloth)
+    b.add(block((0.006, 0.8 * y, 0.006), (0, 0, top)).visual_only(), dark)
+    b.add(box(0.3 * x, 0.4 * y, z - top).collision_only().at(z=top), cloth)
 
 
 def paper_bag(b: ObjectBuilder) -> None:

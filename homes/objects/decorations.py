@@ -40,7 +40,7 @@ def framed(b: ObjectBuilder) -> None:
     if b.pick((False, False, True)):
         y, z = z * 0.9, y * 1.1
     b.add(box(x, y, z), wood)
-    b.add(box(0.5 * x, 0.88 * y, 0.88 * z).seen().at(0.26 * x, 0, 0.06 * z), materials.plain("paper", "paper"))
+    b.add(box(0.5 * x, 0.88 * y, 0.88 * z).visual_only().at(0.26 * x, 0, 0.06 * z), materials.plain("paper", "paper"))
     b.add(
         decal(0.78 * y, 0.78 * z).at(x / 2 + 0.0012, 0, z / 2),
         materials.picture("canvas", textures.painting(b.rng), kind="picture"),
@@ -53,11 +53,11 @@ def board(b: ObjectBuilder, *, kind: str) -> None:
     b.add(box(x, y, z), materials.metal("silver") if kind == "white" else materials.wood("oak", b.rng))
     if kind == "white":
         b.point("toggle_button", (x / 2, 0.45 * y, 0.05 * z))
-        b.add(block((0.001, 0.96 * y, 0.94 * z), (x / 2, 0, z / 2)).seen(), materials.plain("white", shine=0.8))
-        b.add(box(0.05, 0.4 * y, 0.012).seen().at(x / 2 + 0.02, 0, 0.0), materials.metal("silver"))
+        b.add(block((0.001, 0.96 * y, 0.94 * z), (x / 2, 0, z / 2)).visual_only(), materials.plain("white", shine=0.8))
+        b.add(box(0.05, 0.4 * y, 0.012).visual_only().at(x / 2 + 0.02, 0, 0.0), materials.metal("silver"))
     else:
         cork = materials.picture("cork", textures.speckle((0.76, 0.58, 0.38), b.rng, 0.3), 0.15, "wood")
-        b.add(block((0.001, 0.94 * y, 0.92 * z), (x / 2, 0, z / 2)).seen(), cork)
+        b.add(block((0.001, 0.94 * y, 0.92 * z), (x / 2, 0, z / 2)).visual_only(), cork)
         for k in range(5):
             note = materials.picture(
                 f"note_{k}",
@@ -101,13 +101,17 @@ def grandfather_clock(b: ObjectBuilder) -> None:
         decal(0.7 * y, 0.7 * y).at(x / 2 + 0.001, 0, 0.85 * z),
         materials.picture("dial", textures.dial((0.93, 0.88, 0.72))),
     )
-    b.add(block((0.002, 0.5 * y, 0.45 * z), (0.4 * x, 0, 0.47 * z)).seen(), materials.plain("black", "glass", 0.9))
-    b.add(cylinder(0.12 * y, 0.006, 16).seen().turned("y", 90).at(0.4 * x, 0, 0.34 * z), materials.metal("brass"))
-    b.add(block((0.004, 0.012, 0.25 * z), (0.402 * x, 0, 0.48 * z)).seen(), materials.metal("brass"))
+    b.add(
+        block((0.002, 0.5 * y, 0.45 * z), (0.4 * x, 0, 0.47 * z)).visual_only(), materials.plain("black", "glass", 0.9)
+    )
+    b.add(
+        cylinder(0.12 * y, 0.006, 16).visual_only().turned("y", 90).at(0.4 * x, 0, 0.34 * z), materials.metal("brass")
+    )
+    b.add(block((0.004, 0.012, 0.25 * z), (0.402 * x, 0, 0.48 * z)).visual_only(), materials.metal("brass"))
 
 
 def pot_plant(b: ObjectBuilder) -> None:
-    """A plant in a pot: broad leaves, a bush, a palm or a cactus; felt as pot and crown."""
+    """A plant in a pot: broad leaves, a bush, a palm or a cactus; collides as pot and crown."""
     x, _, z = b.size
     plan = b.pick(("leaves", "bush", "palm", "cactus"))
     r = 0.42 * x
@@ -121,7 +125,7 @@ def pot_plant(b: ObjectBuilder) -> None:
     )
     high = 0.34 * z
     b.add(lathe([(0.68 * r, 0), (0.95 * r, 0.85 * high), (r, 0.86 * high), (r, high)], 20), pot)
-    b.add(cylinder(0.92 * r, 0.002, 16).seen().at(z=high), materials.plain("soil", "organic"))
+    b.add(cylinder(0.92 * r, 0.002, 16).visual_only().at(z=high), materials.plain("soil", "organic"))
     green = [materials.plain(materials.tint("leaf", b.rng, 0.2), "organic") for _ in range(2)]
     if plan == "cactus":
         b.add(lathe([(0.4 * r, high - 0.01), (0.5 * r, 0.6 * z), (0.42 * r, 0.92 * z), (0.1 * r, z)], 14), green[0])
@@ -144,7 +148,7 @@ def pot_plant(b: ObjectBuilder) -> None:
             up = high + (z - high - size) * (k % 5) / 4
             b.add(
                 ball(size, size, size, 8)
-                .seen()
+                .visual_only()
                 .at(spread * math.cos(a), spread * math.sin(a), max(high - 0.05 * z, up)),
                 green[k % 2],
             )
@@ -164,8 +168,8 @@ def pot_plant(b: ObjectBuilder) -> None:
                 (0.55 * reach, 0, top - 0.03 * z),
                 (reach, 0, tip),
             ]
-            b.add(hull(leaf).seen().turned("z", math.degrees(a)), green[k % 2])
-    crown = lathe([(0.2 * x, high), (0.5 * x, high + 0.5 * (z - high)), (0.25 * x, z)], 8).felt()
+            b.add(hull(leaf).visual_only().turned("z", math.degrees(a)), green[k % 2])
+    crown = lathe([(0.2 * x, high), (0.5 * x, high + 0.5 * (z - high)), (0.25 * x, z)], 8).collision_only()
     b.add(crown, green[0])
 
 
@@ -190,13 +194,13 @@ def christmas_tree(b: ObjectBuilder, *, decorated: bool = False) -> None:
             wide = r * (1 - 0.16 * level) * 0.97
             place = (wide * math.cos(a), wide * math.sin(a), 0.12 * z + level * 0.155 * z)
             look = materials.plain(("red", "gold", "silver", "blue")[k % 4], "metal", 0.9)
-            b.add(ball(0.05 * x, 0.05 * x, 0.05 * x, 8).seen().at(*place), look)
+            b.add(ball(0.05 * x, 0.05 * x, 0.05 * x, 8).visual_only().at(*place), look)
         b.add(star(0.07 * x).turned("y", 90).turned("z", 0).at(0, 0, 0.985 * z), materials.metal("gold"))
         b.point("toggle_button", (0.3 * r, 0, 0.03 * z))
 
 
 def star(size: float) -> Solid:
-    """A five-pointed star in the plane z = 0, only seen, a twentieth as thick."""
+    """A five-pointed star in the plane z = 0, visual only, a twentieth as thick."""
     corners = []
     for k in range(10):
         a = math.pi * k / 5
@@ -219,12 +223,12 @@ def wreath(b: ObjectBuilder) -> None:
         b.add(
             rod(
                 (r * c, r * s, z * 0.5), (out * math.cos(a + 0.15), out * math.sin(a + 0.15), 0.6 * z), 0.06 * z, 4
-            ).seen(),
+            ).visual_only(),
             needles,
         )
         if k % 5 == 0:
             b.add(
-                ball(0.06 * x, 0.06 * x, 0.06 * x, 7).seen().at(r * c, r * s, 0.75 * z),
+                ball(0.06 * x, 0.06 * x, 0.06 * x, 7).visual_only().at(r * c, r * s, 0.75 * z),
                 materials.plain("red", "organic", 0.8),
             )
     b.add(
@@ -247,7 +251,7 @@ def tinsel(b: ObjectBuilder) -> None:
                     (px + 0.3 * z * math.cos(a), py + 0.5 * z * math.sin(a), pz + 0.4 * z * math.cos(2 * a)),
                     0.04 * z,
                     4,
-                ).seen(),
+                ).visual_only(),
                 look,
             )
 
@@ -255,16 +259,19 @@ def tinsel(b: ObjectBuilder) -> None:
 def baseboard(b: ObjectBuilder) -> None:
     x, y, z = b.size
     b.add(box(x, y, z), materials.plain("white", "wood") if b.pick((True, False)) else materials.wood("oak", b.rng))
-    b.add(box(0.5 * x, y, 0.1 * z).seen().at(0.05 * x, 0, 0.95 * z), materials.plain("light_grey", "wood"))
+    b.add(box(0.5 * x, y, 0.1 * z).visual_only().at(0.05 * x, 0, 0.95 * z), materials.plain("light_grey", "wood"))
 
 
 def wall_socket(b: ObjectBuilder) -> None:
     x, y, z = b.size
     b.add(soft_box(x, y, z, 0.4 * x, 1), materials.plain("white"))
-    b.add(cylinder(0.32 * y, 0.001, 18).seen().turned("y", 90).at(x / 2, 0, z / 2), materials.plain("light_grey"))
+    b.add(
+        cylinder(0.32 * y, 0.001, 18).visual_only().turned("y", 90).at(x / 2, 0, z / 2), materials.plain("light_grey")
+    )
     for s in (-1, 1):
         b.add(
-            cylinder(0.04 * y, 0.002, 8).seen().turned("y", 90).at(x / 2, s * 0.13 * y, z / 2), materials.plain("black")
+            cylinder(0.04 * y, 0.002, 8).visual_only().turned("y", 90).at(x / 2, s * 0.13 * y, z / 2),
+            materials.plain("black"),
         )
     b.point("toggle_button", (x / 2, 0.35 * y, 0.85 * z))
 
@@ -285,7 +292,10 @@ def hinge(b: ObjectBuilder) -> None:
     for s in (-1, 1):
         b.add(box(0.46 * x, y, 0.4 * z).at(s * 0.26 * x), metal)
         for k in (-1, 0, 1):
-            b.add(cylinder(0.04 * x, 0.001, 8).seen().at(s * 0.28 * x, k * 0.3 * y, 0.4 * z), materials.plain("black"))
+            b.add(
+                cylinder(0.04 * x, 0.001, 8).visual_only().at(s * 0.28 * x, k * 0.3 * y, 0.4 * z),
+                materials.plain("black"),
+            )
     b.add(rod((0, -y / 2, z / 2), (0, y / 2, z / 2), z / 2, 10), metal)
 
 

@@ -28,8 +28,8 @@ def lever(s: float) -> Solid:
     """A door handle on both faces of a leaf centred on x = 0; s: +1 points to +y."""
     solids = []
     for face in (-1, 1):
-        solids.append(soft_box(0.012, 0.045, 0.16, 0.005).seen().at(face * (LEAF / 2 + 0.004), 0, -0.08))
-        solids.append(block((0.05, 0.018, 0.018), (face * (LEAF / 2 + 0.025), 0, 0)).seen())
+        solids.append(soft_box(0.012, 0.045, 0.16, 0.005).visual_only().at(face * (LEAF / 2 + 0.004), 0, -0.08))
+        solids.append(block((0.05, 0.018, 0.018), (face * (LEAF / 2 + 0.025), 0, 0)).visual_only())
         solids.append(block((0.016, 0.12, 0.018), (face * (LEAF / 2 + 0.045), s * 0.05, 0)))
     return join(solids)
 
@@ -77,11 +77,14 @@ def _trim(link: LinkBuilder, centre, size, plan: str, wood: Material) -> None:
             for zz, hh in ((0.27, 0.36), (-0.22, 0.42)):
                 for yy in (-0.22, 0.22):
                     link.add(
-                        block((0.004, 0.34 * width, hh * height), (px, cy + yy * width, cz + zz * height)).seen(), dark
+                        block(
+                            (0.004, 0.34 * width, hh * height), (px, cy + yy * width, cz + zz * height)
+                        ).visual_only(),
+                        dark,
                     )
         elif plan == "planks":
             for k in range(1, 6):
-                link.add(block((0.003, 0.006, height), (px, cy + (k / 6 - 0.5) * width, cz)).seen(), dark)
+                link.add(block((0.003, 0.006, height), (px, cy + (k / 6 - 0.5) * width, cz)).visual_only(), dark)
 
 
 def _glazed_leaf(link: LinkBuilder, centre, size, wood: Material) -> None:
@@ -96,8 +99,8 @@ def _glazed_leaf(link: LinkBuilder, centre, size, wood: Material) -> None:
     middle = cz + (0.3 - stile) / 2
     link.add(block((0.008, width - 2 * stile, pane), (cx, cy, middle)), materials.glass("sky", 0.35))
     for k in (-1, 1):
-        link.add(block((0.014, 0.02, pane), (cx, cy + k * 0.13 * width, middle)).seen(), wood)
-        link.add(block((0.014, width - 2 * stile, 0.02), (cx, cy, middle + k * pane / 6)).seen(), wood)
+        link.add(block((0.014, 0.02, pane), (cx, cy + k * 0.13 * width, middle)).visual_only(), wood)
+        link.add(block((0.014, width - 2 * stile, 0.02), (cx, cy, middle + k * pane / 6)).visual_only(), wood)
 
 
 def window(b: ObjectBuilder) -> None:
@@ -109,7 +112,7 @@ def window(b: ObjectBuilder) -> None:
     )
     metal = materials.metal("steel")
     b.add(frame(x, y, z, sill=True), look)
-    b.add(block((0.06, y, 0.02), (x / 2 + 0.03, 0, FRAME - 0.01)).seen(), look)
+    b.add(block((0.06, y, 0.02), (x / 2 + 0.03, 0, FRAME - 0.01)).visual_only(), look)
     width, height = y - 2 * FRAME - 0.008, z - 2 * FRAME - 0.008
     middle = z / 2
     depth = 0.03
@@ -118,7 +121,7 @@ def window(b: ObjectBuilder) -> None:
         _sash(b.base, (-0.018, -half / 2, middle), (half + 0.02, height), depth, look)
         link = b.slide("sash_0", (0.018, half / 2, middle), (0, -1, 0), half - 0.02)
         _sash(link, (0.018, half / 2 - 0.002, middle), (half, height), depth, look)
-        link.add(block((0.02, 0.02, 0.1), (0.018 + 0.024, 0.03, middle)).seen(), metal)
+        link.add(block((0.02, 0.02, 0.1), (0.018 + 0.024, 0.03, middle)).visual_only(), metal)
         return
     front = x / 2 - depth / 2
     leaves = (
@@ -129,7 +132,7 @@ def window(b: ObjectBuilder) -> None:
         link = b.hinge(f"sash_{k}", axis, (0, 0, 1 if left else -1), math.pi / 2)
         _sash(link, (front, (low + high) / 2, middle), (high - low, height), depth, look)
         at = low + 0.02 if left else high - 0.02
-        link.add(block((0.03, 0.02, 0.1), (front + depth / 2 + 0.012, at, middle)).seen(), metal)
+        link.add(block((0.03, 0.02, 0.1), (front + depth / 2 + 0.012, at, middle)).visual_only(), metal)
 
 
 def _sash(link: LinkBuilder, centre, size, depth: float, look: Material) -> None:

@@ -49,12 +49,12 @@ def laptop(b: ObjectBuilder) -> None:
     b.add(box(x, y, low), body)
     pad = materials.picture("keyboard", textures.keys((0.2, 0.2, 0.21), (0.07, 0.07, 0.08), 14, 5))
     b.add(decal(0.9 * y, 0.5 * x, "z").at(-0.15 * x, 0, low + 0.0004), pad)
-    b.add(box(0.24 * x, 0.3 * y, 0.0003).seen().at(0.3 * x, 0, low), materials.plain("grey"))
+    b.add(box(0.24 * x, 0.3 * y, 0.0003).visual_only().at(0.3 * x, 0, low), materials.plain("grey"))
     link = b.hinge("lid", (-x / 2, 0, low + 0.001), (0, -1, 0), 2.1, True)
     link.add(box(x, y, z - low - 0.001).at(z=low + 0.001), body)
     shown = Solid(decal(0.94 * y, 0.92 * x, "z").turned("x", 180).visuals).at(0, 0, low + 0.0008)
     link.add(shown, display(b))
-    link.add(box(0.05, 0.05, 0.0004).seen().turned("z", 45).at(0, 0, z), materials.plain("light_grey"))
+    link.add(box(0.05, 0.05, 0.0004).visual_only().turned("z", 45).at(0, 0, z), materials.plain("light_grey"))
     b.point("toggle_button", (-0.42 * x, 0.42 * y, low))
 
 
@@ -75,7 +75,7 @@ def keyboard(b: ObjectBuilder) -> None:
 def mouse(b: ObjectBuilder) -> None:
     x, y, z = b.size
     body = case(b)
-    b.add(ball(x, y, 2 * z, 14).seen().at(z=-z), body)
+    b.add(ball(x, y, 2 * z, 14).visual_only().at(z=-z), body)
     b.add(
         hull(
             [
@@ -83,11 +83,11 @@ def mouse(b: ObjectBuilder) -> None:
                 for a in (j * math.pi / 4 for j in range(8))
                 for k, h in ((1, 0), (0.9, 0.45), (0.4, 1))
             ]
-        ).felt(),
+        ).collision_only(),
         body,
     )
     b.add(
-        cylinder(0.06 * x, 0.006, 10).seen().at(z=-0.003).turned("x", 90).at(0.25 * x, 0, 0.87 * z),
+        cylinder(0.06 * x, 0.006, 10).visual_only().at(z=-0.003).turned("x", 90).at(0.25 * x, 0, 0.87 * z),
         materials.plain("grey"),
     )
     b.point("toggle_button", (0.3 * x, 0.15 * y, 0.85 * z))
@@ -102,12 +102,14 @@ def box_device(b: ObjectBuilder, *, lamps: bool = True, vents: bool = True, on: 
     if lamps:
         for k in range(4):
             b.add(
-                box(0.002, 0.008, 0.006).seen().at(front, (k - 1.5) * 0.12 * y, 0.7 * z),
+                box(0.002, 0.008, 0.006).visual_only().at(front, (k - 1.5) * 0.12 * y, 0.7 * z),
                 materials.plain("lime" if k else "orange"),
             )
     if vents:
         for k in range(5):
-            b.add(box(0.5 * x, 0.02 * y, 0.001).seen().at(-0.1 * x, (k - 2) * 0.1 * y, z), materials.plain("black"))
+            b.add(
+                box(0.5 * x, 0.02 * y, 0.001).visual_only().at(-0.1 * x, (k - 2) * 0.1 * y, z), materials.plain("black")
+            )
     if on:
         button(b, (front, 0.38 * y, 0.35 * z), materials.plain("sky"), min(0.008, 0.2 * z))
 
@@ -121,7 +123,7 @@ def router(b: ObjectBuilder) -> None:
     for s in (-1, 1):
         b.add(rod((-0.45 * x, s * 0.42 * y, 0.6 * low), (-0.47 * x, s * 0.45 * y, z), 0.005), materials.plain("black"))
     for k in range(4):
-        b.add(box(0.002, 0.008, 0.004).seen().at(x / 2, (k - 1.5) * 0.1 * y, 0.5 * low), materials.plain("lime"))
+        b.add(box(0.002, 0.008, 0.004).visual_only().at(x / 2, (k - 1.5) * 0.1 * y, 0.5 * low), materials.plain("lime"))
     b.point("toggle_button", (x / 2, 0.4 * y, low / 2))
 
 
@@ -131,7 +133,7 @@ def tower(b: ObjectBuilder) -> None:
     b.add(box(x, y, 0.2 * z), materials.plain((0.10, 0.36, 0.20)))
     b.add(box(0.3 * x, 0.3 * y, 0.5 * z).at(0.1 * x, 0, 0.2 * z), materials.metal("silver"))
     for px, py in ((-0.3, -0.2), (-0.3, 0.1), (-0.3, 0.3), (0.3, 0.32), (0.35, -0.3)):
-        b.add(box(0.16 * x, 0.1 * y, 0.3 * z).at(px * x, py * y, 0.2 * z).seen(), materials.plain("black"))
+        b.add(box(0.16 * x, 0.1 * y, 0.3 * z).at(px * x, py * y, 0.2 * z).visual_only(), materials.plain("black"))
     b.add(box(0.06 * x, 0.8 * y, 0.8 * z).at(-0.46 * x, 0, 0.2 * z), materials.plain("dark_grey"))
     b.point("toggle_button", (0.1 * x, 0, 0.7 * z))
 
@@ -151,12 +153,12 @@ def printer(b: ObjectBuilder, *, phone: bool = False) -> None:
     b.add(decal(0.4 * y, 0.2 * x, "z").at(0.12 * x, 0.22 * y, main + 0.0005), pad)
     if phone:
         b.add(soft_box(0.6 * x, 0.16 * y, 0.18 * z).at(-0.1 * x, -0.4 * y, main), materials.plain("black"))
-    b.add(cylinder(0.01, 0.003, 10).seen().at(0.2 * x, -0.2 * y, main), materials.plain("lime"))
+    b.add(cylinder(0.01, 0.003, 10).visual_only().at(0.2 * x, -0.2 * y, main), materials.plain("lime"))
     b.point("toggle_button", (0.2 * x, -0.2 * y, main))
 
 
 def scanner(b: ObjectBuilder) -> None:
-    """A flat bed with a lid (felt as one body)."""
+    """A flat bed with a lid (one collision hull)."""
     x, y, z = b.size
     b.add(soft_box(x, y, 0.6 * z, 0.01), materials.plain("dark_grey"))
     b.add(
@@ -176,15 +178,15 @@ def alarm(b: ObjectBuilder) -> None:
     b.add(cylinder(r, x, 20).turned("y", 90).at(-x / 2, 0, middle), look)
     b.add(decal(1.3 * r, 1.3 * r).at(x / 2 + 0.0005, 0, middle), materials.picture("dial", textures.dial()))
     # Felt as a foot as deep as the drum, so that the clock does not roll over its two thin legs.
-    b.add(box(0.9 * x, 1.3 * r, 0.3 * middle).felt(), metal)
+    b.add(box(0.9 * x, 1.3 * r, 0.3 * middle).collision_only(), metal)
     for s in (-1, 1):
-        b.add(rod((0, s * 0.55 * r, 0.3 * middle), (0, s * 0.85 * r, 0), 0.06 * r + 0.001, 6).seen(), metal)
+        b.add(rod((0, s * 0.55 * r, 0.3 * middle), (0, s * 0.85 * r, 0), 0.06 * r + 0.001, 6).visual_only(), metal)
         b.add(ball(0.6 * r, 0.6 * r, 0.4 * r, 10).turned("x", -s * 35).at(0, s * 0.55 * r, middle + 0.75 * r), metal)
     arch = [
         (0, 0.62 * r * math.cos(a), middle + r + (z - middle - r - 0.003) * math.sin(a))
         for a in (k * math.pi / 6 for k in range(7))
     ]
-    b.add(tube(arch, 0.003, 5, hulls=0) + block((0.02, 0.7 * r, 0.006), (0, 0, z - 0.004)).felt(), metal)
+    b.add(tube(arch, 0.003, 5, hulls=0) + block((0.02, 0.7 * r, 0.006), (0, 0, z - 0.004)).collision_only(), metal)
     b.point("toggle_button", (0, 0, z))
 
 
@@ -210,7 +212,10 @@ def headset(b: ObjectBuilder) -> None:
     for s in (-1, 1):
         b.add(cylinder(r, 0.2 * y, 16).turned("x", 90).at(0, s * y / 2 + (0.2 * y if s < 0 else 0.0), r), look)
         b.add(
-            cylinder(0.8 * r, 0.04 * y, 16).seen().turned("x", 90).at(0, s * 0.3 * y + (0.04 * y if s < 0 else 0), r),
+            cylinder(0.8 * r, 0.04 * y, 16)
+            .visual_only()
+            .turned("x", 90)
+            .at(0, s * 0.3 * y + (0.04 * y if s < 0 else 0), r),
             materials.plain("dark_grey", "fabric"),
         )
     bow = [
@@ -241,12 +246,15 @@ def loudspeaker(b: ObjectBuilder, *, pair: bool = False) -> None:
         for h, k in ((0.3, 0.4), (0.72, 0.26)):
             r = k * min(w, 0.6 * z)
             b.add(
-                lathe([(r, 0), (0.9 * r, 0.008), (0.3 * r, 0.002)], 18).seen().turned("y", 90).at(x / 2, yy, h * z),
+                lathe([(r, 0), (0.9 * r, 0.008), (0.3 * r, 0.002)], 18)
+                .visual_only()
+                .turned("y", 90)
+                .at(x / 2, yy, h * z),
                 cone,
             )
     if pair:
         b.add(box(0.9 * x, 0.5 * y, 0.45 * z), body)
-        b.add(knob(0.02, 0.015).seen().at(0.45 * x, 0, 0.22 * z), materials.metal("silver"))
+        b.add(knob(0.02, 0.015).visual_only().at(0.45 * x, 0, 0.22 * z), materials.metal("silver"))
     b.point("toggle_button", (x / 2, 0.0, 0.1 * z))
 
 
@@ -293,7 +301,7 @@ def scale(b: ObjectBuilder, *, analog: bool = False) -> None:
             decal(0.3 * y, 0.16 * x, "z").at(0.38 * x, 0, z + 0.0004),
             materials.picture("lcd", textures.screen(b.rng, (0.5, 0.6, 0.5))),
         )
-        b.add(cylinder(0.36 * x, 0.002, 20).seen().at(-0.1 * x, 0, z), materials.glass("glass", 0.6))
+        b.add(cylinder(0.36 * x, 0.002, 20).visual_only().at(-0.1 * x, 0, z), materials.glass("glass", 0.6))
         b.point("toggle_button", (0.4 * x, 0.3 * y, z))
 
 

@@ -18,7 +18,7 @@ CRUST = (0.78, 0.54, 0.28)
 
 
 def torus(radius: float, thick: float, height: float, pieces: int = 6) -> Solid:
-    """A ring lying on z = 0 (mean radius, tube diameter, height), felt as `pieces` wedges."""
+    """A ring lying on z = 0 (mean radius, tube diameter, height), collides as `pieces` wedges."""
     path = [(radius * math.cos(a), radius * math.sin(a), 0) for a in np.arange(18) * math.pi / 9]
     ring = tube(path, thick / 2, 8, hulls=pieces, closed=True)
     return ring.scaled(z=height / thick).at(z=height / 2)
@@ -50,7 +50,7 @@ def loaf(b: ObjectBuilder) -> None:
     profile = [(0.25, 0), (0.43, 0.06), (0.5, 0.2), (0.5, 0.8), (0.43, 0.94), (0.25, 1)]
     b.add(lathe(profile, 14, split=[0.35, 0.65]).at(z=-0.5).turned("y", 90).scaled(x, y, z).at(z=z / 2), crust)
     for k in range(5):
-        cut = block((0.09 * x, 0.12 * y, 0.004)).seen().turned("z", 35)
+        cut = block((0.09 * x, 0.12 * y, 0.004)).visual_only().turned("z", 35)
         b.add(cut.at((k - 2) * 0.16 * x, 0, 0.985 * z), materials.plain((0.92, 0.80, 0.58), "organic"))
 
 
@@ -77,7 +77,7 @@ def muffin(b: ObjectBuilder, *, tops: tuple, icing: bool = False) -> None:
             ),
             top,
         )
-        b.add(ball(0.2 * r, 0.2 * r, 0.2 * r, 8).seen().at(0, 0, 0.94 * z), materials.plain("red", "organic"))
+        b.add(ball(0.2 * r, 0.2 * r, 0.2 * r, 8).visual_only().at(0, 0, 0.94 * z), materials.plain("red", "organic"))
     else:
         b.add(lathe([(0.9 * r, 0.46 * z), (r, 0.58 * z), (0.85 * r, 0.82 * z), (0.4 * r, 0.97 * z), (0, z)], 16), top)
 
@@ -94,7 +94,7 @@ def disc_cake(b: ObjectBuilder, *, colours: tuple, dots: str | None = None) -> N
             a = 2.4 * k
             r = 0.4 * math.sqrt((k + 0.3) / 9)
             b.add(
-                ball(0.1 * x, 0.1 * x, 0.3 * z, 6).seen().at(r * x * math.cos(a), r * y * math.sin(a), 0.8 * z),
+                ball(0.1 * x, 0.1 * x, 0.3 * z, 6).visual_only().at(r * x * math.cos(a), r * y * math.sin(a), 0.8 * z),
                 materials.plain(dots, "organic"),
             )
 
@@ -110,9 +110,9 @@ def gingerbread(b: ObjectBuilder) -> None:
     b.add(soft_box(0.15 * x, y, z, 0.3 * z).at(0.12 * x), dough)
     for s in (-1, 1):
         b.add(soft_box(0.45 * x, 0.24 * y, z, 0.3 * z).turned("z", -s * 18).at(-0.27 * x, s * 0.19 * y), dough)
-        b.add(ball(0.03 * x, 0.03 * x, 0.3 * z, 6).seen().at(0.37 * x, s * 0.06 * x, 0.85 * z), white)
+        b.add(ball(0.03 * x, 0.03 * x, 0.3 * z, 6).visual_only().at(0.37 * x, s * 0.06 * x, 0.85 * z), white)
     for k in range(3):
-        b.add(ball(0.04 * x, 0.04 * x, 0.3 * z, 6).seen().at((0.17 - 0.1 * k) * x, 0, 0.85 * z), red)
+        b.add(ball(0.04 * x, 0.04 * x, 0.3 * z, 6).visual_only().at((0.17 - 0.1 * k) * x, 0, 0.85 * z), red)
 
 
 def candy_cane(b: ObjectBuilder) -> None:
@@ -127,9 +127,13 @@ def candy_cane(b: ObjectBuilder) -> None:
     path = straight + hook
     white, red = materials.plain("white", "organic"), materials.plain("red", "organic")
     b.add(tube(path, z / 2, 8, hulls=0), white)
-    b.add(tube(straight, z / 2, 8, hulls=1).felt() + tube([straight[-1], *hook], z / 2, 8, hulls=3).felt(), white)
+    b.add(
+        tube(straight, z / 2, 8, hulls=1).collision_only()
+        + tube([straight[-1], *hook], z / 2, 8, hulls=3).collision_only(),
+        white,
+    )
     for k in range(0, len(path) - 1, 2):
-        b.add(rod(path[k], (np.asarray(path[k]) * 0.5 + np.asarray(path[k + 1]) * 0.5), z * 0.515).seen(), red)
+        b.add(rod(path[k], (np.asarray(path[k]) * 0.5 + np.asarray(path[k + 1]) * 0.5), z * 0.515).visual_only(), red)
 
 
 def lollipop(b: ObjectBuilder) -> None:
@@ -142,16 +146,19 @@ def lollipop(b: ObjectBuilder) -> None:
 
 
 def hamburger(b: ObjectBuilder) -> None:
-    """Bun, salad, patty, cheese, bun; felt as one hull."""
+    """Bun, salad, patty, cheese, bun; collides as one hull."""
     x, _, z = b.size
     r = x / 2
     bun = materials.skin((0.82, 0.56, 0.28), b.rng, 0.1)
-    b.add(lathe([(0.85 * r, 0), (0.97 * r, 0.12 * z), (0.93 * r, 0.27 * z)]).seen(), bun)
-    b.add(lathe([(r, 0.27 * z), (r, 0.46 * z)]).seen(), materials.skin((0.35, 0.19, 0.11), b.rng, 0.3))
-    b.add(box(1.45 * r, 1.45 * r, 0.05 * z).seen().turned("z", 20).at(z=0.46 * z), materials.plain("yellow", "organic"))
-    b.add(lathe([(1.02 * r, 0.5 * z), (r, 0.56 * z)], 12).seen(), materials.plain("lime", "organic"))
-    b.add(lathe([(0.95 * r, 0.56 * z), (0.98 * r, 0.68 * z), (0.7 * r, 0.92 * z), (0, z)]).seen(), bun)
-    b.add(lathe([(0.9 * r, 0), (r, 0.4 * z), (0.7 * r, 0.93 * z)]).felt(), bun)
+    b.add(lathe([(0.85 * r, 0), (0.97 * r, 0.12 * z), (0.93 * r, 0.27 * z)]).visual_only(), bun)
+    b.add(lathe([(r, 0.27 * z), (r, 0.46 * z)]).visual_only(), materials.skin((0.35, 0.19, 0.11), b.rng, 0.3))
+    b.add(
+        box(1.45 * r, 1.45 * r, 0.05 * z).visual_only().turned("z", 20).at(z=0.46 * z),
+        materials.plain("yellow", "organic"),
+    )
+    b.add(lathe([(1.02 * r, 0.5 * z), (r, 0.56 * z)], 12).visual_only(), materials.plain("lime", "organic"))
+    b.add(lathe([(0.95 * r, 0.56 * z), (0.98 * r, 0.68 * z), (0.7 * r, 0.92 * z), (0, z)]).visual_only(), bun)
+    b.add(lathe([(0.9 * r, 0), (r, 0.4 * z), (0.7 * r, 0.93 * z)]).collision_only(), bun)
 
 
 def sushi(b: ObjectBuilder) -> None:
@@ -164,8 +171,8 @@ def sushi(b: ObjectBuilder) -> None:
     else:
         r = y / 2
         b.add(cylinder(r, z, 16), materials.plain((0.08, 0.14, 0.10), "organic"))
-        b.add(cylinder(0.86 * r, 0.001, 16).seen().at(z=z), rice)
-        b.add(cylinder(0.35 * r, 0.0015, 10).seen().at(z=z), materials.plain("orange", "organic"))
+        b.add(cylinder(0.86 * r, 0.001, 16).visual_only().at(z=z), rice)
+        b.add(cylinder(0.35 * r, 0.0015, 10).visual_only().at(z=z), materials.plain("orange", "organic"))
 
 
 def cheese(b: ObjectBuilder) -> None:
@@ -175,10 +182,11 @@ def cheese(b: ObjectBuilder) -> None:
     outline = [(-x / 2, 0), (0.42 * x, -y / 2), (x / 2, 0), (0.42 * x, y / 2)]
     b.add(prism(outline, z), paste)
     rind = [(0.42 * x, -y / 2), (0.43 * x, -y / 2), (x / 2 + 0.001, 0), (0.43 * x, y / 2), (0.42 * x, y / 2)]
-    b.add(prism([rind[0], rind[1], rind[2], rind[3]], z * 1.002).seen(), materials.plain("orange", "organic"))
+    b.add(prism([rind[0], rind[1], rind[2], rind[3]], z * 1.002).visual_only(), materials.plain("orange", "organic"))
     for px, py in ((0.1, 0.05), (0.25, -0.12), (-0.1, 0.0)):
         b.add(
-            cylinder(0.03 * x, 0.0008, 8).seen().at(px * x, py * y, z), materials.plain((0.80, 0.62, 0.25), "organic")
+            cylinder(0.03 * x, 0.0008, 8).visual_only().at(px * x, py * y, z),
+            materials.plain((0.80, 0.62, 0.25), "organic"),
         )
 
 
@@ -220,7 +228,7 @@ def served(b: ObjectBuilder, *, dish: str = "bowl", filling: tuple = ("red",), b
             fill,
         )
         for s in (-1, 1):
-            b.add(box(0.25 * x, 0.025, 0.012).at(0, s * (y / 2 + 0.006), 0.8 * z).seen(), look)
+            b.add(box(0.25 * x, 0.025, 0.012).at(0, s * (y / 2 + 0.006), 0.8 * z).visual_only(), look)
     for k in range(12 if bits else 0):
         a = 2.4 * k
         r = 0.36 * math.sqrt((k + 0.5) / 12)
@@ -228,7 +236,7 @@ def served(b: ObjectBuilder, *, dish: str = "bowl", filling: tuple = ("red",), b
         size = 0.13 * min(x, y)
         b.add(
             soft_box(size, 0.7 * size, 0.3 * size, 0.1 * size, 1)
-            .seen()
+            .visual_only()
             .turned("z", 50 * k)
             .at(r * x * math.cos(a), r * y * math.sin(a), level - 0.08 * size),
             bit,
@@ -260,7 +268,7 @@ def tart(b: ObjectBuilder) -> None:
         materials.skin(CRUST, b.rng, 0.15),
     )
     b.add(
-        cylinder(0.88 * r, 0.002, 20).seen().at(z=0.86 * z),
+        cylinder(0.88 * r, 0.002, 20).visual_only().at(z=0.86 * z),
         materials.skin(b.pick(((0.65, 0.12, 0.18), (0.95, 0.78, 0.35))), b.rng, 0.2),
     )
 

@@ -33,7 +33,9 @@ def fridge(b: ObjectBuilder) -> None:
     b.add(block((depth - 0.06, y - 0.06, foot), (shift, 0, foot / 2)), materials.plain("black"))
     b.add(carcass(depth, y, z - foot, WALL, back=WALL).at(shift, 0, foot), body)
     b.add(
-        block((0.004, y - 2 * WALL, z - foot - 2 * WALL), (shift - depth / 2 + WALL + 0.002, 0, (z + foot) / 2)).seen(),
+        block(
+            (0.004, y - 2 * WALL, z - foot - 2 * WALL), (shift - depth / 2 + WALL + 0.002, 0, (z + foot) / 2)
+        ).visual_only(),
         inner,
     )
     plane = shift + depth / 2

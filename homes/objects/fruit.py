@@ -30,9 +30,9 @@ def round_fruit(b: ObjectBuilder, *, skins: tuple = ("red",), stem: str | None =
         for k in range(5):
             a = 2 * math.pi * k / 5
             tip = (0.3 * x * math.cos(a), 0.3 * y * math.sin(a), z - 2.2 * top)
-            b.add(rod((0, 0, z - top * 0.9), tip, 0.03 * x, 4).seen(), materials.plain("leaf", "organic"))
+            b.add(rod((0, 0, z - top * 0.9), tip, 0.03 * x, 4).visual_only(), materials.plain("leaf", "organic"))
     elif stem:
-        b.add(rod((0, 0, z - 2 * top), (0.03 * x, 0, z), 0.025 * x, 5).seen(), materials.plain(stem, "organic"))
+        b.add(rod((0, 0, z - 2 * top), (0.03 * x, 0, z), 0.025 * x, 5).visual_only(), materials.plain(stem, "organic"))
 
 
 def pear(b: ObjectBuilder) -> None:
@@ -48,7 +48,7 @@ def pear(b: ObjectBuilder) -> None:
         (0.25 * r, 0.92 * z),
     ]
     b.add(lathe(profile, split=[0.55 * z]), materials.skin(b.pick(("lime", "yellow", (0.70, 0.62, 0.30))), b.rng))
-    b.add(rod((0, 0, 0.9 * z), (0.05 * r, 0, z), 0.05 * r, 5).seen(), materials.plain("brown", "organic"))
+    b.add(rod((0, 0, 0.9 * z), (0.05 * r, 0, z), 0.05 * r, 5).visual_only(), materials.plain("brown", "organic"))
 
 
 def lemon(b: ObjectBuilder, *, skins: tuple = ("yellow",)) -> None:
@@ -81,7 +81,7 @@ def strawberry(b: ObjectBuilder) -> None:
     for k in range(5):
         a = 2 * math.pi * k / 5
         b.add(
-            rod((0, 0, 0.93 * z), (0.8 * r * math.cos(a), 0.8 * r * math.sin(a), 0.88 * z), 0.1 * r, 4).seen(),
+            rod((0, 0, 0.93 * z), (0.8 * r * math.cos(a), 0.8 * r * math.sin(a), 0.88 * z), 0.1 * r, 4).visual_only(),
             materials.plain("leaf", "organic"),
         )
 
@@ -118,8 +118,8 @@ def pineapple(b: ObjectBuilder) -> None:
                 (0.12 * r * c, 0.12 * r * s, h * 0.95),
                 (out * r * c, out * r * s, up * z),
             ]
-            b.add(hull(points).seen(), leaf)
-    b.add(lathe([(0.35 * r, h), (0.6 * r, 0.85 * z), (0.2 * r, z)], 8).felt(), leaf)
+            b.add(hull(points).visual_only(), leaf)
+    b.add(lathe([(0.35 * r, h), (0.6 * r, 0.85 * z), (0.2 * r, z)], 8).collision_only(), leaf)
 
 
 def onion(b: ObjectBuilder, *, skins: tuple = ((0.80, 0.55, 0.24),)) -> None:
@@ -135,7 +135,7 @@ def half_of(b: ObjectBuilder, *, whole: Family, inside: Flesh, options: dict | N
     maker = ObjectBuilder(b.category, "whole", (2 * x, y, z), b.rng, b.index)
     whole(maker, **(options or {}))
     half, _ = cut_half(maker.finish(), 1.0, inside(b.rng), b.category, "half")
-    b.base.seen, b.base.hulls = half.base.seen, half.base.hulls
+    b.base.visuals, b.base.hulls = half.base.visuals, half.base.hulls
 
 
 Line = tuple[str, Family, tuple[float, float, float], float, tuple[float, float, float], dict]

@@ -39,7 +39,7 @@ def cut_half(
         kept = _slice(hull_mesh(points), plane, cap=False)
         if kept is not None:
             link.hulls.append(np.asarray(kept.vertices) - offset)
-    for material, mesh in whole.base.seen:
+    for material, mesh in whole.base.visuals:
         solid = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
         kept = _slice(solid, plane, cap=solid.is_watertight)
         if kept is None:
@@ -48,7 +48,7 @@ def cut_half(
         flat = np.abs(vertices[faces][:, :, 0] - middle).max(1) < 1e-9
         for chosen, look in ((~flat, material), (flat, flesh)):
             if chosen.any():
-                link.seen.append((look, Mesh(vertices - offset, faces[chosen])))
+                link.visuals.append((look, Mesh(vertices - offset, faces[chosen])))
     return HouseholdObject(category, name, [link], [], {}, "any"), shift
 
 

@@ -60,7 +60,7 @@ def shaker(b: ObjectBuilder, *, looks: tuple = (("white", "silver"),)) -> None:
     for k in range(5):
         a = 2 * math.pi * k / 5
         b.add(
-            cylinder(0.05 * r, 0.02 * z, 6).seen().at(0.25 * r * math.cos(a), 0.25 * r * math.sin(a), 0.985 * z),
+            cylinder(0.05 * r, 0.02 * z, 6).visual_only().at(0.25 * r * math.cos(a), 0.25 * r * math.sin(a), 0.985 * z),
             materials.plain("black"),
         )
 
@@ -72,7 +72,7 @@ def mill(b: ObjectBuilder) -> None:
     wood = materials.wood(b.pick(("walnut", "cherry", "oak")), b.rng)
     b.add(lathe([(r, 0), (r, 0.12 * z), (0.6 * r, 0.3 * z), (0.75 * r, 0.6 * z), (0.9 * r, 0.7 * z)], 16), wood)
     b.add(lathe([(0.9 * r, 0.71 * z), (0.95 * r, 0.82 * z), (0.5 * r, 0.93 * z)], 16), wood)
-    b.add(ball(0.5 * r, 0.5 * r, 0.07 * z, 10).seen().at(z=0.93 * z), materials.metal("gold"))
+    b.add(ball(0.5 * r, 0.5 * r, 0.07 * z, 10).visual_only().at(z=0.93 * z), materials.metal("gold"))
 
 
 def drink(b: ObjectBuilder) -> None:
@@ -89,10 +89,10 @@ def drink(b: ObjectBuilder) -> None:
     )
     b.add(lathe([(0.05 * r, 0.56 * z), (r, z)], split=[]), glass)
     b.add(
-        lathe([(0.05 * r, 0.575 * z), (0.86 * r, 0.94 * z)]).seen(),
+        lathe([(0.05 * r, 0.575 * z), (0.86 * r, 0.94 * z)]).visual_only(),
         materials.glass(b.pick(("lime", "pink", "gold")), 0.7),
     )
-    b.add(ball(0.2 * r, 0.2 * r, 0.2 * r, 8).seen().at(0.3 * r, 0, 0.9 * z), materials.plain("leaf", "organic"))
+    b.add(ball(0.2 * r, 0.2 * r, 0.2 * r, 8).visual_only().at(0.3 * r, 0, 0.9 * z), materials.plain("leaf", "organic"))
 
 
 def paper_cup(b: ObjectBuilder) -> None:
@@ -126,7 +126,7 @@ def cup_tub(b: ObjectBuilder, *, looks: tuple = (("white", "pink"), ("white", "b
     r = x / 2
     look, accent = b.pick(looks)
     b.add(lathe([(0.78 * r, 0), (0.95 * r, 0.92 * z), (r, 0.93 * z), (r, z)]), materials.plain(look))
-    b.add(cylinder(r * 0.99, 0.001).seen().at(z=z), materials.metal("silver"))
+    b.add(cylinder(r * 0.99, 0.001).visual_only().at(z=z), materials.metal("silver"))
     b.add(sleeve([(0.82 * r, 0.2 * z), (0.92 * r, 0.72 * z)]).scaled(1.02, 1.02), materials.plain(accent, "paper"))
 
 
@@ -159,9 +159,9 @@ def case_of_cans(b: ObjectBuilder) -> None:
         for j in range(4):
             px, py = (i - 1) * x / 3, (j - 1.5) * y / 4
             r = min(x / 6.3, y / 8.4)
-            b.add(lathe([(r, 0.3 * z), (r, 0.94 * z), (0.8 * r, z)], 12).seen().at(px, py), red)
-            b.add(cylinder(0.78 * r, 0.001, 12).seen().at(px, py, z), materials.metal("silver"))
-    b.add(box(0.96 * x, 0.96 * y, 0.65 * z).felt().at(z=0.35 * z), red)
+            b.add(lathe([(r, 0.3 * z), (r, 0.94 * z), (0.8 * r, z)], 12).visual_only().at(px, py), red)
+            b.add(cylinder(0.78 * r, 0.001, 12).visual_only().at(px, py, z), materials.metal("silver"))
+    b.add(box(0.96 * x, 0.96 * y, 0.65 * z).collision_only().at(z=0.35 * z), red)
 
 
 def can(
@@ -175,8 +175,8 @@ def can(
     profile = [(0.78 * r, 0), (r, 0.08 * z), (r, 0.88 * z), (0.8 * r, 0.97 * z), (0.82 * r, z)]
     b.add(lathe(profile), materials.plain(look, "metal", 0.7))
     b.add(*band(r * 0.996, 0.35 * z, 0.62 * z, materials.plain(accent, "metal", 0.7)))
-    b.add(cylinder(0.8 * r, 0.001).seen().at(z=z), silver)
-    b.add(soft_box(0.5 * r, 0.3 * r, 0.002).seen().at(0.15 * r, 0, z + 0.001), silver)
+    b.add(cylinder(0.8 * r, 0.001).visual_only().at(z=z), silver)
+    b.add(soft_box(0.5 * r, 0.3 * r, 0.002).visual_only().at(0.15 * r, 0, z + 0.001), silver)
 
 
 CATEGORIES = [

@@ -67,7 +67,7 @@ def candle(b: ObjectBuilder) -> None:
             materials.metal("silver"),
         )
         b.add(lathe([(0.32 * r, 0.2 * z), (0.28 * r, top)], 12), wax)
-    b.add(rod((0, 0, top), (0, 0, z), 0.0015, 5).seen(), materials.plain("black", "fabric"))
+    b.add(rod((0, 0, top), (0, 0, z), 0.0015, 5).visual_only(), materials.plain("black", "fabric"))
     b.point("heat_source", (0, 0, z))
     b.point("toggle_button", (0, 0, z))
 
@@ -89,8 +89,8 @@ def _shade(b: ObjectBuilder, bottom: float, top: float, low: float, high: float)
     look = materials.glow(b.pick(("cream", "white", "tan", "rose")))
     skin = sleeve([(bottom, low), (top, high)], 24) + sleeve([(top * 0.99, high), (bottom * 0.99, low)], 24)
     b.add(skin, look)
-    b.add(lathe([(bottom, low), (top, high)], 10).felt(), look)
-    b.add(ball(0.06, 0.06, 0.09, 10).seen().at(0, 0, (low + high) / 2 - 0.045), materials.glow("yellow"))
+    b.add(lathe([(bottom, low), (top, high)], 10).collision_only(), look)
+    b.add(ball(0.06, 0.06, 0.09, 10).visual_only().at(0, 0, (low + high) / 2 - 0.045), materials.glow("yellow"))
 
 
 CATEGORIES = [

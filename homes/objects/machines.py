@@ -36,7 +36,7 @@ def treadmill(b: ObjectBuilder) -> None:
     x, y, z = b.size
     dark, grey = materials.plain("black", "rubber"), materials.plain("grey")
     b.add(box(x, y, 0.14), grey)
-    b.add(box(0.9 * x, 0.64 * y, 0.004).seen().at(0.03 * x, 0, 0.14), dark)
+    b.add(box(0.9 * x, 0.64 * y, 0.004).visual_only().at(0.03 * x, 0, 0.14), dark)
     for s in (-1, 1):
         b.add(block((0.06, 0.06, z - 0.14), (-x / 2 + 0.16, s * (y / 2 - 0.04), (z + 0.14) / 2 - 0.06)), grey)
         b.add(block((0.55, 0.04, 0.04), (-x / 2 + 0.45, s * (y / 2 - 0.04), 0.92)), dark)
@@ -66,9 +66,12 @@ def piano(b: ObjectBuilder) -> None:
     b.add(
         decal(0.94 * y, 0.8 * (x - depth), "z").at(x / 2 - 0.5 * (x - depth), 0, 0.716), materials.picture("keys", keys)
     )
-    b.add(block((0.02, 0.6, 0.2), (-x / 2 + depth + 0.01, 0, 0.9)).seen(), wood)
+    b.add(block((0.02, 0.6, 0.2), (-x / 2 + depth + 0.01, 0, 0.9)).visual_only(), wood)
     for k in range(3):
-        b.add(block((0.08, 0.02, 0.01), (-x / 2 + depth + 0.04, (k - 1) * 0.07, 0.06)).seen(), materials.metal("brass"))
+        b.add(
+            block((0.08, 0.02, 0.01), (-x / 2 + depth + 0.04, (k - 1) * 0.07, 0.06)).visual_only(),
+            materials.metal("brass"),
+        )
 
 
 def car(b: ObjectBuilder) -> None:
@@ -123,19 +126,19 @@ def car(b: ObjectBuilder) -> None:
         pane = [(span[0] + 0.02, waist), (span[1] - 0.04, waist), (0.06 * x, 0.95 * z), (-0.24 * x, 0.95 * z)]
         lean = [(px, s * (y / 2 - 0.03 - 0.1 * y * (pz - waist) / (0.4 * z)), pz) for px, pz in pane]
         link.add(hull(lean + [(px, py - s * 0.008, pz) for px, py, pz in lean]), glass)
-        link.add(block((0.14, 0.02, 0.03), (span[0] + 0.14, s * (y / 2 + 0.008), waist - 0.06)).seen(), dark)
+        link.add(block((0.14, 0.02, 0.03), (span[0] + 0.14, s * (y / 2 + 0.008), waist - 0.06)).visual_only(), dark)
         for px in (0.32, -0.34):
             b.add(cylinder(0.2 * z, 0.16, 20).at(z=-0.08).turned("x", 90).at(px * x, s * (y / 2 - 0.08), 0.2 * z), dark)
             b.add(
                 cylinder(0.11 * z, 0.165, 12)
-                .seen()
+                .visual_only()
                 .at(z=-0.0825)
                 .turned("x", 90)
                 .at(px * x, s * (y / 2 - 0.08), 0.2 * z),
                 materials.metal("silver"),
             )
         b.add(
-            ball(0.05, 0.14, 0.12, 10).seen().at(0.485 * x, s * 0.34 * y, 0.36 * z),
+            ball(0.05, 0.14, 0.12, 10).visual_only().at(0.485 * x, s * 0.34 * y, 0.36 * z),
             materials.plain("cream", "glass", 0.9),
         )
         b.add(soft_box(0.5, 0.42 * y, 0.14, 0.04).at(-0.06 * x, s * 0.22 * y, low + 0.06), dark)

@@ -29,7 +29,8 @@ def slab(b: ObjectBuilder, *, colours: tuple, fat: bool = True, bone: bool = Fal
         b.add(tube(path, 0.48 * z, 6, hulls=0), materials.plain((0.95, 0.90, 0.82), "organic"))
     if bone:
         b.add(
-            cylinder(0.12 * y, 0.004, 10).seen().at(0.15 * x, -0.1 * y, z - 0.002), materials.plain("cream", "organic")
+            cylinder(0.12 * y, 0.004, 10).visual_only().at(0.15 * x, -0.1 * y, z - 0.002),
+            materials.plain("cream", "organic"),
         )
 
 
@@ -93,8 +94,10 @@ def rib(b: ObjectBuilder) -> None:
     b.add(soft_box(0.86 * x, y, z, 0.3 * z), meat)
     for k in range(6):
         yy = (k - 2.5) * y / 6.3
-        b.add(rod((-x / 2, yy, z / 2), (x / 2, yy, z / 2), 0.22 * z, 6).seen(), materials.plain("cream", "organic"))
-    b.add(block((x, 0.8 * y, 0.3 * z), (0, 0, z / 2)).felt(), meat)
+        b.add(
+            rod((-x / 2, yy, z / 2), (x / 2, yy, z / 2), 0.22 * z, 6).visual_only(), materials.plain("cream", "organic")
+        )
+    b.add(block((x, 0.8 * y, 0.3 * z), (0, 0, z / 2)).collision_only(), meat)
 
 
 def crab(b: ObjectBuilder) -> None:
@@ -109,7 +112,7 @@ def crab(b: ObjectBuilder) -> None:
             b.add(tube([(dx, s * 0.22 * y, 0.4 * z), knee, foot], 0.02 * y, 5, hulls=0), shell)
         claw = [(0.22 * x, s * 0.2 * y, 0.4 * z), (0.42 * x, s * 0.24 * y, 0.5 * z), (0.47 * x, s * 0.1 * y, 0.45 * z)]
         b.add(swept(claw, [0.03 * y, 0.06 * y, 0.02 * y], 7, hulls=1), shell)
-        b.add(block((0.5 * x, 0.2 * y, 0.5 * z), (-0.02 * x, s * 0.4 * y, 0.3 * z)).felt(), shell)
+        b.add(block((0.5 * x, 0.2 * y, 0.5 * z), (-0.02 * x, s * 0.4 * y, 0.3 * z)).collision_only(), shell)
 
 
 def fish(b: ObjectBuilder) -> None:
@@ -154,13 +157,13 @@ def fish(b: ObjectBuilder) -> None:
     b.add(prism(back, 0.004).at(z=z / 2 - 0.002), fin)
     b.add(
         prism([(0.02 * x, -0.3 * y), (-0.06 * x, -0.3 * y), (-0.1 * x, -0.48 * y), (-0.02 * x, -0.44 * y)], 0.004)
-        .seen()
+        .visual_only()
         .at(z=z / 2),
         fin,
     )
     for h in (0.72, 0.28):
         b.add(
-            ball(0.028 * x, 0.028 * x, 0.028 * x, 8).seen().at(0.41 * x, 0.1 * y, h * z - 0.014 * x),
+            ball(0.028 * x, 0.028 * x, 0.028 * x, 8).visual_only().at(0.41 * x, 0.1 * y, h * z - 0.014 * x),
             materials.plain("black", "organic"),
         )
 

@@ -51,12 +51,12 @@ class LinkBuilder:
     def __init__(self, name: str, origin: Vec = (0.0, 0.0, 0.0)):
         self.name = name
         self.origin = np.asarray(origin, float)
-        self.seen: list[tuple[Material, Mesh]] = []
+        self.visuals: list[tuple[Material, Mesh]] = []
         self.hulls: list[np.ndarray] = []
 
     def add(self, solid: Solid, material: Material, collide: bool = True) -> None:
         """Adds a solid, given in the object's frame. collide False: its hulls are left out."""
-        self.seen += [(material, dataclasses.replace(m, vertices=m.vertices - self.origin)) for m in solid.visuals]
+        self.visuals += [(material, dataclasses.replace(m, vertices=m.vertices - self.origin)) for m in solid.visuals]
         if collide:
             self.hulls += [points - self.origin for points in solid.hulls]
 

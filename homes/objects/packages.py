@@ -28,7 +28,7 @@ def gable_carton(b: ObjectBuilder, *, looks: tuple = (("white", "blue"), ("white
     b.add(box(0.004, y, ridge).at(z=z - ridge), card)
     if b.rng.random() < 0.6:
         b.add(
-            cylinder(0.014, 0.012, 12).seen().turned("y", 45).at(x / 4, 0, (body + z - ridge) / 2 - 0.004),
+            cylinder(0.014, 0.012, 12).visual_only().turned("y", 45).at(x / 4, 0, (body + z - ridge) / 2 - 0.004),
             materials.plain(accent),
         )
     front = printed(b, ground, accent)
@@ -55,8 +55,8 @@ def tin(b: ObjectBuilder, *, looks: tuple = (("red", "cream"),)) -> None:
         lathe([(r, 0), (r, 0.02 * z), (0.965 * r, 0.03 * z), (0.965 * r, 0.97 * z), (r, 0.98 * z), (r, z)]),
         materials.metal("silver"),
     )
-    b.add(cylinder(0.985 * r, 0.88 * z).seen().at(z=0.06 * z), materials.plain(ground, "paper"))
-    b.add(cylinder(0.99 * r, 0.3 * z).seen().at(z=0.35 * z), materials.plain(accent, "paper"))
+    b.add(cylinder(0.985 * r, 0.88 * z).visual_only().at(z=0.06 * z), materials.plain(ground, "paper"))
+    b.add(cylinder(0.99 * r, 0.3 * z).visual_only().at(z=0.35 * z), materials.plain(accent, "paper"))
 
 
 def stick(b: ObjectBuilder, *, looks: tuple = (("yellow", "white"),)) -> None:

@@ -26,12 +26,12 @@ def carcass(x: float, y: float, z: float, board: float = BOARD, top: bool = True
 
 
 def bow_handle(length: float, reach: float = 0.03, radius: float = 0.006, upright: bool = False) -> Solid:
-    """A bar handle on the plane x = 0 reaching to +x, centred; one thin box is felt: the grip."""
+    """A bar handle on the plane x = 0 reaching to +x, centred; the collision hull is one thin box: the grip."""
     h = length / 2
-    posts = [rod((0, s * 0.8 * h, 0), (reach, s * 0.8 * h, 0), radius * 0.8).seen() for s in (-1, 1)]
-    grip = rod((reach, -h, 0), (reach, h, 0), radius).seen()
-    felt = block((2 * radius, length, 2 * radius), (reach, 0, 0)).felt()
-    whole = join([grip, *posts, felt])
+    posts = [rod((0, s * 0.8 * h, 0), (reach, s * 0.8 * h, 0), radius * 0.8).visual_only() for s in (-1, 1)]
+    grip = rod((reach, -h, 0), (reach, h, 0), radius).visual_only()
+    hulls = block((2 * radius, length, 2 * radius), (reach, 0, 0)).collision_only()
+    whole = join([grip, *posts, hulls])
     return whole.turned("x", 90) if upright else whole
 
 
@@ -130,15 +130,15 @@ def flap(
 ) -> LinkBuilder:
     """An oven's or dishwasher's door: hinged along its lower edge, closing the plane x = `plane`.
 
-    It is felt as two sheets, `skin` thick, with air between them: solid, it would be heavier than its hinge can hold
-    (hinges.friction) and a hand can close.
+    Its collision hulls are two sheets, `skin` thick, with air between them: solid, it would be heavier than its hinge
+    can hold (hinges.friction) and a hand can close.
     """
     middle, height = (z[0] + z[1]) / 2, z[1] - z[0]
     # The axis runs along the outer lower edge, so that the open flap does not reach below its closed place.
     link = b.hinge(name, (plane + depth, y, z[0]), (0, 1, 0), angle, openable)
-    link.add(block((depth, width, height), (plane + depth / 2, y, middle)).seen(), face)
+    link.add(block((depth, width, height), (plane + depth / 2, y, middle)).visual_only(), face)
     for at in (plane + skin / 2, plane + depth - skin / 2):
-        link.add(block((skin, width, height), (at, y, middle)).felt(), face)
+        link.add(block((skin, width, height), (at, y, middle)).collision_only(), face)
     if handle is not None:
         link.add(handle.at(plane + depth, y, z[1] - 0.08 * height - 0.01), metal)
     return link
@@ -203,8 +203,8 @@ def ear(radius: float, thickness: float, upright: bool = True) -> Solid:
 def button(
     b: ObjectBuilder, xyz: tuple[float, float, float], material: Material, radius: float = 0.012, facing: str = "x"
 ) -> None:
-    """A push button: a small disc that is only seen, and the toggle_button point in its middle."""
-    disc = cylinder(radius, 0.004, 12).seen()
+    """A push button: a small disc, visual only, and the toggle_button point in its middle."""
+    disc = cylinder(radius, 0.004, 12).visual_only()
     disc = disc.turned("y", 90) if facing == "x" else disc
     b.add(disc.at(*xyz), material)
     b.point("toggle_button", xyz)

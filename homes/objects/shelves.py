@@ -84,14 +84,14 @@ def dish_rack(b: ObjectBuilder) -> None:
     x, y, z = b.size
     wire = materials.metal(b.pick(("chrome", "white", "black")))
     low, rim = 0.03, 0.6 * z
-    b.add(block((x, y, 0.008), (0, 0, low)).felt(), wire)
+    b.add(block((x, y, 0.008), (0, 0, low)).collision_only(), wire)
     for s in (-1, 1):
-        b.add(block((0.006, y, rim - low), (s * (x / 2 - 0.003), 0, (rim + low) / 2)).felt(), wire)
-        b.add(block((x, 0.006, rim - low), (0, s * (y / 2 - 0.003), (rim + low) / 2)).felt(), wire)
+        b.add(block((0.006, y, rim - low), (s * (x / 2 - 0.003), 0, (rim + low) / 2)).collision_only(), wire)
+        b.add(block((x, 0.006, rim - low), (0, s * (y / 2 - 0.003), (rim + low) / 2)).collision_only(), wire)
         for h in (low, rim):
-            b.add(rod((s * x / 2, -y / 2, h), (s * x / 2, y / 2, h), 0.004, 6).seen(), wire)
-            b.add(rod((-x / 2, s * y / 2, h), (x / 2, s * y / 2, h), 0.004, 6).seen(), wire)
-    b.add(box(0.9 * x, 0.9 * y, low).felt(), wire)
+            b.add(rod((s * x / 2, -y / 2, h), (s * x / 2, y / 2, h), 0.004, 6).visual_only(), wire)
+            b.add(rod((-x / 2, s * y / 2, h), (x / 2, s * y / 2, h), 0.004, 6).visual_only(), wire)
+    b.add(box(0.9 * x, 0.9 * y, low).collision_only(), wire)
     for k in range(9):
         yy = (k - 4) * y / 9
         b.add(
@@ -105,7 +105,10 @@ def dish_rack(b: ObjectBuilder) -> None:
         )
     for sx in (-1, 1):
         for sy in (-1, 1):
-            b.add(rod((sx * 0.45 * x, sy * 0.45 * y, 0), (sx * 0.45 * x, sy * 0.45 * y, low), 0.006, 6).seen(), wire)
+            b.add(
+                rod((sx * 0.45 * x, sy * 0.45 * y, 0), (sx * 0.45 * x, sy * 0.45 * y, low), 0.006, 6).visual_only(),
+                wire,
+            )
 
 
 def fence(b: ObjectBuilder) -> None:

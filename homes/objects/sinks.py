@@ -21,7 +21,7 @@ def tap(height: float, reach: float) -> Solid:
         + [p + np.array([r, 0, height - r]) for p in arc(r, 150, 0, 6)]
         + [(reach, 0, height - r - 0.02)]
     )
-    return cylinder(0.024, 0.02, 12).seen() + tube(neck, 0.012, 8, hulls=2)
+    return cylinder(0.024, 0.02, 12).visual_only() + tube(neck, 0.012, 8, hulls=2)
 
 
 def basin(x: float, y: float, depth: float, z: float) -> Solid:
@@ -50,9 +50,9 @@ def fittings(b: ObjectBuilder, x: float, z: float, depth: float, height: float =
     rear = -x / 2 + 0.055
     reach = 0.42 * x
     b.add(tap(height, reach).at(rear, 0, z), chrome)
-    b.add(cylinder(0.022, 0.003, 12).seen().at(0.03, 0, z - depth), materials.metal("iron"))
-    b.add(block((0.05, 0.016, 0.012), (rear + 0.02, 0.06, z + 0.06)).seen(), chrome)
-    b.add(cylinder(0.012, 0.06, 8).seen().at(rear, 0.06, z), chrome)
+    b.add(cylinder(0.022, 0.003, 12).visual_only().at(0.03, 0, z - depth), materials.metal("iron"))
+    b.add(block((0.05, 0.016, 0.012), (rear + 0.02, 0.06, z + 0.06)).visual_only(), chrome)
+    b.add(cylinder(0.012, 0.06, 8).visual_only().at(rear, 0.06, z), chrome)
     b.point("toggle_button", (rear + 0.03, 0.06, z + 0.065))
     b.point("water_source", (rear + reach, 0, z + height - reach / 2 - 0.025))
     b.point("water_sink", (0.03, 0, z - depth))

@@ -19,7 +19,7 @@ def sofa(b: ObjectBuilder) -> None:
     padded(b, x, y, z, cover, wood, seats=2 if y < 1.8 else 3)
     if b.pick((True, False, True)):
         for s in (-1, 1):
-            cushion = soft_box(0.13, 0.4, 0.38, 0.06).turned("y", -12).seen()
+            cushion = soft_box(0.13, 0.4, 0.38, 0.06).turned("y", -12).visual_only()
             b.add(cushion.at(-x / 2 + 0.4, s * (y / 2 - 0.36), 0.42), cloth(b))
 
 
@@ -53,15 +53,15 @@ def bed(b: ObjectBuilder) -> None:
     top = rail - 0.085 + mattress
     b.add(soft_box(x - 0.09, y - 0.07, mattress, 0.05).at(0.0, 0, rail - 0.085), materials.plain("white", "fabric"))
     blanket = cloth(b)
-    b.add(soft_box(0.68 * x, y - 0.04, 0.07, 0.03).seen().at(x / 2 - 0.34 * x - 0.03, 0, top - 0.045), blanket)
+    b.add(soft_box(0.68 * x, y - 0.04, 0.07, 0.03).visual_only().at(x / 2 - 0.34 * x - 0.03, 0, top - 0.045), blanket)
     for s in (-1, 1):
-        drop = block((0.66 * x, 0.012, 0.2), (x / 2 - 0.34 * x - 0.03, s * (y / 2 - 0.018), top - 0.1)).seen()
+        drop = block((0.66 * x, 0.012, 0.2), (x / 2 - 0.34 * x - 0.03, s * (y / 2 - 0.018), top - 0.1)).visual_only()
         b.add(drop, blanket)
     count = 1 if y < 1.2 else 2
     for k in range(count):
         yy = 0.0 if count == 1 else (k - 0.5) * 0.5 * y
         pillow = soft_box(0.4, min(0.65, 0.42 * y if count == 2 else 0.65 * y), 0.12, 0.055, 3)
-        b.add(pillow.seen().at(-x / 2 + 0.3, yy, top - 0.02), materials.plain("cream", "fabric"))
+        b.add(pillow.visual_only().at(-x / 2 + 0.3, yy, top - 0.02), materials.plain("cream", "fabric"))
 
 
 def crib(b: ObjectBuilder) -> None:
@@ -73,12 +73,12 @@ def crib(b: ObjectBuilder) -> None:
             b.add(box(0.05, 0.05, z).at(sx * (x - 0.05) / 2, sy * (y - 0.05) / 2), wood)
     low = 0.28
     for s in (-1, 1):
-        felt = block((x - 0.1, 0.025, z - low), (0, s * (y - 0.05) / 2, (z + low) / 2)).felt()
-        felt += block((0.025, y - 0.1, z - low), (s * (x - 0.05) / 2, 0, (z + low) / 2)).felt()
-        b.add(felt, wood)
+        hulls = block((x - 0.1, 0.025, z - low), (0, s * (y - 0.05) / 2, (z + low) / 2)).collision_only()
+        hulls += block((0.025, y - 0.1, z - low), (s * (x - 0.05) / 2, 0, (z + low) / 2)).collision_only()
+        b.add(hulls, wood)
         for h in (low + 0.025, z - 0.025):
-            b.add(block((x - 0.1, 0.03, 0.05), (0, s * (y - 0.05) / 2, h)).seen(), wood)
-            b.add(block((0.03, y - 0.1, 0.05), (s * (x - 0.05) / 2, 0, h)).seen(), wood)
+            b.add(block((x - 0.1, 0.03, 0.05), (0, s * (y - 0.05) / 2, h)).visual_only(), wood)
+            b.add(block((0.03, y - 0.1, 0.05), (s * (x - 0.05) / 2, 0, h)).visual_only(), wood)
         bars = [
             rod(
                 (-x / 2 + (k + 1) * x / 11, s * (y - 0.05) / 2, low),
@@ -97,10 +97,10 @@ def crib(b: ObjectBuilder) -> None:
             )
             for k in range(6)
         ]
-        b.add(join(bars).seen(), wood)
+        b.add(join(bars).visual_only(), wood)
     b.add(block((x - 0.06, y - 0.06, 0.02), (0, 0, low)), wood)
     b.add(soft_box(x - 0.1, y - 0.1, 0.1, 0.03).at(z=low + 0.01), materials.plain("white", "fabric"))
-    b.add(sheet(0.5 * x, y - 0.12, 0.02, 0.012).seen().at(0.2 * x, 0, low + 0.105), cloth(b))
+    b.add(sheet(0.5 * x, y - 0.12, 0.02, 0.012).visual_only().at(0.2 * x, 0, low + 0.105), cloth(b))
 
 
 CATEGORIES = [

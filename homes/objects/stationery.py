@@ -51,7 +51,7 @@ def notes(b: ObjectBuilder) -> None:
     colour = b.pick(("yellow", "pink", "sky", "lime"))
     b.add(box(x, y, z), materials.plain(colour, "paper"))
     b.add(
-        box(0.9 * x, 0.9 * y, 0.0004).seen().turned("y", 1.5).at(0.05 * x, 0, z),
+        box(0.9 * x, 0.9 * y, 0.0004).visual_only().turned("y", 1.5).at(0.05 * x, 0, z),
         materials.plain(materials.tint(colour, b.rng, 0.12), "paper"),
     )
 
@@ -72,7 +72,7 @@ def pen(b: ObjectBuilder, *, kind: str = "pen") -> None:
         b.add(along(lathe([(r, 0.08 * x), (r, 0.88 * x)], 6)), body)
         b.add(along(lathe([(r, 0.88 * x), (0.3 * r, 0.97 * x), (0, x)], 8)), materials.plain("birch", "wood"))
         b.add(along(lathe([(0.95 * r, 0), (0.95 * r, 0.08 * x)], 10)), materials.plain("pink", "rubber"))
-        b.add(along(lathe([(0.32 * r, 0.965 * x), (0, x)], 6)).seen(), materials.plain("black"))
+        b.add(along(lathe([(0.32 * r, 0.965 * x), (0, x)], 6)).visual_only(), materials.plain("black"))
     elif kind == "pen":
         b.add(
             along(
@@ -90,12 +90,12 @@ def pen(b: ObjectBuilder, *, kind: str = "pen") -> None:
             ),
             body,
         )
-        b.add(block((0.3 * x, 0.3 * r, 0.2 * r), (-0.32 * x, 0, 2 * r)).seen(), materials.metal("silver"))
-        b.add(along(lathe([(0.2 * r, 0.97 * x), (0.1 * r, x)], 6)).seen(), materials.metal("gold"))
+        b.add(block((0.3 * x, 0.3 * r, 0.2 * r), (-0.32 * x, 0, 2 * r)).visual_only(), materials.metal("silver"))
+        b.add(along(lathe([(0.2 * r, 0.97 * x), (0.1 * r, x)], 6)).visual_only(), materials.metal("gold"))
     else:
         b.add(along(lathe([(r, 0), (r, 0.62 * x)], 12)), body)
         b.add(along(lathe([(0.95 * r, 0.62 * x), (0.85 * r, 0.98 * x), (0.6 * r, x)], 12)), materials.plain("black"))
-        b.add(block((0.3 * x, 0.4 * r, 0.3 * r), (0.25 * x, 0, 2 * r)).seen(), materials.plain("black"))
+        b.add(block((0.3 * x, 0.4 * r, 0.3 * r), (0.25 * x, 0, 2 * r)).visual_only(), materials.plain("black"))
 
 
 CATEGORIES = [

@@ -20,12 +20,12 @@ def burners(b: ObjectBuilder, x: float, y: float, z: float, spots: list[tuple[fl
     for k, (px, py) in enumerate(spots):
         radius = (0.09, 0.075)[k % 2] * min(1.0, x / 0.55)
         if gas:
-            b.add(cylinder(radius * 0.45, 0.004, 12).seen().at(px, py, z), iron)
+            b.add(cylinder(radius * 0.45, 0.004, 12).visual_only().at(px, py, z), iron)
             for a in (0, 90):
-                b.add(block((2 * radius, 0.009, 0.004), (0, 0, 0.003)).seen().turned("z", a).at(px, py, z), iron)
+                b.add(block((2 * radius, 0.009, 0.004), (0, 0, 0.003)).visual_only().turned("z", a).at(px, py, z), iron)
         else:
-            b.add(cylinder(radius, 0.0015, 20).seen().at(px, py, z), iron)
-            b.add(cylinder(radius * 0.6, 0.0022, 20).seen().at(px, py, z), materials.metal("dark_grey"))
+            b.add(cylinder(radius, 0.0015, 20).visual_only().at(px, py, z), iron)
+            b.add(cylinder(radius * 0.6, 0.0022, 20).visual_only().at(px, py, z), materials.metal("dark_grey"))
 
 
 def four_spots(x: float, y: float) -> list[tuple[float, float]]:
@@ -39,19 +39,19 @@ def _cavity(
     height = high - low
     b.add(carcass(x, y, height, 0.04, back=0.04).at(shift, 0, low), body)
     dark = materials.plain("dark_grey")
-    b.add(block((0.003, y - 0.08, height - 0.08), (shift - x / 2 + 0.042, 0, (low + high) / 2)).seen(), dark)
+    b.add(block((0.003, y - 0.08, height - 0.08), (shift - x / 2 + 0.042, 0, (low + high) / 2)).visual_only(), dark)
     for k in range(racks):
         at = low + 0.04 + (k + 1) * (height - 0.08) / (racks + 1)
-        b.add(block((x - 0.06, y - 0.08, 0.006), (shift + 0.015, 0, at)).felt(), dark)
+        b.add(block((x - 0.06, y - 0.08, 0.006), (shift + 0.015, 0, at)).collision_only(), dark)
         for j in range(7):
             yy = (j - 3) * (y - 0.1) / 6.5
             b.add(
-                rod((shift - x / 2 + 0.045, yy, at), (shift + x / 2 - 0.02, yy, at), 0.003, 5).seen(),
+                rod((shift - x / 2 + 0.045, yy, at), (shift + x / 2 - 0.02, yy, at), 0.003, 5).visual_only(),
                 materials.metal("chrome"),
             )
         for e in (-0.4, 0.45):
             b.add(
-                rod((shift + e * x, -y / 2 + 0.04, at), (shift + e * x, y / 2 - 0.04, at), 0.003, 5).seen(),
+                rod((shift + e * x, -y / 2 + 0.04, at), (shift + e * x, y / 2 - 0.04, at), 0.003, 5).visual_only(),
                 materials.metal("chrome"),
             )
 
@@ -59,7 +59,7 @@ def _cavity(
 def _oven_door(b: ObjectBuilder, plane: float, y: float, z: tuple[float, float], body: Material, skin: float) -> None:
     handle = bow_handle(0.75 * y, 0.04, 0.009)
     link = flap(b, "door", plane, y, z, body, handle, materials.metal("chrome"), depth=0.035, skin=skin, angle=1.45)
-    pane = block((0.003, 0.7 * y, 0.5 * (z[1] - z[0])), (plane + 0.0365, 0, (z[0] + z[1]) / 2 - 0.02)).seen()
+    pane = block((0.003, 0.7 * y, 0.5 * (z[1] - z[0])), (plane + 0.0365, 0, (z[0] + z[1]) / 2 - 0.02)).visual_only()
     link.add(pane, materials.plain("black", shine=0.8))
 
 
@@ -85,7 +85,7 @@ def stove(b: ObjectBuilder) -> None:
     burners(b, depth, y, z, [(px + shift, py) for px, py in four_spots(depth, y)], gas)
     dial = materials.plain("black" if body.name != "black" else "silver")
     for k in range(5):
-        b.add(knob(0.02, 0.022).seen().at(plane + leaf, (k - 2) * y / 6, top - panel / 2), dial)
+        b.add(knob(0.02, 0.022).visual_only().at(plane + leaf, (k - 2) * y / 6, top - panel / 2), dial)
     b.point("toggle_button", (plane + leaf + 0.02, 0, top - panel / 2))
     b.point("heat_source", (shift, 0, z + 0.02))
     _oven_door(b, plane, y - 0.004, (0.105, top - panel - 0.005), body, 0.004)
@@ -114,7 +114,7 @@ def oven(b: ObjectBuilder) -> None:
     b.add(block((depth + leaf, y, panel), (shift + leaf / 2, 0, z - panel / 2)), body)
     plane = shift + depth / 2
     for k in (-1, 1):
-        b.add(knob(0.02, 0.022).seen().at(plane + leaf, k * 0.3 * y, z - panel / 2), materials.plain("silver"))
+        b.add(knob(0.02, 0.022).visual_only().at(plane + leaf, k * 0.3 * y, z - panel / 2), materials.plain("silver"))
     face = materials.picture("display", textures.screen(b.rng, (0.02, 0.12, 0.1)), kind="screen")
     b.add(decal(0.25 * y, 0.04).at(plane + leaf + 0.001, 0, z - panel / 2), face)
     b.point("toggle_button", (plane + leaf + 0.01, 0.3 * y, z - panel / 2))
@@ -132,9 +132,9 @@ def microwave(b: ObjectBuilder) -> None:
     wall = 0.015
     panel = 0.22 * y
     for dx, dy in ((-1, -1), (-1, 1), (1, -1), (1, 1)):
-        b.add(cylinder(0.015, 0.01, 8).seen().at(dx * 0.4 * x, dy * 0.42 * y, 0), materials.plain("black"))
+        b.add(cylinder(0.015, 0.01, 8).visual_only().at(dx * 0.4 * x, dy * 0.42 * y, 0), materials.plain("black"))
     base = 0.01
-    b.add(box(0.84 * x, 0.88 * y, base).felt(), materials.plain("black"))
+    b.add(box(0.84 * x, 0.88 * y, base).collision_only(), materials.plain("black"))
     room = y - panel
     height = z - base
     middle = -panel / 2
@@ -143,7 +143,7 @@ def microwave(b: ObjectBuilder) -> None:
     b.add(
         block(
             (0.002, room - 2 * wall, height - 2 * wall), (shift - depth / 2 + wall + 0.001, middle, base + height / 2)
-        ).seen(),
+        ).visual_only(),
         materials.plain("cream"),
     )
     plate = min(depth, room) * 0.42
@@ -161,7 +161,7 @@ def microwave(b: ObjectBuilder) -> None:
         depth=leaf - 0.026 + 0.004,
         angle=1.9,
     )
-    window = block((0.002, 0.7 * room, 0.6 * height), (plane + leaf - 0.021, middle, base + height / 2)).seen()
+    window = block((0.002, 0.7 * room, 0.6 * height), (plane + leaf - 0.021, middle, base + height / 2)).visual_only()
     link.add(window, materials.plain("black", shine=0.8))
     pad = materials.picture("keypad", textures.keys((0.1, 0.1, 0.11), (0.75, 0.76, 0.78), 3, 5), kind="plastic")
     b.add(decal(0.75 * panel, 0.5 * height).at(plane + 0.001, (y - panel) / 2, base + 0.42 * height), pad)
@@ -193,13 +193,13 @@ def grill(b: ObjectBuilder) -> None:
         ]
     )
     b.add(walls, iron)
-    b.add(block((x - 0.03, 0.6 * y - 0.03, 0.008), (0, 0, rack - 0.035)).felt(), steel)
+    b.add(block((x - 0.03, 0.6 * y - 0.03, 0.008), (0, 0, rack - 0.035)).collision_only(), steel)
     for k in range(9):
         yy = (k - 4) * 0.066 * y
-        b.add(rod((-x / 2 + 0.012, yy, rack - 0.031), (x / 2 - 0.012, yy, rack - 0.031), 0.004, 5).seen(), steel)
+        b.add(rod((-x / 2 + 0.012, yy, rack - 0.031), (x / 2 - 0.012, yy, rack - 0.031), 0.004, 5).visual_only(), steel)
     for s in (-1, 1):
         b.add(block((0.7 * x, 0.17 * y, 0.02), (0, s * 0.4 * y, rack - 0.05)), materials.wood("teak", b.rng))
-    b.add(block((0.01, 0.14, 0.05), (x / 2 + 0.003, 0, rack - 0.12)).seen(), steel)
+    b.add(block((0.01, 0.14, 0.05), (x / 2 + 0.003, 0, rack - 0.12)).visual_only(), steel)
     button(b, (x / 2 + 0.01, 0.0, rack - 0.12), materials.plain("red"))
     b.point("heat_source", (0, 0, rack - 0.02))
     dome = join(

@@ -113,7 +113,7 @@ def pool_table(b: ObjectBuilder) -> None:
     black = materials.plain("black")
     for sx in (-1, 1):
         for sy in (-1, 0, 1):
-            b.add(cylinder(0.055, 0.004, 12).seen().at(sx * (x / 2 - rim), sy * (y / 2 - rim), z - 0.002), black)
+            b.add(cylinder(0.055, 0.004, 12).visual_only().at(sx * (x / 2 - rim), sy * (y / 2 - rim), z - 0.002), black)
     legs(b, x, y, z - 0.14, 0.14, wood, inset=0.08)
     b.add(block((x * 0.7, y * 0.7, 0.1), (0, 0, z - 0.14)), wood)
 

@@ -34,7 +34,7 @@ def plate(b: ObjectBuilder) -> None:
 
 
 def mug(b: ObjectBuilder, *, handle: bool = True) -> None:
-    """A straight cup with an ear; 6 walls, a floor and the ear are felt."""
+    """A straight cup with an ear; 6 walls, a floor and the ear collide."""
     x, y, z = b.size
     r = min(y, x / 1.35 if handle else x) / 2
     shift = (x - 2 * r) / 2 if handle else 0.0
@@ -123,15 +123,15 @@ def knife(b: ObjectBuilder, *, blade: float = 0.55, tall: float = 0.8, grip: str
         (tip - 0.02, spine),
         (start, spine),
     ]
-    b.add(prism(outline, thick).seen().at(z=low), steel)
-    felt = [
+    b.add(prism(outline, thick).visual_only().at(z=low), steel)
+    outline = [
         (start, edge + rim),
         (tip - 0.1 * blade * x, edge + rim),
         (tip, spine - 0.35 * (spine - edge)),
         (tip - 0.02, spine),
         (start, spine),
     ]
-    b.add(prism(felt, thick).felt().at(z=low), steel)
+    b.add(prism(outline, thick).collision_only().at(z=low), steel)
     b.area("slicer", (0.75 * blade * x, rim, thick), (start + 0.375 * blade * x, edge + rim / 2, z / 2))
     b.add(soft_box(x - blade * x, 0.55 * y, z, 0.3 * z).at(-x / 2 + (x - blade * x) / 2, y / 2 - 0.36 * y, 0), handle)
 

@@ -69,7 +69,7 @@ def saw(b: ObjectBuilder) -> None:
         t = (k + 0.5) / 26
         px, py = start + t * blade, -0.45 * y + t * 0.35 * y
         tooth = [(px - 0.006, py), (px, py - 0.006), (px + 0.006, py)]
-        b.add(prism(tooth, thick).seen().at(z=z / 2 - thick / 2), materials.metal("silver"))
+        b.add(prism(tooth, thick).visual_only().at(z=z / 2 - thick / 2), materials.metal("silver"))
     wood = b.pick((materials.wood("cherry", b.rng), materials.plain("orange"), materials.plain("red")))
     loop = [
         (start + 0.03, 0.4 * y),
@@ -118,7 +118,7 @@ def drill(b: ObjectBuilder) -> None:
         body,
     )
     b.add(soft_box(0.36 * x, y, 0.22 * z, 0.01).at(-0.26 * x), dark)
-    b.add(block((0.02, 0.2 * y, 0.1 * z), (-0.07 * x, 0, 0.56 * z)).seen(), materials.plain("red"))
+    b.add(block((0.02, 0.2 * y, 0.1 * z), (-0.07 * x, 0, 0.56 * z)).visual_only(), materials.plain("red"))
     b.point("toggle_button", (-0.07 * x, 0, 0.56 * z))
 
 
@@ -159,7 +159,7 @@ def caliper(b: ObjectBuilder) -> None:
         steel,
     )
     b.add(block((0.28 * x, 0.36 * y, z), (-0.12 * x, 0.12 * y, z / 2)), materials.plain("dark_grey"))
-    b.add(block((0.1 * x, 0.2 * y, 0.0006), (-0.12 * x, 0.12 * y, z)).seen(), materials.plain("mint"))
+    b.add(block((0.1 * x, 0.2 * y, 0.0006), (-0.12 * x, 0.12 * y, z)).visual_only(), materials.plain("mint"))
     b.point("toggle_button", (0.0, 0.12 * y, z))
 
 
@@ -188,9 +188,9 @@ def scissors(b: ObjectBuilder) -> None:
             for a in (k * math.pi / 6 for k in range(12))
         ]
         b.add(tube(path, 0.4 * z, 6, hulls=0, closed=True), look)
-        b.add(block((0.32 * x, 0.44 * y, 0.8 * z), (centre[0], centre[1], z / 2)).felt(), look)
+        b.add(block((0.32 * x, 0.44 * y, 0.8 * z), (centre[0], centre[1], z / 2)).collision_only(), look)
         b.add(rod((-0.2 * x, s * 0.2 * y, z / 2), (0.0, -s * 0.04 * y, z / 2), 0.35 * z, 6), look)
-    b.add(cylinder(0.5 * z, z, 10).seen(), steel)
+    b.add(cylinder(0.5 * z, z, 10).visual_only(), steel)
 
 
 def nail(b: ObjectBuilder, *, head: float = 0.5, colour: str = "steel") -> None:
@@ -237,7 +237,7 @@ def paper_clip(b: ObjectBuilder) -> None:
         (-0.2 * x, 0.45 * y, r),
     ]
     b.add(
-        tube(path, r, 5, hulls=0) + box(x, y, z).felt(),
+        tube(path, r, 5, hulls=0) + box(x, y, z).collision_only(),
         b.pick((materials.metal("silver"), materials.plain("red"), materials.plain("blue"))),
     )
 
@@ -270,8 +270,8 @@ def tape(b: ObjectBuilder) -> None:
     x, _, z = b.size
     r = x / 2
     look = b.pick((materials.plain("tan"), materials.plain("silver"), materials.plain("cream")))
-    b.add(turned_vessel([(r, 0), (r, z)], 0.38 * r, 7, floor=0.0005).seen() + ring(r, r, 0, z, 0.4 * r, 7), look)
-    b.add(cylinder(0.61 * r, 0.0005).seen(), materials.plain("cardboard", "paper"))
+    b.add(turned_vessel([(r, 0), (r, z)], 0.38 * r, 7, floor=0.0005).visual_only() + ring(r, r, 0, z, 0.4 * r, 7), look)
+    b.add(cylinder(0.61 * r, 0.0005).visual_only(), materials.plain("cardboard", "paper"))
 
 
 def ruler(b: ObjectBuilder) -> None:
@@ -280,7 +280,7 @@ def ruler(b: ObjectBuilder) -> None:
     for k in range(30):
         long = 0.5 if k % 5 == 0 else 0.25
         b.add(
-            box(0.0008, long * y, 0.0003).seen().at((k / 30 - 0.48) * x, y / 2 - long * y / 2, z),
+            box(0.0008, long * y, 0.0003).visual_only().at((k / 30 - 0.48) * x, y / 2 - long * y / 2, z),
             materials.plain("black"),
         )
 

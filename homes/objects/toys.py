@@ -44,15 +44,16 @@ def toy(b: ObjectBuilder) -> None:
         b.add(ball(0.62 * x, 0.6 * y, 0.58 * z, 12), fur)
         b.add(ball(0.5 * x, 0.55 * y, 0.44 * z, 12).at(z=0.52 * z), fur)
         for s in (-1, 1):
-            b.add(ball(0.16 * x, 0.18 * y, 0.18 * z, 8).seen().at(0, s * 0.22 * y, 0.84 * z), fur)
+            b.add(ball(0.16 * x, 0.18 * y, 0.18 * z, 8).visual_only().at(0, s * 0.22 * y, 0.84 * z), fur)
             b.add(ball(0.42 * x, 0.22 * y, 0.22 * z, 8).at(0.28 * x, s * 0.24 * y), fur)
             b.add(ball(0.2 * x, 0.2 * y, 0.36 * z, 8).turned("x", s * 28).at(0.1 * x, s * 0.36 * y, 0.24 * z), fur)
             b.add(
-                ball(0.05 * x, 0.05 * y, 0.05 * z, 6).seen().at(0.22 * x, s * 0.1 * y, 0.76 * z),
+                ball(0.05 * x, 0.05 * y, 0.05 * z, 6).visual_only().at(0.22 * x, s * 0.1 * y, 0.76 * z),
                 materials.plain("black"),
             )
         b.add(
-            ball(0.16 * x, 0.16 * y, 0.13 * z, 8).seen().at(0.23 * x, 0, 0.62 * z), materials.plain("cream", "fabric")
+            ball(0.16 * x, 0.16 * y, 0.13 * z, 8).visual_only().at(0.23 * x, 0, 0.62 * z),
+            materials.plain("cream", "fabric"),
         )
     else:
         hull_points = [
@@ -140,14 +141,16 @@ def guitar(b: ObjectBuilder) -> None:
     lower = [p for p in outline if p[0] >= start + 0.48 * body]
     upper = [p for p in outline if p[0] <= start + 0.52 * body]
     b.add(extrusion(outline, z * 0.9, [lower, upper]), wood)
-    b.add(cylinder(0.13 * y, 0.001, 20).seen().at(start + 0.38 * body, 0, 0.9 * z), materials.plain("black"))
-    b.add(box(0.02, 0.3 * y, 0.012).seen().at(start + 0.75 * body, 0, 0.9 * z), dark)
+    b.add(cylinder(0.13 * y, 0.001, 20).visual_only().at(start + 0.38 * body, 0, 0.9 * z), materials.plain("black"))
+    b.add(box(0.02, 0.3 * y, 0.012).visual_only().at(start + 0.75 * body, 0, 0.9 * z), dark)
     b.add(block((x - body + 0.15 * body, 0.055, 0.025), (start - (x - body) / 2 + 0.07 * body, 0, 0.93 * z)), dark)
     b.add(block((0.13 * x, 0.085, 0.018), (-x / 2 + 0.065 * x, 0, 0.9 * z)), wood)
     for k in range(6):
         yy = (k - 2.5) * 0.008
         b.add(
-            rod((start + 0.75 * body, yy, 0.95 * z + 0.012), (-x / 2 + 0.1 * x, yy, 0.95 * z + 0.01), 0.0006, 4).seen(),
+            rod(
+                (start + 0.75 * body, yy, 0.95 * z + 0.012), (-x / 2 + 0.1 * x, yy, 0.95 * z + 0.01), 0.0006, 4
+            ).visual_only(),
             materials.metal("silver"),
         )
 

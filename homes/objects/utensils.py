@@ -24,7 +24,8 @@ def spatula(b: ObjectBuilder) -> None:
     b.add(prism([(x / 2 - blade, -0.4 * y), (x / 2, -y / 2), (x / 2, y / 2), (x / 2 - blade, 0.4 * y)], 0.003), look)
     for k in (-1, 0, 1):
         b.add(
-            box(0.6 * blade, 0.06 * y, 0.0032).seen().at(x / 2 - blade / 2, k * 0.2 * y), materials.plain("dark_grey")
+            box(0.6 * blade, 0.06 * y, 0.0032).visual_only().at(x / 2 - blade / 2, k * 0.2 * y),
+            materials.plain("dark_grey"),
         )
     end = (x / 2 - blade + 0.01, 0, 0.003)
     b.add(tube([end, (0.1 * x, 0, 0.8 * z), (-x / 2 + 0.01, 0, z - 0.012)], 0.008, 8, hulls=2).scaled(y=1.0), look)
@@ -93,7 +94,7 @@ def chopping_board(b: ObjectBuilder) -> None:
         )
     )
     b.add(soft_box(x, y, z, 0.4 * z), look)
-    b.add(cylinder(0.012, 0.0006, 12).seen().at(0, 0.43 * y, z), materials.plain("dark_grey"))
+    b.add(cylinder(0.012, 0.0006, 12).visual_only().at(0, 0.43 * y, z), materials.plain("dark_grey"))
 
 
 def grater(b: ObjectBuilder) -> None:
@@ -115,7 +116,7 @@ def grater(b: ObjectBuilder) -> None:
         for j in range(5):
             b.add(
                 cylinder(0.003, 0.002, 6)
-                .seen()
+                .visual_only()
                 .turned("y", 76)
                 .at(x / 2 * (0.94 - 0.06 * j), (i - 1) * 0.18 * y, 0.16 * z + j * 0.13 * z),
                 materials.metal("iron"),
@@ -139,7 +140,7 @@ def colander(b: ObjectBuilder) -> None:
             a = 2 * math.pi * k / 12
             b.add(
                 cylinder(0.005, 0.002, 6)
-                .seen()
+                .visual_only()
                 .turned("y", 70)
                 .turned("z", math.degrees(a))
                 .at(ring_ * r * math.cos(a), ring_ * r * math.sin(a), h * z),
@@ -153,8 +154,8 @@ def colander(b: ObjectBuilder) -> None:
             (s * 0.97 * r, 0.2 * r, 0.93 * z),
         ]
         b.add(tube(ear, 0.004, 6, hulls=0), look)
-    # One felt plate through both ears would close the bowl; the ear at +x alone is felt.
-    b.add(block((x / 2 - 0.95 * r, 0.3 * r, 0.008), (x / 4 + 0.475 * r, 0, 0.93 * z)).felt(), look)
+    # One collision plate through both ears would close the bowl; only the ear at +x collides.
+    b.add(block((x / 2 - 0.95 * r, 0.3 * r, 0.008), (x / 4 + 0.475 * r, 0, 0.93 * z)).collision_only(), look)
 
 
 def griddle(b: ObjectBuilder) -> None:
@@ -167,7 +168,9 @@ def griddle(b: ObjectBuilder) -> None:
         b.add(block((0.014, 0.86 * y, z), (s * (x / 2 - 0.007), 0, z / 2)), iron)
         b.add(block((0.4 * x, 0.07 * y, 0.4 * z), (0, s * 0.465 * y, 0.7 * z)), iron)
     for k in range(8):
-        b.add(box(0.92 * x, 0.012, 0.003).seen().at(0, (k - 3.5) * 0.09 * y, 0.5 * z), materials.metal("dark_grey"))
+        b.add(
+            box(0.92 * x, 0.012, 0.003).visual_only().at(0, (k - 3.5) * 0.09 * y, 0.5 * z), materials.metal("dark_grey")
+        )
     b.point("toggle_button", (x / 2, 0.3 * y, 0.5 * z))
 
 
@@ -204,7 +207,7 @@ def pocketknife(b: ObjectBuilder) -> None:
             ],
             thick,
         )
-        .seen()
+        .visual_only()
         .at(z=low),
         steel,
     )
@@ -219,7 +222,7 @@ def pocketknife(b: ObjectBuilder) -> None:
             ],
             thick,
         )
-        .felt()
+        .collision_only()
         .at(z=low),
         steel,
     )

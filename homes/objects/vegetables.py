@@ -38,7 +38,7 @@ def long_root(
         for k in range(6):
             a = 2 * math.pi * k / 6
             tip = (x / 2, 0.8 * r * math.cos(a), r + 0.8 * r * math.sin(a))
-            b.add(rod((x / 2 - tuft - 0.004, 0, r), tip, 0.08 * r, 5).seen(), green)
+            b.add(rod((x / 2 - tuft - 0.004, 0, r), tip, 0.08 * r, 5).visual_only(), green)
 
 
 def bent(
@@ -57,7 +57,7 @@ def bent(
     if tip:
         b.add(
             ball(r * taper * 1.9, r * taper * 1.9, r * taper * 1.9, 8)
-            .seen()
+            .visual_only()
             .at(*middle[-1][:2], r * (1 - taper * 0.95)),
             materials.plain(tip, "organic"),
         )
@@ -87,7 +87,9 @@ def ribbed(b: ObjectBuilder, *, skins: tuple, ribs: int = 8, stem: str = "brown"
     angle = np.arctan2(mesh.vertices[:, 1], mesh.vertices[:, 0])
     mesh.vertices[:, :2] *= (1 - depth / 2 * (1 + np.cos(angle * ribs)))[:, None]
     b.add(body, materials.skin(b.pick(skins), b.rng, 0.1))
-    b.add(lathe([(0.07 * x, 0), (0.05 * x, 2 * top)], 8).seen().at(z=z - 2 * top), materials.plain(stem, "organic"))
+    b.add(
+        lathe([(0.07 * x, 0), (0.05 * x, 2 * top)], 8).visual_only().at(z=z - 2 * top), materials.plain(stem, "organic")
+    )
 
 
 def head(b: ObjectBuilder, *, colour: str | tuple, loose: float = 0.12) -> None:
@@ -99,7 +101,7 @@ def head(b: ObjectBuilder, *, colour: str | tuple, loose: float = 0.12) -> None:
             leaf = materials.plain(materials.tint(colour, b.rng, 0.15), "organic")
             shell = ball(0.13 * x, (0.62 - 0.1 * layer) * y, (0.8 + 0.16 * layer) * z, 10)
             shell = shell.turned("y", (14 - 4 * layer) * (0.5 + 4 * loose)).at((0.36 + loose * (1 - layer) * 0.5) * x)
-            b.add(shell.seen().turned("z", 360 * (k + 0.5 * layer) / count), leaf)
+            b.add(shell.visual_only().turned("z", 360 * (k + 0.5 * layer) / count), leaf)
 
 
 def broccoli(b: ObjectBuilder) -> None:
@@ -111,8 +113,8 @@ def broccoli(b: ObjectBuilder) -> None:
         a = 2 * math.pi * k / 6
         out, up, r = (0.28 * x, 0.42 * z, 0.44 * x) if k < 6 else (0, 0.58 * z, 0.5 * x)
         knob = ball(r, r, min(r, z - up), 10).at(out * math.cos(a), out * math.sin(a), up)
-        b.add(knob.seen(), green)
-    b.add(lathe([(0.4 * x, 0.45 * z), (0.5 * x, 0.65 * z), (0.3 * x, z)], 10).felt(), green)
+        b.add(knob.visual_only(), green)
+    b.add(lathe([(0.4 * x, 0.45 * z), (0.5 * x, 0.65 * z), (0.3 * x, z)], 10).collision_only(), green)
 
 
 def bunch(
@@ -130,10 +132,10 @@ def bunch(
     green, pale = materials.plain(leaf, "organic"), materials.plain(stem, "organic")
     for k in range(count):
         yy, zz = b.rng.uniform(-0.3, 0.3) * y, (0.3 + 0.4 * b.rng.random()) * z
-        b.add(rod((-x / 2, 0.4 * yy, 0.5 * z), (split + 0.1 * x, yy, zz), 0.1 * z, 5).seen(), pale)
+        b.add(rod((-x / 2, 0.4 * yy, 0.5 * z), (split + 0.1 * x, yy, zz), 0.1 * z, 5).visual_only(), pale)
         if bulb and k < 5:
             b.add(
-                ball(0.08 * x, 0.3 * y, 0.5 * z, 8).seen().at(-x / 2 + 0.04 * x, 0.5 * yy, 0.25 * z),
+                ball(0.08 * x, 0.3 * y, 0.5 * z, 8).visual_only().at(-x / 2 + 0.04 * x, 0.5 * yy, 0.25 * z),
                 materials.plain("white", "organic"),
             )
         if leafy > 0:
@@ -145,19 +147,19 @@ def bunch(
                 (start + 0.3 * leafy * x, yy - w, zz + 0.04 * z),
                 (start + b.rng.uniform(0.5, 0.7) * leafy * x, yy + 0.5 * spread, zz + 0.2 * z * b.rng.uniform(-1, 1)),
             ]
-            b.add(hull(points).seen(), green)
+            b.add(hull(points).visual_only(), green)
     b.add(
         hull(
             [(-x / 2, s * 0.25 * y, h * z) for s in (-1, 1) for h in (0.2, 0.8)]
             + [(split, s * 0.5 * y, h * z) for s in (-1, 1) for h in (0, 1)]
             + [(x / 2, s * 0.4 * y, h * z) for s in (-1, 1) for h in (0.1, 0.9)]
-        ).felt(),
+        ).collision_only(),
         green,
     )
 
 
 def heap(b: ObjectBuilder, *, colours: tuple, grain: float = 0.35, count: int = 12) -> None:
-    """A small heap of pieces or a bunch of berries; felt as one hull."""
+    """A small heap of pieces or a bunch of berries; collides as one hull."""
     x, y, z = b.size
     size = grain * min(x, y, 2 * z)
     local = random.Random(b.rng.random())
@@ -168,8 +170,8 @@ def heap(b: ObjectBuilder, *, colours: tuple, grain: float = 0.35, count: int = 
         up = max(0.0, (1 - spread**2)) * (z - size)
         px, py = 0.5 * (x - size) * spread * math.cos(a), 0.5 * (y - size) * spread * math.sin(a)
         piece = ball(size * local.uniform(0.85, 1.1), size, size, 8)
-        b.add(piece.seen().at(px, py, up), looks[k % len(looks)])
-    b.add(lathe([(0.46, 0), (0.5, 0.35), (0.2, 1.0)], 8).felt().scaled(x, y, z), looks[0])
+        b.add(piece.visual_only().at(px, py, up), looks[k % len(looks)])
+    b.add(lathe([(0.46, 0), (0.5, 0.35), (0.2, 1.0)], 8).collision_only().scaled(x, y, z), looks[0])
 
 
 def cherry(b: ObjectBuilder) -> None:
@@ -180,7 +182,7 @@ def cherry(b: ObjectBuilder) -> None:
     for s in (-1, 1):
         b.add(ball(d, d, d, 12).at(-0.1 * x, s * (y - d) / 2, 0), skin)
         b.add(
-            rod((-0.1 * x, s * (y - d) / 2, d * 0.9), (x / 2, 0, 0.9 * z), 0.015 * y, 5).seen(),
+            rod((-0.1 * x, s * (y - d) / 2, d * 0.9), (x / 2, 0, 0.9 * z), 0.015 * y, 5).visual_only(),
             materials.plain("leaf", "organic"),
         )
 
@@ -204,7 +206,7 @@ def corn(b: ObjectBuilder) -> None:
             (0.1 * x, k * 0.4 * y, 0.9 * z),
             (0.1 * x, k * 0.45 * y, r),
         ]
-        b.add(hull(husk).seen(), materials.plain("lime", "organic"))
+        b.add(hull(husk).visual_only(), materials.plain("lime", "organic"))
 
 
 def ginger(b: ObjectBuilder) -> None:
@@ -227,7 +229,7 @@ def stick_spice(b: ObjectBuilder) -> None:
     r = y / 6
     for k in range(3):
         b.add(cylinder(r, x, 10).at(z=-x / 2).turned("y", 90).at(0, (k - 1) * 2 * r, r), bark)
-    b.add(block((0.06 * x, y, 0.002), (0, 0, 2 * r)).seen(), materials.plain("tan", "fabric"))
+    b.add(block((0.06 * x, y, 0.002), (0, 0, 2 * r)).visual_only(), materials.plain("tan", "fabric"))
     del z
 
 
@@ -257,7 +259,7 @@ def grape(b: ObjectBuilder) -> None:
         wide = 0.36 * math.sin(math.pi * min(1, 0.15 + 0.9 * u)) * (y - size)
         a = 2.4 * k
         place = ((u - 0.5) * (0.8 * x - size), wide * math.cos(a), (z - size) / 2 * (1 + math.sin(a) * 0.9))
-        b.add(ball(size, size, size, 8).seen().at(*place), skin)
+        b.add(ball(size, size, size, 8).visual_only().at(*place), skin)
     b.add(
         tube([(0.38 * x, 0, z / 2), (0.45 * x, 0, 0.55 * z), (x / 2, 0.05 * y, 0.65 * z)], 0.04 * y, 5, hulls=0),
         materials.plain("brown", "organic"),
@@ -267,7 +269,7 @@ def grape(b: ObjectBuilder) -> None:
             [(-0.4 * x, s * 0.2 * y, h * z) for s in (-1, 1) for h in (0.2, 0.8)]
             + [(dx * x, s * 0.5 * y, h * z) for dx in (-0.1, 0.2) for s in (-1, 1) for h in (0.1, 0.9)]
             + [(0.4 * x, s * 0.2 * y, h * z) for s in (-1, 1) for h in (0, 1)]
-        ).felt(),
+        ).collision_only(),
         skin,
     )
 
@@ -281,7 +283,7 @@ def rosehip(b: ObjectBuilder) -> None:
     x, y, z = b.size
     b.add(ball(0.85 * x, y, z, 10).at(-0.07 * x), materials.skin("red", b.rng, 0.1))
     b.add(
-        lathe([(0.1 * y, 0), (0.3 * y, 0.15 * x)], 6).seen().turned("y", 90).at(0.33 * x, 0, z / 2),
+        lathe([(0.1 * y, 0), (0.3 * y, 0.15 * x)], 6).visual_only().turned("y", 90).at(0.33 * x, 0, z / 2),
         materials.plain("brown", "organic"),
     )
 

@@ -23,10 +23,10 @@ def gift(b: ObjectBuilder) -> None:
     top = 0.85 * z
     b.add(box(x, y, top), materials.picture("wrap", paper, 0.12))
     ribbon_ = materials.plain(second, "fabric")
-    b.add(block((x + 0.002, 0.12 * y, top + 0.002), (0, 0, top / 2)).seen(), ribbon_)
-    b.add(block((0.12 * y, y + 0.002, top + 0.002), (0, 0, top / 2)).seen(), ribbon_)
+    b.add(block((x + 0.002, 0.12 * y, top + 0.002), (0, 0, top / 2)).visual_only(), ribbon_)
+    b.add(block((0.12 * y, y + 0.002, top + 0.002), (0, 0, top / 2)).visual_only(), ribbon_)
     b.add(loops(0.5 * min(x, y), z - top).at(z=top), ribbon_)
-    b.add(box(0.3 * min(x, y), 0.45 * min(x, y), z - top).felt().at(z=top), ribbon_)
+    b.add(box(0.3 * min(x, y), 0.45 * min(x, y), z - top).collision_only().at(z=top), ribbon_)
 
 
 def bow(b: ObjectBuilder) -> None:
@@ -34,8 +34,10 @@ def bow(b: ObjectBuilder) -> None:
     cloth = materials.plain(b.pick(("red", "gold", "blue", "pink")), "fabric", 0.5)
     b.add(loops(y, z), cloth)
     for s in (-1, 1):
-        b.add(block((0.5 * x, 0.16 * y, 0.003)).seen().turned("z", s * 22).at(0.25 * x, s * 0.12 * y, 0.002), cloth)
-    b.add(box(x, y, z).felt(), cloth)
+        b.add(
+            block((0.5 * x, 0.16 * y, 0.003)).visual_only().turned("z", s * 22).at(0.25 * x, s * 0.12 * y, 0.002), cloth
+        )
+    b.add(box(x, y, z).collision_only(), cloth)
 
 
 def ribbon(b: ObjectBuilder) -> None:
@@ -55,16 +57,16 @@ def envelope(b: ObjectBuilder) -> None:
     card = materials.plain(b.pick(("paper", "cream", "cardboard")), "paper")
     b.add(box(x, y, z), card)
     flap = [(-x / 2, -y / 2, z), (-x / 2, y / 2, z), (0.1 * x, 0, z), (-x / 2, 0, z + 0.0008)]
-    b.add(hull(flap).seen(), materials.plain(materials.tint("light_grey", b.rng), "paper"))
+    b.add(hull(flap).visual_only(), materials.plain(materials.tint("light_grey", b.rng), "paper"))
 
 
 def loops(width: float, height: float) -> Solid:
-    """A tied bow, only seen: two loops and a knot, standing on z = 0."""
+    """A tied bow, visual only: two loops and a knot, standing on z = 0."""
     parts = []
     for s in (-1, 1):
         ellipse = [(0, s * 0.25 * width * (1 - math.cos(a)), 0.5 * height + 0.38 * height * math.sin(a)) for a in _TURN]
         parts.append(tube(ellipse, 0.1 * height, 5, hulls=0, closed=True).scaled(x=2.5))
-    parts.append(soft_box(0.4 * height, 0.4 * height, 0.5 * height).seen().at(z=0.25 * height))
+    parts.append(soft_box(0.4 * height, 0.4 * height, 0.5 * height).visual_only().at(z=0.25 * height))
     return join(parts)
 
 
@@ -85,7 +87,7 @@ def sweets_box(b: ObjectBuilder) -> None:
     ground = b.pick(("dark_red", "brown", "gold"))
     b.add(box(x, y, z), materials.plain(ground, "paper"))
     b.add(decal(0.95 * y, 0.95 * x, "z").at(z=z + 0.0004), printed(b, ground, "cream", (96, 72)))
-    b.add(block((x + 0.001, 0.02, z + 0.001), (0, 0.25 * y, z / 2)).seen(), materials.plain("gold", "fabric"))
+    b.add(block((x + 0.001, 0.02, z + 0.001), (0, 0.25 * y, z / 2)).visual_only(), materials.plain("gold", "fabric"))
 
 
 def punnet(b: ObjectBuilder, *, colours: tuple) -> None:
@@ -97,11 +99,12 @@ def punnet(b: ObjectBuilder, *, colours: tuple) -> None:
             size = 0.2 * x
             look = looks[(i + j) % len(looks)]
             b.add(
-                ball(size, size * 1.1, 0.7 * z, 6).seen().at((i - 1.5) * 0.22 * x, (j - 2) * 0.18 * y, 0.05 * z), look
+                ball(size, size * 1.1, 0.7 * z, 6).visual_only().at((i - 1.5) * 0.22 * x, (j - 2) * 0.18 * y, 0.05 * z),
+                look,
             )
-    b.add(box(x, y, z).felt(), looks[0])
+    b.add(box(x, y, z).collision_only(), looks[0])
     clear = materials.glass("glass", 0.3)
-    b.add(soft_box(x, y, z, 0.1 * z).seen(), clear)
+    b.add(soft_box(x, y, z, 0.1 * z).visual_only(), clear)
 
 
 CATEGORIES = [

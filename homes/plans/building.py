@@ -134,18 +134,18 @@ def write_building(plan: Plan, scene: pathlib.Path, rng: random.Random) -> None:
     ceilings = [(materials.plain("white", "wall", 0.1), ceiling_boxes(plan))]
     names: dict[str, Material] = {}
     for part, groups in (("wall", walls), ("floor", floors), ("ceiling", ceilings)):
-        seen, felt = [], []
+        visuals, collisions = [], []
         for k, (material, boxes) in enumerate(groups):
             name = f"{part}_{k}" if material.texture is not None else material.name
             name = next((known for known, other in names.items() if other is material), name)
             names[name] = material
             solids = join([block(b[1] - b[0], (b[0] + b[1]) / 2) for b in boxes])
-            seen.append(f"{part}_{k}_vm.obj")
-            _text(scene / "shape/visual" / seen[-1], visual_obj(solids.visuals, material, name))
+            visuals.append(f"{part}_{k}_vm.obj")
+            _text(scene / "shape/visual" / visuals[-1], visual_obj(solids.visuals, material, name))
             for hull in solids.hulls:
-                felt.append(f"{part}_{len(felt)}_cm.obj")
-                _text(scene / "shape/collision" / felt[-1], _hull_obj(hull))
-        _text(scene / "urdf" / f"{plan.name}_{part}s.urdf", _one_link_urdf(f"{plan.name}_{part}s", seen, felt))
+                collisions.append(f"{part}_{len(collisions)}_cm.obj")
+                _text(scene / "shape/collision" / collisions[-1], _hull_obj(hull))
+        _text(scene / "urdf" / f"{plan.name}_{part}s.urdf", _one_link_urdf(f"{plan.name}_{part}s", visuals, collisions))
     _write_materials(names, scene)
 
 
@@ -181,11 +181,11 @@ def _write_materials(names: dict[str, Material], scene: pathlib.Path) -> None:
     _text(scene / "shape/visual/default.mtl", "\n".join([*lines, ""]))
 
 
-def _one_link_urdf(name: str, seen: list[str], felt: list[str]) -> str:
+def _one_link_urdf(name: str, visuals: list[str], collisions: list[str]) -> str:
     lines = ['<?xml version="1.0" ?>', f'<robot name="{name}">', '  <link name="base_link">']
     lines.append('    <inertial><origin rpy="0 0 0" xyz="0 0 0"/><mass value="10000"/>')
     lines.append('      <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>')
-    for kind, files in (("visual", seen), ("collision", felt)):
+    for kind, files in (("visual", visuals), ("collision", collisions)):
         for file in files:
             mesh = f'<mesh filename="shape/{kind}/{file}" scale="1 1 1"/>'
             lines.append(f'    <{kind}><origin rpy="0 0 0" xyz="0 0 0"/><geometry>{mesh}</geometry></{kind}>')

@@ -16,7 +16,7 @@ PASSAGE_WIDTH, PASSAGE_TOP = 1.30, 2.10  # m
 SILL, COUNTER_SILL = 0.90, 1.0  # m, height of window sills; in kitchens, where cupboards stand below
 LONG = 4.0  # m of outer wall from which there are two windows in it
 LARGE = 15.0  # m2 of room from which there are windows in two walls
-KNOB = 0.053  # m, by which a door's box is deeper than its frame (families/doors_windows.py)
+KNOB = 0.053  # m, by which a door's box is deeper than its frame (objects/doors_windows.py)
 
 HUBS = ("corridor", "lobby", "living_room", "dining_room", "staircase")
 """Rooms that others are reached through."""

@@ -1,1 +1,1 @@
-"""Shapes: bricks that are seen and collide, their materials, and where objects can be put on them."""
+"""Shapes: bricks with visuals and collision hulls, their materials, and where objects can be put on them."""

@@ -1,4 +1,4 @@
-"""Building bricks: what is seen (meshes) together with what is felt (convex hulls).
+"""Building bricks: visual meshes together with convex collision hulls.
 
 A `Solid` carries both, so that a family writes a shape once and gets a smooth picture and a collision shape of few,
 low-vertex convex pieces. Lengths are metres, angles degrees; z is up, the front of an object looks along +x.
@@ -187,7 +187,7 @@ def extrusion(
 
 
 def hull(points: Sequence[Vec]) -> Solid:
-    """The convex hull of points [n, 3], seen and felt."""
+    """The convex hull of points [n, 3], as visual and as collision hull."""
     cloud = np.asarray(points, float)
     mesh = trimesh.convex.convex_hull(cloud)
     return Solid((Mesh(np.array(mesh.vertices), np.array(mesh.faces)),), (cloud,))
@@ -233,5 +233,5 @@ def sheet(x: float, y: float, waves: float, thickness: float, count: int = 10, p
     total = count * count
     side = np.concatenate([np.c_[rim + total, nxt + total, nxt], np.c_[rim + total, nxt, rim]])
     faces = np.concatenate([upper, upper[:, ::-1] + total, side])
-    felt = _corners((x, y, thickness + waves)) + np.array([0, 0, (thickness + waves) / 2])
-    return Solid((Mesh(np.concatenate([top, bottom]), faces),), (felt,))
+    hull_points = _corners((x, y, thickness + waves)) + np.array([0, 0, (thickness + waves) / 2])
+    return Solid((Mesh(np.concatenate([top, bottom]), faces),), (hull_points,))

@@ -1,4 +1,4 @@
-"""Mesh and Solid: what is seen together with what is felt. The bricks themselves stand in solids.py and turned.py."""
+"""Mesh and Solid: visual meshes together with collision hulls. The bricks themselves are in solids.py and turned.py."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 @dataclasses.dataclass
 class Mesh:
-    """Triangles that are seen. vertices [n, 3], faces [m, 3]; uv [m, 3, 2] per face corner, or None: box mapping."""
+    """Triangles of a visual. vertices [n, 3], faces [m, 3]; uv [m, 3, 2] per face corner, or None: box mapping."""
 
     vertices: np.ndarray
     faces: np.ndarray
@@ -59,11 +59,11 @@ class Solid:
     def mirrored(self, axis: str) -> Solid:
         return self.scaled(**{axis: -1.0})
 
-    def seen(self) -> Solid:
+    def visual_only(self) -> Solid:
         """Only the visuals: a detail that nothing touches."""
         return Solid(self.visuals, ())
 
-    def felt(self) -> Solid:
+    def collision_only(self) -> Solid:
         """Only the collision hulls."""
         return Solid((), self.hulls)
 

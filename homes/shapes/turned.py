@@ -28,7 +28,7 @@ def lathe(profile: Sequence[tuple[float, float]], sides: int = ROUND_SIDES, spli
 
 
 def sleeve(profile: Sequence[tuple[float, float]], sides: int = ROUND_SIDES) -> Solid:
-    """A turned skin without end caps, only seen: a label around a bottle, a stripe. profile: (radius, z), upwards."""
+    """A turned skin without end caps, visual only: a label around a bottle, a stripe. profile: (radius, z), upwards."""
     return Solid((turn([(float(r), float(z)) for r, z in profile], sides),))
 
 

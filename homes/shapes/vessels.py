@@ -14,7 +14,7 @@ RING_GROWTH = 0.5  # a ring's corners lie this far between the circle and the po
 
 
 def ring(bottom: float, top: float, low: float, high: float, wall: float, pieces: int = 7) -> Solid:
-    """Only felt: a conical wall of `pieces` wedges. Outer radii at heights low and high; `wall`: thickness."""
+    """Collision only: a conical wall of `pieces` wedges. Outer radii at heights low and high; `wall`: thickness."""
     grow = 1 + RING_GROWTH * (1 / math.cos(math.pi / pieces) - 1)
     hulls = []
     for k in range(pieces):
@@ -48,7 +48,7 @@ def turned_vessel(
 
 
 def disc(radius: float, z: float, thickness: float, sides: int = 8) -> Solid:
-    """Only felt: a flat round plate with its underside at height z."""
+    """Collision only: a flat round plate with its underside at height z."""
     angles = np.arange(sides) * 2 * math.pi / sides
     flat = np.c_[radius * np.cos(angles), radius * np.sin(angles)]
     return Solid((), (np.concatenate([np.c_[flat, np.full(sides, z)], np.c_[flat, np.full(sides, z + thickness)]]),))
@@ -86,7 +86,7 @@ def tray(x: float, y: float, z: float, wall: float, floor: float | None = None, 
     inside = outside - np.array([[sx * wall, sy * wall, 0] for _ in (0, 1) for sx, sy in _AROUND])
     inside[:4, 2] = floor
     visual = Mesh(np.concatenate([outside, inside]), np.array(_shell_faces()))
-    return Solid((visual,), tuple(walls)) + block((foot_x, foot_y, floor), (0, 0, floor / 2)).felt()
+    return Solid((visual,), tuple(walls)) + block((foot_x, foot_y, floor), (0, 0, floor / 2)).collision_only()
 
 
 _AROUND = ((-1, -1), (1, -1), (1, 1), (-1, 1))

@@ -195,7 +195,7 @@ def test_every_model_of_every_category_keeps_the_rules():
                 assert model.hull_count() <= MOST_HULLS, (name, index)
             volumes = [hull_mesh(p).volume for link in model.links for p in link.hulls]
             assert min(volumes) > 0, (name, index)
-            kinds = {material.kind for link in model.links for material, _ in link.seen}
+            kinds = {material.kind for link in model.links for material, _ in link.visuals}
             assert kinds <= set(CLASSES), (name, index)
             counts[name] += 1
     assert sum(counts.values()) >= 1217

@@ -228,7 +228,7 @@ def sheet(
     check_picture(out)
     use_opengl()
     chosen = [build_model(e, k, seed) for e in entries for k in range(min(models, e.count))]
-    contact_sheet(chosen, opened=opened, felt=collision).save(out)
+    contact_sheet(chosen, opened=opened, collision=collision).save(out)
     print(f"{out}: {len(chosen)} model{'s' * (len(chosen) != 1)}")
 
 

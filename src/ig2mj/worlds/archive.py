@@ -130,6 +130,7 @@ def _name(keys: Any) -> str:
 @contextlib.contextmanager
 def _open(file: str | os.PathLike | bytes) -> Iterator[Any]:
     """The archive, closed afterwards. Raises InputError."""
+    named = "packed arrays" if isinstance(file, bytes) else file
     try:
         stream = io.BytesIO(file if isinstance(file, bytes) else pathlib.Path(file).read_bytes())
     except OSError as e:
@@ -137,9 +138,9 @@ def _open(file: str | os.PathLike | bytes) -> Iterator[Any]:
     try:
         archive = np.load(stream, allow_pickle=False)
     except (OSError, ValueError, EOFError, zipfile.BadZipFile) as e:
-        raise InputError("packed arrays" if isinstance(file, bytes) else file, f"is not an npz archive: {e}") from e
+        raise InputError(named, "is not an npz archive, or broken") from e
     if not hasattr(archive, "files"):  # a single array
-        raise InputError("packed arrays" if isinstance(file, bytes) else file, "is not an npz archive")
+        raise InputError(named, "is not an npz archive")
     with archive:
         yield archive
 
