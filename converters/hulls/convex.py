@@ -136,7 +136,7 @@ def union_mesh(hulls: Sequence[Hull]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def mesh_union_volume(meshes: Sequence[tuple[np.ndarray, np.ndarray]]) -> float | None:
-    """m3 of the union of closed meshes (vertices, faces), or None where one of them is no proper solid."""
+    """m3 of the union of closed meshes (vertices, faces), or None where one of them is not a proper solid."""
     import manifold3d
 
     solids = []

@@ -20,7 +20,7 @@ from .mesh_parts import Part, clean, decimate, enclosed_volume, hull_stands_for,
 from .pieces import HullOptions, Piece, PieceSource
 
 GROUP_RATIO = 1.3
-"""A group whose hull has more than this many times its mesh's volume is no convex piece, whatever the file says
+"""A group whose hull has more than this many times its mesh's volume is not a convex piece, whatever the file says
 (dataset_format.md section 8.4)."""
 
 MOST_FACES = 60_000

@@ -34,7 +34,7 @@ class Dataset:
       specs: category -> CategorySpec. categories, room_types, non_sampleable: the lists of metadata/*.txt.
 
     Raises:
-      InputError: the root is no folder with objects/ or scenes/, or its metadata is broken.
+      InputError: the root is not a folder with objects/ or scenes/, or its metadata is broken.
     """
 
     def __init__(self, root: str | os.PathLike):

@@ -63,7 +63,7 @@ def read_specs(root: pathlib.Path, warnings: list[str]) -> dict[str, CategorySpe
     """metadata/avg_category_specs.json; a missing file is a warning and no specs.
 
     Raises:
-      InputError: it is no JSON, or a number is not positive.
+      InputError: it is not JSON, or a number is not positive.
     """
     file = root / "metadata" / "avg_category_specs.json"
     if not inputs.is_file(file):

@@ -265,7 +265,7 @@ def _same_image(image: Any, files: _GuardedFiles) -> pathlib.Path | None:
             with Image.open(io.BytesIO(inputs.content(path))) as candidate:
                 if candidate.size == image.size and candidate.tobytes() == image.tobytes():
                     return path
-    except Exception:  # a broken image is no texture
+    except Exception:  # a broken image is not a texture
         return None
     return None
 

@@ -19,7 +19,7 @@ def read_metadata(folder: pathlib.Path, warnings: list[str]) -> Metadata:
     """Metadata of a model folder: misc/metadata.json, else misc/bbox.json, else empty.
 
     Raises:
-      InputError: a file is no JSON or a field has the wrong form.
+      InputError: a file is not JSON or a field has the wrong form.
     """
     file = folder / "misc" / "metadata.json"
     if inputs.is_file(file):

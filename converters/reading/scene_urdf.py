@@ -164,7 +164,7 @@ def _read_instance(link: Element, name: str, joint: Element | None, file: pathli
     if (text := link.get("states")) is not None:
         instance.states = decode_json(text, file, f"{where(link)} attribute 'states'")
         if instance.states is not None and not isinstance(instance.states, dict):
-            raise InputError(file, "attribute 'states' is not a JSON object", element=where(link))
+            raise InputError(file, "attribute 'states' is not JSON object", element=where(link))
     if (text := link.get("current_index")) is not None:
         if text.strip() not in ("0", "1"):
             raise InputError(file, f"current_index='{text}' is neither 0 nor 1", element=where(link))

@@ -31,8 +31,8 @@ def find_tree(
 ) -> tuple[str, dict[str, Link], dict[str, Joint]]:
     """(base link, links, joints) of the tree that hangs on the base.
 
-    The base is the first link in document order that is no joint's child (dataset_format.md section 4). Links that do
-    not hang on it are left out with a warning.
+    The base is the first link in document order that is not a joint's child (dataset_format.md section 4). Links
+    that do not hang on it are left out with a warning.
 
     Raises:
       InputError: no links, a joint between links that do not exist, a link with two parents, a cycle.

@@ -178,7 +178,7 @@ def numbers(
       default: where the attribute is absent; None: absence is an error.
 
     Raises:
-      InputError: absent, not `count` words, or a word that is no finite number.
+      InputError: absent, not `count` words, or a word that is not a finite number.
     """
     text = element.get(attribute)
     if text is None:

@@ -22,7 +22,7 @@ from .pictures import Pictures
 
 FORMAT_VERSION = 1
 RENDERED = "rendered"
-"""What the report says of its pictures where they are no drawings."""
+"""What the report says of its pictures where they are not drawings."""
 
 
 class Renderer(Protocol):

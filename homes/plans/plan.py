@@ -208,7 +208,7 @@ def grid_rooms(
     for letter, kind in kinds.items():
         ii, jj = np.array(cells[letter]).T
         height, width = np.ptp(ii) + 1, np.ptp(jj) + 1
-        assert len(ii) == height * width, f"room {letter} is no rectangle"
+        assert len(ii) == height * width, f"room {letter} is not a rectangle"
         x0, x1, y0, y1 = xs[jj.min()], xs[jj.max() + 1], ys[ii.max() + 1], ys[ii.min()]
         rect = (x0 - middle[0], y0 - middle[1], x1 - middle[0], y1 - middle[1])
         number = counts.setdefault(kind, 0)

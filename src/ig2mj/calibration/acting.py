@@ -38,7 +38,7 @@ class Acting:
 
 
 def robot_of(scene: Scene, period: float) -> Controller | None:
-    """The controller of a scene's first agent, whose actuators are all there are; None where it is no robot.
+    """The controller of a scene's first agent, whose actuators are all there are; None where it is not a robot.
     `period`: seconds of an action."""
     if not scene.agents or not isinstance(scene.agents[0], Robot):
         return None

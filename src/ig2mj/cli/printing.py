@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-#: Columns of text where stdout is no terminal, wide enough that nothing is folded away.
+#: Columns of text where stdout is not a terminal, wide enough that nothing is folded away.
 PIPED_WIDTH = 180
 #: Blanks between two columns of a table.
 GAP = 2
@@ -65,7 +65,7 @@ def print_json(data: Any) -> None:
 
 
 def progress_bar() -> Progress:
-    """Bars on stderr that vanish when they are done; nothing at all where stderr is no terminal.
+    """Bars on stderr that vanish when they are done; nothing at all where stderr is not a terminal.
 
     A task has the extra field `text`, e.g. `bar.add_task("converting", total=None, text="")`.
     """

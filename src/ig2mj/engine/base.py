@@ -62,7 +62,7 @@ Physics = Any
 
 @struct.dataclass
 class Write:
-    """A change to physics that is no simulation: teleports, joint positions, grasps. Leave out (None) what stays.
+    """A change to physics that is not simulated: teleports, joint positions, grasps. Leave out (None) what stays.
 
     What is written moves at once, its velocity becomes zero, and it wakes together with the sleeping island it is part
     of. A fixed object cannot be moved: its row of `object_mask` is ignored. A write of nothing at all brings the view

@@ -27,7 +27,7 @@ def check_shape(ctrl: Any, num_worlds: int, num_actuators: int) -> None:
 
 
 def clip(ctrl: Float[Array, "W nu"], before: Float[Array, "W nu"]) -> tuple[Float[Array, "W nu"], Bool[Array, "W"]]:
-    """Controls within `LARGEST`, and the worlds in which some were not. What is no number stays as it was before."""
+    """Controls within `LARGEST`, and the worlds in which some were not. What is not a number stays as it was before."""
     xp: Any = np if isinstance(ctrl, np.ndarray) and isinstance(before, np.ndarray) else jnp
     fine = xp.abs(ctrl) <= LARGEST  # false for NaN, too
     kept = xp.where(xp.isnan(ctrl), before, xp.clip(ctrl, -LARGEST, LARGEST))

@@ -7,7 +7,7 @@
 With `autoreset` (the default) a world that is done begins its next episode in the same step: its observation is the new
 episode's, and what was seen last is in `info["final_obs"]`. Without it, whoever steps a world that is done is told so.
 
-PyTorch is no dependency of ig2mj. Tensors are handed over on the device (DLPack) and copied once there, because the
+PyTorch is not a dependency of ig2mj. Tensors are handed over on the device (DLPack) and copied once there, because the
 environment gives the memory of a state back at the next step.
 
 Axes: W worlds, n numbers of an action.

@@ -6,12 +6,11 @@
     state = env.reset(state, state.terminated | state.truncated)
 
 An agent step is 1/10 s unless `make` is given another period: three control steps of the core, the action held in
-all of them. What the core can compile is
-compiled, and so is this: on a pure engine `step_fn` and `reset_fn` may be part of a program of your own. A state that
-was given to a method is used up; go on with the one that it returns.
+all of them. What the core can compile is compiled, and so is this: on a pure engine `step_fn` and `reset_fn` may be
+part of a program of your own. A state that was passed to a method is used up; continue with the one that it returns.
 
 Success ends an episode, and so does what a task calls failure (`terminated`). The horizon truncates it, and so do
-guards: what a world says whose numbers were lost is not to be believed (`ig2mj.worlds.guards`).
+guards, since results of a world with numbers that are not finite are meaningless (`ig2mj.worlds.guards`).
 
 Axes: W worlds, n numbers of an action.
 """
@@ -81,7 +80,7 @@ class Environment:
           period: seconds of an agent step.
 
         Raises:
-          EngineError: the core has no rules, or `period` is no whole number of its control steps.
+          EngineError: the core has no rules, or `period` is not a whole number of its control steps.
         """
         if core.rules is None:
             raise EngineError("an environment needs a core with rules")
@@ -140,7 +139,7 @@ class Environment:
         """One agent step of every world, the finished ones included.
 
         Args:
-          action: [W, n], -1..1; clipped. Numbers that are not finite are counted and taken for 0.
+          action: [W, n], -1..1; clipped. Numbers that are not finite are counted and treated as 0.
 
         Raises:
           ActionError: the action has another shape, or is not of numbers.
@@ -209,7 +208,7 @@ class Environment:
         """All worlds at the start of an episode from these rows of the pool, so that each can be played once.
 
         Raises:
-          EngineError: not one row for each world, or a row that the pool has not.
+          EngineError: not one row for each world, or a row that the pool does not have.
         """
         size = self.core.starts.pool.size
         rows = np.asarray(rows)

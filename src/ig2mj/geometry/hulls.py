@@ -56,7 +56,7 @@ def point_in_piece(
     With a tolerance polyhedra grow by moving their faces outwards.
     """
     inside = signed_depth(kind, size, planes, point) >= -tolerance
-    return np.asarray(inside) if isinstance(inside, np.bool_) else inside  # NumPy's scalars are no arrays
+    return np.asarray(inside) if isinstance(inside, np.bool_) else inside  # NumPy's scalars are not arrays
 
 
 def support_point(

@@ -37,7 +37,7 @@ def load_overrides(path: str | os.PathLike) -> Overrides:
     """Reads and checks an overrides file.
 
     Raises:
-      InputError: it cannot be read, is no JSON, does not fit the form, or names an ability or a parameter that does
+      InputError: it cannot be read, is not JSON, does not fit the form, or names an ability or a parameter that does
         not exist or has the wrong type.
     """
     file = pathlib.Path(path)

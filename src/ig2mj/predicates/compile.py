@@ -151,7 +151,7 @@ def compile_expression(
       questions: see `CompiledExpression`.
 
     Raises:
-      UnknownNameError, ArityError, AbilityError: see `Literals.build`. ExpressionError: the text is no expression.
+      UnknownNameError, ArityError, AbilityError: see `Literals.build`. ExpressionError: the text is not an expression.
     """
     source = parse(expression) if isinstance(expression, str) else expression
     grounded = logic.ground(source, lambda name: group_members(model, name, groups or {}))

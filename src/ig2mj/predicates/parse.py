@@ -28,7 +28,7 @@ Tree: TypeAlias = str | list
 
 
 class ExpressionError(InputError):
-    """Text that is no expression."""
+    """Text that is not an expression."""
 
 
 def parse(source: str, name: str = "expression") -> Expression:

@@ -55,7 +55,7 @@ def read_conditions(sources: Iterable[str | Expression]) -> list[Condition]:
     """Conditions from expressions: atoms, their negations, and conjunctions of these.
 
     Raises:
-      ExpressionError: a text is no expression. StateError: it is none of these forms.
+      ExpressionError: a text is not an expression. StateError: it is none of these forms.
       UnknownNameError: no such predicate.
     """
     found: list[Condition] = []

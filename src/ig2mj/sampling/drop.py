@@ -54,7 +54,7 @@ class Rest:
     Attributes:
       row, col: the origin's cell, of the world's grid. height: of the origin, metres, where it is clear.
       clear, full, balanced: see the module's text; `full` and `balanced` are false where it is not clear, and where the
-        support is no allowed object.
+        support is not an allowed object.
     """
 
     row: Int[np.ndarray, "N"]

@@ -119,7 +119,7 @@ def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -
       MJCF whose paths are absolute, the manifest with all entries, what was added.
 
     Raises:
-      UnknownNameError: the library has no such model. InputError: a file is no MJCF. Ig2mjError: a fixed model has
+      UnknownNameError: the library has no such model. InputError: a file is not MJCF. Ig2mjError: a fixed model has
       no place.
     """
     root = _read(file)

@@ -149,7 +149,7 @@ def load_manifest(path: str | os.PathLike) -> Manifest:
       path: the file `manifest.json`, or the folder that holds it.
 
     Raises:
-      ManifestError: the file is missing, is no JSON, does not fit the schema, has another format version, or is not
+      ManifestError: the file is missing, is not JSON, does not fit the schema, has another format version, or is not
         consistent in itself.
     """
     file = pathlib.Path(path)

@@ -83,7 +83,7 @@ def make_pieces(model: mujoco.MjModel, geoms: np.ndarray) -> list[Piece]:
     """Pieces of the given geoms [K], in their order.
 
     Raises:
-      ValueError: a geom is no convex solid (plane, height field, ellipsoid, SDF); the message is its name.
+      ValueError: a geom is not a convex solid (plane, height field, ellipsoid, SDF); the message is its name.
     """
     meshes: dict[int, tuple[np.ndarray, np.ndarray]] = {}
     pieces = []

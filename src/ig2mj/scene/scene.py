@@ -127,7 +127,7 @@ def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: S
         "shelf/shelf_14@1,2,0.9,-90" is fixed for good: its frame at x, y, z (m), turned by degrees about the vertical.
 
     Raises:
-      InputError: a file is missing or is no valid MJCF. UnknownNameError: the library has no such object.
+      InputError: a file is missing or is not valid MJCF. UnknownNameError: the library has no such object.
       ManifestError: the manifest is broken, or does not belong to the scene.xml.
     """
     file = model_file(path)

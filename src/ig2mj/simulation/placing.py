@@ -21,7 +21,7 @@ def write_of_pose(scene: Scene, name: str, pos: Vector, quat: Vector) -> Write:
       pos: [3] m, world frame, of the main body's frame. quat: [4] w-x-y-z, of any length but zero.
 
     Raises:
-      UnknownNameError: no such object. PoseError: it is fixed, or the pose is no pose.
+      UnknownNameError: no such object. PoseError: it is fixed, or the pose is invalid.
     """
     index, number = scene.object_index(name), len(scene.object_names)
     if scene.tables.object_fixed[index]:

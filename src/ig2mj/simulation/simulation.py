@@ -256,7 +256,7 @@ class Simulation(Recorded):
           quat_wxyz: [4], of any length but zero; None keeps the rotation.
 
         Raises:
-          UnknownNameError: no such object. PoseError: it is fixed, or the pose is no pose.
+          UnknownNameError: no such object. PoseError: it is fixed, or the pose is invalid.
         """
         quat = self.object_pose(name)[1] if quat_wxyz is None else quat_wxyz
         return self._write(write_of_pose(self.scene, name, pos, quat))

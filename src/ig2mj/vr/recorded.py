@@ -21,7 +21,7 @@ class RecordedPoses:
         """Reads the frames of a run.
 
         Raises:
-          InputError: the file is no recording, has no such run, or none of what devices say.
+          InputError: the file is not a recording, has no such run, or none of what devices say.
         """
         self._frames: list[PoseFrame | None] = []
         with Recording(file) as recording:

@@ -101,7 +101,7 @@ class Gate:
         host = request.headers.get("Host", "")
         name = urllib.parse.urlsplit(f"//{host}").hostname or ""
         if self.access.token is None and not is_loopback(name):
-            # A site whose name was made to point here (DNS rebinding) is no page of ours.
+            # A site whose name was made to point here (DNS rebinding) is not a page of ours.
             return page(http.HTTPStatus.FORBIDDEN, b"this server is for this machine alone", "text/plain")
         socket = request.headers.get("Upgrade", "").lower() == "websocket"
         origin = request.headers.get("Origin")

@@ -78,8 +78,8 @@ def load_pool_scene(
       scene: the home, as of `load_scene`; None: the shipped one of the name that the pool says.
 
     Raises:
-      InputError: the file is no pool, or is one of another home, or a model of the object library is not the one that
-        was added. UnknownNameError: the library has no such model.
+      InputError: the file is not a pool, or is one of another home, or a model of the object library is not the one
+        that was added. UnknownNameError: the library has no such model.
     """
     header = _pool_header(file)
     wanted = []
@@ -93,7 +93,7 @@ def load_pool_scene(
 
 
 def scene_name(file: str | os.PathLike) -> str:
-    """Name of the home that a pool belongs to. Raises InputError: the file is no pool."""
+    """Name of the home that a pool belongs to. Raises InputError: the file is not a pool."""
     return _pool_header(file)["scene"]
 
 

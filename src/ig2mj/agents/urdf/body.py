@@ -27,7 +27,7 @@ class RobotBody:
     """
 
     def __init__(self, folder: pathlib.Path, description: Description):
-        """Raises InputError: its file is missing, is no MJCF, or is not the description's."""
+        """Raises InputError: its file is missing, is not MJCF, or is not the description's."""
         self.base = description.base
         self._file, self._description = folder / MODEL_FILE, description
         try:

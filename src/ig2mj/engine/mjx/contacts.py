@@ -189,7 +189,7 @@ def finger_forces(
     geom = jnp.maximum(contacts.geom, 0)
     finger = jnp.asarray(layout.finger_of_geom)[geom]
     body = jnp.asarray(layout.graspable_of_geom)[geom]
-    first = (finger[:, 0] >= 0) & (body[:, 1] >= 0)  # a finger is no graspable body: never both ways
+    first = (finger[:, 0] >= 0) & (body[:, 1] >= 0)  # a finger is not a graspable body: never both ways
     one, other = jnp.where(first, finger[:, 0], finger[:, 1]), jnp.where(first, body[:, 1], body[:, 0])
     usable = contacts.valid & (one >= 0) & (other >= 0)
     world = jnp.where(usable, contacts.world, num_worlds)  # out of range: dropped

@@ -11,7 +11,7 @@ from ig2mj.sensors.base import Percept, Sensor, Setup, Space
 
 
 def _read(setup: Setup, percept: Percept) -> Float[Array, "W 1"]:
-    """1 while any part of it touches an object that is no floor; what its hands hold counts, too."""
+    """1 while any part of it touches an object that is not a floor; what its hands hold counts, too."""
     touching = jnp.asarray(percept.view.agent.touching)[:, setup.agent]
     return (touching & ~setup.scene.tables.object_is_floor).any(-1, keepdims=True).astype(jnp.float32)
 

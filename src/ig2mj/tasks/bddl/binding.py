@@ -3,7 +3,7 @@
 An object with an `inroom` condition is one that stands in a room of that kind. Objects of one kind of room are in one
 room if that is possible, and whatever a condition of the start relates is in one room anyway (iGibson takes one room
 for all of a kind). Every other object is one of the home's that no other has taken, else one of the object library; so
-is one with `inroom` of which the room has too few, where it is no furniture that is fixed. All choices are the first
+is one with `inroom` of which the room has too few, where it is not a furniture that is fixed. All choices are the first
 possible in the home's order: the same home, the same binding.
 """
 

@@ -31,7 +31,7 @@ def read_problem(name: str | os.PathLike, behavior_1k: bool = False) -> Problem:
       behavior_1k: of BEHAVIOR-1K instead of BEHAVIOR-100: some names occur in both.
 
     Raises:
-      UnknownNameError: no such activity. BddlError: the file is no definition, naming line and word. InputError: it
+      UnknownNameError: no such activity. BddlError: the file is not a definition, naming line and word. InputError: it
         cannot be read.
     """
     if os.fspath(name).endswith(".bddl"):

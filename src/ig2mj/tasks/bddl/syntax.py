@@ -15,7 +15,7 @@ MAX_DEPTH = 100
 
 
 class BddlError(InputError):
-    """Text that is no BDDL, or names what it does not declare; says the line and the word."""
+    """Text that is not a BDDL, or names what it does not declare; says the line and the word."""
 
 
 @dataclasses.dataclass(frozen=True)
