@@ -155,6 +155,7 @@ def test_reset_brings_states_back(world):
         (lambda w: w.set_state("temperature", "table", 3.0), AbilityError, "cookable"),
         (lambda w: w.set_state("temperature", "apple", float("nan")), StateError, "nan"),
         (lambda w: w.set_state("temperature", "apple", 1e40), StateError, "1e+40"),
+        (lambda w: w.set_state("temperature", "apple", True), StateError, "to a number"),
         (lambda w: w.set_state("cooked", "apple", 3.0), StateError, "true or false"),
         (lambda w: w.set_state("pose", "apple", 1.0), StateError, "settable"),
         (lambda w: w.set_state("on_top", "apple", True), StateError, "place"),

@@ -173,7 +173,9 @@ def test_a_world_that_stands_still_is_not_disarranged(env, tmp_path):
         state = played.reset(0)
         for _ in range(4):
             state = played.step(state, np.zeros((2, env.action_space.shape[0]), np.float32))
-    for run in metrics_of(file, settle=0, env=env):
+    runs = list(metrics_of(file, settle=0, env=env))
+    assert len(runs) == 2
+    for run in runs:
         assert run["kinematic_disarrangement"]["total"] < 0.02
         assert run["logical_disarrangement"] == {"total": 0, "no_longer": [], "now": []}
         assert run["goal"]["delta"] == 0

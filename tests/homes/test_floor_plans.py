@@ -88,7 +88,9 @@ def test_walls_are_boxes_that_overlap_nowhere_and_close_every_room(name: str):
 @each_home
 def test_a_door_or_window_fills_its_opening_and_names_the_rooms_on_both_sides(name: str):
     home = cached_plan(name)
-    for opening, thing in opening_things(home):
+    found = list(opening_things(home))
+    assert found
+    for opening, thing in found:
         low, high = thing.box()
         along = 0 if opening.edge.axis == "x" else 1
         assert opening.low < low[along] and high[along] < opening.high

@@ -59,6 +59,7 @@ def test_nothing_overlaps(name: str):
     for thing in home(name).things.things.values():
         assert placed.fits(thing, ways=False, ignore=[t for t in placed.things]), thing.name
         placed.put(thing)
+    assert len(placed.things) >= 20
 
 
 @each_home
@@ -72,6 +73,7 @@ def test_a_disc_of_30_cm_reaches_every_room_with_the_furniture_in_place(name: st
 @each_home
 def test_loose_things_stand_on_something_right_below_them(name: str):
     all_things = list(home(name).things.things.values())
+    assert not all(thing.fixed for thing in all_things)
     for thing in all_things:
         if thing.fixed:
             continue
@@ -102,7 +104,9 @@ def test_the_bed_has_its_head_at_a_wall_and_a_stand_beside_it():
 
 def test_chairs_look_at_their_table_and_are_tucked_in():
     (table,) = things("small_home", "breakfast_table")
-    for chair in things("small_home", "straight_chair"):
+    chairs = things("small_home", "straight_chair")
+    assert chairs
+    for chair in chairs:
         towards = table.centre[:2] - chair.centre[:2]
         assert np.dot(towards, chair.front) > 0
         assert np.dot(towards, chair.front) < (table.size[0] + chair.size[0]) / 2

@@ -27,7 +27,9 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> pathlib.Path:
 
 
 def models(root: pathlib.Path, category: str) -> list[pathlib.Path]:
-    return sorted((root / "objects" / category).iterdir())
+    found = sorted((root / "objects" / category).iterdir())
+    assert found, category
+    return found
 
 
 def floats(text: str) -> np.ndarray:
@@ -70,6 +72,7 @@ def test_non_sampleable_categories_are_synsets_of_fixed_furniture(root: pathlib.
 def test_urdf_names_files_that_exist(root: pathlib.Path, category: str):
     for model in models(root, category):
         tree = ElementTree.parse(model / f"{model.name}.urdf").getroot()
+        assert tree.find(".//mesh") is not None
         for mesh in tree.iter("mesh"):
             assert (model / mesh.attrib["filename"]).is_file()
         for link in tree.iter("link"):
@@ -81,7 +84,9 @@ def test_urdf_names_files_that_exist(root: pathlib.Path, category: str):
 
 @pytest.mark.parametrize("category", SOME)
 def test_collision_files_hold_one_convex_group_per_piece(root: pathlib.Path, category: str):
-    for file in (root / "objects" / category).glob("*/shape/collision/*_cm.obj"):
+    files = list((root / "objects" / category).glob("*/shape/collision/*_cm.obj"))
+    assert len(files) >= len(models(root, category))
+    for file in files:
         names = [line.split()[1] for line in file.read_text().splitlines() if line.startswith("o ")]
         assert names == [f"convex_{k}" for k in range(len(names))] and names
 
@@ -124,6 +129,7 @@ def test_openable_joints_are_named_and_directed(root: pathlib.Path):
     for model in models(root, "bottom_cabinet"):
         tree = ElementTree.parse(model / f"{model.name}.urdf").getroot()
         joints = {joint.attrib["name"]: joint for joint in tree.iter("joint")}
+        assert metadata(model)["openable_joint_ids"], model.name
         for _, name, direction in metadata(model)["openable_joint_ids"]:
             assert direction == 1
             limit = joints[name].find("limit")

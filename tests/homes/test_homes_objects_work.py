@@ -186,6 +186,7 @@ def test_every_joint_of_every_model_opens_under_5_newton_metres_or_20_newtons_an
 def test_a_closed_fridge_stays_closed_when_bumped_gently(convert, index: int):
     """0.3 N s outwards at each door's free edge, as of 0.6 kg at 0.5 m/s."""
     fridge = Converted(convert("fridge", index), fixed=True)
+    assert fridge.manifest.objects[0].openable
     for number, openable in enumerate(fridge.manifest.objects[0].openable):
         mujoco.mj_resetData(fridge.model, fridge.data)
         qpos, dof = fridge.joint(number)

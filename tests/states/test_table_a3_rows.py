@@ -46,6 +46,7 @@ def test_table_a3_moment_of_inertia(tiny_home):
 
 def test_table_a3_kinematic_structure(tiny_home):
     model = tiny_home.model
+    assert {joint.type for entry in tiny_home.manifest.objects for joint in entry.joints} == {"hinge", "slide"}
     for entry in tiny_home.manifest.objects:
         for joint in entry.joints:
             kind = mujoco.mjtJoint(int(model.joint(joint.name).type[0]))

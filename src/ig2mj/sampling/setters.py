@@ -94,6 +94,9 @@ def set_by_name(
         raise AbilityError(lacks(f"state '{kind.name}'", object_name, model, kind.abilities or ()))
     if kind.set is None:
         raise StateError(f"state '{kind.name}' cannot be set (settable: {', '.join(settable())})")
+    kept = np.asarray(getattr(states, kind.name)).dtype if kind.name in kind.fields else np.dtype(bool)
+    if isinstance(value, bool | np.bool_) and kept.kind != "b":
+        raise StateError(f"state '{kind.name}' is set to a number, not to {value}")
     with np.errstate(over="ignore"):
         finite = np.isfinite(np.float32(value))  # as states are kept
     if not finite:
