@@ -227,6 +227,17 @@ def test_output_cut_off_by_head_is_no_error(tmp_path):
         assert b"Traceback" not in process.stderr.read()
 
 
+def test_after_ctrl_c_no_library_is_torn_down():
+    """XLA crashes there while a program is compiled, and status 139 would stand for what the user asked for."""
+    code = (
+        "import atexit, os; from ig2mj import cli; atexit.register(os._exit, 139)\n"
+        "def interrupted(args): raise KeyboardInterrupt\n"
+        "cli._dispatch = interrupted; cli.main(['train'])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (130, "interrupted\n")
+
+
 @pytest.mark.skipif(not pathlib.Path("/dev/full").exists(), reason="needs a device that is always full")
 def test_a_full_disk_names_the_file_that_was_written(tmp_path, monkeypatch, capsys):
     """The error of a write has no file name of its own."""

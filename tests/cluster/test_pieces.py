@@ -101,9 +101,9 @@ def test_a_killed_run_goes_on_where_it_stopped(tmp_path):
         run(wanted, Where(), journal, die_after_three)
     with (tmp_path / "pool.npz.pieces" / "done.jsonl").open("a") as lines:
         lines.write('{"name": "piece_4", "sha2')  # half a line, as a kill leaves it
-    with pytest.raises(InputError, match=r"a run of this was broken off \(--resume goes on with it"):
+    with pytest.raises(InputError, match=r"an earlier run of this was interrupted \(--resume continues it"):
         Journal(out, {"rows": 5})
-    with pytest.raises(InputError, match="the run that was broken off had rows = 5, and here it is 6"):
+    with pytest.raises(InputError, match="the interrupted run had rows = 5, and here it is 6"):
         Journal(out, {"rows": 6}, resume=True)
     before = set(tmp_path.glob("*-*"))
     with Journal(out, {"rows": 5}, resume=True) as journal:
@@ -130,7 +130,7 @@ def test_a_command_that_was_killed_goes_on_to_the_same_bytes(tmp_path):
     finished = len(done.read_text().splitlines())
     assert not (tmp_path / "killed.npz").exists() and finished < 12
     refused = subprocess.run([*command, "killed.npz"], **where, capture_output=True, text=True)
-    assert refused.returncode == 2 and "--resume goes on with it" in refused.stderr
+    assert refused.returncode == 2 and "--resume continues it" in refused.stderr
     for file, more in (("killed.npz", ["--resume"]), ("whole.npz", [])):
         subprocess.run([*command, file, *more], **where, check=True, capture_output=True)
     assert (tmp_path / "killed.npz").read_bytes() == (tmp_path / "whole.npz").read_bytes()

@@ -157,7 +157,7 @@ def test_stairs_rise_to_the_ceiling_and_a_balcony_has_a_parapet():
 
 
 def test_a_room_that_is_no_rectangle_is_refused():
-    with pytest.raises(AssertionError, match="no rectangle"):
+    with pytest.raises(AssertionError, match="not a rectangle"):
         grid_rooms({"A": "kitchen", "B": "bedroom"}, (1.0, 1.0), (1.0, 1.0), "A A\nA B")
 
 

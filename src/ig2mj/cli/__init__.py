@@ -35,6 +35,7 @@ from __future__ import annotations
 import difflib
 import errno
 import importlib
+import multiprocessing
 import os
 import pathlib
 import sys
@@ -74,12 +75,23 @@ COMMANDS: dict[str, str] = {
     "doctor": "show what this machine can run, and how to fix what it cannot",
 }
 
+INTERRUPTED = 130
+"""Exit status after Ctrl-C, as of shells."""
+
 _USAGE = "usage: ig2mj [--debug] [--version] COMMAND ..."
 
 
 def main(argv: Sequence[str] | None = None) -> None:
     """Console script: runs the sub-command named in `argv` (default: the process's arguments) and exits."""
-    sys.exit(call(sys.argv[1:] if argv is None else argv))
+    status = call(sys.argv[1:] if argv is None else argv)
+    if status == INTERRUPTED:
+        # What had to be closed is closed. Libraries are not torn down: XLA crashes where it was compiling.
+        for process in multiprocessing.active_children():
+            process.terminate()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+    sys.exit(status)
 
 
 def call(argv: Sequence[str]) -> int:
@@ -96,7 +108,7 @@ def call(argv: Sequence[str]) -> int:
         if debug:
             raise
         print("interrupted", file=sys.stderr)
-        return 130
+        return INTERRUPTED
     except BrokenPipeError:  # `ig2mj inspect | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 141

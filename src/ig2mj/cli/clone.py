@@ -60,5 +60,5 @@ def train_from_demos(
     file = folder / "policy.npz"
     Policy.of(algorithm, learner, depends, made).save(file)
     print(file)
-    print(f"how good it is on states it has not seen: ig2mj evaluate {file}", file=sys.stderr)
+    print(f"to measure it on states it has not seen: ig2mj evaluate {file}", file=sys.stderr)
     return 0

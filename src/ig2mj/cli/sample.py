@@ -65,7 +65,7 @@ def run(
     loaded = load_scene(scene, objects=add)
     if disturb:
         if cluster is not None or resume:
-            raise Ig2mjError("--disturb: each state goes on from the one before, on this machine's threads (--jobs)")
+            raise Ig2mjError("--disturb: each state continues from the one before, so it is done here, in one piece")
         return _disturb(loaded, count, file, seed, share, jobs)
     return _sample(loaded, conditions, count, file, seed, where, json)
 

@@ -177,7 +177,7 @@ def run(
             return 0
         films.offer(best.file, result.row["seconds"], last=True)
         print(best.file)
-        print(f"how good it is on states it has not seen: ig2mj evaluate {best.file}", file=sys.stderr)
+        print(f"to measure it on states it has not seen: ig2mj evaluate {best.file}", file=sys.stderr)
         return 0
 
 

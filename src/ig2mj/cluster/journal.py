@@ -83,8 +83,8 @@ class Journal:
         file = self.folder / "request.json"
         if (self.folder / "done.jsonl").exists():  # else there is nothing to go on with
             if not resume:
-                fix = f"--resume goes on with it; to begin anew, remove {self.folder}"
-                raise InputError(self.out, "a run of this was broken off", fix=fix)
+                fix = f"--resume continues it; to start over, remove {self.folder}"
+                raise InputError(self.out, "an earlier run of this was interrupted", fix=fix)
             self._compare(file)
             self._read()
             return
@@ -102,7 +102,7 @@ class Journal:
             if known.get(name) != wanted.get(name):
                 was, now = (json.dumps(r.get(name))[:80] for r in (known, wanted))
                 fix = f"to begin anew, remove {self.folder}"
-                problem = f"the run that was broken off had {name} = {was}, and here it is {now}"
+                problem = f"the interrupted run had {name} = {was}, and here it is {now}"
                 raise InputError(self.out, problem, fix=fix)
 
     def _read(self) -> None:

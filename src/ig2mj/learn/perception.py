@@ -72,7 +72,7 @@ class Perception:
         self.picture_shape = None
         if mode == "rgbd":
             if not self._pictures:
-                raise Ig2mjError("pixels are wanted, but the environment observes neither rgb nor depth")
+                raise Ig2mjError("pixels were requested, but the environment observes neither rgb nor depth")
             side = spaces[self._pictures[0]].shape[0]
             if size < 1 or side % size:
                 raise Ig2mjError(f"pictures of {side} pixels cannot be averaged down to {size}")

@@ -30,7 +30,7 @@ def write_of_pose(scene: Scene, name: str, pos: Vector, quat: Vector) -> Write:
     turn = _finite(quat, 4, f"rotation of object '{name}'")
     length = float(np.linalg.norm(turn))
     if length < 1e-6:
-        raise PoseError(f"the rotation of object '{name}' is the zero quaternion (w, x, y, z is wanted)")
+        raise PoseError(f"the rotation of object '{name}' is the zero quaternion (give w, x, y, z)")
     mask, at, to = np.zeros((1, number), bool), np.zeros((1, number, 3)), np.zeros((1, number, 4))
     mask[0, index], at[0, index], to[0, index] = True, place, turn / length
     return Write(object_mask=mask, object_pos=at, object_quat=to)
