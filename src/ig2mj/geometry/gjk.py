@@ -22,6 +22,7 @@ from ig2mj.geometry.hulls import core_radius, core_support
 from ig2mj.geometry.poses import (
     AnyArray,
     length,
+    namespace,
     normalize,
     quat_normalize,
     quat_rotate,
@@ -76,21 +77,50 @@ class Nearest:
 
 def piece_distance(a: PosedPieces, b: PosedPieces) -> Nearest:
     """Distance and nearest points of each pair of pieces (leading axes of `a` and `b` broadcast); NaN for NaN poses."""
-    core_a, core_b, apart = _core_witnesses(*jax.lax.stop_gradient((a, b)))
-    world_a = jnp.add(a.pos, quat_rotate(a.quat, core_a))
-    world_b = jnp.add(b.pos, quat_rotate(b.quat, core_b))
-    away = world_a - world_b
+    most = max(a.vertices.shape[-2], b.vertices.shape[-2])
+
+    def joined(x: AnyArray, y: AnyArray, own: int) -> AnyArray:
+        """The two side by side; `own`: the axes of one piece's value."""
+        lead = np.broadcast_shapes(x.shape[: x.ndim - own], y.shape[: y.ndim - own])
+        xp = namespace(x, y)
+        return xp.stack([xp.broadcast_to(v, (*lead, *v.shape[v.ndim - own :])) for v in (x, y)], axis=len(lead))
+
+    def with_vertices(piece: PosedPieces) -> AnyArray:
+        """Padded by repetition to the larger number."""
+        values = piece.vertices
+        return values[..., np.minimum(np.arange(most), values.shape[-2] - 1), :] if values.shape[-2] < most else values
+
+    return pair_distance(
+        PosedPieces(
+            kind=joined(a.kind, b.kind, 0),
+            size=joined(a.size, b.size, 1),
+            vertices=joined(with_vertices(a), with_vertices(b), 2),
+            pos=joined(a.pos, b.pos, 1),
+            quat=joined(a.quat, b.quat, 1),
+        )
+    )
+
+
+def pair_distance(pairs: PosedPieces) -> Nearest:
+    """As `piece_distance` of pieces that stand side by side: the last leading axis holds the two pieces of a pair.
+
+    Side by side, both pieces are one operation in all that is done with each, which halves the time to compile.
+    """
+    cores, apart = _core_witnesses(jax.lax.stop_gradient(pairs))
+    world = jnp.add(pairs.pos, quat_rotate(pairs.quat, cores))
+    away = world[..., 0, :] - world[..., 1, :]
     reach = length(away)
-    radius_a, radius_b = core_radius(a.kind, a.size), core_radius(b.kind, b.size)
-    distance = jnp.where(apart, reach - radius_a - radius_b, 0.0 * reach)
+    radii = core_radius(pairs.kind, pairs.size)
+    radius_a, both = radii[..., 0], jnp.sum(radii, axis=-1)
+    distance = jnp.where(apart, reach - both, 0.0 * reach)
     unit = normalize(away)
     # Where the roundings overlap the surface points are pulled together to one point of the overlap.
     excess = jnp.minimum(distance, 0.0)
-    share = radius_a / jnp.where(radius_a + radius_b > 0.0, radius_a + radius_b, 1.0)
+    share = radius_a / jnp.where(both > 0.0, both, 1.0)
     return Nearest(
         distance=jnp.maximum(distance, 0.0),
-        point_a=world_a - unit * (radius_a + excess * share)[..., None],
-        point_b=world_b + unit * (radius_b + excess * (1.0 - share))[..., None],
+        point_a=world[..., 0, :] - unit * (radius_a + excess * share)[..., None],
+        point_b=world[..., 1, :] + unit * (radii[..., 1] + excess * (1.0 - share))[..., None],
         overlap=distance <= 0.0,
     )
 
@@ -108,50 +138,53 @@ def point_distance(point: Float[AnyArray, "*#b 3"], piece: PosedPieces) -> Neare
     return piece_distance(as_piece, piece)
 
 
-def _core_witnesses(
-    a: PosedPieces, b: PosedPieces
-) -> tuple[Float[Array, "*b 3"], Float[Array, "*b 3"], Bool[Array, "*b"]]:
+def _core_witnesses(pairs: PosedPieces) -> tuple[Float[Array, "*b 2 3"], Bool[Array, "*b"]]:
     """Nearest points of the cores, each in its own piece's frame, and whether the cores are apart."""
-    pos, quat = relative_pose(a.pos, a.quat, b.pos, b.quat)
+    (pos_a, pos_b), (quat_a, quat_b) = ([field[..., i, :] for i in range(2)] for field in (pairs.pos, pairs.quat))
+    pos, quat = relative_pose(pos_a, quat_a, pos_b, quat_b)
     quat = quat_normalize(quat)
+    shape = np.broadcast_shapes(pos.shape[:-1], pairs.kind.shape[:-1])
 
     def support(direction: Array) -> Array:
         """Points of a and of b, in a's frame, that are farthest along and against `direction`: [..., 2, 3]."""
-        of_a = core_support(a.kind, a.size, a.vertices, direction)
-        of_b = core_support(b.kind, b.size, b.vertices, quat_rotate_inverse(quat, -direction))
-        return jnp.stack([of_a, pos + quat_rotate(quat, of_b)], axis=-2)
+        along = jnp.stack([direction, quat_rotate_inverse(quat, -direction)], axis=-2)
+        found = core_support(pairs.kind, pairs.size, pairs.vertices, along)
+        return jnp.stack([found[..., 0, :], pos + quat_rotate(quat, found[..., 1, :])], axis=-2)
 
     def step(state: tuple) -> tuple:
         count, points, weights, done, overlap = state
         nearest = _weighted(points, weights)
         v = nearest[..., 0, :] - nearest[..., 1, :]
         new = support(-v)
+        # The first turn finds the first supporting point, which takes all places; the frames' origins only gave its
+        # direction. Found before the loop, it would be compiled twice.
+        first = count == 0
         # v.w/|v| bounds the distance from below for the support point w.
         bound = jnp.sum(v * (v - new[..., 0, :] + new[..., 1, :]), axis=-1) / jnp.maximum(length(v), OVERLAP)
-        done = done | ~(bound > CONVERGED)
-        slot = jax.nn.one_hot(jnp.argmin(weights, axis=-1), 4, dtype=bool)
+        done = done | (~(bound > CONVERGED) & ~first)
+        slot = jax.nn.one_hot(jnp.argmin(weights, axis=-1), 4, dtype=bool) | first
         # Points that carry no weight become copies of one that does: the simplex holds supporting points only.
         kept = jnp.take_along_axis(points, jnp.argmax(weights, axis=-1)[..., None, None, None], axis=-3)
         simplex = jnp.where((weights > 0.0)[..., None, None], points, kept)
         simplex = jnp.where(slot[..., None, None], new[..., None, :, :], simplex)
         candidate, enclosed = _nearest_weights(simplex[..., 0, :] - simplex[..., 1, :])
+        enclosed &= ~first
         moved = _weighted(simplex, candidate)
         shorter = length(moved[..., 0, :] - moved[..., 1, :]) < length(v)
-        take = ~done & (shorter | enclosed)
+        take = ~done & (shorter | enclosed | first)
         points = jnp.where(take[..., None, None, None], simplex, points)
-        weights = jnp.where(take[..., None], candidate, weights)
+        weights = jnp.where((take & ~first)[..., None], candidate, weights)
         ended = done | ~take | enclosed
         return count + 1, points, weights, ended, overlap | (take & enclosed)
 
-    shape = jnp.broadcast_shapes(a.pos.shape[:-1], b.pos.shape[:-1], a.kind.shape, b.kind.shape)
-    first = jnp.broadcast_to(support(jnp.broadcast_to(pos, (*shape, 3)))[..., None, :, :], (*shape, 4, 2, 3))
+    origins = jnp.broadcast_to(jnp.stack([jnp.zeros_like(pos), pos], axis=-2)[..., None, :, :], (*shape, 4, 2, 3))
     weights = jnp.broadcast_to(jnp.array([1.0, 0.0, 0.0, 0.0]), (*shape, 4))
-    start = (0, first, weights, jnp.zeros(shape, bool), jnp.zeros(shape, bool))
-    _, points, weights, _, overlap = jax.lax.while_loop(lambda s: (s[0] < MAX_STEPS) & ~jnp.all(s[3]), step, start)
+    start = (0, origins, weights, jnp.zeros(shape, bool), jnp.zeros(shape, bool))
+    _, points, weights, _, overlap = jax.lax.while_loop(lambda s: (s[0] <= MAX_STEPS) & ~jnp.all(s[3]), step, start)
     core = _weighted(points, weights)
     # `~(<=)` so that NaN counts as apart and shows in the distance.
     apart = ~(overlap | (length(core[..., 0, :] - core[..., 1, :]) <= OVERLAP))
-    return core[..., 0, :], quat_rotate_inverse(quat, core[..., 1, :] - pos), apart
+    return jnp.stack([core[..., 0, :], quat_rotate_inverse(quat, core[..., 1, :] - pos)], axis=-2), apart
 
 
 def _weighted(points: Float[Array, "*b 4 2 3"], weights: Float[Array, "*b 4"]) -> Float[Array, "*b 2 3"]:

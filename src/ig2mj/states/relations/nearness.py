@@ -22,7 +22,7 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.boxes import box_gap
-from ig2mj.geometry.gjk import PosedPieces, piece_distance
+from ig2mj.geometry.gjk import PosedPieces, pair_distance
 from ig2mj.geometry.poses import AnyArray, compose, quat_rotate, quat_to_matrix
 from ig2mj.scene.tables import SceneTables
 from ig2mj.states.model import StateModel
@@ -95,7 +95,8 @@ class NearPairs:
         numbers = jnp.nonzero(mask, size=total, fill_value=total)[0]
         numbers = jnp.concatenate([numbers, jnp.full(chunk, total)])
         most = limit(view, self.pairs).T.reshape(-1)
-        poses = jax.lax.stop_gradient((jnp.asarray(view.body_pos), jnp.asarray(view.body_quat)))
+        poses = jnp.concatenate([jnp.asarray(view.body_pos), jnp.asarray(view.body_quat)], axis=-1)
+        poses = jax.lax.stop_gradient(poses)
 
         def some(turn: Int[jax.Array, ""], found: Bool[jax.Array, "M"]) -> Bool[jax.Array, "M"]:
             number = jax.lax.dynamic_slice(numbers, (turn * chunk,), (chunk,))
@@ -109,7 +110,7 @@ class NearPairs:
 
     def _of_rows(
         self,
-        poses: tuple[Float[Array, "W B 3"], Float[Array, "W B 4"]],
+        poses: Float[Array, "W B 7"],
         world: Int[Array, "C"],
         pair: Int[Array, "C"],
         most: Float[Array, "C"],
@@ -117,10 +118,11 @@ class NearPairs:
     ) -> Bool[Array, "C"]:
         """Whether the closest points of chosen pairs in chosen worlds are less than `most` metres apart."""
         shapes = _Shapes.of(self.model.tables)
-        first, second = jnp.asarray(self.first)[pair], jnp.asarray(self.second)[pair]  # [C, S] each
-        low_a, high_a = shapes.boxes(*shapes.posed(poses, world[:, None], first), first)
-        low_b, high_b = shapes.boxes(*shapes.posed(poses, world[:, None], second), second)
-        gap = box_gap(low_a[:, :, None], high_a[:, :, None], low_b[:, None], high_b[:, None])
+        of_a = self.first.shape[1]
+        pieces = jnp.concatenate([jnp.asarray(self.first), jnp.asarray(self.second)], axis=1)[pair]  # [C, S + T]
+        first, second = pieces[:, :of_a], pieces[:, of_a:]
+        low, high = shapes.boxes(poses, world[:, None], pieces)
+        gap = box_gap(low[:, :of_a, None], high[:, :of_a, None], low[:, None, of_a:], high[:, None, of_a:])
         close = (gap < most[:, None, None] + ROUNDING) & (valid[:, None] & (first >= 0))[:, :, None]
         close &= (second >= 0)[:, None]
         size = close.size
@@ -131,10 +133,10 @@ class NearPairs:
         def some(turn: Int[jax.Array, ""], found: Bool[jax.Array, "C"]) -> Bool[jax.Array, "C"]:
             number = jax.lax.dynamic_slice(listed, (turn * block,), (block,))
             row, i, j = jnp.unravel_index(jnp.minimum(number, size - 1), close.shape)
-            a, b = first[row, i], second[row, j]
+            both = pieces[row[:, None], jnp.stack([i, of_a + j], axis=-1)]
             # The barrier keeps XLA from repeating the gathers in everything that reads a piece.
-            both = jax.lax.optimization_barrier(tuple(shapes.pieces(poses, world[row], x) for x in (a, b)))
-            distance = piece_distance(*both).distance
+            chosen = jax.lax.optimization_barrier(shapes.pieces(poses, world[row][:, None], both))
+            distance = pair_distance(chosen).distance
             return found.at[jnp.where(number < size, row, len(found))].max(distance < most[row], mode="drop")
 
         turns = (jnp.sum(close) + block - 1) // block
@@ -143,41 +145,46 @@ class NearPairs:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class _Shapes:
-    """The scene's pieces as arrays that may be indexed while tracing; an index of -1 gives any of them."""
+    """The scene's pieces as arrays that may be indexed while tracing; an index of -1 gives any of them.
 
-    tables: SceneTables
-    center: Float[np.ndarray, "K 3"]
-    half: Float[np.ndarray, "K 3"]
+    Few arrays: each gather is a kernel to compile.
+
+    Attributes:
+      numbers: pose in the body (7), middle and half extents of the piece's own box (3, 3), size (3). names: body, kind.
+    """
+
+    numbers: Float[np.ndarray, "K 16"]
+    names: Int[np.ndarray, "K 2"]
+    vertices: Float[np.ndarray, "K V 3"]
 
     @classmethod
     def of(cls, tables: SceneTables) -> _Shapes:
         low, high = tables.piece_vertices.min(axis=1), tables.piece_vertices.max(axis=1)
-        return cls(tables, ((low + high) / 2).astype(np.float32), ((high - low) / 2).astype(np.float32))
+        numbers = [tables.piece_pos, tables.piece_quat, (low + high) / 2, (high - low) / 2, tables.piece_size]
+        names = np.stack([tables.piece_body, tables.piece_kind], axis=-1).astype(np.int32)
+        return cls(np.concatenate(numbers, axis=-1).astype(np.float32), names, tables.piece_vertices.astype(np.float32))
 
-    def posed(
-        self, poses: tuple[Array, Array], world: Int[Array, "*#b"], piece: Int[Array, "*#b"]
-    ) -> tuple[Float[Array, "*b 3"], Float[Array, "*b 4"]]:
-        """World poses of pieces."""
-        t, body = self.tables, jnp.asarray(self.tables.piece_body)[piece]
-        local = [jnp.asarray(x.astype(np.float32))[piece] for x in (t.piece_pos, t.piece_quat)]
-        return compose(poses[0][world, body], poses[1][world, body], *local)
+    def _posed(
+        self, poses: Float[Array, "W B 7"], world: Int[Array, "*#b"], piece: Int[Array, "*b"]
+    ) -> tuple[Float[Array, "*b 16"], Int[Array, "*b 2"], Float[Array, "*b 3"], Float[Array, "*b 4"]]:
+        """Rows of `numbers` and `names`, and world poses."""
+        numbers, names = jnp.asarray(self.numbers)[piece], jnp.asarray(self.names)[piece]
+        body = poses[world, names[..., 0]]
+        pos, quat = compose(body[..., :3], body[..., 3:], numbers[..., :3], numbers[..., 3:7])
+        return numbers, names, pos, quat
 
     def boxes(
-        self, pos: Float[Array, "*b 3"], quat: Float[Array, "*b 4"], piece: Int[Array, "*b"]
+        self, poses: Float[Array, "W B 7"], world: Int[Array, "*#b"], piece: Int[Array, "*b"]
     ) -> tuple[Float[Array, "*b 3"], Float[Array, "*b 3"]]:
         """World boxes around the pieces' own boxes."""
-        middle = pos + quat_rotate(quat, jnp.asarray(self.center)[piece])
-        reach = jnp.sum(jnp.abs(quat_to_matrix(quat)) * jnp.asarray(self.half)[piece][..., None, :], axis=-1)
+        numbers, _, pos, quat = self._posed(poses, world, piece)
+        middle = pos + quat_rotate(quat, numbers[..., 7:10])
+        reach = jnp.sum(jnp.abs(quat_to_matrix(quat)) * numbers[..., None, 10:13], axis=-1)
         return middle - reach, middle + reach
 
-    def pieces(self, poses: tuple[Array, Array], world: Int[Array, "N"], piece: Int[Array, "N"]) -> PosedPieces:
-        """What `piece_distance` takes."""
-        t = self.tables
-        pos, quat = self.posed(poses, world, piece)
+    def pieces(self, poses: Float[Array, "W B 7"], world: Int[Array, "*#b"], piece: Int[Array, "*b"]) -> PosedPieces:
+        """What `pair_distance` takes."""
+        numbers, names, pos, quat = self._posed(poses, world, piece)
         return PosedPieces(
-            kind=jnp.asarray(t.piece_kind)[piece],
-            size=jnp.asarray(t.piece_size.astype(np.float32))[piece],
-            vertices=jnp.asarray(t.piece_vertices.astype(np.float32))[piece],
-            pos=pos,
-            quat=quat,
+            kind=names[..., 1], size=numbers[..., 13:16], vertices=jnp.asarray(self.vertices)[piece], pos=pos, quat=quat
         )
