@@ -98,7 +98,7 @@ def play_part(part: Part) -> dict[str, Any]:
     env = ig2mj.make(part.task, part.robot, part.count, "native", part.grasping, **settings)
     done = play(env, expert_of(env), part.count, in_order=True, first=part.first)
     metrics = env.metrics(done.state)
-    task = variant(ACTIVITIES[part.task], part.variant)
+    task = variant(ACTIVITIES[part.task], part.variant, part.grasping)
     return {
         "task": part.task,
         "robot": part.robot,
@@ -122,13 +122,14 @@ def min_pool(episodes: int) -> int:
     return max(32, episodes)
 
 
-def make_pools(names: list[str], variants: list[int], episodes: int, jobs: int) -> None:
+def make_pools(names: list[str], variants: list[int], modes: list[str], episodes: int, jobs: int) -> None:
     """Samples the pools that are not in the cache, side by side."""
     from ig2mj.tasks.activities import ACTIVITIES
-    from ig2mj.tasks.pools import pool_of, sampling_processes
+    from ig2mj.tasks.pools import bare_scene, pool_file, pool_of, sampling_processes
     from ig2mj.tasks.variants import variant
 
-    tasks = [variant(ACTIVITIES[name], number) for name in names for number in variants]
+    every = [variant(ACTIVITIES[name], number, mode) for name in names for number in variants for mode in modes]
+    tasks = list({pool_file(task, bare_scene(task), "held_out").name: task for task in every}.values())
     with (
         sampling_processes(jobs) as workers,
         concurrent.futures.ThreadPoolExecutor(len(tasks)) as threads,
@@ -211,7 +212,7 @@ def measure(options: argparse.Namespace) -> int:
     if todo:
         names = dict.fromkeys(part.task for part in todo)
         numbers = ["--episodes", str(options.episodes), "--jobs", str(options.jobs), "--variants"]
-        numbers += map(str, options.variants)
+        numbers += [*map(str, options.variants), "--grasping", *options.grasping]
         command = [sys.executable, __file__, "--pools", *numbers, "--tasks", *names]
         with contextlib.suppress(subprocess.TimeoutExpired):
             subprocess.run(command, env=os.environ | ONE_THREAD, timeout=60 * options.minutes)
@@ -261,7 +262,7 @@ def main() -> int:
     if unknown:
         parser.error(f"no such tasks: {', '.join(sorted(unknown))}; there are {', '.join(ACTIVITIES)}")
     if options.pools:
-        make_pools(options.tasks, options.variants, options.episodes, options.jobs)
+        make_pools(options.tasks, options.variants, options.grasping, options.episodes, options.jobs)
         return 0
     return measure(options)
 

@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
+import trimesh
 
 from ..objects.model import HouseholdObject, LinkBuilder, hull_mesh
 from ..objects.stable_poses import stable_orientations
@@ -52,6 +53,8 @@ def urdf(model: HouseholdObject, visuals: dict[str, list[str]]) -> str:
     lines = ['<?xml version="1.0" ?>', f"<robot name={quoteattr(model.model)}>"]
     for link in model.links:
         lines.append(f'  <link name="{link.name}">')
+        if model.mass is not None:
+            lines.append(f"    {_inertial(link, model.mass)}")
         for file in visuals[link.name]:
             lines.append(_mesh_element("visual", f"shape/visual/{file}"))
         lines.append(_mesh_element("collision", f"shape/collision/{link.name}_cm.obj"))
@@ -69,6 +72,21 @@ def urdf(model: HouseholdObject, visuals: dict[str, list[str]]) -> str:
             lines.append(f'    <dynamics damping="0" friction="{number(joint.friction, 3)}"/>')
         lines.append("  </joint>")
     return "\n".join([*lines, "</robot>", ""])
+
+
+def _inertial(link: LinkBuilder, mass: float) -> str:
+    """The inertia of a link that weighs `mass` kg, filled evenly."""
+    solid = trimesh.Trimesh()
+    for points in link.hulls:
+        solid += hull_mesh(points)
+    solid.density = mass / solid.volume
+    ((xx, xy, xz), (_, yy, yz), (_, _, zz)) = solid.moment_inertia
+    names = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+    inertia = " ".join(
+        f'{name}="{number(value, 9)}"' for name, value in zip(names, (xx, xy, xz, yy, yz, zz), strict=True)
+    )
+    centre, kilograms = numbers(solid.center_mass), number(mass)
+    return f'<inertial><origin xyz="{centre}"/><mass value="{kilograms}"/><inertia {inertia}/></inertial>'
 
 
 def metadata(model: HouseholdObject) -> dict:

@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
+import math
+from typing import Any
+
+import numpy as np
+
 from ..shapes import materials, textures
-from ..shapes.bricks import box, cylinder, join, sheet, soft_box
+from ..shapes.bricks import box, cylinder, join, rod, sheet, soft_box, tube
 from ..shapes.materials import Material
 from .entry import Entry
 from .model import ObjectBuilder
+
+ROLLED = 5
+"""Number of the first rolled bath towel. Only the object library has such."""
+
+ROLLED_DENSITY = 330.0
+"""kg/m^3 of a cloth that is tightly rolled up; folded, a category's mean applies to the box around it."""
 
 
 def cloth(b: ObjectBuilder, kind: str | None = None) -> Material:
@@ -43,6 +54,35 @@ def folded(b: ObjectBuilder, *, layers: int = 4, kind: str | None = None, wipes:
     b.add(join(pile) + box(x, y, z).collision_only(), look)
     if wipes:
         b.area("cleaning_tool_area", (x * 0.98, y * 0.98, 0.2 * z), (0, 0, 0.1 * z))
+
+
+def bath_towel(b: ObjectBuilder, **options: Any) -> None:
+    """Folded; from number `ROLLED` on rolled up and standing on end, so that two fingers can take it."""
+    if b.index < ROLLED:
+        folded(b, **options)
+        return
+    x, y, z = b.size
+    b.rest = "standing"
+    rolled(b, 0.112 * (x + y), 2.1 * z)
+
+
+def rolled(b: ObjectBuilder, across: float, height: float) -> None:
+    """A cloth rolled up, standing on end; its mantle wipes. across: diameter, m."""
+    r, thick = across / 2, 0.006
+    b.mass = ROLLED_DENSITY * math.pi * r**2 * height
+    look = cloth(b, "plain")
+    b.add(cylinder(r, height, 24), look)
+    turns = [
+        (d * math.cos(a), d * math.sin(a), height - 0.001)
+        for a in np.linspace(0.5 * math.pi, 7 * math.pi, 40)
+        for d in (thick * a / (2 * math.pi) + 0.002,)
+        if d < r - 0.004
+    ]
+    edge = tube(turns, 0.0022, 6, None).seen()
+    b.add(edge, look)
+    b.add(edge.at(z=0.002 - height), look)
+    b.add(rod((r - 0.001, 0, 0.002), (r - 0.001, 0, height - 0.002), 0.0028).seen(), look)
+    b.area("cleaning_tool_area", (1.3 * r, 1.3 * r, height * 0.98), (0, 0, height / 2))
 
 
 def kitchen_roll(b: ObjectBuilder) -> None:
@@ -101,7 +141,7 @@ def mat(b: ObjectBuilder) -> None:
 CATEGORIES = [
     Entry("dishtowel", spread, (0.450, 0.300, 0.014), 0.08, 5, vary=0.1, options={"wipes": True}),
     Entry("hand_towel", folded, (0.200, 0.280, 0.040), 0.18, 5, options={"wipes": True}),
-    Entry("bath_towel", folded, (0.300, 0.360, 0.090), 0.55, 5, options={"wipes": True, "layers": 5}),
+    Entry("bath_towel", bath_towel, (0.300, 0.360, 0.090), 0.55, ROLLED, extra=3, options={"wipes": True, "layers": 5}),
     Entry("rag", spread, (0.320, 0.280, 0.018), 0.05, 5, vary=0.12, options={"wipes": True}),
     Entry("dinner_napkin", folded, (0.190, 0.190, 0.008), 0.035, 3, options={"wipes": True, "layers": 3}),
     Entry("paper_towel", kitchen_roll, (0.120, 0.120, 0.260), 0.25, 3, rest="standing", uniform=True),

@@ -75,6 +75,7 @@ class HouseholdObject:
 
     rest: which orientations it can be put down in: "upright", "standing" or "any" (see poses.stable_orientations).
     furniture: it stands fixed in a room, and its model says where objects can be put (see height_maps.py).
+    mass: kg, of an object of one link, where the density of its category does not suit it.
     """
 
     category: str
@@ -85,6 +86,7 @@ class HouseholdObject:
     rest: str
     both_sides: bool = False
     furniture: bool = False
+    mass: float | None = None
     parts: list[Part] = dataclasses.field(default_factory=list)
 
     @property
@@ -116,6 +118,7 @@ class ObjectBuilder:
         self.joints: list[Joint] = []
         self.areas: dict[str, Area] = {}
         self.both_sides = False
+        self.mass: float | None = None
 
     # --- shapes -------------------------------------------------------------------------------------------------
 
@@ -181,9 +184,11 @@ class ObjectBuilder:
     def finish(self) -> HouseholdObject:
         for link in self.links:
             assert link.hulls, f"{self.category}/{self.model}: link {link.name} has no collision"
-        return HouseholdObject(
+        made = HouseholdObject(
             self.category, self.model, self.links, self.joints, self.areas, self.rest, self.both_sides
         )
+        made.mass = self.mass
+        return made
 
 
 def hull_mesh(points: np.ndarray) -> trimesh.Trimesh:

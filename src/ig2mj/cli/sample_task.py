@@ -19,6 +19,7 @@ def run(
     jobs: int = 0,
     anew: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     variant: int = 0,
+    grasping: str = "mitten",
     hashes: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
 ) -> int:
     """Sample the start states of an environment and store them where `ig2mj.make` finds them.
@@ -33,9 +34,11 @@ def run(
       jobs: number of processes; 0: one per processor.
       anew: sample again even if the pool exists.
       variant: variant of the activity's objects: 1 and 2 use other models of the same categories.
+      grasping: physical: objects that fit between two fingers, for activities that have them (TASK all: both).
       hashes: JSON file to which the pools' hashes are added, keyed by file name, in the form of
         src/ig2mj/tasks/pool_hashes.json.
     """
+    from ig2mj.agents.grasping import MODES
     from ig2mj.envs.registry import find_task
     from ig2mj.errors import Ig2mjError, UnknownNameError
     from ig2mj.tasks.activities import ACTIVITIES
@@ -45,13 +48,16 @@ def run(
 
     if count < 0 or jobs < 0:
         raise Ig2mjError(f"--count {count}, --jobs {jobs}: neither can be negative")
+    if grasping not in MODES:
+        raise UnknownNameError("grasping mode", grasping, MODES)
     if task == "all":
         tasks = [task_variant(each, variant) for each in ACTIVITIES.values()]
+        tasks += [task_variant(each, variant, "physical") for each in ACTIVITIES.values() if each.physical is not None]
         return _keep([(each, part) for part in COUNT for each in tasks], count, jobs, anew, hashes)
     found = find_task(task)
     if not isinstance(found, Task):
         raise UnknownNameError("task with a pool of start states", task, ACTIVITIES)
-    return _keep([(task_variant(found, variant), split)], count, jobs, anew, hashes)
+    return _keep([(task_variant(found, variant, grasping), split)], count, jobs, anew, hashes)
 
 
 def _keep(wanted: list[tuple[Task, str]], count: int, jobs: int, anew: bool, hashes: pathlib.Path | None) -> int:

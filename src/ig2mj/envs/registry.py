@@ -114,14 +114,14 @@ def make(
       EngineError: the engine cannot do what is asked.
     """
     task = name if isinstance(name, AnyTask) else find_task(name)
-    if variant:
-        if not isinstance(task, Task):
-            raise EngineError(f"variant {variant} of {task.name}: only the paper's activities have variants")
-        task = task_variant(task, variant)
-    robot = next(iter(task.robots)) if robot is None else robot
     mode = task.grasping if grasping is None else grasping
     if mode not in MODES:
         raise UnknownNameError("grasping mode", mode, MODES)
+    if isinstance(task, Task):
+        task = task_variant(task, variant, mode)
+    elif variant:
+        raise EngineError(f"variant {variant} of {task.name}: only the paper's activities have variants")
+    robot = next(iter(task.robots)) if robot is None else robot
     if worlds < 1:
         raise EngineError(f"worlds = {worlds}: an environment has at least one")
     if pool_size is not None and pool_size < 1:

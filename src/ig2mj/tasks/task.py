@@ -100,6 +100,19 @@ class Near:
 
 
 @dataclasses.dataclass(frozen=True)
+class Physical:
+    """What is different in an activity where nothing holds but friction: objects that fit between two fingers.
+
+    Attributes:
+      objects: for each variant (`ig2mj.tasks.variants`) what is added to the home in the place of the task's `objects`.
+      near: restrictions of start states in the place of the task's.
+    """
+
+    objects: tuple[tuple[str, ...], ...]
+    near: tuple[Near, ...]
+
+
+@dataclasses.dataclass(frozen=True)
 class Task:
     """See the module's text.
 
@@ -115,6 +128,7 @@ class Task:
       stains_of: object whose stains are counted in the reward, or None.
       robots: name of each robot that can do it, and how it takes part.
       horizon: agent steps until an episode is truncated. grasping: mode unless another is asked for.
+      physical: what is different with "physical" grasping; None: nothing.
     """
 
     name: str
@@ -132,6 +146,7 @@ class Task:
     upright: tuple[str, ...] = ()
     horizon: int = HORIZON
     grasping: str = "mitten"
+    physical: Physical | None = None
 
     def acts(self, robot: str) -> Acts:
         """How a robot takes part. Raises UnknownNameError."""

@@ -4,6 +4,8 @@
 
 All worlds of an environment are one compiled scene, so that they share their models: a policy that is to work with
 several is trained in several environments, or judged in one whose variant it has not seen.
+
+With "physical" grasping some activities have objects of their own, which fit between two fingers (`Task.physical`).
 """
 
 from __future__ import annotations
@@ -20,25 +22,33 @@ from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.paths import scene_folder
 from ig2mj.tasks.task import Task
 
+MOST = 3
+"""Variants of a task, its own objects included. Further models in the library serve other ends."""
+
 
 def variants(task: Task) -> int:
     """How many variants a task has, its own objects included: as many as there are models of each category."""
-    return min((len(library().get(category, ())) for category in _categories(task)), default=1)
+    return min((MOST, *(len(library().get(category, ())) for category in _categories(task))))
 
 
-def variant(task: Task, number: int) -> Task:
+def variant(task: Task, number: int, grasping: str = "mitten") -> Task:
     """The task with the models of this number of all that was added to the home for it; 0: the task as it is.
 
     Where the task is about an object of the home's own, another model is added that takes its part; the home's stays
     where it is, since nothing is removed from homes. What has a fixed place stays, too.
 
+    Args:
+      grasping: mode; with "physical" the objects are those of `Task.physical`, where the task has such.
+
     Raises:
       EngineError: it has no such variant.
     """
+    if number and not 0 < number < variants(task):
+        raise EngineError(f"variant {number} of {task.name}: there are 0 to {variants(task) - 1}")
+    if grasping == "physical" and task.physical is not None:
+        return dataclasses.replace(task, objects=task.physical.objects[number], near=task.physical.near)
     if number == 0:
         return task
-    if not 0 < number < variants(task):
-        raise EngineError(f"variant {number} of {task.name}: there are 0 to {variants(task) - 1}")
 
     def model(category: str) -> str:
         return f"{category}/{list(library()[category])[number]}"

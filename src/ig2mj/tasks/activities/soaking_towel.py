@@ -1,9 +1,13 @@
-"""Soaking Towel: a towel on the dishwasher must be held under a tap that runs."""
+"""Soaking Towel: a towel on the dishwasher must be held under a tap that runs.
+
+Towels are rigid, and folded flat they are wider than Fetch's gripper opens. With "physical" grasping the towel is
+rolled up and stands on end, 7 cm across and 19 cm high.
+"""
 
 from __future__ import annotations
 
 from ig2mj.tasks.points import At, Hand, Water
-from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, Acts, Near, Task
+from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, Acts, Near, Physical, Task
 
 SOAKING_TOWEL = Task(
     name="SoakingTowel",
@@ -20,4 +24,8 @@ SOAKING_TOWEL = Task(
         "humanoid": Acts((2.95, -2.95, 0.55), yaw=-45.0, hands=RIGHT, weights=HUMANOID_WEIGHTS),
         "fetch": Acts((2.78, -2.92, 0.0), yaw=-60.0),
     },
+    physical=Physical(
+        tuple((f"bath_towel/bath_towel_{number:02d}",) for number in (5, 6, 7)),
+        near=(Near("bath_towel_0", (3.3, -2.9, 0.95), most=0.55),),
+    ),
 )

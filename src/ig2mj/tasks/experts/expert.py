@@ -86,7 +86,7 @@ class Expert:
             self.task.objects_of_interest,
             self._hands,
             self._grips,
-            self.grasping == "physical",
+            self.grasping,
         )
         base = jnp.asarray(view.agent.base_quat)[:, 0]
         return jnp.concatenate([self._action(base, wish) for wish in self._plan(see)], axis=1)

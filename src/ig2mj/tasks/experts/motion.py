@@ -10,7 +10,14 @@ from flax import struct
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array
-from ig2mj.geometry.poses import length, quat_rotate
+from ig2mj.geometry.poses import (
+    axis_angle_to_quat,
+    length,
+    quat_conjugate,
+    quat_multiply,
+    quat_rotate,
+    quat_to_rotation_vector,
+)
 
 NEAR, BLEND = 0.03, 0.06
 """m: horizontal distance to a goal within which a hand goes straight down, and over which it comes down to that."""
@@ -101,6 +108,24 @@ def outward(quat: Float[Array, "W 4"], offset: Float[Array, "W 3"]) -> Float[Arr
     across = ahead[:, 0] * offset[:, 1] - ahead[:, 1] * offset[:, 0]
     along = ahead[:, 0] * offset[:, 0] + ahead[:, 1] * offset[:, 1]
     return jnp.zeros_like(offset).at[:, 2].set(jnp.arctan2(across, along))
+
+
+def pointing(quat: Float[Array, "W 4"], direction: Float[Array, "W 3"], pitch: float) -> Float[Array, "W 3"]:
+    """The rotation vector by which a gripper comes to point along a direction, and down by `pitch`, its fingers side by
+    side; either way up, whichever is nearer.
+
+    Args:
+      quat: of the gripper, whose x axis points ahead and whose fingers are at +-y. direction: its z does not count.
+    """
+    yaw = jnp.arctan2(direction[:, 1], direction[:, 0])
+    up = jnp.array([0.0, 0.0, 1.0])
+    level = axis_angle_to_quat(up, yaw)
+    wanted = quat_multiply(level, axis_angle_to_quat(jnp.array([0.0, 1.0, 0.0]), jnp.full_like(yaw, pitch)))
+    left = quat_rotate(level, jnp.array([0.0, 1.0, 0.0]))
+    upside_down = jnp.sum(left * quat_rotate(quat, jnp.array([0.0, 1.0, 0.0])), axis=1) < 0
+    over = quat_multiply(wanted, jnp.array([0.0, 1.0, 0.0, 0.0]))
+    wanted = jnp.where(upside_down[:, None], over, wanted)
+    return quat_to_rotation_vector(quat_multiply(wanted, quat_conjugate(quat)))
 
 
 def where(condition: Bool[Array, "W"], then: Wish, otherwise: Wish) -> Wish:

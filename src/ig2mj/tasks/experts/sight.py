@@ -28,7 +28,7 @@ class Sight:
     Attributes:
       robot: name of the robot that acts. objects: names of what the task is about, the first object first.
       hands: numbers of the acting hands among all hands of the scene.
-      grips: [H, 3] grasp point of every hand in the hand's frame. physical: nothing holds but friction.
+      grips: [H, 3] grasp point of every hand in the hand's frame. grasping: the mode.
     """
 
     view: PhysicsView
@@ -39,7 +39,12 @@ class Sight:
     objects: tuple[str, ...]
     hands: tuple[int, ...]
     grips: Float[np.ndarray, "H 3"]
-    physical: bool = False
+    grasping: str = "mitten"
+
+    @property
+    def physical(self) -> bool:
+        """Nothing holds but friction."""
+        return self.grasping == "physical"
 
     def hand_pos(self, hand: int = 0) -> Float[Array, "W 3"]:
         """Palm or end effector; `hand` counts the acting hands."""
@@ -62,6 +67,14 @@ class Sight:
         tables = self.scene.tables
         bodies = np.flatnonzero(tables.graspable_object == self.scene.object_index(name))
         return jnp.asarray(self.view.agent.finger_force)[:, :, bodies].sum((1, 2))
+
+    def squeeze(self, name: str, hand: int = 0) -> Float[Array, "W"]:
+        """N with which the second strongest finger link of an acting hand presses on an object."""
+        tables = self.scene.tables
+        bodies = np.flatnonzero(tables.graspable_object == self.scene.object_index(name))
+        fingers = np.flatnonzero(tables.finger_hand == self.hands[hand])
+        force = jnp.asarray(self.view.agent.finger_force)[:, fingers][:, :, bodies].max(2)
+        return jnp.sort(force, axis=1)[:, -2]
 
     def touches(self, name: str) -> Bool[Array, "W"]:
         """Whether any part of the robot touches an object."""

@@ -1,12 +1,19 @@
-"""Soaking Towel: take the towel, bring it in front of the tap, and slide it below the spout."""
+"""Soaking Towel: take the towel, bring it in front of the tap, and slide it below the spout.
+
+Where nothing sticks the towel is rolled up and stands on end (`Task.physical`): it is gripped below its upper end, and
+let down into the basin before it is slid below the spout.
+"""
 
 from __future__ import annotations
+
+import dataclasses
 
 import jax.numpy as jnp
 from jaxtyping import Float
 
 from ig2mj.engine.view import Array
 from ig2mj.geometry.poses import length
+from ig2mj.tasks.experts.gripping import grip_standing
 from ig2mj.tasks.experts.motion import RISE, Wish, around, levelled, outward, where, wish
 from ig2mj.tasks.experts.reaching import take, take_at
 from ig2mj.tasks.experts.sight import Sight
@@ -14,23 +21,41 @@ from ig2mj.tasks.points import WATER_BELOW, Water
 
 TOWEL, SINK = "bath_towel_0", "sink_0"
 
-TOP = 0.025
-"""m of the towel's top below the tap's opening. (Where drops appear is 0.1 m below it.)"""
 
-AHEAD = 0.11
-"""m of the towel's middle in front of the opening, so that the hand is not below the spout."""
+@dataclasses.dataclass(frozen=True)
+class Way:
+    """How a towel is brought below the spout; all in m.
 
-RUN_UP = 0.25
-"""m in front of that where the towel comes down to the height at which it is slid in."""
+    Attributes:
+      top: of the towel's top below the tap's opening. (Where drops appear is 0.1 m below it.)
+      ahead: of the towel's middle in front of the opening, so that the hand is not below the spout.
+      run_up: in front of that where the towel comes down to the height at which it is slid in.
+      carry: above that height on the way there.
+      clear: in front of the run-up while it is more than `narrow` beside it: the fridge stands there.
+      outside: from the middle of the robot's body that the towel passes it.
+      straight: it goes straight to the run-up, and gives way to the robot's own body only where it meets it; else it
+        swings around the robot.
+    """
+
+    top: float
+    ahead: float
+    run_up: float
+    carry: float
+    clear: float = 0.0
+    narrow: float = 0.25
+    outside: float = 0.42
+    straight: bool = False
+
+
+FOLDED = Way(top=0.025, ahead=0.11, run_up=0.25, carry=0.18)
+LIFTED = Way(top=0.025, ahead=0.11, run_up=0.25, carry=0.26, clear=0.36, narrow=0.12, outside=0.0, straight=True)
+ROLLED = Way(top=0.03, ahead=0.02, run_up=0.1, carry=0.42, clear=0.45, straight=True)
 
 EXACT, BLEND = 0.03, 0.06
 """m off the way in up to which the towel counts as on it, and over which it becomes wholly off it."""
 
-CARRY = 0.18
-"""m above that height on the way there."""
-
-OUTSIDE = 0.42
-"""m from the middle of the robot's body that the towel passes it."""
+NEARLY = 0.1
+"""m of a displacement that count where the way is straight."""
 
 EDGE = 0.1
 """m from the towel's middle towards the robot at which Fetch takes it."""
@@ -38,21 +63,33 @@ EDGE = 0.1
 
 def plan(see: Sight) -> list[Wish]:
     """One hand. The tap's front is where the robot stands: +y in its home."""
-    opening = see.goal(Water(SINK), WATER_BELOW)
-    towel, (_, high) = see.com(TOWEL), see.box(TOWEL)
-    height = opening[:, 2] - TOP - (high[:, 2] - towel[:, 2])
-    beside, ahead = towel[:, 0] - opening[:, 0], towel[:, 1] - opening[:, 1] - AHEAD
-    off = jnp.maximum(_share(jnp.abs(beside)), _share(ahead - RUN_UP))
-    rise = height + CARRY * off - towel[:, 2]
-    back = RUN_UP * jnp.maximum(off, _share(jnp.abs(towel[:, 2] - height)))
-    go = jnp.clip(1.5 - rise / RISE, 0.0, 1.0)
-    move = jnp.stack([-beside * go, (back - ahead) * go, rise], axis=1)
-    move = around(towel, move, see.base_pos(), OUTSIDE)
-    turn, get = levelled(see.quat(TOWEL)), take(see, TOWEL)
+    if see.physical:
+        return [grip_standing(see, TOWEL, _below_spout(see, ROLLED))]
+    # A mitten drags the towel past the fridge's corner; another grasp breaks there. Above the humanoid's body is room.
+    way = LIFTED if see.robot == "humanoid" and see.grasping != "mitten" else FOLDED
+    move, turn, get = _below_spout(see, way), levelled(see.quat(TOWEL)), take(see, TOWEL)
     if see.robot == "fetch":
         turn += outward(see.hand_quat(), see.grip() - see.base_pos())
         get = take_at(see, _near_edge(see))
     return [where(see.holds(TOWEL), wish(move, turn, close=True), get)]
+
+
+def _below_spout(see: Sight, way: Way) -> Float[Array, "W 3"]:
+    """The displacement that brings a towel in hand below the spout."""
+    opening = see.goal(Water(SINK), WATER_BELOW)
+    towel, (_, high) = see.com(TOWEL), see.box(TOWEL)
+    height = opening[:, 2] - way.top - (high[:, 2] - towel[:, 2])
+    beside, ahead = towel[:, 0] - opening[:, 0], towel[:, 1] - opening[:, 1] - way.ahead
+    off = jnp.maximum(_share(jnp.abs(beside)), _share(ahead - way.run_up))
+    rise = height + way.carry * off - towel[:, 2]
+    far = jnp.clip((jnp.abs(beside) - way.narrow) / BLEND, 0.0, 1.0)
+    back = way.clear * far + way.run_up * jnp.maximum(off, _share(jnp.abs(towel[:, 2] - height)))
+    go = jnp.clip(1.5 - rise / RISE, 0.0, 1.0)
+    move = jnp.stack([-beside * go, (back - ahead) * go, rise], axis=1)
+    if way.straight:
+        share = jnp.minimum(1.0, NEARLY / jnp.maximum(length(move[:, :2]), 1e-6))
+        move = move.at[:, :2].multiply(share[:, None])
+    return around(towel, move, see.base_pos(), way.outside)
 
 
 def _near_edge(see: Sight) -> Float[Array, "W 3"]:
