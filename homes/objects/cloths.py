@@ -78,10 +78,10 @@ def rolled(b: ObjectBuilder, across: float, height: float) -> None:
         for d in (thick * a / (2 * math.pi) + 0.002,)
         if d < r - 0.004
     ]
-    edge = tube(turns, 0.0022, 6, None).seen()
+    edge = tube(turns, 0.0022, 6, None).visual_only()
     b.add(edge, look)
     b.add(edge.at(z=0.002 - height), look)
-    b.add(rod((r - 0.001, 0, 0.002), (r - 0.001, 0, height - 0.002), 0.0028).seen(), look)
+    b.add(rod((r - 0.001, 0, 0.002), (r - 0.001, 0, height - 0.002), 0.0028).visual_only(), look)
     b.area("cleaning_tool_area", (1.3 * r, 1.3 * r, height * 0.98), (0, 0, height / 2))
 
 
