@@ -35,7 +35,7 @@ from __future__ import annotations
 import difflib
 import errno
 import importlib
-import multiprocessing
+import multiprocessing.util
 import os
 import pathlib
 import sys
@@ -88,6 +88,8 @@ def main(argv: Sequence[str] | None = None) -> None:
         # What had to be closed is closed. Libraries are not torn down: XLA crashes where it was compiling.
         for process in multiprocessing.active_children():
             process.terminate()
+        # Semaphores, of which Python would say that they leaked.
+        multiprocessing.util._run_finalizers(0)  # pyright: ignore[reportAttributeAccessIssue]
         sys.stdout.flush()
         sys.stderr.flush()
         os._exit(status)

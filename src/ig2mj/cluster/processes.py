@@ -64,7 +64,12 @@ class LocalProcesses:
     def submit(self, piece: Piece) -> None:
         """Hands a piece out to a process that is free, or a new one."""
         process = self._free.pop() if self._free else self._new()
-        self._busy[process.submit(_do_here, self._work.function, piece)] = (piece, process)
+        # A process that starts here inherits this: Ctrl-C would have it print a traceback until `_begin` has run.
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            self._busy[process.submit(_do_here, self._work.function, piece)] = (piece, process)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def _new(self) -> concurrent.futures.ProcessPoolExecutor:
         context = multiprocessing.get_context("spawn")  # forking a process that has threads can hang
