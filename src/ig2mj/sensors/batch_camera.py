@@ -11,6 +11,7 @@ Axes: W worlds, C cameras, Y rows, X columns, G geoms of the scene, S slots.
 
 from __future__ import annotations
 
+import os
 import weakref
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -27,9 +28,11 @@ from ig2mj.engine.base import Engine
 from ig2mj.engine.mjx.engine import MjxEngine, MjxPhysics
 from ig2mj.engine.mjx.physics import own_device
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.engine.warp.patches import pins
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
 from ig2mj.sensors.images import NOTHING, VISIBLE_GROUPS, Images, Pose, RayPattern, check_request
+from ig2mj.sensors.merged_meshes import HIDDEN, Tables, alpha, rigid_parts, tables_of
 from ig2mj.sensors.particle_slots import Slots, fill_slots
 from ig2mj.sensors.ray_cameras import sectors_of, set_rays
 from ig2mj.sensors.render_model import BACKGROUND, make_render_model, mean_colours
@@ -39,6 +42,9 @@ from ig2mj.states.world import ExtendedStates
 
 TILE = 8
 """Pixels a side of what a block of 64 threads sees: a third faster than rows of 64 pixels."""
+
+MERGED = "merged" in os.environ.get("IG2MJ_KERNELS", "").split(",")
+"""Whether rays are cast against merged meshes where a camera is not told; not yet measured on a GPU."""
 
 _KEPT: weakref.WeakKeyDictionary[Engine, list[Any]] = weakref.WeakKeyDictionary()
 """What the ray caster keeps, for as long as the engine whose worlds it sees: a compiled program that outlives its
@@ -65,6 +71,7 @@ class BatchCamera:
         shadows: bool = False,
         cull_backfaces: bool = False,
         rays: Sequence[RayPattern] = (),
+        merge_meshes: bool | None = None,
     ):
         """Compiles the render model.
 
@@ -79,6 +86,8 @@ class BatchCamera:
           cull_backfaces: surfaces seen from behind are not there, so that a camera inside a geom sees through it; a
             third more time.
           rays: patterns to cast besides; each call gives the pose of each.
+          merge_meshes: cast rays against one mesh for all that never moves and one for each rigid part that does
+            (`ig2mj.sensors.merged_meshes`); what is invisible in the compiled scene then is in every world. None: `MERGED`.
 
         Raises:
           EngineError: not the Warp engine, or nothing is to be made. UnknownNameError: no such camera.
@@ -95,6 +104,7 @@ class BatchCamera:
         self.cameras = [_camera_id(host, name) for name in cameras]
         self._plan(host)
         self._model = mjx.put_model(host, own_device(), impl="warp")
+        self._merged = self._merge(groups) if self._merges(merge_meshes) else None
         data = mujoco.MjData(host)
         mujoco.mj_forward(host, data)
         self._template = mjx.put_data(host, data, own_device(), impl="warp", naconmax=1, naccdmax=1, njmax=1)
@@ -128,11 +138,33 @@ class BatchCamera:
         """What the ray caster keeps, on each device. What compiled programs know of stays as long as the engine."""
         self._context = mjx.create_render_context(self._host, devices=self._served, **self._settings)
         _KEPT.setdefault(self.engine, []).append(self._context)
+        if self._merged is not None:
+            from ig2mj.sensors.ray_caster import use_merged
+
+            use_merged(list(self._context._contexts.values()), self._host, self._merged, self.engine.num_worlds)
         if self._sectors:
             set_rays(self._context, self._sectors, len(self.cameras) * self.width * self.height)
         self._handle = self._context.pytree()
         self._check_addresses()
         self._tiled = self._order_rays()
+
+    def _merges(self, asked: bool | None) -> bool:
+        return (MERGED if asked is None else asked) and not pins.mismatches()
+
+    def _merge(self, groups: Sequence[int]) -> Tables | None:
+        """Hides the geoms that merged meshes show, and those that nobody sees, from the ray caster's boxes; None where
+        the scene shows no meshes."""
+        host = self._host
+        parts = rigid_parts(host, self.engine.scene.model, groups)
+        if not parts:
+            return None
+        tables = tables_of(host, parts)
+        host.geom_group[tables.absorbed] = HIDDEN
+        host.geom_group[alpha(host) == 0] = HIDDEN
+        if len(tables.absorbed) and not np.isin(host.geom_group, list(groups)).any():
+            host.geom_group[tables.absorbed[0]] = groups[0]  # the tree of boxes must not be empty
+        self._model = self._model.replace(geom_dataid=tables.data_id)
+        return tables
 
     def __call__(
         self,

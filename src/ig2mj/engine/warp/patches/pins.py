@@ -117,6 +117,21 @@ PINS: dict[str, dict[str, str]] = {
     "third_party.mujoco_warp._src.math": {
         "upper_tri_index": "8ca898f451fd1a2b",
     },
+    "third_party.mujoco_warp._src.render": {
+        "_build_megakernel": "bccfe07f21d1d5a5",
+        "_make_cast_ray": "671c12b0691f44ce",
+        "render": "de80769d94014134",
+    },
+    "third_party.mujoco_warp._src.bvh": {
+        "build_scene_bvh": "fa7f3038ff387137",
+        "refit_scene_bvh": "f80015eb6e0c03bd",
+        "_compute_bvh_bounds": "860bca86a059897c",
+    },
+    "third_party.mujoco_warp._src.ray": {
+        "ray_mesh_with_bvh": "32d1427f32e8b74d",
+        "RAY_TOL_REL": "1187132475a4431d",
+        "RAY_TOL_ABS": "79cda40a9f6ea328",
+    },
     "warp.ffi": {
         "jax_callable_variadic_tuple": "5e767a45cafcf17b",
     },

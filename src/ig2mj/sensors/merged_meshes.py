@@ -1,0 +1,142 @@
+"""The meshes of rigid parts of a scene merged: one mesh for all that never moves, one for each part that does.
+
+MJX-Warp's ray caster has a tree of boxes for each world, with a box for each geom, and a tree of triangles for each
+mesh asset. A ray that looks across a room enters the boxes of walls, floor, ceiling and most furniture, and looks for a
+triangle in each, in no particular order. Merged meshes have one tree for all of them, which all worlds share.
+
+Axes: V vertices, F triangles, G geoms.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+
+MESH = int(mujoco.mjtGeom.mjGEOM_MESH)
+
+HIDDEN = 31
+"""Group of geoms that have no box of their own; no scene has so many groups."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Part:
+    """Meshes that move as one.
+
+    Attributes:
+      geom: in whose frame the vertices are; -1 for what never moves, whose vertices are in the world frame.
+      geoms: whose triangles these are, one geom's after the other's.
+      vertices: metres. faces: vertices of triangles. face_geom: whose each is.
+    """
+
+    geom: int
+    geoms: tuple[int, ...]
+    vertices: Float[np.ndarray, "V 3"]
+    faces: Int[np.ndarray, "F 3"]
+    face_geom: Int[np.ndarray, "F"]
+
+
+def rigid_parts(host: mujoco.MjModel, scene: mujoco.MjModel, groups: Sequence[int]) -> list[Part]:
+    """The parts of a render model, those that never move first.
+
+    Meshes that are invisible (alpha 0) in the compiled scene are in no part.
+
+    Args:
+      host: the render model, which has no joints. scene: the model that it was made from, with the same bodies first.
+      groups: of geoms that are seen.
+    """
+    data = mujoco.MjData(host)
+    mujoco.mj_forward(host, data)
+    seen = np.isin(host.geom_group, list(groups)) & (host.geom_type == MESH) & (alpha(host) > 0)
+    by_body: dict[int, list[int]] = {}
+    for geom in np.flatnonzero(seen[: scene.ngeom]):
+        body = int(scene.geom_bodyid[geom])
+        welded = int(scene.body_weldid[body])
+        mocap = int(scene.body_mocapid[scene.body_rootid[body]]) >= 0
+        by_body.setdefault(welded if welded or not mocap else body, []).append(int(geom))
+    return [_part(host, data, geoms, moves=body > 0) for body, geoms in sorted(by_body.items())]
+
+
+def alpha(model: mujoco.MjModel) -> Float[np.ndarray, "G"]:
+    """Opacity of geoms: their material's where they have no colour of their own."""
+    found = np.array(model.geom_rgba[:, 3], np.float32)
+    plain = (model.geom_matid >= 0) & (model.geom_rgba == np.float32([0.5, 0.5, 0.5, 1.0])).all(axis=1)
+    found[plain] = model.mat_rgba[model.geom_matid[plain], 3]
+    return found
+
+
+def _part(host: mujoco.MjModel, data: mujoco.MjData, geoms: list[int], moves: bool) -> Part:
+    vertices, faces, owners, count = [], [], [], 0
+    for geom in geoms:
+        mesh = int(host.geom_dataid[geom])
+        points = slice(host.mesh_vertadr[mesh], host.mesh_vertadr[mesh] + host.mesh_vertnum[mesh])
+        corners = slice(host.mesh_faceadr[mesh], host.mesh_faceadr[mesh] + host.mesh_facenum[mesh])
+        in_world = host.mesh_vert[points] @ data.geom_xmat[geom].reshape(3, 3).T + data.geom_xpos[geom]
+        vertices.append(in_world)
+        faces.append(host.mesh_face[corners] + count)
+        owners.append(np.full(len(faces[-1]), geom))
+        count += len(in_world)
+    # The box around a mesh is centred on its frame: the geom is taken in whose frame it is smallest.
+    frames = [np.concatenate(vertices)]
+    if moves:
+        turned = data.geom_xmat.reshape(-1, 3, 3)
+        frames = [(frames[0] - data.geom_xpos[geom]) @ turned[geom] for geom in geoms]
+    best = int(np.argmin([np.abs(frame).max(axis=0).prod() for frame in frames]))
+    return Part(
+        geom=geoms[best] if moves else -1,
+        geoms=tuple(geoms),
+        vertices=frames[best].astype(np.float32),
+        faces=np.concatenate(faces).astype(np.int32),
+        face_geom=np.concatenate(owners).astype(np.int32),
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class Tables:
+    """How a triangle of a merged mesh is found in its geom's own.
+
+    Attributes:
+      parts: whose meshes are numbered behind those of the model, in this order.
+      data_id: of geoms: the merged mesh of those that stand for a part, else as in the model.
+      face_geom: geoms of the triangles of all parts. part_face: each part's first triangle among them.
+      geom_face: each geom's first triangle in its part. geom_mesh: its own mesh.
+    """
+
+    parts: tuple[Part, ...]
+    data_id: Int[np.ndarray, "G"]
+    face_geom: Int[np.ndarray, "F"]
+    part_face: Int[np.ndarray, "P"]
+    geom_face: Int[np.ndarray, "G"]
+    geom_mesh: Int[np.ndarray, "G"]
+
+    @property
+    def still(self) -> bool:
+        """The first part is what never moves."""
+        return bool(self.parts) and self.parts[0].geom < 0
+
+    @property
+    def absorbed(self) -> Int[np.ndarray, "n"]:
+        """Geoms that need no box of their own."""
+        return np.array([g for part in self.parts for g in part.geoms if g != part.geom], int)
+
+
+def tables_of(host: mujoco.MjModel, parts: Sequence[Part]) -> Tables:
+    """Tables of these parts of a render model."""
+    data_id, first = np.array(host.geom_dataid, np.int32), np.zeros(host.ngeom, np.int32)
+    sizes = [len(part.faces) for part in parts]
+    for number, part in enumerate(parts):
+        if part.geom >= 0:
+            data_id[part.geom] = host.nmesh + number
+        for geom in part.geoms:
+            first[geom] = np.argmax(part.face_geom == geom)
+    return Tables(
+        parts=tuple(parts),
+        data_id=data_id,
+        face_geom=np.concatenate([part.face_geom for part in parts]) if parts else np.zeros(0, np.int32),
+        part_face=(np.cumsum(sizes) - sizes).astype(np.int32),
+        geom_face=first,
+        geom_mesh=np.array(host.geom_dataid, np.int32),
+    )

@@ -1,0 +1,209 @@
+"""Rays against merged meshes (`ig2mj.sensors.merged_meshes`), in MJX-Warp's ray caster.
+
+Only the function that finds what a ray hits is ours; upstream's kernel shades what it found. Rays first look for what
+never moves, in one tree that all worlds share, and then for what does, as far as they came: upstream takes everything
+in the order of a tree. Hits are the same up to rounding, but for surfaces in the same place: there upstream shows the
+geom with the larger number, and within a merged mesh either is shown.
+"""
+
+# Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
+# pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
+# pyright: reportGeneralTypeIssues=false, reportAssignmentType=false, reportReturnType=false, reportOperatorIssue=false
+# pyright: reportPrivateUsage=false
+
+import types
+from collections.abc import Sequence
+from typing import Any, no_type_check
+
+import mujoco
+import numpy as np
+import warp as wp
+from mujoco.mjx.third_party.mujoco_warp._src import bvh, ray, render
+
+from ig2mj.sensors.merged_meshes import MESH, Tables
+
+PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = range(7)
+"""Geom types, as in `mujoco.mjtGeom`."""
+
+CONSTRUCTOR, LEAF = "sah", 2
+"""How trees of merged meshes are built; they are built once."""
+
+
+def use_merged(contexts: Sequence[Any], host: mujoco.MjModel, tables: Tables, nworld: int) -> None:
+    """Lets render contexts cast rays against merged meshes.
+
+    Args:
+      contexts: of MuJoCo Warp, of cameras of the render model, made with `tables.absorbed` in no group that is seen.
+    """
+    assert host.nflex == 0, "flexes' arrays carry the tables"
+    data = mujoco.MjData(host)
+    mujoco.mj_forward(host, data)
+    known = {name: getattr(host, name) for name in dir(host) if name.startswith(("geom_", "flex_"))}
+    as_merged = types.SimpleNamespace(**{**known, "geom_dataid": tables.data_id, "ngeom": host.ngeom})
+    for context in contexts:
+        with wp.ScopedDevice(context.mesh_bvh_id.device):
+            meshes = [
+                wp.Mesh(
+                    points=wp.array(part.vertices, dtype=wp.vec3),
+                    indices=wp.array(part.faces.ravel(), dtype=wp.int32),
+                    bvh_constructor=CONSTRUCTOR,
+                    bvh_leaf_size=LEAF,
+                )
+                for part in tables.parts
+            ]
+            half = [np.abs(part.vertices).max(axis=0) for part in tables.parts]
+            context.mesh_registry |= {mesh.id: mesh for mesh in meshes}
+            own = context.mesh_bvh_id.numpy()[: host.nmesh]
+            ids = np.concatenate([own, np.array([mesh.id for mesh in meshes], np.uint64)])
+            context.mesh_bvh_id = wp.array(ids, dtype=wp.uint64)
+            sizes = np.concatenate([context.mesh_bounds_size.numpy()[: host.nmesh].reshape(-1, 3), half])
+            context.mesh_bounds_size = wp.array(sizes.astype(np.float32), dtype=wp.vec3)
+            context.flex_geom_flexid = wp.array(tables.face_geom, dtype=int)
+            rows = np.concatenate([tables.geom_face, tables.geom_mesh, tables.part_face])
+            context.flex_geom_edgeid = wp.array(rows.astype(np.int32), dtype=int)
+            context.geom_ray_types = tuple(sorted({*context.geom_ray_types, MESH}))
+            bvh.build_scene_bvh(as_merged, data, context, nworld)
+            context._megakernel = _kernel(context, host, tables)
+
+
+def _kernel(context: Any, host: mujoco.MjModel, tables: Tables) -> wp.Kernel:
+    """Upstream's kernel with `_cast_ray` in place of the function that finds what a ray hits."""
+
+    def make_cast_ray(geom_ray_types: tuple[int, ...], first_hit: bool = False) -> wp.Function:
+        return _cast_ray(geom_ray_types, first_hit, host.ngeom, host.nmesh, tables.still)
+
+    build = render._build_megakernel
+    names = {**build.__globals__, "_make_cast_ray": make_cast_ray}
+    own = types.FunctionType(build.__code__, names, build.__name__, build.__defaults__, build.__closure__)
+    return own(types.SimpleNamespace(nlight=host.nlight), context)
+
+
+@no_type_check
+def _cast_ray(kinds: tuple[int, ...], first_hit: bool, ngeom: int, nmesh: int, still: bool) -> wp.Function:
+    """The function for the kinds of geoms that have boxes. With `first_hit` any hit nearer than `max_dist` will do.
+
+    Upstream's arguments are kept; two arrays of flexes, of which there are none, hold the tables of merged meshes.
+    """
+
+    primitives = any(kind in kinds for kind in (PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX))
+
+    @wp.func
+    def cast_ray(
+        geom_type: wp.array[int],
+        geom_dataid: wp.array2d[int],
+        geom_matid: wp.array2d[int],
+        geom_size: wp.array2d[wp.vec3],
+        geom_rgba: wp.array2d[wp.vec4],
+        flex_vertadr: wp.array[int],
+        flex_edge: wp.array[wp.vec2i],
+        flex_radius: wp.array[float],
+        mat_rgba: wp.array2d[wp.vec4],
+        geom_xpos_in: wp.array2d[wp.vec3],
+        geom_xmat_in: wp.array2d[wp.mat33],
+        flexvert_xpos_in: wp.array2d[wp.vec3],
+        bvh_id: wp.uint64,
+        group_root: int,
+        worldid: int,
+        bvh_ngeom: int,
+        flex_bvh_ngeom: int,
+        enabled_geom_ids: wp.array[int],
+        mesh_bvh_id: wp.array[wp.uint64],
+        hfield_bvh_id: wp.array[wp.uint64],
+        flex_rgba: wp.array[wp.vec4],
+        face_geom: wp.array[int],
+        tables: wp.array[int],
+        flex_bvh_id: wp.array[wp.uint64],
+        flex_group_root: wp.array2d[int],
+        origin: wp.vec3,
+        direction: wp.vec3,
+        max_dist: float,
+        cull_backfaces: bool,
+    ) -> tuple[int, float, wp.vec3, float, float, int, int]:
+        dist = max_dist
+        normal = wp.vec3(0.0, 0.0, 0.0)
+        geom_id = -1
+        bary_u = 0.0
+        bary_v = 0.0
+        face = -1
+        mesh_id = -1
+        if wp.static(still):
+            axes = wp.mat33(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+            d, n, u, v, f, merged = ray.ray_mesh_with_bvh(
+                mesh_bvh_id, wp.static(nmesh), wp.vec3(0.0, 0.0, 0.0), axes, origin, direction, dist, cull_backfaces
+            )
+            if d >= 0.0 and d < dist:
+                dist = d
+                normal = n
+                geom_id = face_geom[f]
+                bary_u = u
+                bary_v = v
+                face = f - tables[geom_id]
+                mesh_id = tables[wp.static(ngeom) + geom_id]
+                if wp.static(first_hit):
+                    return geom_id, dist, normal, bary_u, bary_v, face, mesh_id
+
+        query = wp.bvh_query_ray(bvh_id, origin, direction, group_root)
+        box = 0
+        while wp.bvh_query_next(query, box, dist * (1.0 + wp.static(ray.RAY_TOL_REL)) + wp.static(ray.RAY_TOL_ABS)):
+            reach = dist * (1.0 + wp.static(ray.RAY_TOL_REL)) + wp.static(ray.RAY_TOL_ABS)
+            geom = enabled_geom_ids[box - worldid * bvh_ngeom]
+            kind = geom_type[geom]
+            pos = geom_xpos_in[worldid, geom]
+            mat = geom_xmat_in[worldid, geom]
+            d = -1.0
+            n = wp.vec3(0.0, 0.0, 0.0)
+            u = 0.0
+            v = 0.0
+            f = -1
+            merged = -1
+            if wp.static(MESH in kinds):
+                if kind == wp.static(MESH):
+                    which = geom_dataid[worldid % geom_dataid.shape[0], geom]
+                    d, n, u, v, f, merged = ray.ray_mesh_with_bvh(
+                        mesh_bvh_id, which, pos, mat, origin, direction, reach, cull_backfaces
+                    )
+                    if d >= 0.0 and merged >= wp.static(nmesh):
+                        geom = face_geom[tables[wp.static(2 * ngeom - nmesh) + merged] + f]
+                        f = f - tables[geom]
+                        merged = tables[wp.static(ngeom) + geom]
+            if wp.static(primitives):
+                if kind != wp.static(MESH):
+                    size = geom_size[worldid % geom_size.shape[0], geom]
+                    if wp.static(PLANE in kinds):
+                        if kind == wp.static(PLANE):
+                            d, n = ray.ray_plane(pos, mat, size, origin, direction)
+                    if wp.static(SPHERE in kinds):
+                        if kind == wp.static(SPHERE):
+                            d, n = ray.ray_sphere(pos, size[0] * size[0], origin, direction)
+                    if wp.static(CAPSULE in kinds):
+                        if kind == wp.static(CAPSULE):
+                            d, n = ray.ray_capsule(pos, mat, size, origin, direction)
+                    if wp.static(ELLIPSOID in kinds):
+                        if kind == wp.static(ELLIPSOID):
+                            d, n = ray.ray_ellipsoid(pos, mat, size, origin, direction)
+                    if wp.static(CYLINDER in kinds):
+                        if kind == wp.static(CYLINDER):
+                            d, n = ray.ray_cylinder(pos, mat, size, origin, direction)
+                    if wp.static(BOX in kinds):
+                        if kind == wp.static(BOX):
+                            d, sides, n = ray.ray_box(pos, mat, size, origin, direction)
+            if cull_backfaces and d >= 0.0 and wp.dot(direction, n) > 0.0:
+                d = -1.0
+            if wp.static(first_hit):
+                if d >= 0.0 and d < dist:
+                    return geom, d, n, u, v, f, merged
+            else:
+                # Where two are as near, the geom with the larger number is shown, as in MuJoCo's OpenGL.
+                same = wp.static(ray.RAY_TOL_REL) * wp.max(dist, 1.0)
+                nearer = (d < dist - same) or (wp.abs(d - dist) <= same and (geom_id < 0 or geom > geom_id))
+                if d >= 0.0 and nearer:
+                    dist = d
+                    normal = n
+                    geom_id = geom
+                    bary_u = u
+                    bary_v = v
+                    face = f
+                    mesh_id = merged
+        return geom_id, dist, normal, bary_u, bary_v, face, mesh_id
+
+    return cast_ray
