@@ -87,7 +87,8 @@ class BatchCamera:
             third more time.
           rays: patterns to cast besides; each call gives the pose of each.
           merge_meshes: cast rays against one mesh for all that never moves and one for each rigid part that does
-            (`ig2mj.sensors.merged_meshes`); what is invisible in the compiled scene then is in every world. None: `MERGED`.
+            (`ig2mj.sensors.merged_meshes`); what is invisible in the compiled scene then is in every world. None: as
+            `MERGED` says.
 
         Raises:
           EngineError: not the Warp engine, or nothing is to be made. UnknownNameError: no such camera.

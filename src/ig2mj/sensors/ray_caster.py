@@ -10,6 +10,7 @@ geom with the larger number, and within a merged mesh either is shown.
 # pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
 # pyright: reportGeneralTypeIssues=false, reportAssignmentType=false, reportReturnType=false, reportOperatorIssue=false
 # pyright: reportPrivateUsage=false
+# ruff: noqa: SIM102, UP018, RUF046 (of two conditions the first is one of the compiler's; variables, not constants)
 
 import types
 from collections.abc import Sequence
@@ -121,11 +122,11 @@ def _cast_ray(kinds: tuple[int, ...], first_hit: bool, ngeom: int, nmesh: int, s
     ) -> tuple[int, float, wp.vec3, float, float, int, int]:
         dist = max_dist
         normal = wp.vec3(0.0, 0.0, 0.0)
-        geom_id = -1
-        bary_u = 0.0
-        bary_v = 0.0
-        face = -1
-        mesh_id = -1
+        geom_id = int(-1)
+        bary_u = float(0.0)
+        bary_v = float(0.0)
+        face = int(-1)
+        mesh_id = int(-1)
         if wp.static(still):
             axes = wp.mat33(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
             d, n, u, v, f, merged = ray.ray_mesh_with_bvh(
@@ -143,19 +144,19 @@ def _cast_ray(kinds: tuple[int, ...], first_hit: bool, ngeom: int, nmesh: int, s
                     return geom_id, dist, normal, bary_u, bary_v, face, mesh_id
 
         query = wp.bvh_query_ray(bvh_id, origin, direction, group_root)
-        box = 0
+        box = int(0)
         while wp.bvh_query_next(query, box, dist * (1.0 + wp.static(ray.RAY_TOL_REL)) + wp.static(ray.RAY_TOL_ABS)):
             reach = dist * (1.0 + wp.static(ray.RAY_TOL_REL)) + wp.static(ray.RAY_TOL_ABS)
             geom = enabled_geom_ids[box - worldid * bvh_ngeom]
             kind = geom_type[geom]
             pos = geom_xpos_in[worldid, geom]
             mat = geom_xmat_in[worldid, geom]
-            d = -1.0
+            d = float(-1.0)
             n = wp.vec3(0.0, 0.0, 0.0)
-            u = 0.0
-            v = 0.0
-            f = -1
-            merged = -1
+            u = float(0.0)
+            v = float(0.0)
+            f = int(-1)
+            merged = int(-1)
             if wp.static(MESH in kinds):
                 if kind == wp.static(MESH):
                     which = geom_dataid[worldid % geom_dataid.shape[0], geom]
@@ -186,7 +187,7 @@ def _cast_ray(kinds: tuple[int, ...], first_hit: bool, ngeom: int, nmesh: int, s
                             d, n = ray.ray_cylinder(pos, mat, size, origin, direction)
                     if wp.static(BOX in kinds):
                         if kind == wp.static(BOX):
-                            d, sides, n = ray.ray_box(pos, mat, size, origin, direction)
+                            d, _sides, n = ray.ray_box(pos, mat, size, origin, direction)
             if cull_backfaces and d >= 0.0 and wp.dot(direction, n) > 0.0:
                 d = -1.0
             if wp.static(first_hit):
