@@ -80,11 +80,11 @@ def _part(host: mujoco.MjModel, data: mujoco.MjData, geoms: list[int], moves: bo
         owners.append(np.full(len(faces[-1]), geom))
         count += len(in_world)
     # The box around a mesh is centred on its frame: the geom is taken in whose frame it is smallest.
-    frames = [np.concatenate(vertices)]
+    frames: list[np.ndarray] = [np.concatenate(vertices)]
     if moves:
         turned = data.geom_xmat.reshape(-1, 3, 3)
         frames = [(frames[0] - data.geom_xpos[geom]) @ turned[geom] for geom in geoms]
-    best = int(np.argmin([np.abs(frame).max(axis=0).prod() for frame in frames]))
+    best = int(np.argmin([np.prod(np.abs(frame).max(axis=0)) for frame in frames]))
     return Part(
         geom=geoms[best] if moves else -1,
         geoms=tuple(geoms),
