@@ -63,7 +63,7 @@ def rigid_parts(host: mujoco.MjModel, scene: mujoco.MjModel, groups: Sequence[in
 def alpha(model: mujoco.MjModel) -> Float[np.ndarray, "G"]:
     """Opacity of geoms: their material's where they have no colour of their own."""
     found = np.array(model.geom_rgba[:, 3], np.float32)
-    plain = (model.geom_matid >= 0) & (model.geom_rgba == np.float32([0.5, 0.5, 0.5, 1.0])).all(axis=1)
+    plain = (model.geom_matid >= 0) & (model.geom_rgba == np.array([0.5, 0.5, 0.5, 1.0], np.float32)).all(axis=1)
     found[plain] = model.mat_rgba[model.geom_matid[plain], 3]
     return found
 

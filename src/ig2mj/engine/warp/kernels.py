@@ -28,7 +28,7 @@ Launch = tuple[wp.Kernel, int]
 def launches_of(act: Callable[[], Any]) -> list[Launch]:
     """The kernels that a function of this thread would launch, each once, in the order of their first launch.
 
-    Nothing is launched. Both branches of a condition are taken, and the body of a loop once.
+    Nothing is launched. Both branches of a condition are taken, and the body of a loop twice.
     """
     found: dict[Launch, None] = {}
     default = 256  # Warp's
@@ -36,8 +36,12 @@ def launches_of(act: Callable[[], Any]) -> list[Launch]:
     def launch(kernel: wp.Kernel, dim: Any, *args: Any, block_dim: int = default, **kwargs: Any) -> None:
         found[patches.launched(kernel, dim), block_dim] = None
 
+    def launch_tiled(kernel: wp.Kernel, dim: Any, *args: Any, block_dim: int = default, **kwargs: Any) -> None:
+        found[patches.launched(kernel, dim, tiled=True), block_dim] = None
+
     def capture_while(condition: Any, while_body: Callable, stream: Any = None, **kwargs: Any) -> None:
-        while_body(**kwargs)
+        for _ in range(2):  # ours differ in the first
+            while_body(**kwargs)
 
     def capture_if(
         condition: Any, on_true: Any = None, on_false: Any = None, stream: Any = None, **kwargs: Any
@@ -53,7 +57,7 @@ def launches_of(act: Callable[[], Any]) -> list[Launch]:
     noted.add(
         {
             (wp, "launch"): launch,
-            (wp, "launch_tiled"): launch,
+            (wp, "launch_tiled"): launch_tiled,
             (wp, "capture_while"): capture_while,
             (wp, "capture_if"): capture_if,
             (wp, "get_suggested_block_size"): suggested,

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import ast
 import inspect
+import itertools
 import linecache
 import textwrap
 from typing import Any
 
 import warp as wp
+
+_numbers = itertools.count()
+"""Of sources: kernels that differ in constants only have the same name, and copies of copies are made from sources."""
 
 
 def guarded(
@@ -58,6 +62,34 @@ def strided(kernel: wp.Kernel, index: str, count: str, lanes: int, module: str) 
     return _kernel(kernel, definition, {}, module)
 
 
+def listed(kernel: wp.Kernel, slots: int, module: str) -> wp.Kernel:
+    """The kernel for the worlds of a list only; `slots` of them at a time, each by the threads of one world.
+
+    Further arguments come first: how many worlds there are, and which.
+    """
+    definition = _definition(kernel, "listed")
+    further = {"listed_count": wp.array(dtype=int), "listed_worlds": wp.array(dtype=int)}
+    definition.args.args = [
+        *(ast.arg(name, ast.Name(f"_type_of_{name}", ast.Load())) for name in further),
+        *definition.args.args,
+    ]
+    place = _place_of_tid(definition)
+    line = definition.body[place]
+    assert isinstance(line, ast.Assign)
+    indices = line.targets[0].elts if isinstance(line.targets[0], ast.Tuple) else [line.targets[0]]
+    world, *others = (ast.unparse(index) for index in indices)
+    loop = ast.parse(
+        f"for listed_place in range(listed_slot, listed_count[0], {slots}):\n"
+        f"    over = bool(False)\n"
+        f"    {world} = listed_worlds[listed_place]"
+    ).body[0]
+    assert isinstance(loop, ast.For)
+    loop.body += _in_a_loop(definition.body[place + 1 :])
+    definition.body[place:] = [*ast.parse(f"{', '.join(['listed_slot', *others])} = wp.tid()").body, loop]
+    names = {f"_type_of_{name}": annotation for name, annotation in further.items()}
+    return _kernel(kernel, definition, names, module)
+
+
 def _in_a_loop(lines: list[ast.stmt]) -> list[ast.stmt]:
     """Lines of a body in which "return" becomes "continue" of a loop around them."""
     result: list[ast.stmt] = []
@@ -67,7 +99,7 @@ def _in_a_loop(lines: list[ast.stmt]) -> list[ast.stmt]:
         elif isinstance(line, ast.If):
             line.body, line.orelse = _in_a_loop(line.body), _in_a_loop(line.orelse)
             result.append(line)
-        elif isinstance(line, ast.For) and any(isinstance(inner, ast.Return) for inner in ast.walk(line)):
+        elif isinstance(line, ast.For | ast.While) and any(isinstance(inner, ast.Return) for inner in ast.walk(line)):
             result += [_Leaves().visit(line), *ast.parse("if over:\n    continue").body]
         else:
             result.append(line)
@@ -97,7 +129,7 @@ def _place_of_tid(definition: ast.FunctionDef) -> int:
 def _kernel(kernel: wp.Kernel, definition: ast.FunctionDef, names: dict[str, Any], module: str) -> wp.Kernel:
     """The kernel of a changed definition, in the Warp module of this name."""
     text = ast.unparse(ast.fix_missing_locations(ast.Module([definition], []))) + "\n"
-    file = f"<{definition.name}>"
+    file = f"<{definition.name} {next(_numbers)}>"
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # for tracebacks
     closure = inspect.getclosurevars(kernel.func).nonlocals
     space: dict[str, Any] = {**kernel.func.__globals__, **closure, **names, "__name__": module}

@@ -23,6 +23,9 @@ Substitute = Callable[[wp.Kernel, Any, Sequence[Any]], Launch | None]
 Branch = Callable[[wp.Kernel, Sequence[Any]], "wp.Stream | None"]
 """The stream that a kernel is launched on; None: the present one."""
 
+Narrow = Callable[[wp.Kernel, Any, Sequence[Any]], Launch]
+"""What a launch becomes while only some worlds take part."""
+
 _here = threading.local()
 _substitutes: list[Substitute] = []
 
@@ -51,11 +54,35 @@ def branching(branch: Branch) -> Iterator[None]:
         _here.branch = None
 
 
+@contextlib.contextmanager
+def narrowing(narrow: Narrow) -> Iterator[None]:
+    """Inside the block this thread's launches become those that the function names, after all else."""
+    _here.narrow = narrow
+    try:
+        yield
+    finally:
+        _here.narrow = None
+
+
+def resolved(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any], tiled: bool = False) -> Launch:
+    """What is launched in place of this, in this thread and now."""
+    if not tiled:
+        kernel, dim, inputs = substituted(kernel, dim, inputs)
+    narrow: Narrow | None = getattr(_here, "narrow", None)
+    return narrow(kernel, dim, inputs) if narrow else (kernel, dim, list(inputs))
+
+
 def launch(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any] = (), *args: Any, **kwargs: Any) -> Any:
     """In place of `warp.launch`."""
-    kernel, dim, inputs = substituted(kernel, dim, inputs)
+    kernel, dim, inputs = resolved(kernel, dim, inputs)
     branch: Branch | None = getattr(_here, "branch", None)
     stream = branch(kernel, inputs) if branch else None
     if stream is not None:
         kwargs["stream"] = stream
     return original(wp, "launch")(kernel, dim, inputs, *args, **kwargs)
+
+
+def launch_tiled(kernel: wp.Kernel, *, dim: Any, inputs: Sequence[Any] = (), **kwargs: Any) -> Any:
+    """In place of `warp.launch_tiled`."""
+    kernel, dim, inputs = resolved(kernel, dim, inputs, tiled=True)
+    return original(wp, "launch_tiled")(kernel, dim=dim, inputs=inputs, **kwargs)
