@@ -53,6 +53,7 @@ def run(name: str, num_worlds: int, args: argparse.Namespace) -> dict:
     reward, done, held, success = np.mean(totals, axis=0)
     return {
         "environment": name,
+        "label": args.label,
         "robot": args.robot,
         "grasping": args.grasping,
         "engine": env.core.engine.name,
@@ -134,6 +135,7 @@ def main() -> None:
     )
     parser.add_argument("--kernels", type=int, default=0, metavar="N", help="print the N longest kernels of a GPU")
     parser.add_argument("--lock", type=pathlib.Path, help="file to lock while timing, as of throughput.py")
+    parser.add_argument("--label", default="", help="a remark for the rows")
     parser.add_argument("--patience", type=float, default=0.0, help="seconds to wait for others, as of throughput.py")
     parser.add_argument("--rows", type=pathlib.Path, help="rows are added to this file, as JSON lines")
     args = parser.parse_args()

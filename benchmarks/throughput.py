@@ -60,7 +60,6 @@ def run(
     what: str,
     lock: pathlib.Path | None,
     kernels: int = 0,
-    side_by_side: bool = False,
     patience: float = 0.0,
     **solver: Any,
 ) -> dict:
@@ -68,8 +67,7 @@ def run(
 
     Args:
       lock, patience: see `turns.exclusive`.
-      kernels: so many of the longest are printed afterwards. side_by_side: kernels are compiled by several threads
-        before the first step (`WarpEngine.load_kernels`). solver: limits of iterations.
+      kernels: so many of the longest are printed afterwards. solver: limits of iterations.
     """
     start = time.time()
     scene, model = case.scene, case.model
@@ -78,8 +76,6 @@ def run(
         engine = WarpEngine(
             scene, num_worlds, profile=profile, initial=jax.tree.map(lambda a: a[0], case.pool.physics), **solver
         )
-        if side_by_side:
-            engine.load_kernels()
         worlds = Core(engine, Rules(model, case.goal), case.pool)
         watch, seconds = Watch(engine), engine.substeps * engine.timestep
         call, carry = program(case, worlds, watch, disturbed, what)
@@ -237,9 +233,6 @@ def main() -> None:
         help="full: with states, guards and goal; camera: and a picture a control step; agent: and one in three",
     )
     parser.add_argument("--engine", default="ig2mj", choices=ENGINES, help="mujoco_warp: without our kernels")
-    parser.add_argument(
-        "--side-by-side", action="store_true", help="compile kernels side by side, before the first step"
-    )
     parser.add_argument("--iterations", type=int, nargs="+", default=[0], help="solver limits to try; 0: the engine's")
     parser.add_argument("--pool", type=int, default=16, help="rows of initial states")
     parser.add_argument("--profiles", type=pathlib.Path, help="folder with <home>/engine_profile.json")
@@ -260,7 +253,7 @@ def main() -> None:
                 for limit in args.iterations:
                     solver = {"iterations": limit, "ls_iterations": limit} if limit else {}
                     with ENGINES[args.engine]():
-                        ways = args.lock, args.kernels, args.side_by_side, args.patience
+                        ways = args.lock, args.kernels, args.patience
                         row = run(case, worlds, not args.idle, what, *ways, **solver)
                     row = {"engine": args.engine} | row
                     row |= {"ready_s": case.seconds, "label": args.label, **device()}

@@ -107,7 +107,7 @@ def ours(args: argparse.Namespace, homes: dict[str, str], device: str) -> Iterat
     for engine, home, worlds, what in plan:
         count = min(worlds, args.most_worlds or worlds)
         words = (str(HERE.parent / "throughput.py"), homes[home], "--worlds", str(count), "--what", what)
-        words = (*words, "--engine", engine, "--side-by-side", *common(args, device))
+        words = (*words, "--engine", engine, *common(args, device))
         job = gpu_suite.Job(f"{engine}-{home}-{count}-{what}", words, LIMIT, on(device))
         if (engine, "", home, count, what) not in args.measured:
             yield job

@@ -67,18 +67,9 @@ def _timed(
     import numpy as np
 
     import ig2mj
-    from ig2mj.engine.base import Engine
-    from ig2mj.engine.warp.engine import WarpEngine
     from ig2mj.envs.names import activity_name, short_name
     from ig2mj.envs.registry import VECTORS
     from ig2mj.errors import Ig2mjError
-
-    def load_kernels(engine: Engine) -> None:
-        """Side by side, where there is a GPU; on a processor they would be loaded for nothing but tests."""
-        if isinstance(engine, WarpEngine) and jax.default_backend() == "gpu":
-            tick()
-            engine.load_kernels()
-            parts.insert(1, "kernels")
 
     times, parts = [time.perf_counter()], ["making", "start", "first step"]
 
@@ -87,7 +78,6 @@ def _timed(
 
     if short_name(what) is not None or activity_name(what) is not None:
         env = ig2mj.make(what, robot, worlds, engine, observations=(*VECTORS, *observations))
-        load_kernels(env.core.engine)
         tick()
         state = jax.block_until_ready(env.reset(0))
         tick()
@@ -97,7 +87,6 @@ def _timed(
         if robot is not None or observations:
             raise Ig2mjError("--robot and --observations belong to environments; a home is stepped without them")
         batch = ig2mj.Worlds(what, worlds, engine)
-        load_kernels(batch.engine)
         tick()
         started = jax.block_until_ready(batch.start(0))
         tick()

@@ -57,6 +57,7 @@ class WarpEngine(MjxEngine):
         ls_iterations: int | None = None,
         print_overflow: bool = False,
         graph_mode: str | None = None,
+        compile_beforehand: bool = True,
         **options: Any,
     ):
         """Makes an engine.
@@ -70,6 +71,8 @@ class WarpEngine(MjxEngine):
           graph_mode: how CUDA graphs of a step are kept, a name of `warp.JaxCallableGraphMode`: "WARP" captures a step
             anew wherever its buffers have other addresses, "WARP_STAGED" copies them to addresses that stay. None:
             MJX's choice, which is "WARP" on a GPU.
+          compile_beforehand: on a GPU compile and load all kernels of a step side by side now (`load_kernels`); else the
+            first step does, one after the other.
           print_overflow: let Warp print a line per overflowing world and step. The flags are kept in any case.
         """
         prepare_warp()
@@ -85,11 +88,11 @@ class WarpEngine(MjxEngine):
         if initial is None and not holds_everything(self.profile, scene.model):
             initial = settle(scene)
         super().__init__(scene, num_worlds, initial=initial, **options)
+        if compile_beforehand and own_device().platform == "gpu":  # on processors only some tests make steps
+            self.load_kernels()
 
     def load_kernels(self, workers: int | None = None) -> int:
         """Compiles and loads the kernels of a step side by side; how many modules they are.
-
-        The first step does it, too, but one after the other.
 
         Args:
           workers: threads; None: one for each processor of this process.

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import mujoco
+import numpy as np
 import warp as wp
 from mujoco.mjx.third_party import mujoco_warp
 
@@ -28,16 +29,19 @@ Launch = tuple[wp.Kernel, int]
 def launches_of(act: Callable[[], Any]) -> list[Launch]:
     """The kernels that a function of this thread would launch, each once, in the order of their first launch.
 
-    Nothing is launched. Both branches of a condition are taken, and the body of a loop twice.
+    Nothing is launched. What would be launched for nothing (a dimension is 0) is left out, as Warp does not load it
+    then. Both branches of a condition are taken, and the body of a loop twice.
     """
     found: dict[Launch, None] = {}
     default = 256  # Warp's
 
     def launch(kernel: wp.Kernel, dim: Any, *args: Any, block_dim: int = default, **kwargs: Any) -> None:
-        found[patches.launched(kernel, dim), block_dim] = None
+        if np.prod(dim) > 0:
+            found[patches.launched(kernel, dim), block_dim] = None
 
     def launch_tiled(kernel: wp.Kernel, dim: Any, *args: Any, block_dim: int = default, **kwargs: Any) -> None:
-        found[patches.launched(kernel, dim, tiled=True), block_dim] = None
+        if np.prod(dim) > 0:
+            found[patches.launched(kernel, dim, tiled=True), block_dim] = None
 
     def capture_while(condition: Any, while_body: Callable, stream: Any = None, **kwargs: Any) -> None:
         for _ in range(2):  # ours differ in the first
