@@ -4,7 +4,8 @@
     python benchmarks/cold_start.py birch --worlds 4096 --cache /tmp/new --again  # warm
 
 A process of its own measures: imports, making the worlds, kernels (`WarpEngine.load_kernels`), start, first and second
-step. An engine loads its kernels when it is made; here that is a phase of its own. Kernels and XLA's programs are kept in the folder (IG2MJ_CACHE_DIR), and so is what CUDA's driver compiles.
+step. An engine loads its kernels when it is made; here that is a phase of its own. Kernels and XLA's programs are kept
+in the folder (IG2MJ_CACHE_DIR), and so is what CUDA's driver compiles.
 `missed` names the modules of Warp that no phase but a step compiled: there should be none.
 """
 

@@ -71,8 +71,8 @@ class WarpEngine(MjxEngine):
           graph_mode: how CUDA graphs of a step are kept, a name of `warp.JaxCallableGraphMode`: "WARP" captures a step
             anew wherever its buffers have other addresses, "WARP_STAGED" copies them to addresses that stay. None:
             MJX's choice, which is "WARP" on a GPU.
-          compile_beforehand: on a GPU compile and load all kernels of a step side by side now (`load_kernels`); else the
-            first step does, one after the other.
+          compile_beforehand: on a GPU compile and load all kernels of a step now, side by side (`load_kernels`); else
+            the first step does, one after the other.
           print_overflow: let Warp print a line per overflowing world and step. The flags are kept in any case.
         """
         prepare_warp()
