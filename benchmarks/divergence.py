@@ -1,18 +1,22 @@
 """How far do worlds drift apart that take the same actions from the same start on another engine, or again on a GPU?
 
-    python benchmarks/divergence.py CookingMeat SlicingFruit --worlds 64 --rows out/divergence.jsonl
+    python benchmarks/divergence.py play CookingMeat SlicingFruit --worlds 64 --out out/divergence
+    python benchmarks/divergence.py replay out/divergence --engine warp --rows out/divergence.jsonl
 
-Episodes are played natively, by the task's expert (with noise) and at random, and replayed by action: natively again,
-on the second engine (`--engine warp`), and there again. Measured after each step, over all worlds: the farthest that
-any object is from where it was (m), the farthest of the hands (m), the largest difference of a temperature (K), and in
-how many worlds a literal of the goal has another truth. The expert's actions are those of the first run: nobody
-corrects them when the worlds drift apart. An episode is a success if the goal held after any step.
+`play` needs no GPU: episodes are played natively, by the task's expert (with noise) and at random, and written with
+their start states. `replay` puts an engine's worlds at those starts and takes the actions, twice; a row is written as
+soon as it is known. Measured after each step, over all worlds: the farthest that any object is from where it was (m),
+the farthest of the hands (m), the largest difference of a temperature (K), and in how many worlds a literal of the goal
+has another truth. The expert's actions are those of the first run: nobody corrects them when the worlds drift apart. An
+episode is a success if the goal held after any step. `replay --engine native` says whether another machine comes to the
+same.
 """
 
 from __future__ import annotations
 
 import argparse
 import dataclasses
+import json
 import pathlib
 import sys
 import time
@@ -24,9 +28,10 @@ import numpy as np
 from results import keep_row, machine
 
 import ig2mj
-from ig2mj.demos.frames import Frame, frame_of, resumed
+from ig2mj.demos.frames import frame_of, names_of, resumed
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.experts import expert_of
+from ig2mj.worlds.pool import load_pool, save_pool
 
 NOISE = 0.1
 """Deviation of what is added to the expert's actions."""
@@ -92,60 +97,79 @@ def compared(a: Track, b: Track, period: float) -> dict[str, Any]:
     return found
 
 
-def on_host(frame: Frame) -> Frame:
-    """The same in NumPy's arrays."""
-    return jax.tree.map(np.array, frame)
+def acting(env: Environment, who: str) -> Callable[[EnvState], np.ndarray]:
+    """Actions of the task's expert, disturbed, or random ones."""
+    rng, shape = np.random.default_rng(0), (env.num_worlds, *env.action_space.shape)
+    if who == "random":
+        return lambda state: rng.uniform(-1, 1, shape)
+    expert = expert_of(env)
+    return lambda state: np.clip(np.asarray(expert(state)) + NOISE * rng.standard_normal(shape), -1, 1)
 
 
-def rows_of(task: str, args: argparse.Namespace) -> Iterable[dict[str, Any]]:
-    """A row for each who acts and each pair of runs."""
-    common: dict[str, Any] = {"robot": args.robot, "worlds": args.worlds, "pool_size": args.pool_size}
-    native = ig2mj.make(task, engine="native", **common)
-    other = ig2mj.make(task, engine=args.engine, **common)
-    rows = np.arange(args.worlds) % args.pool_size
-    rng, shape = np.random.default_rng(0), (args.worlds, *native.action_space.shape)
-    expert = expert_of(native)
-    acts = {
-        "expert": lambda state: np.clip(np.asarray(expert(state)) + NOISE * rng.standard_normal(shape), -1, 1),
-        "random": lambda state: rng.uniform(-1, 1, shape),
-    }
-    for who, act in acts.items():
+def play(args: argparse.Namespace) -> None:
+    """Plays and writes; a file for each task and who acts, and one with the task's start states."""
+    args.out.mkdir(parents=True, exist_ok=True)
+    for task in args.tasks:
+        env = ig2mj.make(task, robot=args.robot, engine="native", worlds=args.worlds, pool_size=args.pool_size)
+        save_pool(env.core.starts.pool, args.out / f"{task}.pool.npz", env.scene)
+        rows = np.arange(args.worlds) % args.pool_size
+        for who in ("expert", "random"):
+            state = env.start_from(rows)
+            frame = frame_of(env.core.engine, state)
+            arrays: dict[str, Any] = dict(zip(names_of(frame), map(np.array, jax.tree.leaves(frame)), strict=True))
+            track, actions = played(env, state, [acting(env, who)] * args.steps)
+            arrays |= {f"track/{name}": np.stack(value) for name, value in vars(track).items()}
+            about = {"task": task, "robot": args.robot, "actions": who, "worlds": args.worlds}
+            file = args.out / f"{task}-{who}.npz"
+            np.savez_compressed(file, about=json.dumps(about), rows=rows, actions=np.stack(actions), **arrays)
+            print(f"{file}: {file.stat().st_size / 1e6:.1f} MB")
+
+
+def replay(args: argparse.Namespace) -> None:
+    """Replays what `play` wrote, twice."""
+    where = machine(-1) | {"devices": [d.device_kind for d in jax.devices()]}
+    envs: dict[str, Environment] = {}
+    for file in sorted(args.folder.glob("*-*.npz")):
         began = time.monotonic()
-        state = native.start_from(rows)
-        start = on_host(frame_of(native.core.engine, state))
-        first, actions = played(native, state, [act] * args.steps)
-        given = [lambda state, a=a: a for a in actions]
-
-        def again(env: Environment, start: Frame = start, given: list = given) -> Track:
-            return played(env, resumed(env, start, rows), given)[0]
-
-        there = again(other)
-        pairs = {
-            "native, native": (first, again(native)),
-            f"native, {args.engine}": (first, there),
-            f"{args.engine}, {args.engine}": (there, again(other)),
-        }
-        for pair, tracks in pairs.items():
-            about = {"task": task, "robot": args.robot, "actions": who, "engines": pair, "worlds": args.worlds}
-            yield about | compared(*tracks, native.period) | {"seconds": round(time.monotonic() - began, 1)}
+        with np.load(file) as read:
+            arrays = {name: read[name] for name in read.files}
+        about = json.loads(str(arrays["about"]))
+        task, worlds = about["task"], about["worlds"]
+        pool, robot = load_pool(args.folder / f"{task}.pool.npz"), about["robot"]
+        if task not in envs:
+            envs = {task: ig2mj.make(task, robot, worlds, args.engine, pool=pool)}
+        env, alone = envs[task], ig2mj.make(task, robot, 1, "native", pool=pool)
+        like = frame_of(alone.core.engine, alone.start_from(np.zeros(1, int)))
+        start = jax.tree.unflatten(jax.tree.structure(like), [arrays[name] for name in names_of(like)])
+        first = Track(**{f.name: list(arrays[f"track/{f.name}"]) for f in dataclasses.fields(Track)})
+        given = [lambda state, a=a: a for a in arrays["actions"]]
+        tracks = []
+        for pair in (f"native, {args.engine}", f"{args.engine}, {args.engine} again"):
+            tracks.append(played(env, resumed(env, start, arrays["rows"]), given)[0])
+            row = about | {"engines": pair} | compared(tracks[0] if len(tracks) > 1 else first, tracks[-1], env.period)
+            keep_row(row | {"seconds": round(time.monotonic() - began, 1), "machine": where}, args.rows)
+            for seconds, d in row["after"].items():
+                print(f"{seconds:>5} s  {d['object_m'][0]:.1e} {d['object_m'][1]:.1e} m", file=sys.stderr, flush=True)
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("tasks", nargs="+")
-    parser.add_argument("--robot", default="humanoid")
-    parser.add_argument("--engine", default="warp", help="the second one")
-    parser.add_argument("--worlds", type=int, default=64)
-    parser.add_argument("--steps", type=int, default=200, help="agent steps")
-    parser.add_argument("--pool-size", type=int, default=32)
-    parser.add_argument("--rows", type=pathlib.Path, help="a file to which rows are added")
+    commands = parser.add_subparsers(required=True)
+    first = commands.add_parser("play")
+    first.set_defaults(run=play)
+    first.add_argument("tasks", nargs="+")
+    first.add_argument("--robot", default="humanoid")
+    first.add_argument("--worlds", type=int, default=64)
+    first.add_argument("--steps", type=int, default=200, help="agent steps")
+    first.add_argument("--pool-size", type=int, default=32)
+    first.add_argument("--out", type=pathlib.Path, default=pathlib.Path("out/divergence"))
+    second = commands.add_parser("replay")
+    second.set_defaults(run=replay)
+    second.add_argument("folder", type=pathlib.Path)
+    second.add_argument("--engine", default="warp")
+    second.add_argument("--rows", type=pathlib.Path, help="a file to which rows are added")
     args = parser.parse_args()
-    where = machine(-1) | {"devices": [d.device_kind for d in jax.devices()]}
-    for task in args.tasks:
-        for row in rows_of(task, args):
-            keep_row(row | {"machine": where}, args.rows)
-            for seconds, d in row["after"].items():
-                print(f"{seconds:>5} s  {d['object_m'][0]:.1e} {d['object_m'][1]:.1e} m", file=sys.stderr)
+    args.run(args)
 
 
 if __name__ == "__main__":

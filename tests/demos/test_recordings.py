@@ -225,6 +225,8 @@ def spoil(opened, what, tmp_path):
         opened["index"][:, column] = -5
     elif what == "negative":
         run.attrs["frames"] = -1
+    elif what == "not finite":
+        opened["steps/action"][0] = np.nan
 
 
 @pytest.mark.parametrize(
@@ -243,6 +245,7 @@ def spoil(opened, what, tmp_path):
         ("parts", r"run_000001/attribute parts: names frames that are not there"),
         ("index", r"run_00000\d/steps/action: has \d+ rows, and the index names others"),
         ("negative", r"run_000001/attribute frames: is -1"),
+        ("not finite", r"run_00000\d/steps/action: has numbers that are not finite"),
     ],
 )
 def test_a_file_that_was_tampered_with_is_refused_with_file_and_field(env, recorded, tmp_path, what, named):
@@ -253,6 +256,30 @@ def test_a_file_that_was_tampered_with_is_refused_with_file_and_field(env, recor
         Replayer(recording, env=env)(check=True)
     assert str(copy) in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("attribute", "value", "words"),
+    [
+        ("robot", "dalek", "no robot is named 'dalek'"),
+        ("task", "../../etc/passwd", "no environment is named"),
+        ("grasping", "glue", "no grasping mode is named"),
+        ("worlds", 10**9, "1 to 65536 worlds"),
+        ("made_with", '{"nonsense": 1}', "makes no environment"),
+        ("made_with", '{"worlds": 3}', "makes no environment"),
+        ("made_with", '{"variant": 77}', "cannot be made here"),
+    ],
+)
+def test_an_environment_that_a_tampered_file_names_is_refused_with_file_and_field(
+    recorded, tmp_path, attribute, value, words
+):
+    copy = changed(recorded, tmp_path)
+    with h5py.File(copy, "a") as opened:
+        opened.attrs[attribute] = value
+    with Recording(copy) as recording, pytest.raises(InputError, match=words) as refused:
+        Replayer(recording)
+    assert str(refused.value).startswith(f"{copy}: ") and "\n" not in str(refused.value)
+    assert f"attribute {attribute}" in str(refused.value) or "variant" in str(refused.value)
 
 
 def test_truncated_and_foreign_files_end_in_one_line(recorded, tmp_path, capsys):

@@ -38,10 +38,22 @@ from ig2mj.demos.shipped import find_recording
 from ig2mj.demos.writer import FLUSH
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.registry import VECTORS, find_task, make
-from ig2mj.errors import EngineError, InputError
+from ig2mj.errors import EngineError, InputError, UnknownNameError
 from ig2mj.tasks.task import Task
 
 MODES = ("action", "state")
+
+MOST_WORLDS = 65536
+"""Of a recording: more are taken for a file that was tampered with."""
+
+_NAMED_BY = {
+    "environment": "task",
+    "robot": "robot",
+    "grasping mode": "grasping",
+    "engine": "engine",
+    "split": "made_with",
+}
+"""Attributes of a file that give names, by the kind of the name."""
 
 Watch = Callable[[EnvState, dict[int, Run], int], None]
 """Called with the environment's state, the run of each world that is replayed, and the number of the frame. The next
@@ -229,6 +241,8 @@ class Replayer:
         for start in range(0, run.frames - 1, FLUSH):
             stop = min(start + FLUSH, run.frames - 1)
             rows = run.rows("steps/action", start, stop, like)
+            if not np.isfinite(rows).all():
+                raise run.broken("steps/action", "has numbers that are not finite")
             yield from rows
 
 
@@ -244,13 +258,25 @@ def _environment(recording: Recording, observations: Sequence[str], options: dic
     Runs begin at frames of their own. Of a pool only navigation's tasks need more, which is where to go; to sample
     hundreds of an activity's start states would take minutes.
     """
-    task = find_task(recording.value("task", str))
     made = recording.value("made_with", dict)
     robot, grasping = recording.value("robot", str), recording.value("grasping", str)
     worlds, engine = recording.value("worlds", int), recording.value("engine", str)
-    if not 0 < worlds <= 65536:
-        raise InputError(recording.file, f"is {worlds}", element="attribute worlds")
-    if isinstance(task, Task):
-        made["pool_size"] = 1
-    env = make(task, robot, worlds, engine, grasping, observations=observations, **(made | options))
+    if not 0 < worlds <= MOST_WORLDS:
+        problem = f"is {worlds}, and a recording has 1 to {MOST_WORLDS} worlds"
+        raise InputError(recording.file, problem, element="attribute worlds")
+    try:
+        task = find_task(recording.value("task", str))
+        if isinstance(task, Task):
+            made["pool_size"] = 1
+        env = make(task, robot, worlds, engine, grasping, observations=observations, **(made | options))
+    except UnknownNameError as e:
+        if e.kind not in _NAMED_BY:
+            raise
+        raise InputError(recording.file, str(e), element=f"attribute {_NAMED_BY[e.kind]}") from e
+    except EngineError as e:
+        raise InputError(recording.file, f"its environment cannot be made here: {e}") from e
+    except TypeError as e:
+        if not made.keys() - options.keys():
+            raise
+        raise InputError(recording.file, f"makes no environment: {e}", element="attribute made_with") from e
     return env.with_horizon(recording.value("horizon", int))

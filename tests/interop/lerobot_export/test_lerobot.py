@@ -62,6 +62,7 @@ def test_a_policy_that_pytorch_clones_is_as_good_as_ours(tmp_path):
     action = columns["action"][:].float()
     mean, std = seen.mean(0), seen.std(0) + 1e-3
     torch.manual_seed(0)
+    torch.set_num_threads(1)  # small layers; on a busy machine threads only wait for each other
     layers = [torch.nn.Linear(seen.shape[1], 256), torch.nn.ReLU(), torch.nn.Linear(256, 256), torch.nn.ReLU()]
     network = torch.nn.Sequential(*layers, torch.nn.Linear(256, action.shape[1]), torch.nn.Tanh())
     adam = torch.optim.Adam(network.parameters(), 1e-3)
