@@ -26,7 +26,7 @@ from .model_task import BuiltModel
 from .report.page import RENDERED, ReportInput, write_report
 
 FIRST_WARNINGS = 5
-"""So many warnings are told at the shell; the report has all."""
+"""So many warnings are printed; the report has all."""
 
 
 def version_record(options: ConvertOptions) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""What a conversion may be told."""
+"""Options of a conversion."""
 
 from __future__ import annotations
 

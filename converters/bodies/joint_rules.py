@@ -1,4 +1,4 @@
-"""Joints: what MuJoCo is told about friction, damping and limits, and which joints open an object."""
+"""Joints: friction, damping and limits for MuJoCo, and which joints open an object."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ def task_entry(scene_file_stem: str, scopes: dict[str, str], rooms: dict[str, st
 
 
 def vec3(values: np.ndarray, digits: int = 6) -> Vec3:
-    """Three rounded numbers: to 1 micrometre, unless told otherwise."""
+    """Three rounded numbers: to 1 micrometre by default."""
     x, y, z = (round(float(v), digits) + 0.0 for v in values)
     return (x, y, z)
 

@@ -161,7 +161,7 @@ def read_colour(material: Element, file: object) -> Rgba | None:
 
 
 def _in_urdf(error: MeshError, guard: FileGuard, mesh: Element, named: str) -> InputError:
-    """The error of a mesh file, told from the URDF that names it where the file is not there at all."""
+    """The error of a mesh file, seen from the URDF that names it if the file does not exist."""
     if error.problem == "mesh does not exist":
         return InputError(guard.file, f"its mesh '{shortened(named)}' does not exist", element=where(mesh))
     return error

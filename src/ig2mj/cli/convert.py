@@ -146,7 +146,7 @@ def _tell(outcome: Outcome, out: pathlib.Path, main_file: str, as_json: bool) ->
 
     failed = [check for check in outcome.checks if not check.passed]
     if as_json:
-        told = {
+        summary = {
             "out": str(out),
             "objects": outcome.objects,
             "skipped": outcome.skipped,
@@ -156,7 +156,7 @@ def _tell(outcome: Outcome, out: pathlib.Path, main_file: str, as_json: bool) ->
             "cached": outcome.cached,
             "seconds": {stage: round(seconds, 3) for stage, seconds in outcome.timings.items()},
         }
-        print_json(told)
+        print_json(summary)
     else:
         seconds = sum(outcome.timings.values())
         from_cache = " (nothing has changed: taken from the cache)" if outcome.cached else ""

@@ -61,7 +61,7 @@ def convert_dataset(
     if out.exists() and not out.is_dir():
         raise InputError(out, "is a file", element="--out", fix="name a folder")
     where = where_of(common.jobs, cluster, resume)
-    options_of(common)  # bad numbers are told before any work
+    options_of(common)  # bad numbers are refused before any work
     out.mkdir(parents=True, exist_ok=True)
     chosen = {"skip_missing": skip_missing, "fixed_furniture": fixed_furniture}
     settings = {**dataclasses.asdict(common), "jobs": 1, "json": False}
@@ -116,8 +116,8 @@ def digest_of(root: str) -> str:
     if not names:
         raise InputError(root, "this dataset is not there, or empty")
     files = sorted(f for name in names for f in (pathlib.Path(root) / name).rglob("*.urdf"))
-    told = "\n".join([*names, *(f"{f.relative_to(root)} {f.stat().st_size}" for f in files)])
-    return hashlib.blake2b(told.encode(), digest_size=12).hexdigest()
+    listing = "\n".join([*names, *(f"{f.relative_to(root)} {f.stat().st_size}" for f in files)])
+    return hashlib.blake2b(listing.encode(), digest_size=12).hexdigest()
 
 
 def convert_piece(root: str, name: str, common: Mapping[str, Any], chosen: Mapping[str, Any]) -> bytes:

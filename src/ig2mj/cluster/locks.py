@@ -1,4 +1,4 @@
-"""`hold`: one writer for each output; a second one is told who is there."""
+"""`hold`: one writer for each output; a second one is refused, with the name of the first."""
 
 from __future__ import annotations
 

@@ -71,8 +71,8 @@ def _own_devices(environ: Mapping[str, str]) -> tuple[int, ...] | None:
     if "JAX_LOCAL_DEVICE_IDS" in environ:
         return None  # JAX reads it
     local = _number(environ, "SLURM_LOCALID") if "SLURM_LOCALID" in environ else 0
-    told = re.match(r"\d+", environ.get("SLURM_STEP_TASKS_PER_NODE", environ.get("SLURM_TASKS_PER_NODE", "1")))
-    tasks = int(told[0]) if told else 1
+    per_node = re.match(r"\d+", environ.get("SLURM_STEP_TASKS_PER_NODE", environ.get("SLURM_TASKS_PER_NODE", "1")))
+    tasks = int(per_node[0]) if per_node else 1
     visible = [d for d in environ.get("CUDA_VISIBLE_DEVICES", "").split(",") if d]
     return (local,) if tasks > 1 and len(visible) >= tasks else None
 

@@ -101,7 +101,7 @@ class RayNodes:
         from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
         check = self._work.check and (self._work.check[0], dict(self._work.check[1]))
-        own, files = versions(), told(check)
+        own, files = versions(), digest_seen(check)
         if not nodes:
             raise ClusterError("the cluster has no node that is alive")
         asked = {}
@@ -154,7 +154,7 @@ def _leave_gpus_alone() -> None:
     use_processor_only()
 
 
-def told(check: tuple[str, dict[str, Any]] | None) -> str:
+def digest_seen(check: tuple[str, dict[str, Any]] | None) -> str:
     """What a check says here."""
     return "" if check is None else str(found(check[0])(**check[1]))
 
@@ -162,7 +162,7 @@ def told(check: tuple[str, dict[str, Any]] | None) -> str:
 def _about(check: tuple[str, dict[str, Any]] | None) -> tuple[dict[str, str], str, str]:
     """Versions, what the check says, and what went wrong with it; runs on a node."""
     try:
-        return versions(), told(check), ""
+        return versions(), digest_seen(check), ""
     except Exception as e:
         return versions(), "", " ".join(str(e).split()) or type(e).__name__
 

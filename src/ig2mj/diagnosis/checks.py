@@ -50,7 +50,7 @@ class Check:
 
 
 def diagnose(progress: Callable[[str], None] = lambda text: None) -> list[Check]:
-    """Looks at everything. `progress` is told what is still being tried. Takes seconds, the first time a minute."""
+    """Checks everything. `progress` is called with what is being tried. Takes seconds, the first time a minute."""
     from ig2mj.viewer.offscreen import BACKENDS, probe
 
     tasks: dict[str, Callable[[], Any]] = {

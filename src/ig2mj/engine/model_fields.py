@@ -4,7 +4,7 @@
     fields = dataclasses.replace(with_masses(scene.model, mass), geom_friction=friction)
     physics = engine.write(engine.reset(), Write(model_fields=fields))
 
-An engine is told when it is made which fields these are, since they become part of its physics; worlds then have the
+Which fields these are is given when an engine is made, since they become part of its physics; worlds then have the
 scene's own values until others are written. Parameters of equality constraints, which grasping changes, need not be
 named. Batches that name no field pay nothing.
 

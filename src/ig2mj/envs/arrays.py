@@ -5,7 +5,7 @@
     obs, reward, terminated, truncated, info = env.step(action)     # tensors on the environment's device
 
 With `autoreset` (the default) a world that is done begins its next episode in the same step: its observation is the new
-episode's, and what was seen last is in `info["final_obs"]`. Without it, whoever steps a world that is done is told so.
+episode's, and what was seen last is in `info["final_obs"]`. Without it, stepping a world that is done is an error.
 
 PyTorch is not a dependency of ig2mj. Tensors are handed over on the device (DLPack) and copied once there, because the
 environment gives the memory of a state back at the next step.

@@ -44,7 +44,7 @@ class Change(NamedTuple):
 
 
 class _Task(NamedTuple):
-    """What a setter is told: constants, the present, the objects (one and its halves), a random key."""
+    """A setter's input: constants, the current state, the objects (one and its halves), a random key."""
 
     model: StateModel
     states: ExtendedStates

@@ -244,9 +244,9 @@ def _add_slab(root: ElementTree.Element, entries: Sequence[ObjectEntry]) -> list
     columns = math.ceil(math.sqrt(len(entries)))
     half = columns * cell / 2
     statistic = root.find("statistic")
-    told = {} if statistic is None else statistic.attrib
-    centre = [float(v) for v in told.get("center", "0 0 0").split()]
-    x = centre[0] - float(told.get("extent", "10")) - DISTANCE - half
+    given = {} if statistic is None else statistic.attrib
+    centre = [float(v) for v in given.get("center", "0 0 0").split()]
+    x = centre[0] - float(given.get("extent", "10")) - DISTANCE - half
     body = ElementTree.SubElement(
         _child(root, "worldbody"), "body", name=SLAB, pos=_numbers([x, centre[1], HEIGHT - 0.1])
     )

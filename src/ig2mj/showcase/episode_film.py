@@ -131,7 +131,7 @@ class EpisodeFilm:
         return np.asarray(picture)
 
     def _words(self, state: EnvState) -> str:
-        """The task, the time, and what is told of its first object."""
+        """The task, the time, and a number about its first object."""
         env, world = self._env, self._world
         steps = int(np.asarray(state.info["steps"])[world])
         words = [env.task.name, f"{steps * ACTION_PERIOD:.1f} s"]

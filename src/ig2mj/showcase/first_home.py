@@ -48,7 +48,7 @@ def load_and_run(folder: pathlib.Path, seconds: float = SECONDS) -> tuple[Simula
 def what_stands_where(world: Simulation) -> list[Place]:
     """Every loose object with what it is on top of or inside of (paper table A.1), asked of the predicates.
 
-    Of several answers the smallest object is told: the fish is in the pan rather than on the stove.
+    Of several answers the smallest object is named: the fish is in the pan rather than on the stove.
     """
     from ig2mj.predicates import Or, atom, compile_expression
     from ig2mj.states import StateModel, initial_states

@@ -18,7 +18,7 @@ GIF = ["-filter_complex", "[0:v]split[a][b];[a]palettegen[p];[b][p]paletteuse"]
 H264 = ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2"]  # it takes even sizes only
 H264 += ["-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
 FORMATS = {".mp4": H264, ".gif": GIF}
-"""What ffmpeg is told, by the file's ending."""
+"""ffmpeg's options, by the file's ending."""
 
 
 class Film:

@@ -190,7 +190,7 @@ def open_viewer(
       overlays: what is written over the picture; None: `default_overlays(scene)`.
       step_time: simulated seconds of one control step; steps are paced to real time.
       paused: begin paused.
-      key_callback: is told of every key (GLFW code) that is pressed, in this thread.
+      key_callback: called with every key (GLFW code) that is pressed, in this thread.
       prepare: does what takes long, such as compiling; must not change `data`, which is drawn meanwhile.
       more_keys: what `key_callback` does, key and text, for the list of keys.
       camera: where each picture is taken from; None where it gives none: where the mouse has put the camera.

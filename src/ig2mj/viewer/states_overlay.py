@@ -68,7 +68,7 @@ class StatesOverlay:
 
 
 def describe(model: StateModel, states: ExtendedStates, world: int = 0) -> dict[int, str]:
-    """What is to be told of each object, by index: only what differs from a warm, dry, clean, switched-off start."""
+    """What is written about each object, by index: only what differs from a warm, dry, clean, switched-off start."""
     p, found = model.parameters, {}
     tint = tint_of_objects(model, states, world)
     host: dict[str, Any] = {n: np.asarray(getattr(states, n))[world] for n in ("temperature", "wetness", "sliced")}

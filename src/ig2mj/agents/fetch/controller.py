@@ -72,7 +72,7 @@ class FetchState:
     Attributes:
       target: positions that the servos are at, of the joints from the trunk on. wheels: rad/s of the wheels'.
       solution: of the inverse kinematics at the last action, which is averaged with the next; known: there was one.
-      closed: the gripper was told to close. held: it held something at the last action.
+      closed: the last action closed the gripper. held: it held something at the last action.
     """
 
     target: Float[Array, "W 12"]

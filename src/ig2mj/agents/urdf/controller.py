@@ -37,7 +37,7 @@ class UrdfState:
     """What the controller remembers.
 
     Attributes:
-      arm, fingers: positions that the servos are at. closed: the gripper was told to close. held: it held something.
+      arm, fingers: positions of the servos. closed: the last action closed the gripper. held: it held something.
     """
 
     arm: Float[Array, "W J"]

@@ -79,7 +79,7 @@ class WarpEngine(MjxEngine):
         _say_once_if_slow()
         self.own_kernels = patches.for_new_engines()
         sizes = fit(profile, scene.model) if profile else profile_of_scene(scene)
-        self.profile = sizes.for_worlds(max(num_worlds, 1))  # a wrong number is told by `MjxEngine`
+        self.profile = sizes.for_worlds(max(num_worlds, 1))  # a wrong number is refused by `MjxEngine`
         self._print_overflow = print_overflow
         self._graph_mode = wp.JaxCallableGraphMode[graph_mode] if graph_mode else None
         self._iterations = iterations or int(scene.model.opt.iterations)

@@ -204,9 +204,11 @@ class _Binder:
             for name in names:
                 if name not in matched and self.from_library(name) is None:
                     missing.setdefault(self.synset[name], []).append(name)
-            told = [self.lacks(s, len(found), self.needs.get(found[0], ()), room) for s, found in missing.items()]
-            if best is None or len(told) < len(best):
-                best = told
+            missing_lines = [
+                self.lacks(s, len(found), self.needs.get(found[0], ()), room) for s, found in missing.items()
+            ]
+            if best is None or len(missing_lines) < len(best):
+                best = missing_lines
         return best or [f"no one {kind} holds all that is related"]
 
     def lacks(self, synset_name: str, count: int, needs: Iterable[str], where: str) -> str:
