@@ -178,6 +178,15 @@ def test_an_address_where_nobody_is(address, said):
         run(pieces(1), Where(cluster=address))
 
 
+def test_a_cluster_that_has_ended_is_not_waited_for(tmp_path, monkeypatch):
+    monkeypatch.delenv("RAY_ADDRESS", raising=False)
+    monkeypatch.setenv("RAY_TMPDIR", str(tmp_path))
+    (tmp_path / "ray").mkdir()
+    (tmp_path / "ray" / "ray_current_cluster").write_text("127.0.0.1:9\n")
+    with pytest.raises(ClusterError, match="--cluster auto: nobody answers at 127"):
+        run(pieces(1), Where(cluster="auto"))
+
+
 def test_commands_ask_for_the_cluster_before_they_do_anything(tmp_path, monkeypatch, capsys):
     from ig2mj.cli import call
 

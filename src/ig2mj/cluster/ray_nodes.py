@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import os
+import pathlib
 import socket
 import sys
 import urllib.parse
@@ -168,16 +170,20 @@ def _about(check: tuple[str, dict[str, Any]] | None) -> tuple[dict[str, str], st
 
 
 def check_address(address: str) -> None:
-    """Whether somebody answers at the address of a cluster; "auto" is known only when we connect.
+    """Whether somebody answers at the address of a cluster; for "auto" at the one that Ray has a record of, if any.
 
     Raises:
       ClusterError: nobody does. ModuleNotFoundError: there is no Ray here.
     """
     import ray  # noqa: F401
 
-    if address == "auto":
-        return
-    parsed = urllib.parse.urlsplit(address if "://" in address else f"//{address}")
+    wanted, what = address, "nobody answers there"
+    if address == "auto":  # Ray would wait for minutes for a cluster that has ended without taking back its record
+        wanted = _recorded()
+        if not wanted:
+            return
+        what = f"nobody answers at {wanted}, where this machine's last cluster was (`ray start` begins one)"
+    parsed = urllib.parse.urlsplit(wanted if "://" in wanted else f"//{wanted}")
     try:
         host, port = parsed.hostname, parsed.port
     except ValueError:
@@ -187,7 +193,16 @@ def check_address(address: str) -> None:
     try:
         socket.create_connection((host, port), REACH).close()
     except OSError as e:
-        raise ClusterError(f"--cluster {address}: nobody answers there ({e.strerror or e})") from e
+        raise ClusterError(f"--cluster {address}: {what} ({e.strerror or e})") from e
+
+
+def _recorded() -> str:
+    """The address that Ray would take for "auto": of the environment, or of the last `ray start`; "" without one."""
+    folder = pathlib.Path(os.environ.get("RAY_TMPDIR") or "/tmp")
+    try:
+        return os.environ.get("RAY_ADDRESS") or (folder / "ray" / "ray_current_cluster").read_text().strip()
+    except OSError:
+        return ""
 
 
 def _connect(ray: Any, address: str) -> None:
