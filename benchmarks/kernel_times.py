@@ -20,7 +20,8 @@ WARP_NAME = re.compile(r"_[0-9a-f]{8}_cuda_kernel_forward|_cuda_kernel_forward")
 
 
 def profiled(call: Callable[[], Any], steps: int, most: int, unit: str = "step") -> tuple[Any, dict[str, Any]]:
-    """Runs `call` under the profiler, prints the longest kernels, and returns its result and a summary.
+    """Runs `call` under the profiler, prints the longest kernels and the longest gaps in which none runs, and returns
+    its result and a summary.
 
     Args:
       call: what to run; its result is waited for. steps: how many steps it makes. most: kernels to print.
@@ -55,6 +56,11 @@ def profiled(call: Callable[[], Any], steps: int, most: int, unit: str = "step")
     for name, nanoseconds in total.most_common(most):
         share = f"{nanoseconds / whole:6.1%} {nanoseconds / steps / 1e3:9.2f} us {calls[name] / steps:7.1f} x"
         print(f"{share}  {name[:100]}", flush=True)
+    for (before, after), (nanoseconds, count) in _gaps(events)[: max(1, most // 3)]:
+        print(
+            f"  idle {nanoseconds / steps / 1e3:9.2f} us {count / steps:7.1f} x  {before[:60]} -> {after[:60]}",
+            flush=True,
+        )
     return result, summary
 
 
@@ -69,6 +75,19 @@ def _events(folder: str) -> list[tuple[float, float, str]]:
             if line.name.startswith("Stream"):
                 found += [(e.start_ns, e.duration_ns, WARP_NAME.sub("", e.name)) for e in line.events]
     return sorted(found)
+
+
+def _gaps(events: list[tuple[float, float, str]]) -> list[tuple[tuple[str, str], tuple[float, int]]]:
+    """Between which two nothing runs: nanoseconds and how often, the longest together first."""
+    found: dict[tuple[str, str], tuple[float, int]] = {}
+    until, last = (events[0][0], "") if events else (0.0, "")
+    for start, duration, name in events:
+        if start > until:
+            total, count = found.get((last, name), (0.0, 0))
+            found[last, name] = total + start - until, count + 1
+        if start + duration > until:
+            until, last = start + duration, name
+    return sorted(found.items(), key=lambda item: -item[1][0])
 
 
 def _busy(events: list[tuple[float, float, str]]) -> tuple[float, float]:
