@@ -37,7 +37,8 @@ def profiled(call: Callable[[], Any], steps: int, most: int, unit: str = "step")
             result = jax.block_until_ready(call())
             wall = time.perf_counter() - began
         events = _events(folder)
-    total, calls = collections.Counter(), collections.Counter()
+    total: collections.Counter = collections.Counter()
+    calls: collections.Counter = collections.Counter()
     for _, duration, name in events:
         total[name] += duration
         calls[name] += 1
