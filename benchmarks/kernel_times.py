@@ -37,8 +37,8 @@ def profiled(call: Callable[[], Any], steps: int, most: int, unit: str = "step")
             result = jax.block_until_ready(call())
             wall = time.perf_counter() - began
         events = _events(folder)
-    total: collections.Counter = collections.Counter()
-    calls: collections.Counter = collections.Counter()
+    total: dict[str, float] = collections.defaultdict(float)
+    calls: dict[str, int] = collections.defaultdict(int)
     for _, duration, name in events:
         total[name] += duration
         calls[name] += 1
@@ -54,7 +54,7 @@ def profiled(call: Callable[[], Any], steps: int, most: int, unit: str = "step")
     }
     print(summary, flush=True)
     whole = max(sum(total.values()), 1)
-    for name, nanoseconds in total.most_common(most):
+    for name, nanoseconds in sorted(total.items(), key=lambda item: -item[1])[:most]:
         share = f"{nanoseconds / whole:6.1%} {nanoseconds / steps / 1e3:9.2f} us {calls[name] / steps:7.1f} x"
         print(f"{share}  {name[:100]}", flush=True)
     for (before, after), (nanoseconds, count) in _gaps(events)[: max(1, most // 3)]:
