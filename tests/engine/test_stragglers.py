@@ -37,10 +37,11 @@ def _double(value: wp.array2d(dtype=float), least: float):
     value[world, place] = 2.0 * value[world, place]
 
 
-def test_a_listed_kernel_goes_through_the_worlds_of_its_list():
+@pytest.mark.parametrize(("slots", "dim"), [(2, (2, 2)), (0, (6, 2))])
+def test_a_listed_kernel_goes_through_the_worlds_of_its_list(slots, dim):
     value = wp.array(np.arange(12, dtype=np.float32).reshape(6, 2), dtype=float)
     count, worlds = wp.array([3], dtype=int), wp.array([5, 0, 2, 1, 1, 1], dtype=int)
-    wp.launch(listed(_double, 2, "ig2mj_test_listed"), dim=(2, 2), inputs=[count, worlds, value, 1.0])
+    wp.launch(listed(_double, slots, f"ig2mj_test_listed_{slots}"), dim=dim, inputs=[count, worlds, value, 1.0])
     assert value.numpy().tolist() == [[0, 2], [2, 3], [8, 10], [6, 7], [8, 9], [20, 22]]
 
 

@@ -23,8 +23,8 @@ Substitute = Callable[[wp.Kernel, Any, Sequence[Any]], Launch | None]
 Branch = Callable[[wp.Kernel, Sequence[Any]], "wp.Stream | None"]
 """The stream that a kernel is launched on; None: the present one."""
 
-Narrow = Callable[[wp.Kernel, Any, Sequence[Any]], Launch]
-"""What a launch becomes while only some worlds take part."""
+Narrow = Callable[[wp.Kernel, Any, Sequence[Any], bool], Launch]
+"""What a launch, of tiles where the last is true, becomes while only some worlds take part."""
 
 _here = threading.local()
 _substitutes: list[Substitute] = []
@@ -69,7 +69,7 @@ def resolved(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any], tiled: bool = F
     if not tiled:
         kernel, dim, inputs = substituted(kernel, dim, inputs)
     narrow: Narrow | None = getattr(_here, "narrow", None)
-    return narrow(kernel, dim, inputs) if narrow else (kernel, dim, list(inputs))
+    return narrow(kernel, dim, inputs, tiled) if narrow else (kernel, dim, list(inputs))
 
 
 def launch(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any] = (), *args: Any, **kwargs: Any) -> Any:

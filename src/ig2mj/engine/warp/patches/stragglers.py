@@ -69,13 +69,15 @@ def capture_while(condition: wp.array, while_body: Callable, *args: Any, **kwarg
 
 
 @functools.cache
-def _of_list(kernel: wp.Kernel) -> wp.Kernel:
-    return listed(kernel, SLOTS, f"ig2mj_listed_{kernel.module.name}_{kernel.key}")
+def _of_list(kernel: wp.Kernel, slots: int) -> wp.Kernel:
+    return listed(kernel, slots, f"ig2mj_listed_{kernel.module.name}_{kernel.key}")
 
 
 def _narrow(
-    num_worlds: int, count: wp.array, worlds: wp.array, kernel: wp.Kernel, dim: Any, inputs: Sequence[Any]
+    num_worlds: int, count: wp.array, worlds: wp.array, kernel: wp.Kernel, dim: Any, inputs: Sequence[Any], tiled: bool
 ) -> launching.Launch:
     sizes = tuple(dim) if isinstance(dim, Sequence) else (dim,)
     assert sizes[0] == num_worlds, f"{kernel.key} is launched for {sizes}, not for each world"
-    return _of_list(kernel), (min(SLOTS, num_worlds), *sizes[1:]), [count, worlds, *inputs]
+    if tiled:  # a loop would double the code of factorisations, 5 MB; the blocks that have nothing to do are few
+        return _of_list(kernel, 0), dim, [count, worlds, *inputs]
+    return _of_list(kernel, SLOTS), (min(SLOTS, num_worlds), *sizes[1:]), [count, worlds, *inputs]
