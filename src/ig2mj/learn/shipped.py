@@ -173,7 +173,7 @@ def model_card(name: str, policy: Policy) -> str:
         "helped by": helped or ("demonstrations" if card.get("demonstration_steps") else "nobody"),
         "seed": card.get("seed"),
         "minutes of training": card.get("minutes"),
-        "seconds of compilation before": card.get("compile_s"),
+        "seconds of compilation before": None if card.get("compile_s") is None else round(card["compile_s"]),
         "environment steps": f"{card['env_steps']:,}" if card.get("env_steps") else None,
         "device": card.get("device"),
         "scene": card.get("scene"),
