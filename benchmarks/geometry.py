@@ -1,7 +1,7 @@
 """Time of adjacency rays and piece distances on this machine: `python benchmarks/geometry.py [--worlds 1 1024]`.
 
 Rays: 50 pairs whose target has 16 hulls of 8 to 32 corners, 9 lines asked both ways (the 16 horizontal and 2 vertical
-rays of spec/states.md 4.4). Distances: 30 pairs of such hulls.
+rays of iGibson's adjacency.py). Distances: 30 pairs of such hulls.
 """
 
 from __future__ import annotations

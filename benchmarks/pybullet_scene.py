@@ -1,6 +1,6 @@
 """A converted home as PyBullet would have been given it by iGibson: rewritten URDFs in a folder, and where each goes.
 
-The geometry is read from the dataset again and scaled as iGibson scales it (spec dataset_format.md sections 5 to 7);
+The geometry is read from the dataset again and scaled as iGibson scales it;
 every convex group becomes one `o` group of an OBJ, of which Bullet makes one hull each. Fixed joints are merged, masses
 come from the category's density, friction is Bullet's 0.5 per body. Start poses are the converted home's, so that both
 engines begin alike. Halves parked outside the house are left out, which can only make PyBullet faster.

@@ -47,7 +47,7 @@ def convert_scene(
     Args:
       dataset_root: holds `objects/`, `scenes/` and `metadata/`. name: of the folder in `scenes/`.
       out: replaced as a whole when everything went well.
-      urdf: a scene file other than the default one (dataset_format.md section 2).
+      urdf: a scene file other than the default one (iGibson's dataset format).
 
     Raises:
       InputError: naming the file and the element; without `options.skip_missing` also for models the dataset lacks.
@@ -222,7 +222,7 @@ def _task(scene: SceneDescription, build: SceneBuild) -> dict[str, Any] | None:
 
 
 def _agent(instance: Instance) -> dict[str, Any]:
-    """Start pose of an agent: of its centre of mass for `agent` without saved poses (section 2.2), else of its base."""
+    """Start pose of an agent: of its centre of mass for `agent` without saved poses, else of its base."""
     quat = [round(float(q), 9) + 0.0 for q in quat_from_rotation(np.asarray(instance.pose)[:3, :3])]
     return {
         "name": instance.name,

@@ -203,5 +203,5 @@ def _dataset(root: str) -> Dataset:
 
 
 def _rounded(values: np.ndarray | None) -> tuple[float, ...] | None:
-    """To 1e-6 (section 8, step 5), so that instances which differ by rounding share a model."""
+    """To 1e-6, so that instances which differ by rounding share a model."""
     return None if values is None else tuple(round(float(v), 6) for v in values)

@@ -32,7 +32,7 @@ class Shape:
       pose: 4x4, the element's `<origin>` in the link frame.
       size: full edge lengths of a box; (radius, length) of a cylinder or capsule; (radius,) of a sphere.
       meshes: of a mesh: one per `o`/`g` group, in MESH coordinates after unit and axis conversion, before `scale`.
-      grouped: the file had groups; each is a convex piece by iGibson's convention (dataset_format.md fact 4).
+      grouped: the file had groups; each is a convex piece by iGibson's convention.
       scale: the element's mesh scale, per axis.
       file: where the mesh came from. encrypted: it is there but unreadable by design; `meshes` is empty.
       rgba: flat colour, where the source had one. texture: image file and uv per vertex, where usable.
@@ -130,7 +130,7 @@ class StableOrientation:
 
 @dataclasses.dataclass
 class Metadata:
-    """misc/metadata.json (dataset_format.md 4.1). bbox None: no scaling information."""
+    """misc/metadata.json (iGibson's dataset format). bbox None: no scaling information."""
 
     bbox_size: np.ndarray | None = None
     base_link_offset: np.ndarray | None = None
@@ -158,7 +158,7 @@ class ObjectModel:
 
 @dataclasses.dataclass
 class Instance:
-    """One `<link>` of a scene URDF with its joint (dataset_format.md 2.1).
+    """One `<link>` of a scene URDF with its joint (iGibson's dataset format).
 
     pose: 4x4, of the bounding-box centre (of the base link where the model has no bounding box).
     Exactly one of bounding_box and scale is set, or neither (scale 1).
@@ -189,7 +189,7 @@ class Instance:
 
 @dataclasses.dataclass
 class RoomMaps:
-    """layout/*.png, read (dataset_format.md 2.5). Row is y, column is x, row 0 is the lowest y."""
+    """layout/*.png, read (iGibson's dataset format). Row is y, column is x, row 0 is the lowest y."""
 
     room_map: np.ndarray  # [n, n] int16 at `resolution`: index + 1 into `names`, 0 none
     names: list[str]

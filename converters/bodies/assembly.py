@@ -1,7 +1,7 @@
 """From links to bodies: what an object becomes before any MuJoCo element exists.
 
-Links joined by fixed joints, or by joints without room to move, become one body (dataset_format.md section 6,
-merge_fixed_links); a floating joint cuts the object into several independent trees (section 0, fact 8); every other
+Links joined by fixed joints, or by joints without room to move, become one body, as in iGibson
+(merge_fixed_links); a floating joint cuts the object into several independent trees; every other
 joint leads to a body of its own. All lengths are scaled already. Poses are 4x4.
 """
 
@@ -111,7 +111,7 @@ def assemble(
       pieces: link -> convex collision pieces in the link's frame.
       inertials: link -> inertial in the link's frame.
       igibson_visuals: as iGibson draws: primitive visuals are left out where a link also has a mesh, and links
-        without any collision are not drawn (sections 4 and 8). False draws everything the URDF says.
+        without any collision are not drawn. False draws everything the URDF says.
     """
     plan = _Planner(model, pieces, inertials, igibson_visuals)
     base_poses = _poses_at_zero(model)

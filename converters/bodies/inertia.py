@@ -1,4 +1,4 @@
-"""Mass, centre of mass and inertia of an object's links (dataset_format.md section 6)."""
+"""Mass, centre of mass and inertia of an object's links."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from .kinematics import model_bounds, shape_bounds
 from .solids import Solid, combine, hull_volume, joined, shape_solids, signed_volume
 
 DEFAULT_DENSITY = 67.0
-"""kg per m^3 of the bounding box, of a category without a spec (section 6)."""
+"""kg per m^3 of the bounding box, of a category without a spec."""
 BULLET_MARGIN = 0.001
-"""m: what Bullet adds to each side of a mesh's box (section 6)."""
+"""m: what Bullet adds to each side of a mesh's box."""
 MIN_MASS = 1e-3
 """kg: what a moving body without mass is given; MuJoCo refuses none."""
 MIN_RADIUS = 0.01
@@ -122,7 +122,7 @@ def _split_mass(model: ObjectModel, total: float) -> dict[str, float]:
             name: sum(s.volume for shape in link.collisions for s in shape_solids(shape))
             for name, link in model.links.items()
         }
-    if model.category == "lamp":  # iGibson's own exception (section 6)
+    if model.category == "lamp":  # iGibson's own exception
         volumes = volumes | {model.base: 10 * volumes[model.base]}
     whole = sum(volumes.values())
     if whole <= 0:

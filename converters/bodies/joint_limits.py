@@ -16,7 +16,7 @@ def mujoco_type(joint: Joint) -> str:
 
 
 def joint_range(joint: Joint) -> tuple[float, float] | None:
-    """Lower and upper limit, or None: `continuous`, no limits given, or lower above upper (section 7)."""
+    """Lower and upper limit, or None: `continuous`, no limits given, or lower above upper."""
     if joint.type == "continuous" or joint.lower is None or joint.upper is None or joint.lower > joint.upper:
         return None
     return (float(joint.lower), float(joint.upper))
@@ -29,7 +29,7 @@ def is_locked(joint: Joint) -> bool:
 
 
 def clamp(joint: Joint, position: float) -> float:
-    """A joint position inside the limits (section 7: positions are clamped at export)."""
+    """A joint position inside the limits (positions are clamped at export)."""
     limits = joint_range(joint)
     return position if limits is None else min(max(position, limits[0]), limits[1])
 

@@ -9,8 +9,7 @@ from ..base.transforms import apply
 from .assembly import Assembly
 from .joint_limits import is_locked, joint_range, mujoco_type, unit_axis
 
-#: iGibson holds every joint with a velocity motor of this greatest force: Coulomb friction (dataset_format.md fact
-#: 10), N or N m.
+#: iGibson holds every joint with a velocity motor of this greatest force: Coulomb friction, N or N m.
 FRICTION = 10.0
 FRICTION_BY_CATEGORY = {"oven": 30.0, "dishwasher": 30.0, "toilet": 3.0}
 #: A hinge is held by no more than what this force (N) at the farthest point of the moving part overcomes. It changes
@@ -26,7 +25,7 @@ def friction(joint: Joint, category: str, reach: float) -> float:
     """Coulomb friction of a joint, N or N m.
 
     The URDF's own `<dynamics friction>` where it gives one, else iGibson's motor: objects of iGibson's dataset never
-    give one (dataset_format.md section 4).
+    give one.
 
     Args:
       category: of the object; ovens, dishwashers and toilets have values of their own.
@@ -57,7 +56,7 @@ def reach(assembly: Assembly, index: int) -> float:
 def openable_ends(assembly: Assembly) -> tuple[list[tuple[str, float, float]], list[str]]:
     """Joints that say whether the object is open: (joint, closed end, open end), and warnings.
 
-    The closed end is the lower limit, or the upper one where metadata.json gives direction -1 (section 4.1).
+    The closed end is the lower limit, or the upper one where metadata.json gives direction -1.
     """
     joints = {joint.name: joint for joint in assembly.joints()}
     ends, warnings = [], []

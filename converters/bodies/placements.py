@@ -1,4 +1,4 @@
-"""Which objects of a scene stand where, and which are out of use: wholes and their halves (dataset_format.md 2.1).
+"""Which objects of a scene stand where, and which are out of use: wholes and their halves (iGibson's dataset format).
 
 A sliceable object exists as a whole and as its halves. In a cached scene a multiplexer says which of them are in use;
 in any other scene the halves named in the whole's metadata are made here, and wait on the parking slab.
@@ -94,7 +94,7 @@ def _state_of_part(dump: Any, index: int) -> dict[str, Any] | None:
 def make_halves(
     whole: Placement, parts: Sequence[ObjectPart], scale: np.ndarray, taken: set[str]
 ) -> tuple[list[Placement], list[str]]:
-    """Halves for a whole whose scene file lists none; parked, at the whole's scale (section 5).
+    """Halves for a whole whose scene file lists none; parked, at the whole's scale.
 
     Args:
       parts: of the whole's scaled metadata. scale: of the whole.

@@ -17,7 +17,7 @@ from .still import awake_copy, deep_pairs, start_data
 SETTLE_TIME = 1.0
 """Seconds."""
 DRIFT_TOLERANCE = 0.02
-"""Metres a loose object may move in that time (dataset_format.md section 8.15)."""
+"""Metres a loose object may move in that time."""
 
 SWEEP_TIME = 2.0
 """Seconds a joint has for its range, each way."""

@@ -15,7 +15,7 @@ from ..base.outcome import CheckResult
 from ..mjcf.model_index import ModelIndex, geom_box
 
 BOX_TOLERANCE = 0.015
-"""Relative, per axis: collision AABB at q = 0 against the asked bounding box (dataset_format.md section 8.15)."""
+"""Relative, per axis: collision AABB at q = 0 against the requested bounding box."""
 BOX_SLACK = 2e-3
 """Metres that are always allowed: thin objects are thickened."""
 SOURCE_TOLERANCE, SOURCE_SLACK = 1e-3, 2e-3

@@ -1,6 +1,6 @@
 """One collision shape: what of it is convex already, and which parts have to be cut up.
 
-A primitive stays one; each `o`/`g` group of a mesh is one hull (iGibson's convention, dataset_format.md fact 4); a mesh
+A primitive stays one; each `o`/`g` group of a mesh is one hull (iGibson's convention); a mesh
 without groups is its hull where that fits, else the hulls of its connected parts. A part whose own hull is a bad fit is
 left to `decompose`.
 """
@@ -20,8 +20,7 @@ from .mesh_parts import Part, clean, decimate, enclosed_volume, hull_stands_for,
 from .pieces import HullOptions, Piece, PieceSource
 
 GROUP_RATIO = 1.3
-"""A group whose hull has more than this many times its mesh's volume is not a convex piece, whatever the file says
-(dataset_format.md section 8.4)."""
+"""A group whose hull has more than this many times its mesh's volume is not a convex piece, whatever the file says."""
 
 MOST_FACES = 60_000
 """Meshes with more are made coarser first."""

@@ -63,8 +63,8 @@ def add_ground(spec: mujoco.MjSpec, like: mujoco.MjsDefault) -> None:
 def room_view(rooms: RoomMaps, index: int) -> tuple[np.ndarray, np.ndarray] | None:
     """Eye and target [3] for a look into a room: from the free floor farthest from its middle, towards its middle.
 
-    None where the map has no pixel of the room. Row is y, column is x, the world's origin is the map's centre
-    (dataset_format.md 2.5).
+    None where the map has no pixel of the room. Row is y, column is x, the world's origin is the map's centre,
+    as in iGibson's dataset.
     """
     points = _pixel_centres(rooms.room_map == index + 1, rooms.resolution)
     if len(points) == 0:

@@ -67,8 +67,8 @@ def object_entry(
 
 
 def bounding_box(assembly: Assembly) -> tuple[np.ndarray, np.ndarray]:
-    """Size and centre [3] of an object's box in base axes, scaled: metadata.json's, which no mesh is asked about
-    (section 0, fact 3), or that of the collision pieces where there is none."""
+    """Size and centre [3] of an object's box in base axes, scaled: metadata.json's, or that of the collision
+    pieces where there is none."""
     metadata = assembly.model.metadata
     if metadata.bbox_size is not None and metadata.base_link_offset is not None:
         return metadata.bbox_size, metadata.base_link_offset

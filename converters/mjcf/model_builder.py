@@ -16,7 +16,7 @@ from .textures import TextureStore
 MESH_FOLDER, TEXTURE_FOLDER = "meshes", "textures"
 #: Geom groups: the viewer shows 0 to 2 and hides the others until their number is pressed.
 VISUAL_GROUP, COLLISION_GROUP, HIDDEN_GROUP = 0, 3, 4
-#: Sliding friction: Bullet multiplies 0.5 by 0.5, MuJoCo takes the larger (dataset_format.md section 7). The other two
+#: Sliding friction: Bullet multiplies 0.5 by 0.5, MuJoCo takes the larger. The other two
 #: are MuJoCo's own defaults (m).
 FRICTION = (0.25, 0.005, 0.0001)
 #: Rolling friction (m) of recognised cylinders and spheres. Bullet has none, but puts to sleep whatever rolls slower

@@ -19,7 +19,7 @@ from ..hulls.pieces import Piece
 from .colours import Rgba, category_colour
 from .model_builder import FRICTION, HIDDEN_GROUP, ROLLING_FRICTION, ModelBuilder
 
-#: The annotated links that states know (dataset_format.md 4.2; water_sink is ours, paper table A.3).
+#: The annotated links that states know (iGibson's dataset format; water_sink is ours, paper table A.3).
 LINK_KINDS = ("heat_source", "toggle_button", "water_source", "water_sink", "slicer", "cleaning_tool_area")
 
 _GEOM_TYPES = {
@@ -60,9 +60,9 @@ def add_object(
     """Adds an object to the model.
 
     Args:
-      name: of the object; also of its base body. Other bodies and joints are `<name>_<original name>` (section 7).
+      name: of the object; also of its base body. Other bodies and joints are `<name>_<original name>`.
       root_poses: world pose, 4x4, of each root body of the assembly, the base first.
-      fixed: the base gets no joint. Bodies behind floating joints are free whatever the base is (section 0, fact 8).
+      fixed: the base gets no joint. Bodies behind floating joints are free whatever the base is.
       collide: False leaves the collision geoms out.
       visual_group: geom group of the visuals, default 0.
     """
@@ -223,7 +223,7 @@ class _ObjectWriter:
             equality.data[:5] = [joint.mimic.offset, joint.mimic.multiplier, 0.0, 0.0, 0.0]
 
     def _add_excludes(self, names: list[str]) -> None:
-        """No contacts between bodies of one tree (section 0, fact 7); split-off bodies do touch the rest (fact 8)."""
+        """No contacts between bodies of one tree; split-off bodies do touch the rest."""
         trees: dict[int, list[int]] = {}
         root: dict[int, int] = {}
         for index, plan in enumerate(self._assembly.bodies):

@@ -24,7 +24,7 @@ from .object import ObjectElements, add_object
 from .parking import park
 from .start_state import let_down
 
-#: The start state: joint positions as saved, or 0 brought inside the limits (dataset_format.md section 7).
+#: The start state: joint positions as saved, or 0 brought inside the limits.
 START_KEY = "initial"
 
 HOVERS = "above its support in the source"
@@ -56,7 +56,7 @@ def build_scene(
       placements: in the order of the source.
       assemblies: object name -> its plan.
       assisted_grasp: category -> enable_ag of avg_category_specs.json; absent means yes.
-      ceiling_collision: whether ceilings get collision geoms (section 2.3). Their visuals are in a hidden group either
+      ceiling_collision: whether ceilings get collision geoms. Their visuals are in a hidden group either
         way, so that one can look into the house from above.
     """
     build = SceneBuild(builder, [], {}, {})
@@ -104,7 +104,7 @@ def build_scene(
 def root_poses(placement: Placement, assembly: Assembly) -> list[np.ndarray]:
     """World pose, 4x4, of the base and of every split-off body.
 
-    The scene gives the pose of the bounding box's centre (section 2.2). Saved poses of centres of mass count only where
+    The scene gives the pose of the bounding box's centre. Saved poses of centres of mass count only where
     that does not say enough: for split-off bodies, and for objects without a bounding box.
     """
     instance, metadata = placement.instance, assembly.model.metadata
@@ -141,7 +141,7 @@ def _with_extra_roots(assembly: Assembly, base: np.ndarray) -> list[np.ndarray]:
 
 
 def _start_joints(placement: Placement, assembly: Assembly, elements: ObjectElements) -> dict[str, float]:
-    """MJCF joint -> start position. Saved names are `<object>_<joint>`; unknown ones are ignored (section 7)."""
+    """MJCF joint -> start position. Saved names are `<object>_<joint>`; unknown ones are ignored."""
     saved = placement.instance.joint_states or {}
     positions = {}
     for joint in assembly.joints():

@@ -1,7 +1,7 @@
 """The start state at rest: hovering objects are let down onto what is below them, parked ones have settled.
 
 Real scene files leave millimetres to centimetres of air under loose objects, which iGibson lets fall when it loads the
-scene (dataset_format.md 2.1). Here the fall is done once, at conversion, and only where it is nothing but a fall:
+scene (iGibson's dataset format). Here the fall is done once, at conversion, and only where it is nothing but a fall:
 an object that slides, tips or rolls keeps the source's pose, and the checks list it.
 """
 

@@ -1,4 +1,4 @@
-"""Saved extended states of iGibson (the `states` JSON, dataset_format.md section 9) in ig2mj's names.
+"""Saved extended states of iGibson (the `states` JSON, iGibson's dataset format) in ig2mj's names.
 
 The manifest's `ObjectEntry.state` then holds, each only where the source had it:
 
@@ -21,7 +21,7 @@ import numpy as np
 
 from ..base.transforms import quat_from_rotation, rotation_from_wxyz, wxyz
 
-#: Particles saved farther from their object than this (m) were saved while it was parked elsewhere (states.md 10.2).
+#: Particles saved farther from their object than this (m) were saved while it was parked elsewhere (sliced.py).
 MAX_PARTICLE_DISTANCE = 10.0
 
 #: Link name as saved (or None for the base) -> MJCF body and its 4x4 world pose.

@@ -1,4 +1,4 @@
-"""A dataset root in iGibson's layout (dataset_format.md section 1)."""
+"""A dataset root in iGibson's layout."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Dataset:
         return any(inputs.is_file(folder / f"{model}{end}.urdf") for end in ("", "_simplified"))
 
     def density(self, category: str) -> float:
-        """Bounding-box density of a category, kg/m^3; 67.0 where it has no spec (section 6)."""
+        """Bounding-box density of a category, kg/m^3; 67.0 where it has no spec."""
         spec = self.specs.get(category)
         return DEFAULT_DENSITY if spec is None or spec.density is None else spec.density
 
@@ -99,7 +99,7 @@ class Dataset:
         return self._models[key]
 
     def building(self, scene: str, category: str, model: str) -> ObjectModel:
-        """Reads a building part (walls, floors, ceilings) of a scene (section 2.3). Cached; not to be changed."""
+        """Reads a building part (walls, floors, ceilings) of a scene. Cached; not to be changed."""
         key = (scene, category, model)
         if key not in self._buildings:
             folder = self._inside("scenes", scene)
@@ -126,7 +126,7 @@ class Dataset:
         self, name: str, urdf: str | os.PathLike | None = None, random_index: int | None = None
     ) -> pathlib.Path:
         """The scene URDF that is read: an explicit path, an explicit name in the scene's urdf/ folder,
-        `<S>_random_<index>`, `<S>_best`, `<S>` (section 2).
+        `<S>_random_<index>`, `<S>_best`, `<S>`.
 
         Raises:
           UnknownNameError: no such scene. InputError: no such file.
@@ -239,7 +239,7 @@ def _check_metadata(model: ObjectModel) -> None:
 
 
 def _filter(scene: SceneDescription, options: SceneOptions) -> None:
-    """Applies the loader's filters (section 3). An object without `room` is taken to be in the room it stands in."""
+    """Applies the loader's filters. An object without `room` is taken to be in the room it stands in."""
     wanted = None if options.only_rooms is None else set(options.only_rooms)
     if wanted is not None:
         known = {room for i in scene.instances for room in i.rooms} | set(scene.rooms.names if scene.rooms else [])

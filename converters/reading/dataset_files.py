@@ -1,4 +1,4 @@
-"""The small files of a dataset root: VERSION, metadata/*, misc/bbox_overlap.json (dataset_format.md 1.1, 2.5)."""
+"""The small files of a dataset root: VERSION, metadata/*, misc/bbox_overlap.json (iGibson's dataset format)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .json_reader import read_json, scalar, vector
 from .xml_reader import read_bytes
 
 OLDEST, BEYOND = (2, 0, 6), (2, 2, 3)
-"""iGibson 2.2.2 accepts OLDEST <= VERSION < BEYOND (section 1)."""
+"""iGibson 2.2.2 accepts OLDEST <= VERSION < BEYOND."""
 ALWAYS_THERE = "floor.n.01"  # iGibson puts it before non_sampleable_categories.txt
 
 

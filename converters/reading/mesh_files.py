@@ -55,7 +55,7 @@ class MeshPart:
 
 
 def is_encrypted(file: pathlib.Path) -> bool:
-    """A BEHAVIOR file that only iGibson's renderer may open (dataset_format.md 4.5): name `*.encrypted.*`."""
+    """A BEHAVIOR file that only iGibson's renderer may open: name `*.encrypted.*`."""
     return ".encrypted." in file.name.lower()
 
 

@@ -1,4 +1,4 @@
-"""misc/metadata.json of an object (dataset_format.md 4.1, 4.2)."""
+"""misc/metadata.json of an object (iGibson's dataset format)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Wavefront OBJ, keeping what trimesh's reader merges: one mesh per `o`/`g` group, or one per material with texture uv.
 
-Bullet makes one convex hull of each `o` or `g` group (dataset_format.md fact 4), so for collision files the groups
+Bullet makes one convex hull of each `o` or `g` group (iGibson's dataset format), so for collision files the groups
 are the decomposition.
 """
 

@@ -1,4 +1,4 @@
-"""`layout/*.png` -> `RoomMaps`, and `rooms.npz` (dataset_format.md 2.5).
+"""`layout/*.png` -> `RoomMaps`, and `rooms.npz` (iGibson's dataset format).
 
 All layout images are square, 0.01 m per pixel, centred on the world's origin, row = y, column = x, not flipped.
 """

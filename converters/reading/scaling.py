@@ -1,8 +1,8 @@
-"""Scaling an articulated object per axis (dataset_format.md section 5).
+"""Scaling an articulated object per axis (iGibson's dataset format).
 
 The whole object, at joint positions 0, is stretched by s along its base link's axes. A link whose frame is turned by R
 against the base sees the linear map A = R^T diag(s) R, which is a shear where s is not uniform and R is no quarter
-turn. iGibson applies diag(s) in every link frame instead (fact 12): the same for trees without rotations, a distortion
+turn. iGibson applies diag(s) in every link frame instead: the same for trees without rotations, a distortion
 for others. Here A is baked into the vertices, so the stretched object is right at joint positions 0; joints keep their
 orientation, axes and origins are mapped with the geometry. The one object that has no rigid result is a hinge whose
 axis is oblique to s in a turned frame: what is perpendicular to it would not stay so. That is refused.
@@ -29,13 +29,13 @@ OBLIQUE = 0.01
 STRAIGHT = 1e-3
 """Shear, relative, below which a primitive stays one."""
 LARGE_RATIO = 3.0
-"""max(s) / min(s) from which a warning is given (section 8, step 5)."""
+"""max(s) / min(s) from which a warning is given."""
 
 
 def instance_scale(instance: Instance, model: ObjectModel) -> np.ndarray:
-    """Scale [3] of an instance: bounding_box / metadata.bbox_size, or its scale, or 1 (section 0 fact 2).
+    """Scale [3] of an instance: bounding_box / metadata.bbox_size, or its scale, or 1.
 
-    A bounding box asked of a model that has none says nothing: scale 1 (section 4.1).
+    A bounding box asked of a model that has none says nothing: scale 1.
 
     Raises:
       InputError: a scale that is not positive and finite.

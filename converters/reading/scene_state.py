@@ -1,4 +1,4 @@
-"""The JSON attributes of cached scenes: body poses, velocities, joint states, offsets (dataset_format.md 2.1)."""
+"""The JSON attributes of cached scenes: body poses, velocities, joint states, offsets (iGibson's dataset format)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scene URDF (the pseudo-URDF of iGibson's scenes) -> `SceneDescription` (dataset_format.md 2.1).
+"""Scene URDF (the pseudo-URDF of iGibson's scenes) -> `SceneDescription`.
 
 A `<link>` there is an instance of an object; its `<joint>` gives the pose of the object's bounding-box centre and
 whether it is fixed. All parents are "world", so the file is a flat list.
@@ -41,7 +41,7 @@ FIXED_FURNITURE = (
     "desk",
     "gaming_table",
 )
-"""Categories that BEHAVIOR's `_fixed_furniture` scenes turn fixed (section 8, step 8)."""
+"""Categories that BEHAVIOR's `_fixed_furniture` scenes turn fixed."""
 
 
 @dataclasses.dataclass(frozen=True)

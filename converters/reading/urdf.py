@@ -36,7 +36,7 @@ def read_urdf(
     """Reads an object's URDF and its meshes (unscaled, link frames); metadata is left empty.
 
     Args:
-      file: the URDF. If `<stem>_simplified.urdf` stands beside it, that one is read (dataset_format.md section 4).
+      file: the URDF. If `<stem>_simplified.urdf` stands beside it, that one is read (iGibson's dataset format).
       category, model: what the object is called.
       root: the dataset root (dataset mode): every mesh must lie below it, absolute paths are refused.
         None (plain URDF): meshes may lie below the URDF's folder or its package's root.
@@ -137,7 +137,7 @@ def _read_joint(element: Element, file: pathlib.Path, warnings: list[str]) -> Jo
 
 
 def _read_limits(joint: Joint, element: Element, file: pathlib.Path, warnings: list[str]) -> None:
-    """Limits as Bullet takes them: none at all where lower > upper (dataset_format.md section 7)."""
+    """Limits as Bullet takes them: none at all where lower > upper."""
     limit = element.find("limit")
     if limit is None or (limit.get("lower") is None and limit.get("upper") is None):
         warnings.append(f"{where(element)}: a {joint.type} joint without limits can move without end")

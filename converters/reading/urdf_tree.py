@@ -31,7 +31,7 @@ def find_tree(
 ) -> tuple[str, dict[str, Link], dict[str, Joint]]:
     """(base link, links, joints) of the tree that hangs on the base.
 
-    The base is the first link in document order that is not a joint's child (dataset_format.md section 4). Links
+    The base is the first link in document order that is not a joint's child (iGibson's dataset format). Links
     that do not hang on it are left out with a warning.
 
     Raises:

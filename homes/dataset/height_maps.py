@@ -1,6 +1,6 @@
 """misc/heights_per_link.json and its maps: where on, in and under a piece of furniture something can be put.
 
-dataset_format.md 4.3. A map has one pixel per centimetre of the link's own frame at scale 1; pixel (row, column) stands
+In iGibson's dataset a map has one pixel per centimetre of the link's own frame at scale 1; pixel (row, column) stands
 for the point x = column / 100 - 2, y = row / 100 - 2, and is 255 where there is room above the map's height, else 0.
 """
 

@@ -1,6 +1,6 @@
 """materials/: the classes that material_groups.json files name, one instance each, for iGibson's texture randomiser.
 
-dataset_format.md 4.4: materials.json is class -> instance -> {diffuse, metallic, roughness, normal}, relative paths or
+iGibson's materials.json is class -> instance -> {diffuse, metallic, roughness, normal}, relative paths or
 null; material_friction.json is class -> friction of a link that wears it.
 """
 
@@ -35,7 +35,7 @@ CLASSES = {
     "tile": "white",
     "wood": "oak",
 }
-FRICTION = 0.5  # iGibson's default where it knows nothing (section 4.4)
+FRICTION = 0.5  # iGibson's default where it knows nothing
 
 
 def write_material_library(root: pathlib.Path, seed: int = 0) -> None:

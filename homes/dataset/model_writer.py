@@ -1,4 +1,4 @@
-"""Writes one model folder of the iGibson dataset (dataset_format.md section 4): URDF, meshes, textures, metadata.
+"""Writes one model folder of the iGibson dataset: URDF, meshes, textures, metadata.
 
 Numbers are rounded (collision 1 micrometre, visual 10 micrometres, or 100 in a mesh wider than 0.3 m), so that the same
 model gives the same bytes.
@@ -90,7 +90,7 @@ def _inertial(link: LinkBuilder, mass: float) -> str:
 
 
 def metadata(model: HouseholdObject) -> dict:
-    """misc/metadata.json (dataset_format.md 4.1). Lists of numbers are rounded; quaternions x, y, z, w."""
+    """misc/metadata.json (iGibson's dataset format). Lists of numbers are rounded; quaternions x, y, z, w."""
     low, high = model.bounds()
     boxes = {}
     for link in model.links:

@@ -1,4 +1,4 @@
-"""Writes a dataset root in iGibson's layout (dataset_format.md section 1): VERSION, metadata, materials, objects.
+"""Writes a dataset root in iGibson's layout: VERSION, metadata, materials, objects.
 
 The same seed gives the same bytes. Models are built in a process pool; nothing outside the pool's results is random.
 """
@@ -24,7 +24,7 @@ from .specs import category_spec
 
 VERSION = "2.2.0"  # iGibson 2.2.2 accepts 2.0.6 <= version < 2.2.3
 BUILDING = ("ceilings", "floors", "walls")
-#: Room types in the order of the semantic map's values (dataset_format.md 1.1).
+#: Room types in the order of the semantic map's values (iGibson's dataset format).
 ROOM_TYPES = (
     "bathroom", "bedroom", "childs_room", "closet", "corridor", "dining_room", "empty_room", "exercise_room", "garage",
     "home_office", "kitchen", "living_room", "lobby", "pantry_room", "playroom", "staircase", "storage_room",

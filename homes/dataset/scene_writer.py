@@ -1,4 +1,4 @@
-"""Writes a scene folder of the dataset (dataset_format.md section 2) out of a plan and what stands in it."""
+"""Writes a scene folder of the dataset (iGibson's dataset format) out of a plan and what stands in it."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ Spec = dict[str, object]
 def category_spec(entry: Entry, sizes: Iterable[Iterable[float]]) -> Spec:
     """The spec of one category from the bounding boxes of its whole models.
 
-    `density` is the density of the bounding box, mass / (x y z), as iGibson's loader uses it (dataset_format.md 1.1).
+    `density` is the density of the bounding box, mass / (x y z), as iGibson's loader uses it.
     """
     mean = np.array(list(sizes), float).mean(0)
     density = entry.mass / float(mean.prod())

@@ -1,6 +1,6 @@
-"""Cuts a model in two upright halves: the parts of a sliceable object (dataset_format.md 4.1 `object_parts`).
+"""Cuts a model in two upright halves: the parts of a sliceable object (iGibson's dataset format `object_parts`).
 
-Whole and halves must share one category (states.md section 10.3), so the halves of `apple/apple_00` are written as
+Whole and halves must share one category (iGibson's sliced.py), so the halves of `apple/apple_00` are written as
 `apple/apple_00_part_0` and `_part_1`.
 """
 

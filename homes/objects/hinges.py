@@ -34,7 +34,7 @@ def friction(model: HouseholdObject, joint: Joint, mass: float) -> float:
 def gravity_torque(model: HouseholdObject, joint: Joint, mass: float) -> float:
     """The largest torque, N m, that gravity has about a hinge within its range; 0 for a joint without limits.
 
-    A link's share of the mass is that of its hulls' volume (dataset_format.md section 6).
+    A link's share of the mass is that of its hulls' volume.
     """
     axis, pivot = _axis(model, joint)
     if joint.kind != "revolute" or abs(axis[2]) > 1 - 1e-9:

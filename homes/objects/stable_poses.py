@@ -10,7 +10,7 @@ import trimesh
 
 from .model import HouseholdObject, hull_mesh
 
-MIN_PROBABILITY = 0.03  # states.md section 3: stable poses under this probability are dropped
+MIN_PROBABILITY = 0.03  # stable poses under this probability are dropped, as in iGibson
 MOST = 8
 STANDING = 0.7  # probability that a "standing" object stands
 SOLE = (0.02, 0.004)  # points this close to the lowest carry it: at most this part of its length, and at most so many m

@@ -1,4 +1,4 @@
-"""Walls, floors and ceilings of a plan: boxes, and their three one-link URDFs with meshes (dataset_format.md 2.3)."""
+"""Walls, floors and ceilings of a plan: boxes, and their three one-link URDFs with meshes, as in iGibson."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The maps of a scene folder (dataset_format.md 2.5): rooms, and where a robot can drive. 1 pixel is 0.01 m.
+"""The maps of a scene folder (iGibson's dataset format): rooms, and where a robot can drive. 1 pixel is 0.01 m.
 
 All maps are square with the world's origin in their middle; row is y, column is x, not flipped.
 """

@@ -25,7 +25,7 @@ from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.tables import SceneTables
 
 ACTION_PERIOD = 0.1
-"""Seconds between two actions: three control steps (spec/robots_tasks_sensors.md section 2.6)."""
+"""Seconds between two actions: three control steps (appendix of the paper)."""
 
 ControllerState = Any
 """What a controller remembers from step to step: a pytree of arrays that begin with the world axis."""

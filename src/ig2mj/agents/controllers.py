@@ -19,7 +19,7 @@ def scale_command(
     out_low: Float[np.ndarray, "n"],
     out_high: Float[np.ndarray, "n"],
 ) -> Float[Array, "W n"]:
-    """Clips a command to its limits and maps them linearly onto those of the output (spec 1.2, steps 1 and 3)."""
+    """Clips a command to its limits and maps them linearly onto those of the output."""
     command = jnp.clip(jnp.asarray(command, jnp.float32), low, high)
     gain = np.abs(out_high - out_low) / np.abs(high - low)
     return (command - (low + high) / 2) * gain + (out_low + out_high) / 2
@@ -40,7 +40,7 @@ def differential_drive(
 
 
 def drive_limits(radius: float, axle: float, max_wheel: float) -> Float[np.ndarray, "2"]:
-    """The largest commands of a differential drive, m/s and rad/s (spec 1.2)."""
+    """The largest commands of a differential drive, m/s and rad/s."""
     speed = max_wheel * radius
     return np.array([speed, 2 * speed / axle])
 
@@ -54,8 +54,8 @@ def wheel_odometry(wheels: Float[Array, "W 2"], radius: float, axle: float) -> F
 def discrete_drive(radius: float, axle: float, max_wheel: float) -> Float[np.ndarray, "5 2"]:
     """iGibson's five discrete actions of two wheels as commands (m/s, rad/s): forwards, backwards, right, left, stay.
 
-    Half the wheels' speed to move, 0.5 rad/s of each wheel to turn (spec 1.6, whose rows these are; it does not name
-    directions, and a positive second number turns to the left).
+    Half the wheels' speed to move, 0.5 rad/s of each wheel to turn, as in iGibson's turtlebot.py, which does not name
+    directions; a positive second number turns to the left.
     """
     move, turn = 0.5 * max_wheel * radius, 2 * 0.5 * radius / axle
     return np.array([[move, 0], [-move, 0], [0, turn], [0, -turn], [0, 0]])

@@ -1,6 +1,6 @@
 """A hand that floats: six joints move the palm, ten bend its fingers, all actuated. The simplest robot that acts.
 
-The palm's frame is that of BehaviorRobot's right hand (spec/robots_tasks_sensors.md section 1.3): fingers point along
+The palm's frame is that of BehaviorRobot's right hand (iGibson's behavior_robot.py): fingers point along
 -z, the palm faces -y, the thumb is on the +x side. Three slides along the world's axes and three hinges (x, then y,
 then z) carry it. Position servos limited to the paper's 300 N drive them, each axis by itself, as in Bullet.
 
@@ -27,10 +27,10 @@ from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.tables import SceneTables
 
 HAND_FORCE = 300.0
-"""Newtons (newton metres for turning) of each axis (paper, appendix A.3; design section 5)."""
+"""Newtons (newton metres for turning) of each axis (paper, appendix A.3)."""
 
 FINGER_TORQUE = 3.0
-"""Newton metres of each finger joint (spec/robots_tasks_sensors.md section 1.3)."""
+"""Newton metres of each finger joint (iGibson's behavior_robot.py)."""
 
 FINGER_CLOSED, THUMB_CLOSED = 1.2, 0.6
 """Radians at which fingers and thumb are closed; open is 0 (same section)."""
@@ -42,7 +42,7 @@ PALM_MASS, SEGMENT_MASS = 1.0, 0.1
 """Kilograms (same section)."""
 
 CONTACT_GAP = 0.003
-"""Metres, as on every collision geom of a scene (design section 2, fact 15)."""
+"""Metres, as on every collision geom of a scene."""
 
 PALM_HALF = (0.042, 0.012, 0.045)
 SEGMENTS = (0.042, 0.034)

@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 CONTACT_GAP = 0.003
-"""Metres, as on every collision geom of a scene (design section 2, fact 15)."""
+"""Metres, as on every collision geom of a scene."""
 
 PULL_RATE = 90.0
 """1/s: natural frequency of the critically damped servos that pull a floating part to its target.

@@ -1,6 +1,6 @@
 """TurtleBot 2: two driven wheels, two casters, a camera. The robot of iGibson's navigation tasks and of table A.6.
 
-Figures: iGibson's drive (spec/robots_tasks_sensors.md section 1.6) and the maker's Kobuki base (masses, places of
+Figures: iGibson's drive and the maker's Kobuki base (masses, places of
 wheels, casters and plates). Geometry is our own, of primitives. The base frame is on the floor between the wheels,
 x forward, z up.
 """
@@ -67,7 +67,7 @@ LASER = (0.16, 0.0, 0.36)
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class TurtleBot:
-    """The robot. `pos`, `quat`: its base on the floor. `discrete`: actions are one number, 0 to 4 (spec 1.6)."""
+    """The robot. `pos`, `quat`: its base on the floor. `discrete`: actions are one number, 0 to 4."""
 
     name: str = "turtlebot"
     pos: Vector = (0, 0, 0)

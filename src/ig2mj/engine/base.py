@@ -30,19 +30,19 @@ from ig2mj.scene.scene import Scene
 from ig2mj.scene.tables import SceneTables
 
 PHYSICS_TIMESTEP = 1 / 120
-"""Seconds. iGibson's physics step (spec/dataset_format.md section 7)."""
+"""Seconds. iGibson's physics step."""
 
 SUBSTEPS = 4
-"""Physics steps in a control step: iGibson renders and acts at 30 Hz (spec/states.md section 0)."""
+"""Physics steps in a control step: iGibson renders and acts at 30 Hz."""
 
 TOUCH_TOLERANCE = 0.003
-"""Metres. Surfaces this close touch (spec/states.md section 24)."""
+"""Metres. Surfaces this close touch (measured in PyBullet)."""
 
 BOX_RULES = ("tight", "igibson")
 """How `aabb_low` and `aabb_high` are made.
 
 "tight": smallest world box around the collision geometry. "igibson": each body's box in its own frame, rotated into the
-world and enclosed, plus Bullet's margin (spec/states.md 4.2 and 24).
+world and enclosed, plus Bullet's margin (iGibson's aabb.py).
 """
 
 

@@ -1,6 +1,6 @@
 """`Health`: what an engine knows about worlds that went wrong, and how full its buffers are.
 
-Overflow of a buffer is undefined behaviour in MJX-Warp (design section 2, fact 5): the world goes on with contacts or
+Overflow of a buffer is undefined behaviour in MJX-Warp: the world goes on with contacts or
 constraints missing. So the flags are kept, and guards act on them (`ig2mj.worlds.guards`).
 """
 

@@ -2,7 +2,7 @@
 
 A *unit* is the part of an object that sleeps and wakes as one: its static part, or one kinematic tree of it (a fixed
 cabinet with two drawers has three units). Touching is remembered per pair of units, because two units that sleep have
-no contacts in MuJoCo (design section 2, fact 7), and an object may be half awake.
+no contacts in MuJoCo, and an object may be half awake.
 
 Axes: O objects, U units, T trees, B bodies, G geoms, L annotated links, E equality constraints.
 """

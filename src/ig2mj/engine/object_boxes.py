@@ -121,7 +121,7 @@ def world_boxes(plan: BoxPlan, xpos: np.ndarray, xmat: np.ndarray) -> tuple[np.n
 
 
 def _split_off(model: mujoco.MjModel, tables: SceneTables, layout: ModelLayout) -> np.ndarray:
-    """Bodies that hang on their object by no joint: iGibson's box is the main body's alone (spec/states.md 4.2)."""
+    """Bodies that hang on their object by no joint: iGibson's box is the main body's alone (aabb.py)."""
     roots = model.dof_bodyid[layout.extra_dofadr]
     parents, found = np.asarray(model.body_parentid), np.zeros(model.nbody, bool)
     found[roots] = True

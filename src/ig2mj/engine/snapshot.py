@@ -38,7 +38,7 @@ class ScenePart:
 
     Attributes:
       tree_asleep: sleep state per kinematic tree: negative awake, else the next tree of its sleeping island.
-      eq_data: parameters of equality constraints, per world (design section 2, fact 9).
+      eq_data: parameters of equality constraints, per world.
       touching: remembered contact of units.
     """
 

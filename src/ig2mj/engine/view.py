@@ -87,7 +87,7 @@ class PhysicsView(_MadeLater):
     object_linvel: Float[Array, "W O 3"] = _field("velocity of the main body's origin, m/s; 0 for fixed objects")
     object_angvel: Float[Array, "W O 3"] = _field("angular velocity of the main body, rad/s; 0 for fixed objects")
     object_com: Float[Array, "W O 3"] = _field(
-        "centre of mass of the main body; iGibson's position of an object (spec/states.md 4.1)"
+        "centre of mass of the main body; iGibson's position of an object (pose.py)"
     )
     aabb_low: Float[Array, "W O 3"] = _field(
         "lowest corner of the world box over all bodies of the object, by the engine's box rule"
@@ -100,7 +100,7 @@ class PhysicsView(_MadeLater):
     joint_pos: Float[Array, "W J"] = _field("positions of openable joints, rad or m")
     touching: Bool[Array, "W O O"] = _field(
         "surfaces no further apart than the engine's tolerance (3 mm); symmetric, the diagonal is false. Remembered "
-        "for pairs that sleep (design section 2, fact 7)"
+        "for pairs that sleep"
     )
     link_force: Float[Array, "W L O"] = _field(
         "N; largest normal force of any contact and any physics step of this control step of the annotated link's geom "

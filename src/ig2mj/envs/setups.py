@@ -31,7 +31,7 @@ from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.rules import Rules
 
 PAPER_RL_STAINS = 0.75
-"""Share of the stains that may stay in the paper's runs (spec/robots_tasks_sensors.md section 0.1)."""
+"""Share of the stains that may stay in the paper's runs (appendix of the paper)."""
 
 STANDING = {"humanoid": 0.55, "fetch": 0.0}
 """m above the floor at which robots start."""

@@ -2,7 +2,7 @@
 
 Tight: the smallest box around the object's pieces (`core_boxes`). iGibson's: per link the box of the link's whole shape
 in the link's frame, widened by Bullet's margin (`link_boxes`, made once), and then turned into the world, which makes
-it looser (`turned_boxes`; spec/states.md 4.2 and section 24).
+it looser (`turned_boxes`; iGibson's aabb.py).
 
 `core_boxes` and `turned_boxes` work on NumPy arrays and on JAX's alike and return what they are given.
 
@@ -23,7 +23,7 @@ from ig2mj.scene.tables import PieceKind
 Boxes = tuple[Float[AnyArray, "*b K 3"], Float[AnyArray, "*b K 3"]]
 
 BULLET_MARGIN_SINGLE, BULLET_MARGIN_COMPOUND = 0.003, 0.004
-"""Metres by which pybullet's box stands off one hull, and off a compound of hulls (spec/states.md section 24)."""
+"""Metres by which pybullet's box stands off one hull, and off a compound of hulls (measured in PyBullet)."""
 
 EDGE_ON = 1e-14
 """Of the squared sine of the angle between a cylinder's axis and a world axis: below, the gradient is cut to 0."""
@@ -80,7 +80,7 @@ def turned_boxes(
 ) -> Boxes:
     """iGibson's rule: boxes (low, high) around turned local boxes, about their frames' origins.
 
-    Bullet turns half extents and margin together, |R| (half + margin) (spec/states.md 4.2): `half` includes the margin.
+    Bullet turns half extents and margin together, |R| (half + margin) (iGibson's aabb.py): `half` includes the margin.
     """
     middle = (rotation @ center[..., None])[..., 0]
     reach = (abs(rotation) @ half[..., None])[..., 0]
@@ -119,7 +119,7 @@ def box_gap(
     low_b: Float[AnyArray, "*#b 3"],
     high_b: Float[AnyArray, "*#b 3"],
 ) -> Float[Array, "*b"]:
-    """Distance of two boxes: the length of the gaps along the axes, 0 where they overlap (spec/states.md 5.5)."""
+    """Distance of two boxes: the length of the gaps along the axes, 0 where they overlap (iGibson's next_to.py)."""
     gap = jnp.maximum(low_a, low_b) - jnp.minimum(high_a, high_b)
     endless = gap == jnp.inf  # of an empty box; kept out of the square root for its gradient
     distance = length(jnp.maximum(jnp.where(endless, 0.0, gap), 0.0))

@@ -1,13 +1,13 @@
 """Rays against convex pieces: where does a ray ENTER a piece, for every piece on the line and not just the nearest.
 
-iGibson's adjacency states rest on Bullet's rays (spec/states.md 4.4): a ray that starts inside a convex shape does not
+iGibson's adjacency states rest on Bullet's rays (adjacency.py): a ray that starts inside a convex shape does not
 hit it, nothing occludes anything, and a hit means that the ray enters the shape at 0 <= t <= length. Hence the basic
 function here is the interval [t_in, t_out] of a whole line inside a shape; whether a ray enters, forwards or
 backwards, follows from it. An empty interval is (inf, -inf). t counts in multiples of the direction's length.
 
 Shapes are in their own frame: capsules and cylinders lie along z; `size` is MuJoCo's geom_size (radius, half length);
 polyhedra are half-spaces (n, d) with n.x <= d, |n| = 1, padded with (0, 0, 0, 1). `inflate` (metres) grows a shape;
-Bullet's rays see hulls grown by 1.75 mm (spec section 24).
+Bullet's rays see hulls grown by 1.75 mm.
 
 A NaN in an origin, a direction or a pose yields no hit.
 """

@@ -28,12 +28,12 @@ def abilities(
     Args:
       category: iGibson category. One that the taxonomy does not know has no abilities but those an override gives.
       model: model name within the category, for overrides per model.
-      compat: "paper", or "igibson" for the code's rule where the two differ (spec/states.md section 17).
+      compat: "paper", or "igibson" for the code's rule where the two differ (docs/states.md).
       overrides: a project's own, from `load_overrides`.
 
     Returns:
       {ability: {parameter: value}}, a copy. At most one of heatSource and coldSource: both are the same state, and
-      the alphabetically first one wins (spec/states.md section 1).
+      the alphabetically first one wins (iGibson's factory.py).
     """
     found = {name: dict(parameters) for name, parameters in _shipped(category, model, compat)}
     if overrides is not None:
@@ -53,7 +53,7 @@ def required_states(ability: str) -> tuple[str, ...]:
     """Extended states that an object with this ability carries (table A.2). Raises UnknownNameError.
 
     Table A.2 gives every heat source the toggled state; in the data it is optional, and a fridge has none
-    (`requires_toggled_on` says which; spec/states.md section 17).
+    (`requires_toggled_on` says which; docs/states.md).
     """
     return _ability(ability).states
 

@@ -1,8 +1,8 @@
 """Every ability: its parameters' defaults, the extended states it needs, the annotated links it needs.
 
 An ability is a property of an object category, under the taxonomy's name. Sources: paper tables A.2 (states) and A.3
-(links); the defaults are those of iGibson's state constructors (spec/states.md sections 0, 6, 7, 8, 10, 11), which are
-the paper's where the paper gives one (tables A.1 and A.4).
+(links); the defaults are those of iGibson's state constructors, which are the paper's where it gives one (tables A.1
+and A.4).
 """
 
 from __future__ import annotations

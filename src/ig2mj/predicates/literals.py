@@ -2,8 +2,7 @@
 
 Names become indices here, once, with typed errors. An object without the ability a predicate asks for answers False,
 with one warning, or is an error with `strict`. A whole that has been sliced is stood for by its halves: a predicate of
-it holds when it holds for all of them; with it as the second argument, when it holds for any (in iGibson that raises,
-spec/states.md 19.11).
+it holds when it holds for all of them; with it as the second argument, when it holds for any (in iGibson that raises).
 
 Axes: W worlds, L literals.
 """

@@ -20,7 +20,7 @@ from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.scene.tables import PieceKind, SceneTables
 
 CELL = 0.01
-"""Metres. Side of a column; iGibson's height maps have this resolution too (spec/states.md 14.2)."""
+"""Metres. Side of a column; iGibson's height maps have this resolution too (sampling_utils.py)."""
 
 _LEVEL = 1e-9
 """A plane whose normal has a smaller vertical part is upright."""

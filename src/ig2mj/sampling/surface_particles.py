@@ -2,7 +2,7 @@
 
 Points are spread evenly by area over the outside of the collision pieces of all bodies of the object, where the surface
 does not face down by more than 45 degrees below the horizontal: iGibson's limit of 135 degrees to the vertical
-(spec/states.md 8.2).
+(iGibson's particles.py).
 """
 
 from __future__ import annotations

@@ -227,7 +227,7 @@ def _room_columns(manifest: Manifest, rooms: Rooms | None, file: object) -> dict
 
 
 def _graspable_columns(model: mujoco.MjModel, objects: list[ObjectEntry], find: _Names) -> dict[str, Any]:
-    """What hands can take hold of. iGibson's rule: spec/robots_tasks_sensors.md, assistive grasping."""
+    """What hands can take hold of. iGibson's rule of assistive grasping."""
     rows = [
         (find("body", entry.bodies[0], f"object '{entry.name}'"), number, -1)
         for number, entry in enumerate(objects)

@@ -20,12 +20,12 @@ def equality_name(hand: str, body: str) -> str:
 
 
 def add_grasp_equalities(spec: mujoco.MjSpec, manifest: Manifest, agents: list[AgentEntry]) -> None:
-    """Adds the constraints of each hand of `assisted` agents (design section 5).
+    """Adds the constraints of each hand of `assisted` agents.
 
     These are a weld to the main body of every movable object that allows grasps, and a connect to the moving link of
     every openable joint of fixed objects.
 
-    Switched off they cost nothing (design section 2, fact 16).
+    Switched off they cost nothing.
     """
     movable = [entry.bodies[0] for entry in manifest.objects if entry.assisted_grasp and not entry.fixed]
     moving = [

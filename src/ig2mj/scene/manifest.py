@@ -29,7 +29,7 @@ class JointEntry(msgspec.Struct, omit_defaults=True):
 
 
 class OpenableEntry(msgspec.Struct):
-    """A joint that says whether the object is Open: its closed end and its open end (spec/states.md section 11)."""
+    """A joint that says whether the object is Open: its closed end and its open end (iGibson's open.py)."""
 
     joint: str
     closed: float

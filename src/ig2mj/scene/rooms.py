@@ -1,4 +1,4 @@
-"""`rooms.npz`: which room a point is in, and where the floor is free (dataset_format.md 2.5)."""
+"""`rooms.npz`: which room a point is in, and where the floor is free (iGibson's dataset format)."""
 
 from __future__ import annotations
 

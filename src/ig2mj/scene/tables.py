@@ -54,7 +54,7 @@ class SceneTables:
         (0, 0, 0, 1); vertices in the piece's frame, padded by repeating the first one (of a round primitive the corners
         of its box).
       room_names: room instances; room_types: type of each. room_map: index + 1 of the room instance per pixel, 0 none;
-        row is y, column is x (spec/dataset_format.md 2.5). room_resolution: metres a pixel.
+        row is y, column is x (iGibson's dataset format). room_resolution: metres a pixel.
       object_rooms: annotated rooms of fixed objects, [O, R].
       orientation_*: stable orientations, sorted by object: object, quaternion of its base, probability, size (m) of
         the axis-aligned box that the object fills when it stands so.

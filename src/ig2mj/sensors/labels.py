@@ -1,4 +1,4 @@
-"""Numbers of classes and instances in segmentations (spec robots_tasks_sensors section 3.1).
+"""Numbers of classes and instances in segmentations.
 
 | class | what |
 |--:|---|

@@ -1,4 +1,4 @@
-"""All sensors, one line each. Names are iGibson's where it has the sensor (spec robots_tasks_sensors section 2.1)."""
+"""All sensors, one line each. Names are iGibson's where it has the sensor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The colours of states: of objects that are frozen, burnt, cooked, soaked or switched on (spec/states.md section 13),
+"""The colours of states: of objects that are frozen, burnt, cooked, soaked or switched on, as iGibson tints textures,
 and of dust, stains and water. Their one home; cameras and viewers take them from here.
 
 Of the states that are true the first of `TINTS` is shown. iGibson mixes the state's colour into the object's texture;
@@ -43,7 +43,7 @@ TINTS = (
     Tint(SOAKED, 0.5, (0.0, 0.0, 200 / 255)),
     Tint(TOGGLED_ON, 0.0, brightness=1.5),
 )
-"""Highest priority first (spec/states.md section 13)."""
+"""Highest priority first, as in iGibson."""
 
 DUST_COLOUR = (0.55, 0.52, 0.47)
 STAIN_COLOUR = (0.30, 0.16, 0.07)

@@ -2,7 +2,7 @@
 
 Nothing is scripted but the hand, which presses the stove's button at the start and again when the fish has burnt. The
 rest is the physics and the states of `Simulation`, with the taxonomy's numbers: a stove of 500 C and rate 0.02 that
-reaches 0.2 m, a fridge of -18 C and rate 0.02 for what is inside (spec/states.md sections 0 and 6).
+reaches 0.2 m, a fridge of -18 C and rate 0.02 for what is inside (iGibson's object_states).
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from typing import Literal
 Compat = Literal["paper", "igibson"]
 
 CONTROL_TIMESTEP = 1 / 30
-"""Seconds. iGibson's step: states are updated once per rendered frame (spec/states.md section 2)."""
+"""Seconds. iGibson's step: states are updated once per rendered frame (simulator.py)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -16,7 +16,7 @@ class StateOptions:
     """Choices, fixed for a run.
 
     Attributes:
-      compat: "paper", or "igibson" for the rule of iGibson's code where the two differ (spec/states.md section 17).
+      compat: "paper", or "igibson" for the rule of iGibson's code where the two differ (docs/states.md).
       timestep: seconds between two updates of the states.
       drying_rate: droplets per second that a wet object loses. Beyond iGibson, where nothing ever dries; 0 is off.
       contact_heat_rate: 1/s, rate at which two touching objects with temperatures approach each other. Beyond

@@ -2,8 +2,7 @@
 
 A particle is a point with a normal in the frame of a body; it moves with the body for free. It is `placed` when
 sampling put it there and `alive` until something wipes it off. Levels are relative to the placed ones, and `placed` is
-part of the state, so that a half-cleaned object is still half cleaned after saving and loading (iGibson forgets it,
-spec/states.md section 16).
+part of the state, so that a half-cleaned object is still half cleaned after saving and loading (iGibson forgets it).
 
 Axes: W worlds, R rows (one per object that can be dirty this way; `StateParameters.dust_rows`, `.stain_rows`), N = 20
 particles.
@@ -32,13 +31,13 @@ NUM_PARTICLES = 20
 
 MIN_PLACED = {"paper": NUM_PARTICLES, "igibson": 5}
 """Fewer placed particles than this are a failure that leaves the object clean: the paper's number is fixed (table A.5),
-iGibson's code puts up with five (spec/states.md section 17, row 19)."""
+iGibson's code puts up with five (docs/states.md, row 19)."""
 
 DUST_RADIUS = 0.0075
-"""Metres. Dust is drawn as spheres of 15 mm, half sunk into the surface (spec/states.md 8.2)."""
+"""Metres. Dust is drawn as spheres of 15 mm, half sunk into the surface (iGibson's particles.py)."""
 
 STAIN_THICKNESS = 0.004
-"""Metres. Stains are drawn as flat patches (spec/states.md 8.2)."""
+"""Metres. Stains are drawn as flat patches (iGibson's particles.py)."""
 
 
 @struct.dataclass
@@ -147,7 +146,7 @@ def remove(particles: Particles, row: int, worlds: Bool[Array, "W"] | None = Non
 
 
 def stain_sizes(bounding_box: Float[np.ndarray, "R 3"]) -> Float[np.ndarray, "R N"]:
-    """Edge lengths, metres, of an object's stain patches from its bounding box (spec/states.md section 0)."""
+    """Edge lengths, metres, of an object's stain patches from its bounding box (iGibson's object_states)."""
     median = np.median(bounding_box, axis=-1)
     low, high = np.clip(0.06 * median, 0.01, 0.02), np.clip(0.1 * median, 0.02, 0.1)
     return np.linspace(low, high, NUM_PARTICLES, axis=-1)

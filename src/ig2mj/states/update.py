@@ -1,4 +1,4 @@
-"""The one order in which extended states are updated after physics (spec/states.md section 2): `EVENTS`, then `HEAT`.
+"""The one order in which extended states are updated after physics (iGibson's simulator.py): `EVENTS`, then `HEAT`.
 
 A state that depends on another sees this step's value of it, but for water: a tap that is switched on in this step lets
 the first drop go in the next, as in iGibson. Which heat source acts on what is found between the two parts; a caller

@@ -1,10 +1,10 @@
 """What an action of a task moves: the velocities of one hand or of both, while the rest of the robot stays.
 
 Six numbers of -1 to 1 for each hand: linear velocity, then angular velocity, about the axes of the robot's base. At 1
-they are 0.5 m/s and 0.5 rad/s (paper, appendix A.3, and spec section 2.6). Where hands do not stick by themselves a
+they are 0.5 m/s and 0.5 rad/s (paper, appendix A.3). Where hands do not stick by themselves a
 seventh number of each closes them: the humanoid's opens or closes by that much, Fetch's opens from 0 on.
 
-Fetch's controller makes a fifth of the way to a goal 0.2 m ahead in an action (spec section 1.2): its 1 is 0.4 m/s.
+Fetch's controller makes a fifth of the way to a goal 0.2 m ahead in an action: its 1 is 0.4 m/s.
 
 Axes: W worlds, n numbers of an action, m of the controller's action.
 """

@@ -25,7 +25,7 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 
 WATER_BELOW = 0.1
-"""m below a tap's water source (spec/robots_tasks_sensors.md section 2.6)."""
+"""m below a tap's water source (appendix of the paper)."""
 
 
 @dataclasses.dataclass(frozen=True)

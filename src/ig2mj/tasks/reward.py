@@ -1,4 +1,4 @@
-"""Rewards as differences of potentials, each term by itself (spec/robots_tasks_sensors.md section 2.6).
+"""Rewards as differences of potentials, each term by itself (appendix of the paper).
 
 The potential is  w_goal x literals that hold - w_distance x distances + w_pickup x first object is held
 - w_stain x stains that are left;  the reward of a step is how much it grew. Two traps of iGibson's code are avoided: a

@@ -24,7 +24,7 @@ Vector3 = tuple[float, float, float]
 
 @dataclasses.dataclass(frozen=True)
 class Weights:
-    """Weights of the potential's terms (spec/robots_tasks_sensors.md section 2.6).
+    """Weights of the potential's terms (appendix of the paper).
 
     Attributes:
       goal: of the literals that hold: of their number, or where `share` is set of their share.

@@ -1,4 +1,4 @@
-"""What the mouse does to objects, as in iGibson's viewer (spec/robots_tasks_sensors.md section 4.7).
+"""What the mouse does to objects, as in iGibson's viewer.
 
 An object that was picked (double-click) is dragged by a spring from the point that was clicked to where the mouse is
 (Ctrl and the right button), with at most 100 N; a spring that is stretched too far lets go. A push is along the line of

@@ -1,5 +1,5 @@
 """What hands feel: a strong pulse in both while the body touches walls, a light one in a hand that touches or holds
-something (spec/robots_tasks_sensors.md section 4.2: 0.9 and 0.3)."""
+something (iGibson's VR interface: 0.9 and 0.3)."""
 
 from __future__ import annotations
 

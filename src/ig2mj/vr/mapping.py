@@ -1,4 +1,4 @@
-"""`action_of`: from what a person's devices say to the humanoid's 28 numbers (spec/robots_tasks_sensors.md 4.3).
+"""`action_of`: from what a person's devices say to the humanoid's 28 numbers (iGibson's VR interface).
 
 The head is set directly. Hands and body are targets, to which the humanoid's constraints pull with 300 N and 50 N; so
 hands stop at walls, whatever the person's own hands do. A body without a tracker stands below the head and faces where
@@ -23,7 +23,7 @@ from ig2mj.engine.view import PhysicsView
 from ig2mj.vr.frames import Pose, PoseFrame
 
 TOGGLE_SECONDS = 1.0
-"""Both squeezes held for so long take hold of the robot, or let go of it (spec 4.3, 1)."""
+"""Both squeezes held for so long take hold of the robot, or let go of it."""
 
 PRESSED = 0.5
 """From here on a squeeze counts."""

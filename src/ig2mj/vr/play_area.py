@@ -1,4 +1,4 @@
-"""Moving the play area: by sticks, and to where the robot stands (spec/robots_tasks_sensors.md section 4.2).
+"""Moving the play area: by sticks, and to where the robot stands (iGibson's VR interface).
 
 This runs with the devices, never with physics, so that a person who walks by the stick sees the home move at once.
 """

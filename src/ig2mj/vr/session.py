@@ -35,7 +35,7 @@ from ig2mj.vr.track import PoseTrack
 from ig2mj.worlds.watching import watch_physics
 
 PERIOD = 1 / 30
-"""s of a frame: one control step (iGibson's demonstrations were made at 30 Hz, spec 4.1)."""
+"""s of a frame: one control step (iGibson's demonstrations were made at 30 Hz)."""
 
 HOURS = 12
 """Horizon of an episode: as long as anybody stays."""

@@ -25,10 +25,10 @@ from ig2mj.viewer.offscreen import VISIBLE_GROUPS
 from ig2mj.vr.frames import Pose
 
 WIDTH, HEIGHT = 1296, 1440
-"""Pixels of each eye (spec/robots_tasks_sensors.md section 4.1)."""
+"""Pixels of each eye (iGibson's VR settings)."""
 
 NEAR, FAR = 0.1, 30.0
-"""m (spec 4.1)."""
+"""m."""
 
 SAMPLES = 4
 """Of each pixel."""

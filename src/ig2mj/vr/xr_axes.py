@@ -22,7 +22,7 @@ HAND_IN_GRIP = (
     Rotation.from_matrix([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
 )
 """Left, right: the humanoid's hand in the grip. Exact quarter turns; iGibson's numbers for this are degrees that its
-code takes for radians (spec section 7.4, 1)."""
+code takes for radians."""
 
 
 def vector_from_xr(vector: Vector) -> np.ndarray:

@@ -1,7 +1,7 @@
 """`HandResets`: hands that are asked back while they are out of their arm's reach come back at once.
 
 A hand that something blocks stays behind when the body goes on, and may never come back by its own force. iGibson's
-reset of a hand teleports it to where it is pulled (spec/robots_tasks_sensors.md section 1.3). So it is here for hands
+reset of a hand teleports it to where it is pulled (iGibson's behavior_robot.py). So it is here for hands
 beyond their reach; nearer ones are pulled back, since a hand that jumps could land inside something.
 
 Axes: W worlds, n numbers of an action, K hands of a robot.

@@ -1,4 +1,4 @@
-"""Fetch's eleven-number action and its proprioception (spec/robots_tasks_sensors.md sections 1.2 and 1.6).
+"""Fetch's eleven-number action and its proprioception (iGibson's fetch.py).
 
 | numbers | in units of |
 |---|---|

@@ -1,6 +1,6 @@
 """Fetch's figures: frames, limits, masses and inertias of its maker's public description; drive and poses of iGibson.
 
-Joints are in iGibson's order (spec/robots_tasks_sensors.md section 1.6): right and left wheel, torso, head pan and
+Joints are in iGibson's order: right and left wheel, torso, head pan and
 tilt, seven of the arm, right and left finger. The frames of all links are parallel at joint positions 0, x forward.
 """
 

@@ -45,7 +45,7 @@ DEFAULT = (
     *(f"eef_0_quat_{n}" for n in "wxyz"),
     *("gripper_0_qpos_right", "gripper_0_qpos_left", "grasp_0", "trunk_qpos"),
 )
-"""iGibson's default list (spec section 1.1)."""
+"""iGibson's default list."""
 
 EXPERIMENTS = (
     *(f"eef_0_pos_{n}" for n in "xyz"),
@@ -53,7 +53,7 @@ EXPERIMENTS = (
     "has_grasped",
     *(f"{name}_{kind}" for name in JOINT_NAMES for kind in ("position", "velocity", "torque")),
 )
-"""That of the experiments with activities (spec section 2.6)."""
+"""That of the experiments with activities."""
 
 LISTS = {"default": DEFAULT, "experiments": EXPERIMENTS}
 

@@ -156,7 +156,7 @@ class Fetch:
         return body
 
     def hand_rays(self) -> tuple[HandRays, ...]:
-        """Sixteen rays from corners of the right finger to corners of the left one (spec section 1.6)."""
+        """Sixteen rays from corners of the right finger to corners of the left one."""
         corners = np.array([(x, 0.0, z) for x in (-FINGER_REACH, FINGER_REACH) for z in (-FINGER_EDGE, FINGER_EDGE)])
         inward = np.array([0.0, FINGER_FACE, 0.0])
         right, left = (f"{self.name}_{side}_gripper_finger_link" for side in "rl")

@@ -9,7 +9,7 @@ with the object are dropped while it is held. It lets go when it is asked to ope
   what it holds. MuJoCo's constraints have no limit like iGibson's 500 and 350 N. Here distance is what breaks a grasp,
   and the hand's own 300 N are what bounds its force.
 
-Modes (spec/robots_tasks_sensors.md 1.5, 2.6): "physical" never holds; "assisted" as above; "sticky" without the rays;
+Modes (iGibson's manipulation_robot.py): "physical" never holds; "assisted" as above; "sticky" without the rays;
 "mitten" takes hold of the first of its targets that it touches, open or closed, and never lets go.
 
 Axes: W worlds, H hands, Y graspable bodies, O objects, E equality constraints.

@@ -1,4 +1,4 @@
-"""The humanoid's 28-number action and its proprioception, with iGibson 2.0.0's semantics (spec section 1.3).
+"""The humanoid's 28-number action and its proprioception, with iGibson 2.0.0's semantics.
 
 | numbers | what they add to |
 |---|---|

@@ -1,4 +1,4 @@
-"""Frames and constants of the bimanual humanoid: iGibson's BehaviorRobot (spec/robots_tasks_sensors.md section 1.3).
+"""Frames and constants of the bimanual humanoid: iGibson's BehaviorRobot (behavior_robot.py).
 
 Body frame: x forward, y left, z up, origin in the middle of the body, 0.55 m above the floor.
 

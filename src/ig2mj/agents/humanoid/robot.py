@@ -43,7 +43,7 @@ from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.tables import SceneTables
 
 BODY = {"paper": (1.0, 50.0), "igibson": (15.0, 7500.0)}
-"""kg and N of the body. The paper's 50 N belong to a light body, iGibson's 15 kg to 7,500 N (spec section 0.1)."""
+"""kg and N of the body. The paper's 50 N belong to a light body, iGibson's 15 kg to 7,500 N."""
 
 BODY_INERTIA = 0.05
 """kg m^2 for each kilogram, added to the body's turning."""
@@ -58,7 +58,7 @@ SHELL = {"grey": (0.90, 0.90, 0.92), "blue": (0.62, 0.74, 0.90)}
 """Colours, for two of them in one home."""
 
 FIELD_OF_VIEW = 120.0
-"""Degrees, vertical: that of the paper's experiments (spec section 2.6)."""
+"""Degrees, vertical: that of the paper's experiments."""
 
 LASER = (0.07, 0.0, -0.25)
 """m: before the column, 0.3 m above the floor while the body stands; iGibson's humanoid has no scanner."""

@@ -13,8 +13,7 @@ ROBOT_FILE = "robot.json"
 FORMAT_VERSION = 1
 
 MAX_EFFORT, MAX_SPEED, MAX_WHEEL_SPEED = 100.0, 1.0, 15.0
-"""N m or N, and rad/s or m/s, where the URDF gives none; rad/s of a joint without limits (spec/robots_tasks_sensors.md
-section 1.1: iGibson's)."""
+"""N m or N, and rad/s or m/s, where the URDF gives none; rad/s of a joint without limits: iGibson's."""
 
 
 class JointEntry(msgspec.Struct, frozen=True):

@@ -1,6 +1,6 @@
 """Contacts of an MJX step, reduced to what the view needs. Pure JAX, all worlds at once.
 
-MJX-Warp keeps one flat contact list for all worlds (design section 2, fact 10), MJX-JAX one list per world; both are
+MJX-Warp keeps one flat contact list for all worlds, MJX-JAX one list per world; both are
 brought to one form, and reduced with one scatter.
 
 Axes: C contacts, U units, W worlds, L links, O objects, F finger links, Y graspable bodies.

@@ -1,7 +1,7 @@
 """The JAX engine: MJX `impl='jax'`. Differentiable, for small scenes only.
 
-It keeps a contact slot for every pair of geoms, so time and memory grow with the square of their number (design
-section 2, fact 1), and nothing sleeps in it.
+It keeps a contact slot for every pair of geoms, so time and memory grow with the square of their number, and
+nothing sleeps in it.
 """
 
 from __future__ import annotations

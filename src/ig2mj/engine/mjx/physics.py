@@ -28,7 +28,7 @@ class MjxPhysics:
     """Physics of a batch.
 
     Attributes:
-      data: MJX data; arrays begin with the world axis, but for Warp's contact list (design section 2, fact 10).
+      data: MJX data; arrays begin with the world axis, but for Warp's contact list.
       fields: fields of the model that are each world's own, eq_data always.
       ignored: contacts of hands with objects dropped.
       touching: of units, as of the last step. link_force, finger_force: newtons, of the last control step.

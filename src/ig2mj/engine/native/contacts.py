@@ -115,7 +115,7 @@ class ForcePlan:
 
     def add_links(self, contacts: StepContacts, link_force: np.ndarray) -> bool:
         """Raises forces [L, O] (N) to those of a physics step, of the largest single contact, as in iGibson's slicer
-        (spec/states.md 10.1); says whether any was found."""
+        (iGibson's slicer.py); says whether any was found."""
         own, other, normal, _ = self._normals(contacts, LINK)
         np.maximum.at(link_force, (self.layout.link_of_geom[own], self.geom_object[other]), normal)
         return len(own) > 0

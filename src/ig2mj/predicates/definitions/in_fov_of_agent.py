@@ -29,7 +29,7 @@ NUM_POINTS = 48
 """Sample points of an object."""
 
 NEAR, FAR = 0.1, 100.0
-"""Metres; iGibson's camera (spec/robots_tasks_sensors.md 3.1)."""
+"""Metres; iGibson's camera (iGibson's vision sensor)."""
 
 BLOCKING = 0.999
 """Share of the way to a point within which something stands in front of it: a point on a surface does not hide itself

@@ -1,7 +1,7 @@
 """InHandOfAgent(o): assistive grasping is active on o (table A.1).
 
-iGibson's physical grasping mode calls every object grasped while the fingers look closed on something
-(spec/states.md 19.4); here it is always about o.
+iGibson's physical grasping mode calls every object grasped while the fingers look closed on something;
+here it is always about o.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""OnFloor(a, room): a stands on the floor, and the middle of its box is in that room (table A.1, spec/states.md 5.6).
+"""OnFloor(a, room): a stands on the floor, and the middle of its box is in that room (table A.1; on_floor.py).
 
 A movable object stands on the floor where it touches it. A fixed one is as much a part of the house as the floor is,
 and no engine looks for contacts between bodies that cannot move; a drawer or a door near the floor would decide by

@@ -1,4 +1,4 @@
-"""`lidar`: sixteen beams all around the agent's camera (spec robots_tasks_sensors section 3.3).
+"""`lidar`: sixteen beams all around the agent's camera.
 
 iGibson takes the nearest pixels of four rendered pictures; here the rays themselves are cast. It drops points that are
 not there; here they are zeros, so that all worlds have the same shape.

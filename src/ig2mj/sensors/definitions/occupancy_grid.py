@@ -1,4 +1,4 @@
-"""`occupancy_grid`: the laser scan as a map about the robot (spec robots_tasks_sensors section 3.2).
+"""`occupancy_grid`: the laser scan as a map about the robot.
 
 iGibson draws it: discs of obstacles at the ends of the rays, over them the polygon of what the rays passed through,
 over that the robot. The same rules are applied here to every cell. (iGibson draws obstacles at the ends of rays that

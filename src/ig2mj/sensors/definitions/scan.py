@@ -1,4 +1,4 @@
-"""`scan`: a laser that turns about the vertical of the robot's base (spec robots_tasks_sensors section 3.2)."""
+"""`scan`: a laser that turns about the vertical of the robot's base."""
 
 from __future__ import annotations
 

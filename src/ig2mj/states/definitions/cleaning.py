@@ -1,11 +1,10 @@
-"""Cleaning tools: what they touch they wipe off (spec/states.md 8.3).
+"""Cleaning tools: what they touch they wipe off (iGibson's cleaning_tool.py).
 
 A tool removes, at once, every particle of an object it touches whose centre is in the world box of its annotated
 cleaning area, or of the whole tool where the model has none. The boxes are Bullet's: local boxes with their margin,
 turned together (`ig2mj.geometry.boxes.turned_boxes`). Where the area has geometry, only contacts through it count, so
 that the handle of a broom cleans nothing. Stains go only when the tool is soaked. No movement or minimum force is
-required. A tool with a switch cleans only while it is on (iGibson's vacuum cleaner works when it is off, spec/states.md
-19.17).
+required. A tool with a switch cleans only while it is on (iGibson's vacuum cleaner works even when it is off).
 
 Axes: W worlds, T tools, R rows of particles, N particles.
 """

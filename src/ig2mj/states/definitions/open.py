@@ -1,9 +1,9 @@
-"""Open: whether an articulated object's relevant joints are open (spec/states.md section 11, paper table A.1).
+"""Open: whether an articulated object's relevant joints are open (iGibson's open.py, paper table A.1).
 
 A joint is open strictly beyond 5 % of its range from the closed end towards the open end. The paper calls the closed
 end the lower limit; where a model's annotation says that it closes at the upper one, that end counts. An object is open
 when any joint is. iGibson's code knows models that open to both sides (a sliding door in the middle of its range is
-open, at either end it is not): there, every side must be open (spec/states.md section 17, row 10).
+open, at either end it is not): there, every side must be open (docs/states.md, row 10).
 
 Axes: W worlds, O objects, J openable joints.
 """
@@ -76,7 +76,7 @@ def sample_open(
     and the open end; `fully`: all of them to the open end. False: all move to a random position between the closed end
     and the threshold; `fully`: to the closed end. In iGibson's rules a joint that opens to both sides
     moves to a place between its two thresholds. Every joint uses its own annotated direction (iGibson pairs joints
-    with the wrong ones, spec/states.md 19.9). To be written to the engine with zero velocity.
+    with the wrong ones). To be written to the engine with zero velocity.
 
     Returns:
       Positions, and which joints move.
@@ -98,7 +98,7 @@ def sample_open(
 
 
 def _random_subset(model: StateModel, worlds: int, key: Randomness) -> Bool[Array, "W J"]:
-    """Of each object's joints a subset whose size is uniform from 1 to all of them (spec/states.md section 11)."""
+    """Of each object's joints a subset whose size is uniform from 1 to all of them (iGibson's open.py)."""
     tables = model.tables
     order, size = split(key)
     rank_of = uniform(order, (worlds, len(tables.openable_object)))

@@ -1,9 +1,9 @@
-"""SlicedState: a blade with enough force on it cuts; halves take the whole's place (spec/states.md section 10).
+"""SlicedState: a blade with enough force on it cuts; halves take the whole's place (iGibson's sliced.py).
 
 A contact of a slicer's annotated blade with a normal force strictly over the object's threshold (10 N) in any physics
 step of the control step cuts it, for good (iGibson sees the last physics step only). Where the object has halves, a
 `Swap` asks the engine to put each half where it belongs in the whole, at rest, and the whole where its first half was
-parked. The halves inherit every extended state, particles included (iGibson loses those, spec/states.md 19.8).
+parked. The halves inherit every extended state, particles included (iGibson loses those).
 
 Axes: W worlds, O objects, M swapped objects (wholes, then halves), K blades.
 """

@@ -1,12 +1,12 @@
 """Temperature, Celsius: heat sources and sinks act on the objects within their reach, the room on all others.
 
-Newton's law, explicit Euler, as in iGibson's temperature.py (spec/states.md 6.2):
+Newton's law, explicit Euler, as in iGibson's temperature.py:
 
     T' = T + dt sum_j r_j (T_j - T)      over the sources j that act on the object
     T' = T + dt 0.02 (23 - T)            where none does
 
 The paper prints a multiplicative rule, T' = T (1 + dt r (T_j - T)), under which a fridge freezes nothing; both sets of
-rules use Newton's here (spec/states.md 6.3). Differentiable in temperatures, rates and source temperatures.
+rules use Newton's here (iGibson's temperature.py). Differentiable in temperatures, rates and source temperatures.
 """
 
 from __future__ import annotations

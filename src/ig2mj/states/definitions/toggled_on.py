@@ -1,4 +1,4 @@
-"""ToggledOn: a switch that an agent flips by holding a finger at its button (spec/states.md section 9).
+"""ToggledOn: a switch that an agent flips by holding a finger at its button (iGibson's toggle.py).
 
 The paper asks for contact of the agent with the TogglingLink, which is virtual and collides with nothing. iGibson
 realises that as nearness, and so do both sets of rules here: some finger's frame strictly within 0.10 m of the link at

@@ -5,7 +5,7 @@ pieces of all objects on the way it falls during the step, so that none is skipp
 decides: a soakable object absorbs it (wetness.py), a sink or the source's own object takes it back, on anything else
 it rests until that goes away. Drops that fall out of the house come back to the source.
 
-Rules in force (spec/states.md section 17, rows 2 and 3): the paper's droplets are absorbed, and sinks (`water_sink`
+Rules in force (docs/states.md, rows 2 and 3): the paper's droplets are absorbed, and sinks (`water_sink`
 links) take drops; in iGibson's code a soaked object leaves the drop where it is, and only the source's own object takes
 drops back.
 
@@ -42,19 +42,19 @@ NUM_DROPS = 10
 """Drops of one source (iGibson's particles.py)."""
 
 DROP_RADIUS = 0.01
-"""Metres (spec/states.md section 0)."""
+"""Metres (iGibson's object_states)."""
 
 DROP_PERIOD = 0.1
-"""Seconds that a source waits, at least, between two drops (spec/states.md 7.2)."""
+"""Seconds that a source waits, at least, between two drops (iGibson's water_source.py)."""
 
 SPAWN_BELOW = 0.05
-"""Metres below the source's link at which a drop appears (spec/states.md 7.1)."""
+"""Metres below the source's link at which a drop appears (iGibson's water_source.py)."""
 
 TOUCHING = 0.003
-"""Metres. A drop this near a surface touches it, as any two bodies (spec/states.md section 24)."""
+"""Metres. A drop this near a surface touches it, as any two bodies (measured in PyBullet)."""
 
 GRAVITY = 9.8
-"""m/s^2 (spec/states.md section 0)."""
+"""m/s^2 (iGibson's object_states)."""
 
 LOST_BELOW = 10.0
 """Metres below its source at which a drop has left the house."""

@@ -1,9 +1,9 @@
-"""Vertical and horizontal adjacency: which objects rays from an object's centre of mass enter (spec/states.md 4.4).
+"""Vertical and horizontal adjacency: which objects rays from an object's centre of mass enter (iGibson's adjacency.py).
 
 iGibson shoots rays for every object and lists all that they hit. Here only named pairs (object, target) are asked, and
 of the target only its own pieces: a ray enters a piece whose surface it crosses from outside at 0 <= t <= length,
 nothing occludes anything, and any number of pieces may lie on the ray (Bullet's loop loses hits beyond ten in
-arbitrary order; spec/states.md 19.2).
+arbitrary order).
 
 The directions: up and down; and, in the horizontal plane, both ways along the axes at 0, 22.5, 45, 67.5 and 90 degrees
 and their perpendiculars. The last plane is the first one again, so eight distinct lines.
@@ -31,13 +31,13 @@ HORIZONTAL_ANGLES = np.deg2rad([0.0, 22.5, 45.0, 67.5])
 """Of the first axis of each plane; the second one is perpendicular."""
 
 HORIZONTAL_LENGTH = {"paper": 100.0, "igibson": 1.0}
-"""Metres. The paper's axes have no end; 100 m is longer than any house (spec/states.md section 17, row 8)."""
+"""Metres. The paper's axes have no end; 100 m is longer than any house (docs/states.md, row 8)."""
 
 VERTICAL_LENGTH = {"paper": 100.0, "igibson": 5.0}
 """Metres."""
 
 INFLATE = {"paper": 0.0, "igibson": 0.00175}
-"""Metres by which Bullet's rays see hulls grown (spec/states.md section 24)."""
+"""Metres by which Bullet's rays see hulls grown (measured in PyBullet)."""
 
 
 def _horizontal_lines() -> Float[np.ndarray, "R 3"]:

@@ -4,7 +4,7 @@ Heat sources ask what is inside them; predicates ask for inside, above and below
 gathers the pairs before tracing; `Relations` holds the answers. Rays are the dearest part of a step, so a `Memo` can
 carry the last answers along: a pair is computed anew unless every number it depends on (the object's centre of mass,
 the pose of every body of the target) is bitwise the same. iGibson's own memo looks at two positions only, and goes
-stale when something turns, opens or closes (spec/states.md 19.1). The memo pays where worlds are few and mostly asleep;
+stale when something turns, opens or closes. The memo pays where worlds are few and mostly asleep;
 without one, everything is computed every time.
 
 Axes: W worlds, P pairs of a kind, K numbers that an answer depends on.

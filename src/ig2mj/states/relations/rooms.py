@@ -19,7 +19,7 @@ NO_ROOM = -1
 def room_at(tables: SceneTables, xy: Float[Array, "*b 2"]) -> Int[Array, "*b"]:
     """Room instance at a point, metres; -1 outside the map, where no room is, and for NaN.
 
-    The pixel is truncated towards zero, as iGibson does (spec/states.md section 12).
+    The pixel is truncated towards zero, as iGibson does (room_states.py).
     """
     rows, columns = tables.room_map.shape
     if rows == 0 or columns == 0:
@@ -36,7 +36,7 @@ def in_room(
     """Whether each object is in a room (one per world and object, -1: false).
 
     A fixed object with annotated rooms is in all of those; any other where its centre of mass is. iGibson compares the
-    room's instance with a movable object's room type, which is never equal (spec/states.md 19.3); not here.
+    room's instance with a movable object's room type, which is never equal; not here.
     """
     if not tables.room_names:
         return jnp.zeros(rooms.shape, bool)

@@ -1,4 +1,4 @@
-"""The objective of a BDDL activity: the share of its goal that holds (spec/robots_tasks_sensors.md section 2.5).
+"""The objective of a BDDL activity: the share of its goal that holds (iGibson's behavior_task.py).
 
 Axes: W worlds, n objects, H hands.
 """

@@ -1,4 +1,4 @@
-"""What other robots of a navigation task do: random actions, each held for a while (spec section 2.3)."""
+"""What other robots of a navigation task do: random actions, each held for a while."""
 
 from __future__ import annotations
 

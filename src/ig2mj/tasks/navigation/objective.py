@@ -1,4 +1,4 @@
-"""Measures, rewards, ends and observations of navigation tasks (spec/robots_tasks_sensors.md sections 2.3 and 2.4).
+"""Measures, rewards, ends and observations of navigation tasks (iGibson's tasks).
 
 The potential is how far there still is to go: along the floor or in a straight line (m), or how far furniture stands
 open; the reward of a step is how much it fell, and `success_reward` where the goal is reached, and `collision_reward`

@@ -34,11 +34,11 @@ DOORS = ("door",)
 """Categories that stand wide open."""
 
 OPEN_CHANCE = 0.5
-"""Of each joint of furniture (spec/robots_tasks_sensors.md section 2.3)."""
+"""Of each joint of furniture (iGibson's tasks)."""
 
 SETTLE_SECONDS = 5.0
 TRIES = 100
-"""Places tried for a goal, a start or a loose object (spec section 2.3)."""
+"""Places tried for a goal, a start or a loose object."""
 
 YAWS = 4
 """Directions in which a robot is tried in every cell; it can stand where it can in one of them."""

@@ -1,6 +1,6 @@
 """`NavigationTask`: where a robot is to go, or to reach, or what it is to close, as data.
 
-The rules and their figures are iGibson's (spec/robots_tasks_sensors.md sections 2.2 to 2.4).
+The rules and their figures are iGibson's.
 """
 
 from __future__ import annotations
