@@ -19,6 +19,15 @@ CLOSING = 0.05
 BELOW = 0.03
 """m below its top that the hand goes for: what lies there stops it."""
 
+THIN, CLOSE_TO = 0.015, 0.035
+"""m that take the place of `BELOW` and `CLOSING` where what is to be taken is thin and slips away."""
+
+MISSED, AGAIN = {"humanoid": 0.6, "fetch": 0.9}, 0.03
+"""How far fingers have closed when they have missed what they close on; m that the hand then rises, opens, and begins
+again."""
+
+UP = jnp.array([0.0, 0.0, 1.0])
+
 FAR, BLEND = 0.62, 0.1
 """m from the robot's middle beyond which Fetch's gripper turns outwards, and over which it comes to do so."""
 
@@ -38,6 +47,17 @@ def take_at(see: Sight, place: Float[Array, "W 3"], hand: int = 0) -> Wish:
     down = jnp.array([0.0, 0.0, BELOW], jnp.float32)
     grip = see.grip(hand)
     return wish(over(grip, place - down, place[:, 2] + CLEARANCE), close=length(grip - place) < CLOSING)
+
+
+def take_thin(see: Sight, place: Float[Array, "W 3"], hand: int = 0) -> Wish:
+    """As `take_at`, of something thin: fingers close late, and open again when they missed it. (What a mitten only has
+    to touch it takes as anything else.)"""
+    if see.grasping == "mitten":
+        return take_at(see, place, hand)
+    grip = see.grip(hand)
+    move, near = over(grip, place - THIN * UP, place[:, 2] + CLEARANCE), length(grip - place) < CLOSE_TO
+    missed = near & (see.closed(hand) > MISSED[see.robot])
+    return wish(jnp.where(missed[:, None], AGAIN * UP, move), close=near & ~missed)
 
 
 def far_out(see: Sight, goal: Float[Array, "W 3"], hand: int = 0) -> Float[Array, "W 3"]:

@@ -68,6 +68,16 @@ class Sight:
         bodies = np.flatnonzero(tables.graspable_object == self.scene.object_index(name))
         return jnp.asarray(self.view.agent.finger_force)[:, :, bodies].sum((1, 2))
 
+    def closed(self, hand: int = 0) -> Float[Array, "W"]:
+        """How far the fingers of an acting hand are closed, 0 to 1; the mean of all finger joints."""
+        tables, model = self.scene.tables, self.scene.model
+        bodies = tables.finger_body[tables.finger_hand == self.hands[hand]]
+        joints = np.array([model.body_jntadr[body] for body in bodies])
+        places = [int(np.flatnonzero(tables.agent_joint_qposadr == model.jnt_qposadr[joint])[0]) for joint in joints]
+        low, high = model.jnt_range[joints].T
+        share = (jnp.asarray(self.view.agent.joint_pos)[:, np.array(places)] - low) / (high - low)
+        return share.mean(1) if self.robot == "humanoid" else 1.0 - share.mean(1)
+
     def squeeze(self, name: str, hand: int = 0) -> Float[Array, "W"]:
         """N with which the second strongest finger link of an acting hand presses on an object."""
         tables = self.scene.tables

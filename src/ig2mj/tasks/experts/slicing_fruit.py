@@ -10,7 +10,7 @@ from ig2mj.engine.view import Array
 from ig2mj.geometry.poses import length, quat_rotate
 from ig2mj.scene.tables import LinkKind
 from ig2mj.tasks.experts.motion import Wish, horizontal, over, where, wish
-from ig2mj.tasks.experts.reaching import far_out, take_at
+from ig2mj.tasks.experts.reaching import far_out, take_thin
 from ig2mj.tasks.experts.sight import Sight
 
 KNIFE, FRUIT = "carving_knife_0", "apple_0"
@@ -47,7 +47,7 @@ def plan(see: Sight) -> list[Wish]:
     turn += horizontal(along)
     depth = jnp.where(left < 0.2, top - PRESS, top + CLEARANCE)
     goal = jnp.concatenate([fruit[:, :2], depth[:, None]], axis=1)
-    take = take_at(see, handle)
+    take = take_thin(see, handle)
     if see.robot == "fetch":
         turn += far_out(see, goal)
         take = Wish(take.move, far_out(see, handle), take.close)
