@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from ig2mj.demos import Recording, Replayer, find_recording, shipped
-from ig2mj.demos.origin import origin_of_machine
+from ig2mj.demos.origin import origin_of_machine, task_hash
 from ig2mj.demos.shipped import folder
+from ig2mj.envs.registry import find_task
 from ig2mj.errors import UnknownNameError
 from ig2mj.tasks.experts.expert import PLANS
 
@@ -32,6 +33,13 @@ def test_there_are_32_successes_of_each_activity_in_ten_megabytes():
                 assert label.shape == action.shape and np.abs(label).max() <= 1
                 assert 0.01 < np.abs(label - action).mean() < 0.5  # disturbed, and mostly the expert's
                 assert run.all_rows("steps/success").tolist() == [False] * (len(action) - 1) + [True]
+
+
+def test_they_are_of_the_activities_as_they_are_now():
+    """Else they are refused; a field of `Task` that changes nothing for them has to stay out of its text."""
+    for name in shipped():
+        with Recording(find_recording(name)) as recording:
+            assert recording.header["task_hash"] == task_hash(find_task(name))
 
 
 def test_a_name_that_does_not_ship_is_an_error_with_near_matches():

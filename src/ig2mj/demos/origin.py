@@ -15,7 +15,7 @@ import jax
 import mujoco
 import numpy as np
 
-from ig2mj.envs.environment import Environment
+from ig2mj.envs.environment import Environment, TaskLike
 from ig2mj.scene.scene import Scene
 from ig2mj.worlds.pool import Pool
 
@@ -31,7 +31,7 @@ def origin_of(env: Environment) -> dict[str, Any]:
     engine, made = env.core.engine, env.made_with
     own = {
         "task": env.task.name,
-        "task_hash": _hash(repr(env.task).encode()),
+        "task_hash": task_hash(env.task),
         "pool_hash": pool_hash(env.core.starts.pool),
         "robot": env.robot,
         "grasping": env.grasping,
@@ -44,6 +44,11 @@ def origin_of(env: Environment) -> dict[str, Any]:
         "timestep": engine.timestep,
     }
     return own | origin_of_scene(env.scene) | origin_of_machine()
+
+
+def task_hash(task: TaskLike) -> str:
+    """Of all that a task says of itself, so that another number anywhere in it gives another hash."""
+    return _hash(repr(task).encode())
 
 
 def origin_of_scene(scene: Scene) -> dict[str, Any]:

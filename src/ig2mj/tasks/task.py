@@ -146,7 +146,8 @@ class Task:
     upright: tuple[str, ...] = ()
     horizon: int = HORIZON
     grasping: str = "mitten"
-    physical: Physical | None = None
+    # Not in the text that recordings know a task by: where it applies, it shows in `objects` and `near`.
+    physical: Physical | None = dataclasses.field(default=None, repr=False)
 
     def acts(self, robot: str) -> Acts:
         """How a robot takes part. Raises UnknownNameError."""
