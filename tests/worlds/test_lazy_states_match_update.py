@@ -16,8 +16,8 @@ from ig2mj.predicates import compile_expression
 from ig2mj.states import initial_states, update
 from ig2mj.states.definitions import dust
 from ig2mj.states.relations.asked import PairByPair
-from ig2mj.states.update import HEAT_FIELDS
-from ig2mj.worlds.lazy.program import StateProgram
+from ig2mj.states.update import HEAT_FIELDS, heat
+from ig2mj.worlds.lazy.program import AHEAD, StateProgram
 from ig2mj.worlds.lazy.relevance import EXACT
 from ig2mj.worlds.lazy.stepper import News, StateStepper
 
@@ -212,16 +212,33 @@ def test_a_settled_world_is_left_alone_and_a_cooling_one_is_not():
         states, _, _ = stepper.step(states, VIEWS[0])
     again, _, status = stepper.step(states, VIEWS[0])
     assert again is states and not status.holds[0]
-    states = states.replace(temperature=states.temperature.at[0, 1].set(80.0))
+    states = states.replace(temperature=jnp.asarray(states.temperature).at[0, 1].set(80.0))
     for _ in range(3):
         cooler, _, status = stepper.step(states, VIEWS[0])
         assert cooler.temperature[0, 1] < states.temperature[0, 1] and status.holds[0]
         states = cooler
     # Near 23 C single precision comes to rest, and is noticed.
-    states = states.replace(temperature=states.temperature.at[0, 1].set(23.00001))
+    states = states.replace(temperature=jnp.asarray(states.temperature).at[0, 1].set(23.00001))
     for _ in range(70):
         before, (states, _, _) = states, stepper.step(states, VIEWS[0])
     assert states is before
+
+
+def test_steps_of_temperatures_in_one_call_are_those_of_one_after_the_other():
+    model = HOME.model()
+    stepper = StateStepper(StateProgram(model, compile_expression(model, "(cooked fish)")))
+    states, _, _ = stepper.step(_start(model), VIEWS[0])
+    states = states.replace(temperature=jnp.asarray(states.temperature).at[0, 1].set(80.0))
+    objects = len(HOME.index)
+    nothing = jnp.zeros((1, objects, len(model.parameters.heat_rate)), bool), jnp.zeros((1, objects, objects), bool)
+    reference, expected, most = jax.jit(lambda s: heat(model, s, *nothing)), states, 0
+    for k in range(45):
+        view = VIEWS[3] if k in (5, 40) else VIEWS[0]  # at 5 and 40, and after it, steps are thrown away
+        states, expected = stepper.step(states, view).states, reference(expected)
+        for name in HEAT_FIELDS:
+            assert np.array_equal(getattr(states, name), getattr(expected, name)), (k, name)
+        most = max(most, stepper._ahead_count)
+    assert most == AHEAD
 
 
 def test_states_changed_from_outside_are_seen():

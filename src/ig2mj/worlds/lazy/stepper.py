@@ -9,7 +9,8 @@ is cut up (`ig2mj.worlds.lazy.program`), with the same functions and bitwise the
   come from a memo (`ig2mj.states.relations.plan`).
 - temperatures and the goal, where only what the goal itself reads of the view differs: then this step would change
   nothing else.
-- temperatures and what follows from them, where that does not differ either.
+- temperatures and what follows from them, where that does not differ either. Then some steps are computed in one call,
+  one at first and twice as many each time, and those that something overtakes are thrown away.
 - nothing, where the last step did not change temperatures.
 
 An agent that is awake makes a new view in every step. What states depend on is therefore compared, byte by byte, field
@@ -30,12 +31,9 @@ from ig2mj.engine.view import Array, PhysicsView, read_fields
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.states.definitions import toggled_on
 from ig2mj.states.world import ExtendedStates, Swap
-from ig2mj.worlds.lazy.program import BODY_FIELDS, StateProgram
+from ig2mj.worlds.lazy.program import AHEAD, BODY_FIELDS, Heat, StateProgram
 from ig2mj.worlds.lazy.relevance import Relevance
 from ig2mj.worlds.rules import Outcome, Rules
-
-LOOK_EVERY = 30
-"""Steps of temperatures between two looks whether they still change; a look costs microseconds."""
 
 
 class News(enum.Enum):
@@ -60,7 +58,8 @@ class StateStepper:
         self._acts: Array | None = None  # which source acts on what; None where there must be a whole step next
         self._whole_facts = self._facts = np.zeros((program.num_worlds, 0), bool)  # of the last whole step; now
         self._settled = False
-        self._heat_steps = 0
+        self._ahead: Heat | None = None  # steps computed before they are due, how many, and how many of them are over
+        self._ahead_count, self._ahead_over = 0, 0
         self._seen: list[Array] = []  # fields read, as last seen; and their bytes at the last whole step, once needed
         self._bytes: list[bytes | None] = []
         self._fingers_away = False
@@ -123,23 +122,24 @@ class StateStepper:
         return isinstance(view.agent.finger_pos, np.ndarray) and toggled_on.all_out_of_reach(self.program.model, view)
 
     def _heat(self, last: Outcome, acts: Array) -> Outcome:
-        states = last.states
-        warm, hottest, status = self.program.heat(
-            states.temperature, states.max_temperature, states.sliced, acts, self._facts
-        )
-        if self._heat_steps % LOOK_EVERY == 0:
-            before, after = jax.device_get(((states.temperature, states.max_temperature), (warm, hottest)))
-            self._settled = all(np.array_equal(a, b) for a, b in zip(before, after, strict=True))
-        self._heat_steps += 1
-        states = self.program.with_leaves(states, self.program.heats, [warm, hottest])
-        self._put(self.program.heats, [warm, hottest])
+        program, states = self.program, last.states
+        if self._ahead is None or self._ahead_over == self._ahead_count:
+            self._ahead_count = min(AHEAD, 1 if self._ahead is None else 2 * self._ahead_count)
+            self._ahead, self._ahead_over = program.heat(states, acts, self._facts, self._ahead_count), 0
+        ahead, k = self._ahead, self._ahead_over
+        self._ahead_over += 1
+        self._settled = bool(ahead.same[k])
+        made: list[Array] = [ahead.temperature[k], ahead.max_temperature[k]]
+        states = program.with_leaves(states, program.heats, made)
+        self._put(program.heats, made)
+        status = None if ahead.status is None else tuple(field[k] for field in ahead.status)
         self._step = Outcome(states, None, self._status(status))
         return self._step
 
     def _temperatures_and_goal(self, states: ExtendedStates, acts: Array, view: PhysicsView) -> Outcome:
         program = self.program
         rest = program.rest(self._leaves, acts, view, self._goal_memo)
-        self._goal_memo, self._facts = rest.memo, rest.facts
+        self._goal_memo, self._facts, self._ahead = rest.memo, rest.facts, None
         if not self._settled:
             states = program.with_leaves(states, program.heats, rest.leaves)
             self._put(program.heats, rest.leaves)
@@ -157,7 +157,7 @@ class StateStepper:
         self._facts = self._whole_facts
         new = program.with_leaves(states, [*program.gives, *program.heats], [*events.leaves, *rest.leaves])
         quiet, swapped = np.asarray(events.flags).tolist()
-        self._view, self._heat_steps = view, 0
+        self._view, self._ahead = view, None
         self._step = Outcome(new, None, self._status(rest.status))
         self._acts = None
         if quiet and not program.model.options.contact_heat_rate:
