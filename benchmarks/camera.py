@@ -1,6 +1,6 @@
 """Pictures for benchmarks: MuJoCo's OpenGL renderer kept open, colour and depth read in one go.
 
-Shadows, reflections and anti-aliasing are off, as in iGibson's benchmarks (spec robots_tasks_sensors.md 6.5).
+Shadows, reflections and anti-aliasing are off, as in iGibson's benchmarks.
 """
 
 from __future__ import annotations

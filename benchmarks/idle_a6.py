@@ -2,7 +2,7 @@
 
     python benchmarks/idle_a6.py [HOME ...] [--steps 2000] [--no-pictures] [--out DIR]
 
-Protocol (spec robots_tasks_sensors.md 6.5): four physics steps of 1/120 s in a step, zero action, all extended states
+Protocol of iGibson's benchmark: four physics steps of 1/120 s in a step, zero action, all extended states
 on, 2000 steps; a home's value is the mean over its last 100 steps, by when most objects are asleep. The table gives
 mean, largest and smallest value over the homes. With pictures, every step of the last 100 also reads the sensors
 `rgb` and `depth` of the robot's eye (the steps before them do not, which changes nothing but the time this takes). The

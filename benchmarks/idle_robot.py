@@ -1,6 +1,6 @@
 """A body of a TurtleBot's size that stands and does nothing, for MuJoCo and, the same, as an URDF for PyBullet.
 
-Sizes follow iGibson's Turtlebot (spec robots_tasks_sensors.md: 2.4 kg, wheels of 38 mm radius, 23 cm apart); the shape
+Sizes follow iGibson's Turtlebot (2.4 kg, wheels of 38 mm radius, 23 cm apart); the shape
 is a plain cylinder on two driven wheels and two slippery casters. Its wheels are actuated, so it never sleeps, as
 iGibson's robots never do.
 """

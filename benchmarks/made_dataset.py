@@ -3,7 +3,7 @@
     python benchmarks/made_dataset.py FOLDER
 
 Both engines are given the same URDF source. The home of 20 is the table's: a fridge, a coffee table and a countertop,
-with fifteen cracker boxes on the latter, five by three as in iGibson's script (spec robots_tasks_sensors.md 6.5). Those
+with fifteen cracker boxes on the latter, five by three as in iGibson's script. Those
 of 60 and 120 are one large room with furniture that opens, chairs, and household objects on the furniture that has a
 top. Counts include floor and walls.
 """
