@@ -1,4 +1,4 @@
-"""`ig2mj activity`: BEHAVIOR's activities: which there are, what they ask for, in which homes they can be done."""
+"""`ig2mj activity`: BEHAVIOR's activities: list them, show what each requires, sample their start states."""
 
 from __future__ import annotations
 

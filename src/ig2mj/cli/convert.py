@@ -1,4 +1,4 @@
-"""`ig2mj convert scene|object|robot|dataset`: iGibson scenes, URDF objects and robots to MJCF."""
+"""`ig2mj convert`: convert iGibson scenes, and URDF objects and robots, to MJCF."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`ig2mj demos`: demonstrations of the scripted experts to learn from, and recordings to replay."""
+"""`ig2mj demos`: collect demonstrations of scripted experts; replay, export and measure recordings."""
 
 from __future__ import annotations
 

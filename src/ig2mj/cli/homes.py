@@ -1,4 +1,4 @@
-"""`ig2mj homes`: builds our own dataset of household objects, lists it, and draws it."""
+"""`ig2mj homes`: the homes and objects that come with ig2mj: list, build, convert and draw them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`ig2mj policies`: trained policies that ship with the project."""
+"""`ig2mj policies`: the trained policies that ship with ig2mj."""
 
 from __future__ import annotations
 
