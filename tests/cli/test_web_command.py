@@ -22,6 +22,7 @@ from ig2mj import cli
         (["birch", "--certificate", "no.pem"], "no.pem"),
         (["birch", "--key", "no.pem"], "--certificate"),
         (["birch", "--worlds", "0"], "at least one"),
+        (["birch", "--engine", "wrap"], "near matches: warp"),
         (["birch", "--agent", "expert"], "for a task"),
         (["birch", "--goal", "(and (open"], "--goal"),
         (["CookingMeat", "--goal", "(open x)"], "tasks and recordings have their own"),

@@ -60,11 +60,17 @@ def run(
     from ig2mj.install_hint import require_extras
 
     require_extras("web")
+    from ig2mj.engine.registry import ENGINES
+    from ig2mj.predicates.parse import parse
     from ig2mj.web.access import access_for
 
     access = access_for(host, port, token, certificate, key)
     if worlds < 1:
         raise Ig2mjError(f"--worlds {worlds}: at least one is needed")
+    if engine not in ENGINES:
+        raise UnknownNameError("engine", engine, ENGINES)
+    if goal is not None:
+        parse(goal, "--goal")
     access.listen().close()  # a port that is taken is no news for after a minute of loading
     print(f"loading {what}; the address of the page comes when it is ready", file=sys.stderr, flush=True)
     from ig2mj.web.viewer import WebViewer
