@@ -9,7 +9,19 @@ import pytest
 
 from ig2mj.errors import UnknownNameError
 from ig2mj.tasks.activities import ACTIVITIES
-from ig2mj.tasks.pools import HASHES, SEEDS, bare_scene, known_hash, make_pool, pool_file, pool_hash, pool_of
+from ig2mj.tasks.pools import (
+    CHUNK,
+    HASHES,
+    MAX_CHUNKS,
+    SEEDS,
+    bare_scene,
+    known_hash,
+    limit_of,
+    make_pool,
+    pool_file,
+    pool_hash,
+    pool_of,
+)
 
 TASK = ACTIVITIES["GraspingBook"]
 
@@ -76,3 +88,8 @@ def test_hashes_are_collected_in_the_form_of_those_on_file(tmp_path):
         note_hash(file, name, digest)
     assert file.read_text() == json.dumps({"a.npz": "1", "b.npz": "3"}, indent=1) + "\n"
     assert HASHES.read_text() == json.dumps(json.loads(HASHES.read_text()), indent=1) + "\n"
+
+
+def test_a_large_pool_may_try_more_seeds_than_a_usual_one():
+    assert limit_of(512) == limit_of(1000) == MAX_CHUNKS
+    assert limit_of(4096) * CHUNK == 8 * 4096  # seen: one start state in three or four is good

@@ -45,7 +45,7 @@ CHUNK = 32
 """Rows that are sampled from one seed, at least."""
 
 MAX_CHUNKS = 400
-"""Seeds after which too many rows were turned down."""
+"""Seeds after which too many rows were turned down, of pools of the usual sizes; of larger ones `limit_of`."""
 
 FLAT = 0.98
 """Cosine of the angle between an object's z axis and the vertical from which it lies flat: 11 degrees."""
@@ -163,19 +163,25 @@ def sampling_processes(jobs: int) -> concurrent.futures.Executor:
     return concurrent.futures.ProcessPoolExecutor(jobs or os.cpu_count(), context, initializer=use_processor_only)
 
 
+def limit_of(wanted: int) -> int:
+    """Seeds after which too many rows were turned down: `MAX_CHUNKS`, or where less than one row in eight is good."""
+    return max(MAX_CHUNKS, 8 * -(-wanted // CHUNK))
+
+
 def _chunks(
     task: Task, split: str, scene: Scene, workers: concurrent.futures.Executor | None, wanted: int
 ) -> Generator[Pool | None, None, None]:
     """The good rows of one seed after the other, in order; None: there was none."""
+    limit = limit_of(wanted)
     if workers is None:
-        for k in range(MAX_CHUNKS):
+        for k in range(limit):
             yield _chunk(task, scene, SEEDS[split] + k)
         return
     ahead = collections.deque[concurrent.futures.Future[Pool | None]]()
     submitted, most = 0, 2 * -(-wanted // CHUNK)  # begun before they are known to be needed
     try:
-        while submitted < MAX_CHUNKS or ahead:
-            while submitted < MAX_CHUNKS and len(ahead) < most:
+        while submitted < limit or ahead:
+            while submitted < limit and len(ahead) < most:
                 ahead.append(workers.submit(_chunk, task, None, SEEDS[split] + submitted))
                 submitted += 1
             yield ahead.popleft().result()
