@@ -10,6 +10,8 @@ these in their place; results are the same up to rounding:
   stay as they are (`resting`).
 - Constraint rows and entries of the Hessian have a thread for each that fits into a buffer, in every iteration of the
   solver. Here a few threads of each world go through those that there are (`lanes`).
+- The solver goes on for all worlds until the last has converged. Here later iterations go through a list of those that
+  have not (`stragglers`; on trial: off unless IG2MJ_KERNELS names it).
 - The broad phase of collision detection goes through all pairs of geoms (`broadphase`).
 - The kernels of convex pairs follow each other, and each waits for its slowest pair. Here they run side by side
   (`branches`).
