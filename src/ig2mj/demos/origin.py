@@ -15,8 +15,9 @@ import jax
 import mujoco
 import numpy as np
 
-from ig2mj.envs.environment import Environment, TaskLike
+from ig2mj.envs.environment import Environment
 from ig2mj.scene.scene import Scene
+from ig2mj.tasks.task import TaskLike
 from ig2mj.worlds.pool import Pool
 
 BINDING = ("mujoco", "ig2mj", "scene", "scene_hash", "model_hash", "task", "task_hash", "robot", "grasping", "engine")
