@@ -57,6 +57,9 @@ def test_experts_solve_held_out_states(name, robot):
         ("CleaningStainedShelf", "fetch", "physical"),
         ("CookingMeat", "fetch", "physical"),
         ("SoakingTowel", "fetch", "assisted"),
+        ("SoakingTowel", "humanoid", "assisted"),
+        ("SlicingFruit", "humanoid", "assisted"),
+        ("SoakingTowel", "fetch", "physical"),
     ],
 )
 def test_experts_also_solve_tasks_without_mittens(name, robot, grasping):

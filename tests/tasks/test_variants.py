@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from ig2mj.agents.fetch.figures import FINGERS, UPPER
 from ig2mj.errors import EngineError
+from ig2mj.scene.library import find_model
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.experts.expert import PLANS
 from ig2mj.tasks.points import At
@@ -38,6 +40,24 @@ def test_a_book_is_added_where_the_homes_own_is_meant():
 def test_the_board_stays_on_its_wall_and_the_towel_is_another():
     own, other = ACTIVITIES["CleaningStainedShelf"], variant(ACTIVITIES["CleaningStainedShelf"], 1)
     assert own.objects[1] == other.objects[1] and other.objects[0] == "hand_towel/hand_towel_01"
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_what_nothing_sticks_to_fits_between_fetchs_fingers(number):
+    task = variant(ACTIVITIES["SoakingTowel"], number, "physical")
+    (towel,) = (find_model(name).entry for name in task.objects)
+    opening = UPPER[FINGERS].sum()
+    assert max(towel.bounding_box[:2]) < opening - 0.015 and towel.assisted_grasp
+    assert 0.2 < towel.mass < 0.5
+    assert task.name == "SoakingTowel" and task.goal == ACTIVITIES["SoakingTowel"].goal
+
+
+@pytest.mark.parametrize("mode", ["mitten", "assisted", "sticky"])
+def test_other_modes_and_other_activities_keep_their_objects(mode):
+    assert variant(ACTIVITIES["SoakingTowel"], 0, mode) is ACTIVITIES["SoakingTowel"]
+    assert variant(ACTIVITIES["CookingMeat"], 0, "physical") is ACTIVITIES["CookingMeat"]
+    with pytest.raises(EngineError, match="0 to 2"):
+        variant(ACTIVITIES["SoakingTowel"], 3, "physical")
 
 
 def test_each_variant_has_its_own_pool():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
 from ig2mj.engine.view import Array
@@ -26,7 +27,7 @@ MISSED, AGAIN = {"humanoid": 0.6, "fetch": 0.9}, 0.03
 """How far fingers have closed when they have missed what they close on; m that the hand then rises, opens, and begins
 again."""
 
-UP = jnp.array([0.0, 0.0, 1.0])
+UP = np.array([0.0, 0.0, 1.0], np.float32)
 
 FAR, BLEND = 0.62, 0.1
 """m from the robot's middle beyond which Fetch's gripper turns outwards, and over which it comes to do so."""

@@ -63,7 +63,7 @@ EDGE = 0.1
 
 def plan(see: Sight) -> list[Wish]:
     """One hand. The tap's front is where the robot stands: +y in its home."""
-    if see.physical:
+    if see.physical and see.robot == "fetch":  # (the humanoid's fingers push a roll out of the hand)
         return [grip_standing(see, TOWEL, _below_spout(see, ROLLED))]
     # A mitten drags the towel past the fridge's corner; another grasp breaks there. Above the humanoid's body is room.
     way = LIFTED if see.robot == "humanoid" and see.grasping != "mitten" else FOLDED
