@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import fnmatch
+import functools
 import pathlib
 import re
 import tomllib
@@ -61,27 +62,32 @@ GUESTS = {
 GUEST_NAMES = {"ig2mj_converters", "ig2mj_homes"}
 
 
+@functools.cache
 def imports_of(file: pathlib.Path, typing_too: bool = False) -> list[tuple[int, str]]:
     """(line, absolute module name) of every import that runs, also those inside functions and by `import_module`.
 
     What stands under `if TYPE_CHECKING` never runs and counts only with `typing_too`. `from a import b` gives "a.b".
     """
     tree = ast.parse(file.read_text(encoding="utf-8"), str(file))
+    nodes = list(ast.walk(tree))
     typing_only = {
         id(inner)
-        for node in ast.walk(tree)
+        for node in nodes
         if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test)
         for statement in node.body
         for inner in ast.walk(statement)
     }
     package = module_name(file).split(".") if file.name == "__init__.py" else module_name(file).split(".")[:-1]
     found = []
-    for node in ast.walk(tree):
+    for node in nodes:
         if id(node) in typing_only and not typing_too:
             continue
         if isinstance(node, ast.Import):
             found += [(node.lineno, alias.name) for alias in node.names]
-        elif isinstance(node, ast.Call) and ast.unparse(node.func).endswith("import_module"):
+        elif isinstance(node, ast.Call) and "import_module" in (
+            getattr(node.func, "attr", ""),
+            getattr(node.func, "id", ""),
+        ):
             found += [(node.lineno, arg.value) for arg in node.args if isinstance(arg, ast.Constant)]
         elif isinstance(node, ast.ImportFrom):
             base = package[: len(package) - node.level + 1] if node.level else []
