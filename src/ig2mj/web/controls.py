@@ -17,6 +17,8 @@ from ig2mj.web.sources import Timeline
 from ig2mj.web.tables import goal_tree, object_table, status
 
 NOTHING = "(click an object, or choose one)"
+READY = "<div style='padding:0 12px 8px;font-size:12.5px;color:#6b7280'>getting ready ...</div>"
+"""In the place of what is not compiled yet."""
 SPEEDS = {"1/10": 0.1, "1/4": 0.25, "1/2": 0.5, "1": 1.0, "2": 2.0, "4": 4.0, "10": 10.0}
 
 
@@ -51,7 +53,7 @@ class Controls:
         self._goal: Any = None
         if self._source.goal is not None:
             with gui.add_folder("Goal"):
-                self._goal = gui.add_html("")
+                self._goal = gui.add_html(READY)
         with gui.add_folder("Object"):
             self._object()
         with gui.add_folder("View", expand_by_default=False):
@@ -161,11 +163,14 @@ class Controls:
             self._rate = (steps - self._marked[1]) / (now - self._marked[0]) * self._source.period
             self._marked = (now, steps)
         rows = [("time", f"{shot.time:.1f} s"), *shot.facts]
-        rows.append(("speed", f"{self._rate:.2g} x real time" if runner.playing else "paused"))
+        speed = f"{self._rate:.2g} x real time" if steps else "getting ready"  # the first step compiles
+        rows.append(("speed", speed if runner.playing else "paused"))
         rows.append(("bodies that moved", str(shown)))
         self._set(self._status, status(rows, runner.trouble))
         if isinstance(self._source, Timeline):
             self._follow(self._source)
+        if self.chosen >= 0 and not self._states.content:
+            self._states.content = READY
         self._set(self._states, object_table(model, shot, self.chosen) if self.chosen >= 0 else "")
         if self._goal is not None and self._source.goal is not None:
             self._set(self._goal, goal_tree(self._source.goal, shot))
