@@ -171,6 +171,9 @@ def test_the_command_line_takes_the_urdf(tmp_path, monkeypatch, capsys):
     assert "hnd" in capsys.readouterr().err
     assert call(["rollout", "PointNavigation", "--robot-urdf", str(file), "--robot", "fetch"]) == 2
     assert call(["rollout", "PointNavigation", "--robot-layout", str(file)]) == 2
+    capsys.readouterr()
+    assert call(["rollout", "PointNavigation", "--robot-urdf", str(tmp_path / "none.urdf")]) == 2
+    assert "none.urdf: --robot-urdf: is not a file" in capsys.readouterr().err
     assert call(["convert", "robot", "--urdf", str(file), "--out", str(tmp_path / "out"), "--no-report"]) == 0
     assert UrdfRobot.load(tmp_path / "out").name == "rover"
 

@@ -6,7 +6,7 @@ import hashlib
 import pathlib
 from typing import TYPE_CHECKING
 
-from ig2mj.errors import Ig2mjError
+from ig2mj.errors import Ig2mjError, InputError
 
 if TYPE_CHECKING:
     from ig2mj.agents.urdf import UrdfRobot
@@ -35,6 +35,8 @@ def own_robot(urdf: pathlib.Path, layout: pathlib.Path | None, robot: str | None
 
     if robot is not None:
         raise Ig2mjError("give either --robot or --robot-urdf")
+    if not urdf.is_file():
+        raise InputError(urdf, "is not a file", element="--robot-urdf", fix="name a robot's URDF")
     place = hashlib.blake2b(str(urdf.resolve()).encode(), digest_size=8).hexdigest()
     out = cache_folder("robots") / place / urdf.stem
     out.parent.mkdir(parents=True, exist_ok=True)
