@@ -121,8 +121,10 @@ class NearPairs:
         of_a = self.first.shape[1]
         pieces = jnp.concatenate([jnp.asarray(self.first), jnp.asarray(self.second)], axis=1)[pair]  # [C, S + T]
         first, second = pieces[:, :of_a], pieces[:, of_a:]
-        low, high = shapes.boxes(poses, world[:, None], pieces)
-        gap = box_gap(low[:, :of_a, None], high[:, :of_a, None], low[:, None, of_a:], high[:, None, of_a:])
+        # One call for both would be read through slices, and XLA would compute it anew for every pair of pieces.
+        low_a, high_a = shapes.boxes(poses, world[:, None], first)
+        low_b, high_b = shapes.boxes(poses, world[:, None], second)
+        gap = box_gap(low_a[:, :, None], high_a[:, :, None], low_b[:, None], high_b[:, None])
         close = (gap < most[:, None, None] + ROUNDING) & (valid[:, None] & (first >= 0))[:, :, None]
         close &= (second >= 0)[:, None]
         size = close.size
