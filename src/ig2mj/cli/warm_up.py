@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import pathlib
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import tyro
+
+if TYPE_CHECKING:
+    from ig2mj.engine.base import Engine
 
 
 def run(
@@ -14,6 +17,7 @@ def run(
     robot: str | None = None,
     observations: tuple[str, ...] = (),
     engine: str | None = None,
+    arch: int | None = None,
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FOLDER")] = None,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
@@ -29,6 +33,8 @@ def run(
       robot: for an environment: its robot; default: the task's first.
       observations: for an environment: observations besides its vectors, e.g. rgb depth.
       engine: native, warp or jax; default: warp on a GPU, else native.
+      arch: compile the Warp engine's kernels for GPUs of this architecture (compute capability times ten: 90 is an
+        H100 or H200); this machine needs none. JAX's programs are then left to the machine with the GPU.
       out: folder of the cache; default: IG2MJ_CACHE_DIR, or the user's own.
       json: print one JSON object.
     """
@@ -41,7 +47,10 @@ def run(
 
     if out is not None:
         keep_compiled_in(out)
-    seconds = _timed(what, worlds, robot, observations, engine)
+    if arch is not None:
+        seconds = _ahead(what, worlds, robot, engine, arch)
+    else:
+        seconds = _timed(what, worlds, robot, observations, engine)
     seconds["all"] = time.perf_counter() - began
     folder = cache_folder()
     size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
@@ -57,6 +66,47 @@ def run(
     return 0
 
 
+MOST_WORLDS = 64
+"""Worlds that are created to find kernels, which do not depend on the number."""
+
+
+def _ahead(what: str, worlds: int, robot: str | None, engine: str | None, architecture: int) -> dict[str, float]:
+    """Seconds of finding and of compiling the kernels for a GPU that this machine need not have."""
+    import time
+
+    from ig2mj.engine.warp import ahead
+    from ig2mj.engine.warp.engine import WarpEngine
+    from ig2mj.errors import Ig2mjError
+
+    if engine not in (None, "warp"):
+        raise Ig2mjError(f"--arch compiles kernels of the Warp engine; engine {engine!r} has none")
+    ahead.check(architecture)
+    began = time.perf_counter()
+    made = _engine_of(what, min(worlds, MOST_WORLDS), robot)
+    assert isinstance(made, WarpEngine)
+    launches = ahead.launches_on_gpu(made)
+    found = time.perf_counter()
+    ahead.compile_for(launches, architecture)
+    return {"making": found - began, "kernels": time.perf_counter() - found}
+
+
+def _engine_of(what: str, worlds: int, robot: str | None) -> Engine:
+    import ig2mj
+    from ig2mj.envs.names import activity_name, short_name
+
+    if short_name(what) is not None or activity_name(what) is not None:
+        return ig2mj.make(what, robot, worlds, "warp", pool_size=1).core.engine
+    _check_home(robot, ())
+    return ig2mj.Worlds(what, worlds, "warp").engine
+
+
+def _check_home(robot: str | None, observations: tuple[str, ...]) -> None:
+    from ig2mj.errors import Ig2mjError
+
+    if robot is not None or observations:
+        raise Ig2mjError("--robot and --observations belong to environments; a home is stepped without them")
+
+
 def _timed(
     what: str, worlds: int, robot: str | None, observations: tuple[str, ...], engine: str | None
 ) -> dict[str, float]:
@@ -69,7 +119,6 @@ def _timed(
     import ig2mj
     from ig2mj.envs.names import activity_name, short_name
     from ig2mj.envs.registry import VECTORS
-    from ig2mj.errors import Ig2mjError
 
     times, parts = [time.perf_counter()], ["making", "start", "first step"]
 
@@ -84,8 +133,7 @@ def _timed(
         action = np.zeros((worlds, *env.action_space.shape), np.float32)
         jax.block_until_ready(env.step_autoreset(state, action))
     else:
-        if robot is not None or observations:
-            raise Ig2mjError("--robot and --observations belong to environments; a home is stepped without them")
+        _check_home(robot, observations)
         batch = ig2mj.Worlds(what, worlds, engine)
         tick()
         started = jax.block_until_ready(batch.start(0))

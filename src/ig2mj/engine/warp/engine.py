@@ -97,11 +97,15 @@ class WarpEngine(MjxEngine):
         Args:
           workers: threads; None: one for each processor of this process.
         """
+        return kernels.load(self.launches(), workers=workers)
+
+    def launches(self) -> list[kernels.Launch]:
+        """The kernels of a step, of a forward pass and of the contact filter."""
         warns = int(self.model.opt._impl.warn_overflow)
-        launches = kernels.launches_of_step(self.host_model, self.profile, self.own_kernels, warns)
+        found = kernels.launches_of_step(self.host_model, self.profile, self.own_kernels, warns)
         if self._filters and len(self.tables.hand_body):
-            launches.append((DROP, 256))  # pyright: ignore[reportArgumentType]
-        return kernels.load(launches, workers=workers)
+            found.append((DROP, 256))  # pyright: ignore[reportArgumentType]
+        return found
 
     def usage(self, physics: MjxPhysics) -> Usage:
         """How full the buffers were in the last physics step."""

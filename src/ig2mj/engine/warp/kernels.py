@@ -122,14 +122,14 @@ def load(launches: list[Launch], device: str | None = None, workers: int | None 
     for block_dim, modules in by_size.items():
         for module in modules:
             module.get_module_hash(1 if on.is_cpu else block_dim)
-    with _alone():
+    with alone():
         for block_dim, modules in by_size.items():
             wp.force_load(on, list(modules), block_dim=block_dim, max_workers=threads)
     return sum(map(len, by_size.values()))
 
 
 @contextlib.contextmanager
-def _alone() -> Iterator[None]:
+def alone() -> Iterator[None]:
     """Programs that start together compile in turn: the others find in the cache what the first has made."""
     with contextlib.ExitStack() as stack:
         with contextlib.suppress(OSError, ImportError):  # where there are no such locks each compiles for itself

@@ -1,0 +1,43 @@
+"""Kernels compiled for a GPU on a machine that may have none."""
+
+from __future__ import annotations
+
+import pathlib
+
+import pytest
+import warp as wp
+
+from ig2mj.cli import call
+from ig2mj.engine.warp import ahead
+from ig2mj.engine.warp.engine import WarpEngine
+from ig2mj.errors import EngineError
+
+
+def test_kernels_of_a_step_become_programs_of_a_gpu(tiny_home, tmp_path, monkeypatch):
+    engine = WarpEngine(tiny_home, 2)
+    there = ahead.launches_on_gpu(engine)
+    assert len(there) > 40
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path))
+    two = sorted(there, key=lambda launch: len(launch[0].module.kernels))[:2]
+    assert ahead.compile_for(two, 90, workers=1) == 2
+    made = {p.name: p.stat().st_mtime_ns for p in pathlib.Path(tmp_path).rglob("*.sm90.cubin")}
+    assert set(made) == {f"{k.module.get_module_identifier(b)}.sm90.cubin" for k, b in two}
+    ahead.compile_for(two, 90, workers=1)
+    assert made == {p.name: p.stat().st_mtime_ns for p in pathlib.Path(tmp_path).rglob("*.sm90.cubin")}
+
+
+def test_kernels_are_chosen_as_on_a_gpu():
+    class Asked:
+        def launches(self):
+            device = wp.get_device()
+            return [device.is_cuda, device.is_cpu, device.alias]
+
+    assert ahead.launches_on_gpu(Asked()) == [True, False, wp.get_device().alias]
+    assert wp.get_device().is_cuda == wp.is_cuda_available()
+
+
+def test_architectures_that_are_not_known_are_listed(capsys):
+    with pytest.raises(EngineError, match="architecture 12; it can for .*80, 86"):
+        ahead.check(12)
+    assert call(["warm-up", "small_home", "--arch", "90", "--engine", "native"]) == 2
+    assert "'native' has none" in capsys.readouterr().err
