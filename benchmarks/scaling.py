@@ -146,6 +146,34 @@ def measure(group: Group, number: int, args: Args, until: float) -> dict[str, An
     return row
 
 
+def others(group: Group) -> list[Process]:
+    """The processes beside the first that can be measured alone: those of a simulator."""
+    return group.processes[1:] if 1 in group.numbers and len(group.numbers) > 1 else []
+
+
+def measure_group(group: Group, args: Args, until: float) -> None:
+    """All rows of a case: each number of GPUs, and each further GPU alone, since the GPUs of a host are not all alike."""
+    alone: list[float] = []
+
+    def one(chosen: Group, number: int, **more: Any) -> dict[str, Any]:
+        row = measure(chosen, number, args, min(until, time.monotonic() + 5 * args.seconds + 20.0)) | more
+        if number == args.gpus[0] and row["counts"]:
+            alone.append(row["steps_per_s"] / number)
+        if "steps_per_s" in row and "gpu" not in row:
+            if alone:
+                row["weak_scaling"] = round(row["steps_per_s"] / alone[0], 3)
+            if number <= len(alone) and number > 1:
+                row["of_these_gpus_alone"] = round(row["steps_per_s"] / sum(alone[:number]), 3)
+        results.keep_row({**row, "settings": settings_of(group.case, args)[1]}, args.rows)
+        return row
+
+    for number in group.numbers:
+        one(group, number)
+        if number == 1:
+            for k, process in enumerate(others(group), 1):
+                one(Group(group.case, [process], (1,)), 1, gpu=k)
+
+
 def main(args: Args) -> None:
     """Measures; rows go to standard output and to the file."""
     until = time.monotonic() + args.limit
@@ -157,19 +185,12 @@ def main(args: Args) -> None:
     every = [p for g in made for p in g.processes]
     try:
         # nothing is timed while something else compiles; what is not ready when the rest needs its time is left out
-        rounds = sum(len(g.numbers) for g in made)
+        rounds = sum(len(g.numbers) + len(others(g)) for g in made)
         latest = max(until - rounds * (SLACK + args.seconds), time.monotonic())
         for process in every:
             process.wait_until_ready(latest)
-        alone: dict[str, float] = {}
         for group in made:
-            for number in group.numbers:
-                row = measure(group, number, args, min(until, time.monotonic() + 5 * args.seconds + 20.0))
-                if number == args.gpus[0] and row["counts"]:
-                    alone[group.case] = row["steps_per_s"] / number
-                if group.case in alone and "steps_per_s" in row:
-                    row["weak_scaling"] = round(row["steps_per_s"] / alone[group.case], 3)
-                results.keep_row({**row, "settings": settings_of(group.case, args)[1]}, args.rows)
+            measure_group(group, args, until)
     finally:
         end_all(every)
 

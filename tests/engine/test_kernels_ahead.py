@@ -27,12 +27,18 @@ def test_kernels_of_a_step_become_programs_of_a_gpu(tiny_home, tmp_path, monkeyp
 
 
 def test_kernels_are_chosen_as_on_a_gpu():
-    class Asked:
+    class Asked(WarpEngine):
+        def __init__(self):
+            self.seen = []
+
         def launches(self):
             device = wp.get_device()
-            return [device.is_cuda, device.is_cpu, device.alias]
+            self.seen.append((device.is_cuda, device.is_cpu, device.alias))
+            return []
 
-    assert ahead.launches_on_gpu(Asked()) == [True, False, wp.get_device().alias]
+    asked = Asked()
+    assert ahead.launches_on_gpu(asked) == []
+    assert asked.seen == [(True, False, wp.get_device().alias)]
     assert wp.get_device().is_cuda == wp.is_cuda_available()
 
 
