@@ -153,17 +153,17 @@ def others(group: Group) -> list[Process]:
 
 def measure_group(group: Group, args: Args, until: float) -> None:
     """All rows of a case: each number of GPUs, and each further GPU alone, since the GPUs of a host are not all alike."""
-    alone: list[float] = []
+    alone: dict[int, float] = {}
 
     def one(chosen: Group, number: int, **more: Any) -> dict[str, Any]:
         row = measure(chosen, number, args, min(until, time.monotonic() + 5 * args.seconds + 20.0)) | more
         if number == args.gpus[0] and row["counts"]:
-            alone.append(row["steps_per_s"] / number)
+            alone[more.get("gpu", 0)] = row["steps_per_s"] / number
         if "steps_per_s" in row and "gpu" not in row:
-            if alone:
+            if 0 in alone:
                 row["weak_scaling"] = round(row["steps_per_s"] / alone[0], 3)
-            if number <= len(alone) and number > 1:
-                row["of_these_gpus_alone"] = round(row["steps_per_s"] / sum(alone[:number]), 3)
+            if number > 1 and set(range(number)) <= alone.keys():
+                row["of_these_gpus_alone"] = round(row["steps_per_s"] / sum(alone[k] for k in range(number)), 3)
         results.keep_row({**row, "settings": settings_of(group.case, args)[1]}, args.rows)
         return row
 

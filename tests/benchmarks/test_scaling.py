@@ -51,12 +51,14 @@ def measured(tmp_path: pathlib.Path, monkeypatch, workers: dict[str, list[dict]]
 def test_speeds_are_compared_with_one_gpu(tmp_path, monkeypatch):
     slow = {**GOOD, "steps": 90}
     rows = measured(tmp_path, monkeypatch, {"birch_pictures": [GOOD, slow]}, limit=30.0)
-    assert [(r["gpus"], r["steps_per_s"], r["weak_scaling"]) for r in rows] == [(1, 50.0, 1.0), (2, 95.0, 1.9)]
+    shares = [(r["gpus"], r.get("gpu"), r["steps_per_s"], r.get("weak_scaling")) for r in rows]
+    assert shares == [(1, None, 50.0, 1.0), (1, 1, 45.0, None), (2, None, 95.0, 1.9)]
+    assert rows[2]["of_these_gpus_alone"] == 1.0  # the second one is slower by itself
     assert all(r["counts"] and r["device"] == "a device" for r in rows)
     monkeypatch.setattr(scale_tables, "RESULTS", tmp_path)
     for name in ("scaling", "multi_gpu"):
         (tmp_path / name).mkdir()
-    (tmp_path / "scaling" / "rows.jsonl").write_text("\n".join(map(json.dumps, [*rows, {**rows[1], "counts": False}])))
+    (tmp_path / "scaling" / "rows.jsonl").write_text("\n".join(map(json.dumps, [*rows, {**rows[2], "counts": False}])))
     two = {"devices": 2, "speedup": 1.99, "device": "another"}
     (tmp_path / "multi_gpu" / "result.json").write_text(json.dumps(two))
     assert scale_tables.scaling()["birch_pictures"] == {1: (1.0, "a device"), 2: (1.9, "a device")}
@@ -64,7 +66,7 @@ def test_speeds_are_compared_with_one_gpu(tmp_path, monkeypatch):
 
 def test_a_row_that_overflowed_counts_not_and_is_no_measure_for_others(tmp_path, monkeypatch):
     rows = measured(tmp_path, monkeypatch, {"birch_pictures": [{**GOOD, "overflow": 3}, GOOD]}, limit=30.0)
-    assert [(r["counts"], r["overflow"]) for r in rows] == [(False, 3), (False, 3)]
+    assert [(r["counts"], r["overflow"]) for r in rows] == [(False, 3), (True, 0), (False, 3)]
     assert not any("weak_scaling" in r for r in rows)
 
 
@@ -74,7 +76,8 @@ def test_what_dies_or_is_late_costs_its_own_rows(tmp_path, monkeypatch):
         "learner-1": [{**GOOD, "late": True}],
         "learner-2": [GOOD, GOOD],
     }
-    rows = {(r["case"], r["gpus"]): r for r in measured(tmp_path, monkeypatch, workers, limit=4 * 4.1 + 2.0)}
+    every = measured(tmp_path, monkeypatch, workers, limit=5 * 4.1 + 2.0)
+    rows = {(r["case"], r["gpus"]): r for r in every if "gpu" not in r}
     assert rows["birch_pictures", 1]["weak_scaling"] == 1.0
     assert "no answer, ended with 1: it died" in rows["birch_pictures", 2]["error"]
     assert "not ready, still at work" in rows["learner", 1]["error"]
