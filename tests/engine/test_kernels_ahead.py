@@ -43,7 +43,7 @@ def test_kernels_are_chosen_as_on_a_gpu():
 
 
 def test_architectures_that_are_not_known_are_listed(capsys):
-    with pytest.raises(EngineError, match="architecture 12; it can for .*80, 86"):
+    with pytest.raises(EngineError, match=r"architecture 12; it can for .*80, 86"):
         ahead.check(12)
     assert call(["warm-up", "small_home", "--arch", "90", "--engine", "native"]) == 2
     assert "'native' has none" in capsys.readouterr().err
