@@ -82,7 +82,7 @@ def scaling() -> dict[str, dict[int, tuple[float, str]]]:
     """Measured weak scaling: case -> GPUs -> (of one, device)."""
     found: dict[str, dict[int, tuple[float, str]]] = {}
     for row in lines(RESULTS / "scaling" / "rows.jsonl"):
-        if row.get("counts") and row.get("weak_scaling") and row.get("of") == 1:  # a further GPU alone has no scaling
+        if row.get("counts") and row.get("weak_scaling") and row.get("of") == 1:
             found.setdefault(row["case"], {})[row["gpus"]] = (row["weak_scaling"], row["device"])
     two = json.loads((RESULTS / "multi_gpu" / "result.json").read_text())
     found.setdefault("made_60", {}).setdefault(two["devices"], (two["speedup"], two["device"]))

@@ -152,7 +152,7 @@ def others(group: Group) -> list[Process]:
 
 
 def measure_group(group: Group, args: Args, until: float) -> None:
-    """All rows of a case: each number of GPUs, and each further GPU alone, since the GPUs of a host are not all alike."""
+    """All rows of a case: each number of GPUs, and each further GPU alone, since those of a host are not all alike."""
     alone: dict[int, float] = {}
 
     def one(chosen: Group, number: int, **more: Any) -> dict[str, Any]:
