@@ -29,6 +29,7 @@ PARSED_ONLY = {
     "ig2mj activity sample": "takes half a minute",
     "ig2mj activity show cleaning_windows --pool": "needs what the line before it makes",
     "ig2mj sample-task": "takes minutes",
+    "ig2mj warm-up": "compiles for minutes",
     "ig2mj train": "takes minutes, on a GPU",
     "ig2mj rollout PointNavigation --robot-urdf": "needs a robot of the reader's",
     "ig2mj rollout CookingMeat --agent expert": "samples start states for a minute; run by tests of its own",
