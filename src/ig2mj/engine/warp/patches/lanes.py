@@ -25,19 +25,21 @@ from ig2mj.engine.warp.patches.launching import Launch
 LANES, ENTRIES = 64, 128
 """Threads of a world."""
 
-ROWS = (
-    "_update_constraint_efc",
-    "_update_constraint_init_qfrc_constraint_sparse",
-    "_linesearch_jv_fused_kernel",
-    "_solve_init_jaref_kernel",
-)
-"""Functions of the solver that make kernels with a thread for each row."""
+ROWS = {
+    "_update_constraint_efc": "efc_force_out",
+    "_update_constraint_init_qfrc_constraint_sparse": "efc_force_in",
+    "_linesearch_jv_fused_kernel": "ctx_jv_out",
+    "_solve_init_jaref_kernel": "efc_aref_in",
+}
+"""Functions of the solver that make kernels with a thread for each row, and an argument as long as the buffer (some are
+padded): where rows overflow it, their number is larger."""
 
 
 @functools.cache
 def _by_lanes(kernel: wp.Kernel) -> wp.Kernel:
     # The first row has something to do where there is none, too: it counts.
-    rows = "wp.max(nefc_in[worldid], 1)"
+    room = ROWS[kernel.key.split("__locals__")[0]]
+    rows = f"wp.min(wp.max(nefc_in[worldid], 1), {room}.shape[1])"
     return strided(kernel, "efcid", rows, LANES, f"ig2mj_lanes_{kernel.module.name}")
 
 
