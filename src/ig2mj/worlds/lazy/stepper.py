@@ -64,6 +64,7 @@ class StateStepper:
         self._bytes: list[bytes | None] = []
         self._fingers_away = False
         self._relevance: Relevance | None = None
+        self._without_effect: dict[str, bytes] = {}  # the changed fields of the last view that did not matter
 
     @classmethod
     def of(cls, rules: Rules, num_worlds: int) -> StateStepper:
@@ -91,7 +92,8 @@ class StateStepper:
 
     def _news(self, view: PhysicsView) -> News:
         """What differs from the last whole step, of all that a step depends on."""
-        program, rows, changed, relevance = self.program, self.program.rows, [], self._relevance
+        program, rows, relevance = self.program, self.program.rows, self._relevance
+        changed: dict[str, bytes] = {}
         assert relevance is not None, "there was a whole step"
         news = News.NONE
         for k, now in enumerate(read_fields(view, program.view_reads)):
@@ -107,7 +109,8 @@ class StateStepper:
             before = self._bytes[k]
             if before is None:
                 before = self._bytes[k] = seen[:, chosen].tobytes()
-            if now[:, chosen].tobytes() == before:
+            data = now[:, chosen].tobytes()
+            if data == before:
                 self._seen[k] = now
                 continue
             if name in program.goal_reads and news is News.NONE and not program.goal_rows.same(name, now, seen):
@@ -115,8 +118,12 @@ class StateStepper:
             if name in program.event_reads:
                 if name in relevance.exact:
                     return News.EVENTS
-                changed.append(name)
-        return News.EVENTS if changed and not relevance.same(view, changed) else news
+                changed[name] = data
+        if changed and changed != self._without_effect:
+            if not relevance.same(view, changed):
+                return News.EVENTS
+            self._without_effect = changed
+        return news
 
     def _away(self, view: PhysicsView) -> bool:
         return isinstance(view.agent.finger_pos, np.ndarray) and toggled_on.all_out_of_reach(self.program.model, view)
@@ -165,6 +172,7 @@ class StateStepper:
             if self._relevance is None:
                 self._relevance = Relevance(program.model)
             self._relevance.begin(new, view, program.event_reads)
+            self._without_effect = {}
             self._seen = read_fields(view, program.view_reads)
             self._bytes = [None] * len(self._seen)
             fingers = "agent.finger_pos" in program.view_reads and "agent.finger_pos" not in program.goal_reads
