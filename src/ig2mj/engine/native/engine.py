@@ -224,9 +224,10 @@ class NativeEngine:
     ) -> tuple[NativePhysics, PhysicsView]:
         """One control step of every world; see `Engine.step`. Raises EngineError where a state is not finite."""
         if ctrl is None:
-            if self.num_worlds == 1 and physics.view is not None and physics.worlds[0].only_time_passes():
+            moving = [not world.only_time_passes() for world in physics.worlds]
+            if physics.view is not None and not any(moving):
                 return physics, physics.view
-            changed = self._run(physics, lambda world: world.step(None))
+            changed = self._run(physics, lambda w: w.step(None) if moving[w.number] else Changed.NOTHING)
         else:
             rows = np.asarray(ctrl, np.float64)
             check_shape(rows, self.num_worlds, self._slots[0].model.nu)
