@@ -81,7 +81,7 @@ def test_broken_and_foreign_files_are_refused_with_run_and_field(recorded, tmp_p
     with pytest.raises(InputError, match=r'is for robot = "", and here it is "fetch"'):
         load_demos(file, perception, {**world_of(env), "robot": "fetch"})
     (tmp_path / "no.h5").write_bytes(b"nothing")
-    with pytest.raises(InputError, match="no HDF5 file"):
+    with pytest.raises(InputError, match="is not an HDF5 file"):
         load_demos(tmp_path / "no.h5", perception)
     copy = tmp_path / "cut.h5"
     copy.write_bytes(file.read_bytes())
