@@ -7,7 +7,7 @@ one, the visuals are loaded too; without, they are not, as in iGibson. Requests:
 pixels of a picture after each step, 0 none}, {"do": "poses"}, {"do": "moving"}, {"do": "picture", "size": pixels}. A
 process of its own, because a driver that fails may take the process with it, and because PyBullet prints what it likes.
 
-Settings (spec robots_tasks_sensors.md 6.1, 6.2, dataset_format.md section 7): gravity 9.8, 1/120 s, four physics steps
+iGibson's settings: gravity 9.8, 1/120 s, four physics steps
 in a step, 100 solver iterations, sleeping, deterministic pairs, no file caching, no collision between bases that are
 both fixed, velocity motors for joint friction. Shadows are off, as in iGibson's benchmark.
 """

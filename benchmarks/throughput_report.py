@@ -98,7 +98,7 @@ def _goals(rows: list[Row]) -> Table:
 
 
 def _size(row: Row) -> int:
-    """The issue's size that a scene stands for; 0: none of them."""
+    """The number of objects for which there is a target that a scene stands for; 0: none."""
     return next((size for size in (20, 60, 120) if 0.9 * size <= row["objects"] <= 1.15 * size), 0)
 
 

@@ -1,4 +1,4 @@
-"""Bugs of spec/states.md section 19 that show in a whole world; the others are tested where the state is.
+"""Bugs of iGibson's that show in a whole world; the others are tested where the state is.
 
 19.1 test_relations_facts · 19.2 test_relations_facts · 19.3 test_room_facts, test_table_a1 · 19.4 test_table_a1 · 19.6
 test_water_facts · 19.7 test_sliced_facts · 19.8 test_sliced_facts, test_dirt_facts · 19.9 test_open_facts · 19.11

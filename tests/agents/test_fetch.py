@@ -111,7 +111,7 @@ def test_base_head_and_gripper(tiny_home_folder):
 
 
 def test_the_experiments_proprioception_is_49_numbers_with_the_servos_torques(tiny_home_folder):
-    """Spec 2.6: gripper's position and Euler angles in the base's frame, has grasped, (q, qd, torque) of 14 joints."""
+    """The paper's: gripper's position, Euler angles in the base's frame, has grasped, (q, qd, torque) of 14 joints."""
     world = RobotWorld(tiny_home_folder, Fetch(pos=START, proprioception="experiments"))
     world.act(times=4, forward=0.2, eef_z=-1, eef_rx=0.5, gripper=1)
     felt = world.proprioception()

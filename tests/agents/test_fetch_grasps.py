@@ -1,4 +1,4 @@
-"""Fetch takes objects by its two fingers (spec/robots_tasks_sensors.md 1.5 and 1.6)."""
+"""Fetch takes objects by its two fingers."""
 
 from __future__ import annotations
 

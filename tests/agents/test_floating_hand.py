@@ -24,7 +24,7 @@ def test_the_hand_floats_where_it_is_put():
     model, data = lone_hand(pos=(1, 2, 3))
     mujoco.mj_step(model, data, nstep=240)
     assert data.body("hand").xpos == pytest.approx([1, 2, 3], abs=1e-6)
-    assert data.ntree_awake == 1, "design section 2 fact 6: a tree with actuators never sleeps"
+    assert data.ntree_awake == 1, "a tree with actuators never sleeps"
 
 
 def test_slides_run_along_world_axes_however_the_hand_is_turned():

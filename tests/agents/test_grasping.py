@@ -1,4 +1,4 @@
-"""Assistive grasping (paper, appendix A.1; spec/robots_tasks_sensors.md 1.5): what is held, carried and let go of."""
+"""Assistive grasping (paper, appendix A.1): what is held, carried and let go of."""
 
 from __future__ import annotations
 

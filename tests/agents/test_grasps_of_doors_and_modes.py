@@ -38,7 +38,7 @@ def press_forward(world: GraspingWorld, times: int = 10) -> None:
     [pytest.param("cabinet_drawer_slide", 0.6, marks=pytest.mark.slow), ("cabinet_door_hinge", 0.25)],
 )
 def test_a_sticky_hand_pulls_open_what_it_closes_on(at_cabinet, joint, height):
-    """By a connect (spec 1.5, p2p): the link turns freely about the point where it is held."""
+    """By a connect (iGibson's point-to-point constraint): the link turns freely about the point where it is held."""
     world = at_cabinet
     world.simulation.reset()
     world.act(body_z=height - 0.6, times=1)

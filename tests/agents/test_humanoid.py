@@ -1,4 +1,4 @@
-"""The bimanual humanoid: the acceptance tests of iGibson's own (spec/robots_tasks_sensors.md 1.4), both presets."""
+"""The bimanual humanoid: the acceptance tests of iGibson's own, both presets."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def rotation(quat) -> Rotation:
 @pytest.mark.slow
 @PRESETS
 def test_parts_stay_where_they_are_put(tiny_home_folder, compat):
-    """Spec 1.4, test 1: fifty zero actions, 1 cm."""
+    """iGibson's first test: fifty zero actions, 1 cm."""
     world = RobotWorld(tiny_home_folder, Humanoid(pos=OUTSIDE, quat=QUARTER_LEFT, compat=compat))
     world.act(times=50)
     body = world.body("humanoid")
@@ -45,7 +45,7 @@ def test_parts_stay_where_they_are_put(tiny_home_folder, compat):
 
 @PRESETS
 def test_turns_of_a_hand_are_about_the_axes_of_the_body(tiny_home_folder, compat):
-    """Spec 1.4, test 2: a quarter about z in two actions, then a quarter about y."""
+    """iGibson's second test: a quarter about z in two actions, then a quarter about y."""
     world = RobotWorld(tiny_home_folder, Humanoid(pos=OUTSIDE, compat=compat))
     start = rotation(world.quat("humanoid_right_hand"))
     for turn in ({"yaw": np.pi / 4, "pitch": 0.0},) * 2 + ({"yaw": 0.0, "pitch": np.pi / 4},) * 2:
@@ -59,7 +59,7 @@ def test_turns_of_a_hand_are_about_the_axes_of_the_body(tiny_home_folder, compat
 @pytest.mark.slow
 @PRESETS
 def test_a_body_that_walks_in_circles_neither_tilts_nor_loses_its_hands(tiny_home_folder, compat):
-    """Spec 1.4, test 3, at our steps of 1/120 s: 1,800 actions of 0.1 m and one degree, which are five full turns."""
+    """iGibson's third test, at 1/120 s: 1,800 actions of 0.1 m and one degree, which are five full turns."""
     robot = Humanoid(pos=OUTSIDE, quat=QUARTER_LEFT, compat=compat)
     world = RobotWorld(tiny_home_folder, robot, period=1 / 30)
     world.act(times=1800, body_x=0.1, body_yaw=np.deg2rad(1))
@@ -76,7 +76,7 @@ def test_a_body_that_walks_in_circles_neither_tilts_nor_loses_its_hands(tiny_hom
 
 
 def test_actions_and_proprioception_have_igibsons_order(tiny_home_folder):
-    """Spec 1.3: 28 numbers; spec 1.4, test 4: 22 numbers, or the 20 of the first release."""
+    """28 numbers of action; 22 of proprioception, or the 20 of the first release."""
     world = RobotWorld(tiny_home_folder, Humanoid(pos=OUTSIDE))
     controller = world.controller
     assert isinstance(controller, Controller) and isinstance(Humanoid(), Robot)

@@ -28,7 +28,7 @@ def test_it_drives_forwards_turns_and_knows_how_fast(tiny_home_folder):
 
 
 def test_five_discrete_actions(tiny_home_folder):
-    """spec/robots_tasks_sensors.md 1.6: half the wheels' speed, 0.5 rad/s of each wheel, nothing."""
+    """iGibson's discrete actions: half the wheels' speed, 0.5 rad/s of each wheel, nothing."""
     world = RobotWorld(tiny_home_folder, TurtleBot(pos=START, discrete=True))
     assert world.controller.action_size == 1 and world.controller.action_high.tolist() == [4]
     wheels = []

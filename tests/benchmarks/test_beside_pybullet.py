@@ -1,4 +1,4 @@
-"""PyBullet is given the same home as MuJoCo, with iGibson's settings (spec dataset_format.md 7, robots section 6)."""
+"""PyBullet is given the same home as MuJoCo, with iGibson's settings."""
 
 from __future__ import annotations
 

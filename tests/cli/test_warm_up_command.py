@@ -31,5 +31,8 @@ def test_the_second_process_finds_everything_compiled(tmp_path):
 def test_a_home_takes_no_robot(capsys):
     from ig2mj.cli import call
 
-    assert call(["warm-up", "small_home", "--robot", "fetch"]) == 2
-    assert "belong to environments" in capsys.readouterr().err
+    for architecture in ((), ("--arch", "90")):
+        assert call(["warm-up", "small_home", "--robot", "fetch", *architecture]) == 2
+        assert "belong to environments" in capsys.readouterr().err
+    assert call(["warm-up", "CookingMeat", "--arch", "90", "--observations", "rgb"]) == 2
+    assert "need the GPU itself" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""Single statements of dataset_format.md sections 0, 2, 4, 5 and 7 that other tests pass by, on one converted scene."""
+"""Single facts of iGibson's format that other tests pass by, on one converted scene."""
 
 from __future__ import annotations
 

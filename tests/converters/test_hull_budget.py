@@ -17,7 +17,7 @@ def box(size, at=(0, 0, 0)):
 
 
 def wire_rack():
-    """92 thin wires, as of a dishwasher's tray (dataset_format.md section 8, edge cases)."""
+    """92 thin wires, as of a dishwasher's tray."""
     along = [box((0.6, 0.004, 0.004), (0, 0.012 * i, 0)) for i in range(46)]
     upright = [box((0.004, 0.004, 0.1), (-0.29 + 0.0129 * i, 0.27, 0.05)) for i in range(46)]
     return along + upright

@@ -153,7 +153,7 @@ def test_a_bowl_of_a_single_sheet_stays_open_within_the_budget(no_coacd):
 
 
 def test_doubled_faces_do_not_spoil_the_volume(no_coacd):
-    """PartNet-Mobility's double-sided meshes enclose a signed volume of about 0 (dataset_format.md section 13)."""
+    """PartNet-Mobility's double-sided meshes enclose a signed volume of about 0."""
     mesh = table()
     double = trimesh.Trimesh(mesh.vertices, np.concatenate([mesh.faces, mesh.faces[:, ::-1]]), process=False)
     result = decompose_link([shape(double)], NO_CACHE)
@@ -176,7 +176,7 @@ def test_identical_and_contained_groups_are_kept_once():
 
 
 def test_a_group_that_is_not_convex_is_cut_up_and_reported(no_coacd):
-    """Blender names a whole table one object; one hull of it would be a solid block (section 2.3)."""
+    """Blender names a whole table one object; one hull of it would be a solid block."""
     result = decompose_link([shape(table(), grouped=True)], NO_CACHE)
     assert result.after == 5 and any("not convex" in w for w in result.warnings)
 

@@ -1,4 +1,4 @@
-"""From links to bodies: merging, splitting, inertials (dataset_format.md section 6), on hand-made descriptions."""
+"""From links to bodies: merging, splitting, inertials, on hand-made descriptions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One object in MJCF: dataset_format.md sections 0, 4.2, 6, 7."""
+"""One object in MJCF, from iGibson's format."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scene in MJCF and manifest: dataset_format.md sections 2.1 to 2.5, 7, 9."""
+"""A scene in MJCF and manifest, from iGibson's format."""
 
 from __future__ import annotations
 

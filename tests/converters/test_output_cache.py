@@ -257,7 +257,7 @@ def test_pipes_are_not_waited_for(tmp_path):
 
 
 def test_homes_with_shared_meshes_come_out_of_the_cache_with_them(own, tmp_path, capsys):
-    """Issue 5: a second `homes convert` of what has not changed takes no time and gives the same bytes."""
+    """A second `homes convert` of what has not changed takes no time and gives the same bytes."""
 
     def convert(out: str, *options: str) -> tuple[dict[str, str], bool]:
         call(["homes", "convert", "--dataset", str(own), "--out", str(tmp_path / out), "--jobs", "1", *options])

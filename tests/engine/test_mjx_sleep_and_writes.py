@@ -1,4 +1,4 @@
-"""Writes, sleep, welds and loading: the same on every engine (`ig2mj.engine.base`; design section 2, facts 6, 7, 9)."""
+"""Writes, sleep, welds and loading: the same on every engine (`ig2mj.engine.base`)."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_coordinates_are_written_after_teleports(small):
 
 
 def test_a_weld_toggled_in_one_world_moves_nothing_in_the_others(small):
-    """Design section 2, fact 9. Knife and box are 0.3 m apart, and the weld wants the box 0.1 m over the table."""
+    """Knife and box are 0.3 m apart, and the weld wants the box 0.1 m over the table."""
     start, _ = small.run(small.fresh(), 40)
     row = small.engine.export(start, 0)
     physics = small.write(small.fresh(row), small.switch({"knife/box": [1]}))
@@ -112,7 +112,7 @@ def test_load_replaces_the_masked_worlds(small):
 
 @pytest.mark.parametrize("name", ["native", pytest.param("warp", marks=pytest.mark.slow)])
 def test_a_world_does_not_depend_on_how_many_there_are(name, bench_folder):
-    """Issue, reproducibility: changing the number of worlds does not change world 0. Bitwise on the native engine."""
+    """Changing the number of worlds does not change world 0. Bitwise on the native engine."""
     native = engine_bench.bench(bench_folder, "native")
     row = native.engine.export(native.write(native.fresh(), native.teleport("knife", [0.02, 0, 0.53])), 0)
     places = []
@@ -165,7 +165,7 @@ def test_a_world_that_is_not_there(small):
 
 
 def test_what_sleeps_still_touches(full, asleep):
-    """Design section 2, fact 7: sleeping pairs have no contacts, so touching is remembered."""
+    """Sleeping pairs have no contacts, so touching is remembered."""
     _, view = full.run(full.fresh(asleep), 2)
     assert not np.asarray(view.awake).any()
     for one, other, touch in [("box", "table", True), ("knife", "table", True), ("box", "knife", False)]:
@@ -205,7 +205,7 @@ def test_the_hand_wakes_what_it_touches(full, asleep):
 
 
 def test_a_weld_wakes_what_it_holds_and_lifts_it(full, asleep):
-    """An awake hand and a sleeping box: only that box, in that world (design section 2, fact 9)."""
+    """An awake hand and a sleeping box: only that box, in that world."""
     physics = full.write(full.fresh(asleep), full.switch({"hand/box": [0]}))
     physics, view = full.run(physics, 1)
     assert full.awake(view, "box").tolist() == [True, False]

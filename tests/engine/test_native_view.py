@@ -1,4 +1,4 @@
-"""The native engine's view: touching, forces, poses, who is awake (design section 2; spec/states.md 4 and 24)."""
+"""The native engine's view: touching, forces, poses, who is awake."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_what_rests_touches_and_is_remembered_asleep(home):
 
 
 def test_touching_ends_at_three_millimetres(home):
-    """spec/states.md section 24: use 3 mm."""
+    """3 mm, as measured in PyBullet."""
     half = 0.05
     home.set_object_pose("box", [0.1, 0, homes.TABLE_TOP + half + 0.0028])
     assert touch(home, "box", "table")
@@ -74,7 +74,7 @@ def test_touching_ends_at_three_millimetres(home):
 
 
 def test_a_gap_is_seen_and_not_felt(home):
-    """design section 2 fact 15: `gap` lists a contact and applies no force."""
+    """`gap` lists a contact and applies no force."""
     home.set_object_pose("box", [0.1, 0, homes.TABLE_TOP + 0.05 + 0.0025])
     assert touch(home, "box", "table")
     dof = home.model.joint("box/free").dofadr[0]
@@ -223,7 +223,7 @@ def reference_forces(simulation: ig2mj.Simulation) -> np.ndarray:
 
 @pytest.mark.parametrize("cone", [mujoco.mjtCone.mjCONE_PYRAMIDAL, mujoco.mjtCone.mjCONE_ELLIPTIC])
 def test_link_force_is_the_largest_normal_force_of_any_physics_step(tiny_home, cone):
-    """spec/states.md 10.1 with section 19's fix: the largest of all substeps, not the last one's."""
+    """Unlike iGibson's slicer: the largest of all substeps, not the last one's."""
     scene = dataclasses.replace(tiny_home, model=mujoco.MjModel.from_xml_path(str(tiny_home.folder / "scene.xml")))
     scene.model.opt.cone = cone
     simulation = ig2mj.Simulation(scene)

@@ -139,7 +139,7 @@ def test_a_snapshot_of_another_scene_is_refused(tiny_home, hand_home):
 
 
 def test_equality_parameters_are_each_worlds_own(tiny_home_folder):
-    """design section 2 fact 9, on the native engine: worlds that share a thread share a model, but not eq_data."""
+    """On the native engine: worlds that share a thread share a model, but not eq_data."""
 
     def add(spec):
         entry = add_floating_hand(spec, pos=(0.1, 0, 0.8))

@@ -1,4 +1,4 @@
-"""World boxes of objects by both rules (spec/states.md 4.2 and 24)."""
+"""World boxes of objects by both rules."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_boxes_follow_through_a_fall_into_sleep(tiny_home):
 
 
 def test_igibsons_box_is_the_local_box_with_bullets_margin_rotated(tiny_home):
-    """4.2: a hull ball of radius r gives +-r unrotated and more when turned; section 24: 3 mm for one hull."""
+    """A hull ball of radius r gives +-r unrotated and more when turned, and 3 mm for one hull."""
     simulation = ig2mj.Simulation(tiny_home, boxes="igibson")
     number = tiny_home.object_index("ball")
     simulation.set_object_pose("ball", [0, 0, 2], [1, 0, 0, 0])

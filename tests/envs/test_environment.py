@@ -30,7 +30,7 @@ def test_every_promise_is_kept(env):
 
 
 def test_the_first_step_counts(env):
-    """In iGibson the baseline is taken after it (spec 2.6)."""
+    """In iGibson the baseline is taken after it."""
     state = env.reset(0)
     before = np.asarray(state.measures.distances).sum(1)
     action = np.zeros((2, 6), np.float32)
@@ -111,7 +111,7 @@ def test_unknown_observations_are_refused_with_near_matches():
 
 
 def test_the_paper_s_runs_had_easier_thresholds():
-    """Any force cuts, and three quarters of the stains may stay (spec 0.1)."""
+    """Any force cuts, and three quarters of the stains may stay."""
     from ig2mj.envs.setups import rules_of
 
     task = ACTIVITIES["SlicingFruit"]

@@ -1,4 +1,4 @@
-"""Axis-aligned boxes: tight ones against trimesh, iGibson's against Bullet's measured ones (spec/states.md 4.2, 24)."""
+"""Axis-aligned boxes: tight ones against trimesh, iGibson's against Bullet's measured ones."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_numpy_and_jax_give_the_same_boxes(shapes, seed):
 
 
 def test_igibsons_box_is_that_of_the_turned_local_box():
-    """A ball's hull of radius 0.1 has its box at 0.1015 unturned and up to 0.173 turned (spec/states.md 4.2)."""
+    """A ball's hull of radius 0.1 has its box at 0.1015 unturned and up to 0.173 turned."""
     turned = Rotation.from_rotvec([0.6, 0.6, 0.6]).as_matrix()
     center, half = np.zeros((2, 3)), np.full((2, 3), 0.1)
     low, high = boxes.turned_boxes(np.stack([np.eye(3), turned]), center, half)

@@ -1,4 +1,4 @@
-"""Entry-only rays (spec/states.md 4.4) against MuJoCo's, which also report exits of rays that start inside."""
+"""Entry-only rays, as Bullet's, against MuJoCo's, which also report exits of rays that start inside."""
 
 from __future__ import annotations
 

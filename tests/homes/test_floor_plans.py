@@ -1,4 +1,4 @@
-"""The sixteen floor plans: 119 rooms, real holes in walls, every room within reach (spec/dataset_format.md 2.3)."""
+"""The sixteen floor plans: 119 rooms, real holes in walls, every room within reach."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""misc/heights_per_link.json of furniture (dataset_format.md 4.3): heights, pixels, what is free."""
+"""misc/heights_per_link.json of furniture: heights, pixels, what is free."""
 
 from __future__ import annotations
 

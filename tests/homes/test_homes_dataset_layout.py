@@ -1,4 +1,4 @@
-"""The generated dataset is laid out as dataset_format.md says, and the same seed gives the same bytes."""
+"""The generated dataset is laid out as iGibson's, and the same seed gives the same bytes."""
 
 from __future__ import annotations
 

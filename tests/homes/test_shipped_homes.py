@@ -67,7 +67,7 @@ def test_no_check_failed_when_it_was_converted(name: str):
 
 @each_home
 def test_a_disc_of_30_cm_reaches_every_room_by_the_homes_own_map(name: str):
-    """The map is eroded by up to 10 cm already (dataset_format.md 2.5); the rest of the radius is taken here."""
+    """The map is eroded by up to 10 cm already; the rest of the radius is taken here."""
     rooms = load_rooms(SHIPPED_HOMES / name)
     assert rooms.traversable is not None and rooms.resolution == rooms.trav_resolution
     reach = reachable(rooms.traversable, 0.2, rooms.trav_resolution)

@@ -36,7 +36,7 @@ def cupboard(gap: float, *, slide: bool = False) -> HouseholdObject:
 
 
 def mass_of(model: HouseholdObject) -> float:
-    """kg: by the box, as the loader does (dataset_format.md section 6)."""
+    """kg: by the box, as iGibson's loader does."""
     entry = find(model.category)
     return entry.mass * float(np.prod(np.ptp(model.bounds(), axis=0)) / np.prod(entry.size))
 

@@ -1,4 +1,4 @@
-"""Facts of spec/states.md section 3 (ability data) and of paper tables A.1 to A.4."""
+"""Facts of iGibson's ability data and of paper tables A.1 to A.4."""
 
 import collections
 import json
@@ -8,7 +8,7 @@ import pytest
 from ig2mj import knowledge
 from ig2mj.errors import InputError, UnknownNameError
 
-#: spec/states.md section 3: synsets that carry a category, per ability.
+#: Synsets that carry a category, per ability.
 COUNTS = {
     "dustyable": 212,
     "stainable": 205,

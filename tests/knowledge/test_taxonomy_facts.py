@@ -1,4 +1,4 @@
-"""Facts of the taxonomy: spec/dataset_format.md section 10."""
+"""Facts of the taxonomy of `bddl`."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""Predicates of sliced objects: spec/states.md 10.3 and bug 19.11."""
+"""Predicates of sliced objects: iGibson's rule, and a bug that is not copied."""
 
 from __future__ import annotations
 

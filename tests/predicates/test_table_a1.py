@@ -1,4 +1,4 @@
-"""Paper table A.1, row by row, with the differences of spec/states.md section 17 and the bugs of section 19."""
+"""Paper table A.1, row by row, with the differences between paper and code, and the bugs that are not copied."""
 
 from __future__ import annotations
 

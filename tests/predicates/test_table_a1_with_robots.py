@@ -114,7 +114,7 @@ def nearest_finger(simulation: ig2mj.Simulation, point: np.ndarray) -> float:
 
 @pytest.mark.parametrize("name", ["humanoid", pytest.param("fetch", marks=pytest.mark.slow)])
 def test_a_finger_within_ten_centimetres_of_the_button_flips_it_at_the_fifth_step(tiny_home_folder, name):
-    """Table A.4, spec/states.md section 9: and flips it back no sooner than after it has left."""
+    """Table A.4: and flips it back no sooner than after it has left."""
     at = {"humanoid": (-0.78, 1.72), "fetch": (-1.05, 1.73)}[name]
     simulation = standing(tiny_home_folder, name, *at)
     button = np.array([-0.3, 1.6, 0.7])

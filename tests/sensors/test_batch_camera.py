@@ -67,7 +67,7 @@ def with_value(states, field: str, world: int, thing: int, value: float):
 
 
 def test_the_first_true_state_wins(model, scene):
-    """spec/states.md section 13: frozen, burnt, cooked, soaked, toggled on."""
+    """iGibson's order: frozen, burnt, cooked, soaked, toggled on."""
     box = scene.object_index("box")
     assert [t.predicate.name for t in TINTS] == ["frozen", "burnt", "cooked", "soaked", "toggled_on"]
     states = initial_states(model, 1)

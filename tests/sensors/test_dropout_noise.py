@@ -33,7 +33,7 @@ def test_worlds_sensors_and_keys_have_streams_of_their_own():
 
 
 def test_a_scan_drops_out_to_the_end_of_its_range(tiny_home_folder):
-    """spec/robots_tasks_sensors.md section 3.1: depth 0, scan 1."""
+    """As in iGibson: depth 0, scan 1."""
     world = Perceiving(tiny_home_folder, TurtleBot(pos=(0, -1.2, 0)))
     clean = world.see("scan", scan_rays=400)["scan"][0]
     noisy = world.see("scan", scan_rays=400, scan_noise_rate=0.25, keys=keys(1))["scan"][0]

@@ -89,7 +89,7 @@ def test_depths_out_of_range_read_nothing(world):
 
 
 def test_a_stove_that_is_on_is_brighter_in_its_world_only(world):
-    """spec/states.md section 13. Afterwards pictures are as before."""
+    """iGibson's looks of states. Afterwards pictures are as before."""
     stove, plain = world.scene.object_index("stove"), world.states
     suite = world.suite("rgb", "ins_seg", **SIZE)
     before, _ = world.read(suite)

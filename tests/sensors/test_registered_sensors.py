@@ -40,7 +40,7 @@ def test_every_sensor_keeps_to_its_space(tiny_home_folder, robot):
 
 
 def test_names_are_those_of_igibson():
-    """spec/robots_tasks_sensors.md section 2.1; without task_obs, which tasks make, and what needs a network."""
+    """iGibson's; without task_obs, which tasks make, and what needs a network."""
     theirs = {"rgb", "depth", "pc", "optical_flow", "scene_flow", "normal", "seg", "ins_seg", "scan", "occupancy_grid"}
     assert theirs | {"bump", "proprioception"} <= set(SENSORS)
 

@@ -1,4 +1,4 @@
-"""The cooking demo in the small home: temperatures to the step, as spec/states.md section 22 has them."""
+"""The cooking demo in the small home: temperatures to the step, as computed by hand."""
 
 from __future__ import annotations
 

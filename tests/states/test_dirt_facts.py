@@ -1,4 +1,4 @@
-"""Dust, stains and cleaning: spec/states.md section 8, the dirt vectors of section 22, paper tables A.1 to A.5."""
+"""Dust, stains and cleaning: iGibson's rules with worked examples, paper tables A.1 to A.5."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_section_8_3_only_contacts_through_the_annotated_area_clean():
 
 @pytest.mark.parametrize(("height", "left"), [(0.0229, 18), (0.0231, 20)])
 def test_section_8_3_the_whole_tools_region_has_bullets_margin(height, left):
-    """3 mm for one hull (section 24). Without it a rag that rests 2 mm off its plate would reach nothing on it."""
+    """3 mm for one hull. Without it a rag that rests 2 mm off its plate would reach nothing on it."""
     states = step(ROOM.model(), _dirty(), ROOM.view({"rag": (0.0, 0, height)}, touching=[("rag", "table")]))
     assert _counts(states)[0] == left
 

@@ -1,4 +1,4 @@
-"""Open: spec/states.md section 11, its vector in section 22, paper tables A.1 and A.5, bug 19.9."""
+"""Open: iGibson's rules with a worked example, paper tables A.1 and A.5, and a bug that is not copied."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Adjacency, nearness and the memo of relations: spec/states.md 4.4, 5.3 to 5.5, 19.1, 19.2, paper table A.4."""
+"""Adjacency, nearness and the memo of relations: iGibson's rules, two bugs that are not copied, paper table A.4."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ def test_section_5_4_a_wide_container_is_out_of_reach_of_igibsons_rays():
 
 
 def test_section_5_5_near_is_a_third_of_the_mean_edge():
-    # Unit cubes: one third of a metre between them (section 22).
+    # Unit cubes: one third of a metre between them.
     cubes = HandWorld(Item("a"), Item("b"))
     for compat in ("paper", "igibson"):
         plan = RelationPlan.build(cubes.model(compat=compat), [("near", 0, 1)])

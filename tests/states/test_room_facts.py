@@ -1,4 +1,4 @@
-"""The room of an object: spec/states.md section 12 and bug 19.3."""
+"""The room of an object: iGibson's rule, and a bug that is not copied."""
 
 from __future__ import annotations
 

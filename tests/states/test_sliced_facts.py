@@ -1,4 +1,4 @@
-"""SlicedState: spec/states.md section 10, paper tables A.4 and A.5, bugs 19.7, 19.8 and 19.11."""
+"""SlicedState: iGibson's rules, paper tables A.4 and A.5, and three bugs that are not copied."""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def test_section_10_3_parked_halves_and_a_parked_whole_are_not_updated():
     before = step(model, start, HOME.view())
     assert before.temperature[0, APPLE] < 73.0
     assert before.temperature[0, HALF_A] == 73.0
-    assert np.isneginf(before.max_temperature[0, [HALF_A, HALF_B]]).all()  # spec/states.md 6.4: no update yet
+    assert np.isneginf(before.max_temperature[0, [HALF_A, HALF_B]]).all()  # no update yet
     after, _ = _cut(50.0, states=start)
     assert after.temperature[0, APPLE] == 73.0
     assert after.temperature[0, HALF_A] < 73.0

@@ -1,4 +1,4 @@
-"""Vectors of spec/states.md section 22 for heat, and the facts of sections 6.1 to 6.4."""
+"""Worked examples of heat, and the facts of iGibson's rules."""
 
 from __future__ import annotations
 
@@ -180,7 +180,7 @@ def test_table_a4_max_temperature_starts_at_minus_infinity_and_never_falls():
 
 
 def test_the_rule_is_newtons_and_not_the_papers_product():
-    # 23 C on a 500 C stove: the printed product would add 7.3 C in a step (spec/states.md 6.3).
+    # 23 C on a 500 C stove: the printed product would add 7.3 C in a step.
     history = _run("stove")
     assert history[1] - history[0] < 1.0
     fridge = _run("fridge")

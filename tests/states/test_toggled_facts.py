@@ -1,4 +1,4 @@
-"""ToggledState: spec/states.md section 9, the toggle vector of section 22, paper table A.4."""
+"""ToggledState: iGibson's rules with a worked example, paper table A.4."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Water and wetness: spec/states.md section 7, the tap vector of section 22, paper tables A.1 to A.5."""
+"""Water and wetness: iGibson's rules with a worked example of a tap, paper tables A.1 to A.5."""
 
 from __future__ import annotations
 

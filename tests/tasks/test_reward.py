@@ -1,4 +1,4 @@
-"""Rewards are differences of the potential of spec 2.6, without iGibson's two traps."""
+"""Rewards are differences of the potential, without iGibson's two traps."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_fetch_is_paid_for_one_distance_at_a_time(cleaning):
 
 
 def test_a_distance_that_is_not_defined_any_more_keeps_its_last_value(cleaning):
-    """In iGibson it becomes 0: whoever wipes off the last stain is paid for the way to it (spec 2.6)."""
+    """In iGibson it becomes 0: whoever wipes off the last stain is paid for the way to it."""
     reward, rules, engine = cleaning["humanoid"]
     view, states = engine.view(engine.reset()), rules.initial  # no stains
     now = reward.measure(view, states, rules.goal.status(states, view), measures(distances=(5.0, 0.25)))

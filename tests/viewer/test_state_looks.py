@@ -1,4 +1,4 @@
-"""How states look: spec/robots_tasks_sensors.md 3.7, and the viewer's overlay."""
+"""How states look, as in iGibson, and the viewer's overlay."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From devices to the humanoid's action (spec/robots_tasks_sensors.md 4.3), and the bugs of 7.4 that concern it."""
+"""From devices to the humanoid's action as iGibson maps them, and those of its bugs that concern it."""
 
 from __future__ import annotations
 
@@ -244,7 +244,7 @@ def test_xr_axes_go_there_and_back():
     assert ahead.pos == pytest.approx((-3, -1, 2)) and ahead.turn.magnitude() == pytest.approx(0)
 
 
-# Bugs of iGibson (spec 7.4) that are not copied.
+# Bugs of iGibson that are not copied.
 
 
 @pytest.mark.parametrize("hand", [0, 1])

@@ -219,7 +219,7 @@ def warp_worlds(scene, model, bench_pool) -> Core:
 
 @pytest.mark.slow
 def test_reset_inside_scan_with_autoreset(warp_worlds, scene):
-    """Issue, item 1: a step and its resets are pure functions that `lax.scan` runs; world 1 falls again and again."""
+    """A step and its resets are pure functions that `lax.scan` runs; world 1 falls again and again."""
 
     def body(batch, _):
         batch, status = warp_worlds.step_fn(batch)
@@ -265,7 +265,7 @@ def overflowing(scene, model, bench_pool, tmp_path_factory) -> DebugWorlds:
 
 @pytest.mark.slow
 def test_buffers_that_are_too_small_are_an_error_with_a_dump(overflowing, scene):
-    """Issue, item 3: world, flag, value, the setting to raise, and the last 50 steps to look at."""
+    """World, flag, value, the setting to raise, and the last 50 steps to look at."""
     with pytest.raises(EngineError) as caught:
         overflowing.step(overflowing.start())
     said = re.fullmatch(
@@ -294,7 +294,7 @@ def test_a_world_that_overflowed_is_put_right_by_a_reset(overflowing):
 
 @pytest.mark.slow
 def test_a_world_of_many_goes_on_in_a_simulation(warp_worlds, scene):
-    """Issue, item 5: `engine.export(world)` continued natively, states and all."""
+    """`engine.export(world)` continued natively, states and all."""
     batch = warp_worlds.start(seed=5)
     rows = jax.tree.map(np.array, warp_worlds.engine.snapshot(batch.world.physics))
     address = scene.model.joint("box/free").qposadr[0]

@@ -39,7 +39,7 @@ def on_gpu(bench_folder, gpu) -> engine_bench.Bench:
 
 
 def test_one_step_on_the_gpu_is_one_step_of_c_mujoco(bench_folder, on_gpu):
-    """Issue, parity: kinematics to 1e-5 m; velocities to 1e-3 m/s. The knife tips over, the box slides."""
+    """Kinematics to 1e-5 m; velocities to 1e-3 m/s. The knife tips over, the box slides."""
     native = engine_bench.Bench(on_gpu.scene, "native", 2, substeps=1)
     physics = native.write(native.fresh(), native.teleport("knife", [0.02, 0, 0.53], [0.924, 0, 0.3827, 0]))
     physics, _ = native.run(physics, 24)
@@ -148,7 +148,7 @@ def pushed(batch_of_many, reach):
 
 
 def test_measured_buffers_hold_while_hands_push_things_about(pushed, batch_of_many):
-    """Issue, item 2: no overflow, nothing lost its numbers, nothing fell out of the house."""
+    """No overflow, nothing lost its numbers, nothing fell out of the house."""
     before, after, overflow = pushed
     moved = np.abs(np.asarray(after.world.view.object_com) - np.asarray(before.world.view.object_com)).max((1, 2))
     assert (moved > 0.02).mean() > 0.25, "the hands do push"
@@ -165,7 +165,7 @@ def test_measured_buffers_hold_while_hands_push_things_about(pushed, batch_of_ma
 
 
 def test_world_0_is_the_same_among_few_and_among_many(scene, model, pool, profile, reach, batch_of_many, pushed):
-    """Issue, item 5. Streams and starts to the bit; the first second within what a GPU's order of sums does to it.
+    """Streams and starts to the bit; the first second within what a GPU's order of sums does to it.
 
     Two runs on one device differ too, most after contacts: by 33 mm in the median after two seconds of pushing in
     another home (benchmarks/results/multi_gpu). On an H200 this test, then with a bound of 1e-3, found by world, in
@@ -184,7 +184,7 @@ def test_world_0_is_the_same_among_few_and_among_many(scene, model, pool, profil
 
 
 def test_a_world_of_many_goes_on_natively(batch_of_many, pushed, scene):
-    """Issue, item 5: the same world, pulled to C MuJoCo: alike at once, after a step, and in what holds when still."""
+    """The same world, pulled to C MuJoCo: alike at once, after a step, and in what holds when still."""
     _, after, _ = pushed
     world = WORLDS - 3
     simulation = Simulation.from_snapshot(
@@ -204,7 +204,7 @@ def test_a_world_of_many_goes_on_natively(batch_of_many, pushed, scene):
 
 
 def test_resets_inside_a_program_put_flagged_worlds_right(batch_of_many, scene):
-    """Issue, items 3 and 4: one world in eight loses an object through the floor; it is flagged, counted, replaced."""
+    """One world in eight loses an object through the floor; it is flagged, counted, replaced."""
     batch = batch_of_many.start(seed=9)
     engine = batch_of_many.engine
     rows = jax.tree.map(np.array, engine.snapshot(batch.world.physics))

@@ -18,7 +18,7 @@ from ig2mj.states.definitions import dust
 from ig2mj.states.relations.asked import PairByPair
 from ig2mj.states.update import HEAT_FIELDS, heat
 from ig2mj.worlds.lazy.program import AHEAD, StateProgram
-from ig2mj.worlds.lazy.relevance import EXACT
+from ig2mj.worlds.lazy.relevance import EXACT, Relevance
 from ig2mj.worlds.lazy.stepper import News, StateStepper
 
 FOOD = {"cookable": {}, "burnable": {}, "freezable": {}, "sliceable": {}, "stainable": {}}
@@ -289,6 +289,25 @@ def test_what_moves_without_mattering_is_no_work_for_the_states():
         _assert_same(ours, theirs, status, expected, k)
         moves.append(stepper._acts is whole)
     assert moves == [True] * 5 + [False]
+
+
+def test_what_moved_once_without_mattering_is_looked_at_once(monkeypatch):
+    """The knife lies elsewhere than before and an agent moves; then the fish goes into the oven, and back."""
+    asked, same = [], Relevance.same
+    monkeypatch.setattr(Relevance, "same", lambda self, *a: asked.append(same(self, *a)) or asked[-1])
+    model, program, reference = _rules("(cooked fish)")
+    stepper, view = StateStepper(program), VIEWS[0]
+    ours = theirs = _start(model).replace(toggled_on=jnp.zeros((1, 7), bool).at[0, HOME.index["oven"]].set(True))
+    for k in range(12):
+        fish = (0, 0, 0) if k == 9 else (3, 0, 1)
+        if k >= 3:
+            view = HOME.view({"knife": (19, 0, 0), "fish": fish}, fingers=AWAY, agent_pos=(0.1 * k, 0, 1))
+            view = jax.tree.map(np.asarray, view)
+        ours, _, status = stepper.step(ours, view)
+        theirs, _, expected = reference(theirs, view)
+        _assert_same(ours, theirs, status, expected, k)
+        assert len(asked) == (0 if k < 3 else 1 if k < 9 else len(asked)), (k, asked)
+    assert asked[:2] == [True, False]
 
 
 def test_what_the_goal_does_not_name_is_no_work_for_it():

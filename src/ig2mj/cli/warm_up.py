@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import tyro
 
 if TYPE_CHECKING:
-    from ig2mj.engine.base import Engine
+    from ig2mj.envs.environment import Environment
+    from ig2mj.worlds import Worlds
 
 
 def run(
@@ -33,8 +34,8 @@ def run(
       robot: for an environment: its robot; default: the task's first.
       observations: for an environment: observations besides its vectors, e.g. rgb depth.
       engine: native, warp or jax; default: warp on a GPU, else native.
-      arch: compile the Warp engine's kernels for GPUs of this architecture (compute capability times ten: 90 is an
-        H100 or H200); this machine needs none. JAX's programs are then left to the machine with the GPU.
+      arch: compile the kernels of a physics step for GPUs of this architecture (compute capability times ten: 90 is
+        an H100 or H200); this machine needs none. JAX's programs and pictures are left to the machine with the GPU.
       out: folder of the cache; default: IG2MJ_CACHE_DIR, or the user's own.
       json: print one JSON object.
     """
@@ -48,7 +49,7 @@ def run(
     if out is not None:
         keep_compiled_in(out)
     if arch is not None:
-        seconds = _ahead(what, worlds, robot, engine, arch)
+        seconds = _ahead(what, worlds, robot, observations, engine, arch)
     else:
         seconds = _timed(what, worlds, robot, observations, engine)
     seconds["all"] = time.perf_counter() - began
@@ -70,41 +71,51 @@ MOST_WORLDS = 64
 """Worlds that are created to find kernels, which do not depend on the number."""
 
 
-def _ahead(what: str, worlds: int, robot: str | None, engine: str | None, architecture: int) -> dict[str, float]:
+def _ahead(
+    what: str, worlds: int, robot: str | None, observations: tuple[str, ...], engine: str | None, architecture: int
+) -> dict[str, float]:
     """Seconds of finding and of compiling the kernels for a GPU that this machine need not have."""
     import time
 
     from ig2mj.engine.warp import ahead
     from ig2mj.engine.warp.engine import WarpEngine
     from ig2mj.errors import Ig2mjError
+    from ig2mj.worlds import Worlds
 
     if engine not in (None, "warp"):
         raise Ig2mjError(f"--arch compiles kernels of the Warp engine; engine {engine!r} has none")
+    if observations:
+        raise Ig2mjError("--arch compiles the kernels of a physics step; those of --observations need the GPU itself")
     ahead.check(architecture)
     began = time.perf_counter()
-    made = _engine_of(what, min(worlds, MOST_WORLDS), robot)
-    assert isinstance(made, WarpEngine)
-    launches = ahead.launches_on_gpu(made)
+    made = _worlds(what, min(worlds, MOST_WORLDS), robot, (), "warp", pool_size=1)
+    warp = made.engine if isinstance(made, Worlds) else made.core.engine
+    assert isinstance(warp, WarpEngine)
+    launches = ahead.launches_on_gpu(warp)
     found = time.perf_counter()
     ahead.compile_for(launches, architecture)
     return {"making": found - began, "kernels": time.perf_counter() - found}
 
 
-def _engine_of(what: str, worlds: int, robot: str | None) -> Engine:
+def _worlds(
+    what: str,
+    worlds: int,
+    robot: str | None,
+    observations: tuple[str, ...],
+    engine: str | None,
+    pool_size: int | None = None,
+) -> Worlds | Environment:
+    """The worlds of a home, or an environment."""
     import ig2mj
     from ig2mj.envs.names import activity_name, short_name
-
-    if short_name(what) is not None or activity_name(what) is not None:
-        return ig2mj.make(what, robot, worlds, "warp", pool_size=1).core.engine
-    _check_home(robot, ())
-    return ig2mj.Worlds(what, worlds, "warp").engine
-
-
-def _check_home(robot: str | None, observations: tuple[str, ...]) -> None:
+    from ig2mj.envs.registry import VECTORS
     from ig2mj.errors import Ig2mjError
 
+    if short_name(what) is not None or activity_name(what) is not None:
+        return ig2mj.make(what, robot, worlds, engine, observations=(*VECTORS, *observations), pool_size=pool_size)
     if robot is not None or observations:
         raise Ig2mjError("--robot and --observations belong to environments; a home is stepped without them")
+    return ig2mj.Worlds(what, worlds, engine)
 
 
 def _timed(
@@ -116,28 +127,23 @@ def _timed(
     import jax
     import numpy as np
 
-    import ig2mj
-    from ig2mj.envs.names import activity_name, short_name
-    from ig2mj.envs.registry import VECTORS
+    from ig2mj.worlds import Worlds
 
     times, parts = [time.perf_counter()], ["making", "start", "first step"]
 
     def tick() -> None:
         times.append(time.perf_counter())
 
-    if short_name(what) is not None or activity_name(what) is not None:
-        env = ig2mj.make(what, robot, worlds, engine, observations=(*VECTORS, *observations))
+    made = _worlds(what, worlds, robot, observations, engine)
+    tick()
+    if isinstance(made, Worlds):
+        started = jax.block_until_ready(made.start(0))
         tick()
-        state = jax.block_until_ready(env.reset(0))
-        tick()
-        action = np.zeros((worlds, *env.action_space.shape), np.float32)
-        jax.block_until_ready(env.step_autoreset(state, action))
+        jax.block_until_ready(made.step(started))
     else:
-        _check_home(robot, observations)
-        batch = ig2mj.Worlds(what, worlds, engine)
+        state = jax.block_until_ready(made.reset(0))
         tick()
-        started = jax.block_until_ready(batch.start(0))
-        tick()
-        jax.block_until_ready(batch.step(started))
+        action = np.zeros((worlds, *made.action_space.shape), np.float32)
+        jax.block_until_ready(made.step_autoreset(state, action))
     tick()
     return dict(zip(parts, np.diff(times).tolist(), strict=True))

@@ -17,12 +17,10 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
 from ig2mj.learn.collect import Advice
+from ig2mj.tasks.task import HORIZON
 
 ALONE = 0.1
 """Share of the episodes in which the expert has no part."""
-
-SETTLED = 200
-"""Steps without help after which all episodes count: the activities' horizon."""
 
 
 def share(progress: Float[Array, ""], until: float) -> Float[Array, ""]:
@@ -63,8 +61,10 @@ def uncounted(
 ) -> tuple[Bool[Array, "W"], Int[Array, "W"]]:
     """Whether a running episode is left out of the success that is reported, and `helpless` after another step.
 
+    All count once the activities' longest episode (`HORIZON`) has passed without help.
+
     Args:
       helpless: steps of each world since the limit fell to 0.
     """
     helpless = jnp.where(jnp.round(limit) > 0, 0, helpless + 1)
-    return (handover >= 0) & (helpless <= SETTLED), helpless
+    return (handover >= 0) & (helpless <= HORIZON), helpless

@@ -13,6 +13,7 @@ from __future__ import annotations
 import dataclasses
 import math
 import pathlib
+import sys
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -167,6 +168,10 @@ def _train(
             clock, iteration, env_steps = meta["seconds"], meta["iteration"], meta["env_steps"]
             resumed = True
             log.forget_after(clock)
+        elif (
+            team.first and not run.quiet
+        ):  # as a scheduler that starts a killed job again needs it, but it may be a typo
+            print(f"{run.out}: there is no checkpoint to resume, so the run begins", file=sys.stderr)
     elif team.barrier("is the folder free", checkpoints is not None and bool(checkpoints.numbers())):
         raise Ig2mjError(f"{run.out} {TAKEN}")
 

@@ -11,7 +11,6 @@ Axes: W worlds, C cameras, Y rows, X columns, G geoms of the scene, S slots.
 
 from __future__ import annotations
 
-import os
 import weakref
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -31,6 +30,7 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.engine.warp.patches import pins
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
+from ig2mj.process import on_trial
 from ig2mj.sensors.images import NOTHING, VISIBLE_GROUPS, Images, Pose, RayPattern, check_request
 from ig2mj.sensors.merged_meshes import HIDDEN, Tables, alpha, rigid_parts, tables_of
 from ig2mj.sensors.particle_slots import Slots, fill_slots
@@ -43,7 +43,7 @@ from ig2mj.states.world import ExtendedStates
 TILE = 8
 """Pixels a side of what a block of 64 threads sees: a third faster than rows of 64 pixels."""
 
-MERGED = "merged" in os.environ.get("IG2MJ_KERNELS", "").split(",")
+MERGED = on_trial("merged")
 """Whether rays are cast against merged meshes where a camera is not told; not yet measured on a GPU."""
 
 _KEPT: weakref.WeakKeyDictionary[Engine, list[Any]] = weakref.WeakKeyDictionary()

@@ -18,9 +18,6 @@ from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_warp
 
-OLDEST = 70
-"""Compute capability 7.0 (Volta): the oldest one that MuJoCo Warp supports."""
-
 
 class _Gpu:
     """A device that says that it is a GPU: some of MuJoCo Warp's kernels are others there."""
@@ -37,7 +34,7 @@ class _Gpu:
 def check(architecture: int) -> None:
     """Raises an EngineError that lists what there is, where Warp's compiler does not know an architecture."""
     prepare_warp()
-    known = [a for a in wp.get_cuda_supported_archs() if a >= OLDEST]
+    known = wp.get_cuda_supported_archs()
     if architecture not in known:
         listed = ", ".join(map(str, known))
         raise EngineError(f"Warp cannot compile for GPUs of architecture {architecture}; it can for {listed}")
@@ -71,23 +68,18 @@ def compile_for(launches: list[kernels.Launch], architecture: int, workers: int 
       EngineError: see `check`.
     """
     check(architecture)
-    blocks: dict[wp.Module, dict[int, None]] = {}
-    for kernel, block_dim in launches:
-        blocks.setdefault(kernel.module, {})[block_dim] = None
-    for module, sizes in blocks.items():  # see `kernels.load`
-        for block_dim in sizes:
-            module.get_module_hash(block_dim)
+    by_size = kernels.modules_of(launches)
 
-    def compile_module(module: wp.Module) -> None:
+    def compile_module(module: wp.Module, block_dim: int) -> None:
         usual = module.options["block_dim"]
+        module.options["block_dim"] = block_dim
         try:
-            for block_dim in blocks[module]:
-                module.options["block_dim"] = block_dim
-                wp.compile_aot_module(module, arch=architecture, use_ptx=False)
+            wp.compile_aot_module(module, arch=architecture, use_ptx=False)
         finally:
             module.options["block_dim"] = usual
 
     with kernels.alone(), concurrent.futures.ThreadPoolExecutor(workers or len(os.sched_getaffinity(0))) as pool:
-        for done in [pool.submit(compile_module, module) for module in blocks]:
-            done.result()
-    return sum(map(len, blocks.values()))
+        for block_dim, modules in by_size.items():  # one size after the other: a module may be wanted in several
+            for done in [pool.submit(compile_module, module, block_dim) for module in modules]:
+                done.result()
+    return sum(map(len, by_size.values()))

@@ -113,19 +113,30 @@ def load(launches: list[Launch], device: str | None = None, workers: int | None 
       How many modules were loaded.
     """
     threads = workers or len(os.sched_getaffinity(0))
-    by_size: dict[int, dict[wp.Module, None]] = {}
-    for kernel, block_dim in launches:
-        by_size.setdefault(block_dim, {})[kernel.module] = None
     on = wp.get_device(device)
-    # Names in the cache contain a hash of the module. Functions that several modules share change when one of them is
-    # built, and with them the others' hashes: without this a module built beside others was not found again.
-    for block_dim, modules in by_size.items():
-        for module in modules:
-            module.get_module_hash(1 if on.is_cpu else block_dim)
+    by_size = modules_of(launches, one_thread=on.is_cpu)
     with alone():
         for block_dim, modules in by_size.items():
-            wp.force_load(on, list(modules), block_dim=block_dim, max_workers=threads)
+            wp.force_load(on, modules, block_dim=block_dim, max_workers=threads)
     return sum(map(len, by_size.values()))
+
+
+def modules_of(launches: list[Launch], one_thread: bool = False) -> dict[int, list[wp.Module]]:
+    """The modules of kernels by the number of threads of their blocks, their hashes computed.
+
+    Names in the cache contain a hash of the module. Functions that several modules share change when one of them is
+    built, and with them the others' hashes: a module hashed only when others had been built was not found again.
+
+    Args:
+      one_thread: on a processor, where all blocks have one thread.
+    """
+    found: dict[int, dict[wp.Module, None]] = {}
+    for kernel, block_dim in launches:
+        found.setdefault(block_dim, {})[kernel.module] = None
+    for block_dim, modules in found.items():
+        for module in modules:
+            module.get_module_hash(1 if one_thread else block_dim)
+    return {block_dim: list(modules) for block_dim, modules in found.items()}
 
 
 @contextlib.contextmanager

@@ -12,7 +12,6 @@ On trial: IG2MJ_KERNELS=stragglers; not measured on a GPU yet.
 # pyright: reportIndexIssue=false, reportArgumentType=false, reportCallIssue=false, reportPrivateUsage=false
 
 import functools
-import os
 from collections.abc import Callable, Sequence
 from typing import Any, no_type_check
 
@@ -22,8 +21,9 @@ from mujoco.mjx.third_party.mujoco_warp._src import solver
 from ig2mj.engine.warp.patches import launching
 from ig2mj.engine.warp.patches.guarded import listed
 from ig2mj.engine.warp.patches.replacements import original
+from ig2mj.process import on_trial
 
-ON = "stragglers" in os.environ.get("IG2MJ_KERNELS", "").split(",")
+ON = on_trial("stragglers")
 """Whether engines made from now on do so."""
 
 SLOTS = 512

@@ -1,4 +1,4 @@
-"""dataset_format.md 2.5: layout images, room names, traversable floor, rooms.npz."""
+"""iGibson's room maps: layout images, room names, traversable floor, rooms.npz."""
 
 from __future__ import annotations
 

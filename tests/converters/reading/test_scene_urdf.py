@@ -1,4 +1,4 @@
-"""dataset_format.md sections 1 to 3 and 9: dataset root, scene URDF, loader filters, cached states."""
+"""iGibson's scenes: dataset root, scene URDF, loader filters, cached states."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def placed(make, name, category="cup", kind="floating", xyz=(0, 0, 0), rpy=(0, 0
     return make.scene_link(name, category, **attributes) + make.scene_joint(name, kind, xyz, rpy)
 
 
-# ---- section 1: the root
+# ---- the root
 
 
 def test_metadata_files(root):
@@ -63,7 +63,7 @@ def test_index_skips_hidden_entries_and_files(root, make):
     assert Dataset(root.root).index() == {"cup": ["b2", "m"]}
 
 
-# ---- section 2: which file
+# ---- which file
 
 
 def test_the_order_of_scene_files(root):
@@ -246,7 +246,7 @@ def test_tolerated_xml(root):
         assert [i.name for i in scene.instances] == ["a&b"]
 
 
-# ---- section 3: filters; random models
+# ---- filters; random models
 
 
 def test_random_models_depend_on_the_seed_only(root, make):

@@ -1,4 +1,4 @@
-"""dataset_format.md section 4: object folders, their URDF and metadata; plain URDFs of other sources."""
+"""iGibson's object folders, their URDF and metadata; plain URDFs of other sources."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""dataset_format.md section 6: mass, centre of mass, inertia."""
+"""iGibson's rules of mass, centre of mass, inertia."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""dataset_format.md section 5: scaling an articulated object per axis."""
+"""Scaling an articulated object per axis."""
 
 from __future__ import annotations
 
