@@ -28,6 +28,9 @@ OUTSIDE = 1 << 8
 BEYOND = 0.5
 """Metres beyond the building's box from which an object's centre of mass is outside."""
 
+NEVER = 10**6
+"""Control steps since an object was held that never was."""
+
 _BITS = (guards.Flag.OVERFLOW, guards.Flag.NOT_FINITE, guards.Flag.FELL, OUTSIDE, guards.Flag.TOO_FAST)
 
 
@@ -64,6 +67,8 @@ class Seen:
       flags: when it was first flagged; 0: it never was. object, place, speed: of the object, at that moment (m, m/s).
       touched: geoms that each object touched last, one that stands still and one that moves; -1 none.
       last: those of `object` when its world was flagged.
+      since: control steps since a hand let go of each object; 0 while it is held, `NEVER` where it never was.
+      hand: that held each object last. free_for, by: those two of `object` when its world was flagged.
     """
 
     flags: Int[Array, "W"]
@@ -72,6 +77,10 @@ class Seen:
     speed: Float[Array, "W"]
     touched: Int[Array, "W O 2"]
     last: Int[Array, "W 2"]
+    since: Int[Array, "W O"]
+    hand: Int[Array, "W O"]
+    free_for: Int[Array, "W"]
+    by: Int[Array, "W"]
 
 
 class Watch:
@@ -91,25 +100,32 @@ class Watch:
         count, objects = self.engine.num_worlds, self.tables.num_objects
         zero, none = jnp.zeros(count, jnp.int32), jnp.full((count, 2), -1, jnp.int32)
         place, touched = jnp.zeros((count, 3), jnp.float32), jnp.full((count, objects, 2), -1, jnp.int32)
-        return Seen(zero, zero + 0, place, jnp.zeros(count, jnp.float32), touched, none)
+        since, hand = jnp.full((count, objects), NEVER, jnp.int32), jnp.zeros((count, objects), jnp.int32)
+        speed = jnp.zeros(count, jnp.float32)
+        return Seen(zero, zero + 0, place, speed, touched, none, since, hand, zero + NEVER, zero + 0)
 
     def fresh(self, seen: Seen, physics: Any, mask: Bool[Array, "W"]) -> Seen:
         """The masked worlds begin a new episode."""
-        return seen.replace(
-            flags=jnp.where(mask, 0, seen.flags), touched=jnp.where(mask[:, None, None], -1, seen.touched)
+        return dataclasses.replace(
+            seen,
+            flags=jnp.where(mask, 0, seen.flags),
+            touched=jnp.where(mask[:, None, None], -1, seen.touched),
+            since=jnp.where(mask[:, None], NEVER, seen.since),
         )
 
-    def look(self, seen: Seen, physics: Any, view: PhysicsView) -> Seen:
-        """After a control step."""
+    def look(self, seen: Seen, physics: Any, view: PhysicsView, used: Bool[Array, "W O"] | None = None) -> Seen:
+        """After a control step. `used`: objects that are not parked now; None: those that the scene does not park."""
         com, velocity = jnp.asarray(view.object_com), jnp.asarray(view.object_linvel)
-        speed = jnp.where(self.loose, jnp.linalg.norm(velocity, axis=-1), 0.0)
+        loose = self.loose if used is None else used & ~self.tables.object_fixed
+        speed = jnp.where(loose, jnp.linalg.norm(velocity, axis=-1), 0.0)
         off = jnp.maximum(self.box.low - com, com - self.box.high).max(-1) - BEYOND
-        away = jnp.where(self.loose & jnp.isfinite(off), off, -jnp.inf)
+        away = jnp.where(loose & jnp.isfinite(off), off, -jnp.inf)
         flags = guards.check(self.engine.health(physics), com, np.where(self.loose, self.floor, -np.inf))
         flags = jnp.asarray(flags) | jnp.where((away > 0).any(1), OUTSIDE, 0)
         left = (flags & (OUTSIDE | int(guards.Flag.FELL))) != 0
         culprit = jnp.where(left, away.argmax(1), speed.argmax(1)).astype(jnp.int32)
         touched = self._touched(seen.touched, physics)
+        since, hand = _held(seen, view)
         new = (seen.flags == 0) & (flags != 0)
         row = jnp.arange(len(culprit))
 
@@ -123,6 +139,10 @@ class Watch:
             speed=keep(speed[row, culprit].astype(jnp.float32), seen.speed),
             touched=touched,
             last=keep(touched[row, culprit], seen.last),
+            since=since,
+            hand=hand,
+            free_for=keep(since[row, culprit], seen.free_for),
+            by=keep(hand[row, culprit], seen.by),
         )
 
     def _touched(self, before: Int[Array, "W O 2"], physics: Any) -> Int[Array, "W O 2"]:
@@ -136,12 +156,12 @@ class Watch:
             thing, other = owner[geom[:, side]], geom[:, 1 - side]
             world = jnp.where(felt & (thing >= 0), contacts.world, self.engine.num_worlds)
             column = jnp.where(jnp.asarray(self._still)[other], 0, 1)
-            before = before.at[world, thing, column].set(other.astype(jnp.int32), mode="drop")
+            before = jnp.asarray(before).at[world, thing, column].set(other.astype(jnp.int32), mode="drop")
         return before
 
     def report(self, seen: Seen, world: int) -> dict[str, Any]:
         """What happened in a flagged world, for people."""
-        flags, thing = int(seen.flags[world]), int(seen.object[world])
+        flags, thing, since = int(seen.flags[world]), int(seen.object[world]), int(seen.free_for[world])
         kind = next(name for name, bit in zip(FLAGS, _BITS, strict=True) if flags & int(bit))
         return {
             "kind": kind,
@@ -150,4 +170,21 @@ class Watch:
             "place": np.asarray(seen.place[world], float).round(2).tolist(),
             "speed": round(float(seen.speed[world]), 1),
             "touched": [self.model.geom(int(g)).name for g in np.asarray(seen.last[world]) if g >= 0],
+            **self._holder(int(seen.by[world]), since),
         }
+
+    def _holder(self, hand: int, since: int) -> dict[str, Any]:
+        """Who holds or held the object, and for how many control steps it has been free; nothing where nobody did."""
+        if since >= NEVER:
+            return {}
+        return {"held_by": self.model.body(int(self.tables.hand_body[hand])).name, "free_for": since}
+
+
+def _held(seen: Seen, view: PhysicsView) -> tuple[Int[Array, "W O"], Int[Array, "W O"]]:
+    """`Seen.since` and `Seen.hand` after a control step."""
+    held = jnp.asarray(view.held)
+    if held.shape[1] == 0:
+        return seen.since, seen.hand
+    now = held.any(1)
+    since = jnp.where(now, 0, jnp.minimum(seen.since + 1, NEVER))
+    return since, jnp.where(now, held.argmax(1).astype(jnp.int32), seen.hand)

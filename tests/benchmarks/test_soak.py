@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 
 import jax
@@ -9,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 import soak
+import soak_energy
 import soak_replay
 import soak_watch
 
@@ -77,3 +79,45 @@ def test_a_dumped_world_runs_again_natively(watch, tmp_path):
     steps = soak_replay.replay(file)
     assert [round(s["speed"]) for s in steps] == [25, 24, 24, 24, 23]
     assert steps[-1]["place"][2] == pytest.approx(1.5 + 25 * 5 / 30 - 0.5 * 9.8 * (5 / 30) ** 2, abs=0.1)
+
+
+def test_energy_of_a_thrown_box_is_seen_and_what_no_servo_can_have_given_is_counted(watch):
+    energy = soak_energy.EnergyWatch(watch.engine, watch.loose, episode=40)
+    number, worlds = watch.engine.scene.object_index("box"), watch.engine.num_worlds
+    mass = float(watch.tables.object_mass[number])
+    never = np.full((worlds, watch.tables.num_objects), soak_watch.NEVER)
+    used = np.broadcast_to(watch.loose, never.shape)
+    sound, uncut = np.ones(worlds, bool), np.zeros(worlds, bool)
+
+    def look(seen, velocity, since, step):
+        physics, _ = thrown(watch, 1, velocity, (0, 0, 1.5))
+        view = watch.engine.view(physics)
+        return energy.look(seen, physics, view, never, since, sound, used, uncut, np.full(worlds, step))
+
+    seen = look(energy.start(), (0, 0, 0), never, 1)
+    assert int(seen.steps) == 0, "there is nothing to compare the first step with"
+    held = never.copy()
+    held[1, number] = 0
+    seen = look(seen, (0, 0, 3.0), held, 39)
+    report = energy.report(seen)
+    taken = report["largest_kinetic_energy_J"]["taken in this step"]
+    assert taken["most_of"] == "box" and taken["most"] == pytest.approx(0.5 * mass * 9, rel=1e-3)
+    assert [q is None for q in taken["p99_by_quarter"]] == [True, True, True, False]
+    assert report["largest_rise_of"] == "box" and report["rose_beyond_servos_work"]["0 J"] == 1
+    assert report["control_steps_compared"] == worlds
+
+
+def test_who_held_what_went_wrong_is_named(watch):
+    physics, _ = thrown(watch, 1)
+    number = watch.engine.scene.object_index("box")
+    view = watch.engine.view(physics)
+    held = np.array(view.held)
+    assert held.shape[1] == 1
+    held[1, 0, number] = True
+    seen = watch.look(watch.start(physics), physics, dataclasses.replace(view, held=held))
+    physics, _ = thrown(watch, 1, (0, 0, 25.0), (0, 0, 1.5))
+    physics, view = watch.engine.step(physics)
+    seen = watch.look(seen, physics, view)
+    report = watch.report(seen, 1)
+    assert report["held_by"] == watch.model.body(int(watch.tables.hand_body[0])).name
+    assert report["free_for"] == 1 and report["kind"] == "too_fast"
