@@ -96,6 +96,13 @@ def both_nodes(ray_cluster):
     return ray_cluster
 
 
+def test_disturbed_states_are_the_same(both_nodes, tmp_path):
+    words = ("sample", "willow", "--disturb", "--count", "40", "--out")
+    with_a_death(both_nodes, tmp_path, *words, "there.npz")
+    done(command(both_nodes, tmp_path, *words, "here.npz", "--jobs", "1"))
+    assert (tmp_path / "here.npz").read_bytes() == (tmp_path / "there.npz").read_bytes()
+
+
 def test_demonstrations_are_the_same(both_nodes, tmp_path):
     words = ("demos", "collect", TASK, "--episodes", "70", "--worlds", "4", *STARTS, "--out")
     with_a_death(both_nodes, tmp_path, *words, "there.h5")

@@ -13,10 +13,12 @@ import pytest
 import ig2mj
 from ig2mj import cli
 from ig2mj.agents.floating_hand import FloatingHand
+from ig2mj.cluster.journal import Journal
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import EngineError, InputError
 from ig2mj.sampling import settled
 from ig2mj.sampling.settled import make_pool
+from ig2mj.sampling.settled_pieces import sample_settled
 from ig2mj.worlds.archive import read_header, save_tree
 from ig2mj.worlds.pool import FORMAT_VERSION, Pool, load_pool, save_pool
 
@@ -47,6 +49,17 @@ def test_the_same_seed_gives_the_same_pool(pool, tiny_home, home_model):
     assert not same(pool, other)
 
 
+def test_pieces_of_work_give_the_same_pool(pool, tiny_home, tmp_path):
+    with Journal(tmp_path / "pool.npz", {}) as journal:
+        found, failed = sample_settled(tiny_home, 3, seed=5, share=0.4, journal=journal)
+        turns = sorted(journal.names())
+    assert found is not None and not failed and same(pool, found)
+    assert turns == [f"turn_{n:06d}" for n in range(len(turns))], "no more turns than it takes"
+    with Journal(tmp_path / "pool.npz", {}, resume=True) as journal:
+        again, _ = sample_settled(tiny_home, 3, seed=5, share=0.4, journal=journal, report=lambda status: pytest.fail())
+    assert again is not None and same(pool, again), "of what was kept, nothing is done again"
+
+
 def test_halves_stay_parked(pool, tiny_home):
     address = tiny_home.model.joint("apple_half_0/free").qposadr[0]
     assert np.asarray(pool.physics.qpos)[:, address] == pytest.approx(30.0, abs=0.05)
@@ -62,6 +75,8 @@ def test_a_home_that_never_rests_is_an_error(tiny_home, home_model, monkeypatch)
     monkeypatch.setattr(settled, "SECONDS", 0.05)
     with pytest.raises(EngineError, match="only 0 came to rest"):
         make_pool(tiny_home, home_model, 1, share=1.0, threads=1)
+    with pytest.raises(EngineError, match="only 0 came to rest"):
+        sample_settled(tiny_home, 1, share=1.0)
 
 
 def test_a_pool_survives_its_file(pool, tiny_home, tmp_path):

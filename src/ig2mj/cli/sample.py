@@ -64,31 +64,24 @@ def run(
     where = where_of(jobs, cluster, resume)
     loaded = load_scene(scene, objects=add)
     if disturb:
-        if cluster is not None or resume:
-            raise Ig2mjError("--disturb: each state continues from the one before, so it is done here, in one piece")
-        return _disturb(loaded, count, file, seed, share, jobs)
+        return _disturb(loaded, count, file, seed, share, where)
     return _sample(loaded, conditions, count, file, seed, where, json)
 
 
-def _disturb(loaded, count: int, file: pathlib.Path, seed: int, share: float, jobs: int) -> int:
-    from ig2mj.cli.printing import add_bar, progress_bar
-    from ig2mj.sampling.settled import make_pool
-    from ig2mj.states.model import StateModel
+def _disturb(loaded, count: int, file: pathlib.Path, seed: int, share: float, where: Where) -> int:
+    from ig2mj.cli.pieces import follow, opened, tell_failures
+    from ig2mj.sampling.settled_pieces import sample_settled
     from ig2mj.worlds.pool import save_pool
 
-    model = StateModel.of_manifest(loaded.tables, loaded.manifest)
-    with progress_bar() as bar:
-        report = add_bar(bar, f"settling {loaded.name}")
-        pool = make_pool(
-            loaded,
-            model,
-            count,
-            seed=seed,
-            share=share,
-            threads=jobs or None,
-            progress=lambda done: report("", done, count),
-        )
-    save_pool(pool, file, loaded, {"seed": seed, "share": share})
+    request = {"command": "sample --disturb", "scene": loaded.digest, "rows": count, "seed": seed, "share": share}
+    with opened(file, request, where) as journal, follow(f"settling {loaded.name}", where) as report:
+        pool, failed = sample_settled(loaded, count, seed, share, where=where, journal=journal, report=report)
+        if pool is not None:
+            save_pool(pool, file, loaded, {"seed": seed, "share": share})
+            journal.finish()
+    tell_failures(failed, len(failed))
+    if pool is None:
+        return 1
     print(f"{file}: {pool.size} settled states of {loaded.name}")
     return 0
 

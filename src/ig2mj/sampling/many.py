@@ -23,10 +23,11 @@ from ig2mj.cluster.work import Piece, WholeRunError, Work
 from ig2mj.errors import EngineError
 from ig2mj.predicates.logic import Expression
 from ig2mj.sampling.conditions import Condition, bind, read_conditions
+from ig2mj.sampling.offered import check_of, lent, named, scene_named
 from ig2mj.sampling.placement import Budget, Rejections
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.row import Row, RowSampler
-from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.scene.scene import Scene
 from ig2mj.states.initial import states_of_manifest
 from ig2mj.states.model import StateModel
 from ig2mj.worlds.archive import build, pack, unpack
@@ -104,11 +105,10 @@ def sample(
         report(status)
 
     work = row_work(scene, wanted, range(count), seed, seconds_per_row)
-    _given[_key_of(scene)] = scene
     try:
-        store, failed = run(work, where or Where(jobs), journal, tell)
+        with lent(scene):
+            store, failed = run(work, where or Where(jobs), journal, tell)
     finally:
-        _given.clear()
         _sampler.cache_clear()
     if failed and journal is None:
         raise EngineError(next(iter(failed.values())))
@@ -135,10 +135,8 @@ def row_work(
     scene: Scene, wanted: Sequence[Condition], numbers: Sequence[int], seed: int, seconds: float = math.inf
 ) -> Work:
     """Rows as pieces of work."""
-    name, objects = _key_of(scene)
     common = {
-        "scene": name,
-        "objects": list(objects),
+        **named(scene),
         "conditions": [[c.predicate, list(c.arguments), c.value] for c in wanted],
         "seed": seed,
         "seconds": None if math.isinf(seconds) else seconds,
@@ -147,7 +145,7 @@ def row_work(
         "ig2mj.sampling.many:row_piece",
         f"sampling in {scene.name}",
         [Piece(f"row_{n:06d}", {**common, "number": n}) for n in numbers],
-        check=("ig2mj.scene.scene:digest_of", {"scene": name, "objects": list(objects)}),
+        check=check_of(scene),
     )
 
 
@@ -165,19 +163,9 @@ def row_piece(
     return pack({} if row is None else _as_pool(row), {"rejected": dict(rejected)})
 
 
-_given: dict[tuple[str, tuple[str, ...]], Scene] = {}
-"""Scenes that need not be loaded in this process, by `_key_of`."""
-
-
-def _key_of(scene: Scene) -> tuple[str, tuple[str, ...]]:
-    """What `load_scene` needs to load it on any machine that has it: its name if it ships, else its folder."""
-    return scene.portable_name, tuple(a.wanted for a in scene.additions)
-
-
 @functools.lru_cache(maxsize=1)
 def _sampler(name: str, objects: tuple[str, ...]) -> RowSampler:
-    given = _given.get((name, objects))
-    return make_sampler(given if given is not None else load_scene(name, objects=objects))
+    return make_sampler(scene_named(name, objects))
 
 
 def make_sampler(scene: Scene) -> RowSampler:

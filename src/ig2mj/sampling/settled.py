@@ -14,7 +14,6 @@ from jaxtyping import Float
 
 from ig2mj.engine.base import Write
 from ig2mj.engine.native.engine import NativeEngine, NativePhysics
-from ig2mj.engine.snapshot import Snapshot
 from ig2mj.errors import EngineError
 from ig2mj.sampling.overlap import Overlaps
 from ig2mj.sampling.perturbation import loose_objects, perturb
@@ -57,7 +56,7 @@ def make_pool(
     Args:
       scene, model: the household and its states' constants.
       count: P.
-      seed: the same seed gives the same pool, whatever the number of threads.
+      seed: the same seed gives the same pool, whatever the number of threads; `sample_settled` gives the same.
       share: probability that an object is disturbed, per object and row.
       threads: of the native engine; None: one per processor.
       progress: called with the number of rows done so far.
@@ -65,43 +64,69 @@ def make_pool(
     Raises:
       EngineError: too few rows come to rest with everything still in the house and nothing stuck in something.
     """
-    width = min(count, 16)
-    engine = NativeEngine(scene, width, threads=threads)
-    physics = engine.reset()
-    physics, _ = settle_worlds(engine, physics, SECONDS)
-    view = engine.view(physics)
-    start = engine.export(physics, 0)
-    floor = lowest_support(view, scene.tables.object_fixed)
-    loose = loose_objects(scene.tables)
-    overlaps = Overlaps(scene)
-    usual = overlaps.deepest(np.asarray(start.qpos))
-    bodies = {scene.model.body(b).name: b for b in range(scene.model.nbody)}
-    states = states_of_manifest(model, scene.manifest, bodies)
-    rows: list[Snapshot] = []
-    tried = 0
-    while len(rows) < count:
-        if tried >= TRIES * count + width:
-            raise EngineError(
-                f"of {tried} disturbed states of '{scene.name}' only {len(rows)} came to rest with everything in the "
-                f"house and apart (convert the scene with its checks and fix what does not settle)"
-            )
-        physics = engine.load(physics, start)
-        world = jnp.arange(tried, tried + width)
+    disturber = Disturber(scene, model, width_of(count), threads)
+    rows: list[Pool] = []
+    for turn in range(most_turns(count)):
+        rows += disturber.rows(turn, seed, share)
+        progress(min(len(rows), count))
+        if len(rows) >= count:
+            return stack(rows[:count])
+    raise too_few(scene, count, len(rows))
+
+
+def width_of(count: int) -> int:
+    """Worlds that are disturbed side by side, in one turn, for a pool of so many rows."""
+    return min(count, 16)
+
+
+def most_turns(count: int) -> int:
+    """Turns after which a pool of so many rows is given up."""
+    return -(-(TRIES * count) // width_of(count)) + 1
+
+
+def too_few(scene: Scene, count: int, made: int) -> EngineError:
+    """The error of a pool that was given up."""
+    return EngineError(
+        f"of {most_turns(count) * width_of(count)} disturbed states of '{scene.name}' only {made} came to rest with "
+        f"everything in the house and apart (convert the scene with its checks and fix what does not settle)"
+    )
+
+
+class Disturber:
+    """A scene at rest, in some worlds, from which every turn begins."""
+
+    def __init__(self, scene: Scene, model: StateModel, width: int, threads: int | None = None):
+        """`width`: worlds. `threads`: of the native engine; None: one per processor."""
+        self._scene, self._width = scene, width
+        self._engine = engine = NativeEngine(scene, width, threads=threads)
+        self._physics, _ = settle_worlds(engine, engine.reset(), SECONDS)
+        self._start = engine.export(self._physics, 0)
+        self._floor = lowest_support(engine.view(self._physics), scene.tables.object_fixed)
+        self._loose = loose_objects(scene.tables)
+        self._overlaps = Overlaps(scene)
+        self._usual = self._overlaps.deepest(np.asarray(self._start.qpos))
+        bodies = {scene.model.body(b).name: b for b in range(scene.model.nbody)}
+        self._states = states_of_manifest(model, scene.manifest, bodies)
+
+    def rows(self, turn: int, seed: int, share: float) -> list[Pool]:
+        """Those of a turn's worlds that came to rest with everything in the house and apart, as pools of one row.
+
+        What a turn gives depends on its number, the seed, the share and the number of worlds, not on turns before it.
+        """
+        engine, first = self._engine, turn * self._width
+        physics = engine.load(self._physics, self._start)
+        world = jnp.arange(first, first + self._width)
         key = episode_keys(seed, world, jnp.zeros_like(world))
-        write = jax.device_get(perturb(scene.tables, loose, engine.view(physics), key, share))
-        physics = _disturbed(engine, physics, write, overlaps, usual)
-        physics, asleep = settle_worlds(engine, physics, SECONDS)
-        view = engine.view(physics)
-        inside = (np.asarray(view.object_com)[..., 2] >= floor).all(1)
+        write = jax.device_get(perturb(self._scene.tables, self._loose, engine.view(physics), key, share))
+        physics = _disturbed(engine, physics, write, self._overlaps, self._usual)
+        self._physics, asleep = settle_worlds(engine, physics, SECONDS)
+        inside = (np.asarray(engine.view(self._physics).object_com)[..., 2] >= self._floor).all(1)
+        found = []
         for w in np.flatnonzero(asleep & inside):
-            row = engine.export(physics, int(w))
-            apart = (overlaps.deepest(np.asarray(row.qpos)) <= usual + RESTING_OVERLAP).all()
-            if apart and len(rows) < count:
-                rows.append(row)
-        tried += width
-        progress(len(rows))
-    one = [Pool(physics=jax.tree.map(lambda a: np.asarray(a)[None], row), states=states) for row in rows]
-    return stack(one)
+            row = engine.export(self._physics, int(w))
+            if (self._overlaps.deepest(np.asarray(row.qpos)) <= self._usual + RESTING_OVERLAP).all():
+                found.append(Pool(physics=jax.tree.map(lambda a: np.asarray(a)[None], row), states=self._states))
+        return found
 
 
 def _disturbed(

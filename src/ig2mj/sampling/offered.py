@@ -1,0 +1,41 @@
+"""The scene that pieces of work sample in: loaded by name wherever they are done, or lent to those of this process."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from ig2mj.scene.scene import Scene, load_scene
+
+_lent: dict[tuple[str, tuple[str, ...]], Scene] = {}
+
+
+def named(scene: Scene) -> dict[str, Any]:
+    """What `load_scene` needs on any machine that has the scene, as arguments of a piece.
+
+    `scene`: its name if it ships, else its folder. `objects`: what was added to it.
+    """
+    return {"scene": scene.portable_name, "objects": [a.wanted for a in scene.additions]}
+
+
+def check_of(scene: Scene) -> tuple[str, dict[str, Any]]:
+    """`Work.check`: every machine has the same scene."""
+    return "ig2mj.scene.scene:digest_of", named(scene)
+
+
+@contextlib.contextmanager
+def lent(scene: Scene) -> Iterator[None]:
+    """Inside, pieces that are done in this process take the scene as it is."""
+    key = scene.portable_name, tuple(a.wanted for a in scene.additions)
+    _lent[key] = scene
+    try:
+        yield
+    finally:
+        del _lent[key]
+
+
+def scene_named(scene: str, objects: Sequence[str]) -> Scene:
+    """The scene of `named`. Raises as `load_scene`."""
+    found = _lent.get((scene, tuple(objects)))
+    return found if found is not None else load_scene(scene, objects=tuple(objects))
