@@ -17,8 +17,9 @@ from small_envs import PointMass, SeenPointMass
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.collect import Transition
 from ig2mj.learn.evaluate import wilson
+from ig2mj.learn.hidden import Hidden, guess_loss
 from ig2mj.learn.moments import RewardScale
-from ig2mj.learn.networks import Encoder, brightest, projected, shifted
+from ig2mj.learn.networks import Encoder, brightest, coarse, projected, shifted
 from ig2mj.learn.perception import FAR, Perception, Seen, shrunk
 from ig2mj.learn.policies import Policy, PolicyMismatch, depends_on, perception_of
 from ig2mj.learn.replay import Replay
@@ -78,10 +79,10 @@ def test_a_picture_is_averaged_over_areas_and_no_depth_is_far_away():
     picture = np.zeros((1, 4, 4, 1), np.float32)
     picture[0, :2, :2, 0] = (1.0, 2.0)
     picture[0, 2:, 2:, 0] = 9.0
-    small = np.asarray(shrunk(picture, "depth", 2))[0, :, :, 0]
+    small = np.asarray(shrunk(picture, "depth", 2, 0, 2))[0, :, :, 0]
     assert small[0, 0] == round(255 * 1.5 / FAR)
     assert small[1, 1] == small[0, 1] == 255
-    assert np.asarray(shrunk((255 * (picture > 0)).astype(np.uint8), "rgb", 2))[0, :, :, 0].tolist() == [
+    assert np.asarray(shrunk((255 * (picture > 0)).astype(np.uint8), "rgb", 2, 0, 2))[0, :, :, 0].tolist() == [
         [255, 0],
         [0, 255],
     ]
@@ -150,3 +151,59 @@ def test_an_encoder_ends_with_four_by_four_pixels(side):
         Encoder((side, side, 4)).init, jax.random.PRNGKey(0), jnp.zeros((1, side * side * 4), jnp.uint8)
     )
     assert shape["params"]["Dense_0"]["kernel"].shape == (4 * 4 * 64, 50)
+
+
+def test_rows_that_are_kept_are_those_of_the_whole_picture():
+    env = SeenPointMass(2)
+    state = env.reset(0)
+    whole = np.asarray(Perception(env.observation_spaces, "rgbd", 16)(state.obs).picture).reshape(2, 16, 16, 4)
+    perception = Perception(env.observation_spaces, "rgbd", 16, (4, 12))
+    assert perception.picture_shape == (8, 16, 4)
+    assert np.array_equal(np.asarray(perception(state.obs).picture).reshape(2, 8, 16, 4), whole[:, 4:12])
+    with pytest.raises(Ig2mjError, match="rows 12 to 20 of pictures of 16 rows"):
+        Perception(env.observation_spaces, "rgbd", 16, (12, 20))
+
+
+def test_a_policy_that_acts_on_its_guess_takes_it_along(tmp_path):
+    env = SeenPointMass(2)
+    perception = Perception(env.observation_spaces, "rgbd", 16, (4, 16))
+    sac = SAC(perception, 2, SACConfig(actor=(8,), critic=(8,), net="places"))
+    learner = jax.jit(sac.init)(jax.random.PRNGKey(0))
+    learner.actor["guess"]["kernel"] += 1.0
+    learner.actor["mean"]["kernel"] += 0.1
+    policy = Policy.of(sac, learner, depends_on(env, perception), {})
+    policy.save(tmp_path / "policy.npz")
+    again = Policy.load(tmp_path / "policy.npz")
+    sees = perception_of(again, env.observation_spaces)
+    assert sees.picture_shape == (12, 16, 4) and sees.rows == (4, 16)
+    obs = env.reset(0).obs
+    wanted = sac._look(learner.actor, learner.moments, perception(obs))[0]
+    assert np.allclose(again.actor(sees)(obs), np.tanh(wanted), atol=0.02), "half precision"
+    with pytest.raises(PolicyMismatch, match="rows"):
+        again.check(env, Perception(env.observation_spaces, "rgbd", 16, (0, 12)))
+
+
+def test_a_guess_is_of_rotations_and_not_of_the_sign_of_a_quaternion():
+    names = ["cup_pos_x", *(f"cup_quat_{c}" for c in "wxyz"), "cup_velocity_x", "hand_holds"]
+    hidden = Hidden(2, 7, names)
+    assert hidden.size == 2 + 6
+    quat = np.array([0.0, 0.6, 0.8, 0.0])
+    vector = jnp.asarray([[9, 9, 0.1, *quat, 5.0, 1.0], [9, 9, 0.1, *-quat, -5.0, 1.0]], jnp.float32)
+    found = np.asarray(hidden(vector, vector))
+    assert np.allclose(found[0], found[1])
+    assert np.allclose(found[0, :2], [0.1, 1.0])
+    assert np.allclose(found[0, 2:] / 3**0.5, [-0.28, 0.96, 0, 0.96, 0.28, 0], atol=1e-6), "columns x and y"
+    assert Hidden(2, 7).size == 7, "numbers without names are guessed as they are"
+    assert guess_loss(jnp.ones((1, 2)), jnp.ones((1, 2))) == 0
+    far, farther = (float(guess_loss(jnp.full((1, 1), x), jnp.zeros((1, 1)))) for x in (1.0, 2.0))
+    assert farther - far == pytest.approx(1.0, abs=1e-3)
+
+
+def test_the_depth_at_the_brightest_point_is_seen():
+    maps = np.full((1, 3, 4, 1), -30.0, np.float32)
+    maps[0, 2, 3, 0] = 30.0
+    depth = np.zeros((1, 6, 7), np.float32)  # a picture of 6x7: the last column of cells is half as wide
+    depth[0, 4:, 6] = 0.25
+    assert coarse(jnp.asarray(depth), (3, 4)).shape == (1, 3, 4)
+    found = np.asarray(brightest(jnp.asarray(maps), coarse(jnp.asarray(depth), (3, 4))))
+    assert np.allclose(found, [[1, 1, 1, 1, 1]], atol=1e-4), "row, column, depth, and depth times them"

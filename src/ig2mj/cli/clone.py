@@ -12,6 +12,7 @@ def train_from_demos(
     grasping: str | None,
     obs: str,
     pixels: int,
+    rows: tuple[int, int] | None,
     minutes: float,
     seed: int,
     out: pathlib.Path | None,
@@ -40,7 +41,7 @@ def train_from_demos(
     for name, wanted in (("task", short_name(env) or env), ("robot", robot), ("grasping", grasping)):
         if wanted is not None and world[name] != wanted:
             raise InputError(demos, f"is of {name} {world[name]}, not {wanted}")
-    perception = Perception(spaces, obs, pixels)
+    perception = Perception(spaces, obs, pixels, rows, world.get("privileged", ()))
     runs = load_demos(demos, perception)
     config = configured(BCConfig(), changes)
     algorithm = BC(perception, runs.action.shape[1], config)

@@ -22,6 +22,7 @@ def run(
     grasping: str | None = None,
     obs: str = "state",
     pixels: int = 32,
+    rows: Annotated[str | None, tyro.conf.arg(metavar="TOP:BOTTOM")] = None,
     engine: str | None = None,
     worlds: int = 0,
     minutes: float = 10.0,
@@ -48,6 +49,8 @@ def run(
       grasping: mitten, assisted, sticky or physical; default: mitten for activities.
       obs: state (proprioception and privileged state) or rgbd (proprioception and pictures, as in the paper).
       pixels: height and width to which the 128x128 pictures are averaged down for the networks.
+      rows: of these the first that the networks see and the first below those; 80:128 of 128 is the table before a
+        humanoid; default: all.
       engine: native, warp or jax; default: warp on a GPU, else native.
       worlds: number of worlds stepped at once; 0: 2048 (native: 16).
       minutes: minutes of training, not counting compilation.
@@ -101,12 +104,13 @@ def run(
         raise Ig2mjError(f"--until {until}: a share is more than 0 and at most 1")
     if pixels < 1 or 128 % pixels:
         raise Ig2mjError(f"--pixels {pixels}: a divisor of 128 is needed")
+    kept_rows = rows_of(rows, pixels)
     if devices != "all" and not (devices.isdigit() and int(devices)):
         raise Ig2mjError(f"--devices {devices}: a number from 1 on, or all")
     if algo == "bc":
         from ig2mj.cli.clone import train_from_demos
 
-        return train_from_demos(env, demos, robot, grasping, obs, pixels, minutes, seed, out, resume, set)
+        return train_from_demos(env, demos, robot, grasping, obs, pixels, kept_rows, minutes, seed, out, resume, set)
     if demos is not None and algo != "sac":
         raise Ig2mjError(f"--demos: {algo} takes none (bc and sac do)")
     if expert and algo != "sac":
@@ -134,7 +138,7 @@ def run(
                 paper_rl=paper_rl,
                 pool_size=pool_size or None,
             )
-        perception = Perception(world.observation_spaces, obs, pixels)
+        perception = Perception(world.observation_spaces, obs, pixels, kept_rows, world.privileged_names)
         shown = load_demos(demos, perception, world_of(world)) if demos is not None else None
         algorithm = made(config, perception, world, shown, AXIS if shared else None, expert)
         if out is None:
@@ -179,6 +183,18 @@ def run(
         print(best.file)
         print(f"to measure it on states it has not seen: ig2mj evaluate {best.file}", file=sys.stderr)
         return 0
+
+
+def rows_of(words: str | None, pixels: int) -> tuple[int, int] | None:
+    """The rows of `--rows TOP:BOTTOM`. Raises Ig2mjError."""
+    from ig2mj.errors import Ig2mjError
+
+    if words is None:
+        return None
+    top, _, bottom = words.partition(":")
+    if not (top.isdigit() and bottom.isdigit() and int(top) < int(bottom) <= pixels):
+        raise Ig2mjError(f"--rows {words}: two numbers such as 80:128, of at most {pixels} rows (--pixels)")
+    return int(top), int(bottom)
 
 
 def _devices(wanted: str, processes: int) -> list[Any]:

@@ -15,6 +15,7 @@ from flax import struct
 from jaxtyping import Float, Int, UInt8
 
 from ig2mj.engine.view import Array
+from ig2mj.learn.hidden import guess_loss
 from ig2mj.learn.moments import Moments, average
 from ig2mj.learn.networks import Actor, shifted
 from ig2mj.learn.perception import Perception, Seen, blank
@@ -77,7 +78,7 @@ class Imitation:
 
     def __init__(self, perception: Perception, action_size: int, config: Any, axis: str | None = None):
         """`config`: of cloning or DAgger. `axis`: the name of an axis of devices over which gradients are averaged."""
-        guess = perception.vector_size - perception.actor_size if perception.picture_shape and config.guess else 0
+        guess = perception.hidden.size if perception.hidden and config.guess else 0
         self.actor = Actor(action_size, config.actor, perception.picture_shape, config.net, guess)
         self._perception, self._weight, self._shift, self._axis = perception, config.guess, config.shift, axis
         self._adam = optax.chain(optax.clip_by_global_norm(10.0), optax.flatten(optax.scale_by_adam()))
@@ -101,8 +102,8 @@ class Imitation:
         mean, _, guess = looked
         loss = jnp.square(jnp.tanh(mean) - label).mean()
         found: dict[str, Array] = {"actor_loss": loss}
-        if guess.shape[-1]:
-            found["guess_loss"] = jnp.square(guess - normal[:, self._perception.actor_size :]).mean()
+        if self._perception.hidden is not None and guess.shape[-1]:
+            found["guess_loss"] = guess_loss(guess, self._perception.hidden(seen.vector, normal))
             loss += self._weight * found["guess_loss"]
         return loss, found
 

@@ -22,9 +22,8 @@ LOG_STD = (-5.0, 0.0)
 FIRST_STD = 0.3
 """Standard deviation of an untrained actor."""
 
-NETS = ("small", "paper", "points")
+NETS = ("small", "paper", "points", "places")
 """Encoders of pictures."""
-
 
 SHARP = 3.0
 """Factor of maps before their softmax: without it an untrained softmax is even, and hardly changes."""
@@ -45,10 +44,12 @@ class Trunk(nn.Module):
 class Encoder(nn.Module):
     """Features of pictures.
 
-    `small`: convolutions of stride 2 until 4x4 pixels are left, for 32x32 pixels three (32, 64, 64), and 50 numbers
-    between -1 and 1, as in Squint. `paper`: three convolutions and 256 numbers (iGibson 2.0, appendix A.3). `points`:
-    `small`'s numbers, and where in the picture each of 32 channels is brightest after two halvings (the spatial softmax
-    of Levine et al. 2016), so that the place of a thin object need not be read from four by four coarse cells.
+    `small`: convolutions of stride 2 until four rows of pixels are left, for 32x32 pixels three (32, 64, 64), and 50
+    numbers between -1 and 1, as in Squint. `paper`: three convolutions and 256 numbers (iGibson 2.0, appendix A.3).
+    `points`: `small`'s numbers, and where in the picture each of 32 channels is brightest after two halvings (the
+    spatial softmax of Levine et al. 2016), so that the place of a thin object need not be read from four by four coarse
+    cells. `places`: the same, with how far away it is there, and in half precision. Depth times row and column is what
+    a place in the camera's frame is linear in.
     """
 
     shape: tuple[int, int, int]
@@ -56,33 +57,50 @@ class Encoder(nn.Module):
 
     @nn.compact
     def __call__(self, picture: UInt8[Array, "B q"]) -> Float[Array, "B f"]:
-        x = picture.reshape(-1, *self.shape).astype(jnp.float32) / 255.0 - 0.5
+        seen = x = picture.reshape(-1, *self.shape).astype(jnp.float32) / 255.0 - 0.5
         halvings = 3 if self.net == "paper" else max(3, math.ceil(math.log2(self.shape[0] / 4)))
-        places = jnp.zeros((x.shape[0], 0))
+        places, dtype = jnp.zeros((x.shape[0], 0)), jnp.bfloat16 if self.net == "places" else jnp.float32
         for k, channels in enumerate((32, *[64] * (halvings - 1))):
-            x = nn.relu(nn.Conv(channels, (3, 3), strides=2, padding="SAME")(x))
-            if self.net == "points" and k == 1:
-                maps = nn.Conv(32, (3, 3), padding="SAME", name="points")(nn.LayerNorm(name="points_norm")(x))
-                places = brightest(SHARP * maps)
-        x = x.reshape(x.shape[0], -1)
+            x = nn.relu(nn.Conv(channels, (3, 3), strides=2, padding="SAME", dtype=dtype)(x))
+            if self.net in ("points", "places") and k == 1:
+                normal = nn.LayerNorm(name="points_norm")(x)
+                maps = nn.Conv(32, (3, 3), padding="SAME", dtype=dtype, name="points")(normal)
+                depth = coarse(seen[..., -1], maps.shape[1:3]) if self.net == "places" else None
+                places = brightest(SHARP * maps.astype(jnp.float32), depth)
+        x = x.reshape(x.shape[0], -1).astype(jnp.float32)
         if self.net == "paper":
             return nn.relu(nn.Dense(256)(x))
         return jnp.concatenate([places, jnp.tanh(nn.LayerNorm()(nn.Dense(50)(x)))], axis=-1)
 
 
-def brightest(maps: Float[Array, "B h w c"]) -> Float[Array, "B 2*c"]:
-    """Row and column, from -1 to 1, of the middle of each channel's softmax over the picture."""
+def brightest(maps: Float[Array, "B h w c"], depth: Float[Array, "B h w"] | None = None) -> Float[Array, "B f"]:
+    """Row and column, from -1 to 1, of the middle of each channel's softmax over the picture, [B, 2 * c]; with `depth`
+    also the depth there, and its products with row and column, [B, 5 * c]."""
     count, height, width, channels = maps.shape
     share = jax.nn.softmax(maps.reshape(count, height * width, channels), axis=1).reshape(maps.shape)
     row = jnp.einsum("bhwc,h->bc", share, jnp.linspace(-1.0, 1.0, height))
     column = jnp.einsum("bhwc,w->bc", share, jnp.linspace(-1.0, 1.0, width))
-    return jnp.concatenate([row, column], axis=-1)
+    if depth is None:
+        return jnp.concatenate([row, column], axis=-1)
+    there = jnp.einsum("bhwc,bhw->bc", share, depth)
+    return jnp.concatenate([row, column, there, there * row, there * column], axis=-1)
+
+
+def coarse(depth: Float[Array, "B r s"], shape: tuple[int, ...]) -> Float[Array, "B h w"]:
+    """A picture's depth averaged over the cells of a map, from about -2 to 2."""
+    count, rows, columns = depth.shape
+    height, width = shape
+    low, right = -rows % height, -columns % width  # where convolutions of stride 2 rounded up
+    padded = jnp.pad(depth, ((0, 0), (0, low), (0, right)), mode="edge")
+    cells = padded.reshape(count, height, -1, width, (columns + right) // width)
+    return 4.0 * cells.mean((2, 4))
 
 
 class Actor(nn.Module):
     """Mean and logarithm of the standard deviation of a Gaussian; its tanh is the action.
 
-    With `guess`, a linear guess of that many hidden numbers is made from the picture's features, for an auxiliary loss.
+    With `guess`, a linear guess of that many hidden numbers is made from the picture's features, for an auxiliary loss;
+    with the encoder `places` it is also what the actor's layers see.
 
     Raises:
       UnknownNameError: `net` is none of `NETS`.
@@ -99,6 +117,11 @@ class Actor(nn.Module):
             raise UnknownNameError("encoder", self.net, NETS)
         super().__post_init__()
 
+    @property
+    def uses_guess(self) -> bool:
+        """Whether its actions depend on the guess, which then belongs to the policy."""
+        return self.net == "places" and self.guess > 0
+
     @nn.compact
     def __call__(
         self, vector: Float[Array, "B x"], picture: UInt8[Array, "B q"]
@@ -108,7 +131,8 @@ class Actor(nn.Module):
             features = Encoder(self.picture_shape, self.net, name="encoder")(picture)
             if self.guess:
                 guessed = nn.Dense(self.guess, name="guess")(jnp.concatenate([features, vector], axis=-1))
-            vector = jnp.concatenate([vector, features], axis=-1)
+            known = [vector, features, guessed] if self.uses_guess else [vector, features]
+            vector = jnp.concatenate(known, axis=-1)
         x = Trunk((256,) if self.net == "paper" else self.sizes, name="trunk")(vector)
         small = nn.initializers.orthogonal(0.01)
         mean = nn.Dense(self.action_size, kernel_init=small, name="mean")(x)

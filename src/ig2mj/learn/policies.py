@@ -54,6 +54,8 @@ def depends_of(world: Mapping[str, Any], perception: Perception) -> dict[str, An
     found["mode"] = perception.mode
     found["vector"] = {name: sizes[name] for name in seen}
     found["picture"] = perception.picture_shape and list(perception.picture_shape)
+    if perception.picture_shape and perception.picture_shape[0] < perception.picture_shape[1]:
+        found["rows"] = list(perception.rows)
     found["privileged"] = list(world["privileged"]) if perception.mode == "state" else []
     return found
 
@@ -61,7 +63,8 @@ def depends_of(world: Mapping[str, Any], perception: Perception) -> dict[str, An
 def perception_of(policy: Policy, spaces: Mapping[str, Any]) -> Perception:
     """How a policy sees an environment's observations: as in its training."""
     depends = policy.card["depends"]
-    return Perception(spaces, depends["mode"], depends["picture"][0] if depends["picture"] else SIZE)
+    size, rows = depends["picture"][1] if depends["picture"] else SIZE, depends.get("rows")
+    return Perception(spaces, depends["mode"], size, (rows[0], rows[1]) if rows else None)
 
 
 def depends_on(env: Any, perception: Perception) -> dict[str, Any]:
@@ -96,10 +99,14 @@ class Policy:
           depends: see `depends_on`. made: for the card.
         """
         config, size = algorithm.config, algorithm.perception.actor_size
-        net = {"net": config.net, "sizes": list(config.actor)}
+        net: dict[str, Any] = {"net": config.net, "sizes": list(config.actor)}
+        weights = {k: np.asarray(v) for k, v in _flat(learner.actor).items()}
+        if algorithm.actor.uses_guess:
+            net["guess"] = algorithm.actor.guess
+        else:
+            weights = {k: w for k, w in weights.items() if not k.startswith("guess/")}
         own = dict(depends)
         card = {"format": FORMAT_VERSION, "depends": own, "digest": digest(own), "net": net, **made}
-        weights = {k: np.asarray(v) for k, v in _flat(learner.actor).items() if not k.startswith("guess/")}
         moments: Moments = jax.device_get(learner.moments)
         deviation = np.sqrt(moments.var[:size] + 1e-4)
         return cls(card, weights, np.asarray(moments.mean[:size]), np.asarray(deviation))
@@ -161,7 +168,7 @@ class Policy:
         """
         depends, net = self.card["depends"], self.card["net"]
         shape = depends["picture"] and tuple(depends["picture"])
-        network = Actor(len(depends["actions"]), tuple(net["sizes"]), shape, net["net"])
+        network = Actor(len(depends["actions"]), tuple(net["sizes"]), shape, net["net"], net.get("guess", 0))
         params = jax.tree.map(jnp.asarray, _nested(self.weights))
         mean, deviation = jnp.asarray(self.mean), jnp.asarray(self.deviation)
         size = perception.actor_size

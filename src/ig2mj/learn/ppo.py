@@ -23,6 +23,7 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
 from ig2mj.learn.collect import Advice, Transition, if_ready
+from ig2mj.learn.hidden import guess_loss
 from ig2mj.learn.moments import Moments, RewardScale, average
 from ig2mj.learn.networks import Actor, Value, shifted
 from ig2mj.learn.perception import Perception, Seen, blank
@@ -97,7 +98,7 @@ class PPO:
         """`axis`: the name of an axis of devices over which gradients are averaged."""
         self.perception, self.action_size, self.axis = perception, action_size, axis
         self.config = c = config or PPOConfig()
-        guess = perception.vector_size - perception.actor_size if perception.picture_shape and c.guess else 0
+        guess = perception.hidden.size if perception.hidden and c.guess else 0
         self.actor = Actor(action_size, c.actor, perception.picture_shape, c.net, guess)
         self.value = Value(c.critic)
         self._adam = optax.chain(optax.clip_by_global_norm(1.0), optax.flatten(optax.scale_by_adam(eps=1e-5)))
@@ -223,8 +224,8 @@ class PPO:
             total = actor + c.value * value - c.entropy * entropy
             found = {"actor_loss": actor, "critic_loss": value, "entropy": entropy}
             found["divergence"] = (ratio - 1 - change).mean()
-            if guess.shape[-1]:
-                found["guess_loss"] = jnp.square(guess - normal[:, p.actor_size :]).mean()
+            if p.hidden is not None and guess.shape[-1]:
+                found["guess_loss"] = guess_loss(guess, p.hidden(batch.seen.vector, normal))
                 total += c.guess * found["guess_loss"]
             return total, found
 

@@ -34,6 +34,7 @@ from ig2mj.engine.view import Array
 from ig2mj.learn.collect import GUIDED, Advice, Hint, Transition, if_ready
 from ig2mj.learn.demos import Demos
 from ig2mj.learn.guidance import guided, share, uncounted
+from ig2mj.learn.hidden import guess_loss
 from ig2mj.learn.moments import Moments, RewardScale, average, share_of
 from ig2mj.learn.networks import Actor, projected, shifted, twins
 from ig2mj.learn.perception import Perception, Seen, blank
@@ -154,7 +155,7 @@ class SAC:
         self.perception, self.action_size, self.axis = perception, action_size, axis
         self._demos, self.hint = demos, expert
         self.config = c = config or SACConfig()
-        guess = perception.vector_size - perception.actor_size if perception.picture_shape and c.guess else 0
+        guess = perception.hidden.size if perception.hidden and c.guess else 0
         self.actor = Actor(action_size, c.actor, perception.picture_shape, c.net, guess)
         self.critic = twins(c.atoms, c.critic)
         self._support = jnp.linspace(-c.largest, c.largest, c.atoms)
@@ -243,8 +244,7 @@ class SAC:
 
     def _look(self, actor: Any, moments: Moments, seen: Seen) -> tuple[Array, Array, Array]:
         own = moments.normal(seen.vector[:, : self.perception.actor_size])
-        looked: Any = self.actor.apply({"params": actor}, own, seen.picture)
-        return looked
+        return self.actor.apply({"params": actor}, own, seen.picture)  # pyright: ignore[reportReturnType]
 
     def _draw(self, actor: Any, moments: Moments, seen: Seen, key: Array) -> tuple[Array, Array, Array, Array]:
         """Actions, the logarithm of their density, the guess, and the middle of the actions' distribution."""
@@ -374,8 +374,8 @@ class SAC:
         def loss(actor: Any) -> tuple[Array, dict[str, Array]]:
             action, density, guess, middle = self._draw(actor, learner.moments, seen, draw_key)
             total, found = (alpha * density - value(action)).mean(), {"entropy": -density.mean()}
-            if guess.shape[-1]:
-                found["guess_loss"] = jnp.square(guess - normal[:, p.actor_size :]).mean()
+            if p.hidden is not None and guess.shape[-1]:
+                found["guess_loss"] = guess_loss(guess, p.hidden(batch.seen.vector, normal))
                 total += c.guess * found["guess_loss"]
             if batch.label.shape[-1]:
                 apart = jnp.square(middle - batch.label).mean(-1)

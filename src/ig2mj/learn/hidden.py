@@ -1,0 +1,62 @@
+"""`Hidden`: what an actor that sees pictures learns to tell of `privileged_state`, an auxiliary task of its encoder.
+
+The simulator knows where everything is in every frame, and training may use that; what acts later needs the pictures
+alone. Velocities are left out, since one picture does not show them. A quaternion stands for two columns of the
+rotation matrix: q and -q are the same rotation, and a network that must choose between them learns neither.
+
+Axes: B samples, v numbers of a vector, g of a guess.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.engine.view import Array
+from ig2mj.geometry.poses import quat_rotate
+
+FLAT = 0.01
+"""Error, in standard deviations, below which a guess's loss is quadratic. Beyond it is the absolute error: centimetres
+count as much as decimetres, so that places go on getting better once they are about right."""
+
+
+class Hidden:
+    """Which numbers of a vector are to be guessed. All methods are pure.
+
+    Attributes:
+      size: g.
+    """
+
+    def __init__(self, first: int, count: int, names: Sequence[str] = ()):
+        """
+        Args:
+          first, count: of the vector's numbers that an actor does not see.
+          names: of these, as `Environment.privileged_names` has them; without names all are guessed as they are.
+        """
+        names = list(names) or [""] * count
+        assert len(names) == count, "a name for each number"
+        turns = [k for k, name in enumerate(names) if name.endswith("_quat_w")]  # x, y and z follow
+        parts = {k + j for k in turns for j in range(4)}
+        plain = [k for k, n in enumerate(names) if k not in parts and "_velocity_" not in n]
+        self._plain = first + np.array(plain, int)
+        self._turns = first + np.array([[k + j for j in range(4)] for k in turns], int).reshape(-1, 4)
+        self.size = len(plain) + 6 * len(turns)
+
+    def __call__(self, vector: Float[Array, "B v"], normal: Float[Array, "B v"]) -> Float[Array, "B g"]:
+        """What is to be guessed, each number with a deviation of about 1.
+
+        Args:
+          vector: as it was observed. normal: less its mean, over its deviation.
+        """
+        quat = vector[:, self._turns]
+        columns = [quat_rotate(quat, jnp.asarray(axis)) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))]
+        turned = jnp.sqrt(3.0) * jnp.concatenate(columns, axis=-1)
+        return jnp.concatenate([normal[:, self._plain], turned.reshape(vector.shape[0], -1)], axis=-1)
+
+
+def guess_loss(guess: Float[Array, "B g"], wanted: Float[Array, "B g"]) -> Float[Array, ""]:
+    """Mean absolute error, but quadratic near 0 (`FLAT`)."""
+    return (jnp.sqrt(jnp.square(guess - wanted) + FLAT**2) - FLAT).mean()
