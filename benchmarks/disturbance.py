@@ -74,8 +74,7 @@ def geoms_of(scene: Scene) -> tuple[Bool[np.ndarray, "G"], Bool[np.ndarray, "G"]
     """Which geoms are solid parts of agents, and which of loose objects."""
     model, tables = scene.model, scene.tables
     solid = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
-    root = np.asarray(model.body_rootid)
-    agent = np.isin(root[model.geom_bodyid], root[tables.agent_body]) & (tables.geom_object < 0)
+    agent = tables.body_agent[model.geom_bodyid] >= 0
     return solid & agent, solid & np.isin(tables.geom_object, loose_objects(tables))
 
 

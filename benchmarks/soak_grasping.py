@@ -38,6 +38,7 @@ from ig2mj.envs.environment import Environment
 from ig2mj.states.definitions.sliced import in_use
 from ig2mj.tasks.actions import SPEED, TURN_SPEED
 from ig2mj.worlds.batch import Batch
+from ig2mj.worlds.hand_resets import HandResets
 
 STEPS = 15
 """Control steps of one call; flagged worlds start afresh after it."""
@@ -48,8 +49,8 @@ EPISODE = 600
 PERIOD = 1 / 30
 """Seconds of a control step, in which the robot acts anew: what happens in each of them is looked at."""
 
-NEW_ACTION, RESET_HAND = 1 / 15, 0.02
-"""Chance of a new action in a control step, and that a new action asks a hand back to where it rests."""
+NEW_ACTION = 1 / 15
+"""Chance of a new action in a control step."""
 
 REPORT = 15.0
 
@@ -129,6 +130,7 @@ class Run:
             pool_size=args.pool_size,
         )
         self.core, engine = env.core, env.core.engine
+        self.core.hand_resets = HandResets(engine, self.core.controllers, False)  # no hand is asked back, none jumps
         assert self.core.rules is not None
         self.model = self.core.rules.model
         self.watch = Watch(engine, (0.0, 0.0, 0.0))
@@ -155,11 +157,10 @@ class Run:
         size = before.shape[1]
 
         def draw(k: Array, n: Array) -> Array:
-            return jax.random.uniform(jax.random.fold_in(k, n), (2 * size + 1,))
+            return jax.random.uniform(jax.random.fold_in(k, n), (1 + size,))
 
         drawn = jax.vmap(draw)(key, step)
-        new = (2 * drawn[:, 1 : 1 + size] - 1) * self.scale
-        new = jnp.where(self._resets, jnp.where(drawn[:, 1 + size :] < RESET_HAND, 1.0, -1.0), new)
+        new = jnp.where(self._resets, -1.0, (2 * drawn[:, 1:] - 1) * self.scale)
         return jnp.where((drawn[:, :1] < NEW_ACTION) | (step == 0)[:, None], new, before)
 
     def _looked(

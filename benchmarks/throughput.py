@@ -3,10 +3,11 @@
     python benchmarks/throughput.py HOME [HOME ...] --worlds 1024 4096 16384 [--idle] [--what full] [--rows FILE]
 
 A control step is four physics steps of 1/120 s, the view, all extended states, guards and a goal of up to ten literals,
-in one jitted function under `lax.scan`; a floating hand pushes objects about unless `--idle`. Every row says what the
-hand really did (`benchmarks/disturbance.py`), how many worlds overflowed or lost their numbers, and in how many an
-object left the house. A row with any of the first two or more than one in a thousand of the last does not count
-(`counts` is false), nor does a disturbed one whose hand touches nothing.
+in one jitted function under `lax.scan`; a floating hand pushes objects about unless `--idle`, or with `--robot` the
+humanoid or Fetch acts at random without grasping, a new action every half second (`SHARE`).
+Every row says what hand or robot really did (`benchmarks/disturbance.py`), how many worlds overflowed or lost their
+numbers, and in how many an object left the house. A row with any of the first two or more than one in a thousand of the
+last does not count (`counts` is false), nor does one whose hand touches nothing.
 
 Several of these may run at once (`gpu_suite.py`): what is timed runs under a lock, everything else beside each other.
 """
@@ -25,11 +26,12 @@ import mujoco
 import numpy as np
 import results
 import warp as wp
-from batch_case import HAND_DOFS, Case
+from batch_case import ROBOTS, Case
 from disturbance import LEAST, MOST_LOST, Watch, join, summary
 from kernel_times import profiled
 from turns import exclusive, preparing
 
+from ig2mj.calibration.acting import ACTION_STEPS, act_at_random, robot_of, start_acting
 from ig2mj.calibration.pushing import push, start_pushing
 from ig2mj.engine.health import CAPACITY, Overflow
 from ig2mj.engine.warp import patches
@@ -48,6 +50,10 @@ SIZE = 128
 
 AGENT_STEP = 3
 """Control steps of an agent step, of which `--what agent` takes one picture."""
+
+SHARE = {"Humanoid": 0.5}
+"""Of a robot's range of actions that is drawn from. The humanoid's is 0.3 m in 0.1 s: at all of it boxes fly over the
+walls of the made homes, at the 0.5 m/s of the paper's activities it touches hardly anything."""
 
 ENGINES = {"ig2mj": contextlib.nullcontext, "mujoco_warp": patches.upstream_kernels}
 """Whose functions run on the device: with ours in place of some of MuJoCo Warp's, or MuJoCo Warp's alone."""
@@ -103,7 +109,7 @@ def run(
         "scene": scene.name,
         "objects": scene.tables.num_objects,
         "worlds": num_worlds,
-        "case": "disturbed" if disturbed else "idle",
+        "case": (case.robot.__name__.lower() if case.robot else "disturbed") if disturbed else "idle",
         "what": what,
         **solver,
         "control_steps_per_s": round(num_worlds * STEPS / float(np.median(times))),
@@ -112,7 +118,7 @@ def run(
         "compile_s": round(compile_seconds, 1),
         "first_call_s": round(first, 1),
         "simulated_s": round((len(times) + 2) * STEPS * seconds, 2),
-        **summary(join(activity), HAND_DOFS if disturbed else 0),
+        **summary(join(activity), own_dofs(case)),
         "moved_objects_per_world": round(watch.moved(before, carry[2]), 2),
         "capacity_overflows": int(((overflow & int(CAPACITY)) != 0).sum()),
         "overflow_bits": _bits(overflow),
@@ -130,8 +136,14 @@ def run(
         row["kernels"] = profile_row
     sound = row["capacity_overflows"] == 0 and row["non_finite"] == 0
     sound = sound and row["lost_object_worlds"] <= MOST_LOST * num_worlds
-    row["counts"] = sound and (not disturbed or row["hand_contact_share"] >= LEAST)
+    # A robot that acts at random is the load itself, whatever it happens to touch.
+    row["counts"] = sound and (not disturbed or case.robot is not None or row["hand_contact_share"] >= LEAST)
     return row
+
+
+def own_dofs(case: Case) -> int:
+    """Degrees of freedom of whoever acts."""
+    return int((case.scene.tables.body_agent[case.scene.model.dof_bodyid] >= 0).sum())
 
 
 def program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str, steps: int = STEPS):
@@ -142,9 +154,14 @@ def program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str, 
     if what in ("camera", "agent"):
         camera = BatchCamera(engine, case.model, [case.eye], width=SIZE, height=SIZE, depth=True)
 
+    share = SHARE.get(case.robot.__name__ if case.robot else "", 1.0)
+    robot = robot_of(case.scene, ACTION_STEPS * seconds) if disturbed and case.robot is not None else None
+
     def control(batch, pusher, com, palm):
         if not disturbed:
             return pusher
+        if robot is not None:
+            return act_at_random(robot, pusher, batch.world.view, batch.world.key, batch.world.step, share)
         return push(case.reach, pusher, com, palm, batch.world.key, batch.world.step, seconds)
 
     def full(carry, _):
@@ -174,6 +191,8 @@ def program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str, 
         world = batch.world.replace(physics=state, step=batch.world.step + 1)
         if what == "view":
             world = world.replace(view=view)
+        elif robot is not None:  # what its controller reads
+            world = world.replace(view=world.view.replace(agent=view.agent, held=view.held))
         seen = view.object_com[:, 0, 2].mean()
         return (batch.replace(world=world), pusher, view.object_com, view.agent.base_pos[:, 0]), (
             seen,
@@ -188,7 +207,10 @@ def program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str, 
 
     call = jax.jit(several, donate_argnums=0)
     batch = jax.block_until_ready(worlds.start(0))
-    pusher = start_pushing(case.reach, engine.num_worlds, case.scene.model.nu)
+    if robot is not None:
+        pusher = start_acting(robot, engine.num_worlds, case.scene.model.nu)
+    else:
+        pusher = start_pushing(case.reach, engine.num_worlds, case.scene.model.nu)
     # Copies: what is donated must not be in the batch as well.
     view = batch.world.view
     return call, (batch, pusher, view.object_com + 0.0, view.agent.base_pos[:, 0] + 0.0)
@@ -225,6 +247,7 @@ def main() -> None:
     parser.add_argument("homes", nargs="+")
     parser.add_argument("--worlds", type=int, nargs="+", default=[4096])
     parser.add_argument("--idle", action="store_true", help="no hand, nothing moves")
+    parser.add_argument("--robot", default="hand", choices=["hand", *ROBOTS], help="which acts at random, no hand then")
     parser.add_argument(
         "--what",
         nargs="+",
@@ -247,7 +270,7 @@ def main() -> None:
     for home in args.homes:
         alone = None if args.patience else exclusive(args.lock)
         with preparing(args.lock, args.patience):
-            case = Case(home, not args.idle, args.pool, args.profiles, alone)
+            case = Case(home, not args.idle, args.pool, args.profiles, alone, args.robot)
         for worlds in args.worlds:
             for what in args.what:
                 for limit in args.iterations:

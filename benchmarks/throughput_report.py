@@ -116,7 +116,7 @@ def _all(rows: list[Row]) -> Table:
                 f"{row['worlds']:,}",
                 f"{row['control_steps_per_s']:,}" + ("" if row["counts"] else " (does not count)"),
                 f"{row['ms_per_control_step']:.2f}",
-                f"{row['hand_contact_share']:.0%}" if row["case"] == "disturbed" else "-",
+                f"{row['hand_contact_share']:.0%}" if row["case"] != "idle" else "-",
                 f"{row['moved_objects_per_world']:.1f}",
                 f"{row['awake_dofs_beside_the_hand']:.1f}",
                 f"{row['peak_device_MB_per_world']:.2f}",
@@ -125,7 +125,7 @@ def _all(rows: list[Row]) -> Table:
         )
     title = (
         "All rows. contact: steps in which the hand presses on a loose object; moved: objects per world by over 2 cm; "
-        "awake: degrees of freedom beside the hand's; lost: worlds that overflowed / without numbers"
+        "awake: degrees of freedom beside those of the hand or robot; lost: worlds that overflowed / without numbers"
     )
     return results.table(title, columns, lines)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import mujoco
 import numpy as np
 import pytest
 from batch_case import Case
@@ -62,3 +63,19 @@ def test_what_a_row_says_of_a_hand_is_a_mean_over_steps_and_worlds():
         "awake_dofs_beside_the_hand": 5.0,
         "awake_dofs_peak": 30,
     }
+
+
+def test_a_robot_takes_the_hands_place_and_brings_its_own_buffer_sizes(home):
+    sizes = EngineProfile(awake_dofs=50, constraints=300, contacts=40, convex_contacts=30)
+    save_profile(sizes, home.parent / "profiles" / "made_20", "engine_profile.humanoid.json")
+    case = Case(str(home), True, 1, home.parent / "profiles", robot="humanoid")
+    tables, model = case.scene.tables, case.scene.model
+    assert case.profile == sizes and case.eye == "humanoid/eye"
+    assert np.linalg.norm(model.body_pos[tables.agent_body[0]][:2] - np.array(case.reach.start[:2])) < 3.0
+    data = case.scene.start_data()
+    mujoco.mj_fwdPosition(model, data)
+    own = tables.body_agent[model.geom_bodyid[data.contact.geom[data.contact.dist < 0]]] >= 0
+    assert not (own.any(1) & ~own.all(1)).any(), "it stands in nothing"
+    assert (tables.actuator_agent == 0).all() and model.nu == 38
+    robot, _ = geoms_of(case.scene)
+    assert set(tables.hand_body) <= set(model.geom_bodyid[robot]), "its hands' touches are counted"

@@ -52,14 +52,20 @@ def start_acting(controller: Controller, worlds: int, actuators: int) -> Acting:
 
 
 def act_at_random(
-    controller: Controller, acting: Acting, view: PhysicsView, key: UInt[Array, "W 2"], step: Int[Array, "W"]
+    controller: Controller,
+    acting: Acting,
+    view: PhysicsView,
+    key: UInt[Array, "W 2"],
+    step: Int[Array, "W"],
+    share: float = 1.0,
 ) -> Acting:
     """Controls for the next control step.
 
     Args:
       key: of each world's round. step: control steps since its start, the same in all worlds.
+      share: of the range of actions that is drawn from.
     """
-    low, high = jnp.asarray(controller.action_low), jnp.asarray(controller.action_high)
+    low, high = share * jnp.asarray(controller.action_low), share * jnp.asarray(controller.action_high)
     keys = step_keys(key, step)
     drawn = jax.vmap(lambda k: jax.random.uniform(k, low.shape, minval=low, maxval=high))(keys)
     action = jnp.where((step % (ACTION_STEPS * HOLD) == 0)[:, None], drawn, acting.action)
