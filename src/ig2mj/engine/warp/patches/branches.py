@@ -9,14 +9,15 @@ them come from one counter for all kinds (upstream has one for each, and uses th
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
+from collections.abc import Iterator
 from typing import Any
 
 import warp as wp
 from mujoco.mjx.third_party.mujoco_warp._src import collision_convex, collision_driver
 
-from ig2mj.engine.warp.patches import launching
+from ig2mj.engine.warp.patches import pair_lists, phases
 from ig2mj.engine.warp.patches.replacements import original
+from ig2mj.engine.warp.patches.scope import ScopedReplacement
 
 MOST = 8
 """Streams of a device; further kernels follow the first ones."""
@@ -29,31 +30,33 @@ _lock = threading.Lock()
 def ccd_kernel_builder(*arguments: Any) -> wp.Kernel:
     """The kernel of a kind, with the first counter of places; upstream's has one for each kind."""
     first, second, gjk, epa, multiple, _, block, warn = arguments
-    return original(collision_convex, "ccd_kernel_builder")(first, second, gjk, epa, multiple, 0, block, warn)
+    kernel = original(collision_convex, "ccd_kernel_builder")(first, second, gjk, epa, multiple, 0, block, warn)
+    phases.note(kernel, (first, second, gjk, epa, multiple, 0, block, warn))
+    return kernel
 
 
 def convex_narrowphase(m: Any, d: Any, ctx: Any, collision_table: Any) -> None:
     """As upstream, with each kernel on the next stream."""
     device = d.geom_xpos.device
-    if not device.is_cuda:
+    if not (device.is_cuda or pair_lists.ON or phases.ON):
         original(collision_driver, "convex_narrowphase")(m, d, ctx, collision_table)
         return
-    streams, main = _streams_of(device), device.stream
-    used: list[wp.Stream] = []
-
-    def branch(kernel: wp.Kernel, inputs: Sequence[Any]) -> wp.Stream | None:
-        if "ccd_kernel" not in kernel.key:
-            return None
-        stream = streams[len(used) % len(streams)]
-        if stream not in used:
-            stream.wait_stream(main)
-        used.append(stream)
-        _here.kept.append(inputs)  # freed where the branches have joined, and not at the end of upstream's function
-        return stream
-
-    with launching.branching(branch):
-        original(collision_driver, "convex_narrowphase")(m, d, ctx, collision_table)
-    _here.used = used
+    calls = _calls(m, d, ctx, collision_table)
+    kinds = [phases.kind(call["kernel"]) for call in calls]
+    found = [kind for kind in kinds if kind is not None]
+    lists = iter(pair_lists.listed_by_kind(m, d, ctx, found) if pair_lists.ON and found else [])
+    streams = _in_turn(device)
+    for call, kind in zip(calls, kinds, strict=True):
+        if kind is None:  # of height fields
+            wp.launch(**call)
+            continue
+        if pair_lists.ON:
+            call["inputs"] = _of_list(m, d, ctx, call["inputs"], next(lists))
+        options = next(streams)
+        _here.kept.append(call)  # freed where the branches have joined, and not at the end of this function
+        for launch in phases.launches(d, call) if phases.ON else [call]:
+            _here.kept.append(launch)
+            wp.launch(**launch, **options)
 
 
 def narrowphase(m: Any, d: Any, ctx: Any) -> None:
@@ -65,6 +68,55 @@ def narrowphase(m: Any, d: Any, ctx: Any) -> None:
             d.geom_xpos.device.stream.wait_stream(stream)
     finally:
         _here.kept, _here.used = [], []
+
+
+def _calls(m: Any, d: Any, ctx: Any, collision_table: Any) -> list[dict[str, Any]]:
+    """What upstream would launch: the arguments of each `warp.launch`."""
+    _here.calls = []
+    with _noting.entered():
+        original(collision_driver, "convex_narrowphase")(m, d, ctx, collision_table)
+    return _here.calls
+
+
+def _note(kernel: wp.Kernel, dim: Any, inputs: Any, outputs: Any, **options: Any) -> None:
+    _here.calls.append({"kernel": kernel, "dim": dim, "inputs": list(inputs), "outputs": list(outputs)} | options)
+
+
+def _block_size(kernel: wp.Kernel, device: Any) -> tuple[int, int]:
+    if phases.ON and phases.kind(kernel):
+        return 1, 1  # it is not launched, and the true number would have it compiled
+    return _noting.original(wp, "get_suggested_block_size")(kernel, device)
+
+
+_noting = ScopedReplacement()
+_noting.add({(wp, "launch"): _note, (wp, "get_suggested_block_size"): _block_size})
+
+
+def _of_list(m: Any, d: Any, ctx: Any, inputs: list[Any], pairs: pair_lists.PairList) -> list[Any]:
+    """Inputs of a kernel with a kind's own pairs in place of all."""
+    own = {
+        id(d.ncollision): pairs.count,
+        id(ctx.collision_pair): pairs.pair,
+        id(ctx.collision_pairid): pairs.pairid,
+        id(ctx.collision_worldid): pairs.world,
+    }
+    replaced = [own.get(id(value), value) for value in inputs]
+    assert sum(a is not b for a, b in zip(inputs, replaced, strict=True)) == len(own)
+    return replaced
+
+
+def _in_turn(device: Any) -> Iterator[dict[str, Any]]:
+    """The stream of each kernel, as an option of `warp.launch`; without a GPU none."""
+    if not device.is_cuda:
+        while True:
+            yield {}
+    streams, main = _streams_of(device), device.stream
+    while True:
+        stream = streams[len(_here.used) % len(streams)]
+        if stream not in _here.used:
+            stream.wait_stream(main)
+        _here.used.append(stream)
+        yield {"stream": stream}
 
 
 def _streams_of(device: Any) -> list[wp.Stream]:

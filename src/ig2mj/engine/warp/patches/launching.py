@@ -1,4 +1,4 @@
-"""What a launch of MuJoCo Warp's becomes while our functions run: another kernel, another stream, or itself.
+"""What a launch of MuJoCo Warp's becomes while our functions run: another kernel or itself.
 
 Parts of this package that change launches rather than functions have a function that is given a kernel, its dimensions
 and its inputs, and answers with what to launch in their place, or None.
@@ -19,9 +19,6 @@ Launch = tuple[wp.Kernel, Any, list[Any]]
 """A kernel, its dimensions, and its inputs."""
 
 Substitute = Callable[[wp.Kernel, Any, Sequence[Any]], Launch | None]
-
-Branch = Callable[[wp.Kernel, Sequence[Any]], "wp.Stream | None"]
-"""The stream that a kernel is launched on; None: the present one."""
 
 Narrow = Callable[[wp.Kernel, Any, Sequence[Any], bool], Launch]
 """What a launch, of tiles where the last is true, becomes while only some worlds take part."""
@@ -45,16 +42,6 @@ def substituted(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any]) -> Launch:
 
 
 @contextlib.contextmanager
-def branching(branch: Branch) -> Iterator[None]:
-    """Inside the block this thread's launches go to the streams that the function names."""
-    _here.branch = branch
-    try:
-        yield
-    finally:
-        _here.branch = None
-
-
-@contextlib.contextmanager
 def narrowing(narrow: Narrow) -> Iterator[None]:
     """Inside the block this thread's launches become those that the function names, after all else."""
     _here.narrow = narrow
@@ -75,10 +62,6 @@ def resolved(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any], tiled: bool = F
 def launch(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any] = (), *args: Any, **kwargs: Any) -> Any:
     """In place of `warp.launch`."""
     kernel, dim, inputs = resolved(kernel, dim, inputs)
-    branch: Branch | None = getattr(_here, "branch", None)
-    stream = branch(kernel, inputs) if branch else None
-    if stream is not None:
-        kwargs["stream"] = stream
     return original(wp, "launch")(kernel, dim, inputs, *args, **kwargs)
 
 

@@ -1,0 +1,102 @@
+"""Convex pairs listed by kind, and looked at in two phases: the same contacts."""
+
+from __future__ import annotations
+
+import types
+
+import mujoco
+import numpy as np
+import pytest
+import warp as wp
+from mujoco.mjx.third_party import mujoco_warp
+
+from ig2mj.engine.warp.patches import awake_kernels, pins
+
+if pins.mismatches():
+    pytest.skip(f"our kernels do not fit: {pins.mismatches()}", allow_module_level=True)
+
+from ig2mj.engine.warp.patches import pair_lists, phases
+
+WORLDS = 16
+BOX, CAPSULE, MESH = (int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("BOX", "CAPSULE", "MESH"))
+
+SHAPES = (
+    'type="box" size="0.05 0.04 0.03"',
+    'type="mesh" mesh="wedge"',
+    'type="capsule" size="0.03 0.05"',
+    'type="cylinder" size="0.04 0.03"',
+)
+BODIES = "".join(
+    f'<body pos="{0.07 * (k % 4)} {0.07 * (k // 4 % 2)} {0.05 + 0.07 * (k // 8)}" euler="{20 * k} {35 * k} 0">'
+    f'<freejoint/><geom {SHAPES[(k + k // 4) % 4]} gap="0.003"/></body>'
+    for k in range(16)
+)
+SCENE = f"""<mujoco><option timestep="0.00833333" integrator="implicitfast"><flag sleep="enable"/></option>
+<asset><mesh name="wedge" vertex="-.05 -.04 -.03 .05 -.04 -.03 -.05 .04 -.03 .05 .04 -.03 -.05 0 .04 .05 0 .04"/>
+</asset>
+<worldbody><geom type="box" size="1 1 0.05" pos="0 0 -0.05"/>{BODIES}</worldbody></mujoco>"""
+
+
+def test_every_pair_is_in_the_list_of_its_kind_beside_those_of_the_same_geoms():
+    rng = np.random.default_rng(0)
+    kind_of_geom = np.array([BOX, BOX, CAPSULE, MESH, MESH])
+    pairs = np.sort(rng.integers(0, 5, (500, 2)), axis=1)
+    pairs = pairs[kind_of_geom[pairs[:, 0]] <= MESH].astype(np.int32)
+    order = np.argsort(kind_of_geom[pairs], axis=1, kind="stable")
+    pairs = np.take_along_axis(pairs, order, axis=1)
+    worlds = rng.integers(0, 40, len(pairs)).astype(np.int32)
+    marks = np.stack([np.arange(len(pairs)), -np.arange(len(pairs))], axis=1).astype(np.int32)
+    m = types.SimpleNamespace(geom_type=wp.array(kind_of_geom.astype(np.int32), dtype=int))
+    d = types.SimpleNamespace(ncollision=wp.array([400], dtype=int), naconmax=len(pairs))
+    ctx = types.SimpleNamespace(
+        collision_pair=wp.array(pairs, dtype=wp.vec2i),
+        collision_pairid=wp.array(marks, dtype=wp.vec2i),
+        collision_worldid=wp.array(worlds, dtype=int),
+    )
+    kinds = [(BOX, MESH), (CAPSULE, MESH), (BOX, BOX)]
+    for kind, found in zip(kinds, pair_lists.listed_by_kind(m, d, ctx, kinds), strict=True):
+        expected = [i for i in range(400) if tuple(kind_of_geom[pairs[i]]) == kind]
+        count = int(found.count.numpy()[0])
+        places = found.pairid.numpy()[:count, 0]
+        assert count == len(expected) > 10 and sorted(places) == expected
+        assert np.array_equal(found.pair.numpy()[:count], pairs[places])
+        assert np.array_equal(found.world.numpy()[:count], worlds[places])
+        changes = (np.diff(found.pair.numpy()[:count], axis=0) != 0).any(axis=1).sum()
+        assert changes < len(np.unique(pairs[expected], axis=0)), "each pair of geoms begins once"
+
+
+def _contacts(model: mujoco.MjModel, start: mujoco.MjData, qpos: np.ndarray) -> np.ndarray:
+    """Rows of all contacts in worlds with these positions, sorted: world, geoms, depth, place, normal."""
+    put = mujoco_warp.put_model(model)
+    put.opt.warn_overflow = 0
+    data = mujoco_warp.put_data(model, start, nworld=len(qpos), naconmax=2000, naccdmax=900, njmax=600, nvmax=model.nv)
+    data.qpos.assign(qpos)
+    with awake_kernels():
+        mujoco_warp.kinematics(put, data)
+        mujoco_warp.collision(put, data)
+    assert not data.overflow.numpy().any()
+    count = int(data.nacon.numpy()[0])
+    contact = data.contact
+    columns = [contact.worldid, contact.geom, contact.dist, contact.pos, contact.frame]
+    rows = np.concatenate([np.float64(c.numpy()[:count].reshape(count, -1)) for c in columns], axis=1)[:, :10]
+    return rows[np.lexsort(np.round(rows, 4).T[::-1])]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("lists", "two"), [(True, False), (False, True), (True, True)])
+def test_contacts_are_those_of_one_kernel_for_each_kind(monkeypatch, lists, two):
+    model = mujoco.MjModel.from_xml_string(SCENE)
+    start = mujoco.MjData(model)
+    qpos = []
+    for _ in range(WORLDS):
+        mujoco.mj_step(model, start, nstep=3)
+        qpos.append(start.qpos.copy())
+    expected = _contacts(model, start, np.float32(qpos))
+    monkeypatch.setattr(pair_lists, "ON", lists)
+    monkeypatch.setattr(phases, "ON", two)
+    found = _contacts(model, start, np.float32(qpos))
+    kinds = {tuple(model.geom_type[row[1:3].astype(int)]) for row in expected}
+    assert len(kinds) > 5, "boxes, meshes, capsules and cylinders touch each other"
+    assert (expected[:, 3] > 0).sum() > 20 and (expected[:, 3] < -0.001).sum() > 20, "near and in each other"
+    assert np.array_equal(expected[:, :3], found[:, :3])
+    assert np.allclose(expected, found, atol=1e-5)
