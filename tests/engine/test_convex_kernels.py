@@ -43,7 +43,7 @@ def test_every_pair_is_in_the_list_of_its_kind_beside_those_of_the_same_geoms():
     pairs = np.sort(rng.integers(0, 5, (500, 2)), axis=1)
     pairs = pairs[kind_of_geom[pairs[:, 0]] <= MESH].astype(np.int32)
     order = np.argsort(kind_of_geom[pairs], axis=1, kind="stable")
-    pairs = np.take_along_axis(pairs, order, axis=1)
+    pairs: np.ndarray = np.take_along_axis(pairs, order, axis=1)
     worlds = rng.integers(0, 40, len(pairs)).astype(np.int32)
     marks = np.stack([np.arange(len(pairs)), -np.arange(len(pairs))], axis=1).astype(np.int32)
     m = types.SimpleNamespace(geom_type=wp.array(kind_of_geom.astype(np.int32), dtype=int))
@@ -57,7 +57,7 @@ def test_every_pair_is_in_the_list_of_its_kind_beside_those_of_the_same_geoms():
     for kind, found in zip(kinds, pair_lists.listed_by_kind(m, d, ctx, kinds), strict=True):
         expected = [i for i in range(400) if tuple(kind_of_geom[pairs[i]]) == kind]
         count = int(found.count.numpy()[0])
-        places = found.pairid.numpy()[:count, 0]
+        places = found.pairid.numpy()[:count, 0].astype(int)
         assert count == len(expected) > 10 and sorted(places) == expected
         assert np.array_equal(found.pair.numpy()[:count], pairs[places])
         assert np.array_equal(found.world.numpy()[:count], worlds[places])
@@ -78,7 +78,7 @@ def _contacts(model: mujoco.MjModel, start: mujoco.MjData, qpos: np.ndarray) -> 
     count = int(data.nacon.numpy()[0])
     contact = data.contact
     columns = [contact.worldid, contact.geom, contact.dist, contact.pos, contact.frame]
-    rows = np.concatenate([np.float64(c.numpy()[:count].reshape(count, -1)) for c in columns], axis=1)[:, :10]
+    rows = np.concatenate([c.numpy()[:count].reshape(count, -1).astype(float) for c in columns], axis=1)[:, :10]
     return rows[np.lexsort(np.round(rows, 4).T[::-1])]
 
 
@@ -91,10 +91,10 @@ def test_contacts_are_those_of_one_kernel_for_each_kind(monkeypatch, lists, two)
     for _ in range(WORLDS):
         mujoco.mj_step(model, start, nstep=3)
         qpos.append(start.qpos.copy())
-    expected = _contacts(model, start, np.float32(qpos))
+    expected = _contacts(model, start, np.array(qpos, np.float32))
     monkeypatch.setattr(pair_lists, "ON", lists)
     monkeypatch.setattr(phases, "ON", two)
-    found = _contacts(model, start, np.float32(qpos))
+    found = _contacts(model, start, np.array(qpos, np.float32))
     kinds = {tuple(model.geom_type[row[1:3].astype(int)]) for row in expected}
     assert len(kinds) > 5, "boxes, meshes, capsules and cylinders touch each other"
     assert (expected[:, 3] > 0).sum() > 20 and (expected[:, 3] < -0.001).sum() > 20, "near and in each other"

@@ -10,11 +10,10 @@ these in their place; results are the same up to rounding:
   stay as they are (`resting`).
 - Constraint rows and entries of the Hessian have a thread for each that fits into a buffer, in every iteration of the
   solver. Here a few threads of each world go through those that there are (`lanes`).
-- The solver goes on for all worlds until the last has converged. Here later iterations go through a list of those that
-  have not (`stragglers`; on trial: off unless IG2MJ_KERNELS names it).
 - The broad phase of collision detection goes through all pairs of geoms (`broadphase`).
 - The kernels of convex pairs follow each other, and each waits for its slowest pair. Here they run side by side
-  (`branches`).
+  (`branches`). On trial, off unless IG2MJ_KERNELS names it: each goes through the pairs of its own kind only
+  (`pair_lists`: "sorted"), and depths of what touches are for a second kernel (`phases`).
 - One thread of each world puts its trees to sleep, one after the other (`sleeping`).
 - Gravity compensation is launched for every (world, body, degree of freedom). Here it is for every (world, body).
 - Islands get a numbering that nobody reads (`spared`).
@@ -121,13 +120,13 @@ def engine_kernels() -> Iterator[None]:
             yield
 
 
-def launched(kernel: wp.Kernel, dim: Any = 1, tiled: bool = False) -> wp.Kernel:
+def launched(kernel: wp.Kernel, dim: Any = 1) -> wp.Kernel:
     """The kernel that is launched now, in this thread, in place of one of MuJoCo Warp's; that one where it stays."""
     if not KERNELS.active:
         return kernel
-    from ig2mj.engine.warp.patches.launching import resolved
+    from ig2mj.engine.warp.patches.launching import substituted
 
-    return resolved(kernel, dim, (), tiled)[0]
+    return substituted(kernel, dim, ())[0]
 
 
 @contextlib.contextmanager

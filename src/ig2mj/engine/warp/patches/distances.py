@@ -82,12 +82,13 @@ def closest_of_simplex(n: int, simplex: mat43) -> wp.vec4:
 
 def _rebuilt(function: wp.Function, **names: Any) -> wp.Function:
     """A function of MuJoCo Warp's that calls others by these names."""
-    text = textwrap.dedent(inspect.getsource(function.func)).split("\n", 1)[1]  # without its decorator
-    file = f"<{function.func.__name__} of ig2mj>"
+    upstream: Any = function.func
+    text = textwrap.dedent(inspect.getsource(upstream)).split("\n", 1)[1]  # without its decorator
+    file = f"<{upstream.__name__} of ig2mj>"
     linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # Warp reads the source there
-    space: dict[str, Any] = {**function.func.__globals__, **names, "__name__": __name__}
+    space: dict[str, Any] = {**upstream.__globals__, **names, "__name__": __name__}
     exec(compile(text, file, "exec", dont_inherit=True), space)
-    return wp.func(space[function.func.__name__])
+    return wp.func(space[upstream.__name__])
 
 
 small_gjk = _rebuilt(collision_gjk.gjk, _subdistance=closest_of_simplex)

@@ -10,7 +10,7 @@ On trial: IG2MJ_KERNELS=phases; not measured on a GPU yet.
 """
 
 # Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
-# pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
+# pyright: reportGeneralTypeIssues=false, reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
 
 from __future__ import annotations
 
