@@ -78,3 +78,11 @@ def test_what_slept_with_an_agent_wakes_without_it(full):
     asleep[:3] = [1, trees, 2]  # 0 -> 1 -> the agent's tree; 2 sleeps alone
     woken = row.replace(scene=row.scene.replace(tree_asleep=asleep)).without_agents().scene.tree_asleep
     assert (woken[:2] < 0).all() and woken[2] == 2
+
+
+def test_the_first_world_is_where_reset_puts_one(full):
+    row, view = full.engine.first_world()
+    assert_same(row, full.first)
+    seen = jax.tree.map(lambda a: np.asarray(a[:1]), full.view(full.fresh()))
+    for name in ("object_pos", "object_quat", "aabb_low", "aabb_high", "object_com"):
+        np.testing.assert_allclose(getattr(view, name), getattr(seen, name), atol=1e-5)

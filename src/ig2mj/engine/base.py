@@ -118,6 +118,13 @@ class Engine(Protocol):
         """All worlds at the scene's initial state (its first keyframe, else its zero pose), everything awake."""
         ...
 
+    def first_world(self) -> tuple[Snapshot, PhysicsView]:
+        """What `reset` makes of one world, in numpy arrays: its snapshot without the world axis, and its view (W = 1).
+
+        Never traced, and nothing is compiled for it.
+        """
+        ...
+
     def step(self, physics: Physics, ctrl: Float[Array, "W nu"] | None = None) -> tuple[Physics, PhysicsView]:
         """One control step of every world.
 

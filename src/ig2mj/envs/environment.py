@@ -27,6 +27,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt
 
 from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.engine.base import Physics
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.envs.observations import Observer, Space
 from ig2mj.envs.state import EnvState, Seen
@@ -102,7 +103,7 @@ class Environment:
             self._step = jax.jit(self.step_fn, donate_argnums=0)
             self._reset = jax.jit(self.reset_fn, donate_argnums=0)
             self._autoreset = jax.jit(self.step_autoreset_fn, donate_argnums=0)
-            self._start = jax.jit(self._start_fn)
+            self._start = jax.jit(self._start_fn, donate_argnums=0)
         else:
             self._step, self._reset, self._start = self.step_fn, self.reset_fn, self._start_fn
             self._autoreset = self.step_autoreset_fn
@@ -198,10 +199,10 @@ class Environment:
         """
         if isinstance(seed, EnvState):
             return self._reset(seed, np.ones(self.num_worlds, bool) if mask is None else mask)
-        return self._start(as_seed(seed))
+        return self._start(self.core.engine.reset(), as_seed(seed))
 
-    def _start_fn(self, seed: int | Int[Array, ""]) -> EnvState:
-        batch = self.core.start_fn(seed)
+    def _start_fn(self, physics: Physics, seed: int | Int[Array, ""]) -> EnvState:
+        batch = self.core.start_fn(physics, seed)
         return self._begun(batch, jnp.ones(self.num_worlds, bool), None)
 
     def start_from(self, rows: Int[np.ndarray, "W"], seed: Seed = 0) -> EnvState:

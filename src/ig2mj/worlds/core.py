@@ -102,14 +102,14 @@ class Core:
             self._step = jax.jit(self.step_fn, donate_argnums=0)
             self._reset = jax.jit(self.reset_fn, donate_argnums=0)
             self._rollout = jax.jit(self._scanned, static_argnums=(2, 3), donate_argnums=(0, 1))
-            self._begin = jax.jit(self._episode_0, donate_argnums=0)
+            self._begin = jax.jit(self.start_fn, donate_argnums=0)
             self._write, self._load = jax.jit(self.write_fn, donate_argnums=0), jax.jit(self.load_fn, donate_argnums=0)
             self._react = rules.step if rules is not None else self._no_rules
             self._if_any, self._index = _cond_any, jnp.asarray
         else:
             self.advance, self.grasp = self.advance_fn, self.hands.act
             self._step, self._reset = self.step_fn, self.reset_fn
-            self._rollout, self._begin = self._looped, self._episode_0
+            self._rollout, self._begin = self._looped, self.start_fn
             self._write, self._load = self.write_fn, self.load_fn
             self._react = StateStepper.of(rules, engine.num_worlds).step if rules is not None else self._no_rules
             self._if_any, self._index = _call, np.asarray
@@ -275,33 +275,13 @@ class Core:
         """
         return self._begin(self.engine.reset(), seed, first)
 
-    def start_fn(self, seed: int | Int[Array, ""] = 0, first: int | Int[Array, ""] = 0) -> Batch:
-        """`start`, not compiled."""
-        return self._episode_0(self.engine.reset(), seed, first)
+    def start_fn(self, physics: Physics, seed: int | Int[Array, ""] = 0, first: int | Int[Array, ""] = 0) -> Batch:
+        """`start`, not compiled.
 
-    def reset(self, batch: Batch, mask: Bool[Array, "W"]) -> Batch:
-        """Starts a new episode in the masked worlds, from a random row of the pool."""
-        return self._reset(batch, mask)
-
-    def reset_fn(self, batch: Batch, mask: Bool[Array, "W"]) -> Batch:
-        """`reset`, not compiled."""
-        world = batch.world
-        episode, key, row = self.starts.draw(batch.seed, batch.number, batch.episode, mask)
-        rows = self.starts.pool.rows(self._index(row))
-        physics = self.engine.load(world.physics, rows.physics, mask)
-        zero = jnp.zeros_like(world.step), jnp.zeros_like(world.time)
-        started = (rows.states, key, *zero, self.first_controllers(), self.hands.read(physics))
-        going = (world.states, world.key, world.step, world.time, batch.controllers, batch.grasps)
-        states, key, step, time, controllers, grasps = self._chosen(mask, started, going)
-        view = self.eyes.seen(self.engine.view(physics), controllers)
-        world = WorldState(physics=physics, view=view, states=states, key=key, step=step, time=time)
-        flags = jnp.where(mask, 0, batch.flags)
-        return dataclasses.replace(
-            batch, world=world, controllers=controllers, grasps=grasps, episode=episode, flags=flags
-        )
-
-    def _episode_0(self, physics: Physics, seed: int | Int[Array, ""], first: int | Int[Array, ""]) -> Batch:
-        """The start, from physics in any state."""
+        Args:
+          physics: `engine.reset()`, handed in since it would be thousands of constants in a compiled program.
+          seed, first: as for `start`.
+        """
         count = self.engine.num_worlds
         nothing = jnp.zeros(count, jnp.int32)
         world = WorldState(
@@ -323,6 +303,27 @@ class Core:
             troubles=jnp.zeros((count, len(guards.Flag)), jnp.int32),
         )
         return self.reset_fn(batch, jnp.ones(count, bool))
+
+    def reset(self, batch: Batch, mask: Bool[Array, "W"]) -> Batch:
+        """Starts a new episode in the masked worlds, from a random row of the pool."""
+        return self._reset(batch, mask)
+
+    def reset_fn(self, batch: Batch, mask: Bool[Array, "W"]) -> Batch:
+        """`reset`, not compiled."""
+        world = batch.world
+        episode, key, row = self.starts.draw(batch.seed, batch.number, batch.episode, mask)
+        rows = self.starts.pool.rows(self._index(row))
+        physics = self.engine.load(world.physics, rows.physics, mask)
+        zero = jnp.zeros_like(world.step), jnp.zeros_like(world.time)
+        started = (rows.states, key, *zero, self.first_controllers(), self.hands.read(physics))
+        going = (world.states, world.key, world.step, world.time, batch.controllers, batch.grasps)
+        states, key, step, time, controllers, grasps = self._chosen(mask, started, going)
+        view = self.eyes.seen(self.engine.view(physics), controllers)
+        world = WorldState(physics=physics, view=view, states=states, key=key, step=step, time=time)
+        flags = jnp.where(mask, 0, batch.flags)
+        return dataclasses.replace(
+            batch, world=world, controllers=controllers, grasps=grasps, episode=episode, flags=flags
+        )
 
     # Changes from outside.
 

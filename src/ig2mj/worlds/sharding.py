@@ -64,12 +64,13 @@ class ShardedWorlds:
         self._first = jax.process_index() * len(self.devices) * self.part
         self._sharding = NamedSharding(Mesh(np.array(self.devices), (AXIS,)), PartitionSpec(AXIS))
         self._threads = ThreadPoolExecutor(len(self.devices), "ig2mj-device")
-        self._start = jax.jit(self.local.start_fn)
         _ = self.local.starts.pool, self.local.starts.floor  # made here, once, and not on every device's thread
 
     def start(self, seed: int = 0) -> Shards:
         """All worlds at the start of episode 0."""
-        return Shards(tuple(self._each(lambda k: self._start(jnp.int32(seed), jnp.int32(self._first + k * self.part)))))
+        return Shards(
+            tuple(self._each(lambda k: self.local.start(jnp.int32(seed), jnp.int32(self._first + k * self.part))))
+        )
 
     def step(self, shards: Shards, action: Float[Array, "W n"] | None = None) -> tuple[Shards, GoalStatus]:
         """One control step of every world, and what the goal says, over all worlds of this process.

@@ -48,10 +48,7 @@ class Starts:
     @functools.cached_property
     def _scene(self) -> tuple[Snapshot, PhysicsView]:
         """One world where the engine's reset puts it."""
-        with jax.ensure_compile_time_eval():
-            physics = self._engine.reset()
-            view = jax.tree.map(lambda a: np.asarray(a[:1]), self._engine.view(physics))
-            return self._engine.export(physics, 0), view
+        return self._engine.first_world()
 
     def draw(
         self, seed: Int[Array, ""], number: Int[Array, "W"], episode: Int[Array, "W"], mask: Bool[Array, "W"]

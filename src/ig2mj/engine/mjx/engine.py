@@ -83,8 +83,9 @@ class MjxEngine(abc.ABC):
         self.host_model = self._host_model(scene.model)
         self.layout: ModelLayout = make_layout(self.host_model, self.tables)
         self.plan: ViewPlan = plan_view(self.host_model, self.tables, self.layout, boxes)
-        start = self._scene_start(touch_tolerance)
-        self._initial = fitted(initial, start, 1, scene.name) if initial is not None else start
+        # C MuJoCo's start: all engines begin alike, and MJX need not compile a forward pass.
+        ways = {"timestep": timestep, "touch_tolerance": touch_tolerance, "boxes": boxes, "model_fields": model_fields}
+        self._initial, self._first_view = NativeEngine(scene, **ways).first_world(initial)
         self._pyramidal = self.host_model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
         try:
             self.model = uncommitted(self._put_model(self.host_model))
@@ -133,6 +134,10 @@ class MjxEngine(abc.ABC):
     def reset(self) -> MjxPhysics:
         """All worlds at the initial state."""
         return self._first(self._template, self._initial)
+
+    def first_world(self) -> tuple[Snapshot, PhysicsView]:
+        """What `reset` makes of one world, by C MuJoCo; see `Engine.first_world`."""
+        return self._initial, self._first_view
 
     def step(self, physics: MjxPhysics, ctrl: Float[Array, "W nu"] | None = None) -> tuple[MjxPhysics, PhysicsView]:
         """One control step of every world; see `Engine.step`."""
@@ -298,13 +303,6 @@ class MjxEngine(abc.ABC):
         return mujoco_of(self.export(physics, world), self.host_model, self.tables)
 
     # Stages.
-
-    def _scene_start(self, touch_tolerance: float) -> Snapshot:
-        """The scene's initial state, by C MuJoCo: all engines begin alike, and MJX need not compile a forward pass."""
-        native = NativeEngine(
-            self.scene, timestep=self.timestep, touch_tolerance=touch_tolerance, model_fields=self.model_fields
-        )
-        return native.export(native.reset(), 0)
 
     def _start_all(self, template: mjx.Data, initial: Snapshot) -> MjxPhysics:
         """Every world at `initial`, which has no world axis; the rest of the data is the template's."""

@@ -85,4 +85,4 @@ def uncommitted(tree: Any) -> Any:
     A program's outputs are committed as soon as one of its inputs is, and JAX compiles anew for arguments that are: a
     loop whose carry begins with arrays of the caller's own would compile its program twice.
     """
-    return jax.tree.map(lambda a: jnp.asarray(np.asarray(a)) if isinstance(a, jax.Array) else a, tree)
+    return jax.tree.map(lambda a: jax.device_put(np.asarray(a)) if isinstance(a, jax.Array) else a, tree)

@@ -210,6 +210,19 @@ class NativeEngine:
         physics.update(self._run(physics, World.start))
         return physics
 
+    def first_world(self, initial: Snapshot | None = None) -> tuple[Snapshot, PhysicsView]:
+        """What `reset` makes of one world; see `Engine.first_world`.
+
+        Args:
+          initial: a snapshot of one world, or of its bare scene, to be there instead.
+        """
+        physics = self.reset()
+        row = self.export(physics, 0)
+        if initial is not None:
+            row = fitted(initial, row, 1, self.scene.name)
+            physics = self.load(physics, row)
+        return row, jax.tree.map(lambda a: np.array(a[:1]), self.view(physics))
+
     @functools.cached_property
     def _start(self) -> Snapshot:
         """World 0 of a reset."""

@@ -30,6 +30,7 @@ from ig2mj.engine.view import Array
 from ig2mj.engine.warp import kernels, patches
 from ig2mj.engine.warp.patches.flags import REPLACED
 from ig2mj.engine.warp.patches.ignored import DROP, encode
+from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile, fit, holds_everything, profile_of_scene
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_warp
@@ -149,16 +150,17 @@ class WarpEngine(MjxEngine):
 
     def _put_data(self, model: mujoco.MjModel, data: mujoco.MjData) -> mjx.Data:
         worlds, profile = self._worlds_of_buffers, self.profile
-        return mjx.put_data(
-            model,
-            data,
-            own_device(),
-            impl="warp",
-            naconmax=worlds * profile.contacts,
-            naccdmax=worlds * profile.convex_contacts,
-            njmax=profile.constraints,
-            nvmax=profile.awake_dofs,
-        )
+        with _ZEROED.entered():
+            return mjx.put_data(
+                model,
+                data,
+                own_device(),
+                impl="warp",
+                naconmax=worlds * profile.contacts,
+                naccdmax=worlds * profile.convex_contacts,
+                njmax=profile.constraints,
+                nvmax=profile.awake_dofs,
+            )
 
     def _contacts(self, data: mjx.Data) -> Contacts:
         return warp_contacts(data)
@@ -182,6 +184,12 @@ class WarpEngine(MjxEngine):
 
     def _overflow(self, data: mjx.Data) -> Int[Array, "W"]:
         return data._impl.overflow
+
+
+_ZEROED = ScopedReplacement()
+"""Data begins as zeros where MuJoCo Warp leaves memory as it was, which nothing reads before it is written. In programs
+that hold data as constants such memory would be other numbers each time, and no cache of programs would know them."""
+_ZEROED.add({(wp, "empty"): wp.zeros})
 
 
 @functools.cache
