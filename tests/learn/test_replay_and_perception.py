@@ -207,3 +207,14 @@ def test_the_depth_at_the_brightest_point_is_seen():
     assert coarse(jnp.asarray(depth), (3, 4)).shape == (1, 3, 4)
     found = np.asarray(brightest(jnp.asarray(maps), coarse(jnp.asarray(depth), (3, 4))))
     assert np.allclose(found, [[1, 1, 1, 1, 1]], atol=1e-4), "row, column, depth, and depth times them"
+
+
+def test_half_precision_on_a_gpu_sees_nearly_the_same(monkeypatch):
+    encoder = Encoder((12, 16, 4), "places")
+    picture = jax.random.randint(jax.random.PRNGKey(0), (3, 12 * 16 * 4), 0, 256).astype(jnp.uint8)
+    params = encoder.init(jax.random.PRNGKey(1), picture)
+    full = np.asarray(encoder.apply(params, picture))
+    monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
+    half = np.asarray(encoder.apply(params, picture))
+    assert full.dtype == half.dtype == np.float32
+    assert 0 < np.abs(full - half).max() < 0.1

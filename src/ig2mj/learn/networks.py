@@ -48,8 +48,8 @@ class Encoder(nn.Module):
     numbers between -1 and 1, as in Squint. `paper`: three convolutions and 256 numbers (iGibson 2.0, appendix A.3).
     `points`: `small`'s numbers, and where in the picture each of 32 channels is brightest after two halvings (the
     spatial softmax of Levine et al. 2016), so that the place of a thin object need not be read from four by four coarse
-    cells. `places`: the same, with how far away it is there, and in half precision. Depth times row and column is what
-    a place in the camera's frame is linear in.
+    cells. `places`: the same, with how far away it is there, on a GPU in half precision. Depth times row and column is
+    what a place in the camera's frame is linear in.
     """
 
     shape: tuple[int, int, int]
@@ -59,7 +59,8 @@ class Encoder(nn.Module):
     def __call__(self, picture: UInt8[Array, "B q"]) -> Float[Array, "B f"]:
         seen = x = picture.reshape(-1, *self.shape).astype(jnp.float32) / 255.0 - 0.5
         halvings = 3 if self.net == "paper" else max(3, math.ceil(math.log2(self.shape[0] / 4)))
-        places, dtype = jnp.zeros((x.shape[0], 0)), jnp.bfloat16 if self.net == "places" else jnp.float32
+        half = self.net == "places" and jax.default_backend() == "gpu"  # processors have no fast way to do it
+        places, dtype = jnp.zeros((x.shape[0], 0)), jnp.bfloat16 if half else jnp.float32
         for k, channels in enumerate((32, *[64] * (halvings - 1))):
             x = nn.relu(nn.Conv(channels, (3, 3), strides=2, padding="SAME", dtype=dtype)(x))
             if self.net in ("points", "places") and k == 1:
