@@ -203,11 +203,7 @@ def measure(options: argparse.Namespace) -> int:
     end = time.monotonic() + 60 * options.minutes
     options.out.mkdir(parents=True, exist_ok=True)
     file = options.out / "rows.jsonl"
-    there = (
-        set()
-        if options.anew
-        else {(*(r[k] for k in Part.__annotations__ if k != "episodes"),) for r in read_rows(file)}
-    )
+    there = set() if options.anew else {_key(row) for row in read_rows(file)}
     todo = [part for part in parts(options) if part.key not in there]
     if todo:
         names = dict.fromkeys(part.task for part in todo)

@@ -39,3 +39,14 @@ def test_every_held_out_state_is_in_one_part():
     )
     played = [n for part in experts.parts(options) for n in range(part.first, part.first + part.count)]
     assert sorted(played) == list(range(60))
+
+
+def test_parts_on_file_are_not_played_again_even_those_of_before_there_were_variants(tmp_path, capsys):
+    rows = [row(task="SlicingFruit", grasping="mitten", first=first) for first in (0, 25)]
+    (tmp_path / "rows.jsonl").write_text("".join(json.dumps(r) + "\n" for r in rows))
+    options = argparse.Namespace(
+        tasks=["SlicingFruit"], robots=["fetch"], grasping=["mitten"], variants=[0], episodes=50, worlds=25
+    )
+    options.out, options.minutes, options.jobs, options.anew = tmp_path, 1.0, 1, False
+    assert experts.measure(options) == 0
+    assert "0 of 0 parts played" in capsys.readouterr().out
