@@ -37,6 +37,9 @@ from ig2mj.worlds.rules import Rules
 SETTLE_STEPS = 200
 """Control steps given to the home to come to rest."""
 
+PLACES = 16
+"""Places between which the object that moves goes about."""
+
 TURN = 0.05
 """Seconds of one turn of a measurement; the best of many turns counts, for other work only ever slows one."""
 
@@ -89,13 +92,15 @@ def one_world(scene: ig2mj.Scene, rules: Rules, seconds: float) -> list[Row]:
     assert loose[0] != named
 
     def pushed(obj: int) -> list[PhysicsView]:
-        """Two views between which one object moves a millimetre, back and forth."""
-        two = [jax.tree.map(np.copy, view) for _ in range(2)]
-        body = scene.tables.object_root[obj]
-        for name, row in (("object_com", obj), ("object_pos", obj), ("aabb_low", obj), ("aabb_high", obj)):
-            getattr(two[1], name)[0, row] += 1e-3
-        two[1].body_pos[0, body] += 1e-3
-        return two
+        """Views between which one object moves on by a millimetre each, never to where it lay at first."""
+        body, views = scene.tables.object_root[obj], []
+        for k in range(1, PLACES + 1):
+            there = jax.tree.map(np.copy, view)
+            for name, row in (("object_com", obj), ("object_pos", obj), ("aabb_low", obj), ("aabb_high", obj)):
+                getattr(there, name)[0, row] += 1e-3 * k
+            there.body_pos[0, body] += 1e-3 * k
+            views.append(there)
+        return views
 
     moved, moved_named = pushed(int(loose[0])), pushed(named)
     still, cooling, moving, moving_named, beside = (Stepped(rules) for _ in range(5))
@@ -118,9 +123,9 @@ def one_world(scene: ig2mj.Scene, rules: Rules, seconds: float) -> list[Row]:
             "the same with states and goal": with_physics,
             "states and goal, nothing moves": lambda: still.step(view),
             "states and goal, an object cools": lambda: cooling.step(view),
-            "states and goal, one object moves": lambda: moving.step(moved[moving.count % 2]),
-            "the same, the goal is about it": lambda: moving_named.step(moved_named[moving_named.count % 2]),
-            "states without a goal, one object moves": lambda: aimless.step(moved[aimless.count % 2]),
+            "states and goal, one object moves": lambda: moving.step(moved[moving.count % PLACES]),
+            "the same, the goal is about it": lambda: moving_named.step(moved_named[moving_named.count % PLACES]),
+            "states without a goal, one object moves": lambda: aimless.step(moved[aimless.count % PLACES]),
         },
         seconds,
     )

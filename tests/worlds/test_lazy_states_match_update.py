@@ -249,7 +249,7 @@ def test_states_changed_from_outside_are_seen():
     for _ in range(3):
         states, _, status = stepper.step(states, VIEWS[0])
     assert not status.holds[0]
-    states = states.replace(toggled_on=states.toggled_on.at[0, 0].set(True))
+    states = states.replace(toggled_on=jnp.asarray(states.toggled_on).at[0, 0].set(True))
     states, _, status = stepper.step(states, VIEWS[0])
     assert status.holds[0]
 

@@ -234,9 +234,13 @@ def inherit(particles: Particles, rows: Int[np.ndarray, "R"], cut: Cut) -> Parti
     normal = quat_rotate_inverse(turn, particles.normal[:, start])
     root = np.broadcast_to(tables.object_root[obj][:, None], particles.body[:, start].shape)
 
+    at = np.zeros(len(rows), int)  # by selection: XLA fuses that, but not a scatter
+    at[to] = np.arange(len(to))
+    chosen = mask[:, at] & np.isin(np.arange(len(at)), to)
+
     def put_rows(field: Array, value: Array) -> Array:
-        chosen = mask.reshape(*mask.shape, *[1] * (field.ndim - 2))
-        return jnp.asarray(field).at[:, to].set(jnp.where(chosen, value, field[:, to]).astype(field.dtype))
+        these = chosen.reshape(*chosen.shape, *[1] * (field.ndim - 2))
+        return jnp.where(these, jnp.asarray(value)[:, at].astype(field.dtype), field)
 
     return Particles(
         alive=put_rows(particles.alive, particles.alive[:, start]),

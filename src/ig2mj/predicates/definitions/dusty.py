@@ -7,17 +7,19 @@ import numpy as np
 from jaxtyping import Bool
 
 from ig2mj.engine.view import Array
-from ig2mj.predicates.base import Arguments, Context, Predicate
+from ig2mj.predicates.base import Context, Predicate
 from ig2mj.states.definitions import dust
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import ExtendedStates
 
 
-def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
-    having = context.model.parameters.dust_rows
+def _dusty(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O"]:
+    having, objects = model.parameters.dust_rows, model.tables.num_objects
     if not len(having):
-        return context.none(arguments)
-    rows = np.zeros(context.model.tables.num_objects, int)
+        return jnp.zeros((states.sliced.shape[0], objects), bool)
+    rows = np.zeros(objects, int)
     rows[having] = np.arange(len(having))
-    return jnp.asarray(dust.dusty(context.model, context.states.dust))[:, jnp.asarray(rows)[arguments[:, 0]]]
+    return jnp.asarray(dust.dusty(model, states.dust))[:, rows]  # of objects without dust nobody asks
 
 
 def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
@@ -27,11 +29,9 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
     return f"{alive} of {placed} dust particles, dusty above {limit:.0%}"
 
 
-DUSTY = Predicate(
+DUSTY = Predicate.of_states(
+    _dusty,
     name="dusty",
-    arguments=("object",),
-    evaluate=_evaluate,
-    of_arguments=True,
     ability="dustyable",
     why=_why,
 )

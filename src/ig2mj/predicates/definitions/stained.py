@@ -7,17 +7,19 @@ import numpy as np
 from jaxtyping import Bool
 
 from ig2mj.engine.view import Array
-from ig2mj.predicates.base import Arguments, Context, Predicate
+from ig2mj.predicates.base import Context, Predicate
 from ig2mj.states.definitions import stain
+from ig2mj.states.model import StateModel
+from ig2mj.states.world import ExtendedStates
 
 
-def _evaluate(context: Context, arguments: Arguments) -> Bool[Array, "W P"]:
-    having = context.model.parameters.stain_rows
+def _stained(model: StateModel, states: ExtendedStates) -> Bool[Array, "W O"]:
+    having, objects = model.parameters.stain_rows, model.tables.num_objects
     if not len(having):
-        return context.none(arguments)
-    rows = np.zeros(context.model.tables.num_objects, int)
+        return jnp.zeros((states.sliced.shape[0], objects), bool)
+    rows = np.zeros(objects, int)
     rows[having] = np.arange(len(having))
-    return jnp.asarray(stain.stained(context.model, context.states.stain))[:, jnp.asarray(rows)[arguments[:, 0]]]
+    return jnp.asarray(stain.stained(model, states.stain))[:, rows]  # of objects without stain nobody asks
 
 
 def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
@@ -27,11 +29,9 @@ def _why(context: Context, arguments: tuple[int, ...], world: int) -> str:
     return f"{alive} of {placed} stain particles, stained above {limit:.0%}"
 
 
-STAINED = Predicate(
+STAINED = Predicate.of_states(
+    _stained,
     name="stained",
-    arguments=("object",),
-    evaluate=_evaluate,
-    of_arguments=True,
     ability="stainable",
     why=_why,
 )

@@ -99,11 +99,13 @@ def regions(model: StateModel, view: PhysicsView) -> tuple[Float[Array, "W T 3"]
     low, high = turned_boxes(quat_to_matrix(jnp.concatenate(turns, axis=1)), areas.center, areas.half)
     at = jnp.concatenate(frames, axis=1)
     low, high = low + at, high + at
-    worlds, tools = low.shape[0], len(p.tool_object)
-    return (
-        jnp.full((worlds, tools, 3), jnp.inf).at[:, areas.tool].min(low),
-        jnp.full((worlds, tools, 3), -jnp.inf).at[:, areas.tool].max(high),
-    )
+    boxes = [np.flatnonzero(areas.tool == t) for t in range(len(p.tool_object))]
+    rows = np.full((len(boxes), max(map(len, boxes), default=0)), len(areas.tool))  # beyond the last: a box of nothing
+    for row, own in zip(rows, boxes, strict=True):
+        row[: len(own)] = own
+    nothing = jnp.full((len(low), 1, 3), jnp.inf)
+    low, high = jnp.concatenate([low, nothing], axis=1), jnp.concatenate([high, -nothing], axis=1)
+    return jnp.min(low[:, rows], axis=2), jnp.max(high[:, rows], axis=2)
 
 
 class _Areas(NamedTuple):

@@ -30,6 +30,7 @@ from ig2mj.states.relations.adjacency import (
     VERTICAL_LENGTH,
     VERTICAL_LINE,
 )
+from ig2mj.states.relations.worklist import Worklist
 
 LINES = np.concatenate([HORIZONTAL_LINES, VERTICAL_LINE])
 
@@ -77,17 +78,14 @@ class ContainerPairs:
         worlds, count = needed.shape
         chunk = min(worlds * count, max(SMALLEST_CHUNK, round(CHUNKS_PER_WORLD * worlds)))
         # Container by container, and within one world by world: number = place in `order` * W + world.
-        mask = needed[:, self.order].T.reshape(-1)
-        rank = jnp.cumsum(mask)
-        numbers = jnp.nonzero(mask, size=worlds * count, fill_value=worlds * count)[0]
-        numbers = jnp.concatenate([numbers, jnp.full(chunk, worlds * count)])
-        before = jnp.concatenate([jnp.zeros(1, rank.dtype), rank])[self.start * worlds]
-        found: jax.Array = jnp.zeros(worlds * count, bool)
-        first = 0
+        listed = Worklist.of(needed[:, self.order].T.reshape(-1))
+        before = jnp.concatenate([jnp.zeros(1, listed.until.dtype), listed.until])[self.start * worlds]
+        answers, first = listed.no_answers(chunk), 0
         for table in self.tables:
             limits = before[first : first + len(table.bodies) + 1]
-            found = self._work_off(table, view, numbers, limits, chunk, worlds, found)
+            answers = self._work_off(table, view, listed, limits, chunk, worlds, answers)
             first += len(table.bodies)
+        found = listed.in_place(answers)
         inverse = np.argsort(self.order)
         return found.reshape(count, worlds).T[:, inverse]
 
@@ -95,11 +93,11 @@ class ContainerPairs:
         self,
         table: TargetTable,
         view: PhysicsView,
-        numbers: Int[Array, "N"],
+        listed: Worklist,
         limits: Int[Array, "K"],
         chunk: int,
         worlds: int,
-        found: Bool[jax.Array, "M"],
+        answers: Bool[jax.Array, "M"],
     ) -> Bool[jax.Array, "M"]:
         """Answers the listed pairs of some containers: number k's stand in the list from limits[k] to limits[k + 1]."""
         com = jax.lax.stop_gradient(jnp.asarray(view.object_com))
@@ -108,18 +106,17 @@ class ContainerPairs:
         chunks = (limits[1:] - limits[:-1] + chunk - 1) // chunk
         until = jnp.cumsum(chunks)
 
-        def some(turn: Int[jax.Array, ""], found: Bool[jax.Array, "M"]) -> Bool[jax.Array, "M"]:
+        def some(turn: Int[jax.Array, ""], answers: Bool[jax.Array, "M"]) -> Bool[jax.Array, "M"]:
             k = jnp.sum(until <= turn)
             at = limits[k] + (turn - until[k] + chunks[k]) * chunk
-            number = jax.lax.dynamic_slice(numbers, (at,), (chunk,))
-            valid = at + np.arange(chunk) < limits[k + 1]
+            number = listed.places(at, chunk)
             place, world = number // worlds, number % worlds
             origins = com[world, subject[jnp.minimum(place, len(self.order) - 1)]]
             bodies, targets = table.of(k)
             answer = surrounded(self.model, targets, pos[world][:, bodies], quat[world][:, bodies], origins)
-            return found.at[jnp.where(valid, number, len(found))].set(answer, mode="drop")
+            return listed.noted(answers, at, answer)  # what reaches into the next container's is overwritten later
 
-        return jax.lax.fori_loop(0, until[-1], some, found)
+        return jax.lax.fori_loop(0, until[-1], some, answers)
 
 
 def surrounded(

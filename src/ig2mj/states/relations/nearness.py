@@ -26,6 +26,7 @@ from ig2mj.geometry.gjk import PosedPieces, pair_distance
 from ig2mj.geometry.poses import AnyArray, compose, quat_rotate, quat_to_matrix
 from ig2mj.scene.tables import SceneTables
 from ig2mj.states.model import StateModel
+from ig2mj.states.relations.worklist import Worklist, or_at
 
 SHARE_OF_SIZE = 1 / 6
 """Of the sum of the mean edge lengths (iGibson's next_to.py)."""
@@ -92,21 +93,20 @@ class NearPairs:
         total = worlds * count
         chunk = min(total, max(1, PAIRS_OF_PIECES // (of_a * of_b)))
         mask = needed.T.reshape(-1)  # number = pair * W + world
-        numbers = jnp.nonzero(mask, size=total, fill_value=total)[0]
-        numbers = jnp.concatenate([numbers, jnp.full(chunk, total)])
+        listed = Worklist.of(mask)
         most = limit(view, self.pairs).T.reshape(-1)
         poses = jnp.concatenate([jnp.asarray(view.body_pos), jnp.asarray(view.body_quat)], axis=-1)
         poses = jax.lax.stop_gradient(poses)
 
-        def some(turn: Int[jax.Array, ""], found: Bool[jax.Array, "M"]) -> Bool[jax.Array, "M"]:
-            number = jax.lax.dynamic_slice(numbers, (turn * chunk,), (chunk,))
+        def some(turn: Int[jax.Array, ""], answers: Bool[jax.Array, "M"]) -> Bool[jax.Array, "M"]:
+            number = listed.places(turn * chunk, chunk)
             row = jnp.minimum(number, total - 1)
             answer = self._of_rows(poses, row % worlds, row // worlds, most[row], number < total)
-            return found.at[number].set(answer, mode="drop")
+            return listed.noted(answers, turn * chunk, answer)
 
         turns = (jnp.sum(mask) + chunk - 1) // chunk
-        found = jax.lax.fori_loop(0, turns, some, jnp.zeros(total, bool))
-        return found.reshape(count, worlds).T
+        answers = jax.lax.fori_loop(0, turns, some, listed.no_answers(chunk))
+        return listed.in_place(answers).reshape(count, worlds).T
 
     def _of_rows(
         self,
@@ -129,17 +129,16 @@ class NearPairs:
         close &= (second >= 0)[:, None]
         size = close.size
         block = int(np.clip(size // 64, *BLOCK))
-        listed = jnp.nonzero(close.reshape(-1), size=size, fill_value=size)[0]
-        listed = jnp.concatenate([listed, jnp.full(block, size)])
+        listed = Worklist.of(close.reshape(-1))
 
         def some(turn: Int[jax.Array, ""], found: Bool[jax.Array, "C"]) -> Bool[jax.Array, "C"]:
-            number = jax.lax.dynamic_slice(listed, (turn * block,), (block,))
+            number = listed.places(turn * block, block)
             row, i, j = jnp.unravel_index(jnp.minimum(number, size - 1), close.shape)
             both = pieces[row[:, None], jnp.stack([i, of_a + j], axis=-1)]
             # The barrier keeps XLA from repeating the gathers in everything that reads a piece.
             chosen = jax.lax.optimization_barrier(shapes.pieces(poses, world[row][:, None], both))
             distance = pair_distance(chosen).distance
-            return found.at[jnp.where(number < size, row, len(found))].max(distance < most[row], mode="drop")
+            return or_at(found, jnp.where(number < size, row, len(found)), distance < most[row])
 
         turns = (jnp.sum(close) + block - 1) // block
         return jax.lax.fori_loop(0, turns, some, jnp.zeros(len(world), bool))

@@ -2,10 +2,9 @@
 
 The functions are those of `ig2mj.states.update`, cut in three: `events`, everything but temperatures; `rest`,
 temperatures and the goal, which follow from them; and `heat`, some steps of the same where nothing that the goal reads
-of the view changes. Calling a compiled function from the host costs a microsecond for every array that goes in or out,
-as much as the work itself. So `events` and `rest` are traced first, and then take just the arrays on which their
-results depend and give just those that they make. What they take is also what has to be looked at to see whether
-anything can change at all (`StateProgram.view_reads`).
+of the view changes. Each takes just the arrays on which its results depend, packed into a few vectors
+(`ig2mj.worlds.lazy.packing`). What they take is also what has to be looked at to see whether anything can change at all
+(`StateProgram.view_reads`).
 
 Axes: W worlds, O objects, S heat sources, I facts.
 """
@@ -20,12 +19,11 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
 from ig2mj.engine.view import SCHEMA, Array, PhysicsView, assemble, read_fields
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus
 from ig2mj.predicates.questions import COMPILED_FAST
-from ig2mj.predicates.tracing import inputs_that_matter
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.asked import PairByPair
@@ -33,6 +31,7 @@ from ig2mj.states.relations.plan import Memo, RelationPlan
 from ig2mj.states.update import events, heat, queries
 from ig2mj.states.world import ExtendedStates
 from ig2mj.worlds.lazy.goal_rows import GoalRows
+from ig2mj.worlds.lazy.packing import PackedFunction
 from ig2mj.worlds.rules import Rules
 
 T = TypeVar("T")
@@ -58,13 +57,14 @@ class Events(NamedTuple):
 
     Attributes:
       leaves: of the states, at the places `StateProgram.gives`. swap: mask, pos, quat; None where nothing can be cut.
-      acts: source on object [W, O, S]. flags: whether nothing changed, and whether it asks for teleports.
-      memo: of relations, flat.
+      acts: source on object [W, O, S]. facts: of the goal, those that follow from the states made here.
+      flags: whether nothing changed, and whether it asks for teleports. memo: of relations, flat.
     """
 
     leaves: list[Array]
     swap: tuple[Array, Array, Array] | None
     acts: Bool[Array, "W O S"]
+    facts: Bool[Array, "W I"]
     flags: Bool[Array, "2"]
     memo: list[Array]
 
@@ -99,11 +99,46 @@ class Heat(NamedTuple):
 
 
 class _Traced(NamedTuple):
-    """A compiled function of some of the states' leaves and fields of the view, and which."""
+    """A compiled function of some of the states' leaves, fields of the view and other arrays, and which these are."""
 
-    call: Callable[..., tuple]
+    function: PackedFunction
     takes: list[int]
     reads: tuple[str, ...]
+    others: list[int]
+    structure: Any
+
+    @classmethod
+    def of(
+        cls,
+        step: Callable[..., Any],
+        leaves: list[Array],
+        view: PhysicsView,
+        others: list[Array],
+        options: dict[str, int | bool] | None = None,
+    ) -> _Traced:
+        """Of a function of all leaves, all fields and the others."""
+        structures = []
+
+        def flat(*every: Any) -> list[Any]:
+            made, structure = jax.tree.flatten(step(*every))
+            structures.append(structure)
+            return made
+
+        function = PackedFunction(
+            jax.make_jaxpr(flat)(leaves, read_fields(view, FIELDS), others), step.__name__.strip("_"), options
+        )
+        first, last = len(leaves), len(leaves) + len(FIELDS)
+        return cls(
+            function,
+            [i for i in function.takes if i < first],
+            tuple(FIELDS[i - first] for i in function.takes if first <= i < last),
+            [i - last for i in function.takes if i >= last],
+            structures[0],
+        )
+
+    def __call__(self, leaves: list[Array], view: PhysicsView, others: list[Array]) -> Any:
+        taken = [leaves[i] for i in self.takes] + read_fields(view, self.reads) + [others[i] for i in self.others]
+        return jax.tree.unflatten(self.structure, self.function(taken))
 
 
 class StateProgram:
@@ -136,13 +171,13 @@ class StateProgram:
         self.heats = [self._paths.index((name,)) for name in ("temperature", "max_temperature")]
         self._empty_memo, self._memo_structure = jax.tree.flatten(self.plan.empty_memo(num_worlds))
         self._empty_goal_memo, self._goal_memo_structure = jax.tree.flatten(self.goal_plan.empty_memo(num_worlds))
-        self._heat = jax.jit(self._heat_steps)
         self.view_reads: tuple[str, ...] = ()
         self.event_reads: frozenset[str] = frozenset()
         self.goal_reads: frozenset[str] = frozenset()
         self.gives: list[int] = []
         self._events: _Traced | None = None
         self._rest: _Traced | None = None
+        self._heat: _Traced | None = None
         self.rows, self.goal_rows = _object_bodies(model), GoalRows(model, goal)
 
     @classmethod
@@ -164,29 +199,39 @@ class StateProgram:
           leaves: all leaves of the states. memo: the last step's.
         """
         if self._events is None:
-            self._events = self._trace(self._events_step, leaves, view, memo)
+            self._events = _Traced.of(self._events_step, leaves, view, memo)
             self.event_reads = frozenset(self._events.reads)
-        return Events(*self._called(self._events, leaves, view, memo))
+        return Events(*self._events(leaves, view, memo))
 
-    def rest(self, leaves: list[Array], acts: Bool[Array, "W O S"], view: PhysicsView, memo: list[Array]) -> Rest:
+    def rest(
+        self,
+        leaves: list[Array],
+        acts: Bool[Array, "W O S"],
+        facts: Bool[Array, "W I"],
+        view: PhysicsView,
+        memo: list[Array],
+    ) -> Rest:
         """One step of temperatures, and the goal after it.
 
         Args:
-          leaves: all leaves of the states, those of `events` among them. acts: of `events`. memo: the last call's.
+          leaves: all leaves of the states, those of `events` among them. acts, facts: of `events`; or the facts of the
+          last call, where none of the states has changed since that they follow from. memo: the last call's.
         """
+        others = [acts, facts, *memo]
         if self._rest is None:
             options = COMPILED_FAST if self._many else None
-            self._rest = self._trace(self._rest_step, leaves, view, memo, acts, options=options)
+            self._rest = _Traced.of(self._rest_step, leaves, view, others, options)
             self.goal_reads = frozenset(self._rest.reads)
             every = self.event_reads | self.goal_reads
             self.view_reads = tuple(sorted(every, key=lambda name: (name not in FIRST_MOVED, FIELDS.index(name))))
-        return Rest(*self._called(self._rest, leaves, view, memo, acts))
+        return Rest(*self._rest(leaves, view, others))
 
-    def heat(self, states: ExtendedStates, acts: Array, facts: Array, count: int) -> Heat:
+    def heat(self, leaves: list[Array], acts: Array, facts: Array, view: PhysicsView, count: int) -> Heat:
         """The next `count` steps (at most `AHEAD`) of temperatures and of the goal, in which nothing else changes."""
-        now = states.temperature, states.max_temperature, states.sliced
-        made = self._heat(*now, acts, facts, np.int32(count))
-        return Heat(*jax.tree.map(np.asarray, made))  # on a CPU without a copy, at half the cost of `device_get`
+        others: list[Array] = [acts, facts, np.array(count, np.int32)]
+        if self._heat is None:
+            self._heat = _Traced.of(self._heat_steps, leaves, view, others)
+        return Heat(*self._heat(leaves, view, others))
 
     def with_leaves(self, states: ExtendedStates, places: list[int], leaves: list[Array]) -> ExtendedStates:
         """A copy of the states in which the leaves at some places are others.
@@ -207,35 +252,6 @@ class StateProgram:
                 fields[name] = leaf
         return new
 
-    def _called(self, program: _Traced, leaves: list[Array], view: PhysicsView, *more: Any) -> tuple:
-        taken = [leaves[i] for i in program.takes]
-        return program.call(taken, read_fields(view, program.reads), *more)
-
-    def _trace(
-        self,
-        step: Callable[..., tuple],
-        leaves: list[Array],
-        view: PhysicsView,
-        *more: Any,
-        options: dict[str, int | bool] | None = None,
-    ) -> _Traced:
-        """A function of leaves, fields of the view and others, compiled for what matters of the first two."""
-        fields = read_fields(view, FIELDS)
-        matters = inputs_that_matter(jax.make_jaxpr(step)(leaves, fields, *more).jaxpr)
-        reads = tuple(name for name, used in zip(FIELDS, matters[len(leaves) :], strict=False) if used)
-        takes = [i for i in range(len(leaves)) if matters[i]]
-        blank_leaves: list[Array] = [np.zeros(leaf.shape, leaf.dtype) for leaf in leaves]
-        blank_fields: dict[str, Array] = {n: np.zeros(f.shape, f.dtype) for n, f in zip(FIELDS, fields, strict=True)}
-
-        def call(taken: list[Array], seen: list[Array], *more: Any) -> tuple:
-            every = list(blank_leaves)
-            for place, leaf in zip(takes, taken, strict=True):
-                every[place] = leaf
-            named = {**blank_fields, **dict(zip(reads, seen, strict=True))}
-            return step(every, [named[name] for name in FIELDS], *more)
-
-        return _Traced(jax.jit(call, compiler_options=options), takes, reads)
-
     def _events_step(self, leaves: list[Array], fields: list[Array], memo: list[Array]) -> tuple:
         """`Events` as a plain tuple; notes which leaves of the states it makes."""
         states: ExtendedStates = jax.tree.unflatten(self.structure, leaves)
@@ -248,42 +264,37 @@ class StateProgram:
         same = [jnp.all(leaves[i] == made[i]) for i in self.gives]
         flags = jnp.stack([jnp.all(jnp.array(same)), jnp.any(swap.mask)])
         cuts = (swap.mask, swap.pos, swap.quat) if swap.mask.shape[1] else None
-        return [made[i] for i in self.gives], cuts, acts, flags, jax.tree.leaves(after_memo)
+        facts = jnp.zeros((view.object_com.shape[0], 0), bool)
+        if self.goal is not None:
+            facts = self.goal.literals.lasting_facts(after)
+        return [made[i] for i in self.gives], cuts, acts, facts, flags, jax.tree.leaves(after_memo)
 
-    def _rest_step(
-        self, leaves: list[Array], fields: list[Array], memo: list[Array], acts: Bool[Array, "W O S"]
-    ) -> tuple:
+    def _rest_step(self, leaves: list[Array], fields: list[Array], others: list[Array]) -> tuple:
         """`Rest` as a plain tuple."""
+        acts, facts, *memo = others
         states: ExtendedStates = jax.tree.unflatten(self.structure, leaves)
         view = assemble(dict(zip(FIELDS, fields, strict=True)))
         new = heat(self.model, states, acts, view.touching)
-        facts, status, after_memo = jnp.zeros((view.object_com.shape[0], 0), bool), None, ()
+        status, after_memo = None, ()
         if self.goal is not None:
             before: Memo = jax.tree.unflatten(self._goal_memo_structure, memo)
             relations, after_memo = self.goal_plan.evaluate_changed(view, before)
-            facts = self.goal.literals.facts(self.goal.context(new, view, relations))
+            facts = self.goal.literals.facts(self.goal.context(new, view, relations), lasting=facts)
             status = _status_fields(self.goal.status_of(facts, new))
         pairs = ((states.temperature, new.temperature), (states.max_temperature, new.max_temperature))
         same = jnp.all(jnp.stack([jnp.all(a == b) for a, b in pairs]))
         return [new.temperature, new.max_temperature], status, facts, same, jax.tree.leaves(after_memo)
 
-    def _heat_steps(
-        self,
-        temperature: Float[Array, "W O"],
-        max_temperature: Float[Array, "W O"],
-        sliced: Bool[Array, "W O"],
-        acts: Bool[Array, "W O S"],
-        facts: Bool[Array, "W I"],
-        count: Int[Array, ""],
-    ) -> tuple:
+    def _heat_steps(self, leaves: list[Array], fields: list[Array], others: list[Array]) -> tuple:
         """`Heat` as a plain tuple."""
+        states: ExtendedStates = jax.tree.unflatten(self.structure, leaves)
+        acts, facts, count = others
+        sliced = states.sliced
         nothing = jnp.zeros((sliced.shape[0], sliced.shape[1], sliced.shape[1]), bool)
 
         def step(before: tuple[Array, Array]) -> tuple:
-            states = dataclasses.replace(
-                self._template, temperature=before[0], max_temperature=before[1], sliced=sliced
-            )
-            new = heat(self.model, states, acts, nothing)
+            now = dataclasses.replace(self._template, temperature=before[0], max_temperature=before[1], sliced=sliced)
+            new = heat(self.model, now, acts, nothing)
             same = jnp.all(before[0] == new.temperature) & jnp.all(before[1] == new.max_temperature)
             status = None
             if self.goal is not None:
@@ -295,7 +306,7 @@ class StateProgram:
             made = step(now)
             return made[:2], jax.tree.map(lambda row, value: row.at[k].set(value), rows, made)
 
-        start = jnp.asarray(temperature), jnp.asarray(max_temperature)
+        start = jnp.asarray(states.temperature), jnp.asarray(states.max_temperature)
         shapes = jax.eval_shape(step, start)
         rows = jax.tree.map(lambda leaf: jnp.zeros((AHEAD, *leaf.shape), leaf.dtype), shapes)
         return jax.lax.fori_loop(0, count, turn, (start, rows))[1]

@@ -57,6 +57,7 @@ class StateStepper:
         self._leaves: list[Array] = []
         self._acts: Array | None = None  # which source acts on what; None where there must be a whole step next
         self._whole_facts = self._facts = np.zeros((program.num_worlds, 0), bool)  # of the last whole step; now
+        self._whole_status: GoalStatus | None = None  # of `_whole_facts` and the temperatures as they are now
         self._settled = False
         self._ahead: Heat | None = None  # steps computed before they are due, how many, and how many of them are over
         self._ahead_count, self._ahead_over = 0, 0
@@ -87,8 +88,11 @@ class StateStepper:
                 return self._temperatures_and_goal(last.states, self._acts, view)
             if self._facts is not self._whole_facts:  # all is again as it was then
                 self._facts = self._whole_facts
-                return self._heat(last, self._acts)
-        return last if self._settled else self._heat(last, self._acts)
+                if self._settled and self._whole_status is not None:
+                    self._step = Outcome(last.states, None, self._whole_status)
+                    return self._step
+                return self._heat(last, self._acts, view)
+        return last if self._settled else self._heat(last, self._acts, view)
 
     def _news(self, view: PhysicsView) -> News:
         """What differs from the last whole step, of all that a step depends on."""
@@ -128,11 +132,11 @@ class StateStepper:
     def _away(self, view: PhysicsView) -> bool:
         return isinstance(view.agent.finger_pos, np.ndarray) and toggled_on.all_out_of_reach(self.program.model, view)
 
-    def _heat(self, last: Outcome, acts: Array) -> Outcome:
+    def _heat(self, last: Outcome, acts: Array, view: PhysicsView) -> Outcome:
         program, states = self.program, last.states
         if self._ahead is None or self._ahead_over == self._ahead_count:
             self._ahead_count = min(AHEAD, 1 if self._ahead is None else 2 * self._ahead_count)
-            self._ahead, self._ahead_over = program.heat(states, acts, self._facts, self._ahead_count), 0
+            self._ahead, self._ahead_over = program.heat(self._leaves, acts, self._facts, view, self._ahead_count), 0
         ahead, k = self._ahead, self._ahead_over
         self._ahead_over += 1
         self._settled = bool(ahead.same[k])
@@ -141,13 +145,15 @@ class StateStepper:
         self._put(program.heats, made)
         status = None if ahead.status is None else tuple(field[k] for field in ahead.status)
         self._step = Outcome(states, None, self._status(status))
+        self._whole_status = self._step.status
         return self._step
 
     def _temperatures_and_goal(self, states: ExtendedStates, acts: Array, view: PhysicsView) -> Outcome:
         program = self.program
-        rest = program.rest(self._leaves, acts, view, self._goal_memo)
+        rest = program.rest(self._leaves, acts, self._facts, view, self._goal_memo)
         self._goal_memo, self._facts, self._ahead = rest.memo, rest.facts, None
         if not self._settled:
+            self._whole_status = None
             states = program.with_leaves(states, program.heats, rest.leaves)
             self._put(program.heats, rest.leaves)
         self._step = Outcome(states, None, self._status(rest.status))
@@ -158,14 +164,15 @@ class StateStepper:
         events = program.events(leaves, view, self._memo)
         self._leaves, self._memo = leaves, events.memo
         self._put(program.gives, events.leaves)
-        rest = program.rest(leaves, events.acts, view, self._goal_memo)
+        rest = program.rest(leaves, events.acts, events.facts, view, self._goal_memo)
         self._put(program.heats, rest.leaves)
         self._goal_memo, self._whole_facts = rest.memo, rest.facts
         self._facts = self._whole_facts
+        self._whole_status = self._status(rest.status)
         new = program.with_leaves(states, [*program.gives, *program.heats], [*events.leaves, *rest.leaves])
         quiet, swapped = np.asarray(events.flags).tolist()
         self._view, self._ahead = view, None
-        self._step = Outcome(new, None, self._status(rest.status))
+        self._step = Outcome(new, None, self._whole_status)
         self._acts = None
         if quiet and not program.model.options.contact_heat_rate:
             self._acts, self._settled = events.acts, bool(np.asarray(rest.same))

@@ -1,0 +1,36 @@
+"""`OneKernel`: one function of one world's program, the same results, and the usual way where XLA cannot."""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from ig2mj.process.one_kernel import OneKernel
+
+X = np.random.default_rng(0).normal(size=(7, 100)).astype(np.float32)
+
+
+def _chosen(x, unused, nothing):
+    middle = jax.lax.cond(x[0, 0] > 0, lambda: x * 2, lambda: x + 1)
+    return {"sum": jnp.cumsum(middle, axis=1), "least": jnp.min(jnp.where(middle > 0, middle, 0), axis=0)}, nothing
+
+
+def test_results_are_those_of_the_usual_program_and_arguments_may_be_of_no_use():
+    arguments = X, np.ones(3, bool), np.zeros((0, 2), np.float32)
+    one = OneKernel(_chosen)
+    for _ in range(2):
+        made = one(*arguments)
+    assert one.is_one and one._cache_size() == 1
+    jax.tree.map(np.testing.assert_array_equal, made, jax.jit(_chosen)(*arguments))
+
+
+def test_what_cannot_be_one_function_is_compiled_as_usual():
+    one = OneKernel(lambda x: jnp.sort(x, axis=0))
+    assert np.array_equal(one(X), np.sort(X, axis=0)) and not one.is_one
+    assert np.array_equal(one(-X), np.sort(-X, axis=0))
+
+
+def test_keys_of_random_numbers_are_taken():
+    one, key = OneKernel(lambda key, x: x + jax.random.uniform(key, x.shape)), jax.random.key(3)
+    assert np.array_equal(one(key, X), X + jax.random.uniform(key, X.shape))
