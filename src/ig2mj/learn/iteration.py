@@ -168,7 +168,8 @@ class ManyDevices:
             )
             return play, rollout, jax.tree.map(lambda a: a[None], sums)
 
-        self._collect, self._compiled = jax.jit(collect, donate_argnums=1), False
+        self._collect: list[Callable[..., Any]] = []  # one for each device, once they are compiled
+        self._collect_fn = jax.jit(collect, donate_argnums=1)
         kinds: list[Any] = []
 
         def leaves() -> list[Any]:
@@ -247,15 +248,10 @@ class ManyDevices:
         keys = np.asarray(jax.random.split(play_key, self._count))[self._first :]
         began = time.perf_counter()
 
-        def collect(k: int) -> Any:
-            return jax.block_until_ready(self._collect(self._part(learner, k), plays[k], keys[k]))
-
-        if self._compiled:
-            done = self._each(collect)
-        else:
+        if not self._collect:
             with self._team.turns():  # the first process compiles, the others find its programs in the cache
-                done = self._first_then_each(collect)
-            self._compiled = True
+                self._collect = self._compiled(learner, plays, keys)
+        done = self._each(lambda k: jax.block_until_ready(self._collect[k](self._part(learner, k), plays[k], keys[k])))
         spent = time.perf_counter() - began
         rollout, sums = ([one[k] for one in done] for k in (1, 2))
         learner, memory, sums, losses, told = self.learn(
@@ -295,6 +291,14 @@ class ManyDevices:
         learner, memory = restored(learner, learnt), restored(memory, kept)
         total, losses, told = jax.device_get((total, losses, told))
         return learner, memory, total, losses, float(told)
+
+    def _compiled(self, learner: Any, plays: list[Play], keys: np.ndarray) -> list[Callable[..., Any]]:
+        """The program that plays, for every device of this process: traced in turn, compiled side by side."""
+        lowered = []
+        for k, device in enumerate(self._devices):
+            with jax.default_device(device):
+                lowered.append(self._collect_fn.lower(self._part(learner, k), plays[k], keys[k]))
+        return list(self._threads.map(lambda program: program.compile(), lowered))
 
     def _part(self, tree: Any, k: int) -> Any:
         """One device's copy of what is the same on all."""
