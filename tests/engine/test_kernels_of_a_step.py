@@ -71,7 +71,7 @@ def test_a_step_launches_no_other_kernels():
             return really(kernel, dim, *args, **kwargs)
 
         def launch_tiled(kernel, *, dim, **kwargs):
-            launched.add(kernel.key)
+            launched.add(patches.launched(kernel, dim, tiled=True).key)
             return really_tiled(kernel, dim=dim, **kwargs)
 
         watched = ScopedReplacement()

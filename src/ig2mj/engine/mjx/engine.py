@@ -33,7 +33,7 @@ from ig2mj.engine.native.sleep import FULLY_AWAKE
 from ig2mj.engine.snapshot import Snapshot, fitted, make_snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
-from ig2mj.process import on_trial, prepare_jax
+from ig2mj.process import prepare_jax
 from ig2mj.scene.scene import Scene
 
 
@@ -46,7 +46,7 @@ class MjxEngine(abc.ABC):
 
     name: str
     pure = True
-    unrolled = not on_trial("rolled")
+    unrolled = True
     """Substeps are written out one after the other: no copies at a loop's border, but as often compiled."""
 
     def __init__(

@@ -120,13 +120,13 @@ def engine_kernels() -> Iterator[None]:
             yield
 
 
-def launched(kernel: wp.Kernel, dim: Any = 1) -> wp.Kernel:
+def launched(kernel: wp.Kernel, dim: Any = 1, tiled: bool = False) -> wp.Kernel:
     """The kernel that is launched now, in this thread, in place of one of MuJoCo Warp's; that one where it stays."""
     if not KERNELS.active:
         return kernel
-    from ig2mj.engine.warp.patches.launching import substituted
+    from ig2mj.engine.warp.patches.launching import resolved
 
-    return substituted(kernel, dim, ())[0]
+    return resolved(kernel, dim, (), tiled)[0]
 
 
 @contextlib.contextmanager
