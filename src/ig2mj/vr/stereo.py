@@ -16,7 +16,7 @@ import math
 
 import mujoco
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Bool, Float, UInt8
 from scipy.spatial.transform import Rotation
 
 from ig2mj.process.opengl import use_opengl
@@ -32,6 +32,11 @@ NEAR, FAR = 0.1, 30.0
 
 SAMPLES = 4
 """Of each pixel."""
+
+SHADOW_REACH = 10.0
+"""m. What is further from the place where its shadow would fall is not drawn for the shadow's sake."""
+
+HIDDEN_GROUP = next(group for group in range(mujoco.mjNGROUP) if group not in VISIBLE_GROUPS)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -79,6 +84,8 @@ class StereoPictures:
         self._data = scene.start_data()
         mujoco.mj_forward(model, self._data)
         self._geoms = np.flatnonzero(np.isin(model.geom_group, VISIBLE_GROUPS))
+        self._groups = model.geom_group[self._geoms]
+        self._bounds = np.where(model.geom_rbound[self._geoms] > 0, model.geom_rbound[self._geoms], np.inf)  # planes
         self._turns = Rotation.from_quat(np.roll(model.geom_quat[self._geoms], -1, axis=1))
         self.context = gl_context.GLContext(2 * width, height)
         self.context.make_current()
@@ -104,6 +111,8 @@ class StereoPictures:
           poses: of all bodies, world: position, w-x-y-z.
         """
         self._place(poses)
+        seen = self._seen(eyes[0]) | self._seen(eyes[1])
+        self._model.geom_group[self._geoms] = np.where(seen, self._groups, HIDDEN_GROUP)
         scene = self._scene
         category = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(self._model, self._data, self._option, None, self._camera, category, scene)
@@ -154,6 +163,21 @@ class StereoPictures:
             self.context.free()
             self.renderer = None
 
+    def _seen(self, eye: Eye) -> Bool[np.ndarray, "G"]:
+        """Which geoms the eye may see, or shadows of them.
+
+        A geom's bounding sphere, and the same sphere wherever its shadow may fall, are compared with the planes between
+        which the eye sees: MuJoCo itself sends every geom of a home to OpenGL, for each eye, and again for shadows.
+        """
+        at, model, data = self._data.geom_xpos[self._geoms], self._model, self._data
+        ends = [at]
+        for light in np.flatnonzero(model.light_castshadow & model.light_active):
+            parallel = model.light_type[light] == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
+            way = data.light_xdir[light] if parallel else at - data.light_xpos[light]
+            ends.append(at + SHADOW_REACH * way / np.linalg.norm(way, axis=-1, keepdims=True))
+        beyond = np.min([(end - eye.pose.pos) @ _planes(eye).T for end in ends], axis=0)  # [G, 4], m
+        return (beyond < self._bounds[:, None]).all(1)
+
     def _place(self, poses: Float[np.ndarray, "B 7"]) -> None:
         """Where the geoms are, from where their bodies are."""
         model, data, geoms = self._model, self._data, self._geoms
@@ -161,6 +185,18 @@ class StereoPictures:
         turns = Rotation.from_quat(np.roll(poses[bodies, 3:], -1, axis=1).astype(np.float64))
         data.geom_xpos[geoms] = poses[bodies, :3] + turns.apply(model.geom_pos[geoms])
         data.geom_xmat[geoms] = (turns * self._turns).as_matrix().reshape(-1, 9)
+
+
+def _planes(eye: Eye) -> Float[np.ndarray, "4 3"]:
+    """Outward normals, world, of the planes through the eye that bound what it sees."""
+    left, right, up, down = eye.left, eye.right, eye.up, eye.down
+    normals = [
+        (math.sin(left), math.cos(left), 0.0),
+        (-math.sin(right), -math.cos(right), 0.0),
+        (-math.sin(up), 0.0, math.cos(up)),
+        (math.sin(down), 0.0, -math.cos(down)),
+    ]
+    return eye.pose.turn.apply(normals)
 
 
 def _aim(camera: mujoco.MjvGLCamera, eye: Eye) -> None:
