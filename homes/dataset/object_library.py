@@ -23,9 +23,16 @@ PLACED = ("car", "christmas_tree", "christmas_tree_decorated", "grill", "paintin
 VARIED = ("apple", "bath_towel", "carving_knife", "cauldron", "hand_towel", "notebook", "steak")
 """What the six activities are about: three models of each."""
 
-MODELS = {"carton": (2,), "shelf": (14,), **dict.fromkeys(VARIED, (0, 1, 2)), "bath_towel": (0, 1, 2, 5, 6, 7)}
+MODELS = {
+    "carton": (2,),
+    "shelf": (14,),
+    **dict.fromkeys(VARIED, (0, 1, 2)),
+    "bath_towel": (0, 1, 2, 5, 6, 7),
+    "carving_knife": (0, 1, 2, 4, 5, 6),
+}
 """Numbers of the models where it is not the first alone. The roomiest carton holds what activities pack; the shelf is a
-board for a wall, which no home has; the last three bath towels are rolled, for hands to which nothing sticks."""
+board for a wall, which no home has; the last three bath towels are rolled and the last three carving knives stand on
+their handles, for hands to which nothing sticks."""
 
 
 def is_fixed(category: str) -> bool:

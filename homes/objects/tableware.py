@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from ..shapes import materials
 from ..shapes.bricks import Solid, ball, hull, lathe, prism, rod, soft_box, tube
 from ..shapes.materials import Material
@@ -9,6 +11,10 @@ from ..shapes.vessels import turned_vessel
 from .entry import Entry
 from .model import ObjectBuilder
 from .parts import ear
+
+STANDING, STANDING_MASS = 4, 0.15
+"""Number of the first carving knife that stands on its handle, edge down, and what such a one weighs, kg. Only the
+object library has such."""
 
 GLAZES = ("porcelain", "cream", "sky", "mint", "terracotta", "navy", "light_grey", "rose")
 
@@ -136,6 +142,34 @@ def knife(b: ObjectBuilder, *, blade: float = 0.55, tall: float = 0.8, grip: str
     b.add(soft_box(x - blade * x, 0.55 * y, z, 0.3 * z).at(-x / 2 + (x - blade * x) / 2, y / 2 - 0.36 * y, 0), handle)
 
 
+def carving_knife(b: ObjectBuilder, **options: Any) -> None:
+    """Lying on its side; from number `STANDING` on standing on its handle, so that two fingers can take and use it."""
+    if b.index < STANDING:
+        knife(b, **options)
+        return
+    b.rest, b.mass = "upright", STANDING_MASS
+    standing_knife(b)
+
+
+def standing_knife(b: ObjectBuilder) -> None:
+    """A knife with a stout handle that stands on the table, edge down, the edge a centimetre above the table."""
+    x, y, _ = b.size
+    steel, wood = materials.metal("silver"), materials.wood("walnut", b.rng)
+    wide, tall, half = 0.75 * y, 1.1 * y, 0.00125
+    start, tip, point = -0.12 * x, 0.5 * x, 0.38 * x
+    edge, spine = 0.012, 0.95 * tall
+    rim = edge + 0.008  # below it the blade is its edge
+
+    def blade(low: float) -> Solid:
+        outline = [(start, low), (point, low), (tip, spine - 0.3 * (spine - edge)), (tip, spine), (start, spine)]
+        return hull([(px, side, pz) for px, pz in outline for side in (-half, half)])
+
+    b.add(blade(edge).visual_only(), steel)
+    b.add(blade(rim).collision_only(), steel)
+    b.area("slicer", (point - start, 2 * half, rim - edge), (0.5 * (start + point), 0, 0.5 * (edge + rim)))
+    b.add(soft_box(start + 0.5 * x, wide, tall, 0.006).at(0.5 * (start - 0.5 * x), 0, 0), wood)
+
+
 def chopstick(b: ObjectBuilder) -> None:
     x, _, z = b.size
     b.add(
@@ -190,7 +224,15 @@ CATEGORIES = [
     Entry("spoon", spoon, (0.190, 0.042, 0.020), 0.055, 3),
     Entry("tablefork", fork, (0.195, 0.026, 0.016), 0.050, 3),
     Entry("table_knife", knife, (0.225, 0.022, 0.009), 0.070, 3, options={"blade": 0.5, "grip": "silver"}),
-    Entry("carving_knife", knife, (0.330, 0.046, 0.022), 0.190, 4, options={"blade": 0.62, "grip": "wood"}),
+    Entry(
+        "carving_knife",
+        carving_knife,
+        (0.330, 0.046, 0.022),
+        0.190,
+        STANDING,
+        extra=3,
+        options={"blade": 0.62, "grip": "wood"},
+    ),
     Entry("chopstick", chopstick, (0.230, 0.008, 0.008), 0.012, 2),
     Entry("straw", straw, (0.200, 0.030, 0.006), 0.001, 2),
     Entry("toothpick", toothpick, (0.065, 0.002, 0.002), 0.0002, 2),

@@ -1,4 +1,4 @@
-"""Taking hold of what stands between the fingers by their friction alone, and carrying it."""
+"""Taking hold of something between two fingers by their friction alone, and carrying it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,14 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.engine.view import Array
-from ig2mj.geometry.poses import length, quat_rotate
+from ig2mj.geometry.poses import (
+    length,
+    matrix_to_quat,
+    quat_conjugate,
+    quat_multiply,
+    quat_rotate,
+    quat_to_rotation_vector,
+)
 from ig2mj.tasks.experts.motion import Wish, over, pointing, where, wish
 from ig2mj.tasks.experts.sight import Sight
 
@@ -32,6 +39,13 @@ CLOSING, BETWEEN = 0.02, 0.03
 
 SQUEEZED = 3.0
 """N of each of two fingers from which on it is held."""
+
+PAD, ABOVE, ALIGNED = 0.035, 0.08, 0.15
+"""From above: m over what an object lies on at which the middle of the fingers, which reach 3.2 cm further, takes it; m
+above that at which the gripper turns; rad within which it is turned."""
+
+AT, AWAY = 0.012, 0.15
+"""m from where it is taken within which fingers close; m from the middle of the fingers beyond which it is not held."""
 
 AHEAD, LEFT, UP = np.eye(3, dtype=np.float32)
 
@@ -58,6 +72,30 @@ def grip_standing(see: Sight, name: str, carry: Float[Array, "W 3"]) -> Wish:
     close = wish(jnp.zeros_like(place), close=True)
     move = wish(carry, pointing(quat, see.grip() - see.base_pos(), PITCH), close=True)
     return where(held, move, where(ready, close, get))
+
+
+def grip_from_above(see: Sight, name: str, along: Float[Array, "W 3"], carry: Wish) -> Wish:
+    """What Fetch's gripper does to something long on a table that is narrower than it opens: pointing down, a finger on
+    either side of its centre of mass, so that it does not tip between them.
+
+    Args:
+      along: the long axis, of length 1, nearly level. carry: what is done once it is held.
+    """
+    quat, grip = see.hand_quat(), see.grip()
+    low, _ = see.box(name)
+    place = see.com(name)
+    place = place.at[:, 2].max(low[:, 2] + PAD)
+    across = jnp.cross(jnp.broadcast_to(UP, place.shape), _level(along))
+    across *= jnp.where(jnp.sum(across * quat_rotate(quat, LEFT), axis=1) < 0, -1.0, 1.0)[:, None]
+    down = jnp.broadcast_to(-UP, place.shape)
+    wanted = matrix_to_quat(jnp.stack([down, across, jnp.cross(down, across)], axis=-1))
+    turn = quat_to_rotation_vector(quat_multiply(wanted, quat_conjugate(quat)))
+    goal = jnp.where((length(turn) < ALIGNED)[:, None], place, place + ABOVE * UP)
+    get = wish(EASE * over(grip, goal, place[:, 2] + ABOVE, EXACT, BLEND), turn)
+    close = wish(jnp.zeros_like(place), close=True)
+    ready = (length((place - grip)[:, :2]) < AT) & (jnp.abs((place - grip)[:, 2]) < AT)
+    held = (see.squeeze(name) > SQUEEZED) & (length(see.com(name) - grip) < AWAY)
+    return where(held, carry, where(ready, close, get))
 
 
 def _standing(see: Sight, name: str) -> tuple[Float[Array, "W 3"], Float[Array, "W"]]:

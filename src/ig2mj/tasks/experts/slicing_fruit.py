@@ -1,4 +1,7 @@
-"""Slicing Fruit: take the knife by its handle, turn its edge down, and press it onto the apple."""
+"""Slicing Fruit: take the knife by its handle, turn its edge down, and press it onto the apple.
+
+Where nothing sticks the knife stands on its handle, edge down (`Task.physical`), so that it need not be turned.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ from jaxtyping import Float
 from ig2mj.engine.view import Array
 from ig2mj.geometry.poses import length, quat_rotate
 from ig2mj.scene.tables import LinkKind
+from ig2mj.tasks.experts.gripping import grip_from_above
 from ig2mj.tasks.experts.motion import Wish, horizontal, over, where, wish
 from ig2mj.tasks.experts.reaching import far_out, take_thin
 from ig2mj.tasks.experts.sight import Sight
@@ -34,9 +38,18 @@ EXACT = 0.008
 PRESS = 0.03
 """m below the fruit's top that the blade goes for."""
 
+CUTS, ABOUT, BESIDE = -0.05, (-0.03, 0.05), 0.012
+"""Of a knife that stands: m from the middle of the edge to the point that cuts, near the handle, so that what presses
+on it hardly tips the knife between two fingers; how far from there any other point will do; m beside the edge within
+which it comes down."""
+
 
 def plan(see: Sight) -> list[Wish]:
     """One hand."""
+    done = jnp.asarray(see.states.sliced)[:, see.scene.object_index(FRUIT)]
+    still = wish(jnp.zeros_like(see.pos(KNIFE)), close=True)
+    if see.physical and see.robot == "fetch":  # (the humanoid's fingers close too far beside the handle)
+        return [where(done, still, _grip_and_press(see))]
     quat = see.quat(KNIFE)
     handle = see.pos(KNIFE) + quat_rotate(quat, jnp.asarray(HANDLE, jnp.float32))
     along = quat_rotate(quat, jnp.asarray(ALONG, jnp.float32))
@@ -52,9 +65,20 @@ def plan(see: Sight) -> list[Wish]:
         turn += far_out(see, goal)
         take = Wish(take.move, far_out(see, handle), take.close)
     cut = wish(over(blade, goal, top + CLEARANCE, near=EXACT, blend=EXACT), turn, close=True)
-    done = jnp.asarray(see.states.sliced)[:, see.scene.object_index(FRUIT)]
-    still = wish(jnp.zeros_like(handle), close=True)
     return [where(done, still, where(see.holds(KNIFE), cut, take))]
+
+
+def _grip_and_press(see: Sight) -> Wish:
+    """With a knife that stands on its handle, edge down."""
+    along = quat_rotate(see.quat(KNIFE), jnp.asarray(ALONG, jnp.float32))
+    up = quat_rotate(see.quat(KNIFE), jnp.array([0.0, 0.0, 1.0]))
+    _, high = see.box(FRUIT)
+    goal = see.com(FRUIT).at[:, 2].set(high[:, 2] - PRESS)
+    blade = see.link(KNIFE, LinkKind.SLICER) + CUTS * along
+    blade += jnp.clip(jnp.sum((goal - blade) * along, axis=1, keepdims=True), *ABOUT) * along
+    move = over(blade, goal, high[:, 2] + CLEARANCE, near=BESIDE, blend=EXACT)
+    press = wish(move, horizontal(along) + jnp.cross(up, np.array([0.0, 0.0, 1.0], np.float32)), close=True)
+    return grip_from_above(see, KNIFE, along, press)
 
 
 def _edge_down(edge: Float[Array, "W 3"]) -> tuple[Float[Array, "W 3"], Float[Array, "W"]]:
