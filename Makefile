@@ -114,7 +114,7 @@ homes-check: setup
 	@set -e; made=$$(mktemp -d); trap 'rm -rf "$$made"' EXIT; \
 	$(BIN)/ig2mj homes build --out $$made/dataset; \
 	IG2MJ_CACHE_DIR=$$made/cache $(BIN)/ig2mj homes convert --dataset $$made/dataset --out $$made/homes; \
-	diff -rq -x engine_profile.json $$made/homes scenes_mjcf; \
+	diff -rq -x "engine_profile*.json" $$made/homes scenes_mjcf; \
 	echo "scenes_mjcf/ is what this code builds and converts, byte for byte"
 
 # Needed when the humanoid, a home or the engine changes: recordings belong to the compiled model.

@@ -83,7 +83,7 @@ def grip_from_above(see: Sight, name: str, along: Float[Array, "W 3"], carry: Wi
     """
     quat, grip = see.hand_quat(), see.grip()
     low, _ = see.box(name)
-    place = see.com(name)
+    place = jnp.asarray(see.com(name))
     place = place.at[:, 2].max(low[:, 2] + PAD)
     across = jnp.cross(jnp.broadcast_to(UP, place.shape), _level(along))
     across *= jnp.where(jnp.sum(across * quat_rotate(quat, LEFT), axis=1) < 0, -1.0, 1.0)[:, None]

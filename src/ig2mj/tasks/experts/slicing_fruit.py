@@ -73,7 +73,7 @@ def _grip_and_press(see: Sight) -> Wish:
     along = quat_rotate(see.quat(KNIFE), jnp.asarray(ALONG, jnp.float32))
     up = quat_rotate(see.quat(KNIFE), jnp.array([0.0, 0.0, 1.0]))
     _, high = see.box(FRUIT)
-    goal = see.com(FRUIT).at[:, 2].set(high[:, 2] - PRESS)
+    goal = jnp.asarray(see.com(FRUIT)).at[:, 2].set(high[:, 2] - PRESS)
     blade = see.link(KNIFE, LinkKind.SLICER) + CUTS * along
     blade += jnp.clip(jnp.sum((goal - blade) * along, axis=1, keepdims=True), *ABOUT) * along
     move = over(blade, goal, high[:, 2] + CLEARANCE, near=BESIDE, blend=EXACT)
