@@ -17,7 +17,7 @@ import functools
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from typing import Any, TypeVar
+from typing import Any
 
 import jax
 import mujoco
@@ -31,7 +31,7 @@ from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.model_fields import check_names, check_written, given
 from ig2mj.engine.native.contacts import FingerForces, ForcePlan
-from ig2mj.engine.native.later import RAW, Agents, LaterPlan, ObjectMotion
+from ig2mj.engine.native.later import ALL_RAW, Agents, LaterPlan, ObjectMotion, raw_parts, raw_size
 from ig2mj.engine.native.model_slot import ModelSlot
 from ig2mj.engine.native.one_world import Statics, World
 from ig2mj.engine.native.recorded import Pieces
@@ -77,18 +77,25 @@ class NativePhysics:
                     self.view, _VELOCITIES, ObjectMotion(self.later, arrays["qvel"].copy(), fields["object_quat"])
                 )
             if changed & (Changed.AGENT | Changed.FINGERS):
-                fields["agent"] = self._agents(_copied(self.view.agent), fields, changed)
+                fields["agent"] = self._agents(self.view.agent, fields, changed)
         return self.view
 
-    def _agents(self, agent: AgentView, fields: dict[str, Any], changed: int) -> AgentView:
+    def _agents(self, before: AgentView, fields: dict[str, Any], changed: int) -> AgentView:
+        known = before.__dict__
+        agent = object.__new__(AgentView)
+        kept = agent.__dict__
         if changed & Changed.AGENT:
-            raw = {name: self.arrays[name].copy() for name in RAW}
             contacts = [world.agent_contacts for world in self.worlds]
+            raw = self.arrays[ALL_RAW].copy()
             self.of_agents = Agents(self.later, fields["body_pos"], fields["body_quat"], raw, contacts)
+            if "finger_force" in known:
+                kept["finger_force"] = known["finger_force"]
+        else:
+            kept.update(known)
         if changed & Changed.FINGERS:  # worlds change no list that stands here
             self.of_fingers = FingerForces(self.forces, [world.pressing for world in self.worlds])
-        names = _OF_AGENTS if changed & Changed.AGENT else ()
-        _make_later(agent, (*names, "finger_force") if changed & Changed.FINGERS else names, self._of_both())
+            kept.pop("finger_force", None)
+        kept["_later"] = self._of_both()
         return agent
 
     def _of_both(self) -> Callable[[str], np.ndarray]:
@@ -97,19 +104,16 @@ class NativePhysics:
 
 
 _VELOCITIES = ("object_linvel", "object_angvel")
-_OF_AGENTS = tuple(field.name for field in dataclasses.fields(AgentView) if field.name != "finger_force")
-
-View = TypeVar("View", PhysicsView, AgentView)
 
 
-def _copied(view: View) -> View:
+def _copied(view: PhysicsView) -> PhysicsView:
     """A view of the same arrays; the constructor of a frozen dataclass costs more than to copy what changed."""
-    new = object.__new__(type(view))
+    new = object.__new__(PhysicsView)
     new.__dict__.update(view.__dict__)
     return new
 
 
-def _make_later(view: PhysicsView | AgentView, names: tuple[str, ...], later: Callable[[str], np.ndarray]) -> None:
+def _make_later(view: PhysicsView, names: tuple[str, ...], later: Callable[[str], np.ndarray]) -> None:
     fields = view.__dict__
     for name in names:
         fields.pop(name, None)
@@ -365,5 +369,5 @@ def _working_arrays(num_worlds: int, model: mujoco.MjModel, tables: SceneTables)
     """By field of the view; and by name of MuJoCo's array for those of which copies are kept."""
     sizes = axis_sizes(tables, num_worlds)
     arrays = {name: np.zeros(SCHEMA[name].shape(sizes), SCHEMA[name].dtype) for name in FIELDS}
-    raw = {"qpos": (model.nq,), "qvel": (model.nv,), "cvel": (model.nbody, 6), "subtree_com": (model.nbody, 3)}
-    return arrays | {name: np.zeros((num_worlds, *raw[name])) for name in RAW}
+    raw = np.zeros((num_worlds, raw_size(model)))
+    return arrays | {ALL_RAW: raw} | raw_parts(model, raw)

@@ -9,6 +9,8 @@ class below, so that a field is made once and stays the same array.
 from __future__ import annotations
 
 import dataclasses
+import functools
+import math
 from typing import NamedTuple
 
 import mujoco
@@ -20,12 +22,34 @@ from ig2mj.scene.tables import SceneTables
 RAW = ("qpos", "qvel", "cvel", "subtree_com")
 """MuJoCo's arrays of which copies are kept."""
 
+ALL_RAW = "raw"
+"""The array of an engine that holds all of them: one copy of it is faster than four."""
+
+
+def _raw_shapes(model: mujoco.MjModel) -> dict[str, tuple[int, ...]]:
+    return {"qpos": (model.nq,), "qvel": (model.nv,), "cvel": (model.nbody, 6), "subtree_com": (model.nbody, 3)}
+
+
+def raw_size(model: mujoco.MjModel) -> int:
+    """Numbers of all `RAW` of one world."""
+    return sum(math.prod(shape) for shape in _raw_shapes(model).values())
+
+
+def raw_parts(model: mujoco.MjModel, raw: np.ndarray) -> dict[str, np.ndarray]:
+    """The parts [W, ...] of an array [W, `raw_size`], without copies."""
+    parts, end = {}, 0
+    for name, shape in _raw_shapes(model).items():
+        start, end = end, end + math.prod(shape)
+        parts[name] = raw[:, start:end].reshape(len(raw), *shape)
+    return parts
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class LaterPlan:
     """Index arrays of a scene, shared by all views.
 
     Attributes:
+      model: for the sizes of its arrays.
       free, free_dofs: [n], [n, 6] objects with a free joint, and the addresses of their velocities.
       roots: [B] root of each body's tree. camera_body, camera_pos, camera_quat: [A...] eyes in their bodies' frames.
       unit_starts: [O] first unit of each object. agent_starts: [A] first unit of each agent, counted from V.
@@ -34,6 +58,7 @@ class LaterPlan:
     """
 
     tables: SceneTables
+    model: mujoco.MjModel
     free: np.ndarray
     free_dofs: np.ndarray
     roots: np.ndarray
@@ -55,6 +80,7 @@ class LaterPlan:
         known = camera >= 0
         return cls(
             tables=tables,
+            model=model,
             free=free,
             free_dofs=layout.object_dofadr[free, None] + np.arange(6),
             roots=np.array(model.body_rootid),
@@ -131,15 +157,15 @@ class Agents:
         plan: LaterPlan,
         body_pos: np.ndarray,
         body_quat: np.ndarray,
-        raw: dict[str, np.ndarray],
+        raw: np.ndarray,
         contacts: list[AgentContacts],
     ):
         """Nobody changes any of the arrays any more.
 
         Args:
-          body_pos, body_quat: the view's. raw: [W, ...] by the names of `RAW`. contacts: of each world.
+          body_pos, body_quat: the view's. raw: [W, `raw_size`]. contacts: of each world.
         """
-        self._plan, self._pos, self._quat, self._raw, self._contacts = plan, body_pos, body_quat, raw, contacts
+        self._plan, self._pos, self._quat, self._all_raw, self._contacts = plan, body_pos, body_quat, raw, contacts
         self._made: dict[str, np.ndarray] = {}
 
     def __call__(self, name: str) -> np.ndarray:
@@ -149,6 +175,10 @@ class Agents:
                 raise AttributeError(name)
             getattr(self, f"_make_{name.rpartition('_')[2]}")(name.rpartition("_")[0])
         return self._made[name]
+
+    @functools.cached_property
+    def _raw(self) -> dict[str, np.ndarray]:
+        return raw_parts(self._plan.model, self._all_raw)
 
     def _bodies(self, part: str) -> np.ndarray:
         tables = self._plan.tables

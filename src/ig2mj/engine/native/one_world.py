@@ -182,7 +182,8 @@ class World:
             self.agent_contacts = AgentContacts(self.agent_contacts.remembered, None, geom, dist)
         else:
             self.agent_contacts = AgentContacts(self.agents_touch(), self._agent_fresh, geom, dist)
-        self.rows["cvel"][self._sleeping_agents] = 0.0  # MuJoCo leaves old velocities where a body sleeps
+        if len(self._sleeping_agents):
+            self.rows["cvel"][self._sleeping_agents] = 0.0  # MuJoCo leaves old velocities where a body sleeps
         return Changed.AGENT
 
     def agents_touch(self) -> np.ndarray:
