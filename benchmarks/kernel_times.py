@@ -15,8 +15,6 @@ from collections.abc import Callable
 from typing import Any
 
 import jax
-import warp as wp
-from warp._src.jax.ffi import _FFI_CALLABLE_REGISTRY
 
 WARP_NAME = re.compile(r"_[0-9a-f]{8}_cuda_kernel_forward|_cuda_kernel_forward")
 
@@ -65,44 +63,6 @@ def profiled(call: Callable[[], Any], steps: int, most: int, unit: str = "step")
             flush=True,
         )
     return result, summary
-
-
-def graph_times(most: int = 8, times: int = 5) -> dict[str, Any]:
-    """How long CUDA graphs of MJX-Warp's functions take by themselves, without XLA's programs around them.
-
-    Their memory holds what the last step left there; what they write is lost. So only when all else is done.
-
-    Args:
-      most: so many of the latest graphs. times: how often each is launched.
-
-    Returns:
-      Milliseconds for a launch, of the processor until it returns (`host`) and until the GPU is done (`wall`): `same`,
-      each graph several times in a row; `in_turn`, one after another; `alone`, waiting for the GPU between launches.
-    """
-    captures = [c for callable_ in _FFI_CALLABLE_REGISTRY.values() for c in callable_.captures.values()][-most:]
-    graphs = [capture.graph for capture in captures]
-
-    def timed(order: list[Any], wait: bool = False) -> dict[str, float]:
-        wp.synchronize()
-        began, host = time.perf_counter(), 0.0
-        for graph in order:
-            before = time.perf_counter()
-            wp.capture_launch(graph)
-            host += time.perf_counter() - before
-            if wait:
-                wp.synchronize()
-        wp.synchronize()
-        per = 1e3 / max(1, len(order))
-        return {"host": round(host * per, 3), "wall": round((time.perf_counter() - began) * per, 3)}
-
-    timed(graphs)
-    return {
-        "graphs": len(graphs),
-        "same": timed([graph for graph in graphs for _ in range(times)]),
-        "in_turn": timed(graphs * times),
-        "alone": timed(graphs * times, wait=True),
-        "one": [timed([graph] * times) for graph in graphs],
-    }
 
 
 def _events(folder: str) -> list[tuple[float, float, str]]:

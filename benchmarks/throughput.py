@@ -28,7 +28,7 @@ import results
 import warp as wp
 from batch_case import ROBOTS, Case
 from disturbance import LEAST, MOST_LOST, Watch, join, summary
-from kernel_times import graph_times, profiled
+from kernel_times import profiled
 from turns import exclusive, preparing
 
 from ig2mj.calibration.acting import ACTION_STEPS, act_at_random, robot_of, start_acting
@@ -260,7 +260,6 @@ def main() -> None:
     parser.add_argument("--pool", type=int, default=16, help="rows of initial states")
     parser.add_argument("--profiles", type=pathlib.Path, help="folder with <home>/engine_profile.json")
     parser.add_argument("--kernels", type=int, default=0, metavar="N", help="print the N longest kernels")
-    parser.add_argument("--graphs", action="store_true", help="also time CUDA graphs by themselves")
     parser.add_argument("--label", default="", help="a remark for the rows")
     parser.add_argument("--lock", type=pathlib.Path, help="file to lock while timing")
     parser.add_argument(
@@ -282,9 +281,6 @@ def main() -> None:
                     row = {"engine": args.engine} | row
                     row |= {"ready_s": case.seconds, "label": args.label, **device()}
                     results.keep_row(row, args.rows)
-                    if args.graphs:
-                        with exclusive(args.lock, args.patience):
-                            print("graphs", graph_times(), flush=True)
 
 
 if __name__ == "__main__":
