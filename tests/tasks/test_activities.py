@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from ig2mj.engine.registry import make_engine
 from ig2mj.envs.names import NAMES
@@ -38,3 +39,26 @@ def test_one_arm_does_not_lift_the_cauldron():
     """Paper, appendix A.3: five of the six activities were learned by Fetch."""
     with pytest.raises(UnknownNameError, match="humanoid"):
         make_robot(ACTIVITIES["BimanualPickAndPlace"], "fetch")
+
+
+@pytest.mark.parametrize("robot", ["humanoid", "fetch"])
+def test_whoever_slices_fruit_sees_the_part_of_the_table_where_things_lie(robot):
+    task = ACTIVITIES["SlicingFruit"]
+    scene = load_scene(task.home, agents=[make_robot(task, robot)], objects=task.objects)
+    engine = make_engine("native", scene, 1)
+    view, table = engine.view(engine.reset()), scene.object_index("coffee_table_0")
+    low, high = np.asarray(view.aabb_low)[0, table], np.asarray(view.aabb_high)[0, table]
+    top = np.stack(np.meshgrid(*np.linspace(low[:2], high[:2], 40).T, [high[2]]), -1).reshape(-1, 3)
+    near = task.near[0]
+    top = top[np.linalg.norm(top - near.pos, axis=1) < near.most]
+    across, up, depth = (_in_eye(view, top)).T
+    edge = depth * np.tan(scene.tables.agent_fovy[0] / 2)
+    seen = (depth > 0) & (np.abs(across) < edge) & (np.abs(up) < edge)
+    assert len(top) > 100
+    assert seen.mean() > 0.7
+
+
+def _in_eye(view, points):
+    """Right, up and ahead of the first robot's eye, m."""
+    eye = Rotation.from_quat(np.roll(np.asarray(view.agent.eye_quat)[0, 0], -1))
+    return eye.inv().apply(points - np.asarray(view.agent.eye_pos)[0, 0]) * (1.0, 1.0, -1.0)

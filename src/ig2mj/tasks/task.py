@@ -52,12 +52,14 @@ class Acts:
     Attributes:
       pos: where it starts, m. For the humanoid the middle of its body, 0.55 m above the floor.
       yaw: degrees it is turned about the vertical; at 0 it faces x.
+      camera_tilt: rad, downwards, of Fetch's camera; None: the robot's own.
       hands: numbers of the hands that act; the rest of the robot stays where it is.
       weights: of the reward.
     """
 
     pos: Vector3
     yaw: float = 0.0
+    camera_tilt: float | None = None
     hands: tuple[int, ...] = (0,)
     weights: Weights = FETCH_WEIGHTS
 
@@ -179,5 +181,5 @@ def make_robot(task: Task, robot: str) -> Robot:
 
     acts = task.acts(robot)
     half = math.radians(acts.yaw) / 2
-    options = {"proprioception": "experiments"} if robot == "fetch" else {}
+    options = {"proprioception": "experiments", "camera_tilt": acts.camera_tilt} if robot == "fetch" else {}
     return ROBOTS[robot](pos=acts.pos, quat=(math.cos(half), 0.0, 0.0, math.sin(half)), **options)
