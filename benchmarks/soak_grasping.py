@@ -138,8 +138,8 @@ class Run:
         self.scale = scales(env)
         self._resets = np.array([name.endswith("_reset") for name in env.action_map.names])
         self.lasting = STEPS * engine.substeps * args.worlds
+        # One program with donated arrays: Warp captures its graphs anew wherever arrays have moved, and keeps them all.
         self.many = jax.jit(self._steps, donate_argnums=0) if engine.pure else self._steps
-        self.fresh = jax.jit(self._restart, donate_argnums=0) if engine.pure else self._restart
         self._draw = jax.jit(self._actions)
         self._look = jax.jit(self._looked)
 
@@ -189,8 +189,13 @@ class Run:
         return Soak(batch, seen, energy, action, soak.holding + holding, soak.grasps + taken), None
 
     def _steps(self, soak: Soak) -> Soak:
+        """Flagged worlds, and those whose episodes are over, start afresh; then `STEPS` control steps."""
+        over = (soak.seen.flags != 0) | (jnp.asarray(soak.batch.world.step) >= EPISODE)
         if self.core.engine.pure:
+            soak = jax.lax.cond(over.any(), self._restart, lambda same, _: same, soak, over)
             return jax.lax.scan(self._step, soak, None, STEPS)[0]
+        if np.asarray(over).any():
+            soak = self._restart(soak, np.asarray(over))
         for _ in range(STEPS):
             soak, _ = self._step(soak, None)
         return soak
@@ -249,10 +254,7 @@ def soak(args: Args, grasping: str) -> dict[str, Any]:
         done, calls = done + run.lasting, calls + 1
         flags = np.asarray(state.seen.flags)
         events += [run.watch.report(state.seen, int(world)) for world in np.flatnonzero(flags)]
-        over = (flags != 0) | (np.asarray(state.batch.world.step) >= EPISODE)
         last = done >= args.world_steps or timed >= args.seconds
-        if over.any() and not last:
-            state = run.fresh(state, jnp.asarray(over) if run.core.engine.pure else over)
         if calls <= 2:  # these compile
             ready += time.monotonic() - start
         else:
