@@ -10,6 +10,8 @@ import os
 import pathlib
 import sys
 import time
+from collections.abc import Callable
+from typing import Any
 
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "learn"))
 
@@ -117,15 +119,18 @@ def turns(team: Team) -> dict:
     ppo = PPO(Perception(PointMass.observation_spaces), 2, PPOConfig(length=4, parts=1, epochs=1), AXIS)
     step = ManyDevices(PointMass(4), ppo, jax.devices(), team)
     learner, memory = step.place(ppo.init(jax.random.PRNGKey(0)), step.memory())
-    plays, times, collect = step.begin(0), [], step._collect
+    plays, times, compiled = step.begin(0), [], step._compiled
 
-    def timed(*given: object) -> object:
-        times.append(time.time())
-        found = jax.block_until_ready(collect(*given))
-        times.append(time.time())
-        return found
+    def timed(act: Callable[..., Any]) -> Callable[..., Any]:
+        def noted(*given: Any) -> Any:
+            times.append(time.time())
+            found = act(*given)
+            times.append(time.time())
+            return found
 
-    step._collect = timed
+        return noted
+
+    step._compiled = lambda *given: [timed(program) for program in timed(compiled)(*given)]
     for k in range(2):
         learner, memory, plays, *_ = step(learner, memory, plays, np.asarray(jax.random.PRNGKey(k)), 0.0, True)
     return {"sampled": len(sampled), "times": times}
