@@ -82,7 +82,7 @@ class NavigationObjective:
         privileged = (
             *(() if closing else ("goal_x", "goal_y", "goal_z", "way_left", "ahead_x", "ahead_y")),
             *("velocity_x", "velocity_y", "yaw_rate", "collision"),
-            *((f"eef_{near}_goal_{a}" for near in ("to", "near") for a in "xyz") if task.goal == "reach" else ()),
+            *((f"eef_to_goal_{a}" for a in "xyz") if task.goal == "reach" else ()),
             *(f"{scene.object_names[o]}_{a}" for o in self._loose for a in "xyz"),
             *(f"other_{k}_{a}" for k in range(task.others) for a in "xyz"),
             *(f"{name}_opening" for name in self._names),
@@ -163,8 +163,7 @@ class NavigationObjective:
     ) -> dict[str, Float[Array, "W n"]]:
         """`task_obs`, as iGibson's: the goal in polar coordinates (m, rad) of the base's frame, speed forwards (m/s)
         and to the left (rad/s); to reach, also the goal's height and the gripper, in that frame. `privileged_state`:
-        all in the base's frame, m, m/s, rad/s; `eef_near_goal` is the way that the gripper has left in tolerances, tanh
-        of it: among metres the last centimetres are hard to tell for a network."""
+        all in the base's frame, m, m/s, rad/s."""
         task, agent = self._task, view.agent
         base, quat = jnp.asarray(agent.base_pos)[:, 0], jnp.asarray(agent.base_quat)[:, 0]
         goal = jnp.asarray(self._goals)[now.row]
@@ -185,8 +184,7 @@ class NavigationObjective:
             found["task_obs"] = jnp.stack(polar, axis=1)
         columns += [velocity[:, :2], turning[:, None], now.hit[:, None].astype(jnp.float32)]
         if self._hand >= 0:
-            left = place - own(jnp.asarray(agent.hand_pos)[:, self._hand])
-            columns += [left, jnp.tanh(left / task.tolerance)]
+            columns.append(place - own(jnp.asarray(agent.hand_pos)[:, self._hand]))
         com = jnp.asarray(view.object_com)
         columns += [own(com[:, k]) for k in self._loose]
         columns += [own(jnp.asarray(agent.base_pos)[:, 1 + k]) for k in range(task.others)]
