@@ -9,7 +9,7 @@ import tyro
 
 ALGORITHMS = ("sac", "ppo", "bc", "dagger")
 
-WORLDS = {"native": 16}
+WORLDS = {"native": 32}
 """So many worlds unless another number is asked for; `PURE_WORLDS` on the others."""
 
 PURE_WORLDS = 2048
@@ -52,7 +52,7 @@ def run(
       rows: of these the first that the networks see and the first below those; 80:128 of 128 is the table before a
         humanoid; default: all.
       engine: native, warp or jax; default: warp on a GPU, else native.
-      worlds: number of worlds stepped at once; 0: 2048 (native: 16).
+      worlds: number of worlds stepped at once; 0: 2048 (native: 32).
       minutes: minutes of training, not counting compilation.
       seed: random seed.
       out: folder of the run; default: runs/ENV-ROBOT-GRASPING-ALGO-OBS-SEED.

@@ -20,7 +20,7 @@ CONFIGS: dict[str, Config] = {"sac": SACConfig(), "ppo": PPOConfig(), "dagger": 
 
 SMALL: dict[str, Config] = {
     "sac": SACConfig(
-        updates=8,
+        updates=16,
         batch=256,
         capacity=200_000,
         gamma=0.98,
