@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import warp as wp
 from mujoco.mjx.third_party import mujoco_warp
+from mujoco.mjx.third_party.mujoco_warp._src import island
 
 from ig2mj.engine.warp import kernels, patches
 from ig2mj.engine.warp.engine import WarpEngine
@@ -54,6 +55,12 @@ def _count(count: wp.array(dtype=int)):  # pyright: ignore[reportInvalidTypeForm
     wp.atomic_add(count, 0, 1)
 
 
+def test_islands_are_compiled_without_derivatives():
+    modules = wp.get_module(island.__name__), island._island_dsu.module
+    assert patches.fit()
+    assert all(module.execs or not module.options["enable_backward"] for module in modules)
+
+
 @pytest.mark.slow
 def test_a_step_launches_no_other_kernels():
     model = mujoco.MjModel.from_xml_string(SCENE)
@@ -99,4 +106,4 @@ def test_an_engine_loads_the_kernels_of_its_scene_and_its_first_step_no_others(m
     assert engine.load_kernels(workers=2) > 40
     loaded.clear()
     engine.step(engine.reset())
-    assert set(loaded) <= {"mujoco.mjx.warp.ffi"}  # has no kernels
+    assert not loaded

@@ -17,6 +17,7 @@ import mujoco
 import numpy as np
 import warp as wp
 from mujoco.mjx.third_party import mujoco_warp
+from mujoco.mjx.warp import ffi
 
 from ig2mj.engine.warp import patches
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
@@ -24,6 +25,9 @@ from ig2mj.engine.warp.profile import EngineProfile
 
 Launch = tuple[wp.Kernel, int]
 """A kernel, and the number of threads of its blocks."""
+
+DEFAULT_BLOCK = 256
+"""Threads of a block where nobody says how many; Warp's."""
 
 
 def launches_of(act: Callable[[], Any]) -> list[Launch]:
@@ -33,13 +37,12 @@ def launches_of(act: Callable[[], Any]) -> list[Launch]:
     then. Both branches of a condition are taken, and the body of a loop twice.
     """
     found: dict[Launch, None] = {}
-    default = 256  # Warp's
 
-    def launch(kernel: wp.Kernel, dim: Any, *args: Any, block_dim: int = default, **kwargs: Any) -> None:
+    def launch(kernel: wp.Kernel, dim: Any, *args: Any, block_dim: int = DEFAULT_BLOCK, **kwargs: Any) -> None:
         if np.prod(dim) > 0:
             found[patches.launched(kernel, dim), block_dim] = None
 
-    def launch_tiled(kernel: wp.Kernel, dim: Any, *args: Any, block_dim: int = default, **kwargs: Any) -> None:
+    def launch_tiled(kernel: wp.Kernel, dim: Any, *args: Any, block_dim: int = DEFAULT_BLOCK, **kwargs: Any) -> None:
         if np.prod(dim) > 0:
             found[patches.launched(kernel, dim, tiled=True), block_dim] = None
 
@@ -55,7 +58,7 @@ def launches_of(act: Callable[[], Any]) -> list[Launch]:
                 branch(**kwargs)
 
     def suggested(kernel: wp.Kernel, device: Any = None) -> tuple[int, int]:
-        return default, 1  # the real one compiles the kernel
+        return DEFAULT_BLOCK, 1  # the real one compiles the kernel
 
     noted = ScopedReplacement()
     noted.add(
@@ -115,6 +118,9 @@ def load(launches: list[Launch], device: str | None = None, workers: int | None 
     threads = workers or len(os.sched_getaffinity(0))
     on = wp.get_device(device)
     by_size = modules_of(launches, one_thread=on.is_cpu)
+    by_size.setdefault(DEFAULT_BLOCK, []).append(
+        wp.get_module(ffi.__name__)
+    )  # no kernels, but JAX's first call loads it
     with alone():
         for block_dim, modules in by_size.items():
             wp.force_load(on, modules, block_dim=block_dim, max_workers=threads)

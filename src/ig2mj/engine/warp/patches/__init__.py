@@ -85,11 +85,12 @@ def fit() -> bool:
 
 @functools.cache
 def _fill() -> None:
-    from ig2mj.engine.warp.patches import launching  # not before: its modules need names that may not exist
+    from ig2mj.engine.warp.patches import launching, spared  # not before: its modules need names that may not exist
     from ig2mj.engine.warp.patches.table import OWN, SUBSTITUTES
 
     KERNELS.add(OWN)
     launching.replace_by(SUBSTITUTES)
+    spared.leave_out_derivatives()
 
 
 def for_new_engines() -> bool:

@@ -22,7 +22,7 @@ def choose_broadphase(name: str, m: Any, d: Any, ctx: Any, awake_prev: Any = Non
         original(collision_driver, name)(m, d, ctx, awake_prev)
 
 
-@wp.kernel
+@wp.kernel(enable_backward=False)
 @no_type_check
 def _keep_larger(first: wp.array[int], ncollision: wp.array[int]):
     ncollision[0] = wp.max(first[0], ncollision[0])

@@ -108,7 +108,7 @@ def _smooth_kernel(size: int) -> wp.Kernel:
     return factorize_smooth
 
 
-@wp.kernel
+@wp.kernel(enable_backward=False)
 @no_type_check
 def _init_inertia(awake: wp.array[int], inertia: wp.array3d[float]):
     world, column = wp.tid()

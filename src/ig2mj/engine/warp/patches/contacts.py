@@ -57,7 +57,7 @@ def _face(local: wp.vec3, half: wp.vec3) -> wp.vec3:
     return normal
 
 
-@wp.kernel
+@wp.kernel(enable_backward=False)
 @no_type_check
 def _mend(
     geom_type: wp.array[int],

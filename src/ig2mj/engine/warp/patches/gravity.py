@@ -18,7 +18,7 @@ from mujoco.mjx.third_party.mujoco_warp._src import passive, support, types
 from ig2mj.engine.warp.patches.replacements import original
 
 
-@wp.kernel
+@wp.kernel(enable_backward=False)
 @no_type_check
 def _gravity_compensation(
     gravity: wp.array[wp.vec3],

@@ -23,7 +23,7 @@ def encode(geom_hand: np.ndarray, geom_object: np.ndarray, num_objects: int) -> 
     return np.where(geom_object >= 0, -(geom_object + 1), of_hand).astype(np.float32)
 
 
-@wp.kernel
+@wp.kernel(enable_backward=False)
 @no_type_check
 def _drop(
     code: wp.array2d[float],

@@ -5,6 +5,7 @@
   sleeping needs, is another function's.
 - The list of awake degrees of freedom is made before the smooth accelerations and again before the constraints are
   solved; nothing wakes or falls asleep between.
+- Derivatives of islands' kernels, which are about whole numbers: compiling them takes as long as a convex kernel.
 """
 
 from __future__ import annotations
@@ -12,11 +13,20 @@ from __future__ import annotations
 import threading
 from typing import Any
 
+import warp as wp
 from mujoco.mjx.third_party.mujoco_warp._src import forward, island, solver
 
 from ig2mj.engine.warp.patches.replacements import original
 
 _here = threading.local()
+
+
+def leave_out_derivatives() -> None:
+    """Islands' kernels are compiled without derivatives, in the whole process, unless they are compiled already."""
+    for module in (wp.get_module(island.__name__), island._island_dsu.module):
+        if module is not None and not module.execs:
+            module.options |= {"enable_backward": False}
+            module.mark_modified()
 
 
 def compute_island_mapping(m: Any, d: Any) -> None:
