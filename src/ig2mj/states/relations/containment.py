@@ -78,9 +78,9 @@ class ContainerPairs:
         worlds, count = needed.shape
         chunk = min(worlds * count, max(SMALLEST_CHUNK, round(CHUNKS_PER_WORLD * worlds)))
         # Container by container, and within one world by world: number = place in `order` * W + world.
-        listed = Worklist.of(needed[:, self.order].T.reshape(-1))
+        listed = Worklist.of(needed[:, self.order].T.reshape(-1), chunk)
         before = jnp.concatenate([jnp.zeros(1, listed.until.dtype), listed.until])[self.start * worlds]
-        answers, first = listed.no_answers(chunk), 0
+        answers, first = listed.no_answers(), 0
         for table in self.tables:
             limits = before[first : first + len(table.bodies) + 1]
             answers = self._work_off(table, view, listed, limits, chunk, worlds, answers)
@@ -109,7 +109,7 @@ class ContainerPairs:
         def some(turn: Int[jax.Array, ""], answers: Bool[jax.Array, "M"]) -> Bool[jax.Array, "M"]:
             k = jnp.sum(until <= turn)
             at = limits[k] + (turn - until[k] + chunks[k]) * chunk
-            number = listed.places(at, chunk)
+            number = listed.places(at)
             place, world = number // worlds, number % worlds
             origins = com[world, subject[jnp.minimum(place, len(self.order) - 1)]]
             bodies, targets = table.of(k)

@@ -93,19 +93,19 @@ class NearPairs:
         total = worlds * count
         chunk = min(total, max(1, PAIRS_OF_PIECES // (of_a * of_b)))
         mask = needed.T.reshape(-1)  # number = pair * W + world
-        listed = Worklist.of(mask)
+        listed = Worklist.of(mask, chunk)
         most = limit(view, self.pairs).T.reshape(-1)
         poses = jnp.concatenate([jnp.asarray(view.body_pos), jnp.asarray(view.body_quat)], axis=-1)
         poses = jax.lax.stop_gradient(poses)
 
         def some(turn: Int[jax.Array, ""], answers: Bool[jax.Array, "M"]) -> Bool[jax.Array, "M"]:
-            number = listed.places(turn * chunk, chunk)
+            number = listed.places(turn * chunk)
             row = jnp.minimum(number, total - 1)
             answer = self._of_rows(poses, row % worlds, row // worlds, most[row], number < total)
             return listed.noted(answers, turn * chunk, answer)
 
         turns = (jnp.sum(mask) + chunk - 1) // chunk
-        answers = jax.lax.fori_loop(0, turns, some, listed.no_answers(chunk))
+        answers = jax.lax.fori_loop(0, turns, some, listed.no_answers())
         return listed.in_place(answers).reshape(count, worlds).T
 
     def _of_rows(
@@ -129,10 +129,10 @@ class NearPairs:
         close &= (second >= 0)[:, None]
         size = close.size
         block = int(np.clip(size // 64, *BLOCK))
-        listed = Worklist.of(close.reshape(-1))
+        listed = Worklist.of(close.reshape(-1), block)
 
         def some(turn: Int[jax.Array, ""], found: Bool[jax.Array, "C"]) -> Bool[jax.Array, "C"]:
-            number = listed.places(turn * block, block)
+            number = listed.places(turn * block)
             row, i, j = jnp.unravel_index(jnp.minimum(number, size - 1), close.shape)
             both = pieces[row[:, None], jnp.stack([i, of_a + j], axis=-1)]
             # The barrier keeps XLA from repeating the gathers in everything that reads a piece.

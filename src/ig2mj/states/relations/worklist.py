@@ -22,27 +22,40 @@ FEW = 1 << 14
 
 
 class Worklist(NamedTuple):
-    """The places where a mask is true, numbered in rising order.
+    """The places where a mask is true, numbered in rising order, and worked off some at a time.
 
     Attributes:
       mask: which places are listed. until: how many are listed up to each place, itself included.
+      count: N. listed: the places and then M, N times or more; None: each turn searches for its own.
     """
 
     mask: Bool[Array, "M"]
     until: Int[Array, "M"]
+    count: int
+    listed: Int[Array, "L"] | None
 
     @classmethod
-    def of(cls, mask: Bool[Array, "M"]) -> Worklist:
-        """Of a mask."""
-        return cls(mask, jnp.cumsum(mask))
+    def of(cls, mask: Bool[Array, "M"], count: int, search: bool | None = None) -> Worklist:
+        """Of a mask.
 
-    def places(self, first: Int[Array, ""], count: int) -> Int[Array, "N"]:
-        """The places of `count` entries from a number on; M from the end of the list on."""
-        return jnp.searchsorted(self.until, first + 1 + np.arange(count)).astype(np.int32)
+        Args:
+          count: places of a turn. search: whether each turn searches for its places; None: on processors, where a list
+            is a scatter and the search a few instructions, while on a GPU each turn would wait for a loop of its own.
+        """
+        listed, size = None, mask.size
+        if not (jax.default_backend() == "cpu" if search is None else search):
+            listed = jnp.nonzero(mask, size=size + count, fill_value=size)[0]
+        return cls(mask, jnp.cumsum(mask), count, listed)
 
-    def no_answers(self, count: int) -> Bool[jax.Array, "K"]:
-        """What `noted` fills, where a turn answers `count` entries."""
-        return jnp.zeros(self.mask.size + count, bool)
+    def places(self, first: Int[Array, ""]) -> Int[Array, "N"]:
+        """The places of a turn's entries, from a number on; M from the end of the list on."""
+        if self.listed is not None:
+            return jax.lax.dynamic_slice(jnp.asarray(self.listed), (first,), (self.count,))
+        return jnp.searchsorted(self.until, first + 1 + np.arange(self.count)).astype(np.int32)
+
+    def no_answers(self) -> Bool[jax.Array, "K"]:
+        """What `noted` fills."""
+        return jnp.zeros(self.mask.size + self.count, bool)
 
     def noted(
         self, answers: Bool[jax.Array, "K"], first: Int[Array, ""], of_turn: Bool[Array, "N"]
