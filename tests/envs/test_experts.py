@@ -60,6 +60,7 @@ def test_experts_solve_held_out_states(name, robot):
         ("SoakingTowel", "humanoid", "assisted"),
         ("SlicingFruit", "humanoid", "assisted"),
         ("SoakingTowel", "fetch", "physical"),
+        ("SlicingFruit", "fetch", "physical"),
     ],
 )
 def test_experts_also_solve_tasks_without_mittens(name, robot, grasping):

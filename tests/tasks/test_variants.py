@@ -50,6 +50,10 @@ def test_what_nothing_sticks_to_fits_between_fetchs_fingers(number):
     assert max(towel.bounding_box[:2]) < opening - 0.015 and towel.assisted_grasp
     assert 0.2 < towel.mass < 0.5
     assert task.name == "SoakingTowel" and task.goal == ACTIVITIES["SoakingTowel"].goal
+    fruit, knife = (find_model(name) for name in variant(ACTIVITIES["SlicingFruit"], number, "physical").objects)
+    assert fruit.category == "apple" and knife.entry.assisted_grasp
+    assert knife.entry.bounding_box[1] < opening - 0.015, "narrower than the gripper opens"
+    assert len(knife.entry.orientations) == 1, "it stands on its handle, edge down"
 
 
 @pytest.mark.parametrize("mode", ["mitten", "assisted", "sticky"])
