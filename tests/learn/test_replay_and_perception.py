@@ -19,7 +19,7 @@ from ig2mj.learn.collect import Transition
 from ig2mj.learn.evaluate import wilson
 from ig2mj.learn.hidden import Hidden, guess_loss
 from ig2mj.learn.moments import RewardScale
-from ig2mj.learn.networks import Encoder, brightest, coarse, projected, shifted
+from ig2mj.learn.networks import Actor, Encoder, brightest, coarse, projected, shifted
 from ig2mj.learn.perception import FAR, Perception, Seen, shrunk
 from ig2mj.learn.policies import Policy, PolicyMismatch, depends_on, perception_of
 from ig2mj.learn.replay import Replay
@@ -207,6 +207,20 @@ def test_the_depth_at_the_brightest_point_is_seen():
     assert coarse(jnp.asarray(depth), (3, 4)).shape == (1, 3, 4)
     found = np.asarray(brightest(jnp.asarray(maps), coarse(jnp.asarray(depth), (3, 4))))
     assert np.allclose(found, [[1, 1, 1, 1, 1]], atol=1e-4), "row, column, depth, and depth times them"
+
+
+@pytest.mark.parametrize(("net", "moved"), [("places", False), ("points", True)])
+def test_whether_actions_train_the_encoder(net, moved):
+    actor = Actor(2, (8,), (12, 16, 4), net, guess=3)
+    vector, picture = jnp.ones((4, 2)), jax.random.randint(jax.random.PRNGKey(0), (4, 768), 0, 256).astype(jnp.uint8)
+    params = actor.init(jax.random.PRNGKey(1), vector, picture)["params"]
+
+    def slope(part):
+        found = jax.grad(lambda p: jnp.square(actor.apply({"params": p}, vector, picture)[part] - 1.0).sum())(params)
+        return max(float(jnp.abs(a).max()) for a in jax.tree.leaves(found["encoder"]))
+
+    assert (slope(0) > 0) is moved
+    assert slope(2) > 0, "the guess always does"
 
 
 def test_half_precision_on_a_gpu_sees_nearly_the_same(monkeypatch):
