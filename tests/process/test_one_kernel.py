@@ -34,3 +34,10 @@ def test_what_cannot_be_one_function_is_compiled_as_usual():
 def test_keys_of_random_numbers_are_taken():
     one, key = OneKernel(lambda key, x: x + jax.random.uniform(key, x.shape)), jax.random.key(3)
     assert np.array_equal(one(key, X), X + jax.random.uniform(key, X.shape))
+
+
+def test_without_arguments_there_is_a_result_too():
+    one = OneKernel(lambda: jnp.arange(3))
+    assert one().tolist() == [0, 1, 2] and not one.is_one
+    one = OneKernel(lambda nothing: nothing + jnp.ones((0, 2)))
+    assert one(np.zeros((0, 2), np.float32)).shape == (0, 2)

@@ -49,7 +49,8 @@ class OneKernel:
     def _first(self, arguments: tuple[Any, ...]) -> Any:
         import jax
 
-        for options in (NO_LIBRARY, {}) if jax.default_backend() == "cpu" else ():
+        possible = jax.default_backend() == "cpu" and any(leaf.size for leaf in jax.tree.leaves(arguments))
+        for options in (NO_LIBRARY, {}) if possible else ():
             call = jax.jit(_as_one(self._function), compiler_options={**self._options, **options})
             try:
                 made = call(*arguments)[0]

@@ -86,12 +86,13 @@ class PackedFunction:
         """Compiles nothing yet: that happens at the first call.
 
         Args:
-          traced: by `jax.make_jaxpr`. name: of the program, for people. options: of the compiler.
+          traced: by `jax.make_jaxpr`. name: of the program, for people. options: of the compiler; with any of them the
+            program is none that has to be fast, and is compiled as usual.
         """
         shapes = traced.in_avals
         self.takes = np.flatnonzero(inputs_that_matter(traced.jaxpr)).tolist()
         self._given, self._made = Packing([shapes[i] for i in self.takes]), Packing(traced.out_avals)
-        function, small = jaxpr_as_fun(traced), _is_small(traced)
+        function, small = jaxpr_as_fun(traced), options is None and _is_small(traced)
 
         def packed(vectors: list[Any]) -> list[jax.Array]:
             every: list[Any] = [None] * len(shapes)

@@ -57,14 +57,13 @@ class Events(NamedTuple):
 
     Attributes:
       leaves: of the states, at the places `StateProgram.gives`. swap: mask, pos, quat; None where nothing can be cut.
-      acts: source on object [W, O, S]. facts: of the goal, those that follow from the states made here.
-      flags: whether nothing changed, and whether it asks for teleports. memo: of relations, flat.
+      acts: source on object [W, O, S]. flags: whether nothing changed, and whether it asks for teleports.
+      memo: of relations, flat.
     """
 
     leaves: list[Array]
     swap: tuple[Array, Array, Array] | None
     acts: Bool[Array, "W O S"]
-    facts: Bool[Array, "W I"]
     flags: Bool[Array, "2"]
     memo: list[Array]
 
@@ -178,6 +177,7 @@ class StateProgram:
         self._events: _Traced | None = None
         self._rest: _Traced | None = None
         self._heat: _Traced | None = None
+        self._facts: _Traced | None = None
         self.rows, self.goal_rows = _object_bodies(model), GoalRows(model, goal)
 
     @classmethod
@@ -203,6 +203,13 @@ class StateProgram:
             self.event_reads = frozenset(self._events.reads)
         return Events(*self._events(leaves, view, memo))
 
+    def lasting_facts(self, leaves: list[Array], view: PhysicsView) -> Bool[Array, "W I"]:
+        """Facts of the goal that follow from the states, but from no temperature; a program of its own, so that
+        `events` is the same program whatever the goal is."""
+        if self._facts is None:
+            self._facts = _Traced.of(self._facts_step, leaves, view, [])
+        return self._facts(leaves, view, [])
+
     def rest(
         self,
         leaves: list[Array],
@@ -214,8 +221,9 @@ class StateProgram:
         """One step of temperatures, and the goal after it.
 
         Args:
-          leaves: all leaves of the states, those of `events` among them. acts, facts: of `events`; or the facts of the
-          last call, where none of the states has changed since that they follow from. memo: the last call's.
+          leaves: all leaves of the states, those of `events` among them. acts: of `events`. facts: `lasting_facts`; or
+            those of the last call, where none of the states has changed since that they follow from. memo: the last
+            call's.
         """
         others = [acts, facts, *memo]
         if self._rest is None:
@@ -264,10 +272,13 @@ class StateProgram:
         same = [jnp.all(leaves[i] == made[i]) for i in self.gives]
         flags = jnp.stack([jnp.all(jnp.array(same)), jnp.any(swap.mask)])
         cuts = (swap.mask, swap.pos, swap.quat) if swap.mask.shape[1] else None
-        facts = jnp.zeros((view.object_com.shape[0], 0), bool)
-        if self.goal is not None:
-            facts = self.goal.literals.lasting_facts(after)
-        return [made[i] for i in self.gives], cuts, acts, facts, flags, jax.tree.leaves(after_memo)
+        return [made[i] for i in self.gives], cuts, acts, flags, jax.tree.leaves(after_memo)
+
+    def _facts_step(self, leaves: list[Array], fields: list[Array], others: list[Array]) -> Array:
+        states: ExtendedStates = jax.tree.unflatten(self.structure, leaves)
+        if self.goal is None:
+            return jnp.zeros((self.num_worlds, 0), bool)
+        return self.goal.literals.lasting_facts(states)
 
     def _rest_step(self, leaves: list[Array], fields: list[Array], others: list[Array]) -> tuple:
         """`Rest` as a plain tuple."""

@@ -164,7 +164,8 @@ class StateStepper:
         events = program.events(leaves, view, self._memo)
         self._leaves, self._memo = leaves, events.memo
         self._put(program.gives, events.leaves)
-        rest = program.rest(leaves, events.acts, events.facts, view, self._goal_memo)
+        facts = program.lasting_facts(leaves, view)
+        rest = program.rest(leaves, events.acts, facts, view, self._goal_memo)
         self._put(program.heats, rest.leaves)
         self._goal_memo, self._whole_facts = rest.memo, rest.facts
         self._facts = self._whole_facts
