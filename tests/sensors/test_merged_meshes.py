@@ -13,7 +13,7 @@ from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.sensors.batch_camera import BatchCamera
 from ig2mj.sensors.images import VISIBLE_GROUPS
-from ig2mj.sensors.merged_meshes import MESH, alpha, rigid_parts, tables_of
+from ig2mj.sensors.merged_meshes import MESH, alpha, mergeable, rigid_parts, tables_of
 from ig2mj.sensors.render_model import make_render_model
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
@@ -41,6 +41,15 @@ def host(scene) -> mujoco.MjModel:
 @pytest.fixture(scope="module")
 def parts(scene, host):
     return rigid_parts(host, scene.model, VISIBLE_GROUPS)
+
+
+def test_height_fields_and_flexes_are_left_to_the_upstream_ray_caster(host):
+    ground = '<asset><hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/></asset>', '<geom type="hfield" hfield="h"/>'
+    cloth = "", '<flexcomp name="cloth" type="grid" count="2 2 1" spacing="1 1 1" dim="2"/>'
+    assert mergeable(host)
+    for assets, body in (ground, cloth):
+        xml = f"<mujoco>{assets}<worldbody>{body}</worldbody></mujoco>"
+        assert not mergeable(mujoco.MjModel.from_xml_string(xml))
 
 
 def test_every_visible_mesh_is_in_one_part_and_what_never_moves_is_the_first(scene, host, parts):

@@ -22,6 +22,12 @@ HIDDEN = 31
 """Group of geoms that have no box of their own; no scene has so many groups."""
 
 
+def mergeable(host: mujoco.MjModel) -> bool:
+    """Whether our rays (`ig2mj.sensors.ray_caster`) see all that a render model can show: they know no flexes and no
+    height fields."""
+    return host.nflex == 0 and not (host.geom_type == mujoco.mjtGeom.mjGEOM_HFIELD).any()
+
+
 @dataclasses.dataclass(frozen=True)
 class Part:
     """Meshes that move as one.
