@@ -84,8 +84,8 @@ class BatchCamera:
           rays: patterns to cast besides; each call gives the pose of each.
           merge_meshes: cast rays against one mesh for all that never moves and one for each rigid part that does
             (`ig2mj.sensors.merged_meshes`; a quarter less time); what is invisible in the compiled scene then is in
-            every world. Scenes with flexes or height fields are not merged, nor is what ray patterns see: their
-            distances inside a robot's own body came out 6 mm or more apart from native ones.
+            every world. Scenes with flexes or height fields are not merged, nor where ray patterns are
+            cast: merged, a scan differs from the native one (not yet explained).
 
         Raises:
           EngineError: not the Warp engine, or nothing is to be made. UnknownNameError: no such camera.
