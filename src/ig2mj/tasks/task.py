@@ -59,7 +59,7 @@ class Acts:
 
     pos: Vector3
     yaw: float = 0.0
-    camera_tilt: float | None = None
+    camera_tilt: float | None = dataclasses.field(default=None, repr=False)  # part of the model's hash
     hands: tuple[int, ...] = (0,)
     weights: Weights = FETCH_WEIGHTS
 
