@@ -25,10 +25,13 @@ def test_results_are_those_of_the_usual_program_and_arguments_may_be_of_no_use()
     jax.tree.map(np.testing.assert_array_equal, made, jax.jit(_chosen)(*arguments))
 
 
-def test_what_cannot_be_one_function_is_compiled_as_usual():
+def test_what_cannot_be_one_function_is_compiled_as_usual_and_without_a_word(capfd):
     one = OneKernel(lambda x: jnp.sort(x, axis=0))
     assert np.array_equal(one(X), np.sort(X, axis=0)) and not one.is_one
     assert np.array_equal(one(-X), np.sort(-X, axis=0))
+    inside = OneKernel(lambda x: jax.lax.cond(x[0, 0] > 0, lambda: x[0, :2], lambda: jax.lax.top_k(x[0], 2)[0]))
+    assert inside(X).shape == (2,) and not inside.is_one
+    assert "rror" not in capfd.readouterr().err  # XLA writes there
 
 
 def test_keys_of_random_numbers_are_taken():

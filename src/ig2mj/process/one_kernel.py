@@ -5,7 +5,8 @@ fifty kernels of a few hundred numbers each, handing them over takes longer than
 takes longer than compiling one. XLA:CPU compiles a computation that is called with the attribute `xla_cpu_small_call`
 as one function, as it does by itself with small loops; a backend that does not know the attribute makes a plain call.
 Sorts, scatters of many numbers, and operations large enough to be split between threads cannot be compiled that way: a
-program with such an operation is compiled as usual when it is first called.
+program with such an operation is compiled as usual when it is first called. XLA prints an error of its own when it
+finds that out, so that for the first of these it is not asked.
 """
 
 from __future__ import annotations
@@ -20,6 +21,9 @@ ATTRIBUTES = {"inlineable": "false", "xla_cpu_small_call": "true"}
 
 NO_LIBRARY: Options = {"xla_cpu_experimental_ynn_fusion_type": "LIBRARY_FUSION_TYPE_INDIVIDUAL_CONVOLUTION"}
 """Of a library's kernels none but convolutions, of which we have none: its calls cannot be part of a function."""
+
+APART = {"sort", "top_k"}
+"""Operations of JAX that XLA hands to functions of its runtime."""
 
 LOG = logging.getLogger("ig2mj.process")
 
@@ -52,6 +56,8 @@ class OneKernel:
         possible = jax.default_backend() == "cpu" and any(leaf.size for leaf in jax.tree.leaves(arguments))
         for options in (NO_LIBRARY, {}) if possible else ():
             call = jax.jit(_as_one(self._function), compiler_options={**self._options, **options})
+            if APART & _operations(call.trace(*arguments).jaxpr.jaxpr):
+                break
             try:
                 made = call(*arguments)[0]
             except jax.errors.JaxRuntimeError as e:
@@ -87,6 +93,14 @@ def _as_one(function: Callable[..., Any]) -> Callable[..., tuple[Any, Any]]:
 
     outer.__name__ = function.__name__
     return outer
+
+
+def _operations(jaxpr: Any) -> set[str]:
+    """Names of all operations of a program and of the programs in it."""
+    from jax.extend.core import subjaxprs
+
+    found = {equation.primitive.name for equation in jaxpr.eqns}
+    return found.union(*map(_operations, subjaxprs(jaxpr)))
 
 
 def _one_of_each(arrays: list[Any]) -> Any:
