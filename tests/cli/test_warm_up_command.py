@@ -28,11 +28,15 @@ def test_the_second_process_finds_everything_compiled(tmp_path):
     assert sum(warm["seconds"][k] for k in steps) < 0.6 * sum(cold["seconds"][k] for k in steps)
 
 
-def test_a_home_takes_no_robot(capsys):
+def test_a_home_takes_no_robot_and_no_grasping(capsys):
     from ig2mj.cli import call
 
     for architecture in ((), ("--arch", "90")):
         assert call(["warm-up", "small_home", "--robot", "fetch", *architecture]) == 2
         assert "belong to environments" in capsys.readouterr().err
+    assert call(["warm-up", "small_home", "--grasping", "physical"]) == 2
+    assert "belong to environments" in capsys.readouterr().err
+    assert call(["warm-up", "CookingMeat", "--grasping", "firm", "--worlds", "1"]) == 2
+    assert "firm" in capsys.readouterr().err
     assert call(["warm-up", "CookingMeat", "--arch", "90", "--observations", "rgb"]) == 2
     assert "need the GPU itself" in capsys.readouterr().err

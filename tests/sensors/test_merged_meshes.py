@@ -10,9 +10,9 @@ import pytest
 
 from ig2mj import load_scene
 from ig2mj.engine.warp.engine import WarpEngine
+from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.sensors.batch_camera import BatchCamera
-from ig2mj.sensors.images import VISIBLE_GROUPS
 from ig2mj.sensors.merged_meshes import MESH, alpha, mergeable, rigid_parts, tables_of
 from ig2mj.sensors.render_model import make_render_model
 from ig2mj.states.initial import initial_states

@@ -12,7 +12,7 @@ from perceiving import Perceiving
 from ig2mj.agents.humanoid import Humanoid
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process.opengl import GL_BACKENDS, probe_gl
-from ig2mj.sensors.images import VISIBLE_GROUPS
+from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 from ig2mj.sensors.labels import PARTICLES, class_names, class_of_category
 from ig2mj.sensors.native_camera import NativeCamera
 from ig2mj.states import particles
@@ -125,13 +125,13 @@ def test_leaving_out_what_is_out_of_view_changes_no_pixel(tiny_home_folder, yaw,
     robot = Humanoid(pos=(0.6, -0.6, 0.55), quat=(np.cos(yaw / 2), 0, 0, np.sin(yaw / 2)))
     world = Perceiving(tiny_home_folder, robot)
     suite = world.suite("rgb", "depth", "ins_seg", width=48, height=24)
-    hidden = []
-    original = NativeCamera._out_of_view
+    visible = []
+    original = NativeCamera._in_view
     with monkeypatch.context() as patch:
-        patch.setattr(NativeCamera, "_out_of_view", lambda *a: hidden.append(original(*a)) or hidden[-1])
+        patch.setattr(NativeCamera, "_in_view", lambda *a: visible.append(original(*a)) or visible[-1])
         culled, _ = world.read(suite)
-    assert hidden[0].any() and not hidden[0].all()
-    monkeypatch.setattr(NativeCamera, "_out_of_view", lambda self, *_: np.zeros(self._drawn.ngeom, bool))
+    assert visible[0].any() and not visible[0].all()
+    monkeypatch.setattr(NativeCamera, "_in_view", lambda self, *_: np.ones(self._drawn.ngeom, bool))
     whole, _ = world.read(suite)
     for name, image in whole.items():
         np.testing.assert_array_equal(culled[name], image)

@@ -166,8 +166,9 @@ def _replay(scene, dump, picture, video, camera, eye, target, size, seconds, col
 
     from PIL import Image
 
+    from ig2mj.scene.geom_groups import VISIBLE_GROUPS
     from ig2mj.scene.scene import load_scene
-    from ig2mj.viewer.offscreen import VISIBLE_GROUPS, render
+    from ig2mj.viewer.offscreen import render
     from ig2mj.viewer.replay import Replay
 
     if (picture is not None and video is not None) or seconds > 0:
@@ -195,7 +196,7 @@ def _replay(scene, dump, picture, video, camera, eye, target, size, seconds, col
 def _page_through(scene, pool, row, picture, camera, eye, target, size, collision) -> None:
     import sys
 
-    from ig2mj.viewer.offscreen import VISIBLE_GROUPS
+    from ig2mj.scene.geom_groups import VISIBLE_GROUPS
     from ig2mj.viewer.pool_pages import PoolPages
     from ig2mj.worlds.pool import load_pool, load_pool_scene
 
@@ -232,7 +233,8 @@ def _write_picture(home, file, camera, eye, target, size, seconds, collision) ->
     import mujoco
     from PIL import Image
 
-    from ig2mj.viewer.offscreen import VISIBLE_GROUPS, default_backend, render
+    from ig2mj.scene.geom_groups import VISIBLE_GROUPS
+    from ig2mj.viewer.offscreen import default_backend, render
 
     data = home.start_data()
     if seconds > 0:

@@ -16,6 +16,7 @@ def run(
     what: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="HOME|ENV")],
     worlds: int = 1024,
     robot: str | None = None,
+    grasping: str | None = None,
     observations: tuple[str, ...] = (),
     engine: str | None = None,
     arch: int | None = None,
@@ -32,6 +33,7 @@ def run(
       what: a home or the folder of a scene, or an environment (`ig2mj list-envs`).
       worlds: number of worlds; programs are compiled for this number.
       robot: for an environment: its robot; default: the task's first.
+      grasping: for an environment: mitten, assisted, sticky or physical, for which some tasks have other objects.
       observations: for an environment: observations besides its vectors, e.g. rgb depth.
       engine: native, warp or jax; default: warp on a GPU, else native.
       arch: compile the kernels of a physics step for GPUs of this architecture (compute capability times ten: 90 is
@@ -49,9 +51,9 @@ def run(
     if out is not None:
         keep_compiled_in(out)
     if arch is not None:
-        seconds = _ahead(what, worlds, robot, observations, engine, arch)
+        seconds = _ahead(what, worlds, robot, grasping, observations, engine, arch)
     else:
-        seconds = _timed(what, worlds, robot, observations, engine)
+        seconds = _timed(what, worlds, robot, grasping, observations, engine)
     seconds["all"] = time.perf_counter() - began
     folder = cache_folder()
     size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
@@ -72,7 +74,13 @@ MOST_WORLDS = 64
 
 
 def _ahead(
-    what: str, worlds: int, robot: str | None, observations: tuple[str, ...], engine: str | None, architecture: int
+    what: str,
+    worlds: int,
+    robot: str | None,
+    grasping: str | None,
+    observations: tuple[str, ...],
+    engine: str | None,
+    architecture: int,
 ) -> dict[str, float]:
     """Seconds of finding and of compiling the kernels for a GPU that this machine need not have."""
     import time
@@ -88,7 +96,7 @@ def _ahead(
         raise Ig2mjError("--arch compiles the kernels of a physics step; those of --observations need the GPU itself")
     ahead.check(architecture)
     began = time.perf_counter()
-    made = _worlds(what, min(worlds, MOST_WORLDS), robot, (), "warp", pool_size=1)
+    made = _worlds(what, min(worlds, MOST_WORLDS), robot, grasping, (), "warp", pool_size=1)
     warp = made.engine if isinstance(made, Worlds) else made.core.engine
     assert isinstance(warp, WarpEngine)
     launches = ahead.launches_on_gpu(warp)
@@ -101,6 +109,7 @@ def _worlds(
     what: str,
     worlds: int,
     robot: str | None,
+    grasping: str | None,
     observations: tuple[str, ...],
     engine: str | None,
     pool_size: int | None = None,
@@ -112,14 +121,20 @@ def _worlds(
     from ig2mj.errors import Ig2mjError
 
     if short_name(what) is not None or activity_name(what) is not None:
-        return ig2mj.make(what, robot, worlds, engine, observations=(*VECTORS, *observations), pool_size=pool_size)
-    if robot is not None or observations:
-        raise Ig2mjError("--robot and --observations belong to environments; a home is stepped without them")
+        seen = (*VECTORS, *observations)
+        return ig2mj.make(what, robot, worlds, engine, grasping, observations=seen, pool_size=pool_size)
+    if robot is not None or grasping is not None or observations:
+        raise Ig2mjError("--robot, --grasping and --observations belong to environments; a home is stepped without")
     return ig2mj.Worlds(what, worlds, engine)
 
 
 def _timed(
-    what: str, worlds: int, robot: str | None, observations: tuple[str, ...], engine: str | None
+    what: str,
+    worlds: int,
+    robot: str | None,
+    grasping: str | None,
+    observations: tuple[str, ...],
+    engine: str | None,
 ) -> dict[str, float]:
     """Seconds of making the worlds, starting them, and their first step."""
     import time
@@ -134,7 +149,7 @@ def _timed(
     def tick() -> None:
         times.append(time.perf_counter())
 
-    made = _worlds(what, worlds, robot, observations, engine)
+    made = _worlds(what, worlds, robot, grasping, observations, engine)
     tick()
     if isinstance(made, Worlds):
         started = jax.block_until_ready(made.start(0))

@@ -1,4 +1,4 @@
-"""What a camera may see: view frusta against points.
+"""What a camera may see: view frusta against points and spheres.
 
 Camera axes are MuJoCo's: -z forward, y up, x to the right. `fovy` is the vertical opening angle in radians, `aspect`
 width over height; only what lies between the planes at `near` and `far` (metres, along the view) is in view. Surfaces
@@ -8,6 +8,7 @@ of the frustum belong to it. NaN is never in view.
 from __future__ import annotations
 
 import jax.numpy as jnp
+import numpy as np
 from flax import struct
 from jaxtyping import Array, Bool, Float
 
@@ -42,3 +43,30 @@ def points_in_frustum(camera: Camera, points: Float[AnyArray, "*#b n 3"]) -> Boo
     depth = -local[..., 2]
     reach = camera.slopes[..., None, :] * depth[..., None]
     return (depth >= camera.near) & (depth <= camera.far) & jnp.all(jnp.abs(local[..., :2]) <= reach, axis=-1)
+
+
+def spheres_in_view(
+    centres: Float[np.ndarray, "*k n 3"],
+    radius: Float[np.ndarray, "n"],
+    left: float,
+    right: float,
+    down: float,
+    up: float,
+) -> Bool[np.ndarray, "n"]:
+    """Which of `n` spheres a camera may see, in NumPy: those that are beyond none of the view's sides, nor behind.
+
+    Args:
+      centres: m, in the camera's axes. Where there are several for each sphere, it is all that lies between them.
+      radius: m; 0, as of MuJoCo's planes: always in view.
+      left, right, down, up: slopes of the view's sides; left and down are negative where the axis is in view.
+    """
+    x, y, z = np.moveaxis(centres, -1, 0)
+    beyond = [
+        (-x - left * z) / np.hypot(1.0, left),
+        (x + right * z) / np.hypot(1.0, right),
+        (-y - down * z) / np.hypot(1.0, down),
+        (y + up * z) / np.hypot(1.0, up),
+        z,
+    ]
+    nearest = np.reshape(beyond, (len(beyond), -1, centres.shape[-2])).min(1)
+    return (nearest <= radius).all(0) | (np.asarray(radius) <= 0)

@@ -168,9 +168,8 @@ def _train(
             clock, iteration, env_steps = meta["seconds"], meta["iteration"], meta["env_steps"]
             resumed = True
             log.forget_after(clock)
-        elif (
-            team.first and not run.quiet
-        ):  # as a scheduler that starts a killed job again needs it, but it may be a typo
+        elif team.first and not run.quiet:
+            # A scheduler that starts a killed job again needs it to go on; but the folder may be a typo.
             print(f"{run.out}: there is no checkpoint to resume, so the run begins", file=sys.stderr)
     elif team.barrier("is the folder free", checkpoints is not None and bool(checkpoints.numbers())):
         raise Ig2mjError(f"{run.out} {TAKEN}")

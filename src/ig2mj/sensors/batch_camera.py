@@ -30,7 +30,8 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.engine.warp.patches import pins
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
-from ig2mj.sensors.images import NOTHING, VISIBLE_GROUPS, Images, Pose, RayPattern, check_request
+from ig2mj.scene.geom_groups import VISIBLE_GROUPS
+from ig2mj.sensors.images import NOTHING, Images, Pose, RayPattern, check_request
 from ig2mj.sensors.merged_meshes import HIDDEN, Tables, alpha, mergeable, rigid_parts, tables_of
 from ig2mj.sensors.particle_slots import Slots, fill_slots
 from ig2mj.sensors.ray_cameras import sectors_of, set_rays

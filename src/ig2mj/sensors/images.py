@@ -21,9 +21,6 @@ from ig2mj.states.world import ExtendedStates
 NOTHING = -1
 """In a segmentation: no object there (sky, agents, the world's own geoms). In `geom`: nothing was hit."""
 
-VISIBLE_GROUPS = (0, 1, 2)
-"""Geom groups that sensors see, as in MuJoCo's viewer: visual geoms yes, collision geoms (3) no."""
-
 Pose = tuple[Float[Array, "W 3"], Float[Array, "W 4"]]
 """World frame: m, w-x-y-z."""
 

@@ -21,16 +21,15 @@ from ig2mj.engine.base import Engine
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.geometry.frustum import spheres_in_view
+from ig2mj.scene.geom_groups import HIDDEN_GROUP, VISIBLE_GROUPS
 from ig2mj.sensors.gl_canvas import Canvas
-from ig2mj.sensors.images import NOTHING, VISIBLE_GROUPS, Images, Pose, RayPattern, check_request
+from ig2mj.sensors.images import NOTHING, Images, Pose, RayPattern, check_request
 from ig2mj.sensors.particle_slots import Slots, fill_slots
 from ig2mj.sensors.render_model import mean_colours
 from ig2mj.sensors.tints import UNTINTED, tinted, tints, tints_of_geoms
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
-
-_HIDDEN = mujoco.mjNGROUP - 1
-"""A geom group that rays do not see, whatever groups are visible."""
 
 
 class NativeCamera:
@@ -66,8 +65,8 @@ class NativeCamera:
         self._drawn = copy.copy(engine.scene.model)  # its colours change with the states
         self.cameras = {name: _camera_id(self._drawn, name) for name in cameras}
         self._visible = np.isin(np.arange(mujoco.mjNGROUP), list(groups)).astype(np.uint8)
-        if self._visible[_HIDDEN]:
-            raise EngineError(f"geom group {_HIDDEN} is never seen (take the groups 0 to {_HIDDEN - 1})")
+        if self._visible[HIDDEN_GROUP]:
+            raise EngineError(f"geom group {HIDDEN_GROUP} is never seen (take the groups 0 to {HIDDEN_GROUP - 1})")
         self._owner = np.concatenate([engine.tables.geom_object, np.full(particles, NOTHING)]).astype(np.int32)
         self._plain = mean_colours(self._drawn, np.arange(self._drawn.ngeom))
         self._material, self._group = self._drawn.geom_matid.copy(), self._drawn.geom_group.copy()
@@ -150,26 +149,22 @@ class NativeCamera:
         try:
             if pose is not None:
                 data.cam_xpos[camera], data.cam_xmat[camera] = pose[0], _matrix(pose[1]).ravel()
-            hidden = self._out_of_view(data, camera)
-            self._drawn.geom_group[:] = np.where(hidden, _HIDDEN, self._group)
+            self._drawn.geom_group[:] = np.where(self._in_view(data, camera), self._group, HIDDEN_GROUP)
             self._canvas.update(data, camera, slots, world)
         finally:
             data.cam_xpos[camera], data.cam_xmat[camera] = keep
             self._drawn.geom_group[:] = self._group
         return self._canvas.draw(*self._wants)
 
-    def _out_of_view(self, data: mujoco.MjData, camera: int) -> Bool[np.ndarray, "G"]:
-        """Geoms whose bounding spheres are beyond one of the view's four sides: not drawn, which saves most of a
-        picture's time where OpenGL runs in software."""
+    def _in_view(self, data: mujoco.MjData, camera: int) -> Bool[np.ndarray, "G"]:
+        """Geoms that may be in view: others are not drawn, which saves most of a picture's time where OpenGL runs in
+        software."""
         if self._shadows:
-            return np.zeros(self._drawn.ngeom, bool)
+            return np.ones(self._drawn.ngeom, bool)
         up = np.tan(np.deg2rad(float(self._drawn.cam_fovy[camera])) / 2)
         right = up * self.width / self.height
         local = (data.geom_xpos - data.cam_xpos[camera]) @ data.cam_xmat[camera].reshape(3, 3)
-        radius = self._drawn.geom_rbound
-        beside = np.abs(local[:, 0]) + right * local[:, 2] > radius * np.hypot(1.0, right)
-        above = np.abs(local[:, 1]) + up * local[:, 2] > radius * np.hypot(1.0, up)
-        return (beside | above | (local[:, 2] > radius)) & (radius > 0)
+        return spheres_in_view(local, self._drawn.geom_rbound, -right, right, -up, up)
 
     def _cast(
         self, data: mujoco.MjData, pattern: RayPattern, pos: Float[np.ndarray, "3"], quat: Float[np.ndarray, "4"]
@@ -180,7 +175,7 @@ class NativeCamera:
         found, distance = np.zeros(count, np.int32), np.zeros(count)
         reach = np.linalg.norm(data.geom_xpos - origin, axis=1) + self._drawn.geom_rbound
         hidden = (reach <= pattern.near) & (self._drawn.geom_rbound > 0)  # wholly too near, such as the robot's head
-        self._drawn.geom_group[:] = np.where(hidden, _HIDDEN, self._group)
+        self._drawn.geom_group[:] = np.where(hidden, HIDDEN_GROUP, self._group)
         mujoco.mj_multiRay(
             self._drawn,
             data,

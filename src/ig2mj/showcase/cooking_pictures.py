@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ig2mj.scene.geom_groups import HIDDEN_GROUP
 from ig2mj.showcase.kitchen import Kitchen
 from ig2mj.showcase.temperature_log import Moment
 from ig2mj.simulation import Simulation
@@ -19,8 +20,6 @@ if TYPE_CHECKING:
 
 GLASS = 0.15
 """Opacity of the fridge's doors in these pictures."""
-HIDDEN_GROUP = 5
-"""A geom group that no picture shows (`ig2mj.viewer.offscreen.VISIBLE_GROUPS`)."""
 
 
 class KitchenCameras:

@@ -24,13 +24,10 @@ import numpy as np
 from ig2mj.errors import MissingDependencyError, UnknownNameError
 from ig2mj.process.opengl import GL_BACKENDS, PROBE_XML, fault_of_probe, probe_gl, run_probe
 from ig2mj.process.settings import GL_INSTALL_HINT, use_gl, used_gl
+from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 
 BACKENDS = (*GL_BACKENDS, "warp")
 """In the order in which they are tried."""
-
-VISIBLE_GROUPS = (0, 1, 2)
-"""Geom groups drawn unless asked otherwise, as in MuJoCo's viewer: visual geoms yes, collision geoms (3) no."""
-
 
 _WARP_PROBE = "from ig2mj.viewer import offscreen; offscreen.draw_warp_probe()"
 

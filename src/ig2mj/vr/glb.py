@@ -17,8 +17,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 from ig2mj.sensors.render_model import mean_colours
-from ig2mj.viewer.offscreen import VISIBLE_GROUPS
 
 SEGMENTS = 20
 """Of round shapes, around."""

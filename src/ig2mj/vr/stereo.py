@@ -19,9 +19,10 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 from scipy.spatial.transform import Rotation
 
+from ig2mj.geometry.frustum import spheres_in_view
 from ig2mj.process.opengl import use_opengl
+from ig2mj.scene.geom_groups import HIDDEN_GROUP, VISIBLE_GROUPS
 from ig2mj.scene.scene import Scene
-from ig2mj.viewer.offscreen import VISIBLE_GROUPS
 from ig2mj.vr.frames import Pose
 
 WIDTH, HEIGHT = 1296, 1440
@@ -36,7 +37,8 @@ SAMPLES = 4
 SHADOW_REACH = 10.0
 """m. What is further from the place where its shadow would fall is not drawn for the shadow's sake."""
 
-HIDDEN_GROUP = next(group for group in range(mujoco.mjNGROUP) if group not in VISIBLE_GROUPS)
+_CAMERA_AXES = np.array([[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+"""MuJoCo's camera axes (right, up, back) as columns in an eye's (forward, left, up)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -85,7 +87,6 @@ class StereoPictures:
         mujoco.mj_forward(model, self._data)
         self._geoms = np.flatnonzero(np.isin(model.geom_group, VISIBLE_GROUPS))
         self._groups = model.geom_group[self._geoms]
-        self._bounds = np.where(model.geom_rbound[self._geoms] > 0, model.geom_rbound[self._geoms], np.inf)  # planes
         self._turns = Rotation.from_quat(np.roll(model.geom_quat[self._geoms], -1, axis=1))
         self.context = gl_context.GLContext(2 * width, height)
         self.context.make_current()
@@ -164,19 +165,17 @@ class StereoPictures:
             self.renderer = None
 
     def _seen(self, eye: Eye) -> Bool[np.ndarray, "G"]:
-        """Which geoms the eye may see, or shadows of them.
-
-        A geom's bounding sphere, and the same sphere wherever its shadow may fall, are compared with the planes between
-        which the eye sees: MuJoCo itself sends every geom of a home to OpenGL, for each eye, and again for shadows.
-        """
+        """Which geoms the eye may see, or shadows of them: MuJoCo itself sends every geom of a home to OpenGL, for each
+        eye, and again for shadows."""
         at, model, data = self._data.geom_xpos[self._geoms], self._model, self._data
         ends = [at]
         for light in np.flatnonzero(model.light_castshadow & model.light_active):
             parallel = model.light_type[light] == mujoco.mjtLightType.mjLIGHT_DIRECTIONAL
             way = data.light_xdir[light] if parallel else at - data.light_xpos[light]
             ends.append(at + SHADOW_REACH * way / np.linalg.norm(way, axis=-1, keepdims=True))
-        beyond = np.min([(end - eye.pose.pos) @ _planes(eye).T for end in ends], axis=0)  # [G, 4], m
-        return (beyond < self._bounds[:, None]).all(1)
+        axes = eye.pose.turn.as_matrix() @ _CAMERA_AXES
+        slopes = (math.tan(angle) for angle in (eye.left, eye.right, eye.down, eye.up))
+        return spheres_in_view((np.stack(ends) - eye.pose.pos) @ axes, model.geom_rbound[self._geoms], *slopes)
 
     def _place(self, poses: Float[np.ndarray, "B 7"]) -> None:
         """Where the geoms are, from where their bodies are."""
@@ -185,18 +184,6 @@ class StereoPictures:
         turns = Rotation.from_quat(np.roll(poses[bodies, 3:], -1, axis=1).astype(np.float64))
         data.geom_xpos[geoms] = poses[bodies, :3] + turns.apply(model.geom_pos[geoms])
         data.geom_xmat[geoms] = (turns * self._turns).as_matrix().reshape(-1, 9)
-
-
-def _planes(eye: Eye) -> Float[np.ndarray, "4 3"]:
-    """Outward normals, world, of the planes through the eye that bound what it sees."""
-    left, right, up, down = eye.left, eye.right, eye.up, eye.down
-    normals = [
-        (math.sin(left), math.cos(left), 0.0),
-        (-math.sin(right), -math.cos(right), 0.0),
-        (-math.sin(up), 0.0, math.cos(up)),
-        (math.sin(down), 0.0, -math.cos(down)),
-    ]
-    return eye.pose.turn.apply(normals)
 
 
 def _aim(camera: mujoco.MjvGLCamera, eye: Eye) -> None:

@@ -118,9 +118,8 @@ def load(launches: list[Launch], device: str | None = None, workers: int | None 
     threads = workers or len(os.sched_getaffinity(0))
     on = wp.get_device(device)
     by_size = modules_of(launches, one_thread=on.is_cpu)
-    by_size.setdefault(DEFAULT_BLOCK, []).append(
-        wp.get_module(ffi.__name__)
-    )  # no kernels, but JAX's first call loads it
+    # MJX's own has no kernels, but JAX's first call loads it.
+    by_size.setdefault(DEFAULT_BLOCK, []).append(wp.get_module(ffi.__name__))
     with alone():
         for block_dim, modules in by_size.items():
             wp.force_load(on, modules, block_dim=block_dim, max_workers=threads)

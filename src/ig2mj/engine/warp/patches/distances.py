@@ -13,7 +13,6 @@ are loops around one call; the arithmetic is the same.
 from __future__ import annotations
 
 import inspect
-import linecache
 import textwrap
 from typing import Any, no_type_check
 
@@ -32,6 +31,8 @@ from mujoco.mjx.third_party.mujoco_warp._src.collision_gjk import (
     _supports_multiccd,
 )
 from mujoco.mjx.third_party.mujoco_warp._src.types import GeomType, mat43
+
+from ig2mj.engine.warp.patches.sources import defined
 
 SPHERE, CAPSULE = int(GeomType.SPHERE), int(GeomType.CAPSULE)
 
@@ -84,11 +85,7 @@ def _rebuilt(function: wp.Function, **names: Any) -> wp.Function:
     """A function of MuJoCo Warp's that calls others by these names."""
     upstream: Any = function.func
     text = textwrap.dedent(inspect.getsource(upstream)).split("\n", 1)[1]  # without its decorator
-    file = f"<{upstream.__name__} of ig2mj>"
-    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # Warp reads the source there
-    space: dict[str, Any] = {**upstream.__globals__, **names, "__name__": __name__}
-    exec(compile(text, file, "exec", dont_inherit=True), space)
-    return wp.func(space[upstream.__name__])
+    return wp.func(defined(upstream.__name__, text, {**upstream.__globals__, **names, "__name__": __name__}))
 
 
 small_gjk = _rebuilt(collision_gjk.gjk, _subdistance=closest_of_simplex)

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import ast
 import inspect
-import itertools
-import linecache
 import textwrap
 from typing import Any
 
 import warp as wp
 
-_numbers = itertools.count()
-"""Of sources: kernels that differ in constants only have the same name, and copies of copies are made from sources."""
+from ig2mj.engine.warp.patches.sources import defined
 
 
 def guarded(
@@ -136,11 +133,9 @@ def _place_of_tid(definition: ast.FunctionDef) -> int:
 def _kernel(kernel: wp.Kernel, definition: ast.FunctionDef, names: dict[str, Any], module: str) -> wp.Kernel:
     """The kernel of a changed definition, in the Warp module of this name."""
     text = ast.unparse(ast.fix_missing_locations(ast.Module([definition], []))) + "\n"
-    file = f"<{definition.name} {next(_numbers)}>"
-    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # for tracebacks
     closure = inspect.getclosurevars(kernel.func).nonlocals
-    space: dict[str, Any] = {**kernel.func.__globals__, **closure, **names, "__name__": module}
-    exec(compile(text, file, "exec", dont_inherit=True), space)
+    space = {**kernel.func.__globals__, **closure, **names, "__name__": module}
+    changed = defined(definition.name, text, space)
     own = wp.get_module(module)
     own.options |= {"enable_backward": False}
-    return wp.Kernel(space[definition.name], definition.name, own, dict(kernel.options), source=text)
+    return wp.Kernel(changed, definition.name, own, dict(kernel.options), source=text)

@@ -58,8 +58,7 @@ def _by_lanes(kernel: wp.Kernel, lanes: int) -> wp.Kernel:
     # The first row has something to do where there is none, too: it counts.
     room = ROWS[kernel.key.split("__locals__")[0]]
     rows = f"wp.min(wp.max(nefc_in[worldid], 1), {room}.shape[1])"
-    module = "ig2mj_lanes" if lanes == 64 else f"ig2mj_lanes_{lanes}"
-    return strided(kernel, "efcid", rows, lanes, f"{module}_{kernel.module.name}")
+    return strided(kernel, "efcid", rows, lanes, f"ig2mj_lanes_{lanes}_{kernel.module.name}")
 
 
 @wp.kernel(enable_backward=False)

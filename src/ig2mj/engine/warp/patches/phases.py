@@ -17,7 +17,6 @@ from __future__ import annotations
 import ast
 import functools
 import inspect
-import linecache
 import textwrap
 from typing import Any, NamedTuple
 
@@ -27,6 +26,7 @@ from mujoco.mjx.third_party.mujoco_warp._src.collision_gjk import GJKResult
 
 from ig2mj.engine.warp.patches.distances import distance_phase
 from ig2mj.engine.warp.patches.replacements import original
+from ig2mj.engine.warp.patches.sources import defined
 from ig2mj.process import on_trial
 
 ON = on_trial("phases")
@@ -119,12 +119,8 @@ def _builder(phase: str) -> Any:
         if isinstance(node, ast.Return):
             node.value = ast.Name(kernel.name, ast.Load())
     text = ast.unparse(ast.fix_missing_locations(ast.Module([builder], []))) + "\n"
-    file = f"<{builder.name} of ig2mj>"
-    linecache.cache[file] = (len(text), None, text.splitlines(keepends=True), file)  # Warp reads the source there
     own = {"Found": Found, "gjk_phase": distance_phase, "__name__": __name__}
-    space: dict[str, Any] = {**upstream.__globals__, **own}
-    exec(compile(text, file, "exec", dont_inherit=True), space)
-    return space[builder.name]
+    return defined(builder.name, text, {**upstream.__globals__, **own})
 
 
 OUTPUTS = ("found_out: wp.array[Found]", "listed_out: wp.array[int]", "count_out: wp.array[int]")

@@ -1,0 +1,9 @@
+"""MuJoCo's geom groups, as converted homes and robots use them: 0 to 2 are what is seen, 3 is what collides."""
+
+from __future__ import annotations
+
+VISIBLE_GROUPS = (0, 1, 2)
+"""Groups that pictures and sensors show unless asked otherwise, as in MuJoCo's viewer."""
+
+HIDDEN_GROUP = 5
+"""MuJoCo's last group, for geoms that are not to be drawn just now."""
