@@ -46,11 +46,14 @@ class HandResets:
     def __init__(self, engine: Engine, controllers: Sequence[Controller], enabled: bool):
         """`enabled`: on a pure engine a write more in every program that steps; so only where hands may be reset."""
         self._engine, self._parts = engine, []
-        first = 0
+        numbers, address, first = [np.zeros(0, int)], [np.zeros((0, 3), int)], 0
         for number, controller in enumerate(controllers):
             if enabled and isinstance(controller, WithHandResets):
-                self._parts.append((number, first + controller.reset_numbers, controller))
+                self._parts.append((number, controller))
+                numbers.append(first + controller.reset_numbers)
+                address.append(controller.hand_qposadr)
             first += controller.action_size
+        self._numbers, self._address = np.concatenate(numbers), np.concatenate(address)
         self._find = OfView(self._found)
 
     def act(self, physics: Physics, view: PhysicsView, action: Float[Array, "W n"], states: tuple[Any, ...]) -> Physics:
@@ -61,28 +64,26 @@ class HandResets:
         """
         if not self._parts:
             return physics
+        worlds, length = action.shape[0], self._engine.scene.model.nq
         if self._engine.pure:
-            asked, mask, pos = self._found(view, action, states)
-            write = Write(qpos_mask=mask, qpos=pos)
-            return jax.lax.cond(asked, lambda p: self._engine.write(p, write), lambda p: p, physics)
-        numbers = np.concatenate([numbers for _, numbers, _ in self._parts])
-        if not (np.asarray(action)[:, numbers] > 0).any():
+            jumps, target = self._found(view, action, states)
+            mask, pos = jnp.zeros((worlds, length), bool), jnp.zeros((worlds, length), jnp.float32)
+            mask = mask.at[:, self._address].set(jnp.broadcast_to(jumps[..., None], target.shape))
+            write = Write(qpos_mask=mask, qpos=pos.at[:, self._address].set(target))
+            return jax.lax.cond(jumps.any(), lambda p: self._engine.write(p, write), lambda p: p, physics)
+        if not (np.asarray(action)[:, self._numbers] > 0).any():
             return physics
-        asked, mask, pos = self._find(view, action, states)
-        if not bool(asked):
+        jumps, target = self._find(view, action, states)
+        if not jumps.any():
             return physics
-        return self._engine.write(physics, Write(qpos_mask=np.asarray(mask), qpos=np.asarray(pos)))
+        mask, pos = np.zeros((worlds, length), bool), np.zeros((worlds, length), np.float32)
+        mask[:, self._address], pos[:, self._address] = jumps[..., None], target
+        return self._engine.write(physics, Write(qpos_mask=mask, qpos=pos))
 
     def _found(
         self, view: PhysicsView, action: Float[Array, "W n"], states: tuple[Any, ...]
-    ) -> tuple[Bool[Array, ""], Bool[Array, "W nq"], Float[Array, "W nq"]]:
-        """Whether any hand jumps, and the coordinates that are written."""
-        worlds, length = action.shape[0], self._engine.scene.model.nq
-        mask, pos = jnp.zeros((worlds, length), bool), jnp.zeros((worlds, length), jnp.float32)
-        for number, numbers, controller in self._parts:
-            beyond, target = controller.out_of_reach(view, states[number])
-            jumps = beyond & (jnp.asarray(action)[:, numbers] > 0)
-            address = controller.hand_qposadr
-            mask = mask.at[:, address].set(jnp.broadcast_to(jumps[..., None], target.shape))
-            pos = pos.at[:, address].set(target)
-        return mask.any(), mask, pos
+    ) -> tuple[Bool[Array, "W K"], Float[Array, "W K 3"]]:
+        """Which hands of all robots jump, and where to."""
+        found = [controller.out_of_reach(view, states[number]) for number, controller in self._parts]
+        beyond, target = (jnp.concatenate(parts, axis=1) for parts in zip(*found, strict=True))
+        return beyond & (jnp.asarray(action)[:, self._numbers] > 0), target
