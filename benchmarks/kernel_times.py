@@ -19,13 +19,16 @@ import jax
 WARP_NAME = re.compile(r"_[0-9a-f]{8}_cuda_kernel_forward|_cuda_kernel_forward")
 
 
-def profiled(call: Callable[[], Any], steps: int, most: int, unit: str = "step") -> tuple[Any, dict[str, Any]]:
-    """Runs `call` under the profiler, prints the longest kernels and the longest gaps in which none runs, and returns
-    its result and a summary.
+def profiled(
+    call: Callable[[], Any], steps: int, most: int, unit: str = "step", timeline: pathlib.Path | None = None
+) -> tuple[Any, dict[str, Any]]:
+    """Runs `call` under the profiler, prints the longest kernels, the longest gaps in which none runs and the
+    longest copies, and returns its result and a summary.
 
     Args:
       call: what to run; its result is waited for. steps: how many steps it makes. most: kernels to print.
       unit: what a step is.
+      timeline: file for what ran in the last two steps, as CSV: start and duration in microseconds, stream, name.
 
     Returns:
       The result, and milliseconds a step: `wall` (with the profiler's own cost), `kernels` (their sum), `busy` (at
@@ -36,7 +39,12 @@ def profiled(call: Callable[[], Any], steps: int, most: int, unit: str = "step")
             began = time.perf_counter()
             result = jax.block_until_ready(call())
             wall = time.perf_counter() - began
-        events = _events(folder)
+        streams = _events(folder)
+    events = [(start, duration, name) for start, duration, name, _ in streams]
+    if timeline is not None and streams:
+        with timeline.open("w") as file:
+            for start, duration, name, stream in streams[-2 * len(streams) // steps :]:
+                file.write(f"{(start - events[0][0]) / 1e3:.1f},{duration / 1e3:.1f},{stream},{name}\n")
     total: dict[str, float] = collections.defaultdict(float)
     calls: dict[str, int] = collections.defaultdict(int)
     for _, duration, name in events:
@@ -62,11 +70,14 @@ def profiled(call: Callable[[], Any], steps: int, most: int, unit: str = "step")
             f"  idle {nanoseconds / steps / 1e3:9.2f} us {count / steps:7.1f} x  {before[:60]} -> {after[:60]}",
             flush=True,
         )
+    for (before, name, after), (nanoseconds, count) in _copies(events)[: max(1, most // 3)]:
+        share = f"{nanoseconds / steps / 1e3:9.2f} us {count / steps:7.1f} x"
+        print(f"  copy {share}  {before[:50]} -> {name} -> {after[:50]}", flush=True)
     return result, summary
 
 
-def _events(folder: str) -> list[tuple[float, float, str]]:
-    """Start and duration in ns, and name, of what ran on the first GPU."""
+def _events(folder: str) -> list[tuple[float, float, str, str]]:
+    """Start and duration in ns, name and stream of what ran on the first GPU."""
     file = next(pathlib.Path(folder).rglob("*.xplane.pb"))
     found = []
     for plane in jax.profiler.ProfileData.from_file(str(file)).planes:
@@ -74,8 +85,28 @@ def _events(folder: str) -> list[tuple[float, float, str]]:
             continue
         for line in plane.lines:
             if line.name.startswith("Stream"):
-                found += [(e.start_ns, e.duration_ns, WARP_NAME.sub("", e.name)) for e in line.events]
+                found += [
+                    (e.start_ns, e.duration_ns, WARP_NAME.sub("", e.name) + _copied(e), line.name) for e in line.events
+                ]
     return sorted(found)
+
+
+def _copied(event: Any) -> str:
+    """Of a copy how many MB it copied, so that its array can be found."""
+    if not event.name.startswith("Memcpy"):
+        return ""
+    size = re.search(r"size:(\d+)", " ".join(str(value) for _, value in event.stats))
+    return f" {int(size[1]) / 1e6:.2f} MB" if size else ""
+
+
+def _copies(events: list[tuple[float, float, str]]) -> list[tuple[tuple[str, str, str], tuple[float, int]]]:
+    """Copies with what began before and after them: nanoseconds and how often, the longest together first."""
+    found: dict[tuple[str, str, str], tuple[float, int]] = {}
+    for (_, _, before), (_, duration, name), (_, _, after) in zip(events, events[1:], events[2:], strict=False):
+        if name.startswith("MemcpyD2D"):
+            total, count = found.get((before, name, after), (0.0, 0))
+            found[before, name, after] = total + duration, count + 1
+    return sorted(found.items(), key=lambda item: -item[1][0])
 
 
 def _gaps(events: list[tuple[float, float, str]]) -> list[tuple[tuple[str, str], tuple[float, int]]]:

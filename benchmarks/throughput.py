@@ -67,13 +67,15 @@ def run(
     lock: pathlib.Path | None,
     kernels: int = 0,
     patience: float = 0.0,
+    timeline: pathlib.Path | None = None,
     **solver: Any,
 ) -> dict:
     """Times one batch. The first two calls are not counted.
 
     Args:
       lock, patience: see `turns.exclusive`.
-      kernels: so many of the longest are printed afterwards. solver: limits of iterations.
+      kernels: so many of the longest are printed afterwards. timeline: see `kernel_times.profiled`.
+      solver: limits of iterations.
     """
     start = time.time()
     scene, model = case.scene, case.model
@@ -102,7 +104,7 @@ def run(
             activity.append(acts)
         profile_row: dict = {}
         if kernels:
-            (carry, _), profile_row = profiled(lambda: compiled(carry), STEPS, kernels, "control step")
+            (carry, _), profile_row = profiled(lambda: compiled(carry), STEPS, kernels, "control step", timeline)
     batch = carry[0]
     overflow = np.asarray(batch.world.physics.overflow)
     row: dict[str, Any] = {
@@ -260,6 +262,7 @@ def main() -> None:
     parser.add_argument("--pool", type=int, default=16, help="rows of initial states")
     parser.add_argument("--profiles", type=pathlib.Path, help="folder with <home>/engine_profile.json")
     parser.add_argument("--kernels", type=int, default=0, metavar="N", help="print the N longest kernels")
+    parser.add_argument("--timeline", type=pathlib.Path, help="with --kernels: file for the last steps' launches, CSV")
     parser.add_argument("--label", default="", help="a remark for the rows")
     parser.add_argument("--lock", type=pathlib.Path, help="file to lock while timing")
     parser.add_argument(
@@ -276,7 +279,7 @@ def main() -> None:
                 for limit in args.iterations:
                     solver = {"iterations": limit, "ls_iterations": limit} if limit else {}
                     with ENGINES[args.engine]():
-                        ways = args.lock, args.kernels, args.patience
+                        ways = args.lock, args.kernels, args.patience, args.timeline
                         row = run(case, worlds, not args.idle, what, *ways, **solver)
                     row = {"engine": args.engine} | row
                     row |= {"ready_s": case.seconds, "label": args.label, **device()}
