@@ -15,7 +15,7 @@ from ig2mj.engine.warp.patches import awake_kernels, pins
 if pins.mismatches():
     pytest.skip(f"our kernels do not fit: {pins.mismatches()}", allow_module_level=True)
 
-from ig2mj.engine.warp.patches import pair_lists, phases
+from ig2mj.engine.warp.patches import branches, pair_lists, phases
 
 WORLDS = 16
 BOX, CAPSULE, MESH = (int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("BOX", "CAPSULE", "MESH"))
@@ -83,8 +83,11 @@ def _contacts(model: mujoco.MjModel, start: mujoco.MjData, qpos: np.ndarray) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("lists", "two"), [(True, False), (False, True), (True, True)])
-def test_contacts_are_those_of_one_kernel_for_each_kind(monkeypatch, lists, two):
+@pytest.mark.parametrize(
+    ("lists", "two", "interleaved"),
+    [(True, False, False), (False, True, False), (True, True, False), (False, False, True), (True, True, True)],
+)
+def test_contacts_are_those_of_one_kernel_for_each_kind(monkeypatch, lists, two, interleaved):
     model = mujoco.MjModel.from_xml_string(SCENE)
     start = mujoco.MjData(model)
     qpos = []
@@ -94,6 +97,7 @@ def test_contacts_are_those_of_one_kernel_for_each_kind(monkeypatch, lists, two)
     expected = _contacts(model, start, np.array(qpos, np.float32))
     monkeypatch.setattr(pair_lists, "ON", lists)
     monkeypatch.setattr(phases, "ON", two)
+    monkeypatch.setattr(branches, "INTERLEAVED", interleaved)
     found = _contacts(model, start, np.array(qpos, np.float32))
     kinds = {tuple(model.geom_type[row[1:3].astype(int)]) for row in expected}
     assert len(kinds) > 5, "boxes, meshes, capsules and cylinders touch each other"

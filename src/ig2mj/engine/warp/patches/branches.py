@@ -18,9 +18,15 @@ from mujoco.mjx.third_party.mujoco_warp._src import collision_convex, collision_
 from ig2mj.engine.warp.patches import pair_lists, phases
 from ig2mj.engine.warp.patches.replacements import original
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
+from ig2mj.process import on_trial
 
 MOST = 8
 """Streams of a device; further kernels follow the first ones."""
+
+INTERLEAVED = on_trial("interleaved")
+"""Whether the tables of depths and clipped faces of neighbouring pairs lie beside each other, entry by entry: the
+threads of a warp go through their tables at the same pace, and so read what lies together. Upstream's lie pair by pair,
+kilobytes apart. On trial, not measured on a GPU yet."""
 
 _here = threading.local()
 _streams: dict[str, list[wp.Stream]] = {}
@@ -38,7 +44,7 @@ def ccd_kernel_builder(*arguments: Any) -> wp.Kernel:
 def convex_narrowphase(m: Any, d: Any, ctx: Any, collision_table: Any) -> None:
     """As upstream, with each kernel on the next stream."""
     device = d.geom_xpos.device
-    if not (device.is_cuda or pair_lists.ON or phases.ON):
+    if not (device.is_cuda or pair_lists.ON or phases.ON or INTERLEAVED):
         original(collision_driver, "convex_narrowphase")(m, d, ctx, collision_table)
         return
     calls = _calls(m, d, ctx, collision_table)
@@ -88,8 +94,15 @@ def _block_size(kernel: wp.Kernel, device: Any) -> tuple[int, int]:
     return _noting.original(wp, "get_suggested_block_size")(kernel, device)
 
 
+def _empty(shape: Any, dtype: Any) -> wp.array:
+    make = _noting.original(wp, "empty")
+    if not (INTERLEAVED and isinstance(shape, tuple) and len(shape) == 2 and min(shape) > 0):
+        return make(shape=shape, dtype=dtype)
+    return make(shape=shape[::-1], dtype=dtype).transpose()
+
+
 _noting = ScopedReplacement()
-_noting.add({(wp, "launch"): _note, (wp, "get_suggested_block_size"): _block_size})
+_noting.add({(wp, "launch"): _note, (wp, "get_suggested_block_size"): _block_size, (wp, "empty"): _empty})
 
 
 def _of_list(m: Any, d: Any, ctx: Any, inputs: list[Any], pairs: pair_lists.PairList) -> list[Any]:
