@@ -26,7 +26,8 @@ SLICING_FRUIT = Task(
     objects_of_interest=("carving_knife_0", "apple_0"),
     distances=((Hand(0), At("carving_knife_0")), (At("carving_knife_0"), At("apple_0"))),
     robots={
-        "humanoid": Acts((2.3, 0.05, 0.55), hands=RIGHT, weights=HUMANOID_WEIGHTS),
+        # 5 cm nearer, the camera loses one apple in seven, which lies below its picture or beside it.
+        "humanoid": Acts((2.24, -0.03, 0.55), hands=RIGHT, weights=HUMANOID_WEIGHTS),
         # At the usual 0.45 rad most of the low table before it is below its picture.
         "fetch": Acts((2.28, -0.12, 0.015), yaw=-15.0, camera_tilt=1.0),
     },
