@@ -30,6 +30,7 @@ from jaxtyping import Bool, Float, Int
 from soak_energy import Energy, EnergyWatch
 from soak_watch import FLAGS, Seen, Watch
 from throughput import device
+from warp._src.jax import ffi
 
 import ig2mj
 from ig2mj.agents.base import ACTION_PERIOD
@@ -53,6 +54,9 @@ NEW_ACTION = 1 / 15
 """Chance of a new action in a control step."""
 
 REPORT = 15.0
+
+MOST_GRAPHS = 6
+"""CUDA graphs of steps that are kept: each owns its temporaries, a gigabyte or more of them at 8,192 worlds."""
 
 
 @dataclasses.dataclass
@@ -210,6 +214,17 @@ class Run:
         )
 
 
+def forget_graphs() -> int:
+    """Frees all captured graphs if there are more than `MOST_GRAPHS`; nothing may run meanwhile. Returns their number.
+
+    Warp captures a graph for each set of addresses and keeps up to 32. JAX's allocator may move a program's buffers.
+    """
+    captured = sum(len(each.captures) for each in ffi._FFI_CALLABLE_REGISTRY.values())
+    if captured > MOST_GRAPHS:
+        ffi.clear_jax_callable_graph_cache()
+    return captured
+
+
 def row_of(run: Run, soak: Soak, events: list[dict[str, Any]], numbers: dict[str, Any]) -> dict[str, Any]:
     """All counts so far."""
     kinds = collections.Counter(event["kind"] for event in events)
@@ -246,12 +261,12 @@ def soak(args: Args, grasping: str) -> dict[str, Any]:
     run = Run(args, grasping)
     state = run.start()
     events: list[dict[str, Any]] = []
-    done, calls, timed, told = 0, 0, 0.0, 0.0
+    done, calls, timed, told, graphs = 0, 0, 0.0, 0.0, 0
     ready = time.monotonic() - began
     while True:
         start = time.monotonic()
         state = jax.block_until_ready(run.many(state)) if run.core.engine.pure else run.many(state)
-        done, calls = done + run.lasting, calls + 1
+        done, calls, graphs = done + run.lasting, calls + 1, forget_graphs()
         flags = np.asarray(state.seen.flags)
         events += [run.watch.report(state.seen, int(world)) for world in np.flatnonzero(flags)]
         last = done >= args.world_steps or timed >= args.seconds
@@ -267,6 +282,7 @@ def soak(args: Args, grasping: str) -> dict[str, Any]:
                 "ready_s": round(ready, 1),
                 "share_of_worlds_that_hold": round(float(state.holding) / (calls * STEPS), 4),
                 "grasps": {"loose objects": int(state.grasps[0]), "doors and drawers": int(state.grasps[1])},
+                "captured_graphs": graphs,
                 "done": last,
             }
             row = row_of(run, state, events, numbers)
