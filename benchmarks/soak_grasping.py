@@ -55,8 +55,8 @@ NEW_ACTION = 1 / 15
 
 REPORT = 15.0
 
-MOST_GRAPHS = 6
-"""CUDA graphs of steps that are kept: each owns its temporaries, a gigabyte or more of them at 8,192 worlds."""
+MOST_GRAPHS = 12
+"""CUDA graphs that are kept. Each owns its temporaries; a control step has five or six for each place of buffers."""
 
 
 @dataclasses.dataclass
