@@ -85,8 +85,7 @@ class BatchCamera:
           rays: patterns to cast besides; each call gives the pose of each.
           merge_meshes: cast rays against one mesh for all that never moves and one for each rigid part that does
             (`ig2mj.sensors.merged_meshes`; a quarter less time); what is invisible in the compiled scene then is in
-            every world. Scenes with flexes or height fields are not merged, nor where ray patterns are
-            cast: merged, a scan differs from the native one (not yet explained).
+            every world. Scenes with flexes or height fields are not merged.
 
         Raises:
           EngineError: not the Warp engine, or nothing is to be made. UnknownNameError: no such camera.
@@ -103,9 +102,7 @@ class BatchCamera:
         self.cameras = [_camera_id(host, name) for name in cameras]
         self._plan(host)
         self._model = mjx.put_model(host, own_device(), impl="warp")
-        self._merged = (
-            self._merge(groups) if merge_meshes and not rays and mergeable(host) and not pins.mismatches() else None
-        )
+        self._merged = self._merge(groups) if merge_meshes and mergeable(host) and not pins.mismatches() else None
         data = mujoco.MjData(host)
         mujoco.mj_forward(host, data)
         self._template = mjx.put_data(host, data, own_device(), impl="warp", naconmax=1, naccdmax=1, njmax=1)
@@ -139,12 +136,12 @@ class BatchCamera:
         """What the ray caster keeps, on each device. What compiled programs know of stays as long as the engine."""
         self._context = mjx.create_render_context(self._host, devices=self._served, **self._settings)
         _KEPT.setdefault(self.engine, []).append(self._context)
+        if self._sectors:  # before the kernel is built: whether rays are displaced is compiled into it
+            set_rays(self._context, self._sectors, len(self.cameras) * self.width * self.height)
         if self._merged is not None:
             from ig2mj.sensors.ray_caster import use_merged
 
             use_merged(list(self._context._contexts.values()), self._host, self._merged, self.engine.num_worlds)
-        if self._sectors:
-            set_rays(self._context, self._sectors, len(self.cameras) * self.width * self.height)
         self._handle = self._context.pytree()
         self._check_addresses()
         self._tiled = self._order_rays()
