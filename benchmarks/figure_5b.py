@@ -2,6 +2,9 @@
 
     python benchmarks/figure_5b.py --obs state rgbd --demos 30 --tests 16
 
+Pictures are drawn by one processor for each process. Parts may run side by side, each with some of the moments at which
+a policy takes over (`--seconds`) and a folder of its own; `--merge FOLDER...` makes one table and plot of them.
+
 Demonstrations of the scripted expert, slowed down so that the task takes as long as the paper's people took (more than
 10 s), with noise on every action. Hands hold by assisted grasping. A clone learns the actions that were done, from the
 poses of objects and proprioception ("state") or from 128x128 RGB-D and proprioception ("rgbd"). The closing of the
@@ -62,9 +65,9 @@ class Shown:
     success: bool
 
 
-def environment(split: str, obs: str, worlds: int, pool: int) -> Environment:
+def environment(split: str, obs: str, worlds: int) -> Environment:
     names = VECTORS if obs == "state" else (*VECTORS, "rgb", "depth")
-    return make(TASK, "humanoid", worlds, "native", "assisted", observations=names, split=split, pool_size=pool)
+    return make(TASK, "humanoid", worlds, "native", "assisted", observations=names, split=split)
 
 
 def collect(env: Environment, perception: Perception, count: int, pace: float, noise: float, seed: int) -> list[Shown]:
@@ -90,7 +93,8 @@ def collect(env: Environment, perception: Perception, count: int, pace: float, n
             own = [step for step in steps if step[2][w]]
             if won[w]:
                 parts = ([s[0][w] for s in own], [s[1].vector[w] for s in own], [s[1].picture[w] for s in own])
-                found.append(Shown(int(rows[w]), *(np.stack(p) for p in parts), True))
+                actions, vectors, pictures = (np.stack(p) for p in parts)
+                found.append(Shown(int(rows[w]), actions, vectors, pictures, True))
         if len(found) >= count:
             break
     return found[:count]
@@ -156,11 +160,22 @@ def plotted(rows: Sequence[dict[str, Any]], longest: float, file: pathlib.Path) 
     figure.savefig(file, dpi=130)
 
 
-def kept(rows: Sequence[dict[str, Any]], longest: float, folder: pathlib.Path) -> None:
+def merged(folders: Sequence[pathlib.Path]) -> list[dict[str, Any]]:
+    """The rows of several tables in the order of a plot."""
+    rows = list[dict[str, Any]]()
+    for folder in folders:
+        with (folder / "figure_5b.csv").open() as file:
+            rows += [row | {n: float(row[n]) for n in ("success", "low", "high")} for row in csv.DictReader(file)]
+    order = [str(x) for x in TAKEOVERS[:-1]] + ["all"]
+    return sorted(rows, key=lambda r: (r["observation"] != "state", r["closing"], order.index(r["seconds_before_end"])))
+
+
+def kept(rows: Sequence[dict[str, Any]], folder: pathlib.Path) -> None:
     """Writes what there is so far."""
+    longest = max(float(row.get("longest_s") or 0) for row in rows)
     folder.mkdir(parents=True, exist_ok=True)
     with (folder / "figure_5b.csv").open("w", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]))
+        writer = csv.DictWriter(file, list(max(rows, key=len)))
         writer.writeheader()
         writer.writerows(rows)
     plotted(rows, longest, folder / "figure_5b.png")
@@ -177,31 +192,39 @@ def main() -> None:
     parser.add_argument("--pace", type=float, default=0.35, help="share of the expert's speed")
     parser.add_argument("--noise", type=float, default=0.1, help="deviation, in shares of the slowed action's range")
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--closing", nargs="*", default=["replayed", "learnt"], choices=("replayed", "learnt"))
+    parser.add_argument("--seconds", nargs="*", type=float, default=TAKEOVERS, help="before the end; inf: all alone")
+    parser.add_argument("--merge", nargs="*", type=pathlib.Path, default=(), help="only puts together what is in these")
     parser.add_argument("--out", type=pathlib.Path, default=results.RESULTS / "figure_5b")
     args = parser.parse_args()
+    if args.merge:
+        kept(merged(args.merge), args.out)
+        return
     rows, longest, began = list[dict[str, Any]](), 0.0, time.process_time()
     for obs in args.obs:
-        env = environment("train", obs, args.worlds, max(2 * args.demos, 32))
+        env = environment("train", obs, args.worlds)
         perception = Perception(env.observation_spaces, obs)
         shown = collect(env, perception, args.demos, args.pace, args.noise, args.seed)
-        env = environment("held_out", obs, args.worlds, max(2 * args.tests, 32))
+        env = environment("held_out", obs, args.worlds)
         tests = collect(env, perception, args.tests, args.pace, args.noise, args.seed + 1)
         pairs, seconds = sum(len(s.action) for s in shown), [len(s.action) * ACTION_PERIOD for s in tests]
         longest = max(longest, *seconds)
         print(f"{obs}: {len(shown)} demonstrations, {pairs} pairs; tests last {np.mean(seconds):.1f} s on average")
         closing = np.array(["trigger" in name for name in env.action_names])
         for kind, learnt in (("replayed", np.flatnonzero(~closing)), ("learnt", np.arange(len(closing)))):
+            if kind not in args.closing:
+                continue
             policy, loss = trained(env, perception, demos_of(shown, learnt), args.steps, args.seed)
-            jobs = [(s, x) for x in TAKEOVERS for s in tests]
-            success = np.reshape(take_over(env, policy, perception, jobs, learnt), (len(TAKEOVERS), len(tests)))
-            for x, won in zip(TAKEOVERS, success, strict=True):
+            for x in args.seconds:
+                won = np.array(take_over(env, policy, perception, [(s, x) for s in tests], learnt))
                 low, high = wilson(int(won.sum()), len(won))
                 row = {"observation": obs, "closing": kind, "seconds_before_end": "all" if np.isinf(x) else x}
                 row |= {"success": round(float(won.mean()), 4), "low": round(low, 3), "high": round(high, 3)}
                 row |= {"runs": len(won), "demonstrations": len(shown), "pairs": pairs, "loss_apart": round(loss, 5)}
+                row["longest_s"] = round(float(longest), 1)
                 rows.append(row)
                 print(rows[-1], flush=True)
-            kept(rows, longest, args.out)
+                kept(rows, args.out)
     print(f"{results.command()}: {time.process_time() - began:.0f} s of processor time")
 
 
