@@ -93,15 +93,15 @@ def reached(curve: list[tuple[float, float, float]], least: float = GOOD) -> flo
 def tables(files: list[pathlib.Path]) -> str:
     """The tables of docs/learning.md: a row for each activity, robot and grasping.
 
-    It is of the run from pictures with SAC that was best on held-out states, or with most training success where none
-    was evaluated; further seeds with the same settings stand in the same row.
+    It is of the run from pictures, with SAC or DAgger, that was best on held-out states (SAC's, where both were), or
+    with most training success where none was evaluated; further seeds with the same settings stand in the same row.
     """
     found: dict[tuple[str, str], dict[str, list[pathlib.Path]]] = collections.defaultdict(
         lambda: collections.defaultdict(list)
     )
     for file in files:
         activity, robot, grasping, algorithm, observation, _ = file.stem.split("-")
-        if activity in PAPER and algorithm.startswith("sac") and observation.startswith("rgbd"):
+        if activity in PAPER and algorithm.startswith(("sac", "dagger")) and observation.startswith("rgbd"):
             found[robot, grasping][activity].append(file)
     parts = []
     for (robot, grasping), activities in sorted(found.items(), key=lambda item: item[0], reverse=True):
@@ -115,14 +115,15 @@ def tables(files: list[pathlib.Path]) -> str:
             if activity not in activities:
                 continue
             best = max(
-                activities[activity], key=lambda f: (held_out(f) != "", float(held_out(f)[:-2] or 0), read(f)[-1][2])
+                activities[activity],
+                key=lambda f: (held_out(f) != "", float(held_out(f)[:-2] or 0), "-sac" in f.stem, read(f)[-1][2]),
             )
             seeds = sorted(FOLDER.glob(best.stem.rsplit("-", 1)[0] + "-*.csv"))
             curves = [read(f) for f in seeds]
             paper = PAPER[activity][0 if robot == "humanoid" else 1]
             row = [
                 activity,
-                "expert" if "expert" in best.stem else "",
+                "expert (DAgger)" if "-dagger" in best.stem else "expert" if "expert" in best.stem else "",
                 ", ".join(f"{c[-1][0]:.0f}" for c in curves),
                 ", ".join(f"{1e6 * c[-1][1]:,.0f}" for c in curves),
                 ", ".join(f"{c[-1][2]:.1f} %" for c in curves),
