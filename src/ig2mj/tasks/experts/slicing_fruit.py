@@ -32,7 +32,7 @@ STEEP = 1.25
 CLEARANCE = 0.07
 """m above the fruit at which the blade comes over it."""
 
-EXACT = {"humanoid": 0.015, "fetch": 0.008}
+EXACT = 0.015
 """m beside the fruit's middle at which the blade comes down: farther out the fruit rolls away. With 8 mm, who sees both
 1 cm off, anew in each step, hovers above it."""
 
@@ -65,8 +65,7 @@ def plan(see: Sight) -> list[Wish]:
     if see.robot == "fetch":
         turn += far_out(see, goal)
         take = Wish(take.move, far_out(see, handle), take.close)
-    near = EXACT[see.robot]
-    cut = wish(over(blade, goal, top + CLEARANCE, near=near, blend=near), turn, close=True)
+    cut = wish(over(blade, goal, top + CLEARANCE, near=EXACT, blend=EXACT), turn, close=True)
     return [where(done, still, where(see.holds(KNIFE), cut, take))]
 
 
