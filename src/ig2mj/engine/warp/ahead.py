@@ -6,8 +6,6 @@ compiled; XLA's programs need the card.
 
 from __future__ import annotations
 
-import concurrent.futures
-import os
 from typing import Any
 
 import warp as wp
@@ -70,16 +68,13 @@ def compile_for(launches: list[kernels.Launch], architecture: int, workers: int 
     check(architecture)
     by_size = kernels.modules_of(launches)
 
-    def compile_module(module: wp.Module, block_dim: int) -> None:
+    def compile_module(module: wp.Module, sizes: list[int]) -> None:
         usual = module.options["block_dim"]
-        module.options["block_dim"] = block_dim
         try:
-            wp.compile_aot_module(module, arch=architecture, use_ptx=False)
+            for module.options["block_dim"] in sizes:
+                wp.compile_aot_module(module, arch=architecture, use_ptx=False)
         finally:
             module.options["block_dim"] = usual
 
-    with kernels.alone(), concurrent.futures.ThreadPoolExecutor(workers or len(os.sched_getaffinity(0))) as pool:
-        for block_dim, modules in by_size.items():  # one size after the other: a module may be wanted in several
-            for done in [pool.submit(compile_module, module, block_dim) for module in modules]:
-                done.result()
+    kernels.side_by_side(by_size, compile_module, workers)
     return sum(map(len, by_size.values()))

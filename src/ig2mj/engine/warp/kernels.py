@@ -7,6 +7,7 @@ what they need is then compiled and loaded by as many threads as there are proce
 
 from __future__ import annotations
 
+import concurrent.futures
 import contextlib
 import os
 import pathlib
@@ -115,15 +116,35 @@ def load(launches: list[Launch], device: str | None = None, workers: int | None 
     Returns:
       How many modules were loaded.
     """
-    threads = workers or len(os.sched_getaffinity(0))
     on = wp.get_device(device)
     by_size = modules_of(launches, one_thread=on.is_cpu)
     # MJX's own has no kernels, but JAX's first call loads it.
     by_size.setdefault(DEFAULT_BLOCK, []).append(wp.get_module(ffi.__name__))
-    with alone():
-        for block_dim, modules in by_size.items():
-            wp.force_load(on, modules, block_dim=block_dim, max_workers=threads)
+
+    def load_module(module: wp.Module, sizes: list[int]) -> None:
+        for size in sizes:
+            wp.force_load(on, [module], block_dim=size, max_workers=1)
+
+    side_by_side(by_size, load_module, workers)
     return sum(map(len, by_size.values()))
+
+
+def side_by_side(
+    by_size: dict[int, list[wp.Module]], act: Callable[[wp.Module, list[int]], None], workers: int | None
+) -> None:
+    """Calls `act` for each module with its sizes of blocks, in so many threads (None: one for each processor).
+
+    The longest come first: kernels of convex pairs, which take half a minute each, then others with blocks of their own
+    size (factorisations).
+    """
+    sizes: dict[wp.Module, list[int]] = {}
+    for size, modules in by_size.items():
+        for module in modules:
+            sizes.setdefault(module, []).append(size)
+    order = sorted(sizes, key=lambda module: ("_ccd_" not in module.name, sizes[module] == [DEFAULT_BLOCK]))
+    with alone(), concurrent.futures.ThreadPoolExecutor(workers or len(os.sched_getaffinity(0))) as pool:
+        for done in [pool.submit(act, module, sizes[module]) for module in order]:
+            done.result()
 
 
 def modules_of(launches: list[Launch], one_thread: bool = False) -> dict[int, list[wp.Module]]:
