@@ -15,7 +15,7 @@ from ig2mj.engine.warp.patches import awake_kernels, pins
 if pins.mismatches():
     pytest.skip(f"our kernels do not fit: {pins.mismatches()}", allow_module_level=True)
 
-from ig2mj.engine.warp.patches import branches, pair_lists, phases
+from ig2mj.engine.warp.patches import branches, pair_lists
 
 WORLDS = 16
 BOX, CAPSULE, MESH = (int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("BOX", "CAPSULE", "MESH"))
@@ -83,11 +83,7 @@ def _contacts(model: mujoco.MjModel, start: mujoco.MjData, qpos: np.ndarray) -> 
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("lists", "two", "interleaved"),
-    [(True, False, False), (False, True, False), (True, True, False), (False, False, True), (True, True, True)],
-)
-def test_contacts_are_those_of_one_kernel_for_each_kind(monkeypatch, lists, two, interleaved):
+def test_contacts_are_those_of_one_kernel_for_each_kind(monkeypatch):
     model = mujoco.MjModel.from_xml_string(SCENE)
     start = mujoco.MjData(model)
     qpos = []
@@ -95,9 +91,7 @@ def test_contacts_are_those_of_one_kernel_for_each_kind(monkeypatch, lists, two,
         mujoco.mj_step(model, start, nstep=3)
         qpos.append(start.qpos.copy())
     expected = _contacts(model, start, np.array(qpos, np.float32))
-    monkeypatch.setattr(pair_lists, "ON", lists)
-    monkeypatch.setattr(phases, "ON", two)
-    monkeypatch.setattr(branches, "INTERLEAVED", interleaved)
+    monkeypatch.setattr(branches, "ON_PROCESSORS", True)
     found = _contacts(model, start, np.array(qpos, np.float32))
     kinds = {tuple(model.geom_type[row[1:3].astype(int)]) for row in expected}
     assert len(kinds) > 5, "boxes, meshes, capsules and cylinders touch each other"

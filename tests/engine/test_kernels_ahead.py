@@ -17,6 +17,8 @@ def test_kernels_of_a_step_become_programs_of_a_gpu(tiny_home, tmp_path, monkeyp
     engine = WarpEngine(tiny_home, 2)
     there = ahead.launches_on_gpu(engine)
     assert len(there) > 40
+    convex = [kernel.key for kernel, _ in there if "ccd_" in kernel.key]
+    assert {key.split("__locals__")[0] for key in convex} == {"ig2mj_first_phase", "ig2mj_second_phase"}
     monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path))
     two = sorted(there, key=lambda launch: len(launch[0].module.kernels))[:2]
     assert ahead.compile_for(two, 90, workers=1) == 2

@@ -27,16 +27,14 @@ or earlier by whoever wants to; a second call does nothing. What the user has de
   - The class of OpenGL contexts that `mujoco.Renderer` makes. Environment variables are not changed.
 
 Environment variables that are read: IG2MJ_CACHE_DIR (moves ig2mj's cache folder, and with it JAX's and Warp's),
-MUJOCO_GL (the backend tried first), IG2MJ_KERNELS (changes of GPU kernels that are on trial, `on_trial`), and those
-named above. MuJoCo Warp's functions are not replaced process-wide: what `ig2mj.engine.warp.patches` has in their place
-runs inside our own engines' programs only.
+MUJOCO_GL (the backend tried first), and those named above. MuJoCo Warp's functions are not replaced process-wide: what
+`ig2mj.engine.warp.patches` has in their place runs inside our own engines' programs only.
 """
 
 from __future__ import annotations
 
 from ig2mj.process.compilation import CACHE_VARIABLE, cache_folder
 from ig2mj.process.settings import (
-    on_trial,
     prepare_jax,
     prepare_mujoco,
     prepare_warp,
@@ -50,7 +48,6 @@ from ig2mj.process.settings import (
 __all__ = [
     "CACHE_VARIABLE",
     "cache_folder",
-    "on_trial",
     "prepare_jax",
     "prepare_mujoco",
     "prepare_warp",

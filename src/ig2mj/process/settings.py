@@ -63,11 +63,6 @@ def run_programs_inline() -> None:
         jax.config.update("jax_cpu_enable_async_dispatch", False)
 
 
-def on_trial(name: str) -> bool:
-    """Whether IG2MJ_KERNELS names this change of GPU kernels, which stays off until it has been measured."""
-    return name in os.environ.get("IG2MJ_KERNELS", "").split(",")
-
-
 def use_processor_only() -> None:
     """Keeps JAX off the GPU in this process; only before JAX is first used."""
     import jax

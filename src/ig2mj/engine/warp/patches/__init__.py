@@ -12,8 +12,8 @@ these in their place; results are the same up to rounding:
   solver. Here a few threads of each world go through those that there are (`lanes`).
 - The broad phase of collision detection goes through all pairs of geoms (`broadphase`).
 - The kernels of convex pairs follow each other, and each waits for its slowest pair. Here they run side by side
-  (`branches`). On trial, off unless IG2MJ_KERNELS names it: each goes through the pairs of its own kind only
-  (`pair_lists`: "sorted"), and depths of what touches are for a second kernel (`phases`).
+  (`branches`), each goes through a list of the pairs of its own kind only, sorted by geoms (`pair_lists`), and depths
+  and several contacts of what touches are for a second kernel (`phases`).
 - One thread of each world puts its trees to sleep, one after the other (`sleeping`).
 - Gravity compensation is launched for every (world, body, degree of freedom). Here it is for every (world, body).
 - Islands get a numbering that nobody reads (`spared`).

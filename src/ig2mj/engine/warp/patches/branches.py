@@ -18,15 +18,12 @@ from mujoco.mjx.third_party.mujoco_warp._src import collision_convex, collision_
 from ig2mj.engine.warp.patches import pair_lists, phases
 from ig2mj.engine.warp.patches.replacements import original
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
-from ig2mj.process import on_trial
 
 MOST = 8
 """Streams of a device; further kernels follow the first ones."""
 
-INTERLEAVED = on_trial("interleaved")
-"""Whether the tables of depths and clipped faces of neighbouring pairs lie beside each other, entry by entry: the
-threads of a warp go through their tables at the same pace, and so read what lies together. Upstream's lie pair by pair,
-kilobytes apart. On trial, not measured on a GPU yet."""
+ON_PROCESSORS = False
+"""Whether all this is done without a GPU, too, where nothing is gained: tests compare contacts."""
 
 _here = threading.local()
 _streams: dict[str, list[wp.Stream]] = {}
@@ -44,23 +41,22 @@ def ccd_kernel_builder(*arguments: Any) -> wp.Kernel:
 def convex_narrowphase(m: Any, d: Any, ctx: Any, collision_table: Any) -> None:
     """As upstream, with each kernel on the next stream."""
     device = d.geom_xpos.device
-    if not (device.is_cuda or pair_lists.ON or phases.ON or INTERLEAVED):
+    if not (wp.get_device(device.alias).is_cuda or ON_PROCESSORS):  # `ahead` answers for a GPU that is not there
         original(collision_driver, "convex_narrowphase")(m, d, ctx, collision_table)
         return
     calls = _calls(m, d, ctx, collision_table)
     kinds = [phases.kind(call["kernel"]) for call in calls]
     found = [kind for kind in kinds if kind is not None]
-    lists = iter(pair_lists.listed_by_kind(m, d, ctx, found) if pair_lists.ON and found else [])
+    lists = iter(pair_lists.listed_by_kind(m, d, ctx, found) if found else [])
     streams = _in_turn(device)
     for call, kind in zip(calls, kinds, strict=True):
         if kind is None:  # of height fields
             wp.launch(**call)
             continue
-        if pair_lists.ON:
-            call["inputs"] = _of_list(m, d, ctx, call["inputs"], next(lists))
+        call["inputs"] = _of_list(m, d, ctx, call["inputs"], next(lists))
         options = next(streams)
         _here.kept.append(call)  # freed where the branches have joined, and not at the end of this function
-        for launch in phases.launches(d, call) if phases.ON else [call]:
+        for launch in phases.launches(d, call):
             _here.kept.append(launch)
             wp.launch(**launch, **options)
 
@@ -89,20 +85,13 @@ def _note(kernel: wp.Kernel, dim: Any, inputs: Any, outputs: Any, **options: Any
 
 
 def _block_size(kernel: wp.Kernel, device: Any) -> tuple[int, int]:
-    if phases.ON and phases.kind(kernel):
+    if phases.kind(kernel):
         return 1, 1  # it is not launched, and the true number would have it compiled
     return _noting.original(wp, "get_suggested_block_size")(kernel, device)
 
 
-def _empty(shape: Any, dtype: Any) -> wp.array:
-    make = _noting.original(wp, "empty")
-    if not (INTERLEAVED and isinstance(shape, tuple) and len(shape) == 2 and min(shape) > 0):
-        return make(shape=shape, dtype=dtype)
-    return make(shape=shape[::-1], dtype=dtype).transpose()
-
-
 _noting = ScopedReplacement()
-_noting.add({(wp, "launch"): _note, (wp, "get_suggested_block_size"): _block_size, (wp, "empty"): _empty})
+_noting.add({(wp, "launch"): _note, (wp, "get_suggested_block_size"): _block_size})
 
 
 def _of_list(m: Any, d: Any, ctx: Any, inputs: list[Any], pairs: pair_lists.PairList) -> list[Any]:

@@ -59,41 +59,6 @@ def strided(kernel: wp.Kernel, index: str, count: str, lanes: int, module: str) 
     return _kernel(kernel, definition, {}, module)
 
 
-def listed(kernel: wp.Kernel, slots: int, module: str) -> wp.Kernel:
-    """The kernel for the worlds of a list only. Further arguments come first: how many worlds there are, and which.
-
-    Args:
-      slots: so many worlds are gone through at a time, each by the threads of one world; 0: there are threads for all
-        of them, and those beyond the end of the list have nothing to do.
-    """
-    definition = _definition(kernel, "listed")
-    further = {"listed_count": wp.array(dtype=int), "listed_worlds": wp.array(dtype=int)}
-    definition.args.args = [
-        *(ast.arg(name, ast.Name(f"_type_of_{name}", ast.Load())) for name in further),
-        *definition.args.args,
-    ]
-    place = _place_of_tid(definition)
-    line = definition.body[place]
-    assert isinstance(line, ast.Assign)
-    indices = line.targets[0].elts if isinstance(line.targets[0], ast.Tuple) else [line.targets[0]]
-    world, *others = (ast.unparse(index) for index in indices)
-    begin = ast.parse(f"{', '.join(['listed_slot', *others])} = wp.tid()").body
-    if slots:
-        loop = ast.parse(
-            f"for listed_place in range(listed_slot, listed_count[0], {slots}):\n"
-            f"    over = bool(False)\n"
-            f"    {world} = listed_worlds[listed_place]"
-        ).body[0]
-        assert isinstance(loop, ast.For)
-        loop.body += _in_a_loop(definition.body[place + 1 :])
-        definition.body[place:] = [*begin, loop]
-    else:
-        guard = f"if listed_slot >= listed_count[0]:\n    return\n{world} = listed_worlds[listed_slot]"
-        definition.body[place : place + 1] = [*begin, *ast.parse(guard, mode="exec").body]
-    names = {f"_type_of_{name}": annotation for name, annotation in further.items()}
-    return _kernel(kernel, definition, names, module)
-
-
 def _in_a_loop(lines: list[ast.stmt]) -> list[ast.stmt]:
     """Lines of a body in which "return" becomes "continue" of a loop around them."""
     result: list[ast.stmt] = []

@@ -11,10 +11,8 @@ and `ENTRIES` for its Hessian, which loop over what there is.
 # pyright: reportGeneralTypeIssues=false, reportOperatorIssue=false, reportPrivateUsage=false, reportAssignmentType=false
 # pyright: reportReturnType=false
 
-import contextlib
 import functools
-import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any, no_type_check
 
 import warp as wp
@@ -23,15 +21,9 @@ from mujoco.mjx.third_party.mujoco_warp._src import solver
 from ig2mj.engine.warp.patches import compact_solver
 from ig2mj.engine.warp.patches.guarded import strided
 from ig2mj.engine.warp.patches.launching import Launch
-from ig2mj.process import on_trial
 
-LANES, ENTRIES = 128 if on_trial("wide") else 64, 128
+LANES, ENTRIES = 64, 128
 """Threads of a world."""
-
-WIDE = 256
-"""Threads of a world while only a few worlds take part (`few_worlds`)."""
-
-_here = threading.local()
 
 ROWS = {
     "_update_constraint_efc": "efc_force_out",
@@ -43,22 +35,12 @@ ROWS = {
 padded): where rows overflow it, their number is larger."""
 
 
-@contextlib.contextmanager
-def few_worlds() -> Iterator[None]:
-    """Inside the block this thread's launches give each world `WIDE` threads for its rows."""
-    _here.few = True
-    try:
-        yield
-    finally:
-        _here.few = False
-
-
 @functools.cache
-def _by_lanes(kernel: wp.Kernel, lanes: int) -> wp.Kernel:
+def _by_lanes(kernel: wp.Kernel) -> wp.Kernel:
     # The first row has something to do where there is none, too: it counts.
     room = ROWS[kernel.key.split("__locals__")[0]]
     rows = f"wp.min(wp.max(nefc_in[worldid], 1), {room}.shape[1])"
-    return strided(kernel, "efcid", rows, lanes, f"ig2mj_lanes_{lanes}_{kernel.module.name}")
+    return strided(kernel, "efcid", rows, LANES, f"ig2mj_lanes_{LANES}_{kernel.module.name}")
 
 
 @wp.kernel(enable_backward=False)
@@ -103,6 +85,5 @@ def substitute(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any]) -> Launch | N
     if kernel is compact_solver._init_hessian_kernel():
         return _init_hessian, (dim[0], ENTRIES), list(inputs)
     if isinstance(dim, tuple) and kernel.key.split("__locals__")[0] in ROWS and (len(dim) < 3 or dim[2] == 1):
-        lanes = WIDE if getattr(_here, "few", False) else LANES
-        return _by_lanes(kernel, lanes), (dim[0], lanes), list(inputs)
+        return _by_lanes(kernel), (dim[0], LANES), list(inputs)
     return None

@@ -6,9 +6,7 @@ and its inputs, and answers with what to launch in their place, or None.
 
 from __future__ import annotations
 
-import contextlib
-import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import warp as wp
@@ -20,10 +18,6 @@ Launch = tuple[wp.Kernel, Any, list[Any]]
 
 Substitute = Callable[[wp.Kernel, Any, Sequence[Any]], Launch | None]
 
-Narrow = Callable[[wp.Kernel, Any, Sequence[Any], bool], Launch]
-"""What a launch, of tiles where the last is true, becomes while only some worlds take part."""
-
-_here = threading.local()
 _substitutes: list[Substitute] = []
 
 
@@ -41,22 +35,9 @@ def substituted(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any]) -> Launch:
     return kernel, dim, list(inputs)
 
 
-@contextlib.contextmanager
-def narrowing(narrow: Narrow) -> Iterator[None]:
-    """Inside the block this thread's launches become those that the function names, after all else."""
-    _here.narrow = narrow
-    try:
-        yield
-    finally:
-        _here.narrow = None
-
-
 def resolved(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any], tiled: bool = False) -> Launch:
     """What is launched in place of this, in this thread and now."""
-    if not tiled:
-        kernel, dim, inputs = substituted(kernel, dim, inputs)
-    narrow: Narrow | None = getattr(_here, "narrow", None)
-    return narrow(kernel, dim, inputs, tiled) if narrow else (kernel, dim, list(inputs))
+    return (kernel, dim, list(inputs)) if tiled else substituted(kernel, dim, inputs)
 
 
 def launch(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any] = (), *args: Any, **kwargs: Any) -> Any:

@@ -24,7 +24,6 @@ from ig2mj.engine.warp.patches import (
     resting,
     sleeping,
     spared,
-    stragglers,
     velocity,
 )
 
@@ -52,8 +51,6 @@ OWN = {
     (island, "update_active_dofs"): spared.update_active_dofs,
     (forward, "fwd_acceleration"): spared.fwd_acceleration,
     (solver, "solve"): spared.solve,
-    (solver, "_solver_iteration"): stragglers.solver_iteration,
-    (wp, "capture_while"): stragglers.capture_while,
     (wp, "launch"): launching.launch,
     (wp, "launch_tiled"): launching.launch_tiled,
 }
