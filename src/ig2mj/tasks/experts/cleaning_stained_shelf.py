@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.engine.view import Array
+from ig2mj.geometry.poses import length
 from ig2mj.states.definitions import stain
 from ig2mj.states.particles import world_normals, world_positions
 from ig2mj.tasks.experts.motion import Wish, levelled, over, where, wish
@@ -27,6 +28,10 @@ WITHIN, BLEND = 0.06, 0.03
 
 FACING_UP = 0.7
 """Smallest z of the normal of a stain that a flat towel wipes."""
+
+AT_WALL, LATER = 0.035, 1.0
+"""m from the wall within which stains are Fetch's last, as though they were so much farther away: its arm comes askew
+to the board's end, where the towel's corner meets the wall before the stain is under it, and half of all will do."""
 
 
 def plan(see: Sight) -> list[Wish]:
@@ -49,6 +54,10 @@ def _nearest(see: Sight, towel: Float[Array, "W 3"]) -> Float[Array, "W 3"]:
     pos = world_positions(see.states.stain, see.view)[:, row]
     up = world_normals(see.states.stain, see.view)[:, row, :, 2] > FACING_UP
     left = jnp.asarray(see.states.stain.alive)[:, row] & up
-    apart = jnp.where(left, jnp.sum(jnp.square(pos - towel[:, None])[..., :2], axis=-1), jnp.inf)
+    apart = length((pos - towel[:, None])[..., :2])
+    if see.robot == "fetch":
+        low, _ = see.box(SHELF)
+        apart += LATER * (pos[..., 1] < low[:, None, 1] + AT_WALL)
+    apart = jnp.where(left, apart, jnp.inf)
     nearest = pos[np.arange(pos.shape[0]), jnp.argmin(apart, axis=1)]
     return jnp.where(left.any(1)[:, None], nearest, towel)
