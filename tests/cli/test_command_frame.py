@@ -264,3 +264,12 @@ def test_a_full_disk_names_the_file_that_was_written(tmp_path, monkeypatch, caps
         monkeypatch.setattr(cli, "_dispatch", lambda _, work=work: work())
         assert cli.call(["view"]) == 2
         assert capsys.readouterr().err == f"error: {file}: No space left on device\n"
+
+
+def test_a_seed_below_zero_is_refused_before_the_command_begins(command, capsys):
+    def run(seed: int = 0) -> None:
+        raise AssertionError(f"began with seed {seed}")
+
+    command(run)
+    assert cli.call(["probe", "--seed", "-1"]) == 2
+    assert capsys.readouterr().err == "error: --seed -1: a seed is at least 0\n"

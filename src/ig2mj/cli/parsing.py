@@ -9,6 +9,8 @@ from typing import Annotated, Any
 
 import tyro
 
+from ig2mj.errors import Ig2mjError
+
 
 def parse_and_call(function: Callable[..., Any], prog: str, args: Sequence[str]) -> Any:
     """Calls the function with what the command line says, and returns its answer. Raises SystemExit, as tyro does."""
@@ -26,11 +28,19 @@ def _with_quiet_defaults(function: Callable[..., Any]) -> Callable[..., Any]:
         if name in hints and (parameter.default in (None, ()) or parameter.default is False):
             hints[name] = Annotated[hints[name], tyro.conf.arg(help_behavior_hint="")]
 
-    call = lambda *args, **given: function(*args, **given)  # noqa: E731  a def gets wrapped where types are checked
+    # (A def would be wrapped where types are checked.)
+    call = lambda *args, **given: function(*args, **_with_a_usable_seed(given))  # noqa: E731
     call.__name__, call.__doc__, call.__annotations__ = function.__name__, _unfolded(function.__doc__ or ""), hints
     parameters = [p.replace(annotation=hints.get(n, p.annotation)) for n, p in signature.parameters.items()]
     call.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     return call
+
+
+def _with_a_usable_seed(given: dict[str, Any]) -> dict[str, Any]:
+    """The arguments. Raises Ig2mjError where there is a `seed` below 0, which NumPy's generators refuse."""
+    if isinstance(seed := given.get("seed"), int) and seed < 0:
+        raise Ig2mjError(f"--seed {seed}: a seed is at least 0")
+    return given
 
 
 def _unfolded(doc: str) -> str:

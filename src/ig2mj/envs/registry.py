@@ -121,6 +121,10 @@ def make(
         task = task_variant(task, variant, mode)
     elif variant:
         raise EngineError(f"variant {variant} of {task.name}: only the paper's activities have variants")
+    elif paper_rl:
+        raise EngineError(f"paper_rl for {task.name}: only the paper's activities have thresholds of the paper's runs")
+    if isinstance(task, NavigationTask) and pool is not None:
+        raise EngineError(f"a pool for {task.name}: navigation draws its own start states")
     robot = next(iter(task.robots)) if robot is None else robot
     if worlds < 1:
         raise EngineError(f"worlds = {worlds}: an environment has at least one")
