@@ -117,6 +117,7 @@ def run(
         "control_steps_per_s": round(num_worlds * STEPS / float(np.median(times))),
         "ms_per_control_step": round(1e3 * float(np.median(times)) / STEPS, 3),
         "spread": round((max(times) - min(times)) / float(np.median(times)), 3),
+        "ms_of_calls": [round(1e3 * t / STEPS, 2) for t in times],
         "compile_s": round(compile_seconds, 1),
         "first_call_s": round(first, 1),
         "simulated_s": round((len(times) + 2) * STEPS * seconds, 2),
