@@ -79,11 +79,13 @@ def lines(file: pathlib.Path) -> list[dict[str, Any]]:
 
 
 def scaling() -> dict[str, dict[int, tuple[float, str]]]:
-    """Measured weak scaling: case -> GPUs -> (of one, device)."""
+    """Measured weak scaling: case -> GPUs -> (of one, device; where it was measured also the share of the speeds
+    that each of these GPUs has alone)."""
     found: dict[str, dict[int, tuple[float, str]]] = {}
     for row in lines(RESULTS / "scaling" / "rows.jsonl"):
         if row.get("counts") and row.get("weak_scaling") and row.get("of") == 1:
-            found.setdefault(row["case"], {})[row["gpus"]] = (row["weak_scaling"], row["device"])
+            share = f", {100 * row['of_these_gpus_alone']:.0f} % of each alone" if "of_these_gpus_alone" in row else ""
+            found.setdefault(row["case"], {})[row["gpus"]] = (row["weak_scaling"], row["device"] + share)
     two = json.loads((RESULTS / "multi_gpu" / "result.json").read_text())
     found.setdefault("made_60", {}).setdefault(two["devices"], (two["speedup"], two["device"]))
     return found

@@ -151,9 +151,12 @@ def others(group: Group) -> list[Process]:
     return group.processes[1:] if 1 in group.numbers and len(group.numbers) > 1 else []
 
 
-def measure_group(group: Group, args: Args, until: float) -> None:
-    """All rows of a case: each number of GPUs, and each further GPU alone, since those of a host are not all alike."""
-    alone: dict[int, float] = {}
+def measure_group(group: Group, args: Args, until: float, alone: dict[int, float]) -> None:
+    """All rows of a group: each number of GPUs, and each further GPU alone, since those of a host are not all alike.
+
+    Args:
+      alone: of the group's case, the speed of each GPU by itself, as far as it is known; what is found is added.
+    """
 
     def one(chosen: Group, number: int, **more: Any) -> dict[str, Any]:
         row = measure(chosen, number, args, min(until, time.monotonic() + 5 * args.seconds + 20.0)) | more
@@ -189,8 +192,9 @@ def main(args: Args) -> None:
         latest = max(until - rounds * (SLACK + args.seconds), time.monotonic())
         for process in every:
             process.wait_until_ready(latest)
+        alone: dict[str, dict[int, float]] = {}
         for group in made:
-            measure_group(group, args, until)
+            measure_group(group, args, until, alone.setdefault(group.case, {}))
     finally:
         end_all(every)
 
