@@ -93,7 +93,7 @@ def test_an_expert_that_answers_in_any_state_is_imitated(pure):
 @pytest.mark.parametrize("pure", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_an_expert_begins_episodes_and_leaves_them_to_the_policy(pure, monkeypatch):
     """Without it the same run reaches a third; the success reported is of episodes without the expert."""
-    monkeypatch.setattr(guidance, "SETTLED", 20)  # this environment's horizon is shorter than the activities'
+    monkeypatch.setattr(guidance, "HORIZON", 20)  # this environment's horizon is shorter than the activities'
     env = PointMass(64, pure=pure)
 
     def expert(state):

@@ -115,6 +115,7 @@ def run(
             "agent": str(policy),
             "weights": loaded.weights_digest,
             "paper_rl": settings["paper_rl"],
+            "variant": 0,  # of the objects: policies are trained with the task's own
             "split": split,
             "drawn": drawn,
             "engine": engine,
