@@ -12,11 +12,9 @@ all-reduce of the gradients at the given bandwidths. Forecasts are marked with ~
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import math
 import pathlib
-import statistics
 from typing import Any
 
 HERE = pathlib.Path(__file__).resolve().parent
@@ -45,10 +43,12 @@ def speeds() -> dict[str, float]:
     for row in lines(RESULTS / "environments" / "h200.jsonl"):
         name = "environment_pictures" if row["observations"] else "environment"
         found[name] = max(found.get(name, 0.0), row["agent_steps_per_s"])
-    with (RESULTS / "learning" / "CookingMeat-humanoid-mitten-sac-rgbd-0.csv").open() as file:
-        told = [r for r in csv.DictReader(file) if float(r["seconds"]) > 30]
-    found["learner"] = statistics.median(float(r["steps_per_second"]) for r in told)
-    found["updates"] = statistics.median(float(r["updates_per_second"]) for r in told)
+    for row in lines(RESULTS / "scaling" / "rows.jsonl"):  # the newest of a GPU at work alone
+        if row["gpus"] == 1 and "gpu" not in row and row.get("counts"):
+            found[row["case"]] = row["steps_per_s"]
+            found["updates"] = row.get("updates_per_s", found.get("updates"))
+        if row["gpus"] == 2 and row["case"] == "learner" and row.get("counts"):
+            found["updates_of_two"] = row["updates_per_s"]
     return found
 
 
@@ -108,10 +108,19 @@ def exchange(gpus: int, sizes: dict[str, int], inside: float, between: float) ->
     return 2 * (gpus - 1) / gpus * sizes["gradient_bytes_per_update"] / rate + 2 * math.log2(gpus) * LATENCY
 
 
+def update_seconds(gpus: int, one: dict[str, float], sizes: dict[str, int], inside: float, between: float) -> float:
+    """Of an update, with its share of the worlds' steps: what one GPU takes, the gradients, and what sharing costs.
+
+    The last is what an update on two GPUs was measured to take beyond one's, at any number of them.
+    """
+    alone = 1.0 / one["updates"]
+    shared = 1.0 / one["updates_of_two"] - alone if gpus > 1 and "updates_of_two" in one else 0.0
+    return alone + shared + exchange(gpus, sizes, inside, between)
+
+
 def forecast(gpus: int, one: dict[str, float], sizes: dict[str, int], args: argparse.Namespace) -> float:
-    """Agent steps a second of the learner: each GPU does what one does, and waits for every update's gradients."""
-    alone = 1.0 / one["updates"]  # seconds of an update, with its share of the worlds' steps
-    return gpus * one["learner"] * alone / (alone + exchange(gpus, sizes, args.inside, args.between))
+    """Agent steps a second of the learner: each GPU does what one does, and waits for the others at every update."""
+    return gpus * one["learner"] / (one["updates"] * update_seconds(gpus, one, sizes, args.inside, args.between))
 
 
 def success(row: dict[str, Any]) -> str:
@@ -170,7 +179,7 @@ def tables(args: argparse.Namespace) -> str:
         parts += ["### Seconds of training until 95 % of the episodes succeed", table(head, rows)]
     rows = []
     for gpus in GPUS:
-        rate = one["updates"] / (1 + one["updates"] * exchange(gpus, learner, args.inside, args.between))
+        rate = 1.0 / update_seconds(gpus, one, learner, args.inside, args.between)
         sent = 0.0 if gpus == 1 else 2 * (gpus - 1) / gpus * learner["gradient_bytes_per_update"] * rate
         rows.append([f"{gpus:,}", amount(rate), f"{amount(sent)}B", f"{amount(sent * gpus)}B"])
     head = ["H200s", "updates/s", "gradients each GPU sends a second", "all of them"]

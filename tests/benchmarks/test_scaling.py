@@ -82,3 +82,9 @@ def test_what_dies_or_is_late_costs_its_own_rows(tmp_path, monkeypatch):
     assert "no answer, ended with 1: it died" in rows["birch_pictures", 2]["error"]
     assert "not ready, still at work" in rows["learner", 1]["error"]
     assert rows["learner", 2]["counts"] and "weak_scaling" not in rows["learner", 2], "there is no row of one GPU"
+
+
+def test_a_learner_of_two_gpus_is_compared_with_that_of_one(tmp_path, monkeypatch):
+    workers = {"learner-1": [GOOD], "learner-2": [{**GOOD, "steps": 85}, {**GOOD, "steps": 85}]}
+    rows = measured(tmp_path, monkeypatch, workers, limit=30.0)
+    assert [(r["gpus"], r.get("weak_scaling")) for r in rows] == [(1, 1.0), (2, 1.7)]
