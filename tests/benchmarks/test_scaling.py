@@ -61,7 +61,7 @@ def test_speeds_are_compared_with_one_gpu(tmp_path, monkeypatch):
     (tmp_path / "scaling" / "rows.jsonl").write_text("\n".join(map(json.dumps, [*rows, {**rows[2], "counts": False}])))
     two = {"devices": 2, "speedup": 1.99, "device": "another"}
     (tmp_path / "multi_gpu" / "result.json").write_text(json.dumps(two))
-    assert scale_tables.scaling()["birch_pictures"] == {1: (1.0, "a device"), 2: (1.9, "a device")}
+    assert scale_tables.scaling()["birch_pictures"] == {1: (1.0, "a device"), 2: (1.9, "a device, 100 % of each alone")}
 
 
 def test_a_row_that_overflowed_counts_not_and_is_no_measure_for_others(tmp_path, monkeypatch):
