@@ -105,7 +105,7 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
     env: Any = ig2mj.make(
         settings["env"], worlds=worlds, engine=settings["engine"], observations=names, pool_size=settings["pool_size"]
     )
-    config = dataclasses.replace(
+    config: Any = dataclasses.replace(
         config_of("sac"), batch=settings["batch"] * count, capacity=settings["capacity"] * count
     )
     perception = Perception(env.observation_spaces, settings["obs"])
