@@ -45,7 +45,7 @@ def samples():
     for first in (0, 2, 4, 6):
         steps = [first, first + 1]
         replay = replay.insert(told(steps, [s == 4 for s in steps], [s == 6 for s in steps]))
-    drawn = replay.sample(jax.random.PRNGKey(0), 400, 3, GAMMA)
+    drawn = jax.jit(lambda kept, key: kept.sample(key, 400, 3, GAMMA))(replay, jax.random.PRNGKey(0))
     return jax.tree.map(np.asarray, drawn)
 
 
@@ -177,8 +177,8 @@ def test_a_policy_that_acts_on_its_guess_takes_it_along(tmp_path):
     sees = perception_of(again, env.observation_spaces)
     assert sees.picture_shape == (12, 16, 4) and sees.rows == (4, 16)
     obs = env.reset(0).obs
-    wanted = sac._look(learner.actor, learner.moments, perception(obs))[0]
-    assert np.allclose(again.actor(sees)(obs), np.tanh(wanted), atol=0.02), "half precision"
+    wanted = jax.jit(sac._look)(learner.actor, learner.moments, perception(obs))[0]
+    assert np.allclose(jax.jit(again.actor(sees))(obs), np.tanh(wanted), atol=0.02), "half precision"
     with pytest.raises(PolicyMismatch, match="rows"):
         again.check(env, Perception(env.observation_spaces, "rgbd", 16, (0, 12)))
 
@@ -213,22 +213,31 @@ def test_the_depth_at_the_brightest_point_is_seen():
 def test_whether_actions_train_the_encoder(net, moved):
     actor = Actor(2, (8,), (12, 16, 4), net, guess=3)
     vector, picture = jnp.ones((4, 2)), jax.random.randint(jax.random.PRNGKey(0), (4, 768), 0, 256).astype(jnp.uint8)
-    params = actor.init(jax.random.PRNGKey(1), vector, picture)["params"]
 
-    def slope(part):
-        found = jax.grad(lambda p: jnp.square(actor.apply({"params": p}, vector, picture)[part] - 1.0).sum())(params)
-        return max(float(jnp.abs(a).max()) for a in jax.tree.leaves(found["encoder"]))
+    @jax.jit
+    def slopes(key):
+        """Of the actions and of the guess."""
+        params = actor.init(key, vector, picture)["params"]
+        _, back = jax.vjp(lambda p: actor.apply({"params": p}, vector, picture), params)
+        told = actor.apply({"params": params}, vector, picture)
+        found = []
+        for part in (0, 2):
+            by = [2 * (a - 1.0) if k == part else jax.tree.map(jnp.zeros_like, a) for k, a in enumerate(told)]
+            (gradient,) = back(type(told)(by))
+            found.append(jnp.stack([jnp.abs(a).max() for a in jax.tree.leaves(gradient["encoder"])]).max())
+        return jnp.stack(found)
 
-    assert (slope(0) > 0) is moved
-    assert slope(2) > 0, "the guess always does"
+    of_actions, of_the_guess = slopes(jax.random.PRNGKey(1))
+    assert bool(of_actions > 0) is moved
+    assert of_the_guess > 0, "the guess always does"
 
 
 def test_half_precision_on_a_gpu_sees_nearly_the_same(monkeypatch):
     encoder = Encoder((12, 16, 4), "places")
     picture = jax.random.randint(jax.random.PRNGKey(0), (3, 12 * 16 * 4), 0, 256).astype(jnp.uint8)
-    params = encoder.init(jax.random.PRNGKey(1), picture)
-    full = np.asarray(encoder.apply(params, picture))
+    params = jax.jit(encoder.init)(jax.random.PRNGKey(1), picture)
+    full = np.asarray(jax.jit(encoder.apply)(params, picture))
     monkeypatch.setattr(jax, "default_backend", lambda: "gpu")
-    half = np.asarray(encoder.apply(params, picture))
+    half = np.asarray(jax.jit(lambda p, x: encoder.apply(p, x))(params, picture))
     assert full.dtype == half.dtype == np.float32
     assert 0 < np.abs(full - half).max() < 0.1
