@@ -20,6 +20,7 @@ K buttons.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -36,6 +37,18 @@ EXACT = frozenset({"link_force"})
 
 KNOWN = frozenset({"toggled_on", "sliced", "water_source", "wetness", "dust", "stain"})
 """States whose updates the table above covers. Where there is another, everything matters."""
+
+STILL = {
+    "touching": "tools",
+    "awake": "tools",
+    "body_pos": "all bodies",
+    "body_quat": "all bodies",
+    "link_pos": "all links",
+    "link_quat": "cleaned links",
+    "aabb_low": "boxes",
+    "aabb_high": "boxes",
+}
+"""Fields of the view, and those of their rows whose change can matter to cleaning or to heat."""
 
 MARGIN = 1e-3
 """m by which a place must be clear of a limit; far beyond any rounding within a home."""
@@ -81,20 +94,22 @@ class Relevance:
         Args:
           changed: fields that differ from those of the last whole step; all others of its `reads` are the same.
         """
-        if not self._covered or self.exact.intersection(changed) or any(name not in self._base for name in changed):
+        if not self._covered or not self.exact.isdisjoint(changed):
             return False
-        now = {name: read_field(view, name) for name in changed}
-        if not all(isinstance(field, np.ndarray) for field in now.values()):
-            return False
+        now: dict[str, np.ndarray] = {}
+        for name in changed:
+            field = read_field(view, name)
+            if name not in self._base or not isinstance(field, np.ndarray):
+                return False
+            now[name] = field
         if not self._ready:
             self._prepare()
-        return (
-            self._dry
-            and self._opens_alike(now)
-            and self._cleans_alike(now)
-            and self._heats_alike(now)
-            and self._switches_alike(now)
-        )
+        if not self._dry or not self._opens_alike(now):
+            return False
+        far = self._all_still(now) and self._within_room(now)
+        if not far and not (self._cleans_alike(now) and self._heats_alike(now)):
+            return False
+        return self._switches_alike(now)
 
     def _prepare(self) -> None:
         """What is looked at, from the states of the last whole step; on the host."""
@@ -125,6 +140,9 @@ class Relevance:
             "boxes": boxes,
             "bodies of boxes": np.concatenate([none, *(self._bodies[o] for o in boxes)]),
         }
+        bodies = np.union1d(self._rows["cleaned bodies"], self._rows["bodies of boxes"])
+        links = np.union1d(self._rows["cleaned links"], self._rows["sources"])
+        self._rows |= {"all bodies": bodies.astype(int), "all links": links.astype(int)}
         self._bytes: dict[tuple[str, str], bytes] = {}
         self._room: Float[np.ndarray, "T 1"] | None = None
 
@@ -148,6 +166,11 @@ class Relevance:
         if before is None:
             before = self._bytes[name, which] = self._base[name].take(rows, 1).tobytes()
         return now[name].take(rows, 1).tobytes() == before
+
+    def _all_still(self, now: Mapping[str, Array]) -> bool:
+        """Whether tools, what they touch, sources and boxes of sources are where they were: the most usual answer, and
+        one comparison for each field."""
+        return all(self._stays(now, name, STILL[name]) for name in now if name in STILL)
 
     def _cleans_alike(self, now: Mapping[str, Array]) -> bool:
         if not len(self._tools):
@@ -194,12 +217,18 @@ class Relevance:
         for name in ("aabb_low", "aabb_high", "body_pos", "body_quat"):
             if not self._stays(now, name, "boxes" if name.startswith("aabb") else "bodies of boxes"):
                 return False
+        return self._within_room(now)
+
+    def _within_room(self, now: Mapping[str, Any]) -> bool:
+        """Whether no warm object has moved as far as it had to before any source's reach began or ended."""
         if "object_com" not in now:
             return True
         if self._room is None:
             self._room = self._room_of_base()[:, None]
             self._com = self._base["object_com"][:, self._thermal]
-        return bool((np.abs(now["object_com"].take(self._thermal, 1) - self._com) <= self._room).all())
+        moved: np.ndarray = now["object_com"].take(self._thermal, 1)
+        moved -= self._com
+        return bool((np.abs(moved, out=moved) <= self._room).all())
 
     def _room_of_base(self) -> Float[np.ndarray, "T"]:
         """How far each warm object may go along any axis before it can come into, or leave, the reach of a source."""
