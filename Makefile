@@ -72,8 +72,10 @@ $(PAGE)/three.module.js: web/package-lock.json
 demo: setup
 	@$(BIN)/ig2mj demo
 
+# Most of the quick tests' time is XLA's, for programs that then run a few times; so it is told not to optimize them.
+# Whoever runs pytest, and the slow tests, get programs as they are elsewhere.
 test: setup
-	@$(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m "not slow and not gpu" $(PYTEST_ARGS)
+	@JAX_DISABLE_MOST_OPTIMIZATIONS=1 $(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m "not slow and not gpu" $(PYTEST_ARGS)
 
 test-slow: setup web
 	@$(BIN)/python -m pytest -n $(JOBS) --dist loadfile -m "slow and not gpu" --timeout 1800 $(PYTEST_ARGS)

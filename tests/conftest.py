@@ -7,12 +7,17 @@ its shapes and types checked by beartype while the tests run.
 
 from __future__ import annotations
 
+import importlib.metadata
 import os
 from pathlib import Path
 
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
-if os.environ["JAX_PLATFORMS"] == "cpu":
-    os.environ.setdefault("XLA_FLAGS", "--xla_cpu_multi_thread_eigen=false intra_op_parallelism_threads=1")
+if os.environ["JAX_PLATFORMS"] == "cpu" and "XLA_FLAGS" not in os.environ:
+    flags = ["--xla_cpu_multi_thread_eigen=false", "intra_op_parallelism_threads=1"]
+    # `make test`: kernels are then compiled without MLIR, too. XLA ends the process at a flag that it does not know.
+    if os.environ.get("JAX_DISABLE_MOST_OPTIMIZATIONS") == "1" and importlib.metadata.version("jax") < "0.11":
+        flags.append("--xla_cpu_use_fusion_emitters=false")
+    os.environ["XLA_FLAGS"] = " ".join(flags)
 os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")
 
 import jaxtyping
@@ -48,7 +53,30 @@ def pytest_configure(config: pytest.Config) -> None:
 
     if getattr(config, "cache", None) is not None:  # without its plugin there is no such attribute
         jax.config.update("jax_compilation_cache_dir", str(config.cache.mkdir("jax")))
-        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.3)
+        jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
+
+
+SHARING = {
+    "tests/homes/test_rooms_look_lived_in.py": "tests/homes/test_furnishing.py",  # every home, furnished
+    "tests/demos/test_recordings.py": "tests/envs/test_environment.py",  # `cooking_meat`
+    "tests/demos/test_exports.py": "tests/envs/test_environment.py",
+}
+"""Files that run in the process of another, because they share something that takes long to make."""
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config: pytest.Config, log):
+    """`--dist loadfile`, but for the files above."""
+    if config.getvalue("dist") != "loadfile":
+        return None
+    from xdist.scheduler import LoadFileScheduling
+
+    class Sharing(LoadFileScheduling):
+        def _split_scope(self, nodeid: str) -> str:
+            file = super()._split_scope(nodeid)
+            return SHARING.get(file, file)
+
+    return Sharing(config, log)
 
 
 @pytest.fixture(scope="session")
@@ -93,3 +121,11 @@ def tiny_home(tiny_home_folder: Path):
     import ig2mj
 
     return ig2mj.load_scene(tiny_home_folder)
+
+
+@pytest.fixture(scope="session")
+def cooking_meat():
+    """CookingMeat with the humanoid in two worlds, and a pool of four; shared, since it takes long to compile."""
+    import ig2mj
+
+    return ig2mj.make("CookingMeat", worlds=2, engine="native", pool_size=4)

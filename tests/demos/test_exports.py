@@ -11,7 +11,6 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-import ig2mj
 from ig2mj.demos import Recording, Replayer, record
 from ig2mj.demos.films import EpisodeFilms
 from ig2mj.demos.igibson import export_igibson, read_igibson
@@ -24,10 +23,10 @@ HORIZON = 5
 
 
 @pytest.fixture(scope="module")
-def recorded(tmp_path_factory):
+def recorded(cooking_meat, tmp_path_factory):
     """Two runs of five steps, begun anew at the end; observations and actions of every step."""
     folder = tmp_path_factory.mktemp("exports")
-    env = ig2mj.make("CookingMeat", worlds=2, engine="native", pool_size=4).with_horizon(HORIZON)
+    env = cooking_meat.with_horizon(HORIZON)
     expert, seen = expert_of(env), []
     with record(env, folder / "runs.h5") as played:
         state = played.reset(1)

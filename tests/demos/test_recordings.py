@@ -23,9 +23,8 @@ ROWS, HORIZON = 4, 12
 
 
 @pytest.fixture(scope="module")
-def env():
-    made = ig2mj.make("CookingMeat", worlds=2, engine="native", pool_size=ROWS)
-    return made.with_horizon(HORIZON)
+def env(cooking_meat):
+    return cooking_meat.with_horizon(HORIZON)
 
 
 @pytest.fixture(scope="module")

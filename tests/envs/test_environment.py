@@ -16,8 +16,9 @@ ROWS = 4
 
 
 @pytest.fixture(scope="module")
-def env():
-    return ig2mj.make("ig2mj/CookingMeat-v0", worlds=2, pool_size=ROWS)
+def env(cooking_meat):
+    assert cooking_meat.core.starts.pool.size == ROWS
+    return cooking_meat
 
 
 def numbers(env, state, name):

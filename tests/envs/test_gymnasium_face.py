@@ -12,7 +12,7 @@ import ig2mj.envs.gymnasium  # noqa: F401  makes the environments known
 from ig2mj.envs.registry import find_task
 from ig2mj.errors import UnknownNameError
 
-ID = "ig2mj/GraspingBook-v0"
+ID = "ig2mj/CookingMeat-v0"  # its programs are those of other files' environments, and compiled already
 ROWS = 4
 NOTHING = np.zeros((2, 6), np.float32)
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 import pytest
+from furnished_homes import home
 from ig2mj_homes.dataset.scene_writer import scene_urdf
 from ig2mj_homes.dataset.shipped_homes import furnished, home_names
 from ig2mj_homes.furnish.arrangement import AIR, Arrangement
@@ -18,7 +17,6 @@ from ig2mj_homes.shapes.surfaces import insides, tops
 
 from ig2mj.errors import UnknownNameError
 
-home = functools.cache(furnished)
 SMALL = ("aspen", "hazel", "small_home")
 """Homes that are furnished in half a second."""
 each_home = pytest.mark.parametrize("name", home_names())

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import functools
-
 import numpy as np
 import pytest
-from ig2mj_homes.dataset.shipped_homes import furnished
+from furnished_homes import home
 from ig2mj_homes.furnish.placed import Placed
 from ig2mj_homes.furnish.television_area import ASIDE, FARTHEST, NEAREST, aside, floor_between
 from ig2mj_homes.plans.plan import Room
 from ig2mj_homes.plans.shipped import DRAWINGS
 
-home = functools.cache(furnished)
 each_home = pytest.mark.parametrize("name", sorted(DRAWINGS))
 LARGE = [name for name, drawing in sorted(DRAWINGS.items()) if drawing.objects >= 40]
 EYES = 1.1
