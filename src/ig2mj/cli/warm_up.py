@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pathlib
 from typing import TYPE_CHECKING, Annotated
 
@@ -50,10 +51,8 @@ def run(
 
     if out is not None:
         keep_compiled_in(out)
-    if arch is not None:
-        seconds = _ahead(what, worlds, robot, grasping, observations, engine, arch)
-    else:
-        seconds = _timed(what, worlds, robot, grasping, observations, engine)
+    batch = Batch(what, worlds, robot, grasping, observations, engine)
+    seconds = _timed(batch) if arch is None else _ahead(batch, arch)
     seconds["all"] = time.perf_counter() - began
     folder = cache_folder()
     size = sum(file.stat().st_size for file in folder.rglob("*") if file.is_file())
@@ -69,19 +68,39 @@ def run(
     return 0
 
 
+@dataclasses.dataclass(frozen=True)
+class Batch:
+    """The worlds of a home, or an environment; see `run`."""
+
+    what: str
+    worlds: int
+    robot: str | None
+    grasping: str | None
+    observations: tuple[str, ...]
+    engine: str | None
+
+    def make(self, pool_size: int | None = None) -> Worlds | Environment:
+        """Raises Ig2mjError where a home is given what belongs to environments."""
+        import ig2mj
+        from ig2mj.envs.names import activity_name, short_name
+        from ig2mj.envs.registry import VECTORS
+        from ig2mj.errors import Ig2mjError
+
+        if short_name(self.what) is not None or activity_name(self.what) is not None:
+            seen = (*VECTORS, *self.observations)
+            return ig2mj.make(
+                self.what, self.robot, self.worlds, self.engine, self.grasping, observations=seen, pool_size=pool_size
+            )
+        if self.robot is not None or self.grasping is not None or self.observations:
+            raise Ig2mjError("--robot, --grasping and --observations belong to environments; a home is stepped without")
+        return ig2mj.Worlds(self.what, self.worlds, self.engine)
+
+
 MOST_WORLDS = 64
 """Worlds that are created to find kernels, which do not depend on the number."""
 
 
-def _ahead(
-    what: str,
-    worlds: int,
-    robot: str | None,
-    grasping: str | None,
-    observations: tuple[str, ...],
-    engine: str | None,
-    architecture: int,
-) -> dict[str, float]:
+def _ahead(batch: Batch, architecture: int) -> dict[str, float]:
     """Seconds of finding and of compiling the kernels for a GPU that this machine need not have."""
     import time
 
@@ -90,13 +109,13 @@ def _ahead(
     from ig2mj.errors import Ig2mjError
     from ig2mj.worlds import Worlds
 
-    if engine not in (None, "warp"):
-        raise Ig2mjError(f"--arch compiles kernels of the Warp engine; engine {engine!r} has none")
-    if observations:
+    if batch.engine not in (None, "warp"):
+        raise Ig2mjError(f"--arch compiles kernels of the Warp engine; engine {batch.engine!r} has none")
+    if batch.observations:
         raise Ig2mjError("--arch compiles the kernels of a physics step; those of --observations need the GPU itself")
     ahead.check(architecture)
     began = time.perf_counter()
-    made = _worlds(what, min(worlds, MOST_WORLDS), robot, grasping, (), "warp", pool_size=1)
+    made = dataclasses.replace(batch, worlds=min(batch.worlds, MOST_WORLDS), engine="warp").make(pool_size=1)
     warp = made.engine if isinstance(made, Worlds) else made.core.engine
     assert isinstance(warp, WarpEngine)
     launches = ahead.launches_on_gpu(warp)
@@ -105,37 +124,7 @@ def _ahead(
     return {"making": found - began, "kernels": time.perf_counter() - found}
 
 
-def _worlds(
-    what: str,
-    worlds: int,
-    robot: str | None,
-    grasping: str | None,
-    observations: tuple[str, ...],
-    engine: str | None,
-    pool_size: int | None = None,
-) -> Worlds | Environment:
-    """The worlds of a home, or an environment."""
-    import ig2mj
-    from ig2mj.envs.names import activity_name, short_name
-    from ig2mj.envs.registry import VECTORS
-    from ig2mj.errors import Ig2mjError
-
-    if short_name(what) is not None or activity_name(what) is not None:
-        seen = (*VECTORS, *observations)
-        return ig2mj.make(what, robot, worlds, engine, grasping, observations=seen, pool_size=pool_size)
-    if robot is not None or grasping is not None or observations:
-        raise Ig2mjError("--robot, --grasping and --observations belong to environments; a home is stepped without")
-    return ig2mj.Worlds(what, worlds, engine)
-
-
-def _timed(
-    what: str,
-    worlds: int,
-    robot: str | None,
-    grasping: str | None,
-    observations: tuple[str, ...],
-    engine: str | None,
-) -> dict[str, float]:
+def _timed(batch: Batch) -> dict[str, float]:
     """Seconds of making the worlds, starting them, and their first step."""
     import time
 
@@ -149,7 +138,7 @@ def _timed(
     def tick() -> None:
         times.append(time.perf_counter())
 
-    made = _worlds(what, worlds, robot, grasping, observations, engine)
+    made = batch.make()
     tick()
     if isinstance(made, Worlds):
         started = jax.block_until_ready(made.start(0))
@@ -158,7 +147,7 @@ def _timed(
     else:
         state = jax.block_until_ready(made.reset(0))
         tick()
-        action = np.zeros((worlds, *made.action_space.shape), np.float32)
+        action = np.zeros((batch.worlds, *made.action_space.shape), np.float32)
         jax.block_until_ready(made.step_autoreset(state, action))
     tick()
     return dict(zip(parts, np.diff(times).tolist(), strict=True))
