@@ -1,22 +1,30 @@
 """Where a GPU's time goes: device time by kernel, and the time in which nothing runs.
 
 CUPTI sees kernels inside CUDA graphs too, so XLA's and Warp's are listed side by side. `--kernels N` of
-`throughput.py`, `environments.py` and `learner.py` prints the N longest after their rows.
+`throughput.py`, `environments.py` and `learner.py` prints the N longest after their rows; `scaling.py --kernels FOLDER`
+keeps all of a learner's (`profiled_to`), which `learner_kernels.py` puts side by side.
 """
 
 from __future__ import annotations
 
 import collections
+import json
 import pathlib
 import re
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import jax
+import numpy as np
 
 WARP_NAME = re.compile(r"_[0-9a-f]{8}_cuda_kernel_forward|_cuda_kernel_forward")
+
+WARP_MARK = "warp: "
+
+GAPS, GAP_NAMES = (5e-6, 50e-6, 1e-3), ("under 5 us", "5 to 50 us", "50 us to 1 ms", "over 1 ms")
+"""Seconds in which nothing runs: between launches of one graph, of several, waiting for the host."""
 
 
 def profiled(
@@ -76,18 +84,56 @@ def profiled(
     return result, summary
 
 
-def _events(folder: str) -> list[tuple[float, float, str, str]]:
-    """Start and duration in ns, name and stream of what ran on the first GPU."""
+def profiled_to(file: pathlib.Path, call: Callable[[], Any], steps: int) -> None:
+    """Runs `call` under the profiler, and writes what ran on this process's first GPU, as JSON.
+
+    `steps` and `wall`, `busy` and `idle` as of `profiled`, but seconds of the whole call; `kernels`: by name how often
+    it ran, and its seconds together, shortest and median; `gaps`: by length (`GAPS`) how often nothing ran, and its
+    seconds.
+
+    Args:
+      steps: how many of its units `call` makes.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        with jax.profiler.trace(folder):
+            began = time.perf_counter()
+            jax.block_until_ready(call())
+            wall = time.perf_counter() - began
+        events = [(start, duration, name) for start, duration, name, _ in _events(folder, marked=True)]
+    durations: dict[str, list[float]] = collections.defaultdict(list)
+    for _, duration, name in events:
+        durations[name].append(duration / 1e9)
+    kernels = {
+        name: {"times": len(each), "total": sum(each), "least": min(each), "median": float(np.median(each))}
+        for name, each in sorted(durations.items(), key=lambda item: -sum(item[1]))
+    }
+    idle = np.array([gap for _, gap in _pauses(events)]) / 1e9
+    which = np.digitize(idle, GAPS)
+    gaps = {
+        name: {"times": int((which == k).sum()), "total": float(idle[which == k].sum())}
+        for k, name in enumerate(GAP_NAMES)
+    }
+    busy, span = _busy(events)
+    row = {"steps": steps, "wall": wall, "busy": busy / 1e9, "idle": (span - busy) / 1e9}
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(json.dumps({**row, "gaps": gaps, "kernels": kernels}, indent=1) + "\n")
+
+
+def _events(folder: str, marked: bool = False) -> list[tuple[float, float, str, str]]:
+    """Start and duration in ns, name and stream of what ran on the first GPU. `marked`: Warp's kernels begin with
+    `WARP_MARK`."""
     file = next(pathlib.Path(folder).rglob("*.xplane.pb"))
-    found = []
-    for plane in jax.profiler.ProfileData.from_file(str(file)).planes:
-        if "GPU:0" not in plane.name:
-            continue
-        for line in plane.lines:
+    found: list[tuple[float, float, str, str]] = []
+    planes = {plane.name: plane for plane in jax.profiler.ProfileData.from_file(str(file)).planes}
+    for name in sorted(name for name in planes if "GPU:" in name):
+        for line in planes[name].lines:
             if line.name.startswith("Stream"):
-                found += [
-                    (e.start_ns, e.duration_ns, WARP_NAME.sub("", e.name) + _copied(e), line.name) for e in line.events
-                ]
+                for e in line.events:
+                    short, of_warp = WARP_NAME.subn("", e.name)
+                    mark = WARP_MARK if marked and of_warp else ""
+                    found.append((e.start_ns, e.duration_ns, mark + short + _copied(e), line.name))
+        if found:
+            break
     return sorted(found)
 
 
@@ -112,14 +158,20 @@ def _copies(events: list[tuple[float, float, str]]) -> list[tuple[tuple[str, str
 def _gaps(events: list[tuple[float, float, str]]) -> list[tuple[tuple[str, str], tuple[float, int]]]:
     """Between which two nothing runs: nanoseconds and how often, the longest together first."""
     found: dict[tuple[str, str], tuple[float, int]] = {}
+    for pair, gap in _pauses(events):
+        total, count = found.get(pair, (0.0, 0))
+        found[pair] = total + gap, count + 1
+    return sorted(found.items(), key=lambda item: -item[1][0])
+
+
+def _pauses(events: list[tuple[float, float, str]]) -> Iterator[tuple[tuple[str, str], float]]:
+    """Every pause in which nothing runs: what ran before and what after it, and nanoseconds."""
     until, last = (events[0][0], "") if events else (0.0, "")
     for start, duration, name in events:
         if start > until:
-            total, count = found.get((last, name), (0.0, 0))
-            found[last, name] = total + start - until, count + 1
+            yield (last, name), start - until
         if start + duration > until:
             until, last = start + duration, name
-    return sorted(found.items(), key=lambda item: -item[1][0])
 
 
 def _busy(events: list[tuple[float, float, str]]) -> tuple[float, float]:

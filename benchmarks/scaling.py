@@ -1,6 +1,7 @@
 """Weak scaling over the GPUs of one host: the same work on each of 1, 2, 4, ... GPUs, against one GPU of that machine.
 
     python benchmarks/scaling.py --gpus 1 2 4 [--cases made_60 birch_pictures learner] [--seconds 8] [--rows FILE]
+    python benchmarks/scaling.py --gpus 1 2 --cases learner --kernels DIR     and what runs on each GPU in an update
 
 | case | a GPU's share |
 |---|---|
@@ -20,6 +21,7 @@ import dataclasses
 import json
 import pathlib
 import socket
+import sys
 import time
 from typing import Annotated, Any, Literal
 
@@ -29,6 +31,9 @@ from waiting import Process, end_all
 
 HERE = pathlib.Path(__file__).resolve().parent
 WORK = HERE.parent / "out" / "benchmarks"
+
+PROFILE_SECONDS = 60.0
+"""That listing a learner's kernels may take."""
 
 SLACK = 4.0
 """Seconds beyond `seconds` that a measurement may take: whole calls are counted, two at least."""
@@ -51,6 +56,9 @@ class Args:
     """Rows are added to this file, as JSON lines."""
     logs: pathlib.Path = WORK / "scaling"
     """Folder for what the processes say on standard error."""
+    kernels: pathlib.Path | None = None
+    """Folder for `learner-<GPUs>-<GPU>.json`: what ran on each GPU in ten iterations after a learner's measurement
+    (`learner_kernels.py` puts them side by side)."""
     profiles: pathlib.Path | None = None
     """Folder with `<home>/engine_profile.json`, for the simulator."""
     cpu: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
@@ -146,6 +154,16 @@ def measure(group: Group, number: int, args: Args, until: float) -> dict[str, An
     return row
 
 
+def list_kernels(group: Group, folder: pathlib.Path, until: float) -> None:
+    """Ten more iterations of a learner, whose processes write what runs on their GPUs."""
+    for k, process in enumerate(group.processes):
+        file = folder.resolve() / f"{group.case}-{len(group.processes)}-{k}.json"
+        process.tell({"kernels": str(file)})
+    for k, process in enumerate(group.processes):
+        if process.hear("DONE", until) is None:
+            print(f"no kernels of GPU {k}: {process.trouble()}", file=sys.stderr)
+
+
 def others(group: Group) -> list[Process]:
     """The processes beside the first that can be measured alone: those of a simulator."""
     return group.processes[1:] if 1 in group.numbers and len(group.numbers) > 1 else []
@@ -171,7 +189,9 @@ def measure_group(group: Group, args: Args, until: float, alone: dict[int, float
         return row
 
     for number in group.numbers:
-        one(group, number)
+        row = one(group, number)
+        if args.kernels is not None and group.case == "learner" and "steps_per_s" in row:
+            list_kernels(group, args.kernels, min(until, time.monotonic() + PROFILE_SECONDS))
         if number == 1:
             for k, process in enumerate(others(group), 1):
                 one(Group(group.case, [process], (1,)), 1, gpu=k)

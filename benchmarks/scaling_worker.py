@@ -3,8 +3,9 @@
     python benchmarks/scaling_worker.py CASE '{"worlds": 8192, ...}'
 
 Says `READY {...}` on standard output; for each line `{"seconds": 8}` on standard input it answers `DONE {...}`; it ends
-with its input. A learner of several processes finds the others by the variables of `ig2mj.cluster.place`; what they
-measure together they time together.
+with its input. For `{"kernels": FILE}` a learner makes ten more iterations, and writes what ran on its GPU. A learner
+of several processes finds the others by the variables of `ig2mj.cluster.place`; what they measure together they time
+together.
 """
 
 from __future__ import annotations
@@ -21,12 +22,17 @@ from typing import Any
 
 import jax
 import numpy as np
+from kernel_times import profiled_to
 from throughput import device, memory, program
 
 from ig2mj.cluster.place import place_of
 from ig2mj.cluster.team import Team
 
 Measure = Callable[[float], dict[str, Any]]
+Profile = Callable[[pathlib.Path], dict[str, Any]]
+
+PROFILED = 10
+"""Iterations of a learner whose kernels are listed."""
 
 
 def say(word: str, row: dict[str, Any]) -> None:
@@ -91,7 +97,7 @@ def simulator(settings: dict[str, Any]) -> tuple[dict[str, Any], Measure]:
     return {"objects": case.scene.tables.num_objects, **memory(worlds)}, measure
 
 
-def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measure]:
+def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measure, Profile]:
     """SAC from pixels on an environment, as `ig2mj train` runs it: on one GPU one program for all of an iteration."""
     import ig2mj
     from ig2mj.envs.registry import VECTORS
@@ -146,6 +152,12 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
             "non_finite": sum(t["not_finite"] for t in troubles),
         }
 
+    def profile(file: pathlib.Path) -> dict[str, Any]:
+        rounds[0] += 1
+        team.barrier(f"round {rounds[0]}")
+        profiled_to(file, lambda: [one(True)[0] for _ in range(PROFILED)], PROFILED * sac.samples)
+        return {"updates": PROFILED * sac.samples}
+
     with tempfile.TemporaryDirectory() as folder:
         kept = Checkpoints(folder).save(1, {"learner": jax.device_get(state[0])}, {})
         size = sum(f.stat().st_size for f in kept.rglob("*") if f.is_file())
@@ -155,7 +167,7 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
         "replay_bytes_per_step": _bytes(state[1]) // (config.capacity // count),
         "updates_of_the_critics_per_update_of_the_actor": config.every,
     }
-    return {**about, **memory(worlds)}, measure
+    return {**about, **memory(worlds)}, measure, profile
 
 
 def _bytes(tree: Any) -> int:
@@ -168,10 +180,19 @@ def main() -> None:
     case, settings = sys.argv[1], json.loads(sys.argv[2])
     team = Team.join(place_of(os.environ))
     with team.together():
-        about, measure = simulator(settings) if case == "simulator" else learner(settings, team)
+        profile = None
+        if case == "simulator":
+            about, measure = simulator(settings)
+        else:
+            about, measure, profile = learner(settings, team)
         say("READY", {**about, **device(), "ready_s": round(time.time() - began, 1)})
         for line in sys.stdin:
-            say("DONE", measure(json.loads(line)["seconds"]))
+            wish = json.loads(line)
+            if "kernels" in wish:
+                assert profile is not None
+                say("DONE", profile(pathlib.Path(wish["kernels"])))
+            else:
+                say("DONE", measure(wish["seconds"]))
 
 
 if __name__ == "__main__":

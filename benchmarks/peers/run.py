@@ -121,7 +121,7 @@ def genesis(args: argparse.Namespace, device: str, label: str) -> Iterator[gpu_s
         words = (str(HERE / "genesis_run.py"), str(args.work / "homes" / home), "--worlds", str(count))
         words = (*words, "--variant", variant, "--label", label, *common(args, device))
         words += ("--cpu",) if args.genesis_cpu else ()
-        name = f"genesis-{home}-{count}-{variant}"
+        name = f"genesis-{home}-{count}-physics-{variant}"
         job = gpu_suite.Job(name, words, GENESIS_LIMIT, env, args.genesis_python or sys.executable)
         if ("genesis", variant, home, count, "physics") not in args.measured:
             yield job
