@@ -23,6 +23,7 @@ from ig2mj.engine.warp.patches import (
     launching,
     resting,
     sleeping,
+    solver_loop,
     spared,
     velocity,
 )
@@ -30,6 +31,7 @@ from ig2mj.engine.warp.patches import (
 OWN = {
     (solver, "_cholesky_factorize_solve"): compact_solver.cholesky_factorize_solve,
     (solver, "_update_gradient_init_h_sparse"): compact_solver.init_hessian,
+    (solver, "_solve"): solver_loop.solve,
     (solver, "smooth_solve_compact"): compact_solver.smooth_solve_compact,
     (solver, "_solve_init_dof"): compact_solver.solve_init_dof,
     (passive, "passive"): gravity.passive_forces,
