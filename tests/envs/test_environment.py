@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 import ig2mj
+from ig2mj.envs import setups
 from ig2mj.errors import ActionError, EngineError, UnknownNameError
 from ig2mj.scene.scene import load_scene
 from ig2mj.sensors.base import SensorOptions
 from ig2mj.tasks.activities import ACTIVITIES
+from ig2mj.tasks.pools import pool_of
 from ig2mj.testing import api_test
 
 ROWS = 4
@@ -109,9 +111,18 @@ def test_any_sensor_is_an_observation():
     assert np.array_equal(after[1], flow[1]) and np.array_equal(state.obs["rgb"][1], rgb[1])
 
 
-def test_unknown_observations_are_refused_with_near_matches():
+def test_unknown_names_are_refused_with_near_matches_before_anything_is_sampled(monkeypatch):
+    monkeypatch.setattr(setups, "pool_of", lambda *given: pytest.fail("start states were sampled"))
     with pytest.raises(UnknownNameError, match="near matches: depth"):
         ig2mj.make("CookingMeat", observations=("dept",), pool_size=ROWS)
+    with pytest.raises(UnknownNameError, match="near matches: warp"):
+        ig2mj.make("CookingMeat", engine="wrap", pool_size=ROWS)
+
+
+def test_the_pool_of_another_activity_is_refused():
+    other = pool_of(ACTIVITIES["GraspingBook"], "train", 1)
+    with pytest.raises(EngineError, match="not of scene 'birch' with its objects"):
+        ig2mj.make("CookingMeat", pool=other)
 
 
 def test_the_paper_s_runs_had_easier_thresholds():

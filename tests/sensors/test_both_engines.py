@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 
+import jax
 import numpy as np
 import pytest
 from perceiving import Perceiving
 
 from ig2mj.agents.humanoid import Humanoid
+from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.process.opengl import GL_BACKENDS, probe_gl
 from ig2mj.sensors.registry import SENSORS
 
@@ -65,6 +67,7 @@ def test_names_shapes_types_and_ranges_are_the_same(seen, name):
         ("bump", 0, 1),
         ("proprioception", 1e-3, 1),
         ("object_poses", 2e-2, 1),
+        ("base_pose", 1e-3, 1),
         ("eye_pose", 1e-4, 1),
     ],
 )
@@ -81,3 +84,22 @@ def test_colours_of_objects_are_the_same(seen):
         if pixels.sum() >= 30:
             native, warp = (seen[e]["rgb"][pixels].astype(float).mean(0) for e in ("native", "warp"))
             np.testing.assert_allclose(native, warp, atol=8, err_msg=f"instance {number}")
+
+
+def test_a_bump_is_felt_and_the_same_readings_drop_out(tiny_home_folder):
+    """The TurtleBot stands in a leg of the table; of each world and step the same three readings in ten are missing."""
+    keys = np.asarray(jax.random.key_data(jax.random.split(jax.random.key(3), 1)), np.uint32)
+    sizes, rates = {"width": 24, "height": 16, "scan_rays": 200}, {"depth_noise_rate": 0.3, "scan_noise_rate": 0.3}
+    there, lost = {}, {}
+    for engine in ("native", "warp"):
+        world = Perceiving(tiny_home_folder, TurtleBot(pos=(0.35, -0.35, 0)), engine)
+        clean = world.see("bump", "depth", "scan", **sizes)
+        noisy = world.see("depth", "scan", **sizes, **rates, keys=keys)
+        assert clean["bump"].tolist() == [[1.0]], engine
+        there[engine] = {"depth": clean["depth"] > 0, "scan": clean["scan"] < 1}
+        lost[engine] = {"depth": noisy["depth"] == 0, "scan": noisy["scan"] == 1}
+    for name in ("depth", "scan"):
+        both = there["native"][name] & there["warp"][name]
+        assert both.sum() > 60, name
+        np.testing.assert_array_equal(lost["native"][name][both], lost["warp"][name][both], err_msg=name)
+        assert lost["native"][name][both].mean() == pytest.approx(0.3, abs=0.13), name

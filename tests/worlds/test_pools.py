@@ -19,6 +19,7 @@ from ig2mj.errors import EngineError, InputError
 from ig2mj.sampling import settled
 from ig2mj.sampling.settled import make_pool
 from ig2mj.sampling.settled_pieces import sample_settled
+from ig2mj.worlds import Core, Rules
 from ig2mj.worlds.archive import read_header, save_tree
 from ig2mj.worlds.pool import FORMAT_VERSION, Pool, load_pool, save_pool
 
@@ -88,6 +89,16 @@ def test_a_pool_survives_its_file(pool, tiny_home, tmp_path):
     assert [f.name for f in tmp_path.iterdir()] == ["pool.npz"], "no leftovers"
 
 
+def test_a_pool_of_another_scene_is_refused_whatever_its_shape(pool, tiny_home, home_model, tmp_path):
+    file = tmp_path / "pool.npz"
+    save_pool(pool, file, tiny_home)
+    assert pool.digest == load_pool(file).digest == pool.rows(np.array([1])).digest == tiny_home.digest
+    engine = NativeEngine(tiny_home, 1)
+    Core(engine, Rules(home_model), pool)
+    with pytest.raises(EngineError, match="not of scene 'tiny_home' with its objects as they are now"):
+        Core(engine, Rules(home_model), dataclasses.replace(pool, digest="of another scene"))
+
+
 def test_rows_are_picked_in_order(pool):
     rows = pool.rows(np.array([2, 0]))
     np.testing.assert_array_equal(rows.physics.qpos, np.asarray(pool.physics.qpos)[[2, 0]], "on the host, unrounded")
@@ -146,7 +157,8 @@ def broken(pool: Pool, file, kind: str, scene: ig2mj.Scene) -> str:
         save_pool(pool, file, dataclasses.replace(scene, tables=tables))
         return "was made before 'tiny_home' was converted as it is now"
     if kind == "lengths":
-        save_pool(pool.replace(states=jax.tree.map(lambda a: np.asarray(a)[:-1], pool.states)), file, scene)
+        short = jax.tree.map(lambda a: np.asarray(a)[:-1], pool.states)
+        save_pool(dataclasses.replace(pool, states=short), file, scene)
         return "has arrays of different lengths"
     if kind == "absence":
         header = {"kind": "pool", "format_version": FORMAT_VERSION, "scene": scene.name, "digest": scene.digest}

@@ -139,6 +139,7 @@ def run(
         "episodes": episodes,
         "success_rate": successes / episodes,
         "success_in_hand_rate": in_hand / episodes,
+        **({} if outcome.lifted_by_all is None else {"lifted_by_all_rate": sum(outcome.lifted_by_all) / episodes}),
         "mean_return": float(np.mean(outcome.total)),
         "steps_per_second": round(outcome.steps / outcome.seconds, 1),
         "overflow": metrics["overflow"],

@@ -18,7 +18,7 @@ import jax
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import MODES, Grasping
 from ig2mj.agents.urdf import UrdfRobot
-from ig2mj.engine.registry import make_engine
+from ig2mj.engine.registry import ENGINES, make_engine
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.names import NAMES, NAMESPACE, activity_name, short_name
 from ig2mj.envs.observations import Observer, check_names
@@ -130,6 +130,8 @@ def make(
         raise EngineError(f"worlds = {worlds}: an environment has at least one")
     if pool_size is not None and pool_size < 1:
         raise EngineError(f"pool_size = {pool_size}: an environment has at least one start state")
+    if engine is not None and engine not in ENGINES:
+        raise UnknownNameError("engine", engine, ENGINES)
     if engine in (None, "native"):
         run_programs_inline()
     control = Control(whole_actions, period)
@@ -142,18 +144,19 @@ def make(
     if engine is None:
         engine = "warp" if jax.default_backend() == "gpu" else "native"
     scene, rules, controllers = setup.scene, setup.rules, setup.controllers
+    chosen = check_names(observations, setup.objective)
+    starts = setup.pool()  # may take minutes: everything that has a name is known by now
     physics = make_engine(engine, scene, worlds, **options)
     hands = None if mode == "physical" else Grasping(scene, mode, setup.mittens)
-    core = Core(physics, rules, setup.pool, controllers, hands, hand_resets=whole_actions or None)
+    core = Core(physics, rules, starts, controllers, hands, hand_resets=whole_actions or None)
     settings = sensors or SensorOptions()
     if image_size is not None:
         settings = dataclasses.replace(settings, width=image_size, height=image_size)
-    chosen = check_names(observations, setup.objective)
     perceived = SensorSuite(physics, scene, rules.model, controllers[0], chosen, settings)
     observer = Observer(observations, setup.objective, perceived)
     name = robot if isinstance(robot, str) else robot.name
     env = Environment(task, name, scene, core, setup.actions, setup.objective, observer, mode, setup.companions, period)
-    env.made_with = {"paper_rl": paper_rl, "split": split, "pool_size": setup.pool.size, **options}
+    env.made_with = {"paper_rl": paper_rl, "split": split, "pool_size": starts.size, **options}
     if control != Control():
         env.made_with |= {"whole_actions": whole_actions, "period": period}
     if variant:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import jax
 import numpy as np
@@ -28,12 +28,14 @@ class Played:
 
     Attributes:
       success, success_in_hand: how it ended. total: its return.
+      lifted_by_all: success, and both hands held the object when it last left the floor; None where one hand acts.
       steps: agent steps that were taken in all worlds together. seconds: wall time of that, compilation included.
       state: of all worlds at the end.
     """
 
     success: list[bool]
     success_in_hand: list[bool]
+    lifted_by_all: list[bool] | None
     total: list[float]
     steps: int
     seconds: float
@@ -62,7 +64,8 @@ def play(
 def _drawn(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None) -> Played:
     state = env.reset(seed)
     _look(watch, state)
-    success, in_hand, total = [], [], []
+    success, in_hand, lifted, total = [], [], [], []
+    lifts = Lifts(state.info, env.num_worlds)
     running, steps, began = np.zeros(env.num_worlds), 0, time.monotonic()
     while len(total) < episodes:
         state = env.step_autoreset(state, act(state))
@@ -70,21 +73,24 @@ def _drawn(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | 
         running += np.asarray(state.reward)
         steps += env.num_worlds
         done, won = np.asarray(state.done), np.asarray(state.info["success"])
+        lifts.see(state.info, done, np.ones_like(done))
         for world in np.flatnonzero(done)[: episodes - len(total)]:
             total.append(float(running[world]))
             success.append(bool(won[world]))
             in_hand.append(bool(np.asarray(state.info.get("success_in_hand", won))[world]))
+            lifted.append(bool(won[world] & lifts.by_all[world]))
         running[done] = 0.0
-    return Played(success, in_hand, total, steps, time.monotonic() - began, state)
+    return Played(success, in_hand, lifted if lifts.told else None, total, steps, time.monotonic() - began, state)
 
 
 def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None, start: int = 0) -> Played:
     size, worlds = env.core.starts.pool.size, env.num_worlds
-    success, in_hand, total = [], [], []
-    steps, began, state = 0, time.monotonic(), None
+    success, in_hand, lifted, total = [], [], [], []
+    steps, began, state, lifts = 0, time.monotonic(), None, None
     for first in range(0, episodes, worlds):
         state = env.start_from((start + first + np.arange(worlds)) % size, seed)
         _look(watch, state)
+        lifts = Lifts(state.info, worlds)
         going, won, holding = np.ones(worlds, bool), np.zeros(worlds, bool), np.zeros(worlds, bool)
         running = np.zeros(worlds)
         while going.any():
@@ -95,14 +101,43 @@ def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch
             ends = going & np.asarray(state.done)
             won |= ends & np.asarray(state.info["success"])
             holding |= ends & np.asarray(state.info.get("success_in_hand", state.info["success"]))
+            lifts.see(state.info, np.asarray(state.done), going)
             going &= ~ends
         count = min(worlds, episodes - first)
         success += won[:count].tolist()
         in_hand += holding[:count].tolist()
+        lifted += (won & lifts.by_all)[:count].tolist()
         total += running[:count].tolist()
-    assert state is not None
+    assert state is not None and lifts is not None
     jax.block_until_ready(state.reward)
-    return Played(success, in_hand, total, steps, time.monotonic() - began, state)
+    return Played(success, in_hand, lifted if lifts.told else None, total, steps, time.monotonic() - began, state)
+
+
+class Lifts:
+    """Whether all acting hands held a task's first object when it left the floor, for two hands.
+
+    Attributes:
+      told: the environment tells of it. by_all: [W], at the last time it left the floor; False before that.
+    """
+
+    def __init__(self, info: Mapping[str, Array], num_worlds: int):
+        """`info`: at the start of episodes."""
+        self.told = "off_floor" in info
+        self.by_all = np.zeros(num_worlds, bool)
+        self._off = np.array(info["off_floor"]) if self.told else self.by_all
+
+    def see(self, info: Mapping[str, Array], done: np.ndarray, going: np.ndarray) -> None:
+        """After a step.
+
+        Args:
+          done: [W], episodes that ended with it. going: [W], whose episodes had not ended before; others keep what was
+            found.
+        """
+        if not self.told:
+            return
+        off, held = np.array(info["off_floor"]), np.asarray(info["held_by_all"])
+        self.by_all = np.where(off & ~self._off & going, held, self.by_all)
+        self._off = off & ~done  # a new episode begins on the floor
 
 
 def _look(watch: Watch | None, state: EnvState) -> None:

@@ -62,12 +62,13 @@ class Setup:
 
     Attributes:
       scene: with its robots; the first is the one that acts. rules: with the task's goal, if it has one.
-      pool: start states. controllers: of all robots. mittens: what mittens stick to. companions: see `Environment`.
+      pool: gives the start states, which may take minutes. controllers: of all robots. mittens: what mittens stick to.
+      companions: see `Environment`.
     """
 
     scene: Scene
     rules: Rules
-    pool: Pool
+    pool: Callable[[], Pool]
     controllers: tuple[Controller, ...]
     objective: Objective
     actions: ActionMap
@@ -99,7 +100,7 @@ def setup_activity(
     return Setup(
         scene,
         rules,
-        pool if pool is not None else pool_of(task, split, count),
+        lambda: pool if pool is not None else pool_of(task, split, count),
         (controller,),
         ActivityObjective(task, robot, scene, rules.model),
         control.actions(
@@ -140,7 +141,7 @@ def setup_navigation(
     return Setup(
         scene,
         rules,
-        starts.pool,
+        lambda: starts.pool,
         controllers,
         NavigationObjective(task, scene, starts),
         control.actions(
@@ -165,7 +166,7 @@ def setup_bddl(
     controller = control.controller(body, scene)
     objective = BddlObjective(task.objects_in(scene), goal, scene)
     actions = whole_actions(controller.action_names, controller.action_high)
-    return Setup(scene, rules.with_goal(goal), rows, (controller,), objective, actions)
+    return Setup(scene, rules.with_goal(goal), lambda: rows, (controller,), objective, actions)
 
 
 def _in_place_of_fetch(task: Task, robot: UrdfRobot) -> tuple[Task, UrdfRobot]:

@@ -51,12 +51,14 @@ def summary(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     )
     count, successes = len(success), sum(success)
     low, high = wilson(successes, count)
+    lifted = [x for r in results for x in r.get("lifted_by_all", [])]
     return {
         "episodes": count,
         "success_rate": successes / count,
         "success_low": round(low, 4),
         "success_high": round(high, 4),
         "success_in_hand_rate": sum(in_hand) / count,
+        **({"lifted_by_all_rate": sum(lifted) / count} if lifted else {}),
         "mean_return": float(np.mean(total)),
         **{name: sum(r[name] for r in results) for name in ("overflow", "non_finite")},
     }
@@ -113,6 +115,8 @@ def evaluate_piece(
     played = play(env, acts, episodes, in_order=True, first=first)
     metrics = env.metrics(played.state)
     found = {"success": played.success, "success_in_hand": played.success_in_hand, "total": played.total}
+    if played.lifted_by_all is not None:
+        found["lifted_by_all"] = played.lifted_by_all
     trouble = {"overflow": metrics["overflow"], "non_finite": metrics["not_finite"]}
     return json.dumps({**found, "steps": played.steps, **trouble}).encode()
 

@@ -122,7 +122,7 @@ def sample(
             numbers.append(number)
             pools.append(build(Pool, arrays, piece.name))
     return Sampled(
-        pool=stack(pools) if pools else None,
+        pool=dataclasses.replace(stack(pools), digest=scene.digest) if pools else None,
         rows=tuple(numbers),
         requested=count,
         rejected=rejected,

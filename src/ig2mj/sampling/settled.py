@@ -5,6 +5,7 @@ Native engine only: it puts to sleep what rests, and what sleeps costs nothing i
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 
 import jax
@@ -70,7 +71,7 @@ def make_pool(
         rows += disturber.rows(turn, seed, share)
         progress(min(len(rows), count))
         if len(rows) >= count:
-            return stack(rows[:count])
+            return dataclasses.replace(stack(rows[:count]), digest=scene.digest)
     raise too_few(scene, count, len(rows))
 
 

@@ -6,6 +6,7 @@ handed out until there are enough rows, and the first ones, in the order of the 
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 from collections.abc import Sequence
 
@@ -70,7 +71,7 @@ def sample_settled(
         _disturber.cache_clear()
     if made < count:
         raise too_few(scene, count, made)
-    return jax.tree.map(lambda a: a[:count], stack(pools)), {}
+    return dataclasses.replace(jax.tree.map(lambda a: a[:count], stack(pools)), digest=scene.digest), {}
 
 
 def turn_piece(scene: str, objects: Sequence[str], seed: int, share: float, width: int, turn: int) -> bytes:

@@ -15,7 +15,7 @@ from ig2mj.states.particles import NUM_PARTICLES
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.points import locator
 from ig2mj.tasks.reward import TERMS, Measures, Reward
-from ig2mj.tasks.task import Task
+from ig2mj.tasks.task import GROUND, Task
 
 DEGREES = 100.0
 """Celsius that are 1 in `privileged_state`."""
@@ -29,6 +29,7 @@ class ActivityObjective:
     def __init__(self, task: Task, robot: str, scene: Scene, model: StateModel):
         """Raises UnknownNameError, AbilityError: the task does not fit the scene."""
         self.reward = Reward(task, robot, scene, model)
+        self._ground = np.flatnonzero(np.isin(np.array(scene.tables.object_categories), GROUND))
         self._objects = np.array([scene.object_index(name) for name in task.objects_of_interest])
         self._ends = [locator(end, scene, model) for _, end in task.points(robot)]
         self.vectors = {"privileged_state": _privileged_names(task, robot)}
@@ -52,11 +53,16 @@ class ActivityObjective:
         return holds, jnp.zeros_like(holds)
 
     def info(self, view: PhysicsView, now: Measures, status: GoalStatus) -> dict[str, Array]:
-        return {
-            "success_in_hand": jnp.asarray(status.holds) & self.reward.holding(view).all(1),
+        by_all = self.reward.holding(view).all(1)
+        found = {
+            "success_in_hand": jnp.asarray(status.holds) & by_all,
             "goal_progress": jnp.asarray(status.fraction, jnp.float32),
             "held": now.held,
         }
+        if len(self.reward.hands) > 1:
+            stands = jnp.asarray(view.touching)[:, self._objects[0]][:, self._ground]
+            found |= {"held_by_all": by_all, "off_floor": ~stands.any(1)}
+        return found
 
     def observe(
         self,

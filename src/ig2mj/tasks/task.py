@@ -19,6 +19,9 @@ from ig2mj.tasks.points import Hand, Point
 HORIZON = 200
 """Agent steps of 1/10 s in an episode: 20 s (paper, appendix A.3)."""
 
+GROUND = ("floors", "carpet", "mat", "rug")
+"""Categories that count as the floor: a robot that touches them has not run into anything."""
+
 Vector3 = tuple[float, float, float]
 
 

@@ -37,10 +37,15 @@ _FIX = "make a pool of this scene with `ig2mj sample`"
 
 @struct.dataclass
 class Pool:
-    """Rows of initial states: physics, and extended states. Every array begins with the row axis."""
+    """Rows of initial states: physics, and extended states. Every array begins with the row axis.
+
+    Attributes:
+      digest: of the scene that it belongs to (`Scene.digest`), as far as that is known.
+    """
 
     physics: Snapshot
     states: ExtendedStates
+    digest: str | None = struct.field(pytree_node=False, default=None)
 
     @property
     def size(self) -> int:
@@ -123,7 +128,7 @@ def load_pool(file: str | os.PathLike, scene: Scene | None = None) -> Pool:
         raise InputError(file, f"has arrays of different lengths: {', '.join(map(str, sorted(lengths)))}", fix=fix)
     if not pool.size:
         raise InputError(file, "has no rows", fix=fix)
-    return pool
+    return dataclasses.replace(pool, digest=header.get("digest"))
 
 
 def _pool_header(file: str | os.PathLike) -> dict[str, Any]:

@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float, Int, UInt
 from ig2mj.engine.base import Engine
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.errors import EngineError
 from ig2mj.worlds import guards
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import episode_keys, pick_rows
@@ -25,7 +26,15 @@ class Starts:
     """Rows to start from, and the floor below which an object has left the house. Made when they are first needed."""
 
     def __init__(self, engine: Engine, initial: Any, pool: Pool | None):
-        """`initial`: states of one world, for where no pool is given: then all start where the engine's reset does."""
+        """`initial`: states of one world, for where no pool is given: then all start where the engine's reset does.
+
+        Raises EngineError: the pool is of another scene, of other added objects, or of the scene before it was changed.
+        """
+        if pool is not None and pool.digest is not None and pool.digest != engine.scene.digest:
+            raise EngineError(
+                f"the pool is not of scene '{engine.scene.name}' with its objects as they are now (make one with "
+                "`ig2mj sample` or `ig2mj sample-task`)"
+            )
         self._engine, self._initial, self._given = engine, initial, pool
         self._draw = jax.jit(_draw, static_argnums=4)
 

@@ -23,8 +23,9 @@ from ig2mj.predicates.compile import GoalStatus
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.navigation.floor import look_up
-from ig2mj.tasks.navigation.starts import GROUND, Starts
+from ig2mj.tasks.navigation.starts import Starts
 from ig2mj.tasks.navigation.task import NavigationTask
+from ig2mj.tasks.task import GROUND
 
 CLOSED = 0.05
 """Share of its range up to which a joint counts as closed."""

@@ -25,10 +25,8 @@ from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.navigation.floor import FloorMap
 from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.pools import COUNT, SEEDS
+from ig2mj.tasks.task import GROUND
 from ig2mj.worlds.pool import Pool
-
-GROUND = ("floors", "carpet", "mat", "rug")
-"""Categories that a robot drives on: touching them is no collision."""
 
 DOORS = ("door",)
 """Categories that stand wide open."""
