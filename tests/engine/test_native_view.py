@@ -18,7 +18,7 @@ from ig2mj.engine.base import Engine, Write
 from ig2mj.engine.layout import make_layout
 from ig2mj.engine.model_fields import ModelFields
 from ig2mj.engine.native.engine import NativeEngine
-from ig2mj.engine.view import SCHEMA, read_field
+from ig2mj.engine.view import SCHEMA, but_agents, read_field
 from ig2mj.errors import EngineError
 from ig2mj.scene import manifest as mf
 
@@ -301,6 +301,37 @@ def test_agent_eye_and_fingers_follow_the_hand(tiny_home_folder):
     assert view.agent.finger_pos[0] - start.agent.finger_pos[0] == pytest.approx(
         np.tile([0.2, 0, 0.1], (10, 1)), abs=3e-3
     )
+
+
+def test_views_say_whether_anything_but_agents_changed(tiny_home_folder):
+    """A hand that moves, pushes a box, and moves on when that lies still again; and a write that moves an object."""
+    scene = ig2mj.load_scene(tiny_home_folder, agents=[FloatingHand(pos=(-1, 0, 1))])
+    engine, own = NativeEngine(scene), scene.tables.body_agent >= 0
+    physics = engine.reset()
+    for _ in range(60):
+        physics, before = engine.step(physics)
+    pushed = engine.write(physics, teleport(scene, "box", (-1, 0, 0.8)))  # below the hand: it falls
+    said = {True: 0, False: 0}
+    for k in range(150):
+        physics, view = engine.step(pushed, hand_ctrl((0.1 * np.sin(k / 20), 0, 0.05))[None].astype(np.float64))
+        same = but_agents(view) is but_agents(before)
+        said[same] += 1
+        for name in SCHEMA if same else ():
+            now, then = read_field(view, name), read_field(before, name)
+            if name in ("body_pos", "body_quat"):
+                now, then = now[:, ~own], then[:, ~own]
+            assert name.startswith("agent.") or now.tobytes() == then.tobytes(), name
+        assert view.agent.joint_pos.tobytes() != before.agent.joint_pos.tobytes()
+        before = view
+    assert min(said.values()) > 10
+    assert but_agents(jax.tree.map(np.copy, before)) is None  # copies may be changed
+
+
+def teleport(scene: ig2mj.Scene, name: str, pos: tuple[float, float, float]) -> Write:
+    count, obj = scene.tables.num_objects, scene.object_index(name)
+    mask, to, turn = np.zeros((1, count), bool), np.zeros((1, count, 3)), np.zeros((1, count, 4))
+    mask[0, obj], to[0, obj], turn[0, obj] = True, pos, (1, 0, 0, 0)
+    return Write(object_mask=mask, object_pos=to, object_quat=turn)
 
 
 def test_a_world_gone_wrong_is_named_with_its_bodies(home, tmp_path, monkeypatch):

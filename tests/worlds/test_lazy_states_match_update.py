@@ -170,6 +170,27 @@ def test_an_agent_that_moves_far_from_buttons_is_no_work_for_the_states():
     assert stepper._acts is None and int(states.press_count[0, HOME.index["oven"]]) == 1
 
 
+def test_where_the_engine_says_that_only_agents_moved_only_they_are_looked_at(monkeypatch):
+    _, program, _ = _rules()
+    stepper, states, looked, before = StateStepper(program), _start(program.model), [], object()
+
+    def moved(token, **fields):
+        view = replace_fields(VIEWS[0], {f"agent.{name}": np.array([[at]], np.float32) for name, at in fields.items()})
+        view.__dict__["_but_agents"] = token
+        return view
+
+    for _ in range(3):
+        states, _, _ = stepper.step(states, moved(before))
+    compare = stepper._differences
+    monkeypatch.setattr(stepper, "_differences", lambda view, names: looked.append(names) or compare(view, names))
+    states, _, _ = stepper.step(states, moved(before, base_pos=[1, 2, 3]))
+    assert looked == [program.agent_reads] and "agent.finger_pos" in program.agent_reads
+    states, _, _ = stepper.step(states, moved(object()))
+    assert looked[1:] == [program.scene_reads, program.agent_reads]
+    states, _, _ = stepper.step(states, moved(before, finger_pos=[0, 0, 0.5]))
+    assert stepper._acts is None and int(states.press_count[0, HOME.index["oven"]]) == 1
+
+
 def test_a_goal_about_the_agent_follows_it():
     model, program, _ = _rules("(in_reach_of_agent fish)")
     stepper, states = StateStepper(program), _start(model)

@@ -112,9 +112,10 @@ def world_boxes(plan: BoxPlan, xpos: np.ndarray, xmat: np.ndarray) -> tuple[np.n
       low, high: [n, 3] float64, world frame.
     """
     rows = plan.rows
-    low, high = rows.boxes(xmat[rows.body].reshape(-1, 3, 3))
-    position = xpos[rows.body]
-    low, high = np.add(low, position), np.add(high, position)
+    low, high = rows.boxes(xmat.take(rows.body, 0).reshape(-1, 3, 3))
+    position = xpos.take(rows.body, 0)
+    low += position
+    high += position
     if len(plan.starts) == len(rows.body):
         return low, high
     return np.minimum.reduceat(low, plan.starts), np.maximum.reduceat(high, plan.starts)

@@ -236,10 +236,10 @@ def fitted(snapshot: Snapshot, start: Snapshot, num_worlds: int, scene: str) -> 
     if bare and not snapshot.agents.touching.shape[-2]:
         agents = jax.tree.map(lambda a: np.broadcast_to(a, (*batch, *a.shape)), start.agents)
         snapshot = dataclasses.replace(snapshot, agents=agents)
-    for part in ("scene", "agents"):
-        for field in dataclasses.fields(getattr(start, part)):
-            found = getattr(getattr(snapshot, part), field.name).shape[len(batch) :]
-            wanted = getattr(getattr(start, part), field.name).shape
+    for part, names in _PARTS.items():
+        given_part, own_part = getattr(snapshot, part), getattr(start, part)
+        for name in names:
+            found, wanted = getattr(given_part, name).shape[len(batch) :], getattr(own_part, name).shape
             if tuple(found) != tuple(wanted):
                 fix = (
                     "load it into the scene that it was saved from"
@@ -247,10 +247,17 @@ def fitted(snapshot: Snapshot, start: Snapshot, num_worlds: int, scene: str) -> 
                     else "load it into the scene with the agents that it was saved with, or take its `without_agents()`"
                 )
                 raise EngineError(
-                    f"the snapshot does not fit scene '{scene}': {field.name} of its {part} has shape {tuple(found)}, "
+                    f"the snapshot does not fit scene '{scene}': {name} of its {part} has shape {tuple(found)}, "
                     f"the scene's {tuple(wanted)} ({fix})"
                 )
-    return dataclasses.replace(snapshot, model_fields=_fitted_fields(snapshot.model_fields, start.model_fields, batch))
+    fields = _fitted_fields(snapshot.model_fields, start.model_fields, batch)
+    return snapshot if fields is snapshot.model_fields else dataclasses.replace(snapshot, model_fields=fields)
+
+
+_PARTS = {
+    part: tuple(field.name for field in dataclasses.fields(kind))
+    for part, kind in (("scene", ScenePart), ("agents", AgentsPart))
+}
 
 
 def _fitted_fields(fields: ModelFields, start: ModelFields, batch: tuple[int, ...]) -> ModelFields:
@@ -263,7 +270,7 @@ def _fitted_fields(fields: ModelFields, start: ModelFields, batch: tuple[int, ..
         if tuple(array.shape) != (*batch, *wanted[name].shape):
             raise EngineError(f"the snapshot does not fit: its {name} has shape {tuple(array.shape)}")
     missing = {n: np.broadcast_to(a, (*batch, *a.shape)) for n, a in wanted.items() if n not in found}
-    return dataclasses.replace(fields, **missing)
+    return dataclasses.replace(fields, **missing) if missing else fields
 
 
 def _split(array: Any, axis: int, count: int) -> tuple[Any, Any]:

@@ -170,6 +170,12 @@ def read_field(view: PhysicsView, name: str) -> Array:
     return getattr(view.agent, name[6:]) if name.startswith("agent.") else getattr(view, name)
 
 
+def but_agents(view: PhysicsView) -> object | None:
+    """What stands for all of a view but its agents and their bodies: the same object in views between which nothing
+    else changed. None where the engine does not tell."""
+    return view.__dict__.get("_but_agents")
+
+
 def read_fields(view: PhysicsView, names: tuple[str, ...]) -> list[Array]:
     """The arrays at some paths of `SCHEMA`, in one go: natively every microsecond counts."""
     return [getter(view) for getter in _getters(names)]

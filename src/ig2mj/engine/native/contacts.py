@@ -11,15 +11,11 @@ import numpy as np
 from ig2mj.engine.layout import ModelLayout
 
 
-def touching_units(
-    data: mujoco.MjData, geom_unit: np.ndarray, tolerance: float, remembered: np.ndarray, fresh: np.ndarray
-) -> np.ndarray:
+def touching_units(units: np.ndarray, near: np.ndarray, remembered: np.ndarray, fresh: np.ndarray) -> np.ndarray:
     """Touching of units after a step.
 
     Args:
-      data: its contacts are those of the present positions.
-      geom_unit: [G] unit of each geom, -1 none.
-      tolerance: metres.
+      units: [C, 2] of the contacts of the present positions, -1 none. near: [C] within the tolerance.
       remembered: [U, U] touching before the step.
       fresh: [U, U] pairs of which one is awake: only of these do contacts tell anything.
 
@@ -27,14 +23,10 @@ def touching_units(
       [U, U] symmetric; `remembered` itself where nothing changed.
     """
     touching = remembered & ~fresh
-    if data.ncon:
-        contact = data.contact
-        units = geom_unit[contact.geom]
-        near = (units[:, 0] >= 0) & (units[:, 1] >= 0) & (contact.dist <= tolerance)
-        one, other = units[near].T
-        touching[one, other] = True
-        touching[other, one] = True
-    return remembered if np.array_equal(touching, remembered) else touching
+    for one, other in units[near].tolist():  # few: a loop is faster than indexing by arrays
+        if one >= 0 and other >= 0:
+            touching[one, other] = touching[other, one] = True
+    return remembered if touching.tobytes() == remembered.tobytes() else touching
 
 
 LINK, FINGER = 1, 2
@@ -44,18 +36,34 @@ _SECOND = 2
 """Bits by which those of a contact's second geom are shifted."""
 
 
+class Met(NamedTuple):
+    """Which geoms the contact list names, and what follows from them alone: mostly the same for many steps.
+
+    Attributes:
+      key: tells lists apart. geom, dim: [C, 2], [C] MuJoCo's, copied.
+      meets: [C] bits: kinds of what the first geom presses with, and, shifted, of what the second one does.
+      kinds: all that any of the contacts has.
+    """
+
+    key: bytes
+    geom: np.ndarray
+    dim: np.ndarray
+    meets: np.ndarray
+    kinds: int
+
+
+NOTHING_MET = Met(b"", np.zeros((0, 2), np.int32), np.zeros(0, np.int32), np.zeros(0, np.uint8), 0)
+
+
 class StepContacts(NamedTuple):
     """Copies of what the forces of a physics step are computed from.
 
     Attributes:
-      meets: [C] bits: kinds of what the first geom presses with, and, shifted, of what the second one does.
-      geom, address, dim: [C, 2], [C], [C] MuJoCo's. force: [nefc] forces of constraints.
+      met: the contacts. address: [C] MuJoCo's. force: [nefc] forces of constraints.
     """
 
-    meets: np.ndarray
-    geom: np.ndarray
+    met: Met
     address: np.ndarray
-    dim: np.ndarray
     force: np.ndarray
 
 
@@ -92,26 +100,24 @@ class ForcePlan:
             shape=shape,
         )
 
-    def collect(self, data: mujoco.MjData) -> StepContacts | None:
-        """Contacts of the physics step just taken, copied; None where no force is of interest."""
+    def met(self, data: mujoco.MjData, last: Met) -> Met:
+        """What the contact list names; `last`, what it named before, where that is the same."""
         if not data.ncon:
-            return None
+            return NOTHING_MET
         contact = data.contact
         geom = contact.geom
+        key = geom.tobytes()
+        if key == last.key:
+            return last
         meets = self.first.take(geom[:, 0]) & self.second.take(geom[:, 1])
-        if not np.count_nonzero(meets):
+        every = int(np.bitwise_or.reduce(meets))
+        return Met(key, geom.copy(), contact.dim.copy(), meets, (every | every >> _SECOND) & (LINK | FINGER))
+
+    def collect(self, data: mujoco.MjData, met: Met) -> StepContacts | None:
+        """Contacts of the physics step just taken, copied; None where no force is of interest."""
+        if not met.kinds:
             return None
-        return StepContacts(
-            meets, geom.copy(), contact.efc_address.copy(), contact.dim.copy(), np.array(data.efc_force)
-        )
-
-    def has_links(self, contacts: StepContacts) -> bool:
-        """Whether an annotated link is in any of the contacts."""
-        return bool(np.count_nonzero(contacts.meets & (LINK | LINK << _SECOND)))
-
-    def has_fingers(self, contacts: StepContacts) -> bool:
-        """Whether a finger is in any of the contacts."""
-        return bool(np.count_nonzero(contacts.meets & (FINGER | FINGER << _SECOND)))
+        return StepContacts(met, data.contact.efc_address.copy(), np.array(data.efc_force))
 
     def add_links(self, contacts: StepContacts, link_force: np.ndarray) -> bool:
         """Raises forces [L, O] (N) to those of a physics step, of the largest single contact, as in iGibson's slicer
@@ -125,7 +131,7 @@ class ForcePlan:
         graspable body, of all of them the largest."""
         if not steps:
             return np.zeros(self.shape, np.float32)
-        number = np.repeat(np.arange(len(steps)), [len(contacts.meets) for contacts in steps])
+        number = np.repeat(np.arange(len(steps)), [len(contacts.address) for contacts in steps])
         own, other, normal, row = self._normals(_joined(steps), FINGER)
         total = np.zeros((len(steps), *self.shape), np.float32)
         finger, body = self.layout.finger_of_geom[own], self.layout.graspable_of_geom[other]
@@ -135,16 +141,17 @@ class ForcePlan:
     def _normals(self, contacts: StepContacts, kind: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Of contacts of a kind that act: the geom that presses, the one pressed on, the normal force (N); which of the
         contacts they are."""
-        sides = [((contacts.meets & (kind << shift)) != 0) & (contacts.address >= 0) for shift in (0, _SECOND)]
+        met = contacts.met
+        sides = [((met.meets & (kind << shift)) != 0) & (contacts.address >= 0) for shift in (0, _SECOND)]
         row, side = np.stack(sides, 1).nonzero()
         address = contacts.address[row]
         normal = contacts.force[address]
         if self.pyramidal:  # the normal force is the sum over the pyramid's edges, two per friction direction
-            edges = 2 * (contacts.dim[row] - 1)
+            edges = 2 * (met.dim[row] - 1)
             for k in range(1, int(edges.max(initial=0))):
                 more = edges > k
                 normal = normal + np.where(more, contacts.force[np.where(more, address + k, 0)], 0.0)
-        return contacts.geom[row, side], contacts.geom[row, 1 - side], normal, row
+        return met.geom[row, side], met.geom[row, 1 - side], normal, row
 
 
 def _joined(steps: list[StepContacts]) -> StepContacts:
@@ -153,13 +160,14 @@ def _joined(steps: list[StepContacts]) -> StepContacts:
         return steps[0]
     first = np.cumsum([0, *(len(contacts.force) for contacts in steps[:-1])])
     address = [np.where(c.address >= 0, c.address + at, c.address) for c, at in zip(steps, first, strict=True)]
-    return StepContacts(
-        meets=np.concatenate([c.meets for c in steps]),
-        geom=np.concatenate([c.geom for c in steps]),
-        address=np.concatenate(address),
-        dim=np.concatenate([c.dim for c in steps]),
-        force=np.concatenate([c.force for c in steps]),
+    met = Met(
+        key=b"",
+        geom=np.concatenate([c.met.geom for c in steps]),
+        dim=np.concatenate([c.met.dim for c in steps]),
+        meets=np.concatenate([c.met.meets for c in steps]),
+        kinds=LINK | FINGER,
     )
+    return StepContacts(met, np.concatenate(address), np.concatenate([c.force for c in steps]))
 
 
 class FingerForces:

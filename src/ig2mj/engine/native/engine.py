@@ -31,12 +31,12 @@ from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.model_fields import check_names, check_written, given
 from ig2mj.engine.native.contacts import FingerForces, ForcePlan
-from ig2mj.engine.native.later import ALL_RAW, Agents, LaterPlan, ObjectMotion, raw_parts, raw_size
+from ig2mj.engine.native.later import RAW, Agents, LaterPlan, ObjectMotion
 from ig2mj.engine.native.model_slot import ModelSlot
 from ig2mj.engine.native.one_world import Statics, World
 from ig2mj.engine.native.recorded import Pieces
 from ig2mj.engine.native.vicinity import Masks, VicinityTable
-from ig2mj.engine.native.view_rows import FIELDS, Changed, PoseRows
+from ig2mj.engine.native.view_rows import FIELDS, OF_AGENTS, Changed, PoseRows
 from ig2mj.engine.native.writing import apply_write
 from ig2mj.engine.object_boxes import make_box_table
 from ig2mj.engine.snapshot import Snapshot, fitted
@@ -44,7 +44,6 @@ from ig2mj.engine.view import SCHEMA, AgentView, Array, PhysicsView, axis_sizes
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_jax, prepare_mujoco
 from ig2mj.scene.scene import Scene
-from ig2mj.scene.tables import SceneTables
 
 
 class NativePhysics:
@@ -76,7 +75,9 @@ class NativePhysics:
                 _make_later(
                     self.view, _VELOCITIES, ObjectMotion(self.later, arrays["qvel"].copy(), fields["object_quat"])
                 )
-            if changed & (Changed.AGENT | Changed.FINGERS):
+            if changed & ~OF_AGENTS:
+                fields["_but_agents"] = object()
+            if changed & OF_AGENTS:
                 fields["agent"] = self._agents(self.view.agent, fields, changed)
         return self.view
 
@@ -86,7 +87,7 @@ class NativePhysics:
         kept = agent.__dict__
         if changed & Changed.AGENT:
             contacts = [world.agent_contacts for world in self.worlds]
-            raw = self.arrays[ALL_RAW].copy()
+            raw = self.arrays[RAW].copy()
             self.of_agents = Agents(self.later, fields["body_pos"], fields["body_quat"], raw, contacts)
             if "finger_force" in known:
                 kept["finger_force"] = known["finger_force"]
@@ -203,7 +204,7 @@ class NativeEngine:
 
     def reset(self) -> NativePhysics:
         """New worlds at the scene's initial state: its first keyframe, else the zero pose; everything awake."""
-        arrays = _working_arrays(self.num_worlds, self._slots[0].model, self.tables)
+        arrays = self._working_arrays(self.num_worlds)
         worlds = [
             World(self._statics, self._slots[share], self._masks[share], {n: a[w] for n, a in arrays.items()}, int(w))
             for share, numbers in enumerate(self._shares)
@@ -230,7 +231,7 @@ class NativeEngine:
     @functools.cached_property
     def _start(self) -> Snapshot:
         """World 0 of a reset."""
-        rows = {name: array[0] for name, array in _working_arrays(1, self._slots[0].model, self.tables).items()}
+        rows = {name: array[0] for name, array in self._working_arrays(1).items()}
         world = World(self._statics, self._slots[0], self._masks[0], rows, 0)
         self._slots[0].put(world.fields)
         world.start()
@@ -321,6 +322,14 @@ class NativeEngine:
         physics.update(self._run(physics, replace))
         return physics
 
+    def _working_arrays(self, num_worlds: int) -> dict[str, np.ndarray]:
+        """By field of the view; and objects' velocities, and what agents' fields are made of."""
+        sizes = axis_sizes(self.tables, num_worlds)
+        arrays = {name: np.zeros(SCHEMA[name].shape(sizes), SCHEMA[name].dtype) for name in FIELDS}
+        arrays["qvel"] = np.zeros((num_worlds, self._slots[0].model.nv))
+        arrays[RAW] = np.zeros((num_worlds, self._statics.later.raw.size))
+        return arrays
+
     def to_mujoco(self, physics: NativePhysics, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """The live model and data of a world. Do not step them."""
         one = physics.worlds[world]
@@ -331,29 +340,30 @@ class NativeEngine:
         """Does something to every world, each share of the worlds on its own thread and with its own model."""
 
         failures: list[EngineError] = []
-
-        def run(share: np.ndarray) -> int:
-            changed = Changed.NOTHING
-            for number in share:
-                world = physics.worlds[number]
-                world.model_slot.put(world.fields)
-                try:
-                    changed |= act(world)
-                except EngineError as e:  # the other worlds go on; the caller hears of it when all are done
-                    failures.append(e)
-                    changed = Changed.ALL
-            return changed
-
         if self._pool is None:
-            changed = run(self._shares[0])
+            changed = _act_on(physics.worlds, act, failures)
         else:
+            shares = [[physics.worlds[w] for w in share] for share in self._shares]
             changed = Changed.NOTHING
-            for part in self._pool.map(run, self._shares):
+            for part in self._pool.map(lambda share: _act_on(share, act, failures), shares):
                 changed |= part
         if failures:
             physics.update(changed)
             raise min(failures, key=str)
         return changed
+
+
+def _act_on(worlds: list[World], act: Callable[[World], int], failures: list[EngineError]) -> int:
+    """Does something to worlds of one thread; says what changed."""
+    changed = Changed.NOTHING
+    for world in worlds:
+        world.model_slot.put(world.fields)
+        try:
+            changed |= act(world)
+        except EngineError as e:  # the other worlds go on; the caller hears of it when all are done
+            failures.append(e)
+            changed = Changed.ALL
+    return changed
 
 
 def _engine_model(model: mujoco.MjModel, timestep: float) -> mujoco.MjModel:
@@ -363,11 +373,3 @@ def _engine_model(model: mujoco.MjModel, timestep: float) -> mujoco.MjModel:
     own.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     own.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     return own
-
-
-def _working_arrays(num_worlds: int, model: mujoco.MjModel, tables: SceneTables) -> dict[str, np.ndarray]:
-    """By field of the view; and by name of MuJoCo's array for those of which copies are kept."""
-    sizes = axis_sizes(tables, num_worlds)
-    arrays = {name: np.zeros(SCHEMA[name].shape(sizes), SCHEMA[name].dtype) for name in FIELDS}
-    raw = np.zeros((num_worlds, raw_size(model)))
-    return arrays | {ALL_RAW: raw} | raw_parts(model, raw)

@@ -19,29 +19,53 @@ import numpy as np
 from ig2mj.engine.layout import ModelLayout
 from ig2mj.scene.tables import SceneTables
 
-RAW = ("qpos", "qvel", "cvel", "subtree_com")
-"""MuJoCo's arrays of which copies are kept."""
-
-ALL_RAW = "raw"
-"""The array of an engine that holds all of them: one copy of it is faster than four."""
+RAW = "raw"
+"""The working array of an engine that holds copies of all rows of `RawRows`: one copy of it is faster than four."""
 
 
-def _raw_shapes(model: mujoco.MjModel) -> dict[str, tuple[int, ...]]:
-    return {"qpos": (model.nq,), "qvel": (model.nv,), "cvel": (model.nbody, 6), "subtree_com": (model.nbody, 3)}
+@dataclasses.dataclass(frozen=True)
+class RawRows:
+    """Which rows of MuJoCo's arrays the fields of agents are made of; agents come last, so they are few.
 
+    Attributes:
+      starts, shapes: first row, and shape of the rows, by MuJoCo's name of the array.
+    """
 
-def raw_size(model: mujoco.MjModel) -> int:
-    """Numbers of all `RAW` of one world."""
-    return sum(math.prod(shape) for shape in _raw_shapes(model).values())
+    starts: dict[str, int]
+    shapes: dict[str, tuple[int, ...]]
 
+    @classmethod
+    def build(cls, model: mujoco.MjModel, tables: SceneTables) -> RawRows:
+        """The shortest runs of rows that hold all that is needed."""
+        bodies = np.concatenate([tables.agent_body, tables.hand_body, tables.finger_body]).astype(int)
+        needed = {
+            "qpos": (tables.agent_joint_qposadr, ()),
+            "qvel": (tables.agent_joint_dofadr, ()),
+            "cvel": (bodies, (6,)),
+            "subtree_com": (np.asarray(model.body_rootid)[bodies], (3,)),
+        }
+        starts = {name: int(rows.min()) if len(rows) else 0 for name, (rows, _) in needed.items()}
+        counts = {n: int(rows.max()) + 1 - starts[n] if len(rows) else 0 for n, (rows, _) in needed.items()}
+        return cls(starts, {name: (counts[name], *row) for name, (_, row) in needed.items()})
 
-def raw_parts(model: mujoco.MjModel, raw: np.ndarray) -> dict[str, np.ndarray]:
-    """The parts [W, ...] of an array [W, `raw_size`], without copies."""
-    parts, end = {}, 0
-    for name, shape in _raw_shapes(model).items():
-        start, end = end, end + math.prod(shape)
-        parts[name] = raw[:, start:end].reshape(len(raw), *shape)
-    return parts
+    @property
+    def size(self) -> int:
+        """Numbers of one world."""
+        return sum(math.prod(shape) for shape in self.shapes.values())
+
+    def parts(self, raw: np.ndarray) -> dict[str, np.ndarray]:
+        """The rows [W, ...] of each array in an array [W, `size`], without copies."""
+        parts, end = {}, 0
+        for name, shape in self.shapes.items():
+            start, end = end, end + math.prod(shape)
+            parts[name] = raw[:, start:end].reshape(len(raw), *shape)
+        return parts
+
+    def copied(self, data: mujoco.MjData, raw: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """Pairs of what is to be copied in every step, into and from where, of one world's row of `RAW`."""
+        parts = self.parts(raw[None])
+        pairs = [(part[0], getattr(data, name)[self.starts[name] :][: len(part[0])]) for name, part in parts.items()]
+        return [(into, of) for into, of in pairs if into.size]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -49,7 +73,7 @@ class LaterPlan:
     """Index arrays of a scene, shared by all views.
 
     Attributes:
-      model: for the sizes of its arrays.
+      raw: what is copied.
       free, free_dofs: [n], [n, 6] objects with a free joint, and the addresses of their velocities.
       roots: [B] root of each body's tree. camera_body, camera_pos, camera_quat: [A...] eyes in their bodies' frames.
       unit_starts: [O] first unit of each object. agent_starts: [A] first unit of each agent, counted from V.
@@ -58,7 +82,7 @@ class LaterPlan:
     """
 
     tables: SceneTables
-    model: mujoco.MjModel
+    raw: RawRows
     free: np.ndarray
     free_dofs: np.ndarray
     roots: np.ndarray
@@ -80,7 +104,7 @@ class LaterPlan:
         known = camera >= 0
         return cls(
             tables=tables,
-            model=model,
+            raw=RawRows.build(model, tables),
             free=free,
             free_dofs=layout.object_dofadr[free, None] + np.arange(6),
             roots=np.array(model.body_rootid),
@@ -163,7 +187,7 @@ class Agents:
         """Nobody changes any of the arrays any more.
 
         Args:
-          body_pos, body_quat: the view's. raw: [W, `raw_size`]. contacts: of each world.
+          body_pos, body_quat: the view's. raw: [W, n] of `RAW`. contacts: of each world.
         """
         self._plan, self._pos, self._quat, self._all_raw, self._contacts = plan, body_pos, body_quat, raw, contacts
         self._made: dict[str, np.ndarray] = {}
@@ -178,7 +202,11 @@ class Agents:
 
     @functools.cached_property
     def _raw(self) -> dict[str, np.ndarray]:
-        return raw_parts(self._plan.model, self._all_raw)
+        return self._plan.raw.parts(self._all_raw)
+
+    def _rows(self, name: str, rows: np.ndarray) -> np.ndarray:
+        """Some rows of MuJoCo's array."""
+        return self._raw[name].take(rows - self._plan.raw.starts[name], 1)
 
     def _bodies(self, part: str) -> np.ndarray:
         tables = self._plan.tables
@@ -186,9 +214,7 @@ class Agents:
 
     def _make_pos(self, part: str) -> None:
         if part == "joint":
-            self._made["joint_pos"] = (
-                self._raw["qpos"].take(self._plan.tables.agent_joint_qposadr, 1).astype(np.float32)
-            )
+            self._made["joint_pos"] = self._rows("qpos", self._plan.tables.agent_joint_qposadr).astype(np.float32)
         elif part == "eye":
             self._make_eyes()
         else:
@@ -204,16 +230,16 @@ class Agents:
         plan = self._plan
         pos, quat = self._pos.take(plan.camera_body, 1), self._quat.take(plan.camera_body, 1)
         self._made["eye_pos"] = (pos + _rotate(quat, plan.camera_pos)).astype(np.float32)
-        self._made["eye_quat"] = _multiply(quat, plan.camera_quat).astype(np.float32)
+        self._made["eye_quat"] = multiply(quat, plan.camera_quat).astype(np.float32)
 
     def _make_vel(self, part: str) -> None:
-        self._made["joint_vel"] = self._raw["qvel"].take(self._plan.tables.agent_joint_dofadr, 1).astype(np.float32)
+        self._made["joint_vel"] = self._rows("qvel", self._plan.tables.agent_joint_dofadr).astype(np.float32)
 
     def _make_linvel(self, part: str) -> None:
         """From MuJoCo's velocities about the centre of mass of the whole tree: rotation, then translation."""
         bodies = self._bodies(part)
-        velocity = self._raw["cvel"].take(bodies, 1)
-        lever = self._pos.take(bodies, 1) - self._raw["subtree_com"].take(self._plan.roots[bodies], 1)
+        velocity = self._rows("cvel", bodies)
+        lever = self._pos.take(bodies, 1) - self._rows("subtree_com", self._plan.roots[bodies])
         angular = velocity[..., :3]
         self._made[f"{part}_linvel"] = (velocity[..., 3:] + _cross(angular, lever)).astype(np.float32)
         self._made[f"{part}_angvel"] = angular.astype(np.float32)
@@ -247,7 +273,7 @@ def _rotate(quat: np.ndarray, vector: np.ndarray) -> np.ndarray:
     return vector + w * twice + _cross(u, twice)
 
 
-def _multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+def multiply(p: np.ndarray, q: np.ndarray) -> np.ndarray:
     """Products of quaternions [..., 4], w-x-y-z."""
     w, v = p[..., :1], p[..., 1:]
     s, u = q[..., :1], q[..., 1:]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 
 import mujoco
 import numpy as np
@@ -11,13 +12,14 @@ from ig2mj.engine.contact_filter import BitLayers
 from ig2mj.engine.controls import LARGEST, clip
 from ig2mj.engine.layout import ModelLayout
 from ig2mj.engine.model_fields import ModelFields, given
-from ig2mj.engine.native.contacts import ForcePlan, StepContacts, touching_units
-from ig2mj.engine.native.later import AgentContacts, LaterPlan, agents_touching, of_owners
+from ig2mj.engine.native.contacts import FINGER, LINK, NOTHING_MET, ForcePlan, Met, StepContacts, touching_units
+from ig2mj.engine.native.later import RAW, AgentContacts, LaterPlan, agents_touching, of_owners
 from ig2mj.engine.native.model_slot import ModelSlot
 from ig2mj.engine.native.sleep import restore_sleep, wake_trees
 from ig2mj.engine.native.vicinity import Masks, Vicinity, VicinityTable
 from ig2mj.engine.native.view_rows import Changed, PosePlan, PoseRows
 from ig2mj.engine.snapshot import AXIS, Snapshot, make_snapshot
+from ig2mj.engine.view import Array
 from ig2mj.errors import EngineError
 from ig2mj.scene.tables import SceneTables
 
@@ -73,12 +75,17 @@ class World:
         self._no_contacts = np.zeros((0, 2), np.int32), np.zeros(0)
         self.agent_contacts = AgentContacts(nothing, None, *self._no_contacts)
         self._agent_fresh: np.ndarray | None = None
-        self._sleeping_agents = np.zeros(0, int)
+        self._sleeping_agents = np.zeros(0, int)  # rows of `_cvel`
+        self._raw = statics.later.raw
+        self._copied = self._raw.copied(self.data, rows[RAW])
+        self._cvel = self._raw.parts(rows[RAW][None])["cvel"][0]
         self.fields: dict[str, np.ndarray] = {name: slot.own(name) for name in ("eq_data", *statics.own_fields)}
         self.ignored = np.zeros((len(statics.tables.hand_body), statics.tables.num_objects), bool)
         self._plans: dict[bytes, PosePlan] = {}
         self._fresh = np.zeros_like(self.units)  # [U, U] pairs with an awake unit
         self._any_fresh = False
+        self._met, self._dist = NOTHING_MET, self._no_contacts[1]  # contacts of the last look; their distances, m
+        self._told: tuple[Met | None, bytes, np.ndarray, np.ndarray] = None, b"", self._fresh, self.units
         self._awake_key = self._eq_key = b""
         self._awake = self._awake_before = np.zeros(model.ntree, bool)
         self._none_awake = False
@@ -107,13 +114,13 @@ class World:
         self._near.begin()
         self._let_near()
         mujoco.mj_step2(model, data)
-        steps = [statics.forces.collect(data)] if statics.forces.kinds else []
+        steps = [self._collect()] if statics.forces.kinds else []
         for _ in range(statics.substeps - 1):
             self._near.moved()
             self._let_near()
             mujoco.mj_step(model, data)
             if steps:
-                steps.append(statics.forces.collect(data))
+                steps.append(self._collect())
         self._near.moved()
         self._let_near()
         mujoco.mj_step1(model, data)
@@ -122,6 +129,11 @@ class World:
             if contacts is not None:
                 changed |= self._note_forces(contacts)
         return changed | self.refresh()
+
+    def _collect(self) -> StepContacts | None:
+        forces, data = self.statics.forces, self.data
+        self._met = met = forces.met(data, self._met)
+        return forces.collect(data, met)
 
     def _let_near(self) -> None:
         self.masks.put(self._near.contype, self._near.conaffinity)
@@ -165,6 +177,11 @@ class World:
             plan = self._plan(self._awake | self._awake_before) if changed else self._steady_plan
             self._check_finite()
         changed |= self.statics.poses.refresh(plan, self.data, self.rows) | self._refresh_held()
+        self._met = self.statics.forces.met(self.data, self._met)
+        self._dist = self.data.contact.dist.copy() if self._met.key else self._no_contacts[1]
+        if plan.agents:
+            for into, of in self._copied:
+                into[:] = of
         if self._any_fresh or changed & Changed.AWAKE or everything:
             changed |= self._refresh_touching(everything)
         if self.statics.has_agents:
@@ -172,18 +189,13 @@ class World:
         return changed
 
     def _note_agent_contacts(self) -> int:
-        data = self.data
-        if data.ncon:
-            contact = data.contact
-            geom, dist = contact.geom.copy(), contact.dist.copy()
-        else:
-            geom, dist = self._no_contacts
+        geom, dist = self._met.geom, self._dist
         if self._agent_fresh is None:  # then what they touch hangs on this instant's contacts alone
             self.agent_contacts = AgentContacts(self.agent_contacts.remembered, None, geom, dist)
         else:
             self.agent_contacts = AgentContacts(self.agents_touch(), self._agent_fresh, geom, dist)
         if len(self._sleeping_agents):
-            self.rows["cvel"][self._sleeping_agents] = 0.0  # MuJoCo leaves old velocities where a body sleeps
+            self._cvel[self._sleeping_agents] = 0.0  # MuJoCo leaves old velocities where a body sleeps
         return Changed.AGENT
 
     def agents_touch(self) -> np.ndarray:
@@ -237,10 +249,11 @@ class World:
         mujoco.mj_resetData(model, data)
         self.set_fields(eq_data=np.asarray(snapshot.eq_data), **given(snapshot.model_fields))
         self.ignore(np.asarray(snapshot.agents.ignored_contacts))
-        self._set_state(snapshot)
+        state = {name: snapshot.whole(name) for name in _STATE}
+        self._set_state(state, float(snapshot.time))
         wake_trees(model, data, np.arange(model.ntree))
         mujoco.mj_step1(model, data)  # kinematics of everything, while everything is awake
-        self._set_state(snapshot)
+        self._set_state(state, float(snapshot.time))
         restore_sleep(model, data, np.asarray(snapshot.tree_asleep))
         mujoco.mj_step1(model, data)
         self.units = np.array(snapshot.scene.touching, bool)
@@ -248,11 +261,11 @@ class World:
         self.agent_contacts = AgentContacts(known, np.zeros_like(known), *self._no_contacts)
         return self.clear_force() | self.refresh(everything=True)
 
-    def _set_state(self, snapshot: Snapshot) -> None:
-        for name in _STATE:
-            getattr(self.data, name)[:] = snapshot.whole(name)
-        self.data.qacc[:] = snapshot.qacc_warmstart
-        self.data.time = float(snapshot.time)
+    def _set_state(self, state: Mapping[str, Array], time: float) -> None:
+        for name, array in state.items():
+            getattr(self.data, name)[:] = array
+        self.data.qacc[:] = state["qacc_warmstart"]
+        self.data.time = time
 
     def set_fields(self, **fields: np.ndarray | None) -> None:
         """Fields of the model that this world has for itself from now on; None: the model's own again."""
@@ -284,10 +297,10 @@ class World:
         """Adds forces of a physics step of this control step: links' at once, since states read them in every step;
         fingers' contacts are kept until somebody asks."""
         changed, forces = Changed.NOTHING, self.statics.forces
-        if forces.has_links(contacts) and forces.add_links(contacts, self.rows["link_force"]):
+        if contacts.met.kinds & LINK and forces.add_links(contacts, self.rows["link_force"]):
             self._has_force = True
             changed |= Changed.FORCE
-        if forces.has_fingers(contacts):
+        if contacts.met.kinds & FINGER:
             self.pressing = [*self.pressing, contacts]  # views may hold the old list
             changed |= Changed.FINGERS
         return changed
@@ -336,7 +349,7 @@ class World:
             self._agent_fresh = None if agent_awake.all() else agent_awake[:, None] | unit_awake
             tree = np.asarray(self.model.body_treeid)
             asleep = (tree >= 0) & ~self._awake[tree]
-            self._sleeping_agents = np.flatnonzero(asleep & (self.statics.tables.body_agent >= 0))
+            self._sleeping_agents = np.flatnonzero(asleep[self._raw.starts["cvel"] :][: len(self._cvel)])
         self._fresh = unit_awake[:, None] | unit_awake
         self._any_fresh = bool(unit_awake.any())
         asleep = ~self._awake[self.model.dof_treeid]
@@ -362,9 +375,13 @@ class World:
         return self.data.eq_active[self.statics.layout.grasp_equality].astype(bool)
 
     def _refresh_touching(self, everything: bool) -> int:
-        statics, data = self.statics, self.data
-        later = statics.later
-        units = touching_units(data, later.object_unit, statics.tolerance, self.units, self._fresh)
+        later, near = self.statics.later, self._dist <= self.statics.tolerance
+        told = near.tobytes()
+        met, before, fresh, units = self._told
+        if told == before and self._met is met and self._fresh is fresh and self.units is units and not everything:
+            return Changed.NOTHING  # the same contacts said so before
+        units = touching_units(later.object_unit[self._met.geom], near, self.units, self._fresh)
+        self._told = self._met, told, self._fresh, units
         if units is self.units and not everything:
             return Changed.NOTHING
         self.units = units

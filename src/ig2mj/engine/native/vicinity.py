@@ -243,7 +243,7 @@ class Vicinity:
         forces, none = self._applied, self._no_force
         if forces[0].tobytes() != none[0] or forces[1].tobytes() != none[1]:
             return self.forget()  # what sleeps may wake anywhere
-        if not self.open and (self._bits & self._still).any():
+        if not self.open and np.count_nonzero(self._bits & self._still):  # half the time of any()
             return self.forget()  # velocities from outside wake, too, even a minus zero
         now = self._tree_awake.tobytes(), self._eq_active.tobytes()
         self._wait -= 1

@@ -146,7 +146,8 @@ class StateProgram:
     Attributes:
       heats: places of temperatures among the states' leaves.
       gives: places of the leaves that `events` makes; the others it hands through. event_reads, goal_reads: fields of
-      the view on which events depend, and the goal itself; view_reads: both. All are known from the first step on.
+      the view on which events depend, and the goal itself; view_reads: both; agent_reads, scene_reads: those of agents,
+      and the others. All are known from the first step on.
       rows: bodies whose poses matter. goal_rows: what of its fields the goal can depend on.
     """
 
@@ -170,7 +171,7 @@ class StateProgram:
         self.heats = [self._paths.index((name,)) for name in ("temperature", "max_temperature")]
         self._empty_memo, self._memo_structure = jax.tree.flatten(self.plan.empty_memo(num_worlds))
         self._empty_goal_memo, self._goal_memo_structure = jax.tree.flatten(self.goal_plan.empty_memo(num_worlds))
-        self.view_reads: tuple[str, ...] = ()
+        self.view_reads = self.scene_reads = self.agent_reads = tuple[str, ...]()
         self.event_reads: frozenset[str] = frozenset()
         self.goal_reads: frozenset[str] = frozenset()
         self.gives: list[int] = []
@@ -232,6 +233,8 @@ class StateProgram:
             self.goal_reads = frozenset(self._rest.reads)
             every = self.event_reads | self.goal_reads
             self.view_reads = tuple(sorted(every, key=lambda name: (name not in FIRST_MOVED, FIELDS.index(name))))
+            self.scene_reads = tuple(name for name in self.view_reads if not name.startswith("agent."))
+            self.agent_reads = tuple(name for name in self.view_reads if name.startswith("agent."))
         return Rest(*self._rest(leaves, view, others))
 
     def heat(self, leaves: list[Array], acts: Array, facts: Array, view: PhysicsView, count: int) -> Heat:

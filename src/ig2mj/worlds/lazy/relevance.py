@@ -55,14 +55,10 @@ MARGIN = 1e-3
 
 
 class Relevance:
-    """The question for one scene's states; `begin` with a whole step, then `same` for views after it.
-
-    Attributes:
-      exact: fields of which every change matters.
-    """
+    """The question for one scene's states; `begin` with a whole step, then `same` for views after it."""
 
     def __init__(self, model: StateModel):
-        self._model, self.exact = model, EXACT
+        self._model = model
         p, tables = model.parameters, model.tables
         self._tools = np.asarray(p.tool_object, int)
         self._thermal = np.flatnonzero(p.thermal)
@@ -94,7 +90,7 @@ class Relevance:
         Args:
           changed: fields that differ from those of the last whole step; all others of its `reads` are the same.
         """
-        if not self._covered or not self.exact.isdisjoint(changed):
+        if not self._covered or not EXACT.isdisjoint(changed):
             return False
         now: dict[str, np.ndarray] = {}
         for name in changed:

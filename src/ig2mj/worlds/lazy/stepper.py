@@ -13,9 +13,9 @@ is cut up (`ig2mj.worlds.lazy.program`), with the same functions and bitwise the
   one at first and twice as many each time, and those that something overtakes are thrown away.
 - nothing, where the last step did not change temperatures.
 
-An agent that is awake makes a new view in every step. What states depend on is therefore compared, byte by byte, field
-by field: not the agent's own bodies, and its fingers only near a button, its base and eye only where the goal asks
-for them.
+An agent that is awake makes a new view in every step. Where the engine says that nothing else moved (`but_agents`) only
+its fingers and hands, base and eye are looked at, and those only where a switch is near or the goal asks for them.
+Otherwise what states depend on is compared, byte by byte, field by field, without the agent's own bodies.
 
 Axes: W worlds.
 """
@@ -27,12 +27,12 @@ import enum
 import jax
 import numpy as np
 
-from ig2mj.engine.view import Array, PhysicsView, read_fields
+from ig2mj.engine.view import Array, PhysicsView, but_agents, read_field, read_fields
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.states.definitions import toggled_on
 from ig2mj.states.world import ExtendedStates, Swap
 from ig2mj.worlds.lazy.program import AHEAD, BODY_FIELDS, Heat, StateProgram
-from ig2mj.worlds.lazy.relevance import Relevance
+from ig2mj.worlds.lazy.relevance import EXACT, Relevance
 from ig2mj.worlds.rules import Outcome, Rules
 
 
@@ -42,6 +42,10 @@ class News(enum.Enum):
     NONE = enum.auto()
     GOAL = enum.auto()  # to the goal, and not to the states
     EVENTS = enum.auto()
+
+
+Differences = tuple[bool, dict[str, bytes]]
+"""Whether the goal can depend on what differs, and fields that differ of those on which the states depend."""
 
 
 class StateStepper:
@@ -61,8 +65,10 @@ class StateStepper:
         self._settled = False
         self._ahead: Heat | None = None  # steps computed before they are due, how many, and how many of them are over
         self._ahead_count, self._ahead_over = 0, 0
-        self._seen: list[Array] = []  # fields read, as last seen; and their bytes at the last whole step, once needed
-        self._bytes: list[bytes | None] = []
+        self._seen: dict[str, Array] = {}  # fields read, as last seen; their bytes at the last whole step, once needed
+        self._bytes: dict[str, bytes] = {}
+        self._scene: object | None = None  # what stands for the last view but for its agents
+        self._of_scene: Differences = False, {}
         self._fingers_away = False
         self._relevance: Relevance | None = None
         self._without_effect: dict[str, bytes] = {}  # the changed fields of the last view that did not matter
@@ -79,7 +85,7 @@ class StateStepper:
             return self._everything(states, jax.tree.leaves(states), view)
         if self._acts is None:
             return self._everything(states, self._leaves, view)
-        if view is not self._view:
+        if view is not self._view and not self._nothing_read_moved(view):
             news = self._news(view)
             if news is News.EVENTS:
                 return self._everything(states, self._leaves, view)
@@ -96,38 +102,55 @@ class StateStepper:
 
     def _news(self, view: PhysicsView) -> News:
         """What differs from the last whole step, of all that a step depends on."""
-        program, rows, relevance = self.program, self.program.rows, self._relevance
-        changed: dict[str, bytes] = {}
+        program, relevance, scene = self.program, self._relevance, but_agents(view)
         assert relevance is not None, "there was a whole step"
-        news = News.NONE
-        for k, now in enumerate(read_fields(view, program.view_reads)):
-            seen = self._seen[k]
-            if now is seen:
-                continue
-            name = program.view_reads[k]
-            if name == "agent.finger_pos" and self._fingers_away and self._away(view):
-                continue
-            if not isinstance(now, np.ndarray) or not isinstance(seen, np.ndarray):
-                return News.EVENTS  # on a device: to fetch it would take as long as the step
-            chosen = rows if name in BODY_FIELDS else slice(None)
-            before = self._bytes[k]
-            if before is None:
-                before = self._bytes[k] = seen[:, chosen].tobytes()
-            data = now[:, chosen].tobytes()
-            if data == before:
-                self._seen[k] = now
-                continue
-            if name in program.goal_reads and news is News.NONE and not program.goal_rows.same(name, now, seen):
-                news = News.GOAL
-            if name in program.event_reads:
-                if name in relevance.exact:
-                    return News.EVENTS
-                changed[name] = data
+        if scene is None or scene is not self._scene:
+            found = self._differences(view, program.scene_reads)
+            if found is None:
+                return News.EVENTS
+            self._scene, self._of_scene = scene, found
+        to_goal, changed = self._of_scene
+        if program.agent_reads:
+            found = self._differences(view, program.agent_reads)
+            if found is None:
+                return News.EVENTS
+            to_goal, changed = to_goal or found[0], changed | found[1]
         if changed and changed != self._without_effect:
             if not relevance.same(view, changed):
                 return News.EVENTS
             self._without_effect = changed
-        return news
+        return News.GOAL if to_goal else News.NONE
+
+    def _nothing_read_moved(self, view: PhysicsView) -> bool:
+        """Whether only agents moved since the last view, of which nothing is read."""
+        return not self.program.agent_reads and self._scene is not None and but_agents(view) is self._scene
+
+    def _differences(self, view: PhysicsView, names: tuple[str, ...]) -> Differences | None:
+        """What of these fields is not as it was at the last whole step; None where a whole step must follow."""
+        program, changed, to_goal = self.program, dict[str, bytes](), False
+        for name in names:
+            now, seen = read_field(view, name), self._seen[name]
+            if now is seen:
+                continue
+            if name == "agent.finger_pos" and self._fingers_away and self._away(view):
+                continue
+            if not isinstance(now, np.ndarray) or not isinstance(seen, np.ndarray):
+                return None  # on a device: to fetch it would take as long as the step
+            chosen = program.rows if name in BODY_FIELDS else slice(None)
+            before = self._bytes.get(name)
+            if before is None:
+                before = self._bytes[name] = seen[:, chosen].tobytes()
+            data = now[:, chosen].tobytes()
+            if data == before:
+                self._seen[name] = now
+                continue
+            if name in program.goal_reads and not to_goal:
+                to_goal = not program.goal_rows.same(name, now, seen)
+            if name in program.event_reads:
+                if name in EXACT:
+                    return None
+                changed[name] = data
+        return to_goal, changed
 
     def _away(self, view: PhysicsView) -> bool:
         return isinstance(view.agent.finger_pos, np.ndarray) and toggled_on.all_out_of_reach(self.program.model, view)
@@ -181,8 +204,8 @@ class StateStepper:
                 self._relevance = Relevance(program.model)
             self._relevance.begin(new, view, program.event_reads)
             self._without_effect = {}
-            self._seen = read_fields(view, program.view_reads)
-            self._bytes = [None] * len(self._seen)
+            self._seen = dict(zip(program.view_reads, read_fields(view, program.view_reads), strict=True))
+            self._bytes, self._scene, self._of_scene = {}, but_agents(view), (False, {})
             fingers = "agent.finger_pos" in program.view_reads and "agent.finger_pos" not in program.goal_reads
             self._fingers_away = fingers and self._away(view)
         return self._step._replace(swap=Swap(*events.swap)) if swapped and events.swap else self._step
