@@ -114,8 +114,7 @@ def world_boxes(plan: BoxPlan, xpos: np.ndarray, xmat: np.ndarray) -> tuple[np.n
     rows = plan.rows
     low, high = rows.boxes(xmat.take(rows.body, 0).reshape(-1, 3, 3))
     position = xpos.take(rows.body, 0)
-    low += position
-    high += position
+    low, high = np.add(low, position), np.add(high, position)
     if len(plan.starts) == len(rows.body):
         return low, high
     return np.minimum.reduceat(low, plan.starts), np.maximum.reduceat(high, plan.starts)
