@@ -47,6 +47,7 @@ class BCConfig:
         seen, against copying what was done before.
       guess: weight of the actor's guess of the privileged state, from pixels. shift: pixels they are moved by at most.
       lr: learning rate, falling to `last_lr` along a cosine. actor: sizes of the layers. net: encoder.
+      choices: values of each number of an action that the actor chooses from; 0: it is the mean of a Gaussian.
     """
 
     steps: int = 20_000
@@ -56,6 +57,7 @@ class BCConfig:
     shift: int = 2
     lr: float = 1e-3
     last_lr: float = 1e-5
+    choices: int = 0
     actor: tuple[int, ...] = (256, 256, 256)
     net: str = "small"
 

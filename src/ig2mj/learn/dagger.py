@@ -4,7 +4,8 @@ The experts of `ig2mj.tasks.experts` answer in any state, so labels cost nothing
 that it comes to itself (Ross, Gordon and Bagnell 2011). At first the expert acts in a share of the worlds that falls
 to none over the first part of the run; the expert's own actions are disturbed, so that ways back are seen as well.
 
-What is learned is the mean of the same actor as SAC's and PPO's. An iteration is `length` steps of all worlds, then
+What is learned is for each number of the action how likely each of some values is, or the mean of the same actor as
+SAC's and PPO's (`ig2mj.learn.heads`). An iteration is `length` steps of all worlds, then
 `updates` updates for each of them, on samples of all steps that are kept.
 
 Axes: W worlds, T steps, B samples, n numbers of an action.
@@ -24,6 +25,7 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.engine.view import Array
 from ig2mj.learn.collect import GUIDED, Advice, Hint, Transition, if_ready
 from ig2mj.learn.guidance import ALONE
+from ig2mj.learn.heads import likeliest
 from ig2mj.learn.labels import Imitation, Labels
 from ig2mj.learn.moments import Moments, share_of
 from ig2mj.learn.perception import Perception, Seen
@@ -41,6 +43,7 @@ class DaggerConfig:
       disturbed: share of the expert's steps in which its action is replaced by a random one.
       guess: weight of the actor's guess of the privileged state, from pixels. shift: pixels they are moved by at most.
       lr: learning rate, falling to `last_lr` along a cosine over the run.
+      choices: values of each number of an action that the actor chooses from; 0: it is the mean of a Gaussian.
       actor: sizes of the layers. net: encoder (`networks.NETS`).
     """
 
@@ -56,6 +59,7 @@ class DaggerConfig:
     shift: int = 2
     lr: float = 1e-3
     last_lr: float = 1e-4
+    choices: int = 21
     actor: tuple[int, ...] = (256, 256, 256)
     net: str = "small"
 
@@ -148,7 +152,7 @@ class Dagger:
         left = jnp.where(over, jax.random.randint(time_key, over.shape, 1, 51), turns.left) - 1
         own = learner.moments.normal(seen.vector[:, : self.perception.actor_size])
         looked: Any = self.actor.apply({"params": learner.actor}, own, seen.picture)
-        mean = looked[0]
+        own_action = likeliest(looked[0])
         share = jnp.where(learner.updates == 0, 1.0, 1.0 - learner.progress / max(c.alone, 1e-6))
         begins = advice.steps == 0
         alone = jnp.where(begins, jax.random.uniform(alone_key, begins.shape) < ALONE, turns.alone)
@@ -156,7 +160,7 @@ class Dagger:
         helped = expert | (turns.helped & ~begins)
         label = jnp.clip(advice.label, -1.0, 1.0)
         wild = (jax.random.uniform(which_key, expert.shape) < c.disturbed) & expert
-        action = jnp.where(expert[:, None], label, jnp.tanh(mean))
+        action = jnp.where(expert[:, None], label, own_action)
         action = action + c.noise * jax.random.normal(noise_key, action.shape)
         action = jnp.where(wild[:, None], jax.random.uniform(any_key, action.shape, minval=-1.0), action)
         return jnp.clip(action, -1.0, 1.0), {"label": label, GUIDED: helped}, Turns(draw, left, alone, helped)

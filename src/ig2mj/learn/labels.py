@@ -15,6 +15,7 @@ from flax import struct
 from jaxtyping import Float, Int, UInt8
 
 from ig2mj.engine.view import Array
+from ig2mj.learn.heads import label_loss, likeliest
 from ig2mj.learn.hidden import guess_loss
 from ig2mj.learn.moments import Moments, average
 from ig2mj.learn.networks import Actor, shifted
@@ -79,7 +80,8 @@ class Imitation:
     def __init__(self, perception: Perception, action_size: int, config: Any, axis: str | None = None):
         """`config`: of cloning or DAgger. `axis`: the name of an axis of devices over which gradients are averaged."""
         guess = perception.hidden.size if perception.hidden and config.guess else 0
-        self.actor = Actor(action_size, config.actor, perception.picture_shape, config.net, guess)
+        shape = perception.picture_shape
+        self.actor = Actor(action_size, config.actor, shape, config.net, guess, config.choices)
         self._perception, self._weight, self._shift, self._axis = perception, config.guess, config.shift, axis
         self._adam = optax.chain(optax.clip_by_global_norm(10.0), optax.flatten(optax.scale_by_adam()))
 
@@ -92,16 +94,16 @@ class Imitation:
     def loss(
         self, params: Any, moments: Moments, seen: Seen, label: Float[Array, "B n"], key: Array
     ) -> tuple[Array, dict[str, Array]]:
-        """Mean squared difference of the actor's action from the label ("actor_loss"); with pictures, also of its guess
-        of what it cannot see from the truth."""
+        """How far the actor is from the label ("actor_loss", see `heads.label_loss`; "label_error", the mean absolute
+        difference of its action); with pictures, also its guess from the truth of what it cannot see."""
         normal = moments.normal(seen.vector)
         picture = seen.picture
         if self._perception.picture_shape is not None:
             picture = shifted(picture, self._perception.picture_shape, key, self._shift)
         looked: Any = self.actor.apply({"params": params}, normal[:, : self._perception.actor_size], picture)
-        mean, _, guess = looked
-        loss = jnp.square(jnp.tanh(mean) - label).mean()
-        found: dict[str, Array] = {"actor_loss": loss}
+        head, _, guess = looked
+        loss = label_loss(head, label)
+        found: dict[str, Array] = {"actor_loss": loss, "label_error": jnp.abs(likeliest(head) - label).mean()}
         if self._perception.hidden is not None and guess.shape[-1]:
             found["guess_loss"] = guess_loss(guess, self._perception.hidden(seen.vector, normal))
             loss += self._weight * found["guess_loss"]

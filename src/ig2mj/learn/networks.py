@@ -98,7 +98,8 @@ def coarse(depth: Float[Array, "B r s"], shape: tuple[int, ...]) -> Float[Array,
 
 
 class Actor(nn.Module):
-    """Mean and logarithm of the standard deviation of a Gaussian; its tanh is the action.
+    """Mean and logarithm of the standard deviation of a Gaussian, whose tanh is the action; with `choices` instead for
+    each number of the action how likely each of so many values is, as logits (`ig2mj.learn.heads` makes actions of it).
 
     With `guess`, a linear guess of that many hidden numbers is made from the picture's features, for an auxiliary loss.
     With the encoder `places` the guess is also what the actor's layers see, and the auxiliary loss alone trains the
@@ -113,6 +114,7 @@ class Actor(nn.Module):
     picture_shape: tuple[int, int, int] | None = None
     net: str = "small"
     guess: int = 0
+    choices: int = 0
 
     def __post_init__(self) -> None:
         if self.net not in NETS:
@@ -127,7 +129,7 @@ class Actor(nn.Module):
     @nn.compact
     def __call__(
         self, vector: Float[Array, "B x"], picture: UInt8[Array, "B q"]
-    ) -> tuple[Float[Array, "B n"], Float[Array, "B n"], Float[Array, "B g"]]:
+    ) -> tuple[Float[Array, "B n *K"], Float[Array, "B n"], Float[Array, "B g"]]:
         guessed = jnp.zeros((vector.shape[0], self.guess))
         if self.picture_shape is not None:
             features = Encoder(self.picture_shape, self.net, name="encoder")(picture)
@@ -137,6 +139,10 @@ class Actor(nn.Module):
             vector = jnp.concatenate([vector, *known], axis=-1)
         x = Trunk((256,) if self.net == "paper" else self.sizes, name="trunk")(vector)
         small = nn.initializers.orthogonal(0.01)
+        if self.choices:
+            logits = nn.Dense(self.action_size * self.choices, kernel_init=small, name="choice")(x)
+            shape = (-1, self.action_size, self.choices)
+            return logits.reshape(shape), jnp.zeros((x.shape[0], self.action_size)), guessed
         mean = nn.Dense(self.action_size, kernel_init=small, name="mean")(x)
         low, high = LOG_STD
         start = jnp.arctanh(2 * (jnp.log(FIRST_STD) - low) / (high - low) - 1)

@@ -25,6 +25,8 @@ from jaxtyping import Float
 from ig2mj.engine.view import Array
 from ig2mj.errors import InputError, PolicyMismatch
 from ig2mj.learn.checkpoints import refuse_difference
+from ig2mj.learn.heads import drawn as drawn_from
+from ig2mj.learn.heads import likeliest
 from ig2mj.learn.moments import Moments
 from ig2mj.learn.networks import Actor
 from ig2mj.learn.perception import SIZE, Perception
@@ -105,6 +107,8 @@ class Policy:
             net["guess"] = algorithm.actor.guess
         else:
             weights = {k: w for k, w in weights.items() if not k.startswith("guess/")}
+        if algorithm.actor.choices:
+            net["choices"] = algorithm.actor.choices
         own = dict(depends)
         card = {"format": FORMAT_VERSION, "depends": own, "digest": digest(own), "net": net, **made}
         moments: Moments = jax.device_get(learner.moments)
@@ -163,12 +167,13 @@ class Policy:
         """A pure function from observations by name to actions [W, n].
 
         Args:
-          drawn: actions are drawn from the policy's distribution, as in training, and the function takes a key, too;
-            else they are the middle of it.
+          drawn: actions are drawn from the policy's distribution, and the function takes a key, too; else they are the
+            middle of it, or the likeliest.
         """
         depends, net = self.card["depends"], self.card["net"]
         shape = depends["picture"] and tuple(depends["picture"])
-        network = Actor(len(depends["actions"]), tuple(net["sizes"]), shape, net["net"], net.get("guess", 0))
+        sizes, more = tuple(net["sizes"]), (net.get("guess", 0), net.get("choices", 0))
+        network = Actor(len(depends["actions"]), sizes, shape, net["net"], *more)
         params = jax.tree.map(jnp.asarray, _nested(self.weights))
         mean, deviation = jnp.asarray(self.mean), jnp.asarray(self.deviation)
         size = perception.actor_size
@@ -177,11 +182,11 @@ class Policy:
             seen = perception(obs)
             own = jnp.clip((seen.vector[:, :size] - mean) / deviation, -10.0, 10.0)
             found: Any = network.apply({"params": params}, own, seen.picture)
-            middle, log_std, _ = found
-            if drawn:
-                assert key is not None, "a drawn action needs a key"
-                middle = middle + jnp.exp(log_std) * jax.random.normal(key, middle.shape)
-            return jnp.tanh(middle)
+            head, log_std, _ = found
+            if not drawn:
+                return likeliest(head)
+            assert key is not None, "a drawn action needs a key"
+            return drawn_from(head, log_std, key)
 
         return act
 
