@@ -36,6 +36,7 @@ from ig2mj.sensors.merged_meshes import HIDDEN, Tables, alpha, mergeable, rigid_
 from ig2mj.sensors.particle_slots import Slots, fill_slots
 from ig2mj.sensors.ray_cameras import sectors_of, set_rays
 from ig2mj.sensors.render_model import BACKGROUND, make_render_model, mean_colours
+from ig2mj.sensors.texture_filter import fit_textures
 from ig2mj.sensors.tints import UNTINTED, tinted, tints, tints_of_geoms
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
@@ -100,6 +101,8 @@ class BatchCamera:
         self._patterns = {pattern.name: len(pattern.directions) for pattern in rays}
         self._host = host = make_render_model(engine.scene, particles, [s.camera for s in self._sectors])
         self.cameras = [_camera_id(host, name) for name in cameras]
+        if rgb and cameras:
+            fit_textures(host, float(2 * np.tan(np.deg2rad(host.cam_fovy[self.cameras].min()) / 2) / height))
         self._plan(host)
         self._model = mjx.put_model(host, own_device(), impl="warp")
         self._merged = self._merge(groups) if merge_meshes and mergeable(host) and not pins.mismatches() else None
