@@ -90,7 +90,7 @@ def test_an_expert_that_answers_in_any_state_is_imitated(pure, choices, tmp_path
     Policy.of(algorithm, result.learner, depends_on(env, algorithm.perception), {}).save(tmp_path / "policy.npz")
     choose = Policy.load(tmp_path / "policy.npz").actor(algorithm.perception)
     state = env.reset(1)
-    np.testing.assert_allclose(choose(state.obs), expert(state), atol=0.35)
+    assert np.abs(np.asarray(choose(state.obs)) - np.asarray(expert(state))).mean() < 0.15
 
 
 @pytest.mark.slow
