@@ -2,8 +2,9 @@
 
     python benchmarks/figure_5b.py --obs state rgbd --demos 30 --tests 16
 
-Pictures are drawn by one processor for each process. Parts may run side by side, each with some of the moments at which
-a policy takes over (`--seconds`) and a folder of its own; `--merge FOLDER...` makes one table and plot of them.
+Natively pictures are drawn by one processor for each process; `--engine warp --worlds 48` plays as many runs at a time
+on a GPU. Parts may run side by side, each with some of the moments at which a policy takes over (`--seconds`) and a
+folder of its own; `--merge FOLDER...` makes one table and plot of them.
 
 Demonstrations of the scripted expert, slowed down so that the task takes as long as the paper's people took (more than
 10 s), with noise on every action. Hands hold by assisted grasping. A clone learns the actions that were done, from the
@@ -65,9 +66,9 @@ class Shown:
     success: bool
 
 
-def environment(split: str, obs: str, worlds: int) -> Environment:
+def environment(split: str, obs: str, worlds: int, engine: str = "native", pool_size: int | None = None) -> Environment:
     names = VECTORS if obs == "state" else (*VECTORS, "rgb", "depth")
-    return make(TASK, "humanoid", worlds, "native", "assisted", observations=names, split=split)
+    return make(TASK, "humanoid", worlds, engine, "assisted", observations=names, split=split, pool_size=pool_size)
 
 
 def collect(env: Environment, perception: Perception, count: int, pace: float, noise: float, seed: int) -> list[Shown]:
@@ -188,6 +189,8 @@ def main() -> None:
     parser.add_argument("--demos", type=int, default=30)
     parser.add_argument("--tests", type=int, default=16)
     parser.add_argument("--worlds", type=int, default=16)
+    parser.add_argument("--engine", default="native", choices=("native", "warp"))
+    parser.add_argument("--pool-size", type=int, help="start states of either split; default: all")
     parser.add_argument("--steps", type=int, default=3000, help="updates of a clone")
     parser.add_argument("--pace", type=float, default=0.35, help="share of the expert's speed")
     parser.add_argument("--noise", type=float, default=0.1, help="deviation, in shares of the slowed action's range")
@@ -202,10 +205,10 @@ def main() -> None:
         return
     rows, longest, began = list[dict[str, Any]](), 0.0, time.process_time()
     for obs in args.obs:
-        env = environment("train", obs, args.worlds)
+        env = environment("train", obs, args.worlds, args.engine, args.pool_size)
         perception = Perception(env.observation_spaces, obs)
         shown = collect(env, perception, args.demos, args.pace, args.noise, args.seed)
-        env = environment("held_out", obs, args.worlds)
+        env = environment("held_out", obs, args.worlds, args.engine, args.pool_size)
         tests = collect(env, perception, args.tests, args.pace, args.noise, args.seed + 1)
         pairs, seconds = sum(len(s.action) for s in shown), [len(s.action) * ACTION_PERIOD for s in tests]
         longest = max(longest, *seconds)

@@ -32,7 +32,7 @@ STEEP = 1.25
 CLEARANCE = 0.07
 """m above the fruit at which the blade comes over it."""
 
-EXACT = 0.015
+EXACT = 0.02
 """m beside the fruit's middle at which the blade comes down: farther out the fruit rolls away. With 8 mm, who sees both
 1 cm off, anew in each step, hovers above it."""
 
