@@ -20,7 +20,7 @@ import sys
 import time
 
 
-def measure(what: str, worlds: int, beforehand: bool, cache: pathlib.Path) -> dict:
+def measure(what: str, worlds: int, beforehand: bool, cache: pathlib.Path, meanwhile: bool = False) -> dict:
     """Phases of this process, which began just now."""
     times, names = [time.perf_counter()], []
     modules: list[set[str]] = []
@@ -39,14 +39,15 @@ def measure(what: str, worlds: int, beforehand: bool, cache: pathlib.Path) -> di
 
     tick("imports")
     is_home = short_name(what) is None and activity_name(what) is None
+    loading = "meanwhile" if meanwhile else False
     if is_home:
-        batch = ig2mj.Worlds(what, worlds, "warp", compile_beforehand=False)
+        batch = ig2mj.Worlds(what, worlds, "warp", compile_beforehand=loading)
         engine = batch.engine
     else:
-        env = ig2mj.make(what, worlds=worlds, engine="warp", compile_beforehand=False)
+        env = ig2mj.make(what, worlds=worlds, engine="warp", compile_beforehand=loading)
         engine = env.core.engine
     tick("making")
-    if beforehand:
+    if beforehand and not meanwhile:
         assert isinstance(engine, WarpEngine)
         engine.load_kernels()
         tick("kernels")
@@ -64,15 +65,15 @@ def measure(what: str, worlds: int, beforehand: bool, cache: pathlib.Path) -> di
             state = jax.block_until_ready(env.step_autoreset(state, action))
             tick(step)
     seconds = {name: round(end - begin, 2) for name, begin, end in zip(names, times, times[1:], strict=False)}
-    known = modules[names.index("kernels")] if beforehand else set()
+    known = modules[names.index("kernels")] if "kernels" in names else None
     return {
         "what": what,
         "worlds": worlds,
-        "beforehand": beforehand,
+        "beforehand": "meanwhile" if meanwhile else beforehand,
         "to_first_step_s": round(sum(v for k, v in seconds.items() if k != "second step"), 1),
         "seconds": seconds,
         "modules": [len(m) for m in modules],
-        "missed": sorted(modules[-1] - known) if beforehand else [],
+        "missed": None if known is None else sorted(modules[-1] - known),
         "cores": len(os.sched_getaffinity(0)),
         "device": str(jax.devices()[0].device_kind),
     }
@@ -85,12 +86,14 @@ def main() -> None:
     parser.add_argument("--cache", type=pathlib.Path, required=True, help="folder for everything compiled")
     parser.add_argument("--again", action="store_true", help="with what an earlier run left there")
     parser.add_argument("--one-by-one", action="store_true", help="kernels as steps need them, one after the other")
+    parser.add_argument("--meanwhile", action="store_true", help="kernels while XLA compiles, not before")
     parser.add_argument("--label", default="", help="a remark for the row")
     parser.add_argument("--rows", type=pathlib.Path, help="the row is added to this file, as a JSON line")
     parser.add_argument("--inside", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.inside:
-        print("ROW " + json.dumps(measure(args.what, args.worlds, not args.one_by_one, args.cache)), flush=True)
+        row = measure(args.what, args.worlds, not args.one_by_one, args.cache, args.meanwhile)
+        print("ROW " + json.dumps(row), flush=True)
         return
     if args.cache.exists() and not args.again:
         raise SystemExit(f"error: {args.cache} exists, so this would be no cold start; name another folder, or --again")

@@ -1,4 +1,4 @@
-"""Three repairs of Warp 1.18 as JAX uses it. Each concerns the whole process; other users of Warp lose nothing by them.
+"""Repairs of Warp 1.18 as JAX uses it. Each concerns the whole process; other users of Warp lose nothing by them.
 
 CUDA streams that belong to JAX stay known to Warp. Warp wraps JAX's stream in an object for each call and forgets the
 stream when the object goes away. Two calls that overlap on one stream, as they do when JAX dispatches ahead, then fail
@@ -14,10 +14,14 @@ capture is lost. (Warp puts off unloading its own modules; it cannot know of XLA
 JAX's devices are found by their number in this process. Warp takes their number among the devices of all processes of
 `jax.distributed`, finds no such GPU in the second process, and so loads no kernels beforehand there: the first call
 would load them while it captures a graph.
+
+With the second repair a capture also waits for kernels that other threads are still loading (`AWAITED`), since one that
+needs them would load them itself, one after the other.
 """
 
 from __future__ import annotations
 
+import concurrent.futures
 import gc
 import threading
 from typing import Any
@@ -55,6 +59,10 @@ REST = CollectorRest()
 """The one of this process: there is only one collector."""
 
 
+AWAITED: set[concurrent.futures.Future] = set()
+"""What must have ended, well or not, before Warp captures a graph."""
+
+
 def keep_external_streams() -> None:
     """Applies the first repair, once per process."""
     if getattr(wp.Stream, _REPAIRED, False):
@@ -76,6 +84,7 @@ def collect_nothing_during_captures() -> None:
     enter, leave = wp.ScopedCapture.__enter__, wp.ScopedCapture.__exit__
 
     def enter_without_collector(self: Any) -> Any:
+        concurrent.futures.wait(list(AWAITED))
         REST.begin()
         try:
             return enter(self)

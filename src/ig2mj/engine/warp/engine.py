@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 import sys
-from typing import Any
+from typing import Any, Literal
 
 import jax
 import jax.numpy as jnp
@@ -58,7 +58,7 @@ class WarpEngine(MjxEngine):
         ls_iterations: int | None = None,
         print_overflow: bool = False,
         graph_mode: str | None = None,
-        compile_beforehand: bool = True,
+        compile_beforehand: bool | Literal["meanwhile"] = True,
         **options: Any,
     ):
         """Makes an engine.
@@ -72,8 +72,9 @@ class WarpEngine(MjxEngine):
           graph_mode: how CUDA graphs of a step are kept, a name of `warp.JaxCallableGraphMode`: "WARP" captures a step
             anew wherever its buffers have other addresses, "WARP_STAGED" copies them to addresses that stay. None:
             MJX's choice, which is "WARP" on a GPU.
-          compile_beforehand: on a GPU compile and load all kernels of a step now, side by side (`load_kernels`); else
-            the first step does, one after the other.
+          compile_beforehand: on a GPU compile and load all kernels of a step now, side by side (`load_kernels`);
+            "meanwhile": the same, but do not wait for them before the first step does; False: the first step does it,
+            one after the other.
           print_overflow: let Warp print a line per overflowing world and step. The flags are kept in any case.
         """
         prepare_warp()
@@ -90,7 +91,9 @@ class WarpEngine(MjxEngine):
             initial = settle(scene)
         super().__init__(scene, num_worlds, initial=initial, **options)
         if compile_beforehand and own_device().platform == "gpu":  # on processors only some tests make steps
-            self.load_kernels()
+            loading = kernels.load_meanwhile(self.launches())
+            if compile_beforehand != "meanwhile":
+                loading.result()
 
     def load_kernels(self, workers: int | None = None) -> int:
         """Compiles and loads the kernels of a step side by side; how many modules they are.

@@ -2,7 +2,8 @@
 
 MuJoCo Warp has a module for nearly every kernel, and Warp compiles a module when one of its kernels is first launched:
 one after the other, on one processor. Here a step is made of which only the launches are written down (`launches_of`);
-what they need is then compiled and loaded by as many threads as there are processors (`load`).
+what they need is then compiled and loaded by as many threads as there are processors (`load`), while the caller goes on
+where it wants to (`load_meanwhile`): XLA's programs can be compiled in the same time.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import concurrent.futures
 import contextlib
 import os
 import pathlib
+import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -23,6 +25,7 @@ from mujoco.mjx.warp import ffi
 from ig2mj.engine.warp import patches
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile
+from ig2mj.process.warp_repairs import AWAITED
 
 Launch = tuple[wp.Kernel, int]
 """A kernel, and the number of threads of its blocks."""
@@ -116,6 +119,18 @@ def load(launches: list[Launch], device: str | None = None, workers: int | None 
     Returns:
       How many modules were loaded.
     """
+    return load_meanwhile(launches, device, workers).result()
+
+
+def load_meanwhile(
+    launches: list[Launch], device: str | None = None, workers: int | None = None
+) -> concurrent.futures.Future[int]:
+    """As `load`, and returns at once. The first CUDA graph that is captured waits for the end; what could not be loaded
+    is loaded again by the launch that needs it, which reports why not.
+
+    Begins when what was begun before has ended: names of modules are hashes, which change while others are built.
+    """
+    concurrent.futures.wait(list(AWAITED))
     on = wp.get_device(device)
     by_size = modules_of(launches, one_thread=on.is_cpu)
     # MJX's own has no kernels, but JAX's first call loads it.
@@ -125,8 +140,21 @@ def load(launches: list[Launch], device: str | None = None, workers: int | None 
         for size in sizes:
             wp.force_load(on, [module], block_dim=size, max_workers=1)
 
-    side_by_side(by_size, load_module, workers)
-    return sum(map(len, by_size.values()))
+    done: concurrent.futures.Future[int] = concurrent.futures.Future()
+
+    def load_all() -> None:
+        try:
+            side_by_side(by_size, load_module, workers)
+        except BaseException as failure:
+            done.set_exception(failure)
+        else:
+            done.set_result(sum(map(len, by_size.values())))
+        finally:
+            AWAITED.discard(done)
+
+    AWAITED.add(done)
+    threading.Thread(target=load_all, name="ig2mj-kernels", daemon=True).start()
+    return done
 
 
 def side_by_side(
