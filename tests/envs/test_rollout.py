@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pytest
 
 import ig2mj
 from ig2mj.envs.experts import expert_of
-from ig2mj.envs.rollout import Lifts, play
+from ig2mj.envs.rollout import Lifts, Pace, play
 
 
 def seen(off: list[bool], held: list[bool]) -> dict[str, np.ndarray]:
@@ -30,6 +32,17 @@ def test_a_new_episode_begins_on_the_floor_and_one_that_is_over_is_left_alone():
     lifts.see(seen([True, True], [True, True]), np.array([True, False]), going)
     lifts.see(seen([True, True], [False, False]), np.array([False, False]), np.array([True, False]))
     assert lifts.by_all.tolist() == [False, True]
+
+
+def test_the_first_step_does_not_count_in_the_pace(monkeypatch):
+    """It compiles: RoomRearrangement's episode of 500 steps was said to run at 12 a second instead of 250."""
+    clock = iter([20.0, 24.0])
+    monkeypatch.setattr(time, "monotonic", lambda: next(clock))
+    pace = Pace()
+    assert pace.steps_per_second() == 0.0
+    for _ in range(5):
+        pace.stepped(3)
+    assert pace.steps_per_second() == 12 / 4
 
 
 def test_of_one_hand_nothing_is_told():

@@ -141,7 +141,7 @@ def run(
         "success_in_hand_rate": in_hand / episodes,
         **({} if outcome.lifted_by_all is None else {"lifted_by_all_rate": sum(outcome.lifted_by_all) / episodes}),
         "mean_return": float(np.mean(outcome.total)),
-        "steps_per_second": round(outcome.steps / outcome.seconds, 1),
+        "steps_per_second": round(outcome.steps_per_second, 1),
         "overflow": metrics["overflow"],
         "non_finite": metrics["not_finite"],
     }

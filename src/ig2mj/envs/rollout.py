@@ -6,10 +6,10 @@ Axis: W worlds.
 from __future__ import annotations
 
 import dataclasses
+import math
 import time
 from collections.abc import Callable, Mapping
 
-import jax
 import numpy as np
 
 from ig2mj.engine.view import Array
@@ -29,7 +29,8 @@ class Played:
     Attributes:
       success, success_in_hand: how it ended. total: its return.
       lifted_by_all: success, and both hands held the object when it last left the floor; None where one hand acts.
-      steps: agent steps that were taken in all worlds together. seconds: wall time of that, compilation included.
+      steps: agent steps that were taken in all worlds together.
+      steps_per_second: of them on the wall, without the first step, which compiles.
       state: of all worlds at the end.
     """
 
@@ -38,7 +39,7 @@ class Played:
     lifted_by_all: list[bool] | None
     total: list[float]
     steps: int
-    seconds: float
+    steps_per_second: float
     state: EnvState
 
 
@@ -66,12 +67,13 @@ def _drawn(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | 
     _look(watch, state)
     success, in_hand, lifted, total = [], [], [], []
     lifts = Lifts(state.info, env.num_worlds)
-    running, steps, began = np.zeros(env.num_worlds), 0, time.monotonic()
+    running, steps, pace = np.zeros(env.num_worlds), 0, Pace()
     while len(total) < episodes:
         state = env.step_autoreset(state, act(state))
         _look(watch, state)
         running += np.asarray(state.reward)
         steps += env.num_worlds
+        pace.stepped(env.num_worlds)
         done, won = np.asarray(state.done), np.asarray(state.info["success"])
         lifts.see(state.info, done, np.ones_like(done))
         for world in np.flatnonzero(done)[: episodes - len(total)]:
@@ -80,13 +82,13 @@ def _drawn(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | 
             in_hand.append(bool(np.asarray(state.info.get("success_in_hand", won))[world]))
             lifted.append(bool(won[world] & lifts.by_all[world]))
         running[done] = 0.0
-    return Played(success, in_hand, lifted if lifts.told else None, total, steps, time.monotonic() - began, state)
+    return Played(success, in_hand, lifted if lifts.told else None, total, steps, pace.steps_per_second(), state)
 
 
 def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None, start: int = 0) -> Played:
     size, worlds = env.core.starts.pool.size, env.num_worlds
     success, in_hand, lifted, total = [], [], [], []
-    steps, began, state, lifts = 0, time.monotonic(), None, None
+    steps, pace, state, lifts = 0, Pace(), None, None
     for first in range(0, episodes, worlds):
         state = env.start_from((start + first + np.arange(worlds)) % size, seed)
         _look(watch, state)
@@ -98,6 +100,7 @@ def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch
             _look(watch, state)
             steps += worlds
             running += np.where(going, np.asarray(state.reward), 0.0)
+            pace.stepped(worlds)
             ends = going & np.asarray(state.done)
             won |= ends & np.asarray(state.info["success"])
             holding |= ends & np.asarray(state.info.get("success_in_hand", state.info["success"]))
@@ -109,8 +112,25 @@ def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch
         lifted += (won & lifts.by_all)[:count].tolist()
         total += running[:count].tolist()
     assert state is not None and lifts is not None
-    jax.block_until_ready(state.reward)
-    return Played(success, in_hand, lifted if lifts.told else None, total, steps, time.monotonic() - began, state)
+    return Played(success, in_hand, lifted if lifts.told else None, total, steps, pace.steps_per_second(), state)
+
+
+class Pace:
+    """How fast agent steps are taken, without the first, which compiles for seconds."""
+
+    def __init__(self) -> None:
+        self._steps, self._began = 0, math.nan
+
+    def stepped(self, worlds: int) -> None:
+        """After a step of so many worlds, whose results are there."""
+        if math.isnan(self._began):
+            self._began = time.monotonic()
+        else:
+            self._steps += worlds
+
+    def steps_per_second(self) -> float:
+        """0 where there was one step at most."""
+        return self._steps / (time.monotonic() - self._began) if self._steps else 0.0
 
 
 class Lifts:
