@@ -87,7 +87,7 @@ def profiled(
 def profiled_to(file: pathlib.Path, call: Callable[[], Any], steps: int) -> None:
     """Runs `call` under the profiler, and writes what ran on this process's first GPU, as JSON.
 
-    `steps` and `wall`, `busy` and `idle` as of `profiled`, but seconds of the whole call; `kernels`: by name how often
+    `steps`, `busy` and `idle` as of `profiled`, but seconds of the whole call; `kernels`: by name how often
     it ran, and its seconds together, shortest and median; `gaps`: by length (`GAPS`) how often nothing ran, and its
     seconds.
 
@@ -96,9 +96,7 @@ def profiled_to(file: pathlib.Path, call: Callable[[], Any], steps: int) -> None
     """
     with tempfile.TemporaryDirectory() as folder:
         with jax.profiler.trace(folder):
-            began = time.perf_counter()
             jax.block_until_ready(call())
-            wall = time.perf_counter() - began
         events = [(start, duration, name) for start, duration, name, _ in _events(folder, marked=True)]
     durations: dict[str, list[float]] = collections.defaultdict(list)
     for _, duration, name in events:
@@ -114,7 +112,7 @@ def profiled_to(file: pathlib.Path, call: Callable[[], Any], steps: int) -> None
         for k, name in enumerate(GAP_NAMES)
     }
     busy, span = _busy(events)
-    row = {"steps": steps, "wall": wall, "busy": busy / 1e9, "idle": (span - busy) / 1e9}
+    row = {"steps": steps, "busy": busy / 1e9, "idle": (span - busy) / 1e9}
     file.parent.mkdir(parents=True, exist_ok=True)
     file.write_text(json.dumps({**row, "gaps": gaps, "kernels": kernels}, indent=1) + "\n")
 

@@ -39,7 +39,8 @@ def kind_of(name: str) -> str:
 def shares(written: dict[str, Any]) -> dict[str, float]:
     """Milliseconds of an update by part, and launches."""
     per = 1e3 / written["steps"]
-    found = {"wall": written["wall"] * per, "busy": written["busy"] * per, "idle": written["idle"] * per}
+    found = {"both": (written["busy"] + written["idle"]) * per}
+    found |= {name: written[name] * per for name in ("busy", "idle")}
     for kind in (*(kind for kind, _ in KINDS), OTHER):
         found[kind] = per * sum(k["total"] for name, k in written["kernels"].items() if kind_of(name) == kind)
     collectives = [k for name, k in written["kernels"].items() if kind_of(name) == "collectives"]

@@ -154,8 +154,13 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
 
     def profile(file: pathlib.Path) -> dict[str, Any]:
         rounds[0] += 1
-        team.barrier(f"round {rounds[0]}")
-        profiled_to(file, lambda: [one(True)[0] for _ in range(PROFILED)], PROFILED * sac.samples)
+
+        def traced() -> None:
+            team.barrier(f"traced {rounds[0]}")  # profilers do not begin at the same moment
+            for _ in range(PROFILED):
+                one(True)
+
+        profiled_to(file, traced, PROFILED * sac.samples)
         return {"updates": PROFILED * sac.samples}
 
     with tempfile.TemporaryDirectory() as folder:

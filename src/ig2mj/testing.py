@@ -19,12 +19,15 @@ from ig2mj.errors import ActionError
 SOON = 3
 """Steps of the short episodes in which the end of an episode is looked at."""
 
+ROUNDING = 1e-5
+"""By which numbers of one world may differ that two programs computed."""
 
-def api_test(env: Environment, seed: int = 0, steps: int = 4) -> None:
+
+def api_test(env: Environment, seed: int = 0, steps: int = 4, other: Environment | None = None) -> None:
     """Raises AssertionError, with what is wrong, where an environment breaks a promise.
 
     - observations, rewards and flags have the stated shapes, types and ranges; info has the same keys in every step;
-    - the same seed and actions give the same worlds;
+    - the same seed and actions give the same worlds, in a batch of any size (where `other` is given);
     - a reset of some worlds leaves the others bitwise alone;
     - the horizon truncates and does not terminate; nothing is both;
     - `final_obs` is what was seen before the reset;
@@ -33,6 +36,7 @@ def api_test(env: Environment, seed: int = 0, steps: int = 4) -> None:
 
     Args:
       seed: of resets and actions. steps: of each piece of random play.
+      other: the same environment with another number of worlds. It is not closed.
     """
     assert env.num_worlds >= 2, "api_test needs an environment with at least two worlds"
     rng = np.random.default_rng(seed)
@@ -45,6 +49,8 @@ def api_test(env: Environment, seed: int = 0, steps: int = 4) -> None:
     for k, (a, b) in enumerate(zip(first, again, strict=True)):
         _same(a, b, f"step {k} of the same seed")
         assert set(a["info"]) == set(first[0]["info"]), f"step {k}: info has other keys than after the reset"
+    if other is not None:
+        _alike_in(other, seed, actions, first)
     _spaces_hold(env, first)
     _partial_reset(env, seed, actions)
     _ends(env, seed, actions[0])
@@ -63,16 +69,29 @@ def _play(env: Environment, seed: int, actions: list[np.ndarray]) -> list[dict[s
     return found
 
 
+def _alike_in(other: Environment, seed: int, actions: list[np.ndarray], seen: list[dict[str, Any]]) -> None:
+    """The worlds that two batches have in common are the same, but for rounding: programs of other sizes are others."""
+    assert other.num_worlds != len(actions[0]), "the other environment must have another number of worlds"
+    common = np.arange(min(other.num_worlds, len(actions[0])))
+    more = [np.resize(action, (other.num_worlds, *action.shape[1:])) for action in actions]
+    for k, (a, b) in enumerate(zip(seen, _play(other, seed, more), strict=True)):
+        what = f"step {k} in a batch of {other.num_worlds} instead of {len(actions[0])}"
+        _same(_of(common, a), _of(common, b), what, ROUNDING)
+
+
 def _host(state: EnvState) -> dict[str, Any]:
     seen = {n: getattr(state, n) for n in ("obs", "reward", "terminated", "truncated", "info")}
     return jax.tree.map(lambda a: np.array(a), seen)
 
 
-def _same(a: Any, b: Any, what: str) -> None:
+def _same(a: Any, b: Any, what: str, within: float = 0.0) -> None:
+    """Arrays are equal, those of floats to so much, absolute and relative."""
     for (path, x), (_, y) in zip(
         jax.tree_util.tree_leaves_with_path(a), jax.tree_util.tree_leaves_with_path(b), strict=True
     ):
-        assert np.array_equal(x, y), f"{what}: {jax.tree_util.keystr(path)} differs"
+        close = within if np.issubdtype(x.dtype, np.floating) else 0.0
+        same = np.allclose(x, y, rtol=close, atol=close) if close else np.array_equal(x, y)
+        assert same, f"{what}: {jax.tree_util.keystr(path)} differs"
 
 
 def _of(worlds: np.ndarray, seen: Any) -> Any:

@@ -37,6 +37,7 @@ def test_kinds_waiting_and_pauses_of_an_update(written):
     assert found["the worlds (Warp)"] == pytest.approx(10 * ms)
     assert found["matrices, convolutions"] == pytest.approx(30 * ms)
     assert found[learner_kernels.OTHER] == pytest.approx(10 * ms)
+    assert found["both"] == pytest.approx(2_080 * ms)
     assert found["busy"] == pytest.approx(68 * ms) and found["idle"] == pytest.approx(2_012 * ms)
     assert found["idle, under 5 us"] == pytest.approx(2 * ms) and found["idle, 5 to 50 us"] == pytest.approx(10 * ms)
     assert found["idle, over 1 ms"] == pytest.approx(2_000 * ms) and found["launches"] == 2.5
