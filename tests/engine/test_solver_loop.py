@@ -68,16 +68,16 @@ class _Pair:
         return getattr(self.own, name).numpy(), getattr(self.upstream, name).numpy()
 
 
-def _stages(*limits: int):
+def _stages(*limits: int, panels: bool = False):
     from ig2mj.engine.warp.patches.solver_loop import Stage
 
-    return tuple(Stage(32, limit) for limit in limits)
+    return tuple(Stage(32, limit, panels=panels) for limit in limits)
 
 
-@pytest.mark.parametrize(("limits", "wide"), [((1 << 30,), 0), ((2, 1 << 30), 1)])
-def test_iterations_accelerations_and_forces_are_upstreams(monkeypatch, limits, wide):
+@pytest.mark.parametrize(("limits", "wide", "panels"), [((2, 1 << 30), 1, False), ((1 << 30,), 0, True)])
+def test_iterations_accelerations_and_forces_are_upstreams(monkeypatch, limits, wide, panels):
     """In one world nothing touches anything, in two an arm pushes boxes that slept."""
-    pair = _Pair(monkeypatch, *_start(), _stages(*limits), wide)
+    pair = _Pair(monkeypatch, *_start(), _stages(*limits, panels=panels), wide)
     most = np.zeros(len(PUSHES), int)
     for step in range(80):
         pair.step(np.stack([PUSHES * min(1.0, step / 50), np.zeros(3)], 1))
@@ -93,7 +93,7 @@ def test_iterations_accelerations_and_forces_are_upstreams(monkeypatch, limits, 
 
 
 def test_who_does_not_converge_stops_at_the_limit_and_says_so(monkeypatch):
-    pair = _Pair(monkeypatch, *_start(iterations=2), _stages(1, 1 << 30))
+    pair = _Pair(monkeypatch, *_start(iterations=2), _stages(1, 1 << 30, panels=True))
     for step in range(60):
         pair.step(np.stack([PUSHES * min(1.0, step / 50), np.zeros(3)], 1))
     mine, theirs = pair.of("overflow")
@@ -103,7 +103,7 @@ def test_who_does_not_converge_stops_at_the_limit_and_says_so(monkeypatch):
 
 
 def test_a_world_without_constraints_and_one_without_numbers_end_as_upstream(monkeypatch):
-    pair = _Pair(monkeypatch, *_start(friction=False, iterations=7), _stages(1 << 30))
+    pair = _Pair(monkeypatch, *_start(friction=False, iterations=7), _stages(1 << 30, panels=True))
     pair.step(np.zeros((3, 2)))
     assert pair.own.nefc.numpy().tolist() == [0, 0, 0]
     velocity = pair.upstream.qvel.numpy()

@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, no_type_check
 import warp as wp
 from mujoco.mjx.third_party.mujoco_warp._src import block_cholesky, math, solver, types
 
-from ig2mj.engine.warp.patches import compact_solver
+from ig2mj.engine.warp.patches import compact_solver, panel_cholesky
 from ig2mj.engine.warp.patches.compact_solver import TILE
 from ig2mj.engine.warp.patches.line_search import line_search as line_search_of
 from ig2mj.engine.warp.patches.replacements import original
@@ -33,6 +33,7 @@ class Stage(NamedTuple):
     block_dim: int
     until: int
     registers: int = 128
+    panels: bool = False
 
 
 MOST = 1 << 30
@@ -91,7 +92,7 @@ def _launch(m: Any, d: Any, ctx: Any, stage: Stage) -> None:
     full, whole = ctx.compact_m_full, ctx.compact_d_full
     vectors = [array.reshape(shape=(d.nworld, array.shape[1], 1)) for array in (ctx.grad, ctx.search)]
     wp.launch_tiled(
-        _loop_kernel(m.nv_pad, m.nv, m.opt.ls_iterations, int(m.opt.warn_overflow), stage.registers),
+        _loop_kernel(m.nv_pad, m.nv, m.opt.ls_iterations, int(m.opt.warn_overflow), stage.registers, stage.panels),
         dim=d.nworld,
         inputs=[
             m.opt.iterations,
@@ -153,7 +154,9 @@ def _barrier(): ...
 
 @functools.cache
 @no_type_check
-def _loop_kernel(size: int, vector_size: int, ls_iterations: int, warns: int, registers: int) -> wp.Kernel:
+def _loop_kernel(
+    size: int, vector_size: int, ls_iterations: int, warns: int, registers: int, panels: bool
+) -> wp.Kernel:
     line_search = line_search_of(ls_iterations, warns)
     factorize = block_cholesky.create_blocked_cholesky_augmented_factorize_solve_newton_func(TILE, size, vector_size)
 
@@ -351,11 +354,19 @@ def _loop_kernel(size: int, vector_size: int, ls_iterations: int, warns: int, re
                 for i in range(tid, awake, threads):
                     slope = Ma[world, i] - qfrc_smooth[world, i] - qfrc_constraint[world, i]
                     grad[world, i] = slope
+                    if wp.static(panels):
+                        hessian[world, i, awake] = slope
                     square += slope * slope
                 grad_dot = wp.tile_reduce(wp.add, wp.tile(square))[0]
                 grad_scale = 1.0
                 _barrier()
-                sums = factorize(hessian[world], grad_column[world], active, factor[world], search_column[world])
+                sums = wp.vec2(0.0)
+                if wp.static(panels):
+                    sums = panel_cholesky.factorize_solve(
+                        hessian[world], awake, tid, factor[world], mv[world], search[world]
+                    )
+                else:
+                    sums = factorize(hessian[world], grad_column[world], active, factor[world], search_column[world])
                 search_dots[world] = sums[0]
                 decrement = sums[1]
                 _barrier()
