@@ -2,7 +2,7 @@
 
     python benchmarks/figure_5b.py --obs state rgbd --demos 30 --tests 16
 
-Natively pictures are drawn by one processor for each process; `--engine warp --worlds 48` plays as many runs at a time
+Natively pictures are drawn by one processor for each process; `--engine warp --worlds 192` plays as many runs at a time
 on a GPU. Parts may run side by side, each with some of the moments at which a policy takes over (`--seconds`) and a
 folder of its own; `--merge FOLDER...` makes one table and plot of them.
 
@@ -218,8 +218,9 @@ def main() -> None:
             if kind not in args.closing:
                 continue
             policy, loss = trained(env, perception, demos_of(shown, learnt), args.steps, args.seed)
-            for x in args.seconds:
-                won = np.array(take_over(env, policy, perception, [(s, x) for s in tests], learnt))
+            runs = [(s, x) for x in args.seconds for s in tests]
+            all_won = np.reshape(take_over(env, policy, perception, runs, learnt), (len(args.seconds), len(tests)))
+            for x, won in zip(args.seconds, all_won, strict=True):
                 low, high = wilson(int(won.sum()), len(won))
                 row = {"observation": obs, "closing": kind, "seconds_before_end": "all" if np.isinf(x) else x}
                 row |= {"success": round(float(won.mean()), 4), "low": round(low, 3), "high": round(high, 3)}
@@ -227,7 +228,7 @@ def main() -> None:
                 row["longest_s"] = round(float(longest), 1)
                 rows.append(row)
                 print(rows[-1], flush=True)
-                kept(rows, args.out)
+            kept(rows, args.out)
     print(f"{results.command()}: {time.process_time() - began:.0f} s of processor time")
 
 
