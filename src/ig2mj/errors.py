@@ -61,6 +61,7 @@ class UnknownNameError(Ig2mjError):
     """So many names are listed where none is near."""
 
     def __init__(self, kind: str, name: str, known: Iterable[str]):
+        name = str(name)  # whatever else was given in a name's place
         self.kind, self.name = kind, name
         names = [k for k in known if k]
         near = difflib.get_close_matches(name, names, n=3, cutoff=0.5)

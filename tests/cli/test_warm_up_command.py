@@ -36,6 +36,8 @@ def test_a_home_takes_no_robot_and_no_grasping(capsys):
         assert "belong to environments" in capsys.readouterr().err
     assert call(["warm-up", "small_home", "--grasping", "physical"]) == 2
     assert "belong to environments" in capsys.readouterr().err
+    assert call(["warm-up", "ig2mj/CookingMeet-v0"]) == 2
+    assert "near matches: CookingMeat" in capsys.readouterr().err
     assert call(["warm-up", "CookingMeat", "--grasping", "firm", "--worlds", "1"]) == 2
     assert "firm" in capsys.readouterr().err
     assert call(["warm-up", "CookingMeat", "--arch", "90", "--observations", "rgb"]) == 2

@@ -71,8 +71,10 @@ def test_a_run_becomes_a_policy_that_is_found_by_name(run, monkeypatch):
     assert "98.7% of 1,000 held-out episodes" in page and "helped by | nobody" in page
     monkeypatch.setattr(shipped, "shipped", lambda: {"CookingMeat-state": file})
     assert shipped.find_policy("CookingMeat-state") == file
-    with pytest.raises(UnknownNameError, match="near matches: CookingMeat-state"):
-        shipped.find_policy("CookingMeat-stat")
+    assert shipped.find_policy("ig2mj/CookingMeat-state-v0") == file
+    for wrong in ("CookingMeat-stat", "ig2mj/CookingMeat-stat-v0"):
+        with pytest.raises(UnknownNameError, match="'CookingMeat-stat'; near matches: CookingMeat-state"):
+            shipped.find_policy(wrong)
 
 
 def test_a_name_says_what_is_unusual():

@@ -82,15 +82,19 @@ class Batch:
     def make(self, pool_size: int | None = None) -> Worlds | Environment:
         """Raises Ig2mjError where a home is given what belongs to environments."""
         import ig2mj
-        from ig2mj.envs.names import activity_name, short_name
+        from ig2mj.envs.names import NAMES, NAMESPACE, activity_name, short_name
         from ig2mj.envs.registry import VECTORS
-        from ig2mj.errors import Ig2mjError
+        from ig2mj.errors import Ig2mjError, UnknownNameError
+        from ig2mj.scene.paths import SHIPPED_HOMES, shipped_homes
 
         if short_name(self.what) is not None or activity_name(self.what) is not None:
             seen = (*VECTORS, *self.observations)
             return ig2mj.make(
                 self.what, self.robot, self.worlds, self.engine, self.grasping, observations=seen, pool_size=pool_size
             )
+        if not (pathlib.Path(self.what).exists() or (SHIPPED_HOMES / self.what).is_dir()):
+            short = self.what.removeprefix(f"{NAMESPACE}/")
+            raise UnknownNameError("home or environment", short, (*shipped_homes(), *NAMES))
         if self.robot is not None or self.grasping is not None or self.observations:
             raise Ig2mjError("--robot, --grasping and --observations belong to environments; a home is stepped without")
         return ig2mj.Worlds(self.what, self.worlds, self.engine)

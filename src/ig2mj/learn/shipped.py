@@ -14,6 +14,7 @@ import shlex
 from collections.abc import Mapping
 from typing import Any
 
+from ig2mj.envs.names import NAMESPACE, VERSION
 from ig2mj.envs.registry import find_task
 from ig2mj.errors import InputError, UnknownNameError
 from ig2mj.learn.policies import Policy
@@ -39,7 +40,8 @@ def find_policy(name: str | os.PathLike) -> pathlib.Path:
     """The file of a policy.
 
     Args:
-      name: a file; the folder of a run; or the name of a policy that ships (`shipped`).
+      name: a file; the folder of a run; or the name of a policy that ships (`shipped`), which may be written as that of
+        the environment is for Gymnasium: ig2mj/CookingMeat-v0.
 
     Raises:
       InputError: a path, and there is no such file. UnknownNameError: no policy has that name; with near matches.
@@ -50,11 +52,14 @@ def find_policy(name: str | os.PathLike) -> pathlib.Path:
     if file.is_dir() and (file / "policy.npz").is_file():
         return file / "policy.npz"
     known = shipped()
-    if str(name) in known:
-        return known[str(name)]
-    if file.suffix == ".npz" or len(file.parts) > 1:
+    short = str(name)
+    if short.startswith(f"{NAMESPACE}/"):
+        short = short.removeprefix(f"{NAMESPACE}/").removesuffix(f"-v{VERSION}")
+    if short in known:
+        return known[short]
+    if file.suffix == ".npz" or len(pathlib.PurePath(short).parts) > 1:
         raise InputError(file, "there is no such file", fix="`ig2mj train` writes policies")
-    raise UnknownNameError("policy", str(name), known)
+    raise UnknownNameError("policy", short, known)
 
 
 def usual_name(policy: Policy) -> str:
