@@ -31,7 +31,8 @@ def api_test(env: Environment, seed: int = 0, steps: int = 4, other: Environment
     - a reset of some worlds leaves the others bitwise alone;
     - the horizon truncates and does not terminate; nothing is both;
     - `final_obs` is what was seen before the reset;
-    - numbers of an action that are not finite are counted and taken for 0; a wrong shape is refused;
+    - numbers of an action that are not finite are refused on the host, on a device counted and taken for 0; a wrong
+      shape is refused;
     - nothing is compiled again at the second reset and the second step; closing twice is harmless.
 
     Args:
@@ -159,14 +160,15 @@ def _bad_actions(env: Environment, seed: int) -> None:
     shape = (env.num_worlds, *env.action_space.shape)
     nan = np.zeros(shape, np.float32)
     nan[0, 0] = np.nan
-    state = env.step(env.reset(seed), nan)
+    state = env.step(env.reset(seed), jax.numpy.asarray(nan))
     assert np.asarray(state.info["bad_actions"]).tolist() == [1] + [0] * (env.num_worlds - 1), "NaN is not counted"
     bad = _host(state)
     fine = _host(env.step(env.reset(seed), np.zeros(shape, np.float32)))
     _same(bad["obs"], fine["obs"], "NaN in place of 0")
-    for wrong in (np.zeros(shape[1:], np.float32), np.zeros((shape[0], shape[1] + 1), np.float32)):
+    shapes = (np.zeros(shape[1:], np.float32), np.zeros((shape[0], shape[1] + 1), np.float32))
+    for wrong, what in (*((a, f"of shape {a.shape}") for a in shapes), (nan, "with NaN")):
         try:
             env.step(env.reset(seed), wrong)
         except ActionError:
             continue
-        raise AssertionError(f"an action of shape {wrong.shape} was taken")
+        raise AssertionError(f"an action {what} was taken")

@@ -81,6 +81,8 @@ def test_what_cannot_be_done_is_refused_by_name(env):
         ig2mj.make("ig2mj/CookingMeet")
     with pytest.raises(ActionError, match=r"\(2, 6\)"):
         env.step(env.reset(0), np.zeros((2, 7)))
+    with pytest.raises(ActionError, match="right_hand_y of the action of world 1 is not finite: nan"):
+        env.step(env.reset(0), np.array([[0.0] * 6, [0.0, np.nan, *[0.0] * 4]]))
 
 
 @pytest.mark.slow

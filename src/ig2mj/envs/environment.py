@@ -140,10 +140,10 @@ class Environment:
         """One agent step of every world, the finished ones included.
 
         Args:
-          action: [W, n], -1..1; clipped. Numbers that are not finite are counted and treated as 0.
+          action: [W, n], -1..1; clipped. Numbers of an array of JAX that are not finite are counted and treated as 0.
 
         Raises:
-          ActionError: the action has another shape, or is not of numbers.
+          ActionError: the action has another shape, is not of numbers, or is NumPy's and has some that are not finite.
         """
         return self._step(state, self._checked(action))
 
@@ -365,6 +365,10 @@ class Environment:
             action = np.asarray(action)
         if not (jnp.issubdtype(action.dtype, jnp.floating) or jnp.issubdtype(action.dtype, jnp.integer)):
             raise ActionError(f"an action is of real numbers, not of {action.dtype}")
+        if isinstance(action, np.ndarray) and not (fine := np.isfinite(action)).all():
+            world, number = np.argwhere(~fine)[0]
+            name = self.action_names[number]
+            raise ActionError(f"{name} of the action of world {world} is not finite: {action[world, number]}")
         return action.astype(np.float32)
 
     def metrics(self, state: EnvState) -> dict[str, int]:
