@@ -32,21 +32,22 @@ STEEP = 1.25
 CLEARANCE = 0.07
 """m above the fruit at which the blade comes over it."""
 
-EXACT = 0.02
+EXACT = {"humanoid": 0.02, "fetch": 0.015}
 """m beside the fruit's middle at which the blade comes down: farther out the fruit rolls away. With 8 mm, who sees both
 1 cm off, anew in each step, hovers above it."""
 
-PRESS = 0.08
-"""m below the fruit's top that the blade goes for: more than a step, so that on the fruit it presses with all force."""
+PRESS = {"humanoid": 0.08, "fetch": 0.03}
+"""m below the fruit's top that the blade goes for. The humanoid's is more than a step, so that on the fruit it presses
+with all force; Fetch's gripper would push the fruit away."""
 
 GENTLY = 1 / 3
 """Share of the turn that is left that is made at once. With all of it the hand, which gives way, turned to and fro at
 full speed, and who learned from that hardly turned."""
 
-CUTS, ABOUT, BESIDE, LATER, LEAN = -0.05, (-0.03, 0.05), 0.012, 0.008, 0.03
+CUTS, ABOUT, BESIDE, LATER = -0.05, (-0.03, 0.05), 0.012, 0.008
 """Of a knife that stands: m from the middle of the edge to the point that cuts, near the handle, so that what presses
 on it hardly tips the knife between two fingers; how far from there any other point will do; m beside the edge within
-which it comes down, and farther out over which it begins to; m below the fruit's top that it goes for."""
+which it comes down, and farther out over which it begins to."""
 
 
 def plan(see: Sight) -> list[Wish]:
@@ -63,13 +64,14 @@ def plan(see: Sight) -> list[Wish]:
     fruit, top = see.com(FRUIT), high[:, 2]
     turn, left = _edge_down(quat_rotate(quat, jnp.asarray(EDGE, jnp.float32)))
     turn = GENTLY * (turn + horizontal(along))
-    depth = jnp.where(left < 0.2, top - PRESS, top + CLEARANCE)
+    depth = jnp.where(left < 0.2, top - PRESS[see.robot], top + CLEARANCE)
     goal = jnp.concatenate([fruit[:, :2], depth[:, None]], axis=1)
     take = take_thin(see, handle)
     if see.robot == "fetch":
         turn += far_out(see, goal)
         take = Wish(take.move, far_out(see, handle), take.close)
-    cut = wish(over(blade, goal, top + CLEARANCE, near=EXACT, blend=EXACT), turn, close=True)
+    exact = EXACT[see.robot]
+    cut = wish(over(blade, goal, top + CLEARANCE, near=exact, blend=exact), turn, close=True)
     return [where(done, still, where(see.holds(KNIFE), cut, take))]
 
 
@@ -78,7 +80,7 @@ def _grip_and_press(see: Sight) -> Wish:
     along = quat_rotate(see.quat(KNIFE), jnp.asarray(ALONG, jnp.float32))
     up = quat_rotate(see.quat(KNIFE), jnp.array([0.0, 0.0, 1.0]))
     _, high = see.box(FRUIT)
-    goal = jnp.asarray(see.com(FRUIT)).at[:, 2].set(high[:, 2] - LEAN)
+    goal = jnp.asarray(see.com(FRUIT)).at[:, 2].set(high[:, 2] - PRESS[see.robot])
     blade = see.link(KNIFE, LinkKind.SLICER) + CUTS * along
     blade += jnp.clip(jnp.sum((goal - blade) * along, axis=1, keepdims=True), *ABOUT) * along
     move = over(blade, goal, high[:, 2] + CLEARANCE, near=BESIDE, blend=LATER)
