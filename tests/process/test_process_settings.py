@@ -16,7 +16,7 @@ import warp as wp
 import ig2mj.process
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_warp, quiet_warp, settings
-from ig2mj.process.warp_repairs import CollectorRest
+from ig2mj.process.collector import CollectorRest
 
 STATE = """
 import jax, warp as wp, gc, os
@@ -62,7 +62,7 @@ def test_no_other_module_changes_the_process(repository: pathlib.Path):
         for file in (repository / folder).rglob("*.py")
         if setters.search(file.read_text(encoding="utf-8"))
     }
-    assert found == {"src/ig2mj/process/settings.py", "src/ig2mj/process/warp_repairs.py"}
+    assert found == {f"src/ig2mj/process/{name}.py" for name in ("settings", "warp_repairs", "collector")}
 
 
 def test_warp_is_quiet_inside_the_block_only():

@@ -33,6 +33,7 @@ from ig2mj.predicates.literals import Literals
 from ig2mj.predicates.logic import Atom, Expression
 from ig2mj.predicates.parse import parse
 from ig2mj.predicates.questions import Questions
+from ig2mj.process.collector import REST
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Query, RelationPlan, Relations
 from ig2mj.states.world import ExtendedStates, WorldState
@@ -92,7 +93,8 @@ class CompiledExpression:
 
     def status(self, states: ExtendedStates, view: PhysicsView, relations: Relations | None = None) -> GoalStatus:
         """Truth, fraction and literals in all worlds. Pure."""
-        return self.status_of(self.literals.facts(self.context(states, view, relations)), states)
+        with REST:
+            return self.status_of(self.literals.facts(self.context(states, view, relations)), states)
 
     def context(self, states: ExtendedStates, view: PhysicsView, relations: Relations | None = None) -> Context:
         """What the literals read; relations are computed where they are not given."""

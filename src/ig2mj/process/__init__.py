@@ -23,6 +23,9 @@ or earlier by whoever wants to; a second call does nothing. What the user has de
   - `warp.config.kernel_cache_dir`: below IG2MJ_CACHE_DIR, where that is set and Warp's own folder was not chosen.
   - Three repairs of Warp 1.18, of its streams, graph captures and devices (`ig2mj.process.warp_repairs`).
 
+Where programs are traced, and while Warp captures a graph:
+  - Python's cyclic garbage collector is off, and on again afterwards if it was (`ig2mj.process.collector`).
+
 `use_gl` (the first picture):
   - The class of OpenGL contexts that `mujoco.Renderer` makes. Environment variables are not changed.
 

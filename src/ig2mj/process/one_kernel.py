@@ -15,6 +15,8 @@ import logging
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from ig2mj.process.collector import REST
+
 Options = dict[str, int | bool | str]
 
 ATTRIBUTES = {"inlineable": "false", "xla_cpu_small_call": "true"}
@@ -43,7 +45,8 @@ class OneKernel:
 
     def __call__(self, *arguments: Any) -> Any:
         if self._call is None:
-            return self._first(arguments)
+            with REST:
+                return self._first(arguments)
         return self._call(*arguments)[0] if self.is_one else self._call(*arguments)
 
     def _cache_size(self) -> int:

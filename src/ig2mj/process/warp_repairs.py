@@ -22,41 +22,13 @@ needs them would load them itself, one after the other.
 from __future__ import annotations
 
 import concurrent.futures
-import gc
-import threading
 from typing import Any
 
 import warp as wp
 
+from ig2mj.process.collector import REST
+
 _REPAIRED = "_ig2mj_repaired"
-
-
-class CollectorRest:
-    """Keeps Python's cyclic garbage collector off while at least one block is entered, in any thread."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._entered = 0
-        self._was_on = False
-
-    def begin(self) -> None:
-        """Enters a block: the collector goes off."""
-        with self._lock:
-            if self._entered == 0:
-                self._was_on = gc.isenabled()
-                gc.disable()
-            self._entered += 1
-
-    def end(self) -> None:
-        """Leaves a block; after the last one the collector is on again, if it was."""
-        with self._lock:
-            self._entered -= 1
-            if self._entered == 0 and self._was_on:
-                gc.enable()
-
-
-REST = CollectorRest()
-"""The one of this process: there is only one collector."""
 
 
 AWAITED: set[concurrent.futures.Future] = set()

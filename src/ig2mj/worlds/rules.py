@@ -19,6 +19,7 @@ from ig2mj.engine.view import PhysicsView
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus, compile_expression
 from ig2mj.predicates.logic import Expression
 from ig2mj.predicates.questions import Questions
+from ig2mj.process.collector import REST
 from ig2mj.scene.scene import Scene
 from ig2mj.states.initial import initial_states, states_of_manifest
 from ig2mj.states.model import DEFAULTS, StateModel
@@ -103,12 +104,13 @@ class Rules:
 
     def step(self, states: ExtendedStates, view: PhysicsView) -> Outcome:
         """One control step of all worlds; `view` is physics after it. Pure."""
-        relations = self.plan.evaluate(view)
-        states, swap = update(self.model, states, view, relations)
-        if self.goal is not None:
-            status = self.goal.status(states, view, relations)
-        else:
-            status = GoalStatus.empty(view.object_com.shape[0])
+        with REST:
+            relations = self.plan.evaluate(view)
+            states, swap = update(self.model, states, view, relations)
+            if self.goal is not None:
+                status = self.goal.status(states, view, relations)
+            else:
+                status = GoalStatus.empty(view.object_com.shape[0])
         return Outcome(states, swap if len(self.model.swap_objects) else None, status)
 
     def teleports(self, swap: Swap, view: PhysicsView) -> Write:

@@ -13,6 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from ig2mj.engine.view import SCHEMA, PhysicsView, assemble, read_fields
+from ig2mj.process.collector import REST
 from ig2mj.worlds.lazy.packing import PackedFunction
 
 
@@ -60,7 +61,8 @@ class OfView:
             structures.append(made_structure)
             return found
 
-        function = PackedFunction(jax.make_jaxpr(whole)(shapes), self._name)
+        with REST:
+            function = PackedFunction(jax.make_jaxpr(whole)(shapes), self._name)
         return _Program(
             tuple(names[i] for i in function.takes if i < len(names)),
             [i - len(names) for i in function.takes if i >= len(names)],
