@@ -42,13 +42,15 @@ def _start(friction: bool = True, iterations: int = 100) -> tuple[mujoco.MjModel
 
 
 class _Pair:
-    """Two batches that begin each step with the same state: one is stepped by MuJoCo Warp's loop, one by ours."""
+    """Two batches that begin each step with the same state: one is stepped with MuJoCo Warp's loop, one with ours."""
 
-    def __init__(self, monkeypatch, model: mujoco.MjModel, start: mujoco.MjData, stages, wide: int = 0):
+    def __init__(self, monkeypatch, model: mujoco.MjModel, start: mujoco.MjData, wide: int = 2):
         # not before: its module needs names that may not exist
         from ig2mj.engine.warp.patches import solver_loop
 
-        self.loop, self.patch, self.ours = solver_loop, monkeypatch, (stages, wide)
+        self.loop, self.patch = solver_loop, monkeypatch
+        self.serves = solver_loop._serves
+        monkeypatch.setattr(solver_loop, "WIDE", wide)
         self.put = mujoco_warp.put_model(model)
         self.put.opt.warn_overflow = 0
         sizes = {"nworld": len(PUSHES), "naconmax": 256, "naccdmax": 256, "njmax": 200, "nvmax": 40}
@@ -57,27 +59,24 @@ class _Pair:
     def step(self, ctrl: np.ndarray) -> None:
         for name in STATE:
             wp.copy(getattr(self.own, name), getattr(self.upstream, name))
-        for data, (stages, wide) in ((self.upstream, (None, 0)), (self.own, self.ours)):
-            self.patch.setattr(self.loop, "STAGES", stages)
-            self.patch.setattr(self.loop, "WIDE", wide)
+        for data, serves in ((self.upstream, lambda m, ctx: False), (self.own, self._serves)):
+            self.patch.setattr(self.loop, "_serves", serves)
             data.ctrl.assign(ctrl.astype(np.float32))
             with awake_kernels():
                 mujoco_warp.step(self.put, data)
+
+    def _serves(self, m, ctx) -> bool:
+        assert self.serves(m, ctx), "the kernel is for such models"
+        return True
 
     def of(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         return getattr(self.own, name).numpy(), getattr(self.upstream, name).numpy()
 
 
-def _stages(*limits: int, panels: bool = False):
-    from ig2mj.engine.warp.patches.solver_loop import Stage
-
-    return tuple(Stage(32, limit, panels=panels) for limit in limits)
-
-
-@pytest.mark.parametrize(("limits", "wide", "panels"), [((2, 1 << 30), 1, False), ((1 << 30,), 0, True)])
-def test_iterations_accelerations_and_forces_are_upstreams(monkeypatch, limits, wide, panels):
+@pytest.mark.parametrize("wide", [0, 2])
+def test_iterations_accelerations_and_forces_are_upstreams(monkeypatch, wide):
     """In one world nothing touches anything, in two an arm pushes boxes that slept."""
-    pair = _Pair(monkeypatch, *_start(), _stages(*limits, panels=panels), wide)
+    pair = _Pair(monkeypatch, *_start(), wide)
     most = np.zeros(len(PUSHES), int)
     for step in range(80):
         pair.step(np.stack([PUSHES * min(1.0, step / 50), np.zeros(3)], 1))
@@ -92,18 +91,19 @@ def test_iterations_accelerations_and_forces_are_upstreams(monkeypatch, limits, 
     assert most[0] == 1 and (most[1:] >= 4).all(), "of worlds that need one and several iterations"
 
 
-def test_who_does_not_converge_stops_at_the_limit_and_says_so(monkeypatch):
-    pair = _Pair(monkeypatch, *_start(iterations=2), _stages(1, 1 << 30, panels=True))
+@pytest.mark.parametrize("iterations", [1, 3])
+def test_who_does_not_converge_stops_at_the_limit_and_says_so(monkeypatch, iterations):
+    pair = _Pair(monkeypatch, *_start(iterations=iterations))
     for step in range(60):
         pair.step(np.stack([PUSHES * min(1.0, step / 50), np.zeros(3)], 1))
     mine, theirs = pair.of("overflow")
     assert np.array_equal(mine, theirs)
     assert (mine & int(OverflowType.ITERATIONS) != 0).tolist() == [False, True, True]
-    assert pair.of("solver_niter")[0].max() == 2
+    assert pair.of("solver_niter")[0].max() == iterations
 
 
 def test_a_world_without_constraints_and_one_without_numbers_end_as_upstream(monkeypatch):
-    pair = _Pair(monkeypatch, *_start(friction=False, iterations=7), _stages(1 << 30, panels=True))
+    pair = _Pair(monkeypatch, *_start(friction=False, iterations=7))
     pair.step(np.zeros((3, 2)))
     assert pair.own.nefc.numpy().tolist() == [0, 0, 0]
     velocity = pair.upstream.qvel.numpy()

@@ -10,6 +10,8 @@ these in their place; results are the same up to rounding:
   stay as they are (`resting`).
 - Constraint rows and entries of the Hessian have a thread for each that fits into a buffer, in every iteration of the
   solver. Here a few threads of each world go through those that there are (`lanes`).
+- Each iteration of the solver is a dozen kernels, as often as the slowest world needs. Here one kernel takes each world
+  through all iterations after the second (`solver_loop`).
 - The broad phase of collision detection goes through all pairs of geoms (`broadphase`).
 - The kernels of convex pairs follow each other, and each waits for its slowest pair. Here they run side by side
   (`branches`), each goes through a list of the pairs of its own kind only, sorted by geoms (`pair_lists`), and depths

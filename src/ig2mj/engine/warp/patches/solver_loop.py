@@ -1,11 +1,13 @@
-"""The Newton solver's loop as one kernel: a block of threads takes its world through all iterations.
+"""The Newton solver's later iterations as one kernel: a block of threads takes its world through all that are left.
 
 MuJoCo Warp launches a dozen kernels for each iteration, for as many iterations as the slowest of all worlds needs. Half
-of the worlds of a home need one, one in a hundred nine, so that most of that time goes into starting kernels that have
-next to nothing to do. Here what is done for a world in an iteration, from the line search to the next direction, is
-done by one block, between barriers of its own, and a world that has converged leaves at once.
+of the worlds of `birch` need three, one in a hundred nine, so that most launches find next to nothing to do. Here the
+first iterations, which most worlds need, are MuJoCo Warp's. Then what is done for a world in an iteration, from the
+line search to the next direction, is done by one block, between barriers of its own, and a world that has converged
+leaves at once. The first iterations are faster in kernels of their own: this one needs the registers of all its parts,
+so that fewer threads run side by side.
 
-The line search is MuJoCo Warp's source, made into a function; factorisations are its functions. Everything else is
+The line search is MuJoCo Warp's source, made into a function; the factorisation is its function. Everything else is
 written here for what households use: Newton, pyramidal cones, degrees of freedom compacted to those awake.
 """
 
@@ -16,33 +18,21 @@ written here for what households use: Newton, pyramidal cones, degrees of freedo
 # ruff: noqa: UP018 (variables of the kernel, not constants)
 
 import functools
-from typing import Any, NamedTuple, no_type_check
+from typing import Any, no_type_check
 
 import warp as wp
 from mujoco.mjx.third_party.mujoco_warp._src import block_cholesky, math, solver, types
 
-from ig2mj.engine.warp.patches import compact_solver, panel_cholesky
+from ig2mj.engine.warp.patches import compact_solver
 from ig2mj.engine.warp.patches.compact_solver import TILE
 from ig2mj.engine.warp.patches.line_search import line_search as line_search_of
 from ig2mj.engine.warp.patches.replacements import original
 
-
-class Stage(NamedTuple):
-    """A launch of the kernel: worlds that have not converged go on until they have made so many iterations in all."""
-
-    block_dim: int
-    until: int
-    registers: int = 128
-    panels: bool = False
-
-
-MOST = 1 << 30
-
-WIDE = 0
+WIDE = 2
 """Iterations that MuJoCo Warp's own kernels make first."""
 
-STAGES: tuple[Stage, ...] | None = None
-"""Launches that follow; None: MuJoCo Warp's own loop runs."""
+THREADS, REGISTERS = 128, 128
+"""Threads of a world, and registers of each at most."""
 
 GROUP = 32
 """Threads that add a constraint row to the Hessian together."""
@@ -52,8 +42,8 @@ ITERATIONS = int(types.OverflowType.ITERATIONS)
 
 
 def solve(m: Any, d: Any, ctx: Any, compact: bool = False) -> None:
-    """Finds constraint forces and accelerations (`solver._solve`)."""
-    if not (STAGES and compact and _serves(m, ctx)):
+    """Finds constraint forces and accelerations; as upstream where the kernel does not serve."""
+    if not (compact and _serves(m, ctx)):
         original(solver, "_solve")(m, d, ctx, compact)
         return
     warmstart = not (m.opt.disableflags & types.DisableBit.WARMSTART)
@@ -69,8 +59,7 @@ def solve(m: Any, d: Any, ctx: Any, compact: bool = False) -> None:
     solving = wp.full(shape=(1,), value=d.nworld, dtype=int)
     for _ in range(min(WIDE, m.opt.iterations)):
         solver._solver_iteration(m, d, ctx, solving, compact=compact)
-    for stage in STAGES:
-        _launch(m, d, ctx, stage)
+    _go_on(m, d, ctx)
     wp.launch(
         solver._qfrc_constraint_from_grad,
         dim=(d.nworld, m.nv),
@@ -80,6 +69,7 @@ def solve(m: Any, d: Any, ctx: Any, compact: bool = False) -> None:
 
 
 def _serves(m: Any, ctx: Any) -> bool:
+    """Whether the kernel is for this model: what it leaves out is not there."""
     return (
         solver._sparse_compact(ctx)
         and solver._use_incremental(m)
@@ -88,15 +78,15 @@ def _serves(m: Any, ctx: Any) -> bool:
     )
 
 
-def _launch(m: Any, d: Any, ctx: Any, stage: Stage) -> None:
+def _go_on(m: Any, d: Any, ctx: Any) -> None:
+    """The iterations that are left, of the worlds that have not converged."""
     full, whole = ctx.compact_m_full, ctx.compact_d_full
     vectors = [array.reshape(shape=(d.nworld, array.shape[1], 1)) for array in (ctx.grad, ctx.search)]
     wp.launch_tiled(
-        _loop_kernel(m.nv_pad, m.nv, m.opt.ls_iterations, int(m.opt.warn_overflow), stage.registers, stage.panels),
+        _loop_kernel(m.nv_pad, m.nv, m.opt.ls_iterations, int(m.opt.warn_overflow)),
         dim=d.nworld,
         inputs=[
             m.opt.iterations,
-            stage.until,
             m.opt.tolerance,
             m.opt.ls_tolerance,
             full.M_mulm_rowadr,
@@ -144,7 +134,7 @@ def _launch(m: Any, d: Any, ctx: Any, stage: Stage) -> None:
             ctx.state_changed_count,
             ctx.done,
         ],
-        block_dim=stage.block_dim,
+        block_dim=THREADS,
     )
 
 
@@ -154,9 +144,7 @@ def _barrier(): ...
 
 @functools.cache
 @no_type_check
-def _loop_kernel(
-    size: int, vector_size: int, ls_iterations: int, warns: int, registers: int, panels: bool
-) -> wp.Kernel:
+def _loop_kernel(size: int, vector_size: int, ls_iterations: int, warns: int) -> wp.Kernel:
     line_search = line_search_of(ls_iterations, warns)
     factorize = block_cholesky.create_blocked_cholesky_augmented_factorize_solve_newton_func(TILE, size, vector_size)
 
@@ -164,12 +152,11 @@ def _loop_kernel(
         module="unique",
         enable_backward=False,
         grid_stride=False,
-        cuda_max_registers=registers or None,
+        cuda_max_registers=REGISTERS,
         module_options={"enable_mathdx_gemm": False},
     )
     def solver_loop(
         iterations: int,
-        until: int,
         tolerances: wp.array[float],
         ls_tolerances: wp.array[float],
         M_rowadr: wp.array[int],
@@ -238,9 +225,9 @@ def _loop_kernel(
         if tid == 0:
             num_flipped[world] = 0
             num_changed[world] = 0
-        _barrier()  # all have read what the first thread writes at the end
+        _barrier()
 
-        while niter < wp.min(until, iterations):
+        while niter < iterations:
             # Products with the direction, where it is new. Rows and degrees of freedom stay with their thread.
             if fresh:
                 for i in range(tid, awake, threads):
@@ -354,19 +341,11 @@ def _loop_kernel(
                 for i in range(tid, awake, threads):
                     slope = Ma[world, i] - qfrc_smooth[world, i] - qfrc_constraint[world, i]
                     grad[world, i] = slope
-                    if wp.static(panels):
-                        hessian[world, i, awake] = slope
                     square += slope * slope
                 grad_dot = wp.tile_reduce(wp.add, wp.tile(square))[0]
                 grad_scale = 1.0
                 _barrier()
-                sums = wp.vec2(0.0)
-                if wp.static(panels):
-                    sums = panel_cholesky.factorize_solve(
-                        hessian[world], awake, tid, factor[world], mv[world], search[world]
-                    )
-                else:
-                    sums = factorize(hessian[world], grad_column[world], active, factor[world], search_column[world])
+                sums = factorize(hessian[world], grad_column[world], active, factor[world], search_column[world])
                 search_dots[world] = sums[0]
                 decrement = sums[1]
                 _barrier()
@@ -391,11 +370,7 @@ def _loop_kernel(
 
         if tid == 0:
             solver_niter[world] = niter
-            grad_dots[world] = grad_dot
             grad_scales[world] = grad_scale
-            decrements[world] = decrement
-            unchanged[world] = not fresh
-            done[world] = converged or niter >= iterations
             if niter >= iterations and not converged:
                 wp.atomic_or(overflow, world, wp.static(ITERATIONS))
                 if wp.static(bool(warns & ITERATIONS)):
