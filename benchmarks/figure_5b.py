@@ -109,9 +109,11 @@ def demos_of(shown: Sequence[Shown], chosen: np.ndarray) -> Demos:
     return Demos(seen, jnp.asarray(action), jnp.asarray(action), nothing, nothing > 0, nothing > 0, seen)
 
 
-def trained(env: Environment, perception: Perception, demos: Demos, steps: int, seed: int) -> tuple[Policy, float]:
+def trained(
+    env: Environment, perception: Perception, demos: Demos, steps: int, batch: int, seed: int
+) -> tuple[Policy, float]:
     """A clone, and its loss on the tenth of the steps that is kept apart."""
-    config = BCConfig(steps=steps, batch=256, noise=0.02, actor=(256, 256))
+    config = BCConfig(steps=steps, batch=batch, noise=0.02, actor=(256, 256))
     algorithm = BC(perception, demos.action.shape[1], config)
     learner, row = clone(algorithm, demos, Run(minutes=600, seed=seed, quiet=True))
     depends = depends_on(env, perception)
@@ -192,6 +194,7 @@ def main() -> None:
     parser.add_argument("--engine", default="native", choices=("native", "warp"))
     parser.add_argument("--pool-size", type=int, help="start states of either split; default: all")
     parser.add_argument("--steps", type=int, default=3000, help="updates of a clone")
+    parser.add_argument("--batch", type=int, default=256, help="samples of an update")
     parser.add_argument("--pace", type=float, default=0.35, help="share of the expert's speed")
     parser.add_argument("--noise", type=float, default=0.1, help="deviation, in shares of the slowed action's range")
     parser.add_argument("--seed", type=int, default=0)
@@ -217,7 +220,7 @@ def main() -> None:
         for kind, learnt in (("replayed", np.flatnonzero(~closing)), ("learnt", np.arange(len(closing)))):
             if kind not in args.closing:
                 continue
-            policy, loss = trained(env, perception, demos_of(shown, learnt), args.steps, args.seed)
+            policy, loss = trained(env, perception, demos_of(shown, learnt), args.steps, args.batch, args.seed)
             runs = [(s, x) for x in args.seconds for s in tests]
             all_won = np.reshape(take_over(env, policy, perception, runs, learnt), (len(args.seconds), len(tests)))
             for x, won in zip(args.seconds, all_won, strict=True):
