@@ -1,0 +1,68 @@
+#!/usr/bin/env bash
+# Trainings from pictures that are still to be run, each with its evaluation on held-out start states.
+#
+#     OUT=out/training bash benchmarks/gpu/training.sh pools       # start states; processors only: 250 s on 16 cores
+#     OUT=out/training bash benchmarks/gpu/training.sh fruit       # three trainings side by side on one card: 520 s
+#
+# pools: what fruit and towel begin from.  fruit: SlicingFruit of the humanoid and of Fetch, and Fetch's towel without
+# mittens, by DAgger.  towel: the towel by SAC, which an expert begins for.  compare: the humanoid's fruit for 120 s with
+# choices and with a Gaussian's mean.  figure_5b: from pixels.  shipped: three policies that ship, on Warp.
+#
+# Below $OUT: the best and the last policy, progress.csv, evaluations.jsonl (the likeliest actions, then drawn ones) and
+# the log of each, copied while it trains. $MINUTES of training (5), $WORLDS, $ENGINE (warp), $FRACTION of a card's memory
+# that JAX takes for each training (0.26).
+set -u
+out=${OUT:-out/training}; mkdir -p "$out"
+minutes=${MINUTES:-5} engine=${ENGINE:-warp} fraction=${FRACTION:-0.26}
+pictures=(--set net=places shift=0 actor=256,256 capacity=500000)
+
+sample() { nice -n 10 env JAX_PLATFORMS=cpu python3 -m ig2mj sample-task "$@" >> "$out/pools.txt" 2>&1; }
+
+held() {  # NAME POLICY EPISODES WORDS...: adds a line of JSON
+  local name=$1 policy=$2 episodes=$3; shift 3; mkdir -p "$out/$name"
+  XLA_PYTHON_CLIENT_MEM_FRACTION=0.1 timeout 200 python3 -m ig2mj evaluate "$policy" --episodes "$episodes" --worlds 500 \
+    --engine "$engine" --json "$@" >> "$out/$name/evaluations.jsonl" 2>> "$out/$name/log.txt"
+}
+
+learn() {  # NAME EPISODES WORDS...: trains, and plays so many held-out episodes with and without chance
+  local name=$1 episodes=$2 run; shift 2; mkdir -p "$out/$name"; run=$(mktemp -d)
+  XLA_PYTHON_CLIENT_MEM_FRACTION=$fraction timeout $((${minutes%.*} * 60 + 200)) \
+    python3 -m ig2mj train "$@" --obs rgbd --engine "$engine" --out "$run/run" > "$out/$name/log.txt" 2>&1 &
+  local job=$!
+  while kill -0 $job 2> /dev/null; do sleep 5; cp "$run"/run/*.npz "$run/run/progress.csv" "$out/$name" 2> /dev/null; done
+  wait $job; echo "$name: trained, ended with $? after $SECONDS s" | tee -a "$out/times.txt"
+  held "$name" "$out/$name/policy.npz" "$episodes"
+  held "$name" "$out/$name/policy.npz" 500 --drawn
+  echo "$name: played after $SECONDS s" | tee -a "$out/times.txt"; rm -rf "$run"; cut -c1-400 "$out/$name/evaluations.jsonl"
+}
+
+fruit() {  # NAME ROBOT ROWS WORDS...
+  learn "$1" 1000 SlicingFruit --robot "$2" --rows "$3" --algo dagger --pixels 128 --worlds "${WORLDS:-2048}" \
+    --pool-size 4096 --minutes "$minutes" "${pictures[@]}" "${@:4}"
+}
+
+towel() {  # NAME WORDS...
+  learn "$1" 1000 SoakingTowel --robot fetch --grasping physical --pixels 64 --worlds "${WORLDS:-1024}" --pool-size 1024 \
+    --minutes "$minutes" "${@:2}"
+}
+
+case ${1:-} in
+  pools)
+    sample SlicingFruit --split train --count 4096; sample SlicingFruit --split held_out
+    sample SoakingTowel --grasping physical --split train --count 1024; sample SoakingTowel --grasping physical --split held_out ;;
+  fruit)
+    fruit fruit_humanoid humanoid 80:128 & fruit fruit_fetch fetch 60:108 &
+    towel towel_dagger --algo dagger "${pictures[@]}" length=8 & wait ;;
+  towel)
+    towel towel_sac --algo sac --expert --until 0.95 "${pictures[@]}" gamma=0.99 horizon=5 held=8 std=0.1 guided=0.6 copied=1 \
+      copy=2 trust=1 reach=110 alpha=0.003 ;;
+  compare)
+    minutes=2; fruit choices humanoid 80:128 choices=21 & fruit mean humanoid 80:128 choices=0 & wait ;;
+  figure_5b)
+    XLA_PYTHON_CLIENT_MEM_FRACTION=0.12 timeout 400 python3 benchmarks/figure_5b.py --engine "$engine" --obs rgbd --demos 30 \
+      --tests 48 --worlds "${WORLDS:-192}" --pool-size 64 --steps 4000 --seconds 0 1 2 3 4 6 8 inf --out "$out/figure_5b" ;;
+  shipped)
+    for name in CookingMeat GraspingBook BimanualPickAndPlace; do held "$name" "$name" 500 & done; wait
+    cut -c1-400 "$out"/*/evaluations.jsonl ;;
+  *) sed -n '2,14p' "$0"; exit 2 ;;
+esac
