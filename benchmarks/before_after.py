@@ -60,6 +60,8 @@ class Measure:
     """Whose benchmarks and sources run."""
     seconds: float = 1.5
     """Of each figure of `states_step.py` and `native_step.py`."""
+    pybullet: bool = True
+    """Measure PyBullet, too."""
 
 
 @dataclasses.dataclass
@@ -78,7 +80,7 @@ def measure(args: Measure) -> None:
             (links / f"ig2mj_{package}").symlink_to(args.tree / package)
         told = ["--seconds", str(args.seconds), "--json", str(out / "found.json")]
         a7 = ["--sizes", "60", "--no-pictures", "--rounds", "5", "--rest-steps", "900"]
-        a7 += ["--work", str(out / "work"), "--out", str(out)]
+        a7 += ["--work", str(out / "work"), "--out", str(out), *([] if args.pybullet else ["--no-pybullet"])]
         for name, arguments in (("native_step", told), ("states_step", [*told, "--worlds", "64"]), ("idle_a7", a7)):
             before = list(os.getloadavg())
             command = [sys.executable, str(args.tree / "benchmarks" / f"{name}.py"), *arguments]

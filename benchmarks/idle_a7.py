@@ -76,6 +76,8 @@ class Args:
     """Length of a block."""
     pictures: bool = True
     """Time the renderers too."""
+    pybullet: bool = True
+    """Measure PyBullet beside us; without it there are no ratios."""
     work: pathlib.Path = WORK
     """Folder for what is built on the way."""
     out: pathlib.Path = results.RESULTS
@@ -89,24 +91,28 @@ def measure(home: Home, place: Place | None, args: Args, backend: str | None) ->
     camera = eye_camera(*(place or home.robot_place()))
     world = OneWorld(scene, StateModel.of_manifest(scene.tables, scene.manifest))
     with contextlib.ExitStack() as stack:
-        folder = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory()))
-        robot = [] if place is None else [write_robot_urdf(folder, *place)]
-        bullet = write_bullet_scene(scene, home.dataset, folder, camera, robot)
-        bare_bullet = stack.enter_context(PyBulletProcess(folder))
         falling = OneWorld(scene, world.model)
-        first = {"engine": timed(falling.engine_step)(FIRST), "pybullet": bare_bullet.steps(FIRST)}
+        first = {"engine": timed(falling.engine_step)(FIRST)}
         for _ in range(args.rest_steps):
             world.step()
-        bare_bullet.steps(args.rest_steps)
-        compared = _compare(world, bare_bullet, [b.name for b in bullet.bodies if not b.fixed])
         blocks: dict[str, Block] = {
             "mujoco": timed(world.bare().step),
-            "pybullet": bare_bullet.steps,
             "engine": timed(world.engine_step),
             "ig2mj": timed(world.step),
         }
+        compared: dict[str, Any] = {}
+        folder = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory()))
+        if args.pybullet:
+            robot = [] if place is None else [write_robot_urdf(folder, *place)]
+            bullet = write_bullet_scene(scene, home.dataset, folder, camera, robot)
+            bare_bullet = stack.enter_context(PyBulletProcess(folder))
+            first["pybullet"] = bare_bullet.steps(FIRST)
+            bare_bullet.steps(args.rest_steps)
+            compared = _compare(world, bare_bullet, [b.name for b in bullet.bodies if not b.fixed])
+            compared["pybullet_objects"] = len({b.object for b in bullet.bodies} - {NAME})
+            blocks["pybullet"] = bare_bullet.steps
         notes = []
-        if args.pictures and place is not None:
+        if args.pictures and args.pybullet and place is not None:
             blocks |= _with_pictures(stack, world, folder, args, backend, notes)
         rates = interleave(blocks, args.seconds, args.rounds)
     return {
@@ -116,7 +122,6 @@ def measure(home: Home, place: Place | None, args: Args, backend: str | None) ->
         "free_objects": int((~scene.tables.object_fixed & ~scene.tables.object_parked).sum()),
         "dofs": int(scene.model.nv),
         "collision_geoms": int(((scene.model.geom_contype | scene.model.geom_conaffinity) != 0).sum()),
-        "pybullet_objects": len({b.object for b in bullet.bodies} - {NAME}),
         **compared,
         "notes": notes,
         "first_steps_per_cpu_s": {name: FIRST / cpu for name, (_, cpu) in first.items()},
@@ -204,6 +209,7 @@ def tables(rows: list[dict[str, Any]]) -> list:
         ]
         for row in rows
     ]
+    beside = [row for row in rows if "pybullet" in row["rates"]]
     fair = [
         [
             _label(row),
@@ -213,11 +219,11 @@ def tables(rows: list[dict[str, Any]]) -> list:
             f"{1e3 * row['largest_difference_m']:.1f} ({row['largest_difference_of']})",
             f"{len(row['awake'])} / {len(row['pybullet_awake'])}",
         ]
-        for row in rows
+        for row in beside
     ]
     start = [
         [_label(row), f"{ours:,.0f}", f"{theirs:,.0f}", f"{ours / theirs:.2f}"]
-        for row in rows
+        for row in beside
         for ours, theirs in [(row["first_steps_per_cpu_s"]["engine"], row["first_steps_per_cpu_s"]["pybullet"])]
     ]
     columns = ["home", "objects, ours / PyBullet", "free", "median mm apart", "most mm apart", "awake, ours / PyBullet"]
