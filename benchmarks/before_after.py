@@ -62,6 +62,8 @@ class Measure:
     """Of each figure of `states_step.py` and `native_step.py`."""
     pybullet: bool = True
     """Measure PyBullet, too."""
+    only: tuple[str, ...] = ("native_step", "states_step", "idle_a7")
+    """Which of the benchmarks run."""
 
 
 @dataclasses.dataclass
@@ -81,7 +83,8 @@ def measure(args: Measure) -> None:
         told = ["--seconds", str(args.seconds), "--json", str(out / "found.json")]
         a7 = ["--sizes", "60", "--no-pictures", "--rounds", "5", "--rest-steps", "900"]
         a7 += ["--work", str(out / "work"), "--out", str(out), *([] if args.pybullet else ["--no-pybullet"])]
-        for name, arguments in (("native_step", told), ("states_step", [*told, "--worlds", "64"]), ("idle_a7", a7)):
+        ways = {"native_step": told, "states_step": [*told, "--worlds", "64"], "idle_a7": a7}
+        for name, arguments in [(name, ways[name]) for name in args.only]:
             before = list(os.getloadavg())
             command = [sys.executable, str(args.tree / "benchmarks" / f"{name}.py"), *arguments]
             path = os.pathsep.join([str(args.tree / "src"), str(links), os.environ.get("PYTHONPATH", "")])

@@ -34,9 +34,6 @@ from ig2mj.errors import EngineError
 EPISODE_STEPS = 90
 """Control steps until the pushing hand starts again: later there is little left to push."""
 
-TURN = 0.05
-"""Seconds of one turn of a measurement."""
-
 SETTLE_STEPS = 150
 """Control steps (5 s) given to the home to come to rest."""
 
@@ -74,21 +71,22 @@ class Row:
     own_share: float
 
 
-def rates(actions: list[Callable[[], object]], seconds: float) -> list[float]:
-    """Calls per second of each action: the best of many short turns, taken in turn.
+def rates(actions: list[Callable[[], object]], seconds: float, period: int = 1) -> list[float]:
+    """Calls per second of each action, taken in turn: the shortest time of each step of a period.
 
-    Other work on the machine only ever slows a turn, and so it slows none of the actions more than the others.
+    Other work on the machine only ever makes a step longer. Actions begin at the start of a period.
     """
-    best = [0.0] * len(actions)
-    for _ in range(max(1, round(seconds / TURN))):
+    calls = 8 if period == 1 else 1  # where all steps are alike, the clock is read once for eight
+    best = np.full((len(actions), period), np.inf)
+    end = time.perf_counter() + seconds * len(actions)
+    while time.perf_counter() < end:
         for k, action in enumerate(actions):
-            count, start = 0, time.perf_counter()
-            while (passed := time.perf_counter() - start) < TURN:
-                for _ in range(8):
+            for step in range(period):
+                start = time.perf_counter()
+                for _ in range(calls):
                     action()
-                count += 8
-            best[k] = max(best[k], count / passed)
-    return best
+                best[k, step] = min(best[k, step], (time.perf_counter() - start) / calls)
+    return [1 / float(np.mean(steps)) for steps in best]
 
 
 def row(case: str, awake: float, physics: float, engine: float) -> Row:
@@ -190,7 +188,7 @@ def main(args: Args) -> None:
         awake: list[int] = []
         with console.status(f"measuring: {case}"):
             actions = [bare_physics(engine, physics, ctrl), full_engine(engine, physics, ctrl, awake)]
-            bare, whole = rates(actions, args.seconds)
+            bare, whole = rates(actions, args.seconds, EPISODE_STEPS if "pushes" in case else 1)
         rows.append(row(case, float(np.mean(awake)), bare, whole))
     engine, physics = settled(plain, args.worlds)
     with console.status("measuring: batch"):
