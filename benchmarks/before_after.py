@@ -99,11 +99,12 @@ def measure(args: Measure) -> None:
 
 
 def figures(rows: list[dict[str, Any]], before: bool) -> dict[tuple[str, str], float]:
-    """Microseconds a control step, by benchmark and case; of the newest row that has each."""
+    """Microseconds a control step, by benchmark and case; of each benchmark's newest row."""
     found: dict[tuple[str, str], float] = {}
     for row in rows:
         if (row["which"] == "before") is not before:
             continue
+        found = {key: value for key, value in found.items() if key[0] != row["benchmark"]}
         for case in (case for result in row["result"] for case in result.get("rows", ())):
             if row["benchmark"] == "states_step":
                 name = str(OLD_NAMES.get(case["case"], case["case"]))
@@ -125,7 +126,8 @@ def table(rows: list[dict[str, Any]]) -> str:
     lines = [f"| | `dd38870` | `{newest}` |", "|---|--:|--:|"]
     for text, *key in LINES:
         pair = [shown(of.get((key[0], key[1]))) for of in (then, now)]
-        lines.append(f"| {text} | {pair[0]} | {pair[1]} |")
+        if pair != ["-", "-"]:
+            lines.append(f"| {text} | {pair[0]} | {pair[1]} |")
     return "\n".join(lines) + "\n"
 
 
