@@ -15,7 +15,7 @@ import pathlib
 import platform
 import tempfile
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import msgspec
 import mujoco
@@ -28,7 +28,7 @@ from rich.table import Table
 import ig2mj
 from ig2mj.agents.floating_hand import FloatingHand, hand_ctrl
 from ig2mj.agents.humanoid import Humanoid
-from ig2mj.engine.native.engine import NativeEngine
+from ig2mj.engine.native.engine import NativeEngine, NativePhysics
 from ig2mj.errors import EngineError
 
 EPISODE_STEPS = 90
@@ -71,7 +71,7 @@ class Row:
     own_share: float
 
 
-def rates(actions: list[Callable[[], object]], seconds: float, period: int = 1) -> list[float]:
+def rates(actions: Sequence[Callable[[], object]], seconds: float, period: int = 1) -> list[float]:
     """Calls per second of each action, taken in turn: the shortest time of each step of a period.
 
     Other work on the machine only ever makes a step longer. Actions begin at the start of a period.
@@ -95,7 +95,7 @@ def row(case: str, awake: float, physics: float, engine: float) -> Row:
     return Row(case, awake, physics, engine, physics_us, engine_us, own, own / engine_us)
 
 
-def settled(scene: ig2mj.Scene, worlds: int = 1) -> tuple[NativeEngine, object]:
+def settled(scene: ig2mj.Scene, worlds: int = 1) -> tuple[NativeEngine, NativePhysics]:
     """An engine and its worlds at rest."""
     engine = NativeEngine(scene, worlds)
     physics = engine.reset()
@@ -107,7 +107,7 @@ def settled(scene: ig2mj.Scene, worlds: int = 1) -> tuple[NativeEngine, object]:
     return engine, physics
 
 
-def bare_physics(engine: NativeEngine, physics: object, ctrl: Control | None) -> Callable[[], None]:
+def bare_physics(engine: NativeEngine, physics: NativePhysics, ctrl: Control | None) -> Callable[[], None]:
     """MuJoCo's part of a control step alone, on a copy of world 0."""
     model, data = engine.to_mujoco(physics, 0)
     start, own = mujoco.MjData(model), mujoco.MjData(model)
@@ -129,7 +129,9 @@ def bare_physics(engine: NativeEngine, physics: object, ctrl: Control | None) ->
     return step
 
 
-def full_engine(engine: NativeEngine, physics: object, ctrl: Control | None, awake: list[int]) -> Callable[[], None]:
+def full_engine(
+    engine: NativeEngine, physics: NativePhysics, ctrl: Control | None, awake: list[int]
+) -> Callable[[], None]:
     """The engine's whole control step; notes the number of objects awake at every sixteenth."""
     start = engine.export(physics, 0)
     count = 0

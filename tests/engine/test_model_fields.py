@@ -72,14 +72,15 @@ def positions(bench, physics) -> np.ndarray:
 
 
 def test_masses_and_friction_of_each_world_act_as_in_a_world_alone(bench):
-    """Engines differ by centimetres after the impact (12 mm were seen), the two worlds by more than ten."""
+    """Engines differ by centimetres after the impact (12 and 36 mm were seen on two processors), the two worlds by more
+    than ten."""
     fields, row = differing(bench.scene.model), shoved(bench)
     physics = bench.load(bench.fresh(), bench.every(row))
     found = positions(bench, bench.write(physics, Write(model_fields=fields)))
     box, knife = bench.index("box"), bench.index("knife")
     for world in (0, 1):
         expected = alone(bench.scene, fields, world, row)
-        np.testing.assert_allclose(found[:, world], expected, atol=1e-6 if bench.engine.name == "native" else 0.02)
+        np.testing.assert_allclose(found[:, world], expected, atol=1e-6 if bench.engine.name == "native" else 0.05)
     away = found[-1, :, :, 0] - found[0, :, :, 0]
     assert away[1, box] > away[0, box] + 0.1 and away[1, knife] > away[0, knife] + 0.1
 
