@@ -152,6 +152,8 @@ def plotted(rows: Sequence[dict[str, Any]], longest: float, file: pathlib.Path) 
     for obs in dict.fromkeys(r["observation"] for r in rows):
         for closing, style in (("replayed", "-"), ("learnt", "--")):
             own = [r for r in rows if (r["observation"], r["closing"]) == (obs, closing)]
+            if not own:
+                continue
             x = [longest if r["seconds_before_end"] == "all" else float(r["seconds_before_end"]) for r in own]
             line = axes.plot(x, [100 * r["success"] for r in own], style, marker="o", label=f"{obs}, closing {closing}")
             low, high = ([100 * r[n] for r in own] for n in ("low", "high"))
