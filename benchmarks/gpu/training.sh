@@ -2,11 +2,11 @@
 # Trainings from pictures that are still to be run, each with its evaluation on held-out start states.
 #
 #     OUT=out/training bash benchmarks/gpu/training.sh pools       # start states; processors only: 250 s on 16 cores
-#     OUT=out/training bash benchmarks/gpu/training.sh fruit       # three trainings side by side on one card: 520 s
+#     OUT=out/training bash benchmarks/gpu/training.sh humanoid fetch      # side by side on one card: 520 s
 #
-# pools: what fruit and towel begin from.  fruit: SlicingFruit of the humanoid and of Fetch, and Fetch's towel without
-# mittens, by DAgger.  towel: the towel by SAC, which an expert begins for.  compare: the humanoid's fruit for 120 s with
-# choices and with a Gaussian's mean.  figure_5b: from pixels.  shipped: three policies that ship, on Warp.
+# pools: what the first four begin from.  humanoid, fetch: SlicingFruit by DAgger.  towel: Fetch's towel without mittens
+# by DAgger.  towel_sac: by SAC, which an expert begins for.  choices, mean: the humanoid's fruit for 120 s with choices
+# and with a Gaussian's mean.  figure_5b: from pixels.  shipped: three policies that ship, on Warp.
 #
 # Below $OUT: the best and the last policy, progress.csv, evaluations.jsonl (the likeliest actions, then drawn ones) and
 # the log of each, copied while it trains. $MINUTES of training (5), $WORLDS, $ENGINE (warp), $FRACTION of a card's memory
@@ -46,23 +46,29 @@ towel() {  # NAME WORDS...
     --minutes "$minutes" "${@:2}"
 }
 
-case ${1:-} in
-  pools)
-    sample SlicingFruit --split train --count 4096; sample SlicingFruit --split held_out
-    sample SoakingTowel --grasping physical --split train --count 1024; sample SoakingTowel --grasping physical --split held_out ;;
-  fruit)
-    fruit fruit_humanoid humanoid 80:128 & fruit fruit_fetch fetch 60:108 &
-    towel towel_dagger --algo dagger "${pictures[@]}" length=8 & wait ;;
-  towel)
-    towel towel_sac --algo sac --expert --until 0.95 "${pictures[@]}" gamma=0.99 horizon=5 held=8 std=0.1 guided=0.6 copied=1 \
-      copy=2 trust=1 reach=110 alpha=0.003 ;;
-  compare)
-    minutes=2; fruit choices humanoid 80:128 choices=21 & fruit mean humanoid 80:128 choices=0 & wait ;;
-  figure_5b)
-    XLA_PYTHON_CLIENT_MEM_FRACTION=0.12 timeout 400 python3 benchmarks/figure_5b.py --engine "$engine" --obs rgbd --demos 30 \
-      --tests 48 --worlds "${WORLDS:-192}" --pool-size 64 --steps 4000 --seconds 0 1 2 3 4 6 8 inf --out "$out/figure_5b" ;;
-  shipped)
-    for name in CookingMeat GraspingBook BimanualPickAndPlace; do held "$name" "$name" 500 & done; wait
-    cut -c1-400 "$out"/*/evaluations.jsonl ;;
-  *) sed -n '2,14p' "$0"; exit 2 ;;
-esac
+run() {
+  case $1 in
+    pools)
+      sample SlicingFruit --split train --count 4096; sample SlicingFruit --split held_out
+      sample SoakingTowel --grasping physical --split train --count 1024; sample SoakingTowel --grasping physical --split held_out ;;
+    humanoid) fruit fruit_humanoid humanoid 80:128 ;;
+    fetch) fruit fruit_fetch fetch 60:108 ;;
+    towel) towel towel_dagger --algo dagger "${pictures[@]}" length=8 ;;
+    towel_sac)
+      towel towel_sac --algo sac --expert --until 0.95 "${pictures[@]}" gamma=0.99 horizon=5 held=8 std=0.1 guided=0.6 copied=1 \
+        copy=2 trust=1 reach=110 alpha=0.003 ;;
+    choices) minutes=2; fruit choices humanoid 80:128 choices=21 ;;
+    mean) minutes=2; fruit mean humanoid 80:128 choices=0 ;;
+    figure_5b)
+      XLA_PYTHON_CLIENT_MEM_FRACTION=0.12 timeout 400 python3 benchmarks/figure_5b.py --engine "$engine" --obs rgbd --demos 30 \
+        --tests 48 --worlds "${WORLDS:-192}" --pool-size 64 --steps 4000 --seconds 0 1 2 3 4 6 8 inf --out "$out/figure_5b" ;;
+    shipped)
+      for name in CookingMeat GraspingBook BimanualPickAndPlace; do held "$name" "$name" 500 & done; wait
+      cut -c1-400 "$out"/*/evaluations.jsonl ;;
+    *) sed -n '2,14p' "$0"; exit 2 ;;
+  esac
+}
+
+[ $# != 0 ] || run help
+for name; do run "$name" & done
+wait
