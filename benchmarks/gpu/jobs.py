@@ -121,14 +121,13 @@ def run(jobs: list[Job], out: pathlib.Path, seconds: float, wait: float = 0.3) -
                 running[job.name] = start(job, out), time.monotonic()
                 note(f"{job.name} began")
             time.sleep(wait)
+        left = [*running, *(job.name for job in waiting)]
         for process, _ in running.values():
             end_session(process.pid)
             process.wait()
-        note(
-            "all ended"
-            if not (waiting or running)
-            else f"time was up: {', '.join([*running, *(j.name for j in waiting)])}"
-        )
+        running.clear()
+        waiting.clear()
+        note(f"time was up: {', '.join(left)}" if left else "all ended")
     return ended
 
 
