@@ -15,6 +15,7 @@ from ig2mj.engine.warp.patches import awake_kernels, pins
 if pins.mismatches():
     pytest.skip(f"our kernels do not fit: {pins.mismatches()}", allow_module_level=True)
 
+from ig2mj.engine.warp.kernels import launches_of
 from ig2mj.engine.warp.patches import branches, pair_lists
 
 WORLDS = 16
@@ -80,6 +81,38 @@ def _contacts(model: mujoco.MjModel, start: mujoco.MjData, qpos: np.ndarray) -> 
     columns = [contact.worldid, contact.geom, contact.dist, contact.pos, contact.frame]
     rows = np.concatenate([c.numpy()[:count].reshape(count, -1).astype(float) for c in columns], axis=1)[:, :10]
     return rows[np.lexsort(np.round(rows, 4).T[::-1])]
+
+
+def test_streams_begin_when_all_their_memory_is_there(monkeypatch):
+    """A stream waits for the one before it once, when it begins. A count that was set to 0 after that could be read
+    before, and so were places that nobody had taken: an illegal address on a GPU."""
+    model = mujoco.MjModel.from_xml_string(SCENE)
+    put = mujoco_warp.put_model(model)
+    data = mujoco_warp.make_data(model, nworld=2, naconmax=200, naccdmax=90, njmax=600, nvmax=model.nv)
+    events, make, in_turn = [], wp.empty, branches._in_turn
+
+    def noted(name, act):
+        def noting(*args, **kwargs):
+            events.append(name)
+            return act(*args, **kwargs)
+
+        return noting
+
+    def streams(device):
+        for option in in_turn(device):
+            events.append("stream")
+            yield option
+
+    monkeypatch.setattr(branches, "ON_PROCESSORS", True)
+    monkeypatch.setattr(branches, "_in_turn", streams)
+    monkeypatch.setattr(wp, "empty", noted("memory", make))
+    monkeypatch.setattr(wp, "zeros", noted("memory", wp.zeros))
+    with awake_kernels():
+        launches_of(lambda: mujoco_warp.collision(put, data))
+    first, last = events.index("stream"), len(events) - events[::-1].index("stream")
+    assert events.count("stream") > 5, "of several kinds"
+    assert events[:first].count("memory") > 10
+    assert "memory" not in events[first:last]
 
 
 @pytest.mark.slow

@@ -46,18 +46,22 @@ def convex_narrowphase(m: Any, d: Any, ctx: Any, collision_table: Any) -> None:
         return
     calls = _calls(m, d, ctx, collision_table)
     kinds = [phases.kind(call["kernel"]) for call in calls]
-    found = [kind for kind in kinds if kind is not None]
-    lists = iter(pair_lists.listed_by_kind(m, d, ctx, found) if found else [])
-    streams = _in_turn(device)
     for call, kind in zip(calls, kinds, strict=True):
         if kind is None:  # of height fields
             wp.launch(**call)
-            continue
-        call["inputs"] = _of_list(m, d, ctx, call["inputs"], next(lists))
-        options = next(streams)
-        _here.kept.append(call)  # freed where the branches have joined, and not at the end of this function
-        for launch in phases.launches(d, call):
-            _here.kept.append(launch)
+    convex = [call for call, kind in zip(calls, kinds, strict=True) if kind is not None]
+    if not convex:
+        return
+    # All memory is there and counts are 0 before the streams begin: what comes later on this one, they do not wait for.
+    lists = pair_lists.listed_by_kind(m, d, ctx, [kind for kind in kinds if kind is not None])
+    memory = phases.scratch(d, len(convex))
+    launches = []
+    for number, (call, pairs) in enumerate(zip(convex, lists, strict=True)):
+        call["inputs"] = _of_list(m, d, ctx, call["inputs"], pairs)
+        launches.append(phases.launches(d, call, memory, number))
+    _here.kept = [convex, launches]  # freed where the branches have joined, and not at the end of this function
+    for of_kind, options in zip(launches, _in_turn(device), strict=False):
+        for launch in of_kind:
             wp.launch(**launch, **options)
 
 

@@ -72,21 +72,38 @@ def kind(kernel: wp.Kernel) -> tuple[int, int] | None:
     return _arguments[kernel][:2] if kernel in _arguments else None
 
 
-def launches(d: Any, call: dict[str, Any]) -> list[dict[str, Any]]:
-    """The launches of both phases in place of one of upstream's, as arguments of `warp.launch`."""
+class Scratch(NamedTuple):
+    """What first phases hand to second phases: what was found at each place [P], and for each kind the places that it
+    took [K, P] and how many [K]. Places are taken from one counter (`branches`), so kinds share what was found."""
+
+    found: wp.array
+    listed: wp.array
+    count: wp.array
+
+
+def scratch(d: Any, kinds: int) -> Scratch:
+    """Memory for so many kinds, with counts of 0."""
+    places = max(1, d.naccdmax)
+    listed = wp.empty((kinds, places), dtype=int)
+    return Scratch(wp.empty(places, dtype=Found), listed, wp.zeros(kinds, dtype=int))
+
+
+def launches(d: Any, call: dict[str, Any], memory: Scratch, number: int) -> list[dict[str, Any]]:
+    """The launches of both phases in place of one of upstream's, as arguments of `warp.launch`. Nothing is allocated.
+
+    Args:
+      call: what upstream would launch. number: of its kind in `memory`.
+    """
     kernel: wp.Kernel = call["kernel"]
     both = built(_arguments[kernel])
     names = [argument.label for argument in kernel.adj.args]
     values = dict(zip(names, [*call["inputs"], *call["outputs"]], strict=True))
-    places = max(1, d.naccdmax)
-    values |= {
-        "found_out": wp.empty(places, dtype=Found),
-        "listed_out": wp.empty(places, dtype=int),
-        "count_out": wp.zeros(1, dtype=int),
-    }
+    own = {"listed_out": memory.listed[number], "count_out": memory.count[number : number + 1]}
+    values |= {"found_out": memory.found, **own}
     result = []
-    for phase, most, block in ((both.first, d.naconmax, call["block_dim"]), (both.second, places, SECOND_BLOCK)):
-        values["grid_stride_in"] = collision_convex._ccd_grid_size(phase, most, d.ncollision.device)
+    most = {both.first: d.naconmax, both.second: len(memory.found)}
+    for phase, block in ((both.first, call["block_dim"]), (both.second, SECOND_BLOCK)):
+        values["grid_stride_in"] = collision_convex._ccd_grid_size(phase, most[phase], d.ncollision.device)
         inputs = [values[argument.label] for argument in phase.adj.args]
         result.append({"kernel": phase, "dim": values["grid_stride_in"], "block_dim": block, "inputs": inputs})
     return result
