@@ -15,6 +15,7 @@ na as in MuJoCo.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import mujoco
@@ -113,6 +114,10 @@ class Engine(Protocol):
     tables: SceneTables
     substeps: int
     timestep: float
+
+    def serve(self, devices: Sequence[Any]) -> None:
+        """Makes ready for programs on other devices of this process, before they run: memory on each."""
+        ...
 
     def reset(self) -> Physics:
         """All worlds at the scene's initial state (its first keyframe, else its zero pose), everything awake."""

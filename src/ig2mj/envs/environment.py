@@ -114,7 +114,8 @@ class Environment:
         return self.core.engine.pure
 
     def serve(self, devices: Sequence[Any]) -> None:
-        """Makes ready for programs on other devices of this process, before they are compiled: pictures need it."""
+        """Makes ready for programs on other devices of this process, before they are compiled."""
+        self.core.engine.serve(devices)
         self._observer.serve(devices)
 
     @property

@@ -61,6 +61,7 @@ class ShardedWorlds:
         self.local = make(self.part)
         if not self.local.engine.pure:
             raise EngineError(f"the {self.local.engine.name} engine has no devices to share worlds over")
+        self.local.engine.serve(self.devices)
         self._first = jax.process_index() * len(self.devices) * self.part
         self._sharding = NamedSharding(Mesh(np.array(self.devices), (AXIS,)), PartitionSpec(AXIS))
         self._threads = ThreadPoolExecutor(len(self.devices), "ig2mj-device")

@@ -131,6 +131,9 @@ class MjxEngine(abc.ABC):
 
     # The protocol.
 
+    @abc.abstractmethod
+    def serve(self, devices: Sequence[Any]) -> None: ...
+
     def reset(self) -> MjxPhysics:
         """All worlds at the initial state."""
         return self._first(self._template, self._initial)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -34,6 +34,9 @@ class JaxEngine(MjxEngine):
 
     name = "jax"
     unrolled = False  # a step's program is large: compile it once
+
+    def serve(self, devices: Sequence[Any]) -> None:
+        """Nothing: a program finds its own memory."""
 
     def _host_model(self, model: mujoco.MjModel) -> mujoco.MjModel:
         own = super()._host_model(model)

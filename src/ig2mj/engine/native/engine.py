@@ -278,6 +278,9 @@ class NativeEngine:
         physics.update(self._run(physics, apply))
         return physics
 
+    def serve(self, devices: Sequence[Any]) -> None:
+        """Nothing: worlds are on the processor."""
+
     def health(self, physics: NativePhysics) -> Health:
         """What went wrong in each world; see `ig2mj.engine.health`. C MuJoCo's buffers grow: nothing overflows."""
         count = self.num_worlds

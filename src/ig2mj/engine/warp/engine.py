@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import sys
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import jax
@@ -28,6 +29,7 @@ from ig2mj.engine.native.settle import settle
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.engine.warp import kernels, patches
+from ig2mj.engine.warp.patches import scratch
 from ig2mj.engine.warp.patches.flags import REPLACED
 from ig2mj.engine.warp.patches.ignored import DROP, encode
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
@@ -90,10 +92,18 @@ class WarpEngine(MjxEngine):
         if initial is None and not holds_everything(self.profile, scene.model):
             initial = settle(scene)
         super().__init__(scene, num_worlds, initial=initial, **options)
+        self.serve([own_device()])
         if compile_beforehand and own_device().platform == "gpu":  # on processors only some tests make steps
             loading = kernels.load_meanwhile(self.launches())
             if compile_beforehand != "meanwhile":
                 loading.result()
+
+    def serve(self, devices: Sequence[Any]) -> None:
+        """See `Engine.serve`: takes the memory that steps need (`ig2mj.engine.warp.patches.scratch`)."""
+        for device in devices if self.own_kernels else ():
+            if device.platform == "gpu":
+                on = wp.device_from_jax(device)
+                scratch.reserve(on, kernels.scratch_of_step(self.host_model, self.profile, self.num_worlds, on))
 
     def load_kernels(self, workers: int | None = None) -> int:
         """Compiles and loads the kernels of a step side by side; how many modules they are.

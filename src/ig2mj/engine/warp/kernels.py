@@ -23,6 +23,7 @@ from mujoco.mjx.third_party import mujoco_warp
 from mujoco.mjx.warp import ffi
 
 from ig2mj.engine.warp import patches
+from ig2mj.engine.warp.patches import scratch
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile
 from ig2mj.process.warp_repairs import AWAITED
@@ -89,6 +90,27 @@ def launches_of_step(model: mujoco.MjModel, profile: EngineProfile, own: bool, w
     act = _step_of_one_world(model, profile, warns)
     with patches.engine_kernels() if own else patches.upstream_kernels():
         return launches_of(act)
+
+
+def scratch_of_step(model: mujoco.MjModel, profile: EngineProfile, num_worlds: int, device: Any) -> int:
+    """Bytes for the arrays that a step of our functions makes, at most at a time.
+
+    Measured with one world, without launching anything; nearly all arrays are as long as there are worlds.
+
+    Args:
+      profile: buffer sizes, for this number of worlds. device: Warp's, on which memory for one world is taken.
+    """
+    counter = scratch.Counter(device.get_allocator())
+    with wp.ScopedDevice(device):
+        act = _step_of_one_world(model, profile, 0)
+
+        def counted() -> None:
+            with wp.ScopedAllocator(device, counter):
+                act()
+
+        with patches.engine_kernels():
+            launches_of(counted)
+    return int(scratch.ROOM * counter.most * num_worlds) + scratch.ALIGNMENT * counter.arrays
 
 
 def _step_of_one_world(model: mujoco.MjModel, profile: EngineProfile, warns: int) -> Callable[[], None]:

@@ -15,14 +15,20 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
+import warp as wp
 from mujoco.mjx.warp import ffi
 
 from ig2mj.engine.warp.patches import pins
 from ig2mj.engine.warp.patches.replacements import KERNELS
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
+from ig2mj.engine.warp.patches.scratch import used
 
 REGISTER = "jax_callable_variadic_tuple"
 """Name of MJX's function that registers another with XLA."""
+
+GRAPHS = 128
+"""CUDA graphs of a step that are kept. Warp keeps 32; an environment that is stepped from Python may need more in turn,
+as JAX gives it other buffers, and would capture each anew in every step."""
 
 _here = threading.local()
 _registrations = ScopedReplacement()
@@ -36,7 +42,10 @@ def _choosing(function: Callable[..., Any], own: bool) -> Callable[..., Any]:
 
     @functools.wraps(function)
     def run(*args: Any, **kwargs: Any) -> Any:
-        with KERNELS.entered(own), noted() if own else contextlib.nullcontext():
+        if not own:
+            with KERNELS.entered(False):
+                return function(*args, **kwargs)
+        with KERNELS.entered(True), noted(), used():
             return function(*args, **kwargs)
 
     return run
@@ -46,7 +55,12 @@ def _register(function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
     return _registrations.original(ffi, REGISTER)(_choosing(function, _here.own), *args, **kwargs)
 
 
-_registrations.add({(ffi, REGISTER): _register})
+def _callable(*args: Any, **kwargs: Any) -> Any:
+    more = {"graph_cache_max": GRAPHS} if _here.own else {}
+    return _registrations.original(wp, "jax_callable")(*args, **kwargs, **more)
+
+
+_registrations.add({(ffi, REGISTER): _register, (wp, "jax_callable"): _callable})
 
 
 @contextlib.contextmanager
