@@ -20,7 +20,7 @@ sample() { nice -n 10 env JAX_PLATFORMS=cpu python3 -m ig2mj sample-task "$@" >>
 
 held() {  # NAME POLICY EPISODES WORDS...: adds a line of JSON
   local name=$1 policy=$2 episodes=$3; shift 3; mkdir -p "$out/$name"
-  XLA_PYTHON_CLIENT_MEM_FRACTION=0.1 timeout 200 python3 -m ig2mj evaluate "$policy" --episodes "$episodes" --worlds 500 \
+  XLA_PYTHON_CLIENT_MEM_FRACTION=0.1 timeout 200 python3 -m ig2mj evaluate "$policy" --episodes "$episodes" --worlds "${EVAL_WORLDS:-500}" \
     --engine "$engine" --json "$@" >> "$out/$name/evaluations.jsonl" 2>> "$out/$name/log.txt"
 }
 
