@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import random
+import types
 
+from ig2mj.engine.warp.patches import scratch
 from ig2mj.engine.warp.patches.scratch import ALIGNMENT, Arena, Counter
 
 
@@ -51,3 +53,13 @@ def test_the_most_that_is_held_at_a_time_is_counted():
     counter.allocate(70)
     counter.allocate(50)
     assert counter.most == 120 and counter.arrays == 3
+
+
+def test_a_block_may_be_larger_than_arrays_of_warp_and_is_taken_once(monkeypatch):
+    monkeypatch.setattr(scratch, "_arenas", {})
+    taken = []
+    allocator = types.SimpleNamespace(allocate=lambda size: taken.append(size) or 1 << 20)
+    device = types.SimpleNamespace(alias="cuda:0", default_allocator=allocator, get_allocator=lambda: allocator)
+    for size in (5 << 30, 3 << 30, 5 << 30, 9 << 30):
+        scratch.reserve(device, size)
+    assert taken == [5 << 30, 9 << 30]

@@ -89,27 +89,24 @@ class Counter:
         self._allocator.deallocate(ptr, size_in_bytes)
 
 
-_blocks: dict[str, list[tuple[wp.array, Arena]]] = {}
+_arenas: dict[str, tuple[int, Arena]] = {}
 _lock = threading.Lock()
 
 
 def reserve(device: Any, size: int) -> None:
     """Makes sure that a CUDA device has a block of so many bytes. Smaller ones stay: captured graphs use them."""
     with _lock:
-        blocks = _blocks.setdefault(device.alias, [])
-        if not blocks or blocks[-1][0].size < size:
-            block = wp.empty(int(size), dtype=wp.uint8, device=device)  # pyright: ignore[reportArgumentType]
-            assert block.ptr is not None
-            blocks.append((block, Arena(block.ptr, int(size), device.get_allocator())))
+        if _arenas.get(device.alias, (0, None))[0] < size:
+            start = device.default_allocator.allocate(size)  # which waits, so that any stream may use it
+            _arenas[device.alias] = size, Arena(start, size, device.get_allocator())
 
 
 @contextlib.contextmanager
 def used() -> Iterator[None]:
     """Inside the block arrays of the present device are made in its block of memory, if it has one."""
     device = wp.get_device()
-    blocks = _blocks.get(device.alias)
-    if not blocks:
+    if device.alias not in _arenas:
         yield
         return
-    with wp.ScopedAllocator(device, blocks[-1][1]):
+    with wp.ScopedAllocator(device, _arenas[device.alias][1]):
         yield
