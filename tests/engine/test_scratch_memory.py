@@ -1,11 +1,19 @@
-"""Places in a block of memory do not overlap, are given back, and what does not fit is allocated elsewhere."""
+"""Places in a block of memory do not overlap, are given back, and what does not fit is allocated elsewhere; steps find
+in them what they wrote themselves."""
 
 from __future__ import annotations
 
+import ctypes
 import random
 import types
 
-from ig2mj.engine.warp.patches import scratch
+import mujoco
+import numpy as np
+import pytest
+import warp as wp
+from mujoco.mjx.third_party import mujoco_warp
+
+from ig2mj.engine.warp.patches import awake_kernels, pins, scratch
 from ig2mj.engine.warp.patches.scratch import ALIGNMENT, Arena, Counter
 
 
@@ -63,3 +71,57 @@ def test_a_block_may_be_larger_than_arrays_of_warp_and_is_taken_once(monkeypatch
     for size in (5 << 30, 3 << 30, 5 << 30, 9 << 30):
         scratch.reserve(device, size)
     assert taken == [5 << 30, 9 << 30]
+
+
+class Poisoned(Arena):
+    """What is taken, and what is given back, holds no numbers. The memory is its own."""
+
+    def __init__(self, size: int):
+        self._block = ctypes.create_string_buffer(size + ALIGNMENT)
+        super().__init__(-(-ctypes.addressof(self._block) // ALIGNMENT) * ALIGNMENT, size, None)
+
+    def allocate(self, size_in_bytes: int) -> int:
+        place = super().allocate(size_in_bytes)
+        ctypes.memset(place, 0xFF, self._taken[place])
+        return place
+
+    def deallocate(self, ptr: int, size_in_bytes: int) -> None:
+        ctypes.memset(ptr, 0xFF, self._taken[ptr])
+        super().deallocate(ptr, size_in_bytes)
+
+
+GEOMS = ("type='box' size='.04 .03 .03'", "type='mesh' mesh='wedge'", "type='capsule' size='.02 .04'")
+BODIES = "".join(
+    f'<body pos="{0.08 * (k % 3)} {0.05 * (k % 2)} {0.1 + 0.09 * k}" euler="{20 * k} {35 * k} 0"><freejoint/>'
+    f"<geom {GEOMS[k % 3]}/></body>"
+    for k in range(9)
+)
+SCENE = f"""<mujoco><option timestep="0.00833333" integrator="implicitfast"><flag sleep="enable"/></option>
+<asset><mesh name="wedge" vertex="-.05 -.04 -.03 .05 -.04 -.03 -.05 .04 -.03 .05 .04 -.03 -.05 0 .04 .05 0 .04"/>
+</asset><worldbody><geom type="box" size="1 1 0.05" pos="0 0 -0.05"/>{BODIES}</worldbody></mujoco>"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(pins.mismatches()), reason="our kernels do not fit")
+def test_steps_need_nothing_of_what_was_in_their_memory_before(monkeypatch):
+    from ig2mj.engine.warp.patches import branches
+
+    monkeypatch.setattr(branches, "ON_PROCESSORS", True)
+    model, device = mujoco.MjModel.from_xml_string(SCENE), wp.get_device("cpu")
+
+    def after(steps: int, arena: Arena | None) -> np.ndarray:
+        put = mujoco_warp.put_model(model)
+        put.opt.warn_overflow = 0
+        data = mujoco_warp.put_data(
+            model, mujoco.MjData(model), nworld=2, naconmax=400, naccdmax=200, njmax=300, nvmax=model.nv
+        )
+        with monkeypatch.context() as patch, awake_kernels(), wp.ScopedDevice(device):
+            if arena:
+                patch.setattr(device, "get_allocator", lambda pinned=False: arena)
+            for _ in range(steps):
+                mujoco_warp.step(put, data)
+        return data.qpos.numpy()
+
+    expected = after(60, None)
+    assert abs(expected - model.qpos0).max() > 0.1 and np.isfinite(expected).all()
+    assert np.array_equal(after(60, Poisoned(64 << 20)), expected)

@@ -92,18 +92,23 @@ class WarpEngine(MjxEngine):
         if initial is None and not holds_everything(self.profile, scene.model):
             initial = settle(scene)
         super().__init__(scene, num_worlds, initial=initial, **options)
-        self.serve([own_device()])
-        if compile_beforehand and own_device().platform == "gpu":  # on processors only some tests make steps
-            loading = kernels.load_meanwhile(self.launches())
-            if compile_beforehand != "meanwhile":
-                loading.result()
+        self._scratch = 0
+        if own_device().platform == "gpu":  # on processors only some tests make steps
+            device = wp.device_from_jax(own_device())
+            counter = scratch.Counter(device.get_allocator())
+            with wp.ScopedDevice(device):
+                launches = self.launches(counter)
+            self._scratch = counter.block(num_worlds) if self.own_kernels else 0
+            self.serve([own_device()])
+            if compile_beforehand:
+                loading = kernels.load_meanwhile(launches)
+                if compile_beforehand != "meanwhile":
+                    loading.result()
 
     def serve(self, devices: Sequence[Any]) -> None:
         """See `Engine.serve`: takes the memory that steps need (`ig2mj.engine.warp.patches.scratch`)."""
-        for device in devices if self.own_kernels else ():
-            if device.platform == "gpu":
-                on = wp.device_from_jax(device)
-                scratch.reserve(on, kernels.scratch_of_step(self.host_model, self.profile, self.num_worlds, on))
+        for device in devices if self._scratch else ():
+            scratch.reserve(wp.device_from_jax(device), self._scratch)
 
     def load_kernels(self, workers: int | None = None) -> int:
         """Compiles and loads the kernels of a step side by side; how many modules they are.
@@ -113,10 +118,10 @@ class WarpEngine(MjxEngine):
         """
         return kernels.load(self.launches(), workers=workers)
 
-    def launches(self) -> list[kernels.Launch]:
-        """The kernels of a step, of a forward pass and of the contact filter."""
+    def launches(self, counter: scratch.Counter | None = None) -> list[kernels.Launch]:
+        """The kernels of a step, of a forward pass and of the contact filter. `counter`: see `launches_of_step`."""
         warns = int(self.model.opt._impl.warn_overflow)
-        found = kernels.launches_of_step(self.host_model, self.profile, self.own_kernels, warns)
+        found = kernels.launches_of_step(self.host_model, self.profile, self.own_kernels, warns, counter)
         if self._filters and len(self.tables.hand_body):
             found.append((DROP, 256))  # pyright: ignore[reportArgumentType]
         return found

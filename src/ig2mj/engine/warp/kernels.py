@@ -80,37 +80,24 @@ def launches_of(act: Callable[[], Any]) -> list[Launch]:
     return list(found)
 
 
-def launches_of_step(model: mujoco.MjModel, profile: EngineProfile, own: bool, warns: int = 0) -> list[Launch]:
+def launches_of_step(
+    model: mujoco.MjModel,
+    profile: EngineProfile,
+    own: bool,
+    warns: int = 0,
+    counter: scratch.Counter | None = None,
+) -> list[Launch]:
     """The kernels of a step and of a forward pass of one world.
 
     Args:
       profile: buffer sizes; some kernels are compiled for them. own: with our functions in place of some of MuJoCo
         Warp's (`ig2mj.engine.warp.patches`). warns: the engine's `opt.warn_overflow`.
+      counter: of the memory that they need besides, on a CUDA device, the present one.
     """
     act = _step_of_one_world(model, profile, warns)
-    with patches.engine_kernels() if own else patches.upstream_kernels():
+    counted = wp.ScopedAllocator(wp.get_device(), counter) if counter else contextlib.nullcontext()
+    with patches.engine_kernels() if own else patches.upstream_kernels(), counted:
         return launches_of(act)
-
-
-def scratch_of_step(model: mujoco.MjModel, profile: EngineProfile, num_worlds: int, device: Any) -> int:
-    """Bytes for the arrays that a step of our functions makes, at most at a time.
-
-    Measured with one world, without launching anything; nearly all arrays are as long as there are worlds.
-
-    Args:
-      profile: buffer sizes, for this number of worlds. device: Warp's, on which memory for one world is taken.
-    """
-    counter = scratch.Counter(device.get_allocator())
-    with wp.ScopedDevice(device):
-        act = _step_of_one_world(model, profile, 0)
-
-        def counted() -> None:
-            with wp.ScopedAllocator(device, counter):
-                act()
-
-        with patches.engine_kernels():
-            launches_of(counted)
-    return int(scratch.ROOM * counter.most * num_worlds) + scratch.ALIGNMENT * counter.arrays
 
 
 def _step_of_one_world(model: mujoco.MjModel, profile: EngineProfile, warns: int) -> Callable[[], None]:

@@ -19,6 +19,7 @@ these in their place; results are the same up to rounding:
 - One thread of each world puts its trees to sleep, one after the other (`sleeping`).
 - Gravity compensation is launched for every (world, body, degree of freedom). Here it is for every (world, body).
 - Islands get a numbering that nobody reads (`spared`).
+- Each captured CUDA graph has memory of its own for a step's arrays. Here they lie in one block (`scratch`).
 - The velocity stage runs again at the end of a step with sleep, only to renew derived quantities (`cvel`,
   `qfrc_bias`) that the next step computes anew from positions and velocities. Here they are those of the step's
   beginning, as they are without sleep.

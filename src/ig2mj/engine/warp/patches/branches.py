@@ -67,13 +67,13 @@ def convex_narrowphase(m: Any, d: Any, ctx: Any, collision_table: Any) -> None:
 
 def narrowphase(m: Any, d: Any, ctx: Any) -> None:
     """As upstream; other pairs are looked at beside the convex ones, on the stream that was there."""
-    _here.kept, _here.used = [], []
+    _here.kept, _here.used, _here.calls = [], [], []
     try:
         original(collision_driver, "_narrowphase")(m, d, ctx)
         for stream in dict.fromkeys(_here.used):
             d.geom_xpos.device.stream.wait_stream(stream)
     finally:
-        _here.kept, _here.used = [], []
+        _here.kept, _here.used, _here.calls = [], [], []
 
 
 def _calls(m: Any, d: Any, ctx: Any, collision_table: Any) -> list[dict[str, Any]]:

@@ -70,7 +70,7 @@ class Arena:
 
 
 class Counter:
-    """Another allocator, which counts the most bytes that were allocated at a time."""
+    """Another allocator, which counts the most bytes that were allocated at a time: how large a block must be."""
 
     deallocate_requires_context_guard = True
 
@@ -87,6 +87,10 @@ class Counter:
         """As the other."""
         self._now -= size_in_bytes
         self._allocator.deallocate(ptr, size_in_bytes)
+
+    def block(self, worlds: int) -> int:
+        """Bytes for so many worlds, where one was counted; nearly all arrays are as long as there are worlds."""
+        return int(ROOM * self.most * worlds) + ALIGNMENT * self.arrays
 
 
 _arenas: dict[str, tuple[int, Arena]] = {}
