@@ -150,7 +150,7 @@ def test_a_node_without_the_files_or_with_another_version_is_told_before_any_wor
         file = tmp_path / "scene.xml"
         file.write_text("here")
         other = Work(wanted.function, "", wanted.pieces, check=("piece_functions:node_files", {"path": str(file)}))
-        monkeypatch.setattr(ray_nodes, "told", lambda check: "what this machine has")
+        monkeypatch.setattr(ray_nodes, "digest_seen", lambda check: "what this machine has")
         with pytest.raises(ClusterError, match=r"node .* has other files than this machine"):
             run(other, Where(cluster=joined.address))
         gone = Work(wanted.function, "", wanted.pieces, check=("piece_functions:node_files", {"path": "/no/such"}))

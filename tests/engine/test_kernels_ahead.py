@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pathlib
+import types
 
 import pytest
 import warp as wp
@@ -26,6 +27,30 @@ def test_kernels_of_a_step_become_programs_of_a_gpu(tiny_home, tmp_path, monkeyp
     assert set(made) == {f"{k.module.get_module_identifier(b)}.sm90.cubin" for k, b in two}
     ahead.compile_for(two, 90, workers=1)
     assert made == {p.name: p.stat().st_mtime_ns for p in pathlib.Path(tmp_path).rglob("*.sm90.cubin")}
+
+
+@pytest.mark.slow
+def test_no_kernel_waits_for_a_tile_while_it_is_written(tiny_home, tmp_path, monkeypatch):
+    from warp._src import build
+
+    made, base = [], build._build_lto_base
+
+    def noted(symbol, compile_it, builder, *rest):
+        def compile_now(paths):
+            made.append((symbol, isinstance(builder, types.SimpleNamespace)))
+            return compile_it(paths)
+
+        return base(symbol, compile_now, builder, *rest)
+
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path))
+    monkeypatch.setattr(build, "_build_lto_base", noted)
+    monkeypatch.setattr(build, "build_cuda", lambda source, arch, out, *a, **k: pathlib.Path(out).touch())
+    there = ahead.launches_on_gpu(WarpEngine(tiny_home, 2))
+    called = [launch for launch in there if launch[0].key.startswith("_loop_kernel")]
+    called += [launch for launch in there if "actorize" in launch[0].key and launch not in called]
+    assert len(called) > 3
+    ahead.compile_for(called, 90, workers=2)
+    assert len(made) > 6 and all(beforehand for _, beforehand in made)
 
 
 def test_kernels_are_chosen_as_on_a_gpu():

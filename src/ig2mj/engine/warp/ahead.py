@@ -10,7 +10,7 @@ from typing import Any
 
 import warp as wp
 
-from ig2mj.engine.warp import kernels
+from ig2mj.engine.warp import kernels, tiles
 from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.errors import EngineError
@@ -76,5 +76,5 @@ def compile_for(launches: list[kernels.Launch], architecture: int, workers: int 
         finally:
             module.options["block_dim"] = usual
 
-    kernels.side_by_side(by_size, compile_module, workers)
+    kernels.side_by_side(by_size, compile_module, workers, tiles.builder(kernels.not_made(launches), architecture))
     return sum(map(len, by_size.values()))

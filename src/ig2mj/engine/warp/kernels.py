@@ -22,7 +22,7 @@ import warp as wp
 from mujoco.mjx.third_party import mujoco_warp
 from mujoco.mjx.warp import ffi
 
-from ig2mj.engine.warp import patches
+from ig2mj.engine.warp import patches, tiles
 from ig2mj.engine.warp.patches import scratch
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile
@@ -151,9 +151,13 @@ def load_meanwhile(
 
     done: concurrent.futures.Future[int] = concurrent.futures.Future()
 
+    first = None
+    if on.is_cuda:
+        first = tiles.builder(not_made(launches), on.get_cuda_output_arch())  # pyright: ignore[reportAttributeAccessIssue]
+
     def load_all() -> None:
         try:
-            side_by_side(by_size, load_module, workers)
+            side_by_side(by_size, load_module, workers, first)
         except BaseException as failure:
             done.set_exception(failure)
         else:
@@ -167,21 +171,35 @@ def load_meanwhile(
 
 
 def side_by_side(
-    by_size: dict[int, list[wp.Module]], act: Callable[[wp.Module, list[int]], None], workers: int | None
+    by_size: dict[int, list[wp.Module]],
+    act: Callable[[wp.Module, list[int]], None],
+    workers: int | None,
+    first: Callable[[], None] | None = None,
 ) -> None:
     """Calls `act` for each module with its sizes of blocks, in so many threads (None: one for each processor).
 
-    The longest come first: kernels of convex pairs, which take half a minute each, then others with blocks of their own
-    size (factorisations).
+    The longest come first: kernels of convex pairs, which take half a minute each. Modules with blocks of their own
+    size (factorisations) come last, when `first` has ended, which is called beside the others.
     """
     sizes: dict[wp.Module, list[int]] = {}
     for size, modules in by_size.items():
         for module in modules:
             sizes.setdefault(module, []).append(size)
-    order = sorted(sizes, key=lambda module: ("_ccd_" not in module.name, sizes[module] == [DEFAULT_BLOCK]))
+    convex = [module for module in sizes if "_ccd_" in module.name]
+    plain = [module for module in sizes if module not in convex and sizes[module] == [DEFAULT_BLOCK]]
+    last = [module for module in sizes if module not in convex and module not in plain]
     with alone(), concurrent.futures.ThreadPoolExecutor(workers or len(os.sched_getaffinity(0))) as pool:
-        for done in [pool.submit(act, module, sizes[module]) for module in order]:
+        before = [pool.submit(first)] if first else []
+        jobs = [pool.submit(act, module, sizes[module]) for module in convex + plain]
+        concurrent.futures.wait(before)
+        for done in before + jobs + [pool.submit(act, module, sizes[module]) for module in last]:
             done.result()
+
+
+def not_made(launches: list[Launch]) -> list[Launch]:
+    """Those whose module is not in Warp's cache, for whatever GPU; after `modules_of`."""
+    folder = pathlib.Path(wp.config.kernel_cache_dir or "")
+    return [launch for launch in launches if not (folder / launch[0].module.get_module_identifier(launch[1])).is_dir()]
 
 
 def modules_of(launches: list[Launch], one_thread: bool = False) -> dict[int, list[wp.Module]]:
