@@ -10,14 +10,14 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-import optax
 from flax import struct
 from jaxtyping import Float, Int, UInt8
 
 from ig2mj.engine.view import Array
+from ig2mj.learn.adam import averaged_adam
 from ig2mj.learn.heads import label_loss, likeliest
 from ig2mj.learn.hidden import guess_loss
-from ig2mj.learn.moments import Moments, average
+from ig2mj.learn.moments import Moments
 from ig2mj.learn.networks import Actor, shifted
 from ig2mj.learn.perception import Perception, Seen, blank
 
@@ -83,7 +83,7 @@ class Imitation:
         shape = perception.picture_shape
         self.actor = Actor(action_size, config.actor, shape, config.net, guess, config.choices)
         self._perception, self._weight, self._shift, self._axis = perception, config.guess, config.shift, axis
-        self._adam = optax.chain(optax.clip_by_global_norm(10.0), optax.flatten(optax.scale_by_adam()))
+        self._adam = averaged_adam(10.0, axis)
 
     def init(self, key: Array) -> tuple[Any, Any]:
         """Parameters and the optimiser's state, untrained."""
@@ -114,6 +114,6 @@ class Imitation:
     ) -> tuple[Any, dict[str, Array]]:
         """One update of a learner that has `actor`, `opt`, `moments` and `updates`."""
         slope, found = jax.grad(self.loss, has_aux=True)(learner.actor, learner.moments, seen, label, key)
-        step, opt = self._adam.update(average(slope, self._axis), learner.opt)
+        step, opt = self._adam.update(slope, learner.opt)
         actor = jax.tree.map(lambda a, s: a - rate * s, learner.actor, step)
         return dataclasses.replace(learner, actor=actor, opt=opt, updates=learner.updates + 1), found

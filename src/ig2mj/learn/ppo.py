@@ -17,11 +17,11 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-import optax
 from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
+from ig2mj.learn.adam import averaged_adam
 from ig2mj.learn.collect import Advice, Transition, if_ready
 from ig2mj.learn.hidden import guess_loss
 from ig2mj.learn.moments import Moments, RewardScale, average
@@ -101,7 +101,7 @@ class PPO:
         guess = perception.hidden.size if perception.hidden and c.guess else 0
         self.actor = Actor(action_size, c.actor, perception.picture_shape, c.net, guess)
         self.value = Value(c.critic)
-        self._adam = optax.chain(optax.clip_by_global_norm(1.0), optax.flatten(optax.scale_by_adam(eps=1e-5)))
+        self._adam = averaged_adam(1.0, axis, eps=1e-5)
 
     @property
     def length(self) -> int:
@@ -231,7 +231,7 @@ class PPO:
 
         params = learner.actor, learner.value
         slope, found = jax.grad(loss, has_aux=True)(params)
-        step, opt = self._adam.update(average(slope, self.axis), learner.opt)
+        step, opt = self._adam.update(slope, learner.opt)
         actor, value = jax.tree.map(lambda a, s: a - rate * s, params, step)
         return dataclasses.replace(learner, actor=actor, value=value, opt=opt, updates=learner.updates + 1), found
 

@@ -31,11 +31,12 @@ from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
+from ig2mj.learn.adam import averaged_adam
 from ig2mj.learn.collect import GUIDED, Advice, Hint, Transition, if_ready
 from ig2mj.learn.demos import Demos
 from ig2mj.learn.guidance import guided, share, uncounted
 from ig2mj.learn.hidden import guess_loss
-from ig2mj.learn.moments import Moments, RewardScale, average, share_of
+from ig2mj.learn.moments import Moments, RewardScale, share_of
 from ig2mj.learn.networks import Actor, projected, shifted, twins
 from ig2mj.learn.perception import Perception, Seen, blank
 from ig2mj.learn.replay import Replay, Sample
@@ -160,8 +161,7 @@ class SAC:
         self.critic = twins(c.atoms, c.critic)
         self._support = jnp.linspace(-c.largest, c.largest, c.atoms)
         self._entropy = 0.5 * action_size * math.log(2 * math.pi * math.e * c.std**2)
-        # Adam over one long list of numbers: one kernel of a GPU instead of one for every layer
-        self._adam = optax.chain(optax.clip_by_global_norm(10.0), optax.flatten(optax.scale_by_adam()))
+        self._adam = averaged_adam(10.0, axis)
 
     @property
     def length(self) -> int:
@@ -312,7 +312,7 @@ class SAC:
             (loss, q), slope = jax.value_and_grad(self._critic_loss, has_aux=True)(
                 params, target, learner.moments, alpha, *part
             )
-            step, opt = self._adam.update(average(slope, self.axis), opt)
+            step, opt = self._adam.update(slope, opt)
             params = jax.tree.map(lambda p, s: p - rate * s, params, step)
             target = jax.tree.map(lambda t, p: t + c.tau * (p - t), target, params)
             return (params, target, opt), {"critic_loss": loss, "q": q}
@@ -385,9 +385,9 @@ class SAC:
             return total, found
 
         (total, found), slope = jax.value_and_grad(loss, has_aux=True)(learner.actor)
-        step, actor_opt = self._adam.update(average(slope, self.axis), learner.actor_opt)
+        step, actor_opt = self._adam.update(slope, learner.actor_opt)
         actor = jax.tree.map(lambda a, s: a - rate * s, learner.actor, step)
-        lack = average(found["entropy"] - self._entropy, self.axis)  # more entropy than wanted lowers its weight
+        lack = found["entropy"] - self._entropy  # more entropy than wanted lowers its weight
         step, alpha_opt = self._adam.update(lack, learner.alpha_opt)
         learner = dataclasses.replace(
             learner,

@@ -1,0 +1,28 @@
+"""Adam over one long list of numbers, with gradients that are averaged over the devices.
+
+All arrays of a gradient become one before anything else is done with them. One exchange between the devices and one
+kernel of a GPU then serve what would be one for every layer, on one device as on several.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import optax
+
+from ig2mj.learn.moments import average
+
+
+def averaged_adam(largest: float, axis: str | None = None, eps: float = 1e-8) -> optax.GradientTransformation:
+    """Adam's steps, to be multiplied with the rate and subtracted.
+
+    Args:
+      largest: norm that an averaged gradient is cut down to. axis: of devices, whose own gradients `update` is given;
+        None: there is one device. eps: Adam's.
+    """
+    clip = optax.clip_by_global_norm(largest)
+
+    def shared(slope: Any, _: Any) -> Any:
+        return clip.update(average(slope, axis), optax.EmptyState())[0]
+
+    return optax.flatten(optax.chain(optax.stateless(shared), optax.scale_by_adam(eps=eps)))
