@@ -1,11 +1,11 @@
 """Where an update's time goes on one GPU and on several, from what `scaling.py --kernels DIR` wrote.
 
-    python benchmarks/learner_kernels.py DIR/learner-1-0.json DIR/learner-2-0.json DIR/learner-2-1.json [--longest 20]
+    python benchmarks/learner_kernels.py DIR/learner-1-apart-0.json DIR/learner-2-processes-0.json [...] [--longest 20]
 
-Milliseconds of an update, its share of the worlds' steps with it, by kind of kernel, and what is between kernels. A
-collective waits for the other GPUs: at its shortest it took what it takes, the rest is waiting. Then the kernels whose
-times differ most between the first file and the others. Kernels run side by side in places, so that kinds may add up to
-more than `busy`.
+Milliseconds of an update by kind of kernel, and what is between kernels; the worlds' steps are not in it. A collective
+waits for the other GPUs: at its shortest it took what it takes, the rest is waiting. Then the kernels whose times
+differ most between the first file and the others. Kernels run side by side in places, so that kinds may add up to more
+than `busy`.
 """
 
 from __future__ import annotations

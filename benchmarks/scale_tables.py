@@ -43,11 +43,11 @@ def speeds() -> dict[str, float]:
     for row in lines(RESULTS / "environments" / "h200.jsonl"):
         name = "environment_pictures" if row["observations"] else "environment"
         found[name] = max(found.get(name, 0.0), row["agent_steps_per_s"])
-    for row in lines(RESULTS / "scaling" / "rows.jsonl"):  # the newest of a GPU at work alone
-        if row["gpus"] == 1 and "gpu" not in row and row.get("counts"):
+    for row in runs(RESULTS / "scaling" / "rows.jsonl"):  # the newest of a GPU at work alone
+        if row["gpus"] == 1 and "gpu" not in row:
             found[row["case"]] = row["steps_per_s"]
             found["updates"] = row.get("updates_per_s", found.get("updates"))
-        if row["gpus"] == 2 and row["case"] == "learner" and row.get("counts"):
+        if row["gpus"] == 2 and row["case"] == "learner":
             found["updates_of_two"] = row["updates_per_s"]
     return found
 
@@ -73,6 +73,11 @@ def memory() -> list[tuple[str, int, float]]:
     return found
 
 
+def runs(file: pathlib.Path) -> list[dict[str, Any]]:
+    """Rows of `scaling.py` that count, of learners those in which each GPU has a process and XLA its own options."""
+    return [row for row in lines(file) if row.get("counts") and row.get("way", "processes") == "processes"]
+
+
 def lines(file: pathlib.Path) -> list[dict[str, Any]]:
     """Rows of a file of JSON lines; none where it is not there."""
     return [json.loads(line) for line in file.read_text().splitlines() if line] if file.exists() else []
@@ -82,8 +87,8 @@ def scaling() -> dict[str, dict[int, tuple[float, str]]]:
     """Measured weak scaling: case -> GPUs -> (of one, device; where it was measured also the share of the speeds
     that each of these GPUs has alone)."""
     found: dict[str, dict[int, tuple[float, str]]] = {}
-    for row in lines(RESULTS / "scaling" / "rows.jsonl"):
-        if row.get("counts") and row.get("weak_scaling") and row.get("of") == 1:
+    for row in runs(RESULTS / "scaling" / "rows.jsonl"):
+        if row.get("weak_scaling") and row.get("of") == 1:
             share = f", {100 * row['of_these_gpus_alone']:.0f} % of each alone" if "of_these_gpus_alone" in row else ""
             found.setdefault(row["case"], {})[row["gpus"]] = (row["weak_scaling"], row["device"] + share)
     two = json.loads((RESULTS / "multi_gpu" / "result.json").read_text())

@@ -1,7 +1,7 @@
 """Weak scaling over the GPUs of one host: the same work on each of 1, 2, 4, ... GPUs, against one GPU of that machine.
 
     python benchmarks/scaling.py --gpus 1 2 4 [--cases made_60 birch_pictures learner] [--seconds 8] [--rows FILE]
-    python benchmarks/scaling.py --gpus 1 2 --cases learner --kernels DIR     and what runs on each GPU in an update
+    python benchmarks/scaling.py --gpus 1 2 --cases learner --ways processes graphs together --kernels DIR
 
 | case | a GPU's share |
 |---|---|
@@ -10,15 +10,19 @@
 | `learner` | learner with simulator: CookingMeat from pixels, SAC, 2,048 worlds, 1,024 samples of an update |
 
 One process for each GPU. Worlds do not talk to each other, so that the processes of the simulator only begin together;
-those of a learner average gradients by one collective program (`ig2mj.learn.iteration`). Everything is made ready side
-by side, then measured one after the other while the rest waits. A speed is all the work over the slowest process's
-time. Every row says how many worlds overflowed or lost their numbers; a row with any does not count.
+those of a learner average gradients by one collective program (`ig2mj.learn.iteration`). A learner of several GPUs can
+run in several ways (`--ways`): `processes`; `graphs`, the same with the exchange of gradients inside XLA's CUDA graphs;
+`together`, one process with all GPUs. With `--kernels` there is `apart`, too: one GPU, on which the worlds and the
+learning are two programs as they are on several. Rows of several GPUs and of `apart` tell the two's shares. Everything
+is made ready side by side, then measured one after the other while the rest waits. A speed is all the work over the
+slowest process's time. Every row says how many worlds overflowed or lost their numbers; a row with any does not count.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import json
+import os
 import pathlib
 import socket
 import sys
@@ -40,6 +44,14 @@ SLACK = 4.0
 
 Case = Literal["made_60", "birch_pictures", "learner"]
 
+Way = Literal["processes", "graphs", "together"]
+
+GRAPHS = "--xla_gpu_enable_command_buffer=+COLLECTIVES"
+"""XLA leaves collectives out of its CUDA graphs, which then end before and begin anew after each."""
+
+PROFILED = "--xla_enable_command_buffers_during_profiling=true"
+"""Without it XLA launches each kernel by itself while a profiler looks on, which is another program."""
+
 
 @dataclasses.dataclass
 class Args:
@@ -48,6 +60,8 @@ class Args:
     gpus: tuple[int, ...] = (1, 2)
     """Numbers of GPUs; the others are compared with the first, which should be 1."""
     cases: tuple[Case, ...] = ("made_60", "birch_pictures", "learner")
+    ways: tuple[Way, ...] = ("processes",)
+    """Of a learner on several GPUs; see above."""
     seconds: float = 8.0
     """Of a measurement, about."""
     limit: float = 330.0
@@ -57,8 +71,8 @@ class Args:
     logs: pathlib.Path = WORK / "scaling"
     """Folder for what the processes say on standard error."""
     kernels: pathlib.Path | None = None
-    """Folder for `learner-<GPUs>-<GPU>.json`: what ran on each GPU in ten iterations after a learner's measurement
-    (`learner_kernels.py` puts them side by side)."""
+    """Folder for `learner-<GPUs>-<way>-<process>.json`: what ran on a process's first GPU while a learner learned from
+    one rollout ten times, after all measurements (`learner_kernels.py` puts them side by side)."""
     profiles: pathlib.Path | None = None
     """Folder with `<home>/engine_profile.json`, for the simulator."""
     cpu: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
@@ -67,11 +81,19 @@ class Args:
 
 @dataclasses.dataclass
 class Group:
-    """Processes of one case: for a learner as many as GPUs, else the most that are asked for."""
+    """Processes of one case: for a learner of so many GPUs, else the most that are asked for.
+
+    `way`: of a learner whose worlds and learning are two programs; "" where they are one, and for the simulator.
+    """
 
     case: str
     processes: list[Process]
     numbers: tuple[int, ...]
+    way: str = ""
+
+    def chosen(self, number: int) -> list[Process]:
+        """The processes that so many GPUs are at work with."""
+        return self.processes if self.case == "learner" else self.processes[:number]
 
 
 def settings_of(case: str, args: Args) -> tuple[str, dict[str, Any]]:
@@ -89,26 +111,44 @@ def settings_of(case: str, args: Args) -> tuple[str, dict[str, Any]]:
     return "simulator", {**common, "profiles": str(args.profiles) if args.profiles else None}
 
 
-def start(case: str, count: int, args: Args) -> list[Process]:
-    """The processes of a group, each with a GPU of its own."""
+def start(case: str, count: int, args: Args, way: str = "") -> list[Process]:
+    """The processes of a group, each with a GPU of its own; `together`: one with all of them."""
     word, settings = settings_of(case, args)
+    together = way == "together"
+    flags = os.environ.get("XLA_FLAGS", "").split()
+    flags += [GRAPHS] if way == "graphs" else []
+    flags += [PROFILED] if args.kernels is not None and word == "learner" and not args.cpu else []
+    flags += [f"--xla_force_host_platform_device_count={count}"] if together and args.cpu else []
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     found = []
-    for k in range(count):
+    for k in range(1 if together else count):
         environment = {
             "XLA_PYTHON_CLIENT_PREALLOCATE": "false",
-            "CUDA_VISIBLE_DEVICES": str(k),
+            "XLA_FLAGS": " ".join(flags),
+            "CUDA_VISIBLE_DEVICES": ",".join(map(str, range(count))) if together else str(k),
             "PYTHONFAULTHANDLER": "1",
         }
         if args.cpu:
             environment["JAX_PLATFORMS"] = "cpu"
-        if word == "learner" and count > 1:
+        if word == "learner" and count > 1 and not together:
             environment["JAX_COORDINATOR_ADDRESS"] = f"127.0.0.1:{port}"
             environment["JAX_NUM_PROCESSES"], environment["JAX_PROCESS_ID"] = str(count), str(k)
-        words = [str(HERE / "scaling_worker.py"), word, json.dumps(settings)]
-        found.append(Process(words, args.logs / f"{case}-{count}-{k}.log", environment))
+        words = [str(HERE / "scaling_worker.py"), word, json.dumps({**settings, "apart": way == "apart"})]
+        found.append(Process(words, args.logs / f"{name_of(case, count, way)}-{k}.log", environment))
     return found
+
+
+def name_of(case: str, gpus: int, way: str) -> str:
+    """Of a group's files."""
+    return f"{case}-{gpus}-{way}" if way else f"{case}-{gpus}"
+
+
+def ways_of(gpus: int, args: Args) -> tuple[str, ...]:
+    """How a learner is to run on so many GPUs."""
+    if gpus > 1:
+        return args.ways
+    return ("", "apart") if args.kernels is not None else ("",)
 
 
 def groups(args: Args) -> list[Group]:
@@ -116,16 +156,17 @@ def groups(args: Args) -> list[Group]:
     made = []
     for case in args.cases:
         if case == "learner":
-            made += [Group(case, start(case, n, args), (n,)) for n in args.gpus]
+            made += [Group(case, start(case, n, args, way), (n,), way) for n in args.gpus for way in ways_of(n, args)]
         else:
             made.append(Group(case, start(case, max(args.gpus), args), args.gpus))
     return made
 
 
 def measure(group: Group, number: int, args: Args, until: float) -> dict[str, Any]:
-    """One row: the first `number` processes of a group at the same time. `until`: then it is given up."""
-    chosen = group.processes[:number]
+    """One row: a group's processes of `number` GPUs at the same time. `until`: then it is given up."""
+    chosen = group.chosen(number)
     row: dict[str, Any] = {"case": group.case, "gpus": number, "of": args.gpus[0]}
+    row |= {"way": group.way} if group.way else {}
     late = [p for p in chosen if p.ready is None]
     if late:
         return {**row, "counts": False, "error": f"not ready, {late[0].trouble()}"}
@@ -135,7 +176,7 @@ def measure(group: Group, number: int, args: Args, until: float) -> dict[str, An
         process.tell({"seconds": args.seconds})
     done = [process.hear("DONE", until) for process in chosen]
     answers = [d for d in done if d is not None]
-    if len(answers) < number:
+    if len(answers) < len(chosen):
         silent = next(p for p, d in zip(chosen, done, strict=True) if d is None)
         return {**row, "counts": False, "error": f"no answer, {silent.trouble()}"}
     seconds = max(d["seconds"] for d in answers)
@@ -151,17 +192,21 @@ def measure(group: Group, number: int, args: Args, until: float) -> dict[str, An
     }
     if "updates" in answers[0]:
         row["updates_per_s"] = round(answers[0]["updates"] / seconds, 2)
+    if "worlds_seconds" in answers[0]:
+        share, updates = max(d["worlds_seconds"] for d in answers), answers[0]["updates"]
+        row["worlds_ms_per_update"] = round(1e3 * share / updates, 3)
+        row["learning_ms_per_update"] = round(1e3 * (seconds - share) / updates, 3)
     return row
 
 
 def list_kernels(group: Group, folder: pathlib.Path, until: float) -> None:
-    """Ten more iterations of a learner, whose processes write what runs on their GPUs."""
+    """A learner learns some more, and its processes write what runs on their GPUs."""
+    name = name_of(group.case, group.numbers[0], group.way)
     for k, process in enumerate(group.processes):
-        file = folder.resolve() / f"{group.case}-{len(group.processes)}-{k}.json"
-        process.tell({"kernels": str(file)})
+        process.tell({"kernels": str(folder.resolve() / f"{name}-{k}.json")})
     for k, process in enumerate(group.processes):
         if process.hear("DONE", until) is None:
-            print(f"no kernels of GPU {k}: {process.trouble()}", file=sys.stderr)
+            print(f"no kernels of {name}, process {k}: {process.trouble()}", file=sys.stderr)
 
 
 def others(group: Group) -> list[Process]:
@@ -178,7 +223,7 @@ def measure_group(group: Group, args: Args, until: float, alone: dict[int, float
 
     def one(chosen: Group, number: int, **more: Any) -> dict[str, Any]:
         row = measure(chosen, number, args, min(until, time.monotonic() + 5 * args.seconds + 20.0)) | more
-        if number == args.gpus[0] and row["counts"]:
+        if number == args.gpus[0] and row["counts"] and chosen.way in ("", args.ways[0]):
             alone[more.get("gpu", 0)] = row["steps_per_s"] / number
         if "steps_per_s" in row and "gpu" not in row:
             if 0 in alone:
@@ -189,9 +234,7 @@ def measure_group(group: Group, args: Args, until: float, alone: dict[int, float
         return row
 
     for number in group.numbers:
-        row = one(group, number)
-        if args.kernels is not None and group.case == "learner" and "steps_per_s" in row:
-            list_kernels(group, args.kernels, min(until, time.monotonic() + PROFILE_SECONDS))
+        one(group, number)
         if number == 1:
             for k, process in enumerate(others(group), 1):
                 one(Group(group.case, [process], (1,)), 1, gpu=k)
@@ -215,6 +258,9 @@ def main(args: Args) -> None:
         alone: dict[str, dict[int, float]] = {}
         for group in made:
             measure_group(group, args, until, alone.setdefault(group.case, {}))
+        for group in made:
+            if args.kernels is not None and group.way and all(p.ready is not None for p in group.processes):
+                list_kernels(group, args.kernels, min(until, time.monotonic() + PROFILE_SECONDS))
     finally:
         end_all(every)
 

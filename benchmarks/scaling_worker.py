@@ -3,9 +3,9 @@
     python benchmarks/scaling_worker.py CASE '{"worlds": 8192, ...}'
 
 Says `READY {...}` on standard output; for each line `{"seconds": 8}` on standard input it answers `DONE {...}`; it ends
-with its input. For `{"kernels": FILE}` a learner makes ten more iterations, and writes what ran on its GPU. A learner
-of several processes finds the others by the variables of `ig2mj.cluster.place`; what they measure together they time
-together.
+with its input. For `{"kernels": FILE}` a learner learns from one rollout ten times, and writes what ran on its GPU. A
+learner of several processes finds the others by the variables of `ig2mj.cluster.place`; what they measure together they
+time together. It takes all GPUs that it sees.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ Measure = Callable[[float], dict[str, Any]]
 Profile = Callable[[pathlib.Path], dict[str, Any]]
 
 PROFILED = 10
-"""Iterations of a learner whose kernels are listed."""
+"""How often a learner learns while its kernels are listed."""
 
 
 def say(word: str, row: dict[str, Any]) -> None:
@@ -98,7 +98,11 @@ def simulator(settings: dict[str, Any]) -> tuple[dict[str, Any], Measure]:
 
 
 def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measure, Profile]:
-    """SAC from pixels on an environment, as `ig2mj train` runs it: on one GPU one program for all of an iteration."""
+    """SAC from pixels on an environment, as `ig2mj train` runs it: on one GPU one program for all of an iteration.
+
+    With `apart` the worlds and the learning are two programs there, too. Only such a learner can list its kernels: the
+    worlds are left out, since with them a process of two once ended under the profiler (a failed launch of a graph).
+    """
     import ig2mj
     from ig2mj.envs.registry import VECTORS
     from ig2mj.learn.algorithms import config_of, made
@@ -106,7 +110,8 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
     from ig2mj.learn.iteration import AXIS, ManyDevices, OneDevice
     from ig2mj.learn.perception import Perception
 
-    worlds, count = settings["worlds"], team.count
+    worlds, count = settings["worlds"], jax.device_count()
+    apart = count > 1 or settings["apart"]
     names = VECTORS if settings["obs"] == "state" else (*VECTORS, "rgb", "depth")
     env: Any = ig2mj.make(
         settings["env"], worlds=worlds, engine=settings["engine"], observations=names, pool_size=settings["pool_size"]
@@ -115,18 +120,18 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
         config_of("sac"), batch=settings["batch"] * count, capacity=settings["capacity"] * count
     )
     perception = Perception(env.observation_spaces, settings["obs"])
-    sac = made(config, perception, env, None, AXIS if count > 1 else None)
-    step: Any = ManyDevices(env, sac, jax.devices(), team) if count > 1 else OneDevice(env, sac)
+    sac = made(config, perception, env, None, AXIS if apart else None)
+    step: Any = ManyDevices(env, sac, jax.devices(), team) if apart else OneDevice(env, sac)
     held, memory_, key = *step.place(sac.init(jax.random.PRNGKey(0)), step.memory()), jax.random.PRNGKey(1)
     play = step.begin(0)
     parts = {name: sum(a.size for a in jax.tree.leaves(getattr(held, name))) for name in ("actor", "critic")}
     state = [held, memory_, play, key]
 
-    def one(ready: bool) -> tuple[float, dict[str, float], dict[str, float]]:
+    def one(ready: bool) -> tuple[float, dict[str, float], dict[str, float], float | None]:
         began = time.perf_counter()
         state[3], now = jax.random.split(state[3])
-        *state[:3], sums, losses, _ = step(state[0], state[1], state[2], now, 0.1, ready)
-        return time.perf_counter() - began, sums, losses
+        *state[:3], sums, losses, spent = step(state[0], state[1], state[2], now, 0.1, ready)
+        return time.perf_counter() - began, sums, losses, spent
 
     for _ in range(sac.warm_up(False)):
         one(False)
@@ -145,20 +150,23 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
         troubles = [env.metrics(p.state) for p in parts_of_play]
         return {
             "seconds": took,
-            "steps": sum(sums["steps"] for _, sums, _ in done) / count,  # every process gives the sum of all
-            "updates": sum(losses["updates"] for _, _, losses in done),
-            "finite": all(np.isfinite(list(losses.values())).all() for _, _, losses in done),
+            "steps": sum(sums["steps"] for _, sums, _, _ in done) / team.count,  # every process gives the sum of all
+            "updates": sum(losses["updates"] for _, _, losses, _ in done),
+            "finite": all(np.isfinite(list(losses.values())).all() for _, _, losses, _ in done),
+            **({"worlds_seconds": sum(spent for *_, spent in done)} if apart else {}),
             "overflow": sum(t["overflow"] for t in troubles),
             "non_finite": sum(t["not_finite"] for t in troubles),
         }
 
     def profile(file: pathlib.Path) -> dict[str, Any]:
         rounds[0] += 1
+        state[2], rollouts, sums, _ = step.play(state[0], state[2], state[3])
 
         def traced() -> None:
             team.barrier(f"traced {rounds[0]}")  # profilers do not begin at the same moment
-            for _ in range(PROFILED):
-                one(True)
+            for k in range(PROFILED):
+                key = np.asarray(jax.random.fold_in(state[3], k))
+                state[0], state[1], *_ = step.learn(state[0], state[1], rollouts, sums, key, 0.1, True)
 
         profiled_to(file, traced, PROFILED * sac.samples)
         return {"updates": PROFILED * sac.samples}

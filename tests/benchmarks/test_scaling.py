@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip("tyro")
 
+import all_reduce
 import scale_tables
 import scaling
 from waiting import Process
@@ -23,7 +24,11 @@ print("READY " + json.dumps({"device": "a device"}), flush=True)
 for line in sys.stdin:
     if about["dies"]:
         sys.exit("it died")
+    wish = json.loads(line)
+    if "kernels" in wish:
+        open(wish["kernels"], "w").close()
     row = {"seconds": 2.0, "steps": about["steps"], "overflow": about["overflow"], "non_finite": 0}
+    row |= about.get("more", {})
     print("DONE " + json.dumps(row), flush=True)
 """
 
@@ -35,11 +40,10 @@ def measured(tmp_path: pathlib.Path, monkeypatch, workers: dict[str, list[dict]]
     script = tmp_path / "worker.py"
     script.write_text(WORKER)
 
-    def start(case: str, count: int, args: scaling.Args) -> list[Process]:
-        about = workers[case if case != "learner" else f"learner-{count}"]
-        return [
-            Process([str(script), json.dumps(a)], tmp_path / f"{case}-{count}-{k}", {}) for k, a in enumerate(about)
-        ]
+    def start(case: str, count: int, args: scaling.Args, way: str = "") -> list[Process]:
+        name = "-".join([case, str(count), *([way] if way and way != "processes" else [])])
+        about = workers[case if case != "learner" else name]
+        return [Process([str(script), json.dumps(a)], tmp_path / f"{name}-{k}", {}) for k, a in enumerate(about)]
 
     monkeypatch.setattr(scaling, "start", start)
     rows = tmp_path / "rows.jsonl"
@@ -88,3 +92,30 @@ def test_a_learner_of_two_gpus_is_compared_with_that_of_one(tmp_path, monkeypatc
     workers = {"learner-1": [GOOD], "learner-2": [{**GOOD, "steps": 85}, {**GOOD, "steps": 85}]}
     rows = measured(tmp_path, monkeypatch, workers, limit=30.0)
     assert [(r["gpus"], r.get("weak_scaling")) for r in rows] == [(1, 1.0), (2, 1.7)]
+
+
+def test_ways_to_learn_on_two_gpus_are_told_apart(tmp_path, monkeypatch):
+    parts = {"updates": 4, "worlds_seconds": 1.5}
+    workers = {
+        "learner-1": [GOOD],
+        "learner-1-apart": [{**GOOD, "steps": 90, "more": parts}],
+        "learner-2": [{**GOOD, "steps": 80, "more": parts}] * 2,
+        "learner-2-together": [{**GOOD, "steps": 190, "more": parts}],
+    }
+    kernels = tmp_path / "kernels"
+    kernels.mkdir()
+    rows = measured(tmp_path, monkeypatch, workers, limit=40.0, ways=("processes", "together"), kernels=kernels)
+    shares = [(r["gpus"], r.get("way"), r["weak_scaling"], r.get("learning_ms_per_update")) for r in rows]
+    two = [(2, "processes", 1.6, 125.0), (2, "together", 1.9, 125.0)]
+    assert shares == [(1, None, 1.0, None), (1, "apart", 0.9, 125.0), *two]
+    named = {file.name for file in kernels.iterdir()}
+    assert named == {f"learner-{n}.json" for n in ("1-apart-0", "2-processes-0", "2-processes-1", "2-together-0")}
+    told = [(r["gpus"], r.get("way")) for r in scale_tables.runs(tmp_path / "rows.jsonl")]
+    assert told == [(1, None), (2, "processes")], "the tables tell what a GPU's own process does"
+
+
+def test_what_nccl_says_of_the_ways_between_gpus(tmp_path):
+    (tmp_path / "nccl-2-0").write_text("vm:1:9 [0] NCCL INFO Channel 00/0 : 0[0] -> 1[1] via SHM/direct/direct\n")
+    (tmp_path / "nccl-1-0").write_text("vm:1:9 [0] NCCL INFO Channel 23/0 : 0[0] -> 1[1] via P2P/direct pointer\n")
+    assert all_reduce.transports(tmp_path, "nccl-2-*") == ["SHM/direct/direct"]
+    assert all_reduce.transports(tmp_path, "nccl-1-*") == ["P2P/direct"]

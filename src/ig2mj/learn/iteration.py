@@ -245,7 +245,23 @@ class ManyDevices:
     ) -> tuple[Any, Any, list[Play], dict[str, float], dict[str, float], float]:
         """As `OneDevice.__call__`; `losses["clock"]` is the largest of all processes' clocks."""
         play_key, learn_key = jax.random.split(key)
-        keys = np.asarray(jax.random.split(play_key, self._count))[self._first :]
+        plays, rollouts, sums, spent = self.play(learner, plays, play_key)
+        learner, memory, sums, losses, told = self.learn(
+            learner, memory, rollouts, sums, np.asarray(learn_key), progress, ready, clock
+        )
+        losses = {**floats(losses), "clock": told}
+        return learner, memory, plays, floats(sums), losses, spent
+
+    def play(self, learner: Any, plays: list[Play], key: Array) -> tuple[list[Play], list[Any], list[Any], float]:
+        """Steps the worlds of this process's devices, of which each begins where its part of `plays` ended.
+
+        Args:
+          key: the same in every process.
+
+        Returns:
+          Where they stand now, their rollouts, the rollouts' sums (arrays [1]), and seconds.
+        """
+        keys = np.asarray(jax.random.split(key, self._count))[self._first :]
         began = time.perf_counter()
 
         if not self._collect:
@@ -253,12 +269,8 @@ class ManyDevices:
                 self._collect = self._compiled(learner, plays, keys)
         done = self._each(lambda k: jax.block_until_ready(self._collect[k](self._part(learner, k), plays[k], keys[k])))
         spent = time.perf_counter() - began
-        rollout, sums = ([one[k] for one in done] for k in (1, 2))
-        learner, memory, sums, losses, told = self.learn(
-            learner, memory, rollout, sums, np.asarray(learn_key), progress, ready, clock
-        )
-        losses = {**floats(losses), "clock": told}
-        return learner, memory, [play for play, _, _ in done], floats(sums), losses, spent
+        plays, rollouts, sums = ([one[k] for one in done] for k in range(3))
+        return plays, rollouts, sums, spent
 
     def learn(
         self,
