@@ -20,7 +20,9 @@ TARGET = '''
 platform_name: "CUDA"
 device_description_str: "NVIDIA H200"
 dnn_version_info { major: 9 minor: 12 }
+runtime_version { major: 13 }
 gpu_device_info {
+  driver_version: "13.0.0" runtime_version: "13.0.0" compile_time_toolkit_version: "13.0.0"
   cuda_compute_capability { major: 9 minor: 0 }
   threads_per_block_limit: 1024 threads_per_warp: 32 threads_per_core_limit: 2048
   shared_memory_per_block: 49152 shared_memory_per_core: 233472 shared_memory_per_block_optin: 232448
