@@ -153,7 +153,7 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
             "steps": sum(sums["steps"] for _, sums, _, _ in done) / team.count,  # every process gives the sum of all
             "updates": sum(losses["updates"] for _, _, losses, _ in done),
             "finite": all(np.isfinite(list(losses.values())).all() for _, _, losses, _ in done),
-            **({"worlds_seconds": sum(spent for *_, spent in done)} if apart else {}),
+            **({"worlds_seconds": sum(spent or 0.0 for *_, spent in done)} if apart else {}),
             "overflow": sum(t["overflow"] for t in troubles),
             "non_finite": sum(t["not_finite"] for t in troubles),
         }

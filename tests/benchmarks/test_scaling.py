@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import pathlib
+from typing import Any
 
 import pytest
 
@@ -47,7 +48,7 @@ def measured(tmp_path: pathlib.Path, monkeypatch, workers: dict[str, list[dict]]
 
     monkeypatch.setattr(scaling, "start", start)
     rows = tmp_path / "rows.jsonl"
-    cases = tuple(sorted({name.split("-")[0] for name in workers}))
+    cases: Any = tuple(sorted({name.split("-")[0] for name in workers}))
     scaling.main(scaling.Args(gpus=(1, 2), cases=cases, seconds=0.1, rows=rows, logs=tmp_path, **options))
     return [json.loads(line) for line in rows.read_text().splitlines()]
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -13,7 +15,7 @@ from ig2mj.learn.adam import averaged_adam
 SHAPES = {"bias": (3,), "kernel": (4, 3), "scale": ()}
 
 
-def gradients(devices: int) -> dict[str, jax.Array]:
+def gradients(devices: int) -> Any:
     rng = np.random.default_rng(5)
     return {name: jnp.asarray(rng.normal(size=(devices, *shape)), jnp.float32) for name, shape in SHAPES.items()}
 
@@ -22,8 +24,8 @@ def gradients(devices: int) -> dict[str, jax.Array]:
 def test_a_step_is_that_of_the_mean_gradient(largest):
     slopes = gradients(4)
     mean = jax.tree.map(lambda a: a.mean(0), slopes)
-    plain = optax.chain(optax.clip_by_global_norm(largest), optax.scale_by_adam(eps=1e-3))
-    shared = averaged_adam(largest, "devices", eps=1e-3)
+    plain: Any = optax.chain(optax.clip_by_global_norm(largest), optax.scale_by_adam(eps=1e-3))
+    shared: Any = averaged_adam(largest, "devices", eps=1e-3)
     wanted, state = plain.init(mean), shared.init(mean)
     update = jax.vmap(shared.update, in_axes=(0, None), axis_name="devices", out_axes=0)
     for _ in range(2):
@@ -32,7 +34,8 @@ def test_a_step_is_that_of_the_mean_gradient(largest):
         state = jax.tree.map(lambda a: a[0], states)
         for name in SHAPES:
             np.testing.assert_allclose(found[name], np.broadcast_to(step[name], found[name].shape), atol=1e-6)
-    alone, _ = averaged_adam(largest, eps=1e-3).update(mean, averaged_adam(largest).init(mean))
+    single: Any = averaged_adam(largest, eps=1e-3)
+    alone, _ = single.update(mean, single.init(mean))
     first, _ = plain.update(mean, plain.init(mean))
     jax.tree.map(lambda a, b: np.testing.assert_allclose(a, b, atol=1e-6), alone, first)
 
