@@ -32,6 +32,7 @@ class ViewPlan:
       tables, layout, boxes: constants of the scene.
       com_offset: [O, 3] centre of mass of the main body in its frame.
       box_slots, unit_slots: [O, S] rows of the box table, and units, of each object; -1 none. agent_slots: [A, S].
+      grasp_slots: [H * O, S] equality constraints by which each hand holds each object; -1 none.
       free: objects that are free. base_joints, hand_joints: what moves bases and hands.
       qpos_openable: [J]. camera_body, camera_pos, camera_quat: [A...] eyes in their bodies' frames.
     """
@@ -43,6 +44,7 @@ class ViewPlan:
     box_slots: np.ndarray
     unit_slots: np.ndarray
     agent_slots: np.ndarray
+    grasp_slots: np.ndarray
     free: np.ndarray
     base_joints: JointsAbove
     hand_joints: JointsAbove
@@ -64,6 +66,7 @@ def plan_view(model: mujoco.MjModel, tables: SceneTables, layout: ModelLayout, b
         box_slots=slots(boxes.owner, tables.num_objects),
         unit_slots=slots(layout.unit_object, tables.num_objects),
         agent_slots=slots(layout.unit_agent, len(tables.agent_names)),
+        grasp_slots=_grasp_slots(tables, layout),
         free=np.flatnonzero(layout.object_dofadr >= 0),
         base_joints=joints_above(model, tables.agent_body),
         hand_joints=joints_above(model, tables.hand_body),
@@ -219,9 +222,20 @@ def _any_of(values: Bool[Array, "W T"], owned: np.ndarray) -> Bool[Array, "W O"]
     return result
 
 
-def _held(plan: ViewPlan, eq_active: Bool[Array, "W E"]) -> Bool[Array, "W H O"]:
-    layout, tables = plan.layout, plan.tables
-    result = jnp.zeros((eq_active.shape[0], len(tables.hand_body), tables.num_objects), bool)
+def _grasp_slots(tables: SceneTables, layout: ModelLayout) -> np.ndarray:
+    """`ViewPlan.grasp_slots`."""
+    pair = np.asarray(layout.grasp_hand, int) * tables.num_objects + np.asarray(layout.grasp_object, int)
+    slot = slots(pair, len(tables.hand_body) * tables.num_objects)
     if not len(layout.grasp_equality):
-        return result
-    return result.at[:, layout.grasp_hand, layout.grasp_object].max(eq_active[:, layout.grasp_equality])
+        return slot
+    return np.where(slot >= 0, np.asarray(layout.grasp_equality)[slot], -1)
+
+
+def _held(plan: ViewPlan, eq_active: Bool[Array, "W E"]) -> Bool[Array, "W H O"]:
+    """A gather for each slot: where a program knows `eq_active` of all worlds beforehand, as at a start, XLA works a
+    scatter out while it compiles, one element after the other (5 s for 8,192 worlds)."""
+    worlds, tables = eq_active.shape[0], plan.tables
+    shape = worlds, len(tables.hand_body), tables.num_objects
+    if not len(plan.layout.grasp_equality):
+        return jnp.zeros(shape, bool)
+    return _any_over_slots(eq_active[:, :, None], plan.grasp_slots).reshape(shape)
