@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 import ig2mj
 from ig2mj.envs.experts import expert_of
-from ig2mj.envs.rollout import Lifts, Pace, play
+from ig2mj.envs.rollout import Lifts, Pace, play, resting
 
 
 def seen(off: list[bool], held: list[bool]) -> dict[str, np.ndarray]:
@@ -43,6 +44,14 @@ def test_the_first_step_does_not_count_in_the_pace(monkeypatch):
     for _ in range(5):
         pace.stepped(3)
     assert pace.steps_per_second() == 12 / 4
+
+
+def test_nobody_acts_in_a_world_whose_episode_is_over():
+    """Numbers of JAX stay JAX's: those that are not finite are counted there, and refused of NumPy."""
+    for xp in (np, jnp):
+        action = resting(xp.array([[0.5, np.nan], [0.5, np.nan]], xp.float32), np.array([False, True]))
+        assert isinstance(action, np.ndarray) == (xp is np)
+        assert np.array_equal(np.asarray(action), [[0, 0], [0.5, np.nan]], equal_nan=True)
 
 
 def test_of_one_hand_nothing_is_told():

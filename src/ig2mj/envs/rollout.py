@@ -10,6 +10,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 
+import jax.numpy as jnp
 import numpy as np
 
 from ig2mj.engine.view import Array
@@ -57,6 +58,7 @@ def play(
     Args:
       act: who acts. seed: of the start states that are drawn.
       in_order: begin with the rows of the environment's pool, each once; again from the first where there are fewer.
+        Where an episode is over actions are zero until all are.
       first: of these rows.
     """
     return _in_order(env, act, episodes, seed, watch, first) if in_order else _drawn(env, act, episodes, seed, watch)
@@ -96,7 +98,7 @@ def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch
         going, won, holding = np.ones(worlds, bool), np.zeros(worlds, bool), np.zeros(worlds, bool)
         running = np.zeros(worlds)
         while going.any():
-            state = env.step(state, act(state))
+            state = env.step(state, resting(act(state), going))
             _look(watch, state)
             steps += worlds
             running += np.where(going, np.asarray(state.reward), 0.0)
@@ -113,6 +115,13 @@ def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch
         total += running[:count].tolist()
     assert state is not None and lifts is not None
     return Played(success, in_hand, lifted if lifts.told else None, total, steps, pace.steps_per_second(), state)
+
+
+def resting(action: Array, going: np.ndarray) -> Array:
+    """Zeros where the episode is over. A world waits there for the others, and a policy that was trained up to the end
+    of episodes only would go on: a knife is pressed through the table with all force, until nothing is finite."""
+    where = np.where if isinstance(action, np.ndarray) else jnp.where
+    return where(going[:, None], action, np.float32(0.0))
 
 
 class Pace:
