@@ -32,10 +32,10 @@ def grouped_bars(
     axes.set_xticks(range(len(groups)), groups)
     if log:
         axes.set_yscale("log")
-    axes.margins(y=0.25)  # room for the values and the legend
+    axes.margins(y=0.2)  # room for the values
     axes.set_ylabel(ylabel)
     axes.set_title(title, fontsize=10)
-    axes.legend(fontsize=7, ncols=2)
+    figure.legend(fontsize=7, ncols=len(series), loc="outside lower center")
     figure.savefig(file, dpi=130)
     plt.close(figure)
 

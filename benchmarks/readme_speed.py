@@ -58,6 +58,7 @@ def _one_gpu() -> list[tuple[str, str]]:
     def speed(scene: str, worlds: int, what: str = "full") -> str:
         return _thousands(known[scene, worlds, what]["control_steps_per_s"])
 
+    others = [_physics(peers, engine, "birch", 8192) for engine in ("mujoco_warp", "genesis")]
     cooking, seeing = (_cooking(observations) for observations in ([], ["rgb", "depth"]))
     return [
         ("**One H200**, 20 objects, 32,768 worlds", speed("made_20", 32768)),
@@ -66,9 +67,19 @@ def _one_gpu() -> list[tuple[str, str]]:
         ("120 objects, 16,384 worlds", speed("made_120", 16384)),
         ("the home `birch`, 8,192 worlds", speed("birch", 8192)),
         ("`birch` with a picture in every step", speed("birch", 8192, "camera")),
+        (
+            "`birch`, physics alone; beside it MuJoCo Warp as it comes, and Genesis",
+            f"{_physics(peers, 'ig2mj', 'birch', 8192)} ({others[0]}, {others[1]})",
+        ),
         (f"environment CookingMeat with the humanoid, {cooking['worlds']:,} worlds", _agent_steps(cooking)),
         ("CookingMeat with a picture in every agent step", _agent_steps(seeing)),
     ]
+
+
+def _physics(peers: list[Row], engine: str, scene: str, worlds: int) -> str:
+    """The newest row of an engine's physics."""
+    asked = {"engine": engine, "scene": scene, "worlds": worlds, "what": "physics", "counts": True}
+    return _thousands([row for row in peers if asked.items() <= row.items()][-1]["control_steps_per_s"])
 
 
 def _two_gpus() -> tuple[str, str]:

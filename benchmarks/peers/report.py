@@ -131,11 +131,12 @@ def written(rows: list[Row]) -> str:
 
 
 def draw(rows: list[Row], file: pathlib.Path) -> None:
-    """Bars of physics alone by home and worlds; only rows that count."""
+    """Bars of physics alone by home and worlds, where one of the others was measured; only rows that count."""
     import plots
 
     physics = [row for row in rows if row["what"] == "physics" and row["counts"]]
-    places = list(dict.fromkeys((row["scene"], row["worlds"]) for row in physics))
+    compared = [row for row in physics if row["engine"] != "ig2mj"] or physics
+    places = list(dict.fromkeys((row["scene"], row["worlds"]) for row in compared))
     by = {(*name(row), row["scene"], row["worlds"]): row["control_steps_per_s"] for row in physics}
     series = {
         label: [by.get((*key, *place)) for place in places]
