@@ -14,7 +14,7 @@
 set -u
 out=${OUT:-out/training}; mkdir -p "$out"
 minutes=${MINUTES:-5} engine=${ENGINE:-warp} fraction=${FRACTION:-0.26}
-pictures=(--set net=places shift=0 actor=256,256 capacity=500000)
+pictures=(--set net=glimpses shift=0 actor=256,256 capacity=500000)
 
 sample() { nice -n 10 env JAX_PLATFORMS=cpu python3 -m ig2mj sample-task "$@" >> "$out/pools.txt" 2>&1; }
 

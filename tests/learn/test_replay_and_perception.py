@@ -14,12 +14,13 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from small_envs import PointMass, SeenPointMass
 
+from ig2mj.envs.observations import Space
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.collect import Transition
 from ig2mj.learn.evaluate import wilson
 from ig2mj.learn.hidden import Hidden, guess_loss
 from ig2mj.learn.moments import RewardScale
-from ig2mj.learn.networks import Actor, Encoder, brightest, coarse, projected, shifted
+from ig2mj.learn.networks import Actor, Encoder, brightest, coarse, projected, shifted, window
 from ig2mj.learn.perception import FAR, Perception, Seen, shrunk
 from ig2mj.learn.policies import Policy, PolicyMismatch, depends_on, perception_of
 from ig2mj.learn.replay import Replay
@@ -164,19 +165,22 @@ def test_rows_that_are_kept_are_those_of_the_whole_picture():
         Perception(env.observation_spaces, "rgbd", 16, (12, 20))
 
 
-def test_a_policy_that_acts_on_its_guess_takes_it_along(tmp_path):
+@pytest.mark.parametrize("net", ["places", "glimpses"])
+def test_a_policy_that_acts_on_its_guess_takes_it_along(net, tmp_path):
     env = SeenPointMass(2)
-    perception = Perception(env.observation_spaces, "rgbd", 16, (4, 16))
-    sac = SAC(perception, 2, SACConfig(actor=(8,), critic=(8,), net="places"))
+    spaces = {**env.observation_spaces, "privileged_state": Space((3,), np.float32, -np.inf, np.inf)}
+    perception = Perception(spaces, "rgbd", 16, (4, 16), [f"goal_pos_{c}" for c in "xyz"])
+    assert perception.objects == 1
+    sac = SAC(perception, 2, SACConfig(actor=(8,), critic=(8,), net=net))
     learner = jax.jit(sac.init)(jax.random.PRNGKey(0))
     learner.actor["guess"]["kernel"] += 1.0
     learner.actor["mean"]["kernel"] += 0.1
     policy = Policy.of(sac, learner, depends_on(env, perception), {})
     policy.save(tmp_path / "policy.npz")
     again = Policy.load(tmp_path / "policy.npz")
-    sees = perception_of(again, env.observation_spaces)
+    sees = perception_of(again, spaces)
     assert sees.picture_shape == (12, 16, 4) and sees.rows == (4, 16)
-    obs = env.reset(0).obs
+    obs = {**env.reset(0).obs, "privileged_state": jnp.zeros((2, 3))}
     wanted = jax.jit(sac._look)(learner.actor, learner.moments, perception(obs))[0]
     assert np.allclose(jax.jit(again.actor(sees))(obs), np.tanh(wanted), atol=0.02), "half precision"
     with pytest.raises(PolicyMismatch, match="rows"):
@@ -194,9 +198,35 @@ def test_a_guess_is_of_rotations_and_not_of_the_sign_of_a_quaternion():
     assert np.allclose(found[0, :2], [0.1, 1.0])
     assert np.allclose(found[0, 2:] / 3**0.5, [-0.28, 0.96, 0, 0.96, 0.28, 0], atol=1e-6), "columns x and y"
     assert Hidden(2, 7).size == 7, "numbers without names are guessed as they are"
+    wanted = hidden(vector, vector)
+    for number, more in ((0, 1.0), (5, 4.0 - 1.0)):  # a place: the absolute error; a rotation: its square
+        one, two = (float(hidden.loss(wanted.at[:, number].add(far), vector, vector)) for far in (1.0, 2.0))
+        assert two - one == pytest.approx(more / hidden.size, abs=1e-3)
     assert guess_loss(jnp.ones((1, 2)), jnp.ones((1, 2))) == 0
     far, farther = (float(guess_loss(jnp.full((1, 1), x), jnp.zeros((1, 1)))) for x in (1.0, 2.0))
     assert farther - far == pytest.approx(1.0, abs=1e-3)
+
+
+def test_places_of_objects_are_guessed_twice_where_one_point_of_the_picture_has_to_tell_each():
+    names = ["hand_1_pos_x", "hand_1_pos_y", "hand_1_pos_z", "cup_pos_x", "cup_pos_y", "cup_pos_z", "stains"]
+    hidden, vector = Hidden(1, 7, names), jnp.arange(8.0)[None]
+    assert (hidden.size, hidden.objects) == (7, 1)
+    assert hidden(vector, vector).tolist() == [[1, 2, 3, 4, 5, 6, 7]]
+    assert hidden(vector, vector, 10).tolist() == [[1, 2, 3, 4, 5, 6, 7, 4, 5, 6]]
+    actor = Actor(2, (8,), (12, 16, 4), "glimpses", hidden.size, objects=hidden.objects)
+    seen = jnp.ones((2, 1)), jnp.ones((2, 768), jnp.uint8)
+    shapes = jax.eval_shape(lambda key: actor.init_with_output(key, *seen)[0], jax.random.PRNGKey(0))
+    assert shapes[2].shape == (2, 10)
+
+
+def test_a_window_is_what_lies_around_a_point():
+    picture = jnp.arange(40 * 60, dtype=jnp.float32).reshape(1, 40, 60, 1)
+    row, column = 20.5, 30.5  # between pixels, as the window has no middle one
+    point = jnp.array([[row / 39 * 2 - 1, column / 59 * 2 - 1]])
+    assert np.allclose(window(picture, point)[0], picture[0, 9:33, 19:43], atol=0.01)
+    corner = np.asarray(window(picture, jnp.array([[-1.0, -1.0]])))[0, :, :, 0]
+    assert (corner[:11] == 0).all() and (corner[:, :11] == 0).all(), "nothing beside the picture"
+    assert corner[12, 12] == pytest.approx(0.25 * (0 + 1 + 60 + 61))
 
 
 def test_the_depth_at_the_brightest_point_is_seen():
@@ -209,9 +239,9 @@ def test_the_depth_at_the_brightest_point_is_seen():
     assert np.allclose(found, [[1, 1, 1, 1, 1]], atol=1e-4), "row, column, depth, and depth times them"
 
 
-@pytest.mark.parametrize(("net", "moved"), [("places", False), ("points", True)])
+@pytest.mark.parametrize(("net", "moved"), [("places", False), ("glimpses", False), ("points", True)])
 def test_whether_actions_train_the_encoder(net, moved):
-    actor = Actor(2, (8,), (12, 16, 4), net, guess=3)
+    actor = Actor(2, (8,), (12, 16, 4), net, guess=3, objects=2)
     vector, picture = jnp.ones((4, 2)), jax.random.randint(jax.random.PRNGKey(0), (4, 768), 0, 256).astype(jnp.uint8)
 
     @jax.jit

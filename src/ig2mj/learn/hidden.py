@@ -27,7 +27,7 @@ class Hidden:
     """Which numbers of a vector are to be guessed. All methods are pure.
 
     Attributes:
-      size: g.
+      size: g. objects: how many objects, hands apart, have their place among the numbers.
     """
 
     def __init__(self, first: int, count: int, names: Sequence[str] = ()):
@@ -44,17 +44,41 @@ class Hidden:
         self._plain = first + np.array(plain, int)
         self._turns = first + np.array([[k + j for j in range(4)] for k in turns], int).reshape(-1, 4)
         self.size = len(plain) + 6 * len(turns)
+        self._turned = np.arange(len(plain), self.size)
+        starts = [k for k, name in enumerate(names) if name.endswith("_pos_x") and not name.startswith("hand_")]
+        self._spots = first + np.array([[k + j for j in range(3)] for k in starts], int).reshape(-1)
+        self.objects = len(starts)
 
-    def __call__(self, vector: Float[Array, "B v"], normal: Float[Array, "B v"]) -> Float[Array, "B g"]:
+    def __call__(
+        self, vector: Float[Array, "B v"], normal: Float[Array, "B v"], count: int | None = None
+    ) -> Float[Array, "B g"]:
         """What is to be guessed, each number with a deviation of about 1.
 
         Args:
           vector: as it was observed. normal: less its mean, over its deviation.
+          count: of the numbers; where that is more than g, the places of the objects follow once more.
         """
         quat = vector[:, self._turns]
         columns = [quat_rotate(quat, jnp.asarray(axis)) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))]
         turned = jnp.sqrt(3.0) * jnp.concatenate(columns, axis=-1)
-        return jnp.concatenate([normal[:, self._plain], turned.reshape(vector.shape[0], -1)], axis=-1)
+        found = [normal[:, self._plain], turned.reshape(vector.shape[0], -1)]
+        if count is not None and count > self.size:
+            found.append(normal[:, self._spots])
+        return jnp.concatenate(found, axis=-1)
+
+    def loss(
+        self, guess: Float[Array, "B g"], vector: Float[Array, "B v"], normal: Float[Array, "B v"]
+    ) -> Float[Array, ""]:
+        """Mean error of a guess: squared of rotations, else as `guess_loss`.
+
+        Whoever cannot tell yet which way round a thing is guesses the middle. There an absolute error is flat, and is
+        left late; a squared one is steep on both sides.
+        """
+        wanted = self(vector, normal, guess.shape[-1])
+        other = np.setdiff1d(np.arange(guess.shape[-1]), self._turned)
+        squares = jnp.square(guess - wanted)[:, self._turned].sum(-1).mean()
+        plain = guess_loss(guess[:, other], wanted[:, other]) * len(other) if len(other) else 0.0
+        return (squares + plain) / guess.shape[-1]
 
 
 def guess_loss(guess: Float[Array, "B g"], wanted: Float[Array, "B g"]) -> Float[Array, ""]:

@@ -16,7 +16,6 @@ from jaxtyping import Float, Int, UInt8
 from ig2mj.engine.view import Array
 from ig2mj.learn.adam import averaged_adam
 from ig2mj.learn.heads import label_loss, likeliest
-from ig2mj.learn.hidden import guess_loss
 from ig2mj.learn.moments import Moments
 from ig2mj.learn.networks import Actor, shifted
 from ig2mj.learn.perception import Perception, Seen, blank
@@ -81,7 +80,7 @@ class Imitation:
         """`config`: of cloning or DAgger. `axis`: the name of an axis of devices over which gradients are averaged."""
         guess = perception.hidden.size if perception.hidden and config.guess else 0
         shape = perception.picture_shape
-        self.actor = Actor(action_size, config.actor, shape, config.net, guess, config.choices)
+        self.actor = Actor(action_size, config.actor, shape, config.net, guess, config.choices, perception.objects)
         self._perception, self._weight, self._shift, self._axis = perception, config.guess, config.shift, axis
         self._adam = averaged_adam(10.0, axis)
 
@@ -105,7 +104,7 @@ class Imitation:
         loss = label_loss(head, label)
         found: dict[str, Array] = {"actor_loss": loss, "label_error": jnp.abs(likeliest(head) - label).mean()}
         if self._perception.hidden is not None and guess.shape[-1]:
-            found["guess_loss"] = guess_loss(guess, self._perception.hidden(seen.vector, normal))
+            found["guess_loss"] = self._perception.hidden.loss(guess, seen.vector, normal)
             loss += self._weight * found["guess_loss"]
         return loss, found
 

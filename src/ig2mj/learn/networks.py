@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import flax.linen as nn
 import jax
@@ -22,8 +23,11 @@ LOG_STD = (-5.0, 0.0)
 FIRST_STD = 0.3
 """Standard deviation of an untrained actor."""
 
-NETS = ("small", "paper", "points", "places")
+NETS = ("small", "paper", "points", "places", "glimpses")
 """Encoders of pictures."""
+
+WINDOW = 24
+"""Pixels, height and width, of what a glimpse sees around an object."""
 
 SHARP = 3.0
 """Factor of maps before their softmax: without it an untrained softmax is even, and hardly changes."""
@@ -49,29 +53,65 @@ class Encoder(nn.Module):
     `points`: `small`'s numbers, and where in the picture each of 32 channels is brightest after two halvings (the
     spatial softmax of Levine et al. 2016), so that the place of a thin object need not be read from four by four coarse
     cells. `places`: the same, with how far away it is there, on a GPU in half precision. Depth times row and column is
-    what a place in the camera's frame is linear in.
+    what a place in the camera's frame is linear in. `glimpses`: the same, and for each of so many `objects` three
+    numbers that follow linearly from one point of the picture (they come first, and are to be where the object is) and
+    what is around that point at full resolution: how a thin object lies shows in a few pixels, wherever they are.
     """
 
     shape: tuple[int, int, int]
     net: str = "small"
+    objects: int = 0
 
     @nn.compact
     def __call__(self, picture: UInt8[Array, "B q"]) -> Float[Array, "B f"]:
         seen = x = picture.reshape(-1, *self.shape).astype(jnp.float32) / 255.0 - 0.5
         halvings = 3 if self.net == "paper" else max(3, math.ceil(math.log2(self.shape[0] / 4)))
-        half = self.net == "places" and jax.default_backend() == "gpu"  # processors have no fast way to do it
+        half = (
+            self.net in ("places", "glimpses") and jax.default_backend() == "gpu"
+        )  # processors have no fast way to do it
         places, dtype = jnp.zeros((x.shape[0], 0)), jnp.bfloat16 if half else jnp.float32
         for k, channels in enumerate((32, *[64] * (halvings - 1))):
             x = nn.relu(nn.Conv(channels, (3, 3), strides=2, padding="SAME", dtype=dtype)(x))
-            if self.net in ("points", "places") and k == 1:
+            if self.net in ("points", "places", "glimpses") and k == 1:
                 normal = nn.LayerNorm(name="points_norm")(x)
                 maps = nn.Conv(32, (3, 3), padding="SAME", dtype=dtype, name="points")(normal)
-                depth = coarse(seen[..., -1], maps.shape[1:3]) if self.net == "places" else None
+                depth = coarse(seen[..., -1], maps.shape[1:3]) if self.net != "points" else None
                 places = brightest(SHARP * maps.astype(jnp.float32), depth)
         x = x.reshape(x.shape[0], -1).astype(jnp.float32)
         if self.net == "paper":
             return nn.relu(nn.Dense(256)(x))
-        return jnp.concatenate([places, jnp.tanh(nn.LayerNorm()(nn.Dense(50)(x)))], axis=-1)
+        features = [places, jnp.tanh(nn.LayerNorm()(nn.Dense(50)(x)))]
+        if self.net == "glimpses":
+            points = jnp.moveaxis(places.reshape(x.shape[0], 5, -1), -1, 1)[:, : self.objects]
+            spots = [nn.Dense(3, name=f"spot_{k}")(points[:, k]) for k in range(self.objects)]
+            around = [Glimpse(dtype, name=f"glimpse_{k}")(seen, points[:, k, :2]) for k in range(self.objects)]
+            features = [*spots, *features, *around]
+        return jnp.concatenate(features, axis=-1)
+
+
+class Glimpse(nn.Module):
+    """What is around a point of the picture at full resolution, as 128 numbers."""
+
+    dtype: Any = jnp.float32
+
+    @nn.compact
+    def __call__(self, seen: Float[Array, "B r s c"], point: Float[Array, "B 2"]) -> Float[Array, "B f"]:
+        x = window(seen, jax.lax.stop_gradient(point))
+        for channels, stride in ((32, 1), (64, 2), (64, 2)):
+            x = nn.relu(nn.Conv(channels, (3, 3), strides=stride, padding="SAME", dtype=self.dtype)(x))
+        return nn.relu(nn.Dense(128)(x.reshape(x.shape[0], -1).astype(jnp.float32)))
+
+
+def window(seen: Float[Array, "B r s c"], point: Float[Array, "B 2"]) -> Float[Array, "B w w c"]:
+    """`WINDOW` rows and columns of each picture around a point whose row and column are from -1 to 1, interpolated
+    linearly; 0 beside the picture."""
+
+    def weights(middle: Float[Array, "B"], size: int) -> Float[Array, "B w n"]:
+        places = (middle[:, None] + 1.0) * (0.5 * (size - 1)) + jnp.arange(WINDOW) - 0.5 * (WINDOW - 1)
+        return jnp.maximum(1.0 - jnp.abs(places[:, :, None] - jnp.arange(size)), 0.0)
+
+    rows, columns = weights(point[:, 0], seen.shape[1]), weights(point[:, 1], seen.shape[2])
+    return jnp.einsum("bir,brsc,bjs->bijc", rows, seen, columns)
 
 
 def brightest(maps: Float[Array, "B h w c"], depth: Float[Array, "B h w"] | None = None) -> Float[Array, "B f"]:
@@ -101,9 +141,11 @@ class Actor(nn.Module):
     """Mean and logarithm of the standard deviation of a Gaussian, whose tanh is the action; with `choices` instead for
     each number of the action how likely each of so many values is, as logits (`ig2mj.learn.heads` makes actions of it).
 
-    With `guess`, a linear guess of that many hidden numbers is made from the picture's features, for an auxiliary loss.
-    With the encoder `places` the guess is also what the actor's layers see, and the auxiliary loss alone trains the
-    encoder: gradients of actions are larger and noisier, and where both did, places were off by centimetres.
+    With `guess`, that many hidden numbers are guessed linearly from the features of the picture, for an auxiliary loss.
+    With the encoders `places` and `glimpses` the guess is also what the actor's layers see, and the auxiliary loss
+    alone trains the encoder: gradients of actions are larger and noisier, and where both did, places were off by
+    centimetres. With `glimpses` the places of the `objects` follow in the guess once more (`Hidden`), each from one
+    point of the picture.
 
     Raises:
       UnknownNameError: `net` is none of `NETS`.
@@ -115,6 +157,7 @@ class Actor(nn.Module):
     net: str = "small"
     guess: int = 0
     choices: int = 0
+    objects: int = 0
 
     def __post_init__(self) -> None:
         if self.net not in NETS:
@@ -124,7 +167,7 @@ class Actor(nn.Module):
     @property
     def uses_guess(self) -> bool:
         """Whether its actions depend on the guess, which then belongs to the policy."""
-        return self.net == "places" and self.guess > 0
+        return self.net in ("places", "glimpses") and self.guess > 0
 
     @nn.compact
     def __call__(
@@ -132,9 +175,14 @@ class Actor(nn.Module):
     ) -> tuple[Float[Array, "B n *K"], Float[Array, "B n"], Float[Array, "B g"]]:
         guessed = jnp.zeros((vector.shape[0], self.guess))
         if self.picture_shape is not None:
-            features = Encoder(self.picture_shape, self.net, name="encoder")(picture)
+            features = Encoder(self.picture_shape, self.net, self.objects, name="encoder")(picture)
             if self.guess:
-                guessed = nn.Dense(self.guess, name="guess")(jnp.concatenate([features, vector], axis=-1))
+                known = jnp.concatenate([features, vector], axis=-1)
+                if self.net == "glimpses":
+                    known = jnp.concatenate([known, nn.relu(nn.Dense(256, name="combined")(known))], axis=-1)
+                guessed = nn.Dense(self.guess, name="guess")(known)
+                if self.net == "glimpses":
+                    guessed = jnp.concatenate([guessed, features[:, : 3 * self.objects]], axis=-1)
             known = jax.lax.stop_gradient((features, guessed)) if self.uses_guess else (features,)
             vector = jnp.concatenate([vector, *known], axis=-1)
         x = Trunk((256,) if self.net == "paper" else self.sizes, name="trunk")(vector)

@@ -99,6 +99,11 @@ class Perception:
             raise Ig2mjError("the environment has no observation that is a list of numbers")
 
     @property
+    def objects(self) -> int:
+        """How many objects there are whose places an actor can learn to guess."""
+        return self.hidden.objects if self.hidden else 0
+
+    @property
     def names(self) -> tuple[str, ...]:
         """The observations that are looked at."""
         return (*self.vector_names, *self._pictures)

@@ -105,6 +105,8 @@ class Policy:
         weights = {k: np.asarray(v) for k, v in _flat(learner.actor).items()}
         if algorithm.actor.uses_guess:
             net["guess"] = algorithm.actor.guess
+            if config.net == "glimpses":
+                net["objects"] = algorithm.actor.objects
         else:
             weights = {k: w for k, w in weights.items() if not k.startswith("guess/")}
         if algorithm.actor.choices:
@@ -172,7 +174,7 @@ class Policy:
         """
         depends, net = self.card["depends"], self.card["net"]
         shape = depends["picture"] and tuple(depends["picture"])
-        sizes, more = tuple(net["sizes"]), (net.get("guess", 0), net.get("choices", 0))
+        sizes, more = tuple(net["sizes"]), (net.get("guess", 0), net.get("choices", 0), net.get("objects", 0))
         network = Actor(len(depends["actions"]), sizes, shape, net["net"], *more)
         params = jax.tree.map(jnp.asarray, _nested(self.weights))
         mean, deviation = jnp.asarray(self.mean), jnp.asarray(self.deviation)

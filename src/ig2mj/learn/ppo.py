@@ -23,7 +23,6 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.engine.view import Array
 from ig2mj.learn.adam import averaged_adam
 from ig2mj.learn.collect import Advice, Transition, if_ready
-from ig2mj.learn.hidden import guess_loss
 from ig2mj.learn.moments import Moments, RewardScale, average
 from ig2mj.learn.networks import Actor, Value, shifted
 from ig2mj.learn.perception import Perception, Seen, blank
@@ -99,7 +98,7 @@ class PPO:
         self.perception, self.action_size, self.axis = perception, action_size, axis
         self.config = c = config or PPOConfig()
         guess = perception.hidden.size if perception.hidden and c.guess else 0
-        self.actor = Actor(action_size, c.actor, perception.picture_shape, c.net, guess)
+        self.actor = Actor(action_size, c.actor, perception.picture_shape, c.net, guess, objects=perception.objects)
         self.value = Value(c.critic)
         self._adam = averaged_adam(1.0, axis, eps=1e-5)
 
@@ -225,7 +224,7 @@ class PPO:
             found = {"actor_loss": actor, "critic_loss": value, "entropy": entropy}
             found["divergence"] = (ratio - 1 - change).mean()
             if p.hidden is not None and guess.shape[-1]:
-                found["guess_loss"] = guess_loss(guess, p.hidden(batch.seen.vector, normal))
+                found["guess_loss"] = p.hidden.loss(guess, batch.seen.vector, normal)
                 total += c.guess * found["guess_loss"]
             return total, found
 

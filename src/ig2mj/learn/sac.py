@@ -35,7 +35,6 @@ from ig2mj.learn.adam import averaged_adam
 from ig2mj.learn.collect import GUIDED, Advice, Hint, Transition, if_ready
 from ig2mj.learn.demos import Demos
 from ig2mj.learn.guidance import guided, share, uncounted
-from ig2mj.learn.hidden import guess_loss
 from ig2mj.learn.moments import Moments, RewardScale, share_of
 from ig2mj.learn.networks import Actor, projected, shifted, twins
 from ig2mj.learn.perception import Perception, Seen, blank
@@ -157,7 +156,7 @@ class SAC:
         self._demos, self.hint = demos, expert
         self.config = c = config or SACConfig()
         guess = perception.hidden.size if perception.hidden and c.guess else 0
-        self.actor = Actor(action_size, c.actor, perception.picture_shape, c.net, guess)
+        self.actor = Actor(action_size, c.actor, perception.picture_shape, c.net, guess, objects=perception.objects)
         self.critic = twins(c.atoms, c.critic)
         self._support = jnp.linspace(-c.largest, c.largest, c.atoms)
         self._entropy = 0.5 * action_size * math.log(2 * math.pi * math.e * c.std**2)
@@ -375,7 +374,7 @@ class SAC:
             action, density, guess, middle = self._draw(actor, learner.moments, seen, draw_key)
             total, found = (alpha * density - value(action)).mean(), {"entropy": -density.mean()}
             if p.hidden is not None and guess.shape[-1]:
-                found["guess_loss"] = guess_loss(guess, p.hidden(batch.seen.vector, normal))
+                found["guess_loss"] = p.hidden.loss(guess, batch.seen.vector, normal)
                 total += c.guess * found["guess_loss"]
             if batch.label.shape[-1]:
                 apart = jnp.square(middle - batch.label).mean(-1)
