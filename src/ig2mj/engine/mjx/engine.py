@@ -351,12 +351,7 @@ class MjxEngine(abc.ABC):
         return dataclasses.replace(physics, data=data, touching=touching)
 
     def _map(
-        self,
-        act: Any,
-        model: mjx.Model,
-        data: mjx.Data,
-        fields: ModelFields,
-        ignored: Bool[Array, "W H O"],
+        self, act: Any, model: mjx.Model, data: mjx.Data, fields: ModelFields, ignored: Bool[Array, "W H O"]
     ) -> mjx.Data:
         """A function of MJX on every world. The model comes as an argument, so that a program holds it only once."""
         of_world = {name: array for name, array in given(fields).items() if name in MOVING and array.size}
