@@ -21,6 +21,9 @@ CONTROL_STEPS = 3
 
 Row = dict[str, Any]
 
+SCALING = {"made_60": ("made_60", 16384, "full"), "birch_pictures": ("birch", 8192, "camera")}
+"""Cases of `scaling.py` on one GPU: home, worlds and what is run."""
+
 
 def table() -> str:
     """The whole table, Markdown."""
@@ -53,7 +56,8 @@ def _one_gpu() -> list[tuple[str, str]]:
     measured = {(row["scene"], row["worlds"], row["what"]): row for row in _load("throughput")["rows"] if _counts(row)}
     peers = [json.loads(line) for line in (RESULTS / "peers" / "rows.jsonl").read_text().splitlines()]
     ours = {(row["scene"], row["worlds"], row["what"]): row for row in peers if row["engine"] == "ig2mj"}
-    known = {**measured, **ours}  # the newer ones last
+    alone = {(scene, worlds, what): _scaling(case, 1) for case, (scene, worlds, what) in SCALING.items()}
+    known = {**measured, **ours, **alone}  # the newer ones last
 
     def speed(scene: str, worlds: int, what: str = "full") -> str:
         return _thousands(known[scene, worlds, what]["control_steps_per_s"])
@@ -83,7 +87,15 @@ def _physics(peers: list[Row], engine: str, scene: str, worlds: int) -> str:
 
 
 def _two_gpus() -> tuple[str, str]:
-    return "**Two H200**, 60 objects, 32,768 worlds", _thousands(_load("multi_gpu")["control_steps_per_s_2"])
+    return "**Two H200**, 60 objects, 32,768 worlds", _thousands(_scaling("made_60", 2)["control_steps_per_s"])
+
+
+def _scaling(case: str, gpus: int) -> Row:
+    """The newest row of `scaling.py`, all states included."""
+    lines = (RESULTS / "scaling" / "rows.jsonl").read_text().splitlines()
+    asked = {"case": case, "gpus": gpus, "counts": True}
+    row = [row for row in map(json.loads, lines) if asked.items() <= row.items()][-1]
+    return {"control_steps_per_s": row["steps_per_s"]}
 
 
 def _counts(row: Row) -> bool:
