@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -249,7 +250,7 @@ def test_whether_actions_train_the_encoder(net, moved):
         """Of the actions and of the guess."""
         params = actor.init(key, vector, picture)["params"]
         _, back = jax.vjp(lambda p: actor.apply({"params": p}, vector, picture), params)
-        told = actor.apply({"params": params}, vector, picture)
+        told: Any = actor.apply({"params": params}, vector, picture)
         found = []
         for part in (0, 2):
             by = [2 * (a - 1.0) if k == part else jax.tree.map(jnp.zeros_like, a) for k, a in enumerate(told)]

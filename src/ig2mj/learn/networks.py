@@ -66,9 +66,8 @@ class Encoder(nn.Module):
     def __call__(self, picture: UInt8[Array, "B q"]) -> Float[Array, "B f"]:
         seen = x = picture.reshape(-1, *self.shape).astype(jnp.float32) / 255.0 - 0.5
         halvings = 3 if self.net == "paper" else max(3, math.ceil(math.log2(self.shape[0] / 4)))
-        half = (
-            self.net in ("places", "glimpses") and jax.default_backend() == "gpu"
-        )  # processors have no fast way to do it
+        # processors have no fast way to convolve in half precision
+        half = self.net in ("places", "glimpses") and jax.default_backend() == "gpu"
         places, dtype = jnp.zeros((x.shape[0], 0)), jnp.bfloat16 if half else jnp.float32
         for k, channels in enumerate((32, *[64] * (halvings - 1))):
             x = nn.relu(nn.Conv(channels, (3, 3), strides=2, padding="SAME", dtype=dtype)(x))
