@@ -43,18 +43,20 @@ PointNavigation and Reaching were trained on processors, the others on one H200,
 on the card ("sac+expert" alone). "Held out": of the mean actions of the last policy, on 1,000 start states that
 training never saw. With DAgger and with "sac+expert" (`--expert`) the scripted expert helps; the paper's runs had
 none. The DAgger runs here stopped too early, since success then counted episodes that the expert had a part in.
-SlicingFruit with `--expert`: the first run was cut off; "48_updates" has `guided=0.4 copied=0.25 reach=30
-updates=48`; "trusted" `guided=0.4 copied=0.4 trust=1 reach=30 updates=48`; "rgbd64" the same with `--pixels 64`, cut
-off at second 161. In these the peak after the expert's help has ended is one of counting: all worlds then begin alone
-at one moment, successes end at once and failures 40 s later. It is repaired in "weak_labels" (`guided=0.4 copied=0.3
-copy=1 trust=1 reach=30 updates=48 alpha=0.003 capacity=600000 --pixels 64`, and the repaired scale of rewards), which
-has learned its 512 start states by heart: 95 % of them, and 64 % of the held-out ones. "4096_states" is the same with
-`--pool-size 4096 --set net=points shift=0`, cut off at second 252: what it does on held-out states is what it does in
-training. "places": `--pixels 128 --rows 80:128 --pool-size 4096 --set net=places shift=0 guess=3 actor=256,256
-guided=0.35` and the rest alike, cut off at second 348. Reaching: "quiet" had four hardware threads each, "busy" two of
-a host that was at work, so that five minutes held 91,000 or 50,000 steps. Fetch without mittens: `--pixels 64 --set
-gamma=0.98 horizon=5 held=8 std=0.1 guided=0.4 copied=0.3 copy=1 trust=1 reach=60 shift=0 net=points`.
-The towel's expert needs 85 to 98 steps, so that with `reach=60` no episode of "60_steps" ever saw a success.
+SlicingFruit with `--expert`: the first run was cut off; "48_updates" has `guided=0.4 copied=0.25 reach=30 updates=48`;
+"trusted" `guided=0.4 copied=0.4 trust=1 reach=30 updates=48`; "rgbd64" the same with `--pixels 64`, cut off at second
+161. In these the peak after the expert's help has ended is one of counting: all worlds then begin alone at one moment,
+successes end at once and failures 40 s later. It is repaired in "weak_labels" (`guided=0.4 copied=0.3 copy=1 trust=1
+reach=30 updates=48 alpha=0.003 capacity=600000 --pixels 64`, and the repaired scale of rewards), which has learned its
+512 start states by heart: 95 % of them, and 64 % of the held-out ones. "4096_states" is the same with `--pool-size
+4096 --set net=points shift=0`, cut off at second 252: what it does on held-out states is what it does in training.
+"places": `--pixels 128 --rows 80:128 --pool-size 4096 --set net=places shift=0 guess=3 actor=256,256 guided=0.35` and
+the rest alike, cut off at second 348. "places_choices": DAgger with the same encoder and 21 choices (`training.sh
+humanoid` of 2026-11-23 before `glimpses`), beside another run on the card. Reaching: "quiet" had four hardware threads
+each, "busy" two of a host that was at work, so that five minutes held 91,000 or 50,000 steps. Fetch without mittens:
+`--pixels 64 --set gamma=0.98 horizon=5 held=8 std=0.1 guided=0.4 copied=0.3 copy=1 trust=1 reach=60 shift=0
+net=points`. The towel's expert needs 85 to 98 steps, so that with `reach=60` no episode of "60_steps" ever saw a
+success.
 """
 
 GOOD = 95.0
