@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import warp as wp
 from mujoco.mjx.third_party import mujoco_warp
+from tumbling_shapes import SCENE
 
 from ig2mj.engine.warp.patches import awake_kernels, pins
 
@@ -20,22 +21,6 @@ from ig2mj.engine.warp.patches import branches, pair_lists
 
 WORLDS = 16
 BOX, CAPSULE, MESH = (int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")) for name in ("BOX", "CAPSULE", "MESH"))
-
-SHAPES = (
-    'type="box" size="0.05 0.04 0.03"',
-    'type="mesh" mesh="wedge"',
-    'type="capsule" size="0.03 0.05"',
-    'type="cylinder" size="0.04 0.03"',
-)
-BODIES = "".join(
-    f'<body pos="{0.07 * (k % 4)} {0.07 * (k // 4 % 2)} {0.05 + 0.07 * (k // 8)}" euler="{20 * k} {35 * k} 0">'
-    f'<freejoint/><geom {SHAPES[(k + k // 4) % 4]} gap="0.003"/></body>'
-    for k in range(16)
-)
-SCENE = f"""<mujoco><option timestep="0.00833333" integrator="implicitfast"><flag sleep="enable"/></option>
-<asset><mesh name="wedge" vertex="-.05 -.04 -.03 .05 -.04 -.03 -.05 .04 -.03 .05 .04 -.03 -.05 0 .04 .05 0 .04"/>
-</asset>
-<worldbody><geom type="box" size="1 1 0.05" pos="0 0 -0.05"/>{BODIES}</worldbody></mujoco>"""
 
 
 def test_every_pair_is_in_the_list_of_its_kind_beside_those_of_the_same_geoms():
@@ -89,7 +74,7 @@ def test_streams_begin_when_all_their_memory_is_there(monkeypatch):
     model = mujoco.MjModel.from_xml_string(SCENE)
     put = mujoco_warp.put_model(model)
     data = mujoco_warp.make_data(model, nworld=2, naconmax=200, naccdmax=90, njmax=600, nvmax=model.nv)
-    events, make, in_turn = [], wp.empty, branches._in_turn
+    events, in_turn = [], branches._in_turn
 
     def noted(name, act):
         def noting(*args, **kwargs):
@@ -105,7 +90,7 @@ def test_streams_begin_when_all_their_memory_is_there(monkeypatch):
 
     monkeypatch.setattr(branches, "ON_PROCESSORS", True)
     monkeypatch.setattr(branches, "_in_turn", streams)
-    monkeypatch.setattr(wp, "empty", noted("memory", make))
+    monkeypatch.setattr(wp, "empty", noted("memory", wp.empty))
     monkeypatch.setattr(wp, "zeros", noted("memory", wp.zeros))
     with awake_kernels():
         launches_of(lambda: mujoco_warp.collision(put, data))

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import warp as wp
 from mujoco.mjx.third_party import mujoco_warp
+from tumbling_shapes import SCENE
 
 from ig2mj.engine.warp.patches import awake_kernels, pins, scratch
 from ig2mj.engine.warp.patches.scratch import ALIGNMENT, Arena, Counter
@@ -90,17 +91,6 @@ class Poisoned(Arena):
         super().deallocate(ptr, size_in_bytes)
 
 
-GEOMS = ("type='box' size='.04 .03 .03'", "type='mesh' mesh='wedge'", "type='capsule' size='.02 .04'")
-BODIES = "".join(
-    f'<body pos="{0.08 * (k % 3)} {0.05 * (k % 2)} {0.1 + 0.09 * k}" euler="{20 * k} {35 * k} 0"><freejoint/>'
-    f"<geom {GEOMS[k % 3]}/></body>"
-    for k in range(9)
-)
-SCENE = f"""<mujoco><option timestep="0.00833333" integrator="implicitfast"><flag sleep="enable"/></option>
-<asset><mesh name="wedge" vertex="-.05 -.04 -.03 .05 -.04 -.03 -.05 .04 -.03 .05 .04 -.03 -.05 0 .04 .05 0 .04"/>
-</asset><worldbody><geom type="box" size="1 1 0.05" pos="0 0 -0.05"/>{BODIES}</worldbody></mujoco>"""
-
-
 @pytest.mark.slow
 @pytest.mark.skipif(bool(pins.mismatches()), reason="our kernels do not fit")
 def test_steps_need_nothing_of_what_was_in_their_memory_before(monkeypatch):
@@ -113,7 +103,7 @@ def test_steps_need_nothing_of_what_was_in_their_memory_before(monkeypatch):
         put = mujoco_warp.put_model(model)
         put.opt.warn_overflow = 0
         data = mujoco_warp.put_data(
-            model, mujoco.MjData(model), nworld=2, naconmax=400, naccdmax=200, njmax=300, nvmax=model.nv
+            model, mujoco.MjData(model), nworld=2, naconmax=1000, naccdmax=500, njmax=600, nvmax=model.nv
         )
         with monkeypatch.context() as patch, awake_kernels(), wp.ScopedDevice(device):
             if arena:

@@ -29,6 +29,9 @@ NETS = ("small", "paper", "points", "places", "glimpses")
 WINDOW = 24
 """Pixels, height and width, of what a glimpse sees around an object."""
 
+PRECISE = ("places", "glimpses")
+"""Those that the guess of hidden numbers alone trains, and whose guess the actor sees."""
+
 SHARP = 3.0
 """Factor of maps before their softmax: without it an untrained softmax is even, and hardly changes."""
 
@@ -67,14 +70,14 @@ class Encoder(nn.Module):
         seen = x = picture.reshape(-1, *self.shape).astype(jnp.float32) / 255.0 - 0.5
         halvings = 3 if self.net == "paper" else max(3, math.ceil(math.log2(self.shape[0] / 4)))
         # processors have no fast way to convolve in half precision
-        half = self.net in ("places", "glimpses") and jax.default_backend() == "gpu"
+        half = self.net in PRECISE and jax.default_backend() == "gpu"
         places, dtype = jnp.zeros((x.shape[0], 0)), jnp.bfloat16 if half else jnp.float32
         for k, channels in enumerate((32, *[64] * (halvings - 1))):
             x = nn.relu(nn.Conv(channels, (3, 3), strides=2, padding="SAME", dtype=dtype)(x))
-            if self.net in ("points", "places", "glimpses") and k == 1:
+            if self.net in ("points", *PRECISE) and k == 1:
                 normal = nn.LayerNorm(name="points_norm")(x)
                 maps = nn.Conv(32, (3, 3), padding="SAME", dtype=dtype, name="points")(normal)
-                depth = coarse(seen[..., -1], maps.shape[1:3]) if self.net != "points" else None
+                depth = coarse(seen[..., -1], maps.shape[1:3]) if self.net in PRECISE else None
                 places = brightest(SHARP * maps.astype(jnp.float32), depth)
         x = x.reshape(x.shape[0], -1).astype(jnp.float32)
         if self.net == "paper":
@@ -166,7 +169,7 @@ class Actor(nn.Module):
     @property
     def uses_guess(self) -> bool:
         """Whether its actions depend on the guess, which then belongs to the policy."""
-        return self.net in ("places", "glimpses") and self.guess > 0
+        return self.net in PRECISE and self.guess > 0
 
     @nn.compact
     def __call__(

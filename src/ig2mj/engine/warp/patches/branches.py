@@ -54,7 +54,7 @@ def convex_narrowphase(m: Any, d: Any, ctx: Any, collision_table: Any) -> None:
         return
     # All memory is there and counts are 0 before the streams begin: what comes later on this one, they do not wait for.
     lists = pair_lists.listed_by_kind(m, d, ctx, [kind for kind in kinds if kind is not None])
-    memory = phases.scratch(d, len(convex))
+    memory = phases.handover(d, len(convex))
     launches = []
     for number, (call, pairs) in enumerate(zip(convex, lists, strict=True)):
         call["inputs"] = _of_list(m, d, ctx, call["inputs"], pairs)

@@ -72,7 +72,7 @@ def kind(kernel: wp.Kernel) -> tuple[int, int] | None:
     return _arguments[kernel][:2] if kernel in _arguments else None
 
 
-class Scratch(NamedTuple):
+class Handover(NamedTuple):
     """What first phases hand to second phases: what was found at each place [P], and for each kind the places that it
     took [K, P] and how many [K]. Places are taken from one counter (`branches`), so kinds share what was found."""
 
@@ -81,14 +81,14 @@ class Scratch(NamedTuple):
     count: wp.array
 
 
-def scratch(d: Any, kinds: int) -> Scratch:
+def handover(d: Any, kinds: int) -> Handover:
     """Memory for so many kinds, with counts of 0."""
     places = max(1, d.naccdmax)
     listed = wp.empty((kinds, places), dtype=int)
-    return Scratch(wp.empty(places, dtype=Found), listed, wp.zeros(kinds, dtype=int))
+    return Handover(wp.empty(places, dtype=Found), listed, wp.zeros(kinds, dtype=int))
 
 
-def launches(d: Any, call: dict[str, Any], memory: Scratch, number: int) -> list[dict[str, Any]]:
+def launches(d: Any, call: dict[str, Any], memory: Handover, number: int) -> list[dict[str, Any]]:
     """The launches of both phases in place of one of upstream's, as arguments of `warp.launch`. Nothing is allocated.
 
     Args:
