@@ -6,7 +6,7 @@ then z) carry it. Position servos limited to the paper's 300 N drive them, each 
 
 The damping of the slides lies in their joints and not in the servos' limited force, so that a hand whose target jumps
 across the house moves at most at 300 N / 136 N s/m = 2.2 m/s along each axis; near its target it moves as with a damped
-servo. With the damping inside the limit it reached 50 m/s and threw objects out of the house (docs/notes.md).
+servo. With the damping inside the limit it reached 50 m/s and threw objects out of the house (docs/notes/lost.md).
 """
 
 from __future__ import annotations

@@ -32,7 +32,7 @@ Three more, for safety:
 - Contacts are checked against their geoms (`contacts`).
 - Too many pairs in the first of a step's two passes of collision detection are flagged (`collision`).
 
-What each was of a step on an H200 is in docs/notes.md.
+What each was of a step on an H200 is in docs/notes/gpu.md.
 
 Who gets them: programs of our own engines (`traced_with`), and direct calls inside `awake_kernels()`. Everybody else in
 the process, in whatever thread, gets MuJoCo Warp's own functions. An engine made inside `upstream_kernels()` gets
