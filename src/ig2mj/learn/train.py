@@ -11,11 +11,11 @@ on, since inside one program the two cannot be told apart; with two programs bot
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 import pathlib
 import sys
 import time
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -28,9 +28,7 @@ from ig2mj.learn.checkpoints import TAKEN, Checkpoints, newest, only_run, same, 
 from ig2mj.learn.collect import TrainingEnv
 from ig2mj.learn.iteration import Algorithm, ManyDevices, OneDevice
 from ig2mj.learn.log import Log
-
-EPISODES = (100, 500)
-"""Return and success are told of so many of the last episodes: of as many as there are worlds, within these limits."""
+from ig2mj.learn.progress import EPISODES, Window
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,43 +68,6 @@ class Result:
     stopped: str
 
 
-@dataclasses.dataclass
-class _Window:
-    """What happened since the last report, and in the last episodes.
-
-    `last` reaches back over `episodes` episodes and `least` steps of all worlds together: over less than an episode's
-    horizon those that end are mostly the short ones, and those succeed.
-    """
-
-    began: float
-    episodes: int
-    least: float
-    last: deque[dict[str, float]] = dataclasses.field(default_factory=deque)
-    steps: float = 0.0
-    updates: float = 0.0
-    spent: float = 0.0
-    losses: dict[str, float] = dataclasses.field(default_factory=dict)
-
-    def add(self, sums: Mapping[str, float]) -> None:
-        self.last.append(dict(sums))
-        episodes, steps = (sum(s[name] for s in self.last) for name in ("episodes", "steps"))
-        while len(self.last) > 1:
-            episodes, steps = episodes - self.last[0]["episodes"], steps - self.last[0]["steps"]
-            if episodes < self.episodes or steps < self.least:
-                break
-            self.last.popleft()
-
-    def mean(self) -> dict[str, float | None]:
-        """Of the last episodes by name; per step, what is counted per step."""
-        total = {name: sum(s[name] for s in self.last) for name in self.last[-1]}
-        episodes, steps = total.pop("episodes"), total.pop("steps")
-        found: dict[str, float | None] = {}
-        for name, value in total.items():
-            count = steps if name.startswith("reward") else episodes if steps >= self.least else 0
-            found[name] = value / count if count else None
-        return found
-
-
 def train(
     env: TrainingEnv,
     algorithm: Algorithm,
@@ -134,113 +95,145 @@ def train(
     """
     team = team or Team()
     with only_run(run.out if team.first else None):
-        return _train(env, algorithm, run, depends, learner, devices, team, kept, compiled)
+        training = _Training(env, algorithm, run, depends or {}, learner, devices, team)
+        return training.until_stopped(kept or (lambda *_: None), compiled or (lambda: None))
 
 
-def _train(
-    env: TrainingEnv,
-    algorithm: Algorithm,
-    run: Run,
-    depends: Mapping[str, Any] | None,
-    learner: Any,
-    devices: Sequence[Any],
-    team: Team,
-    kept: Callable[[Any, dict[str, Any]], None] | None,
-    compiled: Callable[[], None] | None,
-) -> Result:
-    depends = {**(depends or {}), "algorithm": algorithm.name, "settings": dataclasses.asdict(algorithm.config)}
-    key = jax.random.PRNGKey(run.seed)
-    first_key, key = jax.random.split(key)
-    learner = algorithm.init(first_key) if learner is None else learner
-    step: Any = ManyDevices(env, algorithm, devices, team) if devices else OneDevice(env, algorithm, run.programs)
-    memory = step.memory()
-    checkpoints = Checkpoints(run.out) if run.out is not None else None
-    log = Log(run.out if team.first else None, quiet=run.quiet or not team.first)
-    clock, iteration, env_steps, resumed = 0.0, 0, 0, False
-    if run.resume:
-        if checkpoints is None:
+class _Training:
+    """A run: what is learned, and how far it is."""
+
+    def __init__(
+        self,
+        env: TrainingEnv,
+        algorithm: Algorithm,
+        run: Run,
+        depends: Mapping[str, Any],
+        learner: Any,
+        devices: Sequence[Any],
+        team: Team,
+    ):
+        settings = dataclasses.asdict(algorithm.config)
+        self.run, self.team = run, team
+        self.depends = {**depends, "algorithm": algorithm.name, "settings": settings, "save_buffer": run.save_buffer}
+        first_key, self.key = jax.random.split(jax.random.PRNGKey(run.seed))
+        self.learner = algorithm.init(first_key) if learner is None else learner
+        self.step: Any = (
+            ManyDevices(env, algorithm, devices, team) if devices else OneDevice(env, algorithm, run.programs)
+        )
+        self.memory = self.step.memory()
+        self.checkpoints = Checkpoints(run.out) if run.out is not None else None
+        self.log = Log(run.out if team.first else None, quiet=run.quiet or not team.first)
+        self.clock, self.iteration, self.env_steps = 0.0, 0, 0
+        resumed = self._resume() if run.resume else self._begin()
+        self.waiting = 2 if resumed and run.save_buffer else algorithm.warm_up(resumed)
+        """Of the iterations of this process the first that learns."""
+        self.horizon = float(getattr(getattr(env, "task", env), "horizon", 0))
+
+    def _begin(self) -> bool:
+        kept = self.checkpoints is not None and bool(self.checkpoints.numbers())
+        if self.team.barrier("is the folder free", kept):
+            raise Ig2mjError(f"{self.run.out} {TAKEN}")
+        return False
+
+    def _resume(self) -> bool:
+        """Goes on from the newest checkpoint; False: there is none."""
+        if self.checkpoints is None:
             raise Ig2mjError("--resume needs --out, the folder of the run")
-        tree = {"learner": learner, "key": key, **({"memory": memory} if run.save_buffer else {})}
-        found = newest(checkpoints, tree, {**depends, "save_buffer": run.save_buffer}, team)
-        if found is not None:
-            tree, meta = found
-            learner, key, memory = tree["learner"], tree["key"], tree.get("memory", memory)
-            clock, iteration, env_steps = meta["seconds"], meta["iteration"], meta["env_steps"]
-            resumed = True
-            log.forget_after(clock)
-        elif team.first and not run.quiet:
-            # A scheduler that starts a killed job again needs it to go on; but the folder may be a typo.
-            print(f"{run.out}: there is no checkpoint to resume, so the run begins", file=sys.stderr)
-    elif team.barrier("is the folder free", checkpoints is not None and bool(checkpoints.numbers())):
-        raise Ig2mjError(f"{run.out} {TAKEN}")
+        found = newest(self.checkpoints, self._tree(self.memory), self.depends, self.team)
+        if found is None:
+            if self.team.first and not self.run.quiet:
+                # A scheduler that starts a killed job again needs it to go on; but the folder may be a typo.
+                print(f"{self.run.out}: there is no checkpoint to resume, so the run begins", file=sys.stderr)
+            return False
+        tree, meta = found
+        self.learner, self.key, self.memory = tree["learner"], tree["key"], tree.get("memory", self.memory)
+        self.clock, self.iteration, self.env_steps = (meta[name] for name in ("seconds", "iteration", "env_steps"))
+        self.log.forget_after(self.clock)
+        return True
 
-    learner, memory = step.place(same(learner, team), memory)
-    with team.turns():
-        play = step.begin(run.seed + iteration)  # a resumed run has other starts
-    least = float(getattr(getattr(env, "task", env), "horizon", 0)) * step.num_worlds
-    waiting = 2 if resumed and run.save_buffer else algorithm.warm_up(resumed)
-    window, budget = _Window(time.monotonic(), int(np.clip(step.num_worlds, *EPISODES)), least), run.minutes * 60
-    logged, saved = time.monotonic(), clock
-    compile_s = simulator = math.nan
-    zero = logged  # when the clock was 0
-    row: dict[str, Any] = {}
+    def _tree(self, memory: Any) -> dict[str, Any]:
+        """What a checkpoint holds."""
+        return {"learner": self.learner, "key": self.key, **({"memory": memory} if self.run.save_buffer else {})}
 
-    def save(learner: Any) -> None:
-        if checkpoints is not None:
-            tree = {"learner": learner, "key": key, **({"memory": whole(memory, team)} if run.save_buffer else {})}
-            if not team.first:
-                return
-            meta = {"seconds": clock, "iteration": iteration, "env_steps": env_steps}
-            checkpoints.save(iteration, tree, {**meta, "depends": {**depends, "save_buffer": run.save_buffer}})
+    def _save(self) -> None:
+        """Writes a checkpoint; all processes of a team take part where it holds their replay buffers."""
+        if self.checkpoints is None:
+            return
+        tree = self._tree(whole(self.memory, self.team) if self.run.save_buffer else None)
+        if self.team.first:
+            meta = {"seconds": self.clock, "iteration": self.iteration, "env_steps": self.env_steps}
+            self.checkpoints.save(self.iteration, tree, {**meta, "depends": self.depends})
 
-    for done in range(10**12):
-        began = time.monotonic()
-        key, now = jax.random.split(key)
-        progress = min(clock / budget, 1.0)
-        if run.iterations is not None:
-            progress = max(progress, iteration / run.iterations)
-        learner, memory, play, sums, losses, spent = step(learner, memory, play, now, progress, done >= waiting, clock)
-        told = losses.pop("clock")
-        took = time.monotonic() - began
-        if done == 0:
-            if compiled is not None:
+    def until_stopped(self, kept: Callable[[Any, dict[str, Any]], None], compiled: Callable[[], None]) -> Result:
+        """Iterations until the run is over; see `train`."""
+        run, team, worlds = self.run, self.team, self.step.num_worlds
+        self.learner, self.memory = self.step.place(same(self.learner, team), self.memory)
+        with team.turns():
+            play = self.step.begin(run.seed + self.iteration)  # a resumed run has other starts
+        zero = logged = time.monotonic()  # `zero`: when the clock was 0
+        window = Window(logged, int(np.clip(worlds, *EPISODES)), self.horizon * worlds)
+        saved, compile_s, simulator = self.clock, math.nan, math.nan
+        row: dict[str, Any] = {}
+        for done in itertools.count():
+            began = time.monotonic()
+            play, sums, losses, spent = self._iterate(play, done >= self.waiting)
+            told = losses.pop("clock")
+            now = time.monotonic()
+            took = now - began
+            if done == 0:
                 compiled()
-            compile_s, logged = took, time.monotonic()
-            window.began, zero = logged, logged - clock
-        else:
-            clock = time.monotonic() - zero
-            if done < waiting:
-                simulator = min(took, simulator) if simulator == simulator else took
-            window.spent += spent if spent is not None else min(simulator, took)
-        iteration += 1
-        env_steps += int(sums["steps"])
-        _guard(losses, checkpoints)
-        window.add(sums)
-        window.steps += sums["steps"] if done else 0
-        window.updates += losses.pop("updates") * (done > 0)
-        window.losses = losses
-        solved = run.until is not None and _solved(window, run.until)
-        if team.count == 1:
-            told = clock
-        stopped = "solved" if solved else "time" if told >= budget else None
-        if run.iterations is not None and iteration >= run.iterations:
-            stopped = "iterations"
-        now_s = time.monotonic()
-        if now_s - logged >= run.log_every or stopped:
-            passed = max(now_s - window.began, 1e-9)
-            row = _row(window, passed, clock, iteration, env_steps, compile_s)
-            log.row(row)
-            logged, window = now_s, _Window(now_s, window.episodes, least, window.last)
-        if told - saved >= run.checkpoint_every or stopped:
-            save(learner)
-            saved = told
-            if kept is not None and team.first:
-                kept(learner, {"seconds": clock, "env_steps": env_steps, **row})
-            team.barrier(f"saved {iteration}")
-        if stopped:
-            log.close()
-            return Result(learner, row, iteration, compile_s, stopped)
-    raise AssertionError
+                compile_s, logged = took, time.monotonic()
+                window.began, zero = logged, logged - self.clock
+            else:
+                self.clock = time.monotonic() - zero
+                if done < self.waiting:
+                    simulator = min(took, simulator) if simulator == simulator else took
+                window.spent += spent if spent is not None else min(simulator, took)
+            _guard(losses, self.checkpoints)
+            window.add(sums)
+            updates = losses.pop("updates")
+            if done:
+                window.steps, window.updates = window.steps + sums["steps"], window.updates + updates
+            window.losses = losses
+            told = self.clock if team.count == 1 else told
+            stopped = self._stopped(window, told)
+            now = time.monotonic()
+            if now - logged >= run.log_every or stopped:
+                counters = {"seconds": self.clock, "iteration": self.iteration, "env_steps": self.env_steps}
+                row = {**counters, **window.mean(), **window.rates(now), **losses, "compile_s": compile_s}
+                self.log.row(row)
+                logged, window = now, window.next(now)
+            if told - saved >= run.checkpoint_every or stopped:
+                self._save()
+                saved = told
+                if team.first:
+                    kept(self.learner, {"seconds": self.clock, "env_steps": self.env_steps, **row})
+                team.barrier(f"saved {self.iteration}")
+            if stopped:
+                self.log.close()
+                return Result(self.learner, row, self.iteration, compile_s, stopped)
+        raise AssertionError
+
+    def _iterate(self, play: Any, learns: bool) -> tuple[Any, dict[str, float], dict[str, float], float | None]:
+        """One iteration; the worlds after it, sums over its episodes, losses, and the simulator's seconds if known."""
+        self.key, now = jax.random.split(self.key)
+        progress = min(self.clock / (self.run.minutes * 60), 1.0)
+        if self.run.iterations is not None:
+            progress = max(progress, self.iteration / self.run.iterations)
+        self.learner, self.memory, play, sums, losses, spent = self.step(
+            self.learner, self.memory, play, now, progress, learns, self.clock
+        )
+        self.iteration += 1
+        self.env_steps += int(sums["steps"])
+        return play, sums, losses, spent
+
+    def _stopped(self, window: Window, clock: float) -> str | None:
+        """Why the run is over: "iterations", "solved" or "time"; None: it goes on. `clock`: the team's."""
+        if self.run.iterations is not None and self.iteration >= self.run.iterations:
+            return "iterations"
+        if self.run.until is not None and window.solved(self.run.until):
+            return "solved"
+        return "time" if clock >= self.run.minutes * 60 else None
 
 
 def _guard(losses: dict[str, float], checkpoints: Checkpoints | None) -> None:
@@ -253,27 +246,3 @@ def _guard(losses: dict[str, float], checkpoints: Checkpoints | None) -> None:
     numbers = checkpoints.numbers() if checkpoints is not None else []
     where = f"the last good checkpoint is {checkpoints.folder / str(numbers[-1])}" if checkpoints and numbers else ""
     raise Ig2mjError(f"training stopped: {what}" + (f"; {where}" if where else "; there is no checkpoint yet"))
-
-
-def _solved(window: _Window, until: float) -> bool:
-    episodes, steps = (sum(s[name] for s in window.last) for name in ("episodes", "steps"))
-    enough = episodes >= window.episodes and steps >= window.least
-    return enough and sum(s["success"] for s in window.last) >= until * episodes
-
-
-def _row(
-    window: _Window, passed: float, clock: float, iteration: int, env_steps: int, compile_s: float
-) -> dict[str, Any]:
-    simulator = min(window.spent / passed, 1.0) if window.spent == window.spent else None
-    return {
-        "seconds": clock,
-        "iteration": iteration,
-        "env_steps": env_steps,
-        **window.mean(),
-        "steps_per_second": window.steps / passed,
-        "updates_per_second": window.updates / passed,
-        "simulator_share": simulator,
-        "learner_share": None if simulator is None else 1 - simulator,
-        **window.losses,
-        "compile_s": compile_s,
-    }
