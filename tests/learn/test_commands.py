@@ -38,6 +38,8 @@ def test_wrong_options_name_what_is_near(capsys):
         (["train", "CookingMeat", "--obs", "rgb"], "near matches: rgbd"),
         (["train", "CookingMeat", "--set", "updatez=3"], "updates"),
         (["train", "CookingMeat", "--algo", "bc"], "needs --demos"),
+        (["train", "CookingMeat", "--algo", "bc", "--expert"], "--expert is for sac"),
+        (["train", "CookingMeat", "--programs", "3"], "--programs 3"),
         (["train", "CookingMeat", "--minutes", "nan"], "--minutes nan"),
         (["train", "CookingMeat", "--until", "7"], "--until 7.0: a share"),
         (["train", "CookingMeat", "--pixels", "0"], "--pixels 0"),

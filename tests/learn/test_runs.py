@@ -20,10 +20,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 from small_envs import PointMass
 
 from ig2mj.errors import ClusterError, Ig2mjError, InputError, UnknownNameError
+from ig2mj.learn.bc import BCConfig
 from ig2mj.learn.best import BEST, LAST, SUCCESS, Best
 from ig2mj.learn.checkpoints import Checkpoints, only_run
+from ig2mj.learn.dagger import DaggerConfig
 from ig2mj.learn.networks import Actor
-from ig2mj.learn.options import configured
+from ig2mj.learn.options import configured, written
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy, depends_on
 from ig2mj.learn.ppo import PPO, PPOConfig
@@ -230,3 +232,24 @@ def test_settings_are_known_by_name_and_type():
         configured(SACConfig(), ["gama=0.9"])
     with pytest.raises(Ig2mjError, match="updates=32"):
         configured(SACConfig(), ["updates=many"])
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ("updates=0", "at least 1"),
+        ("alpha=-1", "at least 0"),
+        ("gamma=1.5", "from 0 to 1"),
+        ("lr=inf", "finite"),
+        ("actor=64,0", "at least 1"),
+    ],
+)
+def test_settings_that_cannot_be_are_refused(change, told):
+    with pytest.raises(Ig2mjError, match=told):
+        configured(SACConfig(), [change])
+
+
+def test_every_setting_of_an_algorithm_may_be_what_it_is():
+    for config in (SACConfig(), PPOConfig(), DaggerConfig(), BCConfig()):
+        changes = [f"{name}={written(value)}" for name, value in dataclasses.asdict(config).items()]
+        assert configured(config, changes) == config

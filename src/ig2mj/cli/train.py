@@ -82,7 +82,7 @@ def run(
     from ig2mj.cluster.place import place_of
     from ig2mj.cluster.team import Team
     from ig2mj.envs.registry import VECTORS, make
-    from ig2mj.errors import Ig2mjError, UnknownNameError
+    from ig2mj.errors import Ig2mjError
     from ig2mj.learn.algorithms import config_of, made
     from ig2mj.learn.bc import begin_as_clone
     from ig2mj.learn.best import SUCCESS, Best
@@ -90,31 +90,16 @@ def run(
     from ig2mj.learn.iteration import AXIS
     from ig2mj.learn.memory import is_out_of_memory, too_large
     from ig2mj.learn.options import configured
-    from ig2mj.learn.perception import MODES, Perception
+    from ig2mj.learn.perception import Perception
     from ig2mj.learn.policies import Policy, depends_on, world_of
     from ig2mj.learn.train import Run, train
 
-    if algo not in ALGORITHMS:
-        raise UnknownNameError("algorithm", algo, ALGORITHMS)
-    if obs not in MODES:
-        raise UnknownNameError("kind of observation", obs, MODES)
-    if not 0 < minutes < float("inf") or not 0 <= videos < float("inf"):
-        raise Ig2mjError(f"--minutes {minutes}, --videos {videos}: finite, more than 0, and 0 or more")
-    if until is not None and not 0 < until <= 1:
-        raise Ig2mjError(f"--until {until}: a share is more than 0 and at most 1")
-    if pixels < 1 or 128 % pixels:
-        raise Ig2mjError(f"--pixels {pixels}: a divisor of 128 is needed")
+    _check(algo, obs, minutes, videos, until, pixels, programs, devices, demos, expert)
     kept_rows = rows_of(rows, pixels)
-    if devices != "all" and not (devices.isdigit() and int(devices)):
-        raise Ig2mjError(f"--devices {devices}: a number from 1 on, or all")
     if algo == "bc":
         from ig2mj.cli.clone import train_from_demos
 
         return train_from_demos(env, demos, robot, grasping, obs, pixels, kept_rows, minutes, seed, out, resume, set)
-    if demos is not None and algo != "sac":
-        raise Ig2mjError(f"--demos: {algo} takes none (bc and sac do)")
-    if expert and algo != "sac":
-        raise Ig2mjError(f"--expert is for sac: {'dagger always has one' if algo == 'dagger' else 'ppo learns alone'}")
     team = Team.join(place_of(os.environ))
     with team.together():
         if engine is None:
@@ -183,6 +168,43 @@ def run(
         print(best.file)
         print(f"to measure it on states it has not seen: ig2mj evaluate {best.file}", file=sys.stderr)
         return 0
+
+
+def _check(
+    algo: str,
+    obs: str,
+    minutes: float,
+    videos: float,
+    until: float | None,
+    pixels: int,
+    programs: int,
+    devices: str,
+    demos: pathlib.Path | None,
+    expert: bool,
+) -> None:
+    """Refuses options that cannot be, before anything is made. Raises Ig2mjError."""
+    from ig2mj.errors import Ig2mjError, UnknownNameError
+    from ig2mj.learn.perception import MODES
+
+    if algo not in ALGORITHMS:
+        raise UnknownNameError("algorithm", algo, ALGORITHMS)
+    if obs not in MODES:
+        raise UnknownNameError("kind of observation", obs, MODES)
+    if not 0 < minutes < float("inf") or not 0 <= videos < float("inf"):
+        raise Ig2mjError(f"--minutes {minutes}, --videos {videos}: finite, more than 0, and 0 or more")
+    if until is not None and not 0 < until <= 1:
+        raise Ig2mjError(f"--until {until}: a share is more than 0 and at most 1")
+    if pixels < 1 or 128 % pixels:
+        raise Ig2mjError(f"--pixels {pixels}: a divisor of 128 is needed")
+    if programs not in (1, 2):
+        raise Ig2mjError(f"--programs {programs}: 1 or 2 are possible")
+    if devices != "all" and not (devices.isdigit() and int(devices)):
+        raise Ig2mjError(f"--devices {devices}: a number from 1 on, or all")
+    if demos is not None and algo not in ("bc", "sac"):
+        raise Ig2mjError(f"--demos: {algo} takes none (bc and sac do)")
+    if expert and algo != "sac":
+        others = {"dagger": "dagger always has one", "ppo": "ppo learns alone", "bc": "bc learns from --demos"}
+        raise Ig2mjError(f"--expert is for sac: {others[algo]}")
 
 
 def rows_of(words: str | None, pixels: int) -> tuple[int, int] | None:
