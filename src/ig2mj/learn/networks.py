@@ -16,6 +16,7 @@ from jaxtyping import Float, UInt8
 
 from ig2mj.engine.view import Array
 from ig2mj.errors import UnknownNameError
+from ig2mj.learn.convolution import convolve
 
 LOG_STD = (-5.0, 0.0)
 """Limits of the logarithm of an actor's standard deviation, before tanh (FlashSAC's recommendation)."""
@@ -73,10 +74,10 @@ class Encoder(nn.Module):
         half = self.net in PRECISE and jax.default_backend() == "gpu"
         places, dtype = jnp.zeros((x.shape[0], 0)), jnp.bfloat16 if half else jnp.float32
         for k, channels in enumerate((32, *[64] * (halvings - 1))):
-            x = nn.relu(nn.Conv(channels, (3, 3), strides=2, padding="SAME", dtype=dtype)(x))
+            x = nn.relu(_conv(channels, 2, dtype)(x))
             if self.net in ("points", *PRECISE) and k == 1:
                 normal = nn.LayerNorm(name="points_norm")(x)
-                maps = nn.Conv(32, (3, 3), padding="SAME", dtype=dtype, name="points")(normal)
+                maps = _conv(32, 1, dtype, "points")(normal)
                 depth = coarse(seen[..., -1], maps.shape[1:3]) if self.net in PRECISE else None
                 places = brightest(SHARP * maps.astype(jnp.float32), depth)
         x = x.reshape(x.shape[0], -1).astype(jnp.float32)
@@ -100,8 +101,13 @@ class Glimpse(nn.Module):
     def __call__(self, seen: Float[Array, "B r s c"], point: Float[Array, "B 2"]) -> Float[Array, "B f"]:
         x = window(seen, jax.lax.stop_gradient(point))
         for channels, stride in ((32, 1), (64, 2), (64, 2)):
-            x = nn.relu(nn.Conv(channels, (3, 3), strides=stride, padding="SAME", dtype=self.dtype)(x))
+            x = nn.relu(_conv(channels, stride, self.dtype)(x))
         return nn.relu(nn.Dense(128)(x.reshape(x.shape[0], -1).astype(jnp.float32)))
+
+
+def _conv(channels: int, stride: int, dtype: Any, name: str | None = None) -> nn.Conv:
+    """A convolution of 3x3 pixels."""
+    return nn.Conv(channels, (3, 3), stride, dtype=dtype, conv_general_dilated=convolve, name=name)
 
 
 def window(seen: Float[Array, "B r s c"], point: Float[Array, "B 2"]) -> Float[Array, "B w w c"]:
