@@ -28,7 +28,10 @@ def __getattr__(name: str) -> Any:
     """Imports the public names when they are first used, so that `import ig2mj` loads neither MuJoCo nor JAX."""
     if name not in _HOME:
         raise AttributeError(f"module 'ig2mj' has no attribute '{name}'")
-    return getattr(importlib.import_module(_HOME[name]), name)
+    from ig2mj.process.collector import REST
+
+    with REST:
+        return getattr(importlib.import_module(_HOME[name]), name)
 
 
 def __dir__() -> list[str]:

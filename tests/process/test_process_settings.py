@@ -16,7 +16,7 @@ import warp as wp
 import ig2mj.process
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_warp, quiet_warp, settings
-from ig2mj.process.collector import CollectorRest
+from ig2mj.process.collector import CollectorRest, Compiled
 
 STATE = """
 import jax, warp as wp, gc, os
@@ -138,3 +138,15 @@ def test_nothing_is_collected_while_warp_captures():
     with pytest.raises(ZeroDivisionError), wp.ScopedCapture(device="cpu"):
         _ = 1 / 0
     assert gc.isenabled()
+
+
+def test_a_compiled_function_is_traced_while_the_collector_rests():
+    seen = []
+
+    def doubled(x):
+        seen.append(gc.isenabled())
+        return 2 * x
+
+    compiled = Compiled(doubled, static_argnums=0)
+    assert (compiled(3), compiled(3), seen, gc.isenabled()) == (6, 6, [False], True)
+    assert compiled._cache_size() == 1 and compiled.lower(4).compile()() == 8

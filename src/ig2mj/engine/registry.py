@@ -7,6 +7,8 @@ from typing import Any
 
 from ig2mj.engine.base import Engine
 from ig2mj.errors import UnknownNameError
+from ig2mj.process.collector import REST
+from ig2mj.process.imports import import_mjx
 from ig2mj.scene.scene import Scene
 
 ENGINES = {
@@ -17,6 +19,7 @@ ENGINES = {
 """Name: module and class."""
 
 
+@REST
 def make_engine(name: str, scene: Scene, num_worlds: int = 1, **options: Any) -> Engine:
     """Makes an engine for a scene.
 
@@ -29,5 +32,7 @@ def make_engine(name: str, scene: Scene, num_worlds: int = 1, **options: Any) ->
     """
     if name not in ENGINES:
         raise UnknownNameError("engine", name, ENGINES)
+    if name != "native":
+        import_mjx()
     module, kind = ENGINES[name].split(":")
     return getattr(importlib.import_module(module), kind)(scene, num_worlds, **options)

@@ -33,6 +33,7 @@ from ig2mj.envs.observations import Observer, Space
 from ig2mj.envs.state import EnvState, Seen
 from ig2mj.errors import ActionError, EngineError
 from ig2mj.predicates.compile import GoalStatus
+from ig2mj.process.collector import REST, Compiled
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.actions import ActionMap
@@ -100,10 +101,10 @@ class Environment:
         compiled = jax.jit if core.engine.pure else OfView
         self._see, self._see_first = compiled(self._after_step), compiled(self._after_reset)
         if core.engine.pure:
-            self._step = jax.jit(self.step_fn, donate_argnums=0)
-            self._reset = jax.jit(self.reset_fn, donate_argnums=0)
-            self._autoreset = jax.jit(self.step_autoreset_fn, donate_argnums=0)
-            self._start = jax.jit(self._start_fn, donate_argnums=0)
+            self._step = Compiled(self.step_fn, donate_argnums=0)
+            self._reset = Compiled(self.reset_fn, donate_argnums=0)
+            self._autoreset = Compiled(self.step_autoreset_fn, donate_argnums=0)
+            self._start = Compiled(self._start_fn, donate_argnums=0)
         else:
             self._step, self._reset, self._start = self.step_fn, self.reset_fn, self._start_fn
             self._autoreset = self.step_autoreset_fn
@@ -200,7 +201,8 @@ class Environment:
         """
         if isinstance(seed, EnvState):
             return self._reset(seed, np.ones(self.num_worlds, bool) if mask is None else mask)
-        return self._start(self.core.engine.reset(), as_seed(seed))
+        with REST:
+            return self._start(self.core.engine.reset(), as_seed(seed))
 
     def _start_fn(self, physics: Physics, seed: int | Int[Array, ""]) -> EnvState:
         batch = self.core.start_fn(physics, seed)

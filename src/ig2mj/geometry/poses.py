@@ -11,7 +11,6 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-import scipy.spatial.transform
 from jaxtyping import Array, Float
 
 AnyArray = Array | np.ndarray
@@ -92,7 +91,16 @@ def quat_to_matrix(q: Quat) -> Float[Array, "*b 3 3"]:
 
 def matrices_on_host(q: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 3 3"]:
     """`quat_to_matrix` in float64 and without JAX: for constants, also while something is traced."""
-    return scipy.spatial.transform.Rotation.from_quat(np.roll(q, -1, axis=-1)).as_matrix()  # SciPy: x-y-z-w
+    squares = q * q
+    q = q / np.sqrt(squares[:, 1] + squares[:, 2] + squares[:, 3] + squares[:, 0])[:, None]  # SciPy's order
+    w, x, y, z = q.T
+    ww, xx, yy, zz = (q * q).T
+    rows = [
+        [xx - yy - zz + ww, 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), -xx + yy - zz + ww, 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), -xx - yy + zz + ww],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def matrix_to_quat(m: Float[AnyArray, "*b 3 3"]) -> Float[Array, "*b 4"]:

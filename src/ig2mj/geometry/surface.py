@@ -10,7 +10,6 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-import scipy.spatial
 from jaxtyping import Float, Int
 
 from ig2mj.geometry.hulls import signed_depth
@@ -143,6 +142,8 @@ def _outline(
 
 def _hull_triangles(points: Float[np.ndarray, "M 3"]) -> Float[np.ndarray, "T 3 3"]:
     """Triangles of the convex hull, counter-clockwise from outside."""
+    import scipy.spatial  # takes as long as all of this package
+
     try:
         hull = scipy.spatial.ConvexHull(points)
     except scipy.spatial.QhullError:

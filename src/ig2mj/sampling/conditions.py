@@ -10,7 +10,6 @@ import dataclasses
 import re
 from collections.abc import Iterable, Sequence
 
-import networkx
 import numpy as np
 
 from ig2mj.errors import StateError, UnknownNameError
@@ -128,6 +127,8 @@ def order(conditions: Sequence[Condition]) -> Plan:
     Raises:
       StateError: objects are to be placed on each other in a circle.
     """
+    import networkx
+
     graph = networkx.DiGraph()
     where: dict[str, list[Condition]] = {}
     for condition in conditions:

@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
-import scipy.signal
 from jaxtyping import Bool
 
 from ig2mj.sampling.columns import Level
@@ -59,5 +58,7 @@ def _meets(
     """For every cell of the origin whether a cell of the mask falls on a wrong one."""
     if not wrong.any() or not mask.any():
         return np.zeros((rows, cols), bool)
+    import scipy.signal  # half a second
+
     count = scipy.signal.oaconvolve(wrong.astype(float), mask[::-1, ::-1].astype(float), mode="valid")
     return count[:rows, :cols] > 0.5

@@ -10,7 +10,6 @@ import dataclasses
 
 import mujoco
 import numpy as np
-import scipy.spatial
 
 from ig2mj.scene.tables import PieceKind
 
@@ -47,6 +46,8 @@ def hull_planes(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns:
       planes [m, 4], corners [k, 3] in the order of `vertices`.
     """
+    import scipy.spatial  # not needed to read a household's manifest
+
     try:
         hull = scipy.spatial.ConvexHull(vertices)
     except scipy.spatial.QhullError:

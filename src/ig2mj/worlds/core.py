@@ -37,6 +37,7 @@ from ig2mj.engine.base import Engine, Physics, Write
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.predicates.compile import GoalStatus
+from ig2mj.process.collector import REST, Compiled
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
 from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Batch
@@ -98,12 +99,13 @@ class Core:
         self._count = guards.counter(lambda: self.starts.floor, seconds, engine.pure)
         self._chosen = jax.jit(chosen)
         if engine.pure:
-            self.advance, self.grasp = jax.jit(self.advance_fn), jax.jit(self.hands.act)
-            self._step = jax.jit(self.step_fn, donate_argnums=0)
-            self._reset = jax.jit(self.reset_fn, donate_argnums=0)
-            self._rollout = jax.jit(self._scanned, static_argnums=(2, 3), donate_argnums=(0, 1))
-            self._begin = jax.jit(self.start_fn, donate_argnums=0)
-            self._write, self._load = jax.jit(self.write_fn, donate_argnums=0), jax.jit(self.load_fn, donate_argnums=0)
+            self.advance, self.grasp = Compiled(self.advance_fn), jax.jit(self.hands.act)
+            self._step = Compiled(self.step_fn, donate_argnums=0)
+            self._reset = Compiled(self.reset_fn, donate_argnums=0)
+            self._rollout = Compiled(self._scanned, static_argnums=(2, 3), donate_argnums=(0, 1))
+            self._begin = Compiled(self.start_fn, donate_argnums=0)
+            self._write = Compiled(self.write_fn, donate_argnums=0)
+            self._load = Compiled(self.load_fn, donate_argnums=0)
             self._react = rules.step if rules is not None else self._no_rules
             self._if_any, self._index = _cond_any, jnp.asarray
         else:
@@ -267,6 +269,7 @@ class Core:
 
     # Episodes.
 
+    @REST
     def start(self, seed: int | Int[Array, ""] = 0, first: int | Int[Array, ""] = 0) -> Batch:
         """All worlds at the start of their first episode.
 

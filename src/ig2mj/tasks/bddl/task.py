@@ -15,7 +15,6 @@ import os
 import sys
 
 import numpy as np
-import scipy.ndimage
 
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.errors import EngineError, UnknownNameError
@@ -121,6 +120,8 @@ def standing_place(task: BddlTask, pool: Pool) -> tuple[float, float]:
     Raises:
       EngineError: the home has no map, or no such floor.
     """
+    import scipy.ndimage
+
     probe = load_scene(task.home, agents=[TurtleBot()], objects=task.binding.additions)
     own = probe.start_data().qpos.copy()
     row = np.asarray(pool.physics.scene.qpos)[0]

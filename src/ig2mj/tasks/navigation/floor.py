@@ -10,15 +10,16 @@ Axes: W worlds, N cells, G goals, P rows of a pool, h and w cells of the map alo
 from __future__ import annotations
 
 import dataclasses
+from typing import TYPE_CHECKING
 
 import jax.numpy as jnp
 import numpy as np
-import scipy.ndimage
-import scipy.sparse
 from jaxtyping import Bool, Float, Int
-from scipy.sparse import csgraph
 
 from ig2mj.engine.view import Array
+
+if TYPE_CHECKING:
+    import scipy.sparse
 
 AHEAD = 5
 """Cells around the robot in which the next point of the way is looked for."""
@@ -57,6 +58,8 @@ class FloorMap:
         Raises:
           ValueError: nothing is free.
         """
+        import scipy.ndimage
+
         labels = np.asarray(scipy.ndimage.label(free, np.ones((3, 3)))[0])  # pyright: ignore[reportIndexIssue]
         if not labels.any():
             raise ValueError("no cell is free")
@@ -77,6 +80,8 @@ class FloorMap:
 
     def distances(self, goals: Int[np.ndarray, "G 2"]) -> Float[np.ndarray, "G h w"]:
         """Metres from every cell to the goals' cells along free ones; infinite where there is no way."""
+        from scipy.sparse import csgraph
+
         number = np.full(self.free.shape, -1)
         number[self.free] = np.arange(int(self.free.sum()))
         graph = self._graph(number)
@@ -86,6 +91,8 @@ class FloorMap:
         return fields
 
     def _graph(self, number: Int[np.ndarray, "h w"]) -> scipy.sparse.csr_matrix:
+        import scipy.sparse
+
         starts, ends, lengths = [], [], []
         padded = np.pad(self.free, 2)
         cells = self.cells + 2

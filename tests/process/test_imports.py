@@ -1,0 +1,42 @@
+"""What is imported when: a start does not wait for libraries that it does not call."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+
+def imported(code: str) -> set[str]:
+    shown = "import sys; print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", f"{code}\n{shown}"], capture_output=True, text=True, check=True)
+    return set(done.stdout.splitlines()[-1].split())
+
+
+@pytest.mark.parametrize("name", ["Simulation", "Worlds", "make", "load_scene"])
+def test_the_public_names_import_neither_gpu_libraries_nor_what_only_sampling_and_meshes_need(name):
+    found = imported(f"import ig2mj; ig2mj.{name}")
+    assert "mujoco" in found
+    assert found.isdisjoint({"warp", "mujoco.mjx", "trimesh", "networkx", "scipy.spatial", "scipy.signal"})
+
+
+def test_mjx_is_imported_without_trimesh_and_calls_it_all_the_same():
+    code = """
+from ig2mj.process.imports import import_mjx
+import_mjx()
+import sys
+from mujoco.mjx._src import mesh
+assert not {"trimesh", "scipy.spatial"} & sys.modules.keys()
+corners = [[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]
+assert mesh.trimesh.Trimesh(corners).convex_hull.volume == 1.0
+assert mesh.spatial.ConvexHull(corners).volume == 1.0
+import trimesh
+assert type(trimesh.Trimesh(corners)) is trimesh.Trimesh
+"""
+    assert {"mujoco.mjx", "trimesh", "scipy.spatial"} <= imported(code)
+
+
+def test_libraries_that_are_there_already_stay():
+    code = "import trimesh; before = trimesh\nfrom ig2mj.process.imports import import_mjx; import_mjx()\n"
+    assert "mujoco.mjx" in imported(code + "from mujoco.mjx._src import mesh; assert mesh.trimesh is before")
