@@ -72,7 +72,7 @@ def run(home: str, num_worlds: int, args: argparse.Namespace) -> dict:
         make_pool(bare, rules.model, 16, share=0.2),
         controllers_of(scene, CONTROL_STEPS * engine.substeps * engine.timestep),
     )
-    low, high = jnp.asarray(core.action_low), jnp.asarray(core.action_high)
+    low, high = jnp.asarray(core.controls.low), jnp.asarray(core.controls.high)
 
     def agent_step(carry, _):
         batch, action, key = carry
@@ -93,7 +93,7 @@ def run(home: str, num_worlds: int, args: argparse.Namespace) -> dict:
         key, draw = jax.random.split(key)
         action = jax.random.uniform(draw, action.shape, minval=low * actions, maxval=high * actions)
         world = batch.world
-        ctrl, controllers = core.control(action, world.view, batch.controllers)
+        ctrl, controllers = core.controls.act(action, world.view, batch.controllers)
         physics, view = engine.step(world.physics, ctrl)
         for _ in range(CONTROL_STEPS - 1):
             physics, view = engine.step(physics, None)
@@ -163,7 +163,7 @@ def time_parts(core: Core, batch: Batch, action: jax.Array) -> dict[str, float]:
     """Milliseconds of the parts of a control step, each compiled and called by itself."""
     world = batch.world
     parts = {
-        "control": (lambda a, v, c: core.control(a, v, c), (action, world.view, batch.controllers)),
+        "control": (lambda a, v, c: core.controls.act(a, v, c), (action, world.view, batch.controllers)),
         "physics": (lambda p: core.engine.step(p, None)[0], (world.physics,)),
         "view": (core.engine.view, (world.physics,)),
         "rules": (core.rules.step, (world.states, world.view)),

@@ -31,7 +31,7 @@ def test_fetch_holds_what_its_closing_fingers_touch_and_carries_it(tiny_home_fol
     robots, core = world.simulation.robots, world.simulation.core
     action = np.zeros((1, 11), np.float32)
     action[0, -1] = -1.0
-    ctrl, robots.controllers = core.control(action, world.view, robots.controllers)
+    ctrl, robots.controllers = core.controls.act(action, world.view, robots.controllers)
     for _ in range(15):
         before = can(world)
         world.simulation.step(np.asarray(ctrl)[0])

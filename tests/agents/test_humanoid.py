@@ -144,7 +144,7 @@ def test_a_hand_that_stayed_behind_is_put_back_at_once(tiny_home_folder, engine)
         before = simulation.view
         action = np.zeros((1, 28), np.float32)
         action[0, world.controller.action_names.index("right_hand_reset")] = 1.0
-        _, state = simulation.core.control(action, before, simulation.robots.controllers)
+        _, state = simulation.core.controls.act(action, before, simulation.robots.controllers)
         physics = simulation.core.hand_resets.act(simulation.physics, before, action, state)
         after = np.asarray(simulation.engine.view(physics).agent.hand_pos)[0, 1]
         moved = np.linalg.norm(after - np.asarray(before.agent.hand_pos)[0, 1])

@@ -125,7 +125,7 @@ def test_a_finger_within_ten_centimetres_of_the_button_flips_it_at_the_fifth_ste
         action[0, robots.action_names.index(key)] = value
     near = 0
     for _ in range(120):
-        ctrl, robots.controllers = core.control(action, simulation.view, robots.controllers)
+        ctrl, robots.controllers = core.controls.act(action, simulation.view, robots.controllers)
         simulation.step(np.asarray(ctrl)[0])
         near = near + 1 if nearest_finger(simulation, button) < 0.1 else 0
         assert simulation.predicate("toggled_on", "stove") == (near >= 5)

@@ -28,7 +28,7 @@ class RobotsOfWorld:
         self._simulation, self._core = simulation, simulation.core
         engine = simulation.engine
         self._steps = max(1, round(ACTION_PERIOD / (engine.substeps * engine.timestep)))
-        self.controllers: tuple[Any, ...] = self._core.first_controllers()
+        self.controllers: tuple[Any, ...] = self._core.controls.first()
         self.held: Held = self._core.hands.read(simulation.physics)
 
     @property
@@ -66,7 +66,7 @@ class RobotsOfWorld:
         view = self._simulation.view
         for _ in range(count):
             simulation = self._simulation
-            ctrl, self.controllers = self._core.control(row[None], view, self.controllers)
+            ctrl, self.controllers = self._core.controls.act(row[None], view, self.controllers)
             resets = self._core.hand_resets
             simulation.physics = resets.act(simulation.physics, view, row[None], self.controllers)
             view = self._simulation.step(np.asarray(ctrl, np.float64)[0], self._steps)
@@ -92,4 +92,4 @@ def remembered(simulation: Simulation) -> tuple[Any, ...]:
     """What the controllers of a simulation remember, where its view depends on that; else nothing."""
     if not simulation.scene.agents or not simulation.core.eyes.moving:
         return ()
-    return simulation.core.first_controllers() if simulation._robots is None else simulation._robots.controllers
+    return simulation.core.controls.first() if simulation._robots is None else simulation._robots.controllers

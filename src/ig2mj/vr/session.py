@@ -104,7 +104,7 @@ class Session:
             self.env = record(env, record_to, devices=rows, past_success=True)
         self.source, self.timing, self.track = source, Timing(), PoseTrack()
         watch_physics(env.core, lambda: self.timing.part("physics"))
-        self._scale = env.core.action_high
+        self._scale = env.core.controls.high
         self._touch, self._tell = Touch(env.scene), person or (lambda text: None)
         self.memory, self.frame, self.succeeded = Memory(), None, False
         self.pulses = np.zeros(2)

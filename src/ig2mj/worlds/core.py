@@ -41,10 +41,10 @@ from ig2mj.process.collector import REST, Compiled
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
 from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Batch
+from ig2mj.worlds.controls import Controls
 from ig2mj.worlds.eyes import Eyes
 from ig2mj.worlds.hand_resets import HandResets
 from ig2mj.worlds.hands import Hands
-from ig2mj.worlds.lazy.of_view import OfView
 from ig2mj.worlds.lazy.stepper import StateStepper
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.rules import Outcome, Rules, States
@@ -60,9 +60,8 @@ class Core:
     Attributes:
       advance: see `advance_fn`. hands: what they hold. grasp: `hands.act`, compiled where that helps. eyes: where they
         are in views.
-      engine: physics. rules: states and goal. controllers: of the scene's robots. grasping: how their hands hold.
-      starts: what episodes start from.
-      action_low, action_high: [n] limits of an action, of all robots one after the other.
+      engine: physics. rules: states and goal. controllers: of the scene's robots. controls: what they make of actions.
+      grasping: how their hands hold. starts: what episodes start from.
     """
 
     def __init__(
@@ -90,11 +89,9 @@ class Core:
         self.eyes = Eyes(engine, self.controllers)
         resets = not engine.pure if hand_resets is None else hand_resets
         self.hand_resets = HandResets(engine, self.controllers, resets)
-        self.action_low = np.concatenate([np.zeros(0), *(c.action_low for c in self.controllers)])
-        self.action_high = np.concatenate([np.zeros(0), *(c.action_high for c in self.controllers)])
+        self.controls = Controls(engine, self.controllers)
         self.starts = Starts(engine, rules.initial if rules is not None else None, pool)
         self._physics_step = engine.step  # a world at rest steps in under 2 us: even looking up a name counts
-        self._control = self._of_view(self._control_fn)
         seconds = engine.substeps * engine.timestep
         self._count = guards.counter(lambda: self.starts.floor, seconds, engine.pure)
         self._chosen = jax.jit(chosen)
@@ -123,7 +120,7 @@ class Core:
         """One control step of every world.
 
         Args:
-          action: of the robots, clipped to `action_low` and `action_high`; without controllers, MuJoCo's controls
+          action: of the robots, clipped to the limits of `controls`; without controllers, MuJoCo's controls
             [W, nu]. None: what was asked of the actuators last stays.
 
         Returns:
@@ -162,7 +159,7 @@ class Core:
     def _acted(self, batch: Batch, action: Float[Array, "W n"]) -> tuple[Batch, Float[Array, "W nu"]]:
         """What controllers make of an action."""
         world = batch.world
-        ctrl, controllers = self._control(world.view, action, batch.controllers)
+        ctrl, controllers = self.controls.act(action, world.view, batch.controllers)
         physics = self.hand_resets.act(world.physics, world.view, action, controllers)
         return dataclasses.replace(
             batch, world=dataclasses.replace(world, physics=physics), controllers=controllers
@@ -231,25 +228,6 @@ class Core:
         """
         return self._rollout(batch, carry, policy, length)
 
-    def control(
-        self, action: Float[Array, "W n"], view: PhysicsView, controllers: tuple[Any, ...]
-    ) -> tuple[Float[Array, "W nu"], tuple[Any, ...]]:
-        """MuJoCo's controls for an action of the robots, and what their controllers remember now."""
-        return self._control(view, action, controllers)
-
-    def _of_view(self, function: Callable[..., Any]) -> Callable[..., Any]:
-        """A function of the view and others, compiled as the engine's views want it."""
-        return jax.jit(function) if self.engine.pure else OfView(function)
-
-    def _control_fn(
-        self, view: PhysicsView, action: Float[Array, "W n"], states: tuple[Any, ...]
-    ) -> tuple[Float[Array, "W nu"], tuple[Any, ...]]:
-        action = jnp.clip(jnp.asarray(action), self.action_low, self.action_high)
-        sizes = np.cumsum([c.action_size for c in self.controllers])[:-1]
-        asked = jnp.split(action, sizes, axis=-1)
-        done = [c.control(a, view, s) for c, a, s in zip(self.controllers, asked, states, strict=True)]
-        return jnp.concatenate([ctrl for ctrl, _ in done], axis=-1), tuple(state for _, state in done)
-
     def _no_rules(self, states: States, view: PhysicsView) -> Outcome:
         return Outcome(states, None, self._no_status)
 
@@ -289,7 +267,7 @@ class Core:
         nothing = jnp.zeros(count, jnp.int32)
         world = WorldState(
             physics=physics,
-            view=self.eyes.seen(self.engine.view(physics), self.first_controllers()),
+            view=self.eyes.seen(self.engine.view(physics), self.controls.first()),
             states=self.starts.pool.rows(np.zeros(count, int)).states,
             key=jnp.zeros((count, 2), jnp.uint32),
             step=nothing,
@@ -297,7 +275,7 @@ class Core:
         )
         batch = Batch(
             world=world,
-            controllers=self.first_controllers(),
+            controllers=self.controls.first(),
             grasps=self.hands.read(physics),
             number=first + jnp.arange(count, dtype=jnp.int32),
             seed=jnp.asarray(seed, jnp.int32),
@@ -318,7 +296,7 @@ class Core:
         rows = self.starts.pool.rows(self._index(row))
         physics = self.engine.load(world.physics, rows.physics, mask)
         zero = jnp.zeros_like(world.step), jnp.zeros_like(world.time)
-        started = (rows.states, key, *zero, self.first_controllers(), self.hands.read(physics))
+        started = (rows.states, key, *zero, self.controls.first(), self.hands.read(physics))
         going = (world.states, world.key, world.step, world.time, batch.controllers, batch.grasps)
         states, key, step, time, controllers, grasps = self._chosen(mask, started, going)
         view = self.eyes.seen(self.engine.view(physics), controllers)
@@ -376,10 +354,6 @@ class Core:
             world=dataclasses.replace(batch.world, physics=physics, view=view, states=states),
             grasps=self.hands.read(physics),
         )
-
-    def first_controllers(self) -> tuple[Any, ...]:
-        """What the robots' controllers remember at the start."""
-        return tuple(c.initial(self.engine.num_worlds) for c in self.controllers)
 
     # What went wrong.
 
