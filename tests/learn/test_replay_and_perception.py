@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from pathlib import Path
 from typing import Any
@@ -18,10 +19,12 @@ from small_envs import PointMass, SeenPointMass
 from ig2mj.envs.observations import Space
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.collect import Transition
+from ig2mj.learn.dagger import DaggerConfig
 from ig2mj.learn.evaluate import wilson
 from ig2mj.learn.hidden import Hidden, guess_loss
-from ig2mj.learn.moments import RewardScale
-from ig2mj.learn.networks import Actor, Encoder, brightest, coarse, projected, shifted, window
+from ig2mj.learn.labels import Imitation
+from ig2mj.learn.moments import Moments, RewardScale
+from ig2mj.learn.networks import GLIMPSE, SHAKEN, Actor, Encoder, brightest, coarse, projected, shifted, window
 from ig2mj.learn.perception import FAR, Perception, Seen, shrunk
 from ig2mj.learn.policies import Policy, PolicyMismatch, depends_on, perception_of
 from ig2mj.learn.replay import Replay
@@ -224,10 +227,10 @@ def test_a_window_is_what_lies_around_a_point():
     picture = jnp.arange(40 * 60, dtype=jnp.float32).reshape(1, 40, 60, 1)
     row, column = 20.5, 30.5  # between pixels, as the window has no middle one
     point = jnp.array([[row / 39 * 2 - 1, column / 59 * 2 - 1]])
-    assert np.allclose(window(picture, point)[0], picture[0, 9:33, 19:43], atol=0.01)
+    assert np.allclose(window(picture, point)[0], picture[0, 5:37, 15:47], atol=0.01)
     corner = np.asarray(window(picture, jnp.array([[-1.0, -1.0]])))[0, :, :, 0]
-    assert (corner[:11] == 0).all() and (corner[:, :11] == 0).all(), "nothing beside the picture"
-    assert corner[12, 12] == pytest.approx(0.25 * (0 + 1 + 60 + 61))
+    assert (corner[:15] == 0).all() and (corner[:, :15] == 0).all(), "nothing beside the picture"
+    assert corner[16, 16] == pytest.approx(0.25 * (0 + 1 + 60 + 61))
 
 
 def test_the_depth_at_the_brightest_point_is_seen():
@@ -272,3 +275,31 @@ def test_half_precision_on_a_gpu_sees_nearly_the_same(monkeypatch):
     half = np.asarray(jax.jit(lambda p, x: encoder.apply(p, x))(params, picture))
     assert full.dtype == half.dtype == np.float32
     assert 0 < np.abs(full - half).max() < 0.1
+
+
+def test_glimpses_look_beside_their_points_while_they_learn():
+    encoder = Encoder((48, 64, 4), "glimpses", 2)
+    picture = jax.random.randint(jax.random.PRNGKey(0), (2, 48 * 64 * 4), 0, 256).astype(jnp.uint8)
+    params = jax.jit(encoder.init)(jax.random.PRNGKey(1), picture)
+    looks = jax.jit(lambda *key: encoder.apply(params, picture, rngs=dict(zip([SHAKEN], key, strict=False))))
+    still, one, two = np.asarray(looks()), *(np.asarray(looks(jax.random.PRNGKey(k))) for k in (2, 3))
+    seen = slice(6, 6 + 2 * GLIMPSE)
+    assert (one[:, seen] != still[:, seen]).any() and (one[:, seen] != two[:, seen]).any()
+    assert np.array_equal(np.delete(one, seen, 1), np.delete(still, seen, 1)), "nothing else moves"
+    env = SeenPointMass(2)
+    spaces = {**env.observation_spaces, "privileged_state": Space((3,), np.float32, -np.inf, np.inf)}
+    perception = Perception(spaces, "rgbd", 16, None, [f"goal_pos_{c}" for c in "xyz"])
+    algorithm = Imitation(perception, 2, DaggerConfig(actor=(8,), net="glimpses", shift=0))
+    actor, _ = jax.jit(algorithm.init)(jax.random.PRNGKey(0))
+    own, none = perception({**env.reset(0).obs, "privileged_state": jnp.ones((2, 3))}), jnp.zeros((2, 2))
+    moments = Moments.initial(perception.vector_size)
+    loss = jax.jit(lambda key: algorithm.loss(actor, moments, own, none, key)[0])
+    assert loss(jax.random.PRNGKey(0)) != loss(jax.random.PRNGKey(1)), "it learns so"
+
+
+@pytest.mark.parametrize("vector", [22, 49])
+def test_policies_of_glimpses_are_small_enough_to_ship(vector):
+    """Of the humanoid's and Fetch's SlicingFruit. A file has 1.85 bytes for each number."""
+    actor, picture = Actor(6, (192, 192), (48, 128, 4), "glimpses", 47, 21, 2), jnp.zeros((1, 48 * 128 * 4), jnp.uint8)
+    shapes = jax.eval_shape(actor.init, jax.random.PRNGKey(0), jnp.zeros((1, vector)), picture)
+    assert 1.85 * sum(math.prod(a.shape) for a in jax.tree.leaves(shapes)) < 0.7e6

@@ -37,6 +37,7 @@ def run(
     devices: str = "1",
     paper_rl: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     pool_size: int = 0,
+    mixed: int = 0,
     videos: float = 0.0,
     set: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=VALUE")] = (),
 ) -> int:
@@ -66,6 +67,8 @@ def run(
       devices: number of GPUs, or all: those of this machine, or of all processes started together (docs/scale.md).
       paper_rl: use the success thresholds of the paper's experiments.
       pool_size: number of start states; 0: all of the split.
+      mixed: train on this many start states made of those: every object lies where it does in one, turned as in
+        another; 0: on those themselves.
       videos: minutes between two films of a held-out episode, written to the run's folder videos; 0: none. A low-
         priority process makes them; they need OpenGL and ffmpeg.
       set: settings of the algorithm, e.g. updates=16 actor=128,128.
@@ -122,6 +125,7 @@ def run(
                 observations=names,
                 paper_rl=paper_rl,
                 pool_size=pool_size or None,
+                mixed=mixed,
             )
         perception = Perception(world.observation_spaces, obs, pixels, kept_rows, world.privileged_names)
         shown = load_demos(demos, perception, world_of(world)) if demos is not None else None

@@ -29,6 +29,7 @@ from ig2mj.sensors.base import SensorOptions
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.bddl.task import BddlTask, bddl_task
+from ig2mj.tasks.mixing import mixed_pool
 from ig2mj.tasks.navigation.task import NAVIGATION, NavigationTask
 from ig2mj.tasks.task import Task
 from ig2mj.tasks.variants import variant as task_variant
@@ -76,6 +77,7 @@ def make(
     pool: Pool | None = None,
     split: str = "train",
     pool_size: int | None = None,
+    mixed: int = 0,
     image_size: int | None = None,
     sensors: SensorOptions | None = None,
     whole_actions: bool = False,
@@ -100,6 +102,7 @@ def make(
       paper_rl: the thresholds that the paper's runs had: any force cuts, and three quarters of the stains may stay.
       pool: start states of an activity; None: the task's own, of which `split` is "train" or "held_out" and `pool_size`
         the number of rows; sampled on first use and kept (`ig2mj sample-task`). Navigation makes its own each time.
+      mixed: so many start states instead, made of those (`ig2mj.tasks.mixing`); 0: they are as they are.
       image_size: pixels, height and width of pictures; None: those of `sensors`, by default 128.
       sensors: settings of the sensors.
       whole_actions: an action has every number of the robot's controller, 1 being its limit, not only the hands that
@@ -130,6 +133,8 @@ def make(
         raise EngineError(f"worlds = {worlds}: an environment has at least one")
     if pool_size is not None and pool_size < 1:
         raise EngineError(f"pool_size = {pool_size}: an environment has at least one start state")
+    if mixed < 0 or (mixed and not isinstance(task, Task)):
+        raise EngineError(f"mixed = {mixed} for {task.name}: only start states of the paper's activities are mixed")
     if engine is not None and engine not in ENGINES:
         raise UnknownNameError("engine", engine, ENGINES)
     if engine in (None, "native"):
@@ -146,6 +151,9 @@ def make(
     scene, rules, controllers = setup.scene, setup.rules, setup.controllers
     chosen = check_names(observations, setup.objective)
     starts = setup.pool()  # may take minutes: everything that has a name is known by now
+    rows = starts.size
+    if mixed and isinstance(task, Task):
+        starts = mixed_pool(task, scene, starts, mixed)
     physics = make_engine(engine, scene, worlds, **options)
     hands = None if mode == "physical" else Grasping(scene, mode, setup.mittens)
     core = Core(physics, rules, starts, controllers, hands, hand_resets=whole_actions or None)
@@ -156,9 +164,11 @@ def make(
     observer = Observer(observations, setup.objective, perceived)
     name = robot if isinstance(robot, str) else robot.name
     env = Environment(task, name, scene, core, setup.actions, setup.objective, observer, mode, setup.companions, period)
-    env.made_with = {"paper_rl": paper_rl, "split": split, "pool_size": starts.size, **options}
+    env.made_with = {"paper_rl": paper_rl, "split": split, "pool_size": rows, **options}
     if control != Control():
         env.made_with |= {"whole_actions": whole_actions, "period": period}
+    if mixed:
+        env.made_with["mixed"] = mixed
     if variant:
         env.made_with["variant"] = variant
     return env

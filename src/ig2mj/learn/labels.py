@@ -17,7 +17,7 @@ from ig2mj.engine.view import Array
 from ig2mj.learn.adam import averaged_adam
 from ig2mj.learn.heads import label_loss, likeliest
 from ig2mj.learn.moments import Moments
-from ig2mj.learn.networks import Actor, shifted
+from ig2mj.learn.networks import SHAKEN, Actor, shifted
 from ig2mj.learn.perception import Perception, Seen, blank
 
 
@@ -99,7 +99,8 @@ class Imitation:
         picture = seen.picture
         if self._perception.picture_shape is not None:
             picture = shifted(picture, self._perception.picture_shape, key, self._shift)
-        looked: Any = self.actor.apply({"params": params}, normal[:, : self._perception.actor_size], picture)
+        own, shake = normal[:, : self._perception.actor_size], {SHAKEN: jax.random.fold_in(key, 1)}
+        looked: Any = self.actor.apply({"params": params}, own, picture, rngs=shake)
         head, _, guess = looked
         loss = label_loss(head, label)
         found: dict[str, Array] = {"actor_loss": loss, "label_error": jnp.abs(likeliest(head) - label).mean()}

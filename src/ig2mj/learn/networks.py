@@ -27,8 +27,18 @@ FIRST_STD = 0.3
 NETS = ("small", "paper", "points", "places", "glimpses")
 """Encoders of pictures."""
 
-WINDOW = 24
+WINDOW = 32
 """Pixels, height and width, of what a glimpse sees around an object."""
+
+GLIMPSE = 64
+"""Numbers that say what a glimpse sees."""
+
+SHAKEN = "glimpse"
+"""The name of the random numbers (flax's `rngs`) with which glimpses are shaken; without them they are not."""
+
+SHAKE = 1.0
+"""Pixels, deviation of how far beside its point a glimpse looks while it learns. Exactly at the point, which is between
+pixels, start states are known by heart from how the pixels lie, and nothing else is learnt from them."""
 
 PRECISE = ("places", "glimpses")
 """Those that the guess of hidden numbers alone trains, and whose guess the actor sees."""
@@ -59,7 +69,7 @@ class Encoder(nn.Module):
     cells. `places`: the same, with how far away it is there, on a GPU in half precision. Depth times row and column is
     what a place in the camera's frame is linear in. `glimpses`: the same, and for each of so many `objects` three
     numbers that follow linearly from one point of the picture (they come first, and are to be where the object is) and
-    what is around that point at full resolution: how a thin object lies shows in a few pixels, wherever they are.
+    then what is around that point at full resolution: how a thin object lies shows in a few pixels, wherever they are.
     """
 
     shape: tuple[int, int, int]
@@ -73,7 +83,8 @@ class Encoder(nn.Module):
         # processors have no fast way to convolve in half precision
         half = self.net in PRECISE and jax.default_backend() == "gpu"
         places, dtype = jnp.zeros((x.shape[0], 0)), jnp.bfloat16 if half else jnp.float32
-        for k, channels in enumerate((32, *[64] * (halvings - 1))):
+        small, few = (32, 32) if self.net == "glimpses" else (64, 50)
+        for k, channels in enumerate((32, 64, *[small] * (halvings - 2))):
             x = nn.relu(_conv(channels, 2, dtype)(x))
             if self.net in ("points", *PRECISE) and k == 1:
                 normal = nn.LayerNorm(name="points_norm")(x)
@@ -83,26 +94,31 @@ class Encoder(nn.Module):
         x = x.reshape(x.shape[0], -1).astype(jnp.float32)
         if self.net == "paper":
             return nn.relu(nn.Dense(256)(x))
-        features = [places, jnp.tanh(nn.LayerNorm()(nn.Dense(50)(x)))]
+        features = [places, jnp.tanh(nn.LayerNorm()(nn.Dense(few)(x)))]
         if self.net == "glimpses":
             points = jnp.moveaxis(places.reshape(x.shape[0], 5, -1), -1, 1)[:, : self.objects]
             spots = [nn.Dense(3, name=f"spot_{k}")(points[:, k]) for k in range(self.objects)]
-            around = [Glimpse(dtype, name=f"glimpse_{k}")(seen, points[:, k, :2]) for k in range(self.objects)]
-            features = [*spots, *features, *around]
+            glimpse = Glimpse(dtype, name="glimpse")
+            around = [glimpse(seen, points[:, k, :2]) for k in range(self.objects)]
+            features = [*spots, *around, *features]
         return jnp.concatenate(features, axis=-1)
 
 
 class Glimpse(nn.Module):
-    """What is around a point of the picture at full resolution, as 128 numbers."""
+    """What is around a point of the picture at full resolution, as `GLIMPSE` numbers; of any object."""
 
     dtype: Any = jnp.float32
 
     @nn.compact
     def __call__(self, seen: Float[Array, "B r s c"], point: Float[Array, "B 2"]) -> Float[Array, "B f"]:
-        x = window(seen, jax.lax.stop_gradient(point))
-        for channels, stride in ((32, 1), (64, 2), (64, 2)):
-            x = nn.relu(_conv(channels, stride, self.dtype)(x))
-        return nn.relu(nn.Dense(128)(x.reshape(x.shape[0], -1).astype(jnp.float32)))
+        point = jax.lax.stop_gradient(point)
+        if self.has_rng(SHAKEN):
+            pixel = 2.0 / (jnp.asarray(seen.shape[1:3], jnp.float32) - 1.0)
+            point += SHAKE * pixel * jax.random.normal(self.make_rng(SHAKEN), point.shape)
+        x = window(seen, point)
+        for channels in (32, 48, 48):
+            x = nn.relu(_conv(channels, 2, self.dtype)(x))
+        return nn.relu(nn.Dense(GLIMPSE)(x.reshape(x.shape[0], -1).astype(jnp.float32)))
 
 
 def _conv(channels: int, stride: int, dtype: Any, name: str | None = None) -> nn.Conv:
@@ -153,7 +169,7 @@ class Actor(nn.Module):
     With the encoders `places` and `glimpses` the guess is also what the actor's layers see, and the auxiliary loss
     alone trains the encoder: gradients of actions are larger and noisier, and where both did, places were off by
     centimetres. With `glimpses` the places of the `objects` follow in the guess once more (`Hidden`), each from one
-    point of the picture.
+    point of the picture, and of the features the actor's layers see the glimpses' alone.
 
     Raises:
       UnknownNameError: `net` is none of `NETS`.
@@ -187,10 +203,11 @@ class Actor(nn.Module):
             if self.guess:
                 known = jnp.concatenate([features, vector], axis=-1)
                 if self.net == "glimpses":
-                    known = jnp.concatenate([known, nn.relu(nn.Dense(256, name="combined")(known))], axis=-1)
+                    known = jnp.concatenate([known, nn.relu(nn.Dense(128, name="combined")(known))], axis=-1)
                 guessed = nn.Dense(self.guess, name="guess")(known)
                 if self.net == "glimpses":
                     guessed = jnp.concatenate([guessed, features[:, : 3 * self.objects]], axis=-1)
+                    features = features[:, 3 * self.objects : (3 + GLIMPSE) * self.objects]
             known = jax.lax.stop_gradient((features, guessed)) if self.uses_guess else (features,)
             vector = jnp.concatenate([vector, *known], axis=-1)
         x = Trunk((256,) if self.net == "paper" else self.sizes, name="trunk")(vector)

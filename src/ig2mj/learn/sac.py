@@ -36,7 +36,7 @@ from ig2mj.learn.collect import GUIDED, Advice, Hint, Transition, if_ready
 from ig2mj.learn.demos import Demos
 from ig2mj.learn.guidance import guided, share, uncounted
 from ig2mj.learn.moments import Moments, RewardScale, share_of
-from ig2mj.learn.networks import Actor, projected, shifted, twins
+from ig2mj.learn.networks import SHAKEN, Actor, projected, shifted, twins
 from ig2mj.learn.perception import Perception, Seen, blank
 from ig2mj.learn.replay import Replay, Sample
 
@@ -241,13 +241,18 @@ class SAC:
         apart, helpless = uncounted(handover, noise.helpless, limit)
         return action, {"label": label, GUIDED: apart}, Noise(value, left, handover, helpless)
 
-    def _look(self, actor: Any, moments: Moments, seen: Seen) -> tuple[Array, Array, Array]:
-        own = moments.normal(seen.vector[:, : self.perception.actor_size])
-        return self.actor.apply({"params": actor}, own, seen.picture)  # pyright: ignore[reportReturnType]
+    def _look(self, actor: Any, moments: Moments, seen: Seen, shake: Array | None = None) -> tuple[Array, Array, Array]:
+        """`shake`: a key, while it learns (`networks.SHAKEN`)."""
+        own, rngs = moments.normal(seen.vector[:, : self.perception.actor_size]), {}
+        if shake is not None:
+            rngs[SHAKEN] = shake
+        return self.actor.apply({"params": actor}, own, seen.picture, rngs=rngs)  # pyright: ignore[reportReturnType]
 
-    def _draw(self, actor: Any, moments: Moments, seen: Seen, key: Array) -> tuple[Array, Array, Array, Array]:
+    def _draw(
+        self, actor: Any, moments: Moments, seen: Seen, key: Array, shake: Array | None = None
+    ) -> tuple[Array, Array, Array, Array]:
         """Actions, the logarithm of their density, the guess, and the middle of the actions' distribution."""
-        mean, log_std, guess = self._look(actor, moments, seen)
+        mean, log_std, guess = self._look(actor, moments, seen, shake)
         eps = jax.random.normal(key, mean.shape)
         raw = mean + jnp.exp(log_std) * eps
         density = -0.5 * jnp.square(eps) - log_std - 0.5 * math.log(2 * math.pi)
@@ -360,7 +365,7 @@ class SAC:
         self, learner: SACLearner, batch: Sample, key: Array, rate: Array
     ) -> tuple[SACLearner, dict[str, Array]]:
         c, p = self.config, self.perception
-        shift_key, draw_key = jax.random.split(key)
+        shift_key, draw_key, shake_key = jax.random.split(key, 3)
         seen, normal = batch.seen, learner.moments.normal(batch.seen.vector)
         if p.picture_shape is not None:
             seen = Seen(seen.vector, shifted(seen.picture, p.picture_shape, shift_key, c.shift))
@@ -371,7 +376,7 @@ class SAC:
             return (jax.nn.softmax(logits) @ self._support).mean(0)
 
         def loss(actor: Any) -> tuple[Array, dict[str, Array]]:
-            action, density, guess, middle = self._draw(actor, learner.moments, seen, draw_key)
+            action, density, guess, middle = self._draw(actor, learner.moments, seen, draw_key, shake_key)
             total, found = (alpha * density - value(action)).mean(), {"entropy": -density.mean()}
             if p.hidden is not None and guess.shape[-1]:
                 found["guess_loss"] = p.hidden.loss(guess, batch.seen.vector, normal)
