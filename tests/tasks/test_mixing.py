@@ -19,7 +19,7 @@ def test_objects_lie_where_they_do_in_one_state_turned_as_in_another():
     env = ig2mj.make("SlicingFruit", "humanoid", 2, "native", pool_size=4, mixed=200)
     mixed, pool, scene = env.core.starts.pool, pool_of(task, "train", 4), bare_scene(task)
     assert isinstance(mixed, mixing.MixedPool) and mixed.size == 200
-    own, rows = np.asarray(pool.physics.scene.qpos), mixed.rows(np.arange(200)).physics.scene.qpos
+    own, rows = (np.asarray(p.physics.scene.qpos) for p in (pool, mixed.rows(np.arange(200))))
     assert np.array_equal(rows[:4], own)
     columns = list(mixed.columns)
     rest = np.setdiff1d(np.arange(own.shape[1]), columns)
