@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from ig2mj.learn.heads import drawn, label_loss, likeliest
+from ig2mj.learn.heads import drawn, drawn_with_density, label_loss, likeliest
 
 
 def learnt(labels, choices: int):
@@ -47,3 +47,12 @@ def test_a_gaussian_is_drawn_around_its_middle():
     found = np.arctanh(np.asarray(drawn(head, log_std, jax.random.PRNGKey(0)), float))
     assert abs(found.mean() - 0.3) < 0.005 and abs(found.std() - 0.1) < 0.005
     np.testing.assert_allclose(likeliest(head), np.tanh(0.3), rtol=1e-5)
+
+
+def test_the_density_of_an_action_is_how_often_actions_near_it_are_drawn():
+    count = 200_000
+    mean, log_std = jnp.full((count, 1), 0.3), jnp.full((count, 1), -0.5)
+    action, density = map(np.asarray, drawn_with_density(mean, log_std, jax.random.PRNGKey(0)))
+    for middle in (-0.8, 0.0, 0.5, 0.9):
+        near = np.abs(action[:, 0] - middle) < 0.02
+        np.testing.assert_allclose(near.mean() / 0.04, np.exp(density[near]).mean(), rtol=0.06)

@@ -8,6 +8,8 @@ Axes: B samples, n numbers of an action, K values.
 
 from __future__ import annotations
 
+import math
+
 import jax
 import jax.numpy as jnp
 from jaxtyping import Float
@@ -41,6 +43,17 @@ def drawn(head: Float[Array, "B n *K"], log_std: Float[Array, "B n"], key: Array
     if head.ndim == 2:
         return jnp.tanh(head + jnp.exp(log_std) * jax.random.normal(key, head.shape))
     return values(head.shape[-1])[jax.random.categorical(key, head)]
+
+
+def drawn_with_density(
+    mean: Float[Array, "B n"], log_std: Float[Array, "B n"], key: Array
+) -> tuple[Float[Array, "B n"], Float[Array, "B"]]:
+    """An action from the tanh of a Gaussian, and the logarithm of its density there."""
+    eps = jax.random.normal(key, mean.shape)
+    raw = mean + jnp.exp(log_std) * eps
+    density = -0.5 * jnp.square(eps) - log_std - 0.5 * math.log(2 * math.pi)
+    stretch = 2 * (math.log(2.0) - raw - jax.nn.softplus(-2 * raw))  # log of tanh's slope
+    return jnp.tanh(raw), (density - stretch).sum(-1)
 
 
 def label_loss(head: Float[Array, "B n *K"], label: Float[Array, "B n"]) -> Float[Array, ""]:

@@ -35,6 +35,7 @@ from ig2mj.learn.adam import averaged_adam
 from ig2mj.learn.collect import GUIDED, Advice, Hint, Transition, if_ready
 from ig2mj.learn.demos import Demos
 from ig2mj.learn.guidance import guided, share, uncounted
+from ig2mj.learn.heads import drawn_with_density
 from ig2mj.learn.moments import Moments, RewardScale, share_of
 from ig2mj.learn.networks import SHAKEN, Actor, projected, shifted, twins
 from ig2mj.learn.perception import Perception, Seen, blank
@@ -243,9 +244,8 @@ class SAC:
 
     def _look(self, actor: Any, moments: Moments, seen: Seen, shake: Array | None = None) -> tuple[Array, Array, Array]:
         """`shake`: a key, while it learns (`networks.SHAKEN`)."""
-        own, rngs = moments.normal(seen.vector[:, : self.perception.actor_size]), {}
-        if shake is not None:
-            rngs[SHAKEN] = shake
+        own = moments.normal(seen.vector[:, : self.perception.actor_size])
+        rngs = {} if shake is None else {SHAKEN: shake}
         return self.actor.apply({"params": actor}, own, seen.picture, rngs=rngs)  # pyright: ignore[reportReturnType]
 
     def _draw(
@@ -253,11 +253,8 @@ class SAC:
     ) -> tuple[Array, Array, Array, Array]:
         """Actions, the logarithm of their density, the guess, and the middle of the actions' distribution."""
         mean, log_std, guess = self._look(actor, moments, seen, shake)
-        eps = jax.random.normal(key, mean.shape)
-        raw = mean + jnp.exp(log_std) * eps
-        density = -0.5 * jnp.square(eps) - log_std - 0.5 * math.log(2 * math.pi)
-        stretch = 2 * (math.log(2.0) - raw - jax.nn.softplus(-2 * raw))  # log of tanh's slope
-        return jnp.tanh(raw), (density - stretch).sum(-1), guess, jnp.tanh(mean)
+        action, density = drawn_with_density(mean, log_std, key)
+        return action, density, guess, jnp.tanh(mean)
 
     # How it learns.
 
