@@ -55,7 +55,7 @@ class Acts:
     Attributes:
       pos: where it starts, m. For the humanoid the middle of its body, 0.55 m above the floor.
       yaw: degrees it is turned about the vertical; at 0 it faces x.
-      camera_tilt: rad, downwards, of Fetch's camera; None: the robot's own.
+      camera_tilt, camera_pan: rad, downwards and to the left, of Fetch's camera; None: the robot's own.
       hands: numbers of the hands that act; the rest of the robot stays where it is.
       weights: of the reward.
     """
@@ -63,6 +63,7 @@ class Acts:
     pos: Vector3
     yaw: float = 0.0
     camera_tilt: float | None = dataclasses.field(default=None, repr=False)  # part of the model's hash
+    camera_pan: float = dataclasses.field(default=0.0, repr=False)  # as well
     hands: tuple[int, ...] = (0,)
     weights: Weights = FETCH_WEIGHTS
 
@@ -111,10 +112,12 @@ class Physical:
     Attributes:
       objects: for each variant (`ig2mj.tasks.variants`) what is added to the home in the place of the task's `objects`.
       near: restrictions of start states in the place of the task's.
+      robots: those that take part in another way than in the task.
     """
 
     objects: tuple[tuple[str, ...], ...]
     near: tuple[Near, ...]
+    robots: Mapping[str, Acts] = dataclasses.field(default_factory=dict)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -184,5 +187,6 @@ def make_robot(task: Task, robot: str) -> Robot:
 
     acts = task.acts(robot)
     half = math.radians(acts.yaw) / 2
-    options = {"proprioception": "experiments", "camera_tilt": acts.camera_tilt} if robot == "fetch" else {}
+    camera = {"camera_tilt": acts.camera_tilt, "camera_pan": acts.camera_pan}
+    options = {"proprioception": "experiments", **camera} if robot == "fetch" else {}
     return ROBOTS[robot](pos=acts.pos, quat=(math.cos(half), 0.0, 0.0, math.sin(half)), **options)

@@ -46,7 +46,8 @@ def variant(task: Task, number: int, grasping: str = "mitten") -> Task:
     if number and not 0 < number < variants(task):
         raise EngineError(f"variant {number} of {task.name}: there are 0 to {variants(task) - 1}")
     if grasping == "physical" and task.physical is not None:
-        return dataclasses.replace(task, objects=task.physical.objects[number], near=task.physical.near)
+        other, robots = task.physical, {**task.robots, **task.physical.robots}
+        return dataclasses.replace(task, objects=other.objects[number], near=other.near, robots=robots)
     if number == 0:
         return task
 

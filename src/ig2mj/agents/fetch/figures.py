@@ -158,8 +158,8 @@ CAMERA_TILT = 0.45
 """rad, downwards."""
 
 
-def start_positions(pose: str, camera_tilt: float | None = None) -> np.ndarray:
-    """[14] joint positions of a pose of the arm, gripper open."""
+def start_positions(pose: str, camera_tilt: float | None = None, camera_pan: float = 0.0) -> np.ndarray:
+    """[14] joint positions of a pose of the arm, gripper open. `camera_tilt`, `camera_pan`: rad, down, left."""
     trunk, tilt = (TRUNK_TUCKED, 0.0) if pose == "tucked" else (TRUNK_HEIGHT, CAMERA_TILT)
     tilt = tilt if camera_tilt is None else camera_tilt
-    return np.array([0.0, 0.0, trunk, 0.0, tilt, *ARM_POSES[pose], 0.05, 0.05])
+    return np.array([0.0, 0.0, trunk, camera_pan, tilt, *ARM_POSES[pose], 0.05, 0.05])

@@ -72,6 +72,7 @@ class Fetch:
       pose: of the arm at the start, which inverse kinematics keeps near; iGibson's names (`figures.ARM_POSES`).
       proprioception: "default", iGibson's 41 numbers, or "experiments", the 49 of its activities.
       camera_tilt: rad, downwards, at the start; None: iGibson's, 0.45, or 0 with a tucked arm.
+      camera_pan: rad, to the left, at the start.
     """
 
     name: str = "fetch"
@@ -80,6 +81,7 @@ class Fetch:
     pose: str = "diagonal30"
     proprioception: str = "default"
     camera_tilt: float | None = None
+    camera_pan: float = 0.0
 
     def __post_init__(self) -> None:
         if self.pose not in ARM_POSES:
@@ -96,7 +98,7 @@ class Fetch:
         draw_link(base, "base_link", look)
         for x, y in CASTERS:
             collision(base, GEOM.mjGEOM_SPHERE, (0.03,), 0, (x, y, 0.0245), frictionless=True)
-        links, start = {"base_link": base}, start_positions(self.pose, self.camera_tilt)
+        links, start = {"base_link": base}, start_positions(self.pose, self.camera_tilt, self.camera_pan)
         for joint, q in zip(JOINTS, start, strict=True):
             links[joint.link] = self._add_link(spec, links[joint.parent], joint, float(q), look)
             if joint.link == "wrist_roll_link":
@@ -174,7 +176,9 @@ class Fetch:
         )
 
     def controller(self, tables: SceneTables, agent: int, period: float = ACTION_PERIOD) -> FetchController:
-        return FetchController(tables, agent, period, start_positions(self.pose, self.camera_tilt), self.proprioception)
+        return FetchController(
+            tables, agent, period, start_positions(self.pose, self.camera_tilt, self.camera_pan), self.proprioception
+        )
 
 
 Inertia = tuple[float, tuple[float, ...], tuple[float, ...]]

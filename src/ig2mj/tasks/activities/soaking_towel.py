@@ -1,7 +1,8 @@
 """Soaking Towel: a towel on the dishwasher must be held under a tap that runs.
 
 Towels are rigid, and folded flat they are wider than Fetch's gripper opens. With "physical" grasping the towel is
-rolled up and stands on end, 7 cm across and 19 cm high.
+rolled up and stands on end, 7 cm across and 19 cm high, to the left of Fetch, which looks there: straight ahead it sees
+the sink, which is always at one place, and no towel.
 """
 
 from __future__ import annotations
@@ -27,5 +28,6 @@ SOAKING_TOWEL = Task(
     physical=Physical(
         tuple((f"bath_towel/bath_towel_{number:02d}",) for number in (5, 6, 7)),
         near=(Near("bath_towel_0", (3.3, -2.9, 0.95), most=0.55),),
+        robots={"fetch": Acts((2.78, -2.92, 0.0), yaw=-60.0, camera_tilt=0.75, camera_pan=1.25)},
     ),
 )
