@@ -42,7 +42,7 @@ fruit() {  # NAME ROBOT ROWS WORDS...
 }
 
 towel() {  # NAME WORDS...
-  learn "$1" 1000 SoakingTowel --robot fetch --grasping physical --pixels 64 --worlds "${WORLDS:-1024}" --pool-size 1024 \
+  learn "$1" 1000 SoakingTowel --robot fetch --grasping physical --pixels 128 --rows 32:80 --worlds "${WORLDS:-1024}" --pool-size 1024 \
     --minutes "$minutes" "${@:2}"
 }
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
+import ig2mj
 from ig2mj.agents.fetch.figures import FINGERS, UPPER
 from ig2mj.errors import EngineError
+from ig2mj.geometry.poses import matrices_on_host
 from ig2mj.scene.library import find_model
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.experts.expert import PLANS
@@ -68,3 +71,16 @@ def test_each_variant_has_its_own_pool():
     task = ACTIVITIES["CookingMeat"]
     files = {pool_file(t, bare_scene(t)).name for t in (task, variant(task, 1), variant(task, 2))}
     assert len(files) == 3
+
+
+def test_without_mittens_fetch_looks_at_the_towel_that_it_is_to_take():
+    """The towel's middle is within the half of its picture, which spans 45 degrees to each side."""
+    env = ig2mj.make("SoakingTowel", robot="fetch", grasping="physical", worlds=4, pool_size=4)
+    view = env.reset(0).batch.world.view
+    eye, axes = (np.asarray(x)[:, 0] for x in (view.agent.eye_pos, view.agent.eye_quat))
+    towel = np.asarray(view.object_com)[:, env.scene.object_index("bath_towel_0")]
+    right, up, backwards = np.einsum("wji,wj->iw", matrices_on_host(axes), towel - eye)
+    assert (
+        (backwards < -0.3).all() and (np.abs(right) < 0.5 * -backwards).all() and (np.abs(up) < 0.5 * -backwards).all()
+    )
+    env.close()
