@@ -7,6 +7,7 @@
 # pools: what the first four begin from.  humanoid, fetch: SlicingFruit by DAgger.  towel: Fetch's towel without mittens
 # by DAgger.  towel_sac: by SAC, which an expert begins for.  choices, mean: the humanoid's fruit for 120 s with choices
 # and with a Gaussian's mean.  figure_5b: from pixels.  shipped: three policies that ship, on Warp.
+# speed: an evaluation of 1,000 worlds, then again with everything compiled (start_seconds, steps_per_second).
 #
 # Below $OUT: the best and the last policy, progress.csv, evaluations.jsonl (the likeliest actions, then drawn ones) and
 # the log of each, copied while it trains. $MINUTES of training (5), $WORLDS, $ENGINE (warp), $FRACTION of a card's memory
@@ -33,7 +34,7 @@ learn() {  # NAME EPISODES WORDS...: trains, and plays so many held-out episodes
   wait $job; echo "$name: trained, ended with $? after $SECONDS s" | tee -a "$out/times.txt"
   held "$name" "$out/$name/policy.npz" "$episodes"
   held "$name" "$out/$name/policy.npz" 500 --drawn
-  echo "$name: played after $SECONDS s" | tee -a "$out/times.txt"; rm -rf "$run"; cut -c1-400 "$out/$name/evaluations.jsonl"
+  echo "$name: played after $SECONDS s" | tee -a "$out/times.txt"; rm -rf "$run"; cut -c1-600 "$out/$name/evaluations.jsonl"
 }
 
 fruit() {  # NAME ROBOT ROWS WORDS...
@@ -64,8 +65,11 @@ run() {
         --tests 48 --worlds "${WORLDS:-192}" --pool-size 64 --steps 4000 --seconds 0 1 2 3 4 6 8 inf --out "$out/figure_5b" ;;
     shipped)
       for name in CookingMeat GraspingBook BimanualPickAndPlace; do held "$name" "$name" 500 & done; wait
-      cut -c1-400 "$out"/*/evaluations.jsonl ;;
-    *) sed -n '2,14p' "$0"; exit 2 ;;
+      cut -c1-600 "$out"/*/evaluations.jsonl ;;
+    speed)
+      for _ in cold warm; do EVAL_WORLDS=1000 held speed CookingMeat 1000; done
+      cut -c1-600 "$out/speed/evaluations.jsonl" ;;
+    *) sed -n '2,15p' "$0"; exit 2 ;;
   esac
 }
 

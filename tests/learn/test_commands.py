@@ -24,6 +24,7 @@ def test_a_recorded_expert_is_cloned_and_judged(tmp_path, capsys):
     found = json.loads(capsys.readouterr().out)
     assert found["env"] == "CookingMeat" and found["episodes"] == 4
     assert found["success_low"] <= found["success_rate"] <= found["success_high"]
+    assert found["start_seconds"] > 0.0 and found["steps_per_second"] > 0.0
     assert found["success_rate"] >= 0.75
     assert call(["rollout", "CookingMeat", "--agent", str(run / "policy.npz"), "--worlds", "4", *episodes]) == 0
     played = json.loads(capsys.readouterr().out)

@@ -10,19 +10,25 @@ import json
 import math
 import pathlib
 import tempfile
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import jax
 import numpy as np
+from jaxtyping import UInt
 
 from ig2mj.cluster.work import Piece, WholeRunError
+from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.pieces import keep_pool
 from ig2mj.envs.registry import make
 from ig2mj.envs.rollout import Act, play
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.policies import Policy, perception_of
+
+Choose = Callable[[Mapping[str, Array], UInt[np.ndarray, "2"]], Array]
+"""Actions [W, n] from observations by name and a key."""
 
 
 def acting(policy: Policy, env: Environment, file: object, *, drawn: bool = False, seed: int = 0) -> Act:
@@ -34,14 +40,7 @@ def acting(policy: Policy, env: Environment, file: object, *, drawn: bool = Fals
     Raises:
       InputError: the policy is for something else.
     """
-    perception = perception_of(policy, env.observation_spaces)
-    policy.check(env, perception, file)
-    choose, keys = jax.jit(policy.actor(perception, drawn=drawn)), np.random.default_rng(seed)
-
-    def act(state: Any) -> np.ndarray:
-        return np.asarray(choose(state.obs, keys.integers(0, 2**32, 2, np.uint32)))
-
-    return act
+    return _with_keys(_compiled(policy, env, file, drawn), seed)
 
 
 def summary(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -98,31 +97,37 @@ def evaluate_piece(
     episodes: int,
     shared: Mapping[str, bytes],
 ) -> bytes:
-    """Episodes from the start states `first` on, as JSON: how each ended, and what went wrong.
+    """Episodes from the start states `first` on, as JSON: how each ended, what went wrong, and how long it took until
+    the first step was taken ("start_seconds").
 
     Args:
       file: of the policy, for messages.
       shared: "policy", a policy's file, and where another machine made them the start states. The others: of
         `ig2mj.make`, and of `acting`.
     """
+    began = time.monotonic()
     try:
         keep_pool(shared, task, split, pool_size)
         made = (task, robot, grasping, engine, worlds, tuple(observations), paper_rl, split, pool_size)
-        env, policy = _environment(*made), _policy(shared["policy"])
-        acts = acting(policy, env, file, drawn=drawn, seed=first // worlds)
+        env, choose = _player(shared["policy"], file, drawn, *made)
     except Ig2mjError as e:
         raise WholeRunError(e) from e
-    played = play(env, acts, episodes, in_order=True, first=first)
+    played = play(env, _with_keys(choose, first // worlds), episodes, in_order=True, first=first)
     metrics = env.metrics(played.state)
     found = {"success": played.success, "success_in_hand": played.success_in_hand, "total": played.total}
     if played.lifted_by_all is not None:
         found["lifted_by_all"] = played.lifted_by_all
     trouble = {"overflow": metrics["overflow"], "non_finite": metrics["not_finite"]}
-    return json.dumps({**found, "steps": played.steps, **trouble}).encode()
+    stepping = (played.steps - worlds) / played.steps_per_second if played.steps_per_second else 0.0
+    start = time.monotonic() - began - stepping
+    return json.dumps({**found, "steps": played.steps, "start_seconds": start, **trouble}).encode()
 
 
 @functools.lru_cache(maxsize=1)
-def _environment(
+def _player(
+    content: bytes,
+    file: str,
+    drawn: bool,
     task: str,
     robot: str,
     grasping: str,
@@ -132,23 +137,29 @@ def _environment(
     paper_rl: bool,
     split: str,
     pool_size: int | None,
-) -> Environment:
-    return make(
-        task,
-        robot,
-        worlds,
-        engine,
-        grasping,
-        observations=observations,
-        paper_rl=paper_rl,
-        split=split,
-        pool_size=pool_size,
-    )
+) -> tuple[Environment, Choose]:
+    """What is played, and who chooses: the same in all pieces of an evaluation, so that each is compiled once.
 
-
-@functools.lru_cache(maxsize=1)
-def _policy(content: bytes) -> Policy:
+    Args:
+      content: of the policy's file. The others: of `evaluate_piece`.
+    """
+    made: dict[str, Any] = {"observations": observations, "paper_rl": paper_rl, "split": split, "pool_size": pool_size}
+    env = make(task, robot, worlds, engine, grasping, **made)
     with tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:
-        file = pathlib.Path(folder) / "policy.npz"
-        file.write_bytes(content)
-        return Policy.load(file)
+        copy = pathlib.Path(folder) / "policy.npz"
+        copy.write_bytes(content)
+        policy = Policy.load(copy)
+    return env, _compiled(policy, env, file, drawn)
+
+
+def _compiled(policy: Policy, env: Environment, file: object, drawn: bool) -> Choose:
+    """Raises InputError: the policy is for something else."""
+    perception = perception_of(policy, env.observation_spaces)
+    policy.check(env, perception, file)
+    return jax.jit(policy.actor(perception, drawn=drawn))
+
+
+def _with_keys(choose: Choose, seed: int) -> Act:
+    """Who acts, with a key of that seed for each step."""
+    keys = np.random.default_rng(seed)
+    return lambda state: np.asarray(choose(state.obs, keys.integers(0, 2**32, 2, np.uint32)))
