@@ -33,7 +33,7 @@ def test_a_recorded_expert_is_cloned_and_judged(tmp_path, capsys):
     assert 'is for robot = "humanoid", and here it is "fetch"' in capsys.readouterr().err
 
 
-def test_wrong_options_name_what_is_near(capsys):
+def test_wrong_options_name_what_is_near(tmp_path, capsys):
     for arguments, told in (
         (["train", "CookingMeat", "--algo", "sax"], "near matches: sac"),
         (["train", "CookingMeat", "--obs", "rgb"], "near matches: rgbd"),
@@ -45,13 +45,26 @@ def test_wrong_options_name_what_is_near(capsys):
         (["train", "CookingMeat", "--until", "7"], "--until 7.0: a share"),
         (["train", "CookingMeat", "--pixels", "0"], "--pixels 0"),
         (["evaluate", "CookingMeet"], "no policy is named"),
+        (["train", "GraspingBook", "--mixed", "-1"], "mixed = -1: a number of start states"),
+        (["train", "GraspingBook", "--out", __file__], "is a file"),
+        (["train", "GraspingBook", "--devices", "4"], "--devices 4: this run can have 1"),
         (["evaluate", "no/such.npz"], "there is no such file"),
+        (["evaluate", str(tmp_path)], "holds no policy.npz"),
+        (["evaluate", "CookingMeat", "--worlds", "-2"], "--worlds -2"),
+        (["evaluate", "CookingMeat", "--out", "no/such.json"], "folder no does not exist"),
         (["rollout", "CookingMeat", "--agent", "expart"], "near matches: expert"),
         (["rollout", "CookingMeat", "--pool-size", "-1"], "at least one start state"),
         (["rollout", "CookingMeat", "--video", "a.doc"], "not a film format"),
         (["rollout", "CookingMeat", "--record", "no/such.h5"], "folder no does not exist"),
+        (["rollout", "CookingMeat", "--record", str(tmp_path)], "is a folder"),
+        (["rollout", "CookingMeat", "--format", "igibson"], "--record FILE, which is missing"),
         (["demos", "collect", "CookingMeat", "--out", "a.h5", "--noise", "nan"], "--noise nan"),
         (["demos", "collect", "CookingMeat", "--out", "a.h5", "--disturbed", "4"], "--disturbed 4.0"),
+        (["demos", "collect", "CookingMeat", "--out", str(tmp_path)], "is a folder"),
+        (
+            ["demos", "collect", "CookingMeat", "--out", str(tmp_path / "a.h5"), "--engine", "natve", *POOL],
+            "error: no eng",
+        ),
     ):
         assert call(arguments) == 2, arguments
         assert told in capsys.readouterr().err, arguments

@@ -48,7 +48,7 @@ def sample(
       json: print the result as JSON.
     """
     from ig2mj.cli.bindings import binding_as_text, find_homes
-    from ig2mj.cli.files import check_folder_of
+    from ig2mj.cli.files import check_output
     from ig2mj.errors import Ig2mjError
     from ig2mj.tasks.bddl.definitions import load_activity
     from ig2mj.tasks.bddl.start import first_that_works, fitting, sample_start
@@ -60,7 +60,7 @@ def sample(
         raise Ig2mjError(f"--jobs {jobs}: 0 takes one process per processor, else at least one is needed")
     activity = load_activity(name, behavior1k)
     file = out or pathlib.Path(f"{activity.name}.npz")
-    check_folder_of(file)
+    check_output(file)
     where = where_of(jobs, cluster, resume)
     bound, errors = fitting(activity, find_homes(scene))
     if not bound:

@@ -38,7 +38,7 @@ def collect(
       episodes: number of successful episodes to collect.
       robot: humanoid or fetch; default: the task's first robot.
       grasping: mitten, assisted, sticky or physical; default: the task's.
-      obs: state, or rgbd with pictures as well (needs --engine warp).
+      obs: state, or rgbd with pictures as well.
       engine: native, warp or jax.
       worlds: number of worlds stepped at once.
       noise: standard deviation of the noise added to the expert's actions; the labels stay noise-free.
@@ -50,7 +50,7 @@ def collect(
       cluster: run on a Ray cluster: its address, or auto.
       resume: continue an interrupted collection.
     """
-    from ig2mj.cli.files import check_folder_of
+    from ig2mj.cli.files import check_output
     from ig2mj.cluster.pieces import run
     from ig2mj.cluster.work import Work
     from ig2mj.envs.experts import expert_of
@@ -68,7 +68,7 @@ def collect(
         raise Ig2mjError(f"--noise {noise}, --disturbed {disturbed}: 0 or more, and between 0 and 1")
     if jobs < 0:
         raise Ig2mjError(f"--jobs {jobs}: 0 takes one process per processor, else at least one is needed")
-    check_folder_of(out)
+    check_output(out)
     where = where_of(jobs, cluster, resume)
     names = VECTORS if obs == "state" else (*VECTORS, "rgb", "depth")
     settings = {

@@ -46,7 +46,7 @@ def replay(
 
     from ig2mj.cli.demos_folder import files_of, of_files
     from ig2mj.cli.demos_pieces import replay_in_pieces
-    from ig2mj.cli.files import check_film, check_folder_of
+    from ig2mj.cli.files import check_film, check_output
     from ig2mj.demos.replay import MODES
     from ig2mj.errors import Ig2mjError, UnknownNameError
 
@@ -60,7 +60,7 @@ def replay(
     if video is not None:
         check_film(video)
     if out is not None:
-        check_folder_of(out)
+        check_output(out)
     names = tuple(name.strip() for name in sensors.split(",") if name.strip())
     if cluster is not None or resume:
         if video is not None:

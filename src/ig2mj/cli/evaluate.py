@@ -55,6 +55,7 @@ def run(
 
     import jax
 
+    from ig2mj.cli.files import check_output
     from ig2mj.cluster.pieces import run
     from ig2mj.cluster.work import Work
     from ig2mj.envs.pieces import shared_pool
@@ -63,10 +64,14 @@ def run(
     from ig2mj.learn.policies import Policy
     from ig2mj.learn.shipped import find_policy
 
-    if episodes < 1 or jobs < 0:
-        raise Ig2mjError(f"--episodes {episodes}, --jobs {jobs}: at least one is needed")
+    if episodes < 1 or min(jobs, worlds) < 0:
+        raise Ig2mjError(
+            f"--episodes {episodes}, --jobs {jobs}, --worlds {worlds}: at least one episode, and none below 0"
+        )
     if resume and out is None:
         raise Ig2mjError("--resume needs --out, the file beside which the finished pieces are")
+    if out is not None:
+        check_output(out)
     file = find_policy(policy)
     loaded = Policy.load(file)
     depends = loaded.card["depends"]

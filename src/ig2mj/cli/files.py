@@ -8,10 +8,12 @@ from collections.abc import Iterable
 from ig2mj.errors import InputError
 
 
-def check_folder_of(file: pathlib.Path) -> None:
-    """The folder must be there. Raises InputError."""
+def check_output(file: pathlib.Path) -> None:
+    """The folder must be there, and no folder in the file's place. Raises InputError."""
     if not file.parent.is_dir():
         raise InputError(file, f"the folder {file.parent} does not exist", fix="make it, or choose another place")
+    if file.is_dir():
+        raise InputError(file, "is a folder", fix="name a file")
 
 
 def check_picture(file: pathlib.Path, others: Iterable[str] = ()) -> None:
@@ -22,7 +24,7 @@ def check_picture(file: pathlib.Path, others: Iterable[str] = ()) -> None:
     endings = {ending for ending, form in Image.registered_extensions().items() if form in Image.SAVE}
     if file.suffix.lower() not in {*endings, *others}:
         raise InputError(file, "is not a picture format that can be written", fix="use .png or .jpg")
-    check_folder_of(file)
+    check_output(file)
 
 
 def check_film(file: pathlib.Path, others: Iterable[str] = ()) -> None:
@@ -31,4 +33,4 @@ def check_film(file: pathlib.Path, others: Iterable[str] = ()) -> None:
 
     if file.suffix.lower() not in {*FORMATS, *others}:
         raise InputError(file, "is not a film format that can be written", fix=f"use {' or '.join(FORMATS)}")
-    check_folder_of(file)
+    check_output(file)

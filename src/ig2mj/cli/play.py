@@ -47,7 +47,7 @@ def run(
         for binding in BINDINGS:
             print(f"{binding.shown:16} {binding.command}")
         return 0
-    from ig2mj.cli.files import check_folder_of
+    from ig2mj.cli.files import check_output
     from ig2mj.cli.robot_urdf import check_layout, own_robot
     from ig2mj.envs.registry import find_task, make
     from ig2mj.errors import UnknownNameError
@@ -61,7 +61,7 @@ def run(
     check_display()
     check_layout(robot_urdf, robot_layout)
     if record is not None:
-        check_folder_of(record)
+        check_output(record)
     if grasping is None:
         grasping = "physical" if isinstance(task, NavigationTask) else "assisted"
     made = make(

@@ -69,7 +69,7 @@ def run(
 
     import numpy as np
 
-    from ig2mj.cli.files import check_film, check_folder_of
+    from ig2mj.cli.files import check_film, check_output
     from ig2mj.cli.robot_urdf import check_layout, own_robot
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.envs.rollout import play
@@ -77,6 +77,8 @@ def run(
 
     if format not in FORMATS:
         raise UnknownNameError("format", format, FORMATS)
+    if record is None and format != FORMATS[0]:
+        raise Ig2mjError(f"--format {format} is that of --record FILE, which is missing")
     check_layout(robot_urdf, robot_layout)
     policy = None if agent in AGENTS else policy_named(agent)
     if episodes < 1 or worlds < 1:
@@ -87,7 +89,7 @@ def run(
         check_film(video, ENDINGS)
         engine = engine or "native"
     if record is not None:
-        check_folder_of(record)
+        check_output(record)
     split = "held_out" if held_out else split
     played = make(
         env,

@@ -47,7 +47,7 @@ def run(
       share: with --disturb: probability that a loose object is moved.
       json: print the result as JSON.
     """
-    from ig2mj.cli.files import check_folder_of
+    from ig2mj.cli.files import check_output
     from ig2mj.errors import Ig2mjError
     from ig2mj.scene.scene import load_scene
 
@@ -60,7 +60,7 @@ def run(
     if disturb == bool(conditions):
         raise Ig2mjError('give conditions, such as "(on_top apple_0 breakfast_table_0)", or --disturb')
     file = out or pathlib.Path("pool.npz")
-    check_folder_of(file)
+    check_output(file)
     where = where_of(jobs, cluster, resume)
     loaded = load_scene(scene, objects=add)
     if disturb:

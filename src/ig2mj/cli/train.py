@@ -97,7 +97,7 @@ def run(
     from ig2mj.learn.policies import Policy, depends_on, world_of
     from ig2mj.learn.train import Run, train
 
-    _check(algo, obs, minutes, videos, until, pixels, programs, devices, demos, expert)
+    _check(algo, obs, minutes, videos, until, pixels, programs, devices, demos, expert, out)
     kept_rows = rows_of(rows, pixels)
     if algo == "bc":
         from ig2mj.cli.clone import train_from_demos
@@ -185,9 +185,10 @@ def _check(
     devices: str,
     demos: pathlib.Path | None,
     expert: bool,
+    out: pathlib.Path | None,
 ) -> None:
     """Refuses options that cannot be, before anything is made. Raises Ig2mjError."""
-    from ig2mj.errors import Ig2mjError, UnknownNameError
+    from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
     from ig2mj.learn.perception import MODES
 
     if algo not in ALGORITHMS:
@@ -209,6 +210,8 @@ def _check(
     if expert and algo != "sac":
         others = {"dagger": "dagger always has one", "ppo": "ppo learns alone", "bc": "bc learns from --demos"}
         raise Ig2mjError(f"--expert is for sac: {others[algo]}")
+    if out is not None and out.is_file():
+        raise InputError(out, "is a file", fix="--out names the folder of a run")
 
 
 def rows_of(words: str | None, pixels: int) -> tuple[int, int] | None:
@@ -239,7 +242,7 @@ def _devices(wanted: str, processes: int) -> list[Any]:
     least = min(sum(d.process_index == p for d in every) for p in range(processes))
     each = least if wanted == "all" else int(wanted) // processes
     if not 0 < each <= least or (wanted != "all" and int(wanted) % processes):
-        have = f"there are {len(every)} devices in {processes} processes, and each takes as many"
-        raise Ig2mjError(f"--devices {wanted}: {have if processes > 1 else f'there are {len(every)} devices'}")
+        shares = f" in {processes} processes, and each takes as many" if processes > 1 else ""
+        raise Ig2mjError(f"--devices {wanted}: this run can have {len(every)}{shares}")
     by_process = [[d for d in every if d.process_index == p][:each] for p in range(processes)]
     return [device for own in by_process for device in own]

@@ -133,7 +133,9 @@ def make(
         raise EngineError(f"worlds = {worlds}: an environment has at least one")
     if pool_size is not None and pool_size < 1:
         raise EngineError(f"pool_size = {pool_size}: an environment has at least one start state")
-    if mixed < 0 or (mixed and not isinstance(task, Task)):
+    if mixed < 0:
+        raise EngineError(f"mixed = {mixed}: a number of start states, or 0")
+    if mixed and not isinstance(task, Task):
         raise EngineError(f"mixed = {mixed} for {task.name}: only start states of the paper's activities are mixed")
     if engine is not None and engine not in ENGINES:
         raise UnknownNameError("engine", engine, ENGINES)

@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ig2mj.cluster.work import Piece
+from ig2mj.cluster.work import Piece, WholeRunError
 from ig2mj.envs.experts import expert_of
 from ig2mj.envs.pieces import keep_pool
 from ig2mj.envs.registry import make
+from ig2mj.errors import Ig2mjError
 from ig2mj.learn.demos import DemoWriter, collect_demos
 
 PIECE = 32
@@ -52,12 +53,14 @@ def collect_piece(
     """A file of demonstrations. Arguments: of `ig2mj.make` and of `collect_demos`.
 
     Raises:
-      Ig2mjError: nearly all episodes fail.
+      Ig2mjError: nearly all episodes fail. WholeRunError: there is no such environment.
     """
-    keep_pool(shared or {}, env, split, pool_size)
-    played = make(
-        env, robot, worlds, engine, grasping, observations=observations, split=split, pool_size=pool_size
-    )  # fmt: skip
+    try:
+        keep_pool(shared or {}, env, split, pool_size)
+        starts: dict[str, Any] = {"split": split, "pool_size": pool_size}
+        played = make(env, robot, worlds, engine, grasping, observations=observations, **starts)
+    except Ig2mjError as e:
+        raise WholeRunError(e) from e
     with tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:
         file = pathlib.Path(folder) / "demos.h5"
         with DemoWriter(file, played) as writer:

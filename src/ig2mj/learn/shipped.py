@@ -57,6 +57,8 @@ def find_policy(name: str | os.PathLike) -> pathlib.Path:
         short = short.removeprefix(f"{NAMESPACE}/").removesuffix(f"-v{VERSION}")
     if short in known:
         return known[short]
+    if file.is_dir():
+        raise InputError(file, "holds no policy.npz", fix="`ig2mj train` writes one with every checkpoint")
     if file.suffix == ".npz" or len(pathlib.PurePath(short).parts) > 1:
         raise InputError(file, "there is no such file", fix="`ig2mj train` writes policies")
     raise UnknownNameError("policy", short, known)
