@@ -1,7 +1,11 @@
-"""A film of an episode: one world of an environment, seen from beside the robot, in real time."""
+"""A film of an episode: one world of an environment, seen from beside the robot, in real time.
+
+Where a robot drives through rooms the camera goes along above it, and the goal is marked.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import os
 import pathlib
@@ -14,10 +18,12 @@ from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.showcase.cooking_pictures import caption_at, font
 from ig2mj.showcase.film_strip import ENDINGS, FilmStrip
+from ig2mj.tasks.navigation.objective import NavigationObjective
+from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.task import Task
 from ig2mj.viewer.film import Film
 from ig2mj.viewer.offscreen import FreeView, render
-from ig2mj.viewer.state_marks import Tinter, draw_marks, marks, tint_of_objects
+from ig2mj.viewer.state_marks import Mark, Tinter, draw_marks, marks, tint_of_objects
 
 WIDTH, HEIGHT = 640, 480
 """Pixels."""
@@ -33,6 +39,12 @@ SIDES = (50.0, -50.0, 25.0, -25.0, 75.0, -75.0, 110.0, -110.0)
 
 DISTANCE, ELEVATION = 1.7, -32.0
 """m from what is looked at, and degrees."""
+
+FROM_ABOVE, DOWN, UP = 4.0, -75.0, 0.5
+"""The same for a camera that goes along, and m above the floor of what it looks at."""
+
+GOAL_COLOUR, GOAL_THICK = (0.1, 0.9, 0.2, 0.5), 0.01
+"""Of the mark of a goal; half its height, m, where it lies on the floor."""
 
 LAST = 15
 """Frames for which the end of an episode stays."""
@@ -52,6 +64,7 @@ class EpisodeFilm:
         assert env.core.rules is not None
         self._env, self._world, self._model_of_states = env, world, env.core.rules.model
         self._objects = env.task.objects_of_interest if isinstance(env.task, Task) else ()
+        self._goes_along = isinstance(env.task, NavigationTask)
         strip = pathlib.Path(file).suffix.lower() in ENDINGS
         self._film = FilmStrip(file) if strip else Film(file, WIDTH, HEIGHT, BETWEEN / ACTION_PERIOD)
         self._drawn: mujoco.MjData | None = None
@@ -110,18 +123,34 @@ class EpisodeFilm:
         drawn.qpos[:] = qpos
         mujoco.mj_forward(model, drawn)
         states, view = state.batch.world.states, state.batch.world.view
-        found = marks(self._model_of_states, states, view, self._world)
+        found = [*marks(self._model_of_states, states, view, self._world), *self._goal_marks(state)]
+        camera = self._camera
+        if self._goes_along and camera is not None:
+            camera = dataclasses.replace(camera, lookat=_above(drawn.xpos[self._env.scene.tables.agent_body[0]]))
         with self._tinter.shown(tint_of_objects(self._model_of_states, states, self._world)):
             self._last = pixels = render(
                 model,
                 drawn,
-                self._camera,
+                camera,
                 width=WIDTH,
                 height=HEIGHT,
                 decorate=lambda scene: draw_marks(scene, found),
             )
         self._told = self._words(state)
         return self._captioned(pixels, self._told)
+
+    def _goal_marks(self, state: EnvState) -> list[Mark]:
+        """A disc on the floor, or a ball in the air, within which the goal is reached."""
+        objective, task = self._env.objective, self._env.task
+        if not isinstance(objective, NavigationObjective) or not isinstance(task, NavigationTask):
+            return []
+        goal = objective.goal(state.measures)
+        if goal is None:
+            return []
+        pos, ball = np.array(np.asarray(goal)[self._world], float), task.goal == "reach"
+        kind = mujoco.mjtGeom.mjGEOM_SPHERE if ball else mujoco.mjtGeom.mjGEOM_CYLINDER
+        size = (task.tolerance, 0.0 if ball else GOAL_THICK, 0.0)
+        return [Mark(kind, size, pos, np.eye(3), GOAL_COLOUR)]
 
     def _captioned(self, pixels: UInt8[np.ndarray, "Y X 3"], words: str) -> UInt8[np.ndarray, "Y X 3"]:
         from PIL import Image, ImageDraw
@@ -153,6 +182,10 @@ class EpisodeFilm:
         objects = [env.scene.object_index(name) for name in self._objects]
         wanted = np.isin(tables.body_object[model.geom_bodyid], objects)
         hands = np.isin(tables.body_hand[model.geom_bodyid], np.flatnonzero(tables.hand_agent == 0))
+        middle, distance, elevation = ahead, DISTANCE, ELEVATION
+        if self._goes_along:
+            hands = tables.body_agent[model.geom_bodyid] == 0
+            middle, distance, elevation = _above(base), FROM_ABOVE, DOWN
 
         def seen(view: FreeView) -> float:
             ids = render(model, data, view, width=160, height=120, segmentation=True)
@@ -160,5 +193,10 @@ class EpisodeFilm:
             first = np.isin(tables.body_object[model.geom_bodyid[geoms]], objects[:1])
             return float(min(wanted[geoms].sum(), 800) + 3 * hands[geoms].sum() + 5 * first.sum())
 
-        views = [FreeView(ahead, DISTANCE, math.degrees(yaw) + side, ELEVATION) for side in SIDES]
+        views = [FreeView(middle, distance, math.degrees(yaw) + side, elevation) for side in SIDES]
         return max(views, key=seen)
+
+
+def _above(base: np.ndarray) -> tuple[float, float, float]:
+    """What a camera that goes along looks at."""
+    return float(base[0]), float(base[1]), float(base[2]) + UP

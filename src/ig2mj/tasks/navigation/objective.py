@@ -131,6 +131,10 @@ class NavigationObjective:
         collisions = before.collisions + hit.astype(jnp.int32)
         return Measures(row, now, ahead, reached, hit, fallen, before.start, pos, travelled, collisions)
 
+    def goal(self, now: Measures) -> Float[Array, "W 3"] | None:
+        """Where the goal is, world frame, m; None where furniture is to be closed."""
+        return None if self._task.goal == "close" else jnp.asarray(self._goals)[now.row]
+
     def rewards(self, before: Measures, now: Measures) -> dict[str, Float[Array, "W"]]:
         task = self._task
         terms = {
