@@ -25,6 +25,7 @@ import time
 from collections.abc import Sequence
 from typing import Any
 
+import jax
 import jax.numpy as jnp
 import matplotlib
 import numpy as np
@@ -34,6 +35,7 @@ from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.experts import expert_of
 from ig2mj.envs.registry import VECTORS, make
+from ig2mj.envs.rollout import Lifts
 from ig2mj.learn.bc import BC, BCConfig, clone
 from ig2mj.learn.demos import Demos
 from ig2mj.learn.evaluate import wilson
@@ -123,9 +125,10 @@ def trained(
 
 def take_over(
     env: Environment, policy: Policy, perception: Perception, jobs: Sequence[tuple[Shown, float]], learnt: np.ndarray
-) -> list[bool]:
-    """Replays each job's demonstration until so many seconds before its end, then lets the policy act: who succeeds."""
-    choose, success = policy.actor(perception), list[bool]()
+) -> tuple[list[bool], list[bool]]:
+    """Replays each job's demonstration until so many seconds before its end, then lets the policy act: who succeeds,
+    and who of those held the cauldron with both hands when it left the floor."""
+    choose, success, lifted = jax.jit(policy.actor(perception)), list[bool](), list[bool]()
     for first in range(0, len(jobs), env.num_worlds):
         part = list(jobs[first : first + env.num_worlds])
         part += [part[-1]] * (env.num_worlds - len(part))
@@ -133,6 +136,7 @@ def take_over(
         length = np.array([len(shown.action) for shown, _ in part])
         lead = np.where([np.isinf(x) for _, x in part], length, [round(min(x, 1e3) / ACTION_PERIOD) for _, x in part])
         handover, going, won = np.maximum(length - lead, 0), np.ones(len(part), bool), np.zeros(len(part), bool)
+        lifts = Lifts(state.info, env.num_worlds)
         for k in range(env.task.horizon):
             action = np.stack([shown.action[min(k, len(shown.action) - 1)] for shown, _ in part])
             alone = k >= handover
@@ -140,11 +144,14 @@ def take_over(
             state = env.step(state, action)
             ended = going & np.asarray(state.done)
             won |= ended & np.asarray(state.info["success"])
+            lifts.see(state.info, np.asarray(state.done), going)
             going &= ~ended
             if not going.any():
                 break
-        success += won[: min(env.num_worlds, len(jobs) - first)].tolist()
-    return success
+        count = min(env.num_worlds, len(jobs) - first)
+        success += won[:count].tolist()
+        lifted += (won & lifts.by_all)[:count].tolist()
+    return success, lifted
 
 
 def plotted(rows: Sequence[dict[str, Any]], longest: float, file: pathlib.Path) -> None:
@@ -203,6 +210,7 @@ def main() -> None:
     parser.add_argument("--closing", nargs="*", default=["replayed", "learnt"], choices=("replayed", "learnt"))
     parser.add_argument("--seconds", nargs="*", type=float, default=TAKEOVERS, help="before the end; inf: all alone")
     parser.add_argument("--merge", nargs="*", type=pathlib.Path, default=(), help="only puts together what is in these")
+    parser.add_argument("--policies", type=pathlib.Path, help="a folder for the clones")
     parser.add_argument("--out", type=pathlib.Path, default=results.RESULTS / "figure_5b")
     args = parser.parse_args()
     if args.merge:
@@ -224,11 +232,16 @@ def main() -> None:
                 continue
             policy, loss = trained(env, perception, demos_of(shown, learnt), args.steps, args.batch, args.seed)
             runs = [(s, x) for x in args.seconds for s in tests]
-            all_won = np.reshape(take_over(env, policy, perception, runs, learnt), (len(args.seconds), len(tests)))
-            for x, won in zip(args.seconds, all_won, strict=True):
+            if args.policies is not None:
+                args.policies.mkdir(parents=True, exist_ok=True)
+                policy.save(args.policies / f"{obs}-{kind}.npz")
+            found = take_over(env, policy, perception, runs, learnt)
+            all_won, all_lifted = np.reshape(found, (2, len(args.seconds), len(tests)))
+            for x, won, lifted in zip(args.seconds, all_won, all_lifted, strict=True):
                 low, high = wilson(int(won.sum()), len(won))
                 row = {"observation": obs, "closing": kind, "seconds_before_end": "all" if np.isinf(x) else x}
                 row |= {"success": round(float(won.mean()), 4), "low": round(low, 3), "high": round(high, 3)}
+                row |= {"lifted_by_all": round(float(lifted.mean()), 4)}
                 row |= {"runs": len(won), "demonstrations": len(shown), "pairs": pairs, "loss_apart": round(loss, 5)}
                 row["longest_s"] = round(float(longest), 1)
                 rows.append(row)
