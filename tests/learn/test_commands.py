@@ -18,7 +18,8 @@ def test_a_recorded_expert_is_cloned_and_judged(tmp_path, capsys):
     assert call(["demos", "collect", "CookingMeat", "--out", str(demos), "--episodes", "8", *POOL]) == 0
     train = ["train", "CookingMeat", "--algo", "bc", "--demos", str(demos), "--out", str(run)]
     assert call([*train, "--set", "steps=1500", "batch=128", "actor=64,64"]) == 0
-    capsys.readouterr()
+    assert call([*train[:-1], str(tmp_path / "other"), "--obs", "rgbd"]) == 2
+    assert "holds no pictures" in capsys.readouterr().err
     episodes = ["--episodes", "4", *POOL, "--split", "train", "--json"]
     assert call(["evaluate", str(run), "--worlds", "4", *episodes]) == 0
     found = json.loads(capsys.readouterr().out)
@@ -29,8 +30,9 @@ def test_a_recorded_expert_is_cloned_and_judged(tmp_path, capsys):
     assert call(["rollout", "CookingMeat", "--agent", str(run / "policy.npz"), "--worlds", "4", *episodes]) == 0
     played = json.loads(capsys.readouterr().out)
     assert played["success_rate"] >= 0.75 and set(played) <= set(found), "evaluate has the keys of rollout"
-    assert call(["evaluate", str(run), "--worlds", "1", "--episodes", "1", *POOL, "--robot", "fetch"]) == 2
-    assert 'is for robot = "humanoid", and here it is "fetch"' in capsys.readouterr().err
+    assert call(["evaluate", str(run), "--worlds", "1", "--episodes", "5", *POOL, "--robot", "fetch"]) == 2
+    assert "there are 4 start states, so some are played and counted again" in (refused := capsys.readouterr().err)
+    assert 'is for robot = "humanoid", and here it is "fetch"' in refused
 
 
 def test_wrong_options_name_what_is_near(tmp_path, capsys):

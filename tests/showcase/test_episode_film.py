@@ -37,7 +37,7 @@ def test_where_a_robot_drives_the_camera_goes_along_and_the_goal_is_marked(tmp_p
     env = ig2mj.make("PointNavigation", engine="native", split="held_out", pool_size=4).with_horizon(4)
     seen = []
 
-    def render(model, data, camera, *, width, height, segmentation=False, decorate=None):
+    def render(model, data, camera, *, width, height, segmentation=False, decorate=print):
         if segmentation:
             return np.full((height, width), -1)
         scene = mujoco.MjvScene(model, 20)

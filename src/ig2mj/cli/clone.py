@@ -41,11 +41,14 @@ def train_from_demos(
     for name, wanted in (("task", short_name(env) or env), ("robot", robot), ("grasping", grasping)):
         if wanted is not None and world[name] != wanted:
             raise InputError(demos, f"is of {name} {world[name]}, not {wanted}")
+    if obs == "rgbd" and not {"rgb", "depth"} & set(spaces):
+        raise InputError(demos, "holds no pictures", fix="`ig2mj demos collect --obs rgbd` records them")
     perception = Perception(spaces, obs, pixels, rows, world.get("privileged", ()))
     runs = load_demos(demos, perception)
     config = configured(BCConfig(), changes)
     algorithm = BC(perception, runs.action.shape[1], config)
-    folder = out or pathlib.Path("runs") / "-".join([world["task"], world["robot"], world["grasping"], "bc", obs])
+    names = [world["task"], world["robot"], world["grasping"], "bc", obs, str(seed)]
+    folder = out or pathlib.Path("runs") / "-".join(names)
     depends = depends_of(world, perception)
     learner, row = clone(algorithm, runs, Run(minutes, seed=seed, out=folder, resume=resume), depends)
     made = {

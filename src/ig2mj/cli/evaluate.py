@@ -31,7 +31,7 @@ def run(
     resume: Resume = False,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
-    """Measure how often a policy succeeds; each start state is played once.
+    """Measure how often a policy succeeds; each start state is played once, where there are enough of them.
 
     Args:
       policy: a file that `ig2mj train` wrote, or the name of one that ships.
@@ -51,6 +51,7 @@ def run(
     """
     import contextlib
     import json as form
+    import sys
     import time
 
     import jax
@@ -63,6 +64,7 @@ def run(
     from ig2mj.learn.evaluate import evaluation_pieces, summary
     from ig2mj.learn.policies import Policy
     from ig2mj.learn.shipped import find_policy
+    from ig2mj.tasks.pools import COUNT
 
     if episodes < 1 or min(jobs, worlds) < 0:
         raise Ig2mjError(
@@ -91,6 +93,10 @@ def run(
         "pool_size": pool_size or None,
         "drawn": drawn,
     }
+    states = pool_size or COUNT.get(split, episodes)
+    if episodes > states:
+        words = f"--episodes {episodes}: there are {states} start states, so some are played and counted again"
+        print(f"warning: {words}", file=sys.stderr)
     where, title = where_of(jobs, cluster, resume), f"evaluating {policy}"
     starts = (depends["task"], split, pool_size or None)
     shared = {"policy": file.read_bytes(), **(shared_pool(*starts) if cluster is not None or jobs != 1 else {})}
