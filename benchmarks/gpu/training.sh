@@ -6,7 +6,7 @@
 #
 # pools: what the first four begin from.  humanoid, fetch: SlicingFruit by DAgger.  towel: Fetch's towel without mittens
 # by DAgger.  towel_sac: by SAC, which an expert begins for.  choices, mean: the humanoid's fruit for 120 s with choices
-# and with a Gaussian's mean.  figure_5b: from pixels.  shipped: three policies that ship, on Warp.
+# and with a Gaussian's mean.  shipped: three policies that ship, on Warp.
 # speed: an evaluation of 1,000 worlds, then again with everything compiled (start_seconds, steps_per_second).
 #
 # Below $OUT: the best and the last policy, progress.csv, evaluations.jsonl (the likeliest actions, then drawn ones) and
@@ -60,9 +60,6 @@ run() {
         copy=2 trust=1 reach=110 alpha=0.003 ;;
     choices) minutes=2; fruit choices humanoid 80:128 choices=21 ;;
     mean) minutes=2; fruit mean humanoid 80:128 choices=0 ;;
-    figure_5b)
-      XLA_PYTHON_CLIENT_MEM_FRACTION=0.12 timeout 400 python3 benchmarks/figure_5b.py --engine "$engine" --obs rgbd --demos 30 \
-        --tests 48 --worlds "${WORLDS:-192}" --pool-size 64 --steps 4000 --seconds 0 1 2 3 4 6 8 inf --out "$out/figure_5b" ;;
     shipped)
       for name in CookingMeat GraspingBook BimanualPickAndPlace; do held "$name" "$name" 500 & done; wait
       cut -c1-600 "$out"/*/evaluations.jsonl ;;
