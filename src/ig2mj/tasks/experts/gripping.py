@@ -28,8 +28,9 @@ PITCH = 0.1
 CLEARANCE = 0.06
 """m above the upper end at which the open gripper comes over it."""
 
-EXACT, BLEND = 0.008, 0.03
-"""m beside the axis within which the gripper goes straight down, and over which it comes to do so."""
+EXACT, BLEND = 0.015, 0.03
+"""m beside the axis within which the gripper goes straight down, and over which it comes to do so. The fingers have as
+much on either side of a towel; whoever learns from pictures, and waits to be nearer, hovers above it for ever."""
 
 EASE = 0.6
 """Share of the way to it that the gripper goes in an action; the arm lags, and with all of it swings to and fro."""
