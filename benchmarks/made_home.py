@@ -23,7 +23,7 @@ def write_home(folder: pathlib.Path, num_objects: int, seed: int = 0) -> pathlib
     rng = np.random.default_rng(seed)
     furniture = max(1, (num_objects - 1) // 6)
     columns = int(np.ceil(np.sqrt(furniture)))
-    bodies, excludes, entries = [_floor(columns)], [], [_entry("floor", "floors", (4, 4, 0.1), fixed=True)]
+    bodies, excludes, entries = [_floor()], [], [_entry("floor", "floors", (100, 100, 1), fixed=True)]
     spots = []
     for k in range(furniture):
         x, y = 2.0 * (k % columns), 2.0 * (k // columns)
@@ -78,9 +78,9 @@ def _box(body: str, number: int, size: str, pos: str) -> str:
     return f'<geom name="{body}/collision_{number}" type="box" size="{size}" pos="{pos}" density="300" {COLLISION}/>'
 
 
-def _floor(columns: int) -> str:
-    half = 2 * columns + 2
-    return f'<body name="floor" pos="0 0 -0.05">{_box("floor", 0, f"{half} {half} 0.05", "0 0 0")}</body>'
+def _floor() -> str:
+    """Without walls and so wide that nothing rolls off it; so deep that nothing is pressed out at its underside."""
+    return f'<body name="floor" pos="0 0 -0.5">{_box("floor", 0, "50 50 0.5", "0 0 0")}</body>'
 
 
 def _table(name: str, x: float, y: float) -> str:

@@ -4,7 +4,7 @@
 
 A control step is four physics steps of 1/120 s, the view, all extended states, guards and a goal of up to ten literals,
 in one jitted function under `lax.scan`; a floating hand pushes objects about unless `--idle`, or with `--robot` the
-humanoid or Fetch acts at random without grasping, a new action every half second (`SHARE`).
+humanoid or Fetch acts at random without grasping, a new action every half second (`ACTS`).
 Every row says what hand or robot really did (`benchmarks/disturbance.py`), how many worlds overflowed or lost their
 numbers, and in how many an object left the house. A row with any of the first two or more than one in a thousand of the
 last does not count (`counts` is false), nor does one whose hand touches nothing.
@@ -51,9 +51,11 @@ SIZE = 128
 AGENT_STEP = 3
 """Control steps of an agent step, of which `--what agent` takes one picture."""
 
-SHARE = {"Humanoid": 0.5}
-"""Of a robot's range of actions that is drawn from. The humanoid's is 0.3 m in 0.1 s: at all of it boxes fly over the
-walls of the made homes, at the 0.5 m/s of the paper's activities it touches hardly anything."""
+ACTS = {"Humanoid": (1, 0.5 / ACTION_STEPS)}
+"""By robot: control steps of an action (else `ACTION_STEPS`), and share of the range of actions that is drawn from. The
+humanoid goes at up to 1.5 m/s along each axis: at twice that boxes fly over walls, at the 0.5 m/s of the paper's
+activities it touches hardly anything. It acts in every control step: hands that are sent 0.15 m on ten times a second
+jump there at 5 m/s."""
 
 ENGINES = {"ig2mj": contextlib.nullcontext, "mujoco_warp": patches.upstream_kernels}
 """Whose functions run on the device: with ours in place of some of MuJoCo Warp's, or MuJoCo Warp's alone."""
@@ -157,14 +159,15 @@ def program(case: Case, worlds: Core, watch: Watch, disturbed: bool, what: str, 
     if what in ("camera", "agent"):
         camera = BatchCamera(engine, case.model, [case.eye], width=SIZE, height=SIZE, depth=True)
 
-    share = SHARE.get(case.robot.__name__ if case.robot else "", 1.0)
-    robot = robot_of(case.scene, ACTION_STEPS * seconds) if disturbed and case.robot is not None else None
+    every, share = ACTS.get(case.robot.__name__ if case.robot else "", (ACTION_STEPS, 1.0))
+    robot = robot_of(case.scene, every * seconds) if disturbed and case.robot is not None else None
 
     def control(batch, pusher, com, palm):
         if not disturbed:
             return pusher
         if robot is not None:
-            return act_at_random(robot, pusher, batch.world.view, batch.world.key, batch.world.step, share)
+            world = batch.world
+            return act_at_random(robot, pusher, world.view, world.key, world.step, share, every)
         return push(case.reach, pusher, com, palm, batch.world.key, batch.world.step, seconds)
 
     def full(carry, _):

@@ -8,10 +8,12 @@ import mujoco
 import numpy as np
 import pytest
 from batch_case import Case
-from disturbance import Activity, geoms_of, join, summary
+from disturbance import Activity, geoms_of, join, lost_worlds, summary
 from made_home import write_home
 
+import ig2mj
 from ig2mj.engine.warp.profile import EngineProfile, save_profile
+from ig2mj.sampling.perturbation import loose_objects
 
 PROFILE = EngineProfile(awake_dofs=40, constraints=200, contacts=30, convex_contacts=20)
 
@@ -79,3 +81,24 @@ def test_a_robot_takes_the_hands_place_and_brings_its_own_buffer_sizes(home):
     assert (tables.actuator_agent == 0).all() and model.nu == 38
     robot, _ = geoms_of(case.scene)
     assert set(tables.hand_body) <= set(model.geom_bodyid[robot]), "its hands' touches are counted"
+
+
+def test_a_dip_into_the_floor_is_no_loss_but_what_falls_past_it_or_flies_off_is():
+    place = np.zeros((4, 2, 3))
+    place[:, :, 2] = 0.05
+    place[1, 0, 2], place[2, 1, 2], place[3, 0, 0] = -0.06, -0.12, 51.0
+    assert lost_worlds(place) == 2
+
+
+def test_what_slides_from_the_furniture_of_a_made_home_stays_on_its_floor(home):
+    scene = ig2mj.load_scene(home)
+    model, data = scene.model, scene.start_data()
+    loose = loose_objects(scene.tables)
+    model.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+    address = model.jnt_dofadr[model.body_jntadr[scene.tables.object_root[loose]]]
+    data.qvel[address], data.qvel[address + 2] = 6.0, 2.0
+    for _ in range(480):
+        mujoco.mj_step(model, data)
+    place = data.xipos[scene.tables.object_root[loose]]
+    assert (place[:, 0] > 6.5).any(), "beyond where its floor once ended"
+    assert lost_worlds(place[None]) == 0

@@ -58,12 +58,14 @@ def act_at_random(
     key: UInt[Array, "W 2"],
     step: Int[Array, "W"],
     share: float = 1.0,
+    action_steps: int = ACTION_STEPS,
 ) -> Acting:
     """Controls for the next control step.
 
     Args:
       key: of each world's round. step: control steps since its start, the same in all worlds.
       share: of the range of actions that is drawn from.
+      action_steps: control steps after which the robot acts, as often as its controller was told.
     """
     low, high = share * jnp.asarray(controller.action_low), share * jnp.asarray(controller.action_high)
     keys = step_keys(key, step)
@@ -74,4 +76,4 @@ def act_at_random(
         ctrl, state = controller.control(action, view, acting.state)
         return Acting(jnp.asarray(ctrl, acting.ctrl.dtype), action, state)
 
-    return jax.lax.cond(step[0] % ACTION_STEPS == 0, another, lambda: dataclasses.replace(acting, action=action))
+    return jax.lax.cond(step[0] % action_steps == 0, another, lambda: dataclasses.replace(acting, action=action))
