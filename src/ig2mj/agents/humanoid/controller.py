@@ -55,8 +55,10 @@ from ig2mj.geometry.poses import (
 )
 from ig2mj.scene.tables import SceneTables
 
-MAX_TURN_RATE = 10.0
-"""rad/s."""
+MAX_SPEED, MAX_TURN_RATE = 6.0, 10.0
+"""m/s along each axis and rad/s at which a hand is sent to its target; the former is what hand and body can be told to
+go in 1/10 s together. A hand that something held back, far behind its target, would otherwise rush there when it comes
+free, and throw what it holds or hits out of the house."""
 
 REACH_SLACK = 0.001
 """m by which a target may be out of reach before it is brought back."""
@@ -167,9 +169,11 @@ class HumanoidController:
         new = HumanoidState(hand_pos, hand_quat, eye_pos, eye_quat, trigger, held, fingers)
 
         target_pos, target_quat = compose(body_pos[:, None], body_quat[:, None], hand_pos, hand_quat)
+        hand, ahead = view.agent.hand_pos[:, self._hands], MAX_SPEED / self._gain
+        sent_pos = jnp.clip(target_pos, hand - ahead, hand + ahead)
         left = quat_multiply(quat_conjugate(view.agent.hand_quat[:, self._hands]), target_quat)
         ctrl_fingers = jnp.where(held[..., None], fingers, trigger[..., None] * CLOSED)
-        ctrl_hands = jnp.concatenate([target_pos, _turn_rate(left, self._gain), ctrl_fingers], axis=-1)
+        ctrl_hands = jnp.concatenate([sent_pos, _turn_rate(left, self._gain), ctrl_fingers], axis=-1)
         ctrl_body = jnp.concatenate([body_pos, _turn_rate(turn, self._gain)], axis=-1)
         return jnp.concatenate([ctrl_body, ctrl_hands.reshape(-1, 32)], axis=-1), new
 
