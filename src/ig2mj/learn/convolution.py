@@ -13,9 +13,8 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+from jax import Array
 from jaxtyping import Float
-
-from ig2mj.engine.view import Array
 
 SIDE = 3
 """Rows and columns of a kernel."""

@@ -245,7 +245,7 @@ class SAC:
     def _look(self, actor: Any, moments: Moments, seen: Seen, shake: Array | None = None) -> tuple[Array, Array, Array]:
         """`shake`: a key, while it learns (`networks.SHAKEN`)."""
         own = moments.normal(seen.vector[:, : self.perception.actor_size])
-        rngs = {} if shake is None else {SHAKEN: shake}
+        rngs: Any = {} if shake is None else {SHAKEN: shake}
         return self.actor.apply({"params": actor}, own, seen.picture, rngs=rngs)  # pyright: ignore[reportReturnType]
 
     def _draw(
