@@ -6,16 +6,18 @@
 #
 # pools: what the first four begin from.  humanoid, fetch: SlicingFruit by DAgger.  towel: Fetch's towel without mittens
 # by DAgger.  towel_sac: by SAC, which an expert begins for.  choices, mean: the humanoid's fruit for 120 s with choices
-# and with a Gaussian's mean.  shipped: three policies that ship, on Warp.
+# and with a Gaussian's mean.  sight: what the encoders tell of unseen start states, 60 s each; nobody acts.
+# shipped: three policies that ship, on Warp.
 # speed: an evaluation of 1,000 worlds, then again with everything compiled (start_seconds, steps_per_second).
 #
 # Below $OUT: the best and the last policy, progress.csv, evaluations.jsonl (the likeliest actions, then drawn ones) and
 # the log of each, copied while it trains. $MINUTES of training (5), $WORLDS, $ENGINE (warp), $FRACTION of a card's memory
-# that JAX takes for each training (0.26).
+# that JAX takes for each training (0.26), $BATCH, $STARTS and $LOOK: pictures of start states, and updates of the guess
+# on them.
 set -u
 out=${OUT:-out/training}; mkdir -p "$out"
 minutes=${MINUTES:-5} engine=${ENGINE:-warp} fraction=${FRACTION:-0.26}
-pictures=(--set net=glimpses shift=0 actor=256,256 capacity=500000)
+pictures=(--set net=glimpses shift=0 actor=192,192 capacity=500000 batch="${BATCH:-1024}")
 
 sample() { nice -n 10 env JAX_PLATFORMS=cpu python3 -m ig2mj sample-task "$@" >> "$out/pools.txt" 2>&1; }
 
@@ -39,7 +41,14 @@ learn() {  # NAME EPISODES WORDS...: trains, and plays so many held-out episodes
 
 fruit() {  # NAME ROBOT ROWS WORDS...
   learn "$1" 1000 SlicingFruit --robot "$2" --rows "$3" --algo dagger --pixels 128 --worlds "${WORLDS:-2048}" \
-    --pool-size 4096 --minutes "$minutes" "${pictures[@]}" "${@:4}"
+    --pool-size 4096 --mixed 200000 --minutes "$minutes" "${pictures[@]}" starts="${STARTS:-16384}" look="${LOOK:-3000}" "${@:4}"
+}
+
+sight() {  # ROBOT ROWS NET: the guess alone, from start states
+  mkdir -p "$out/sight"
+  XLA_PYTHON_CLIENT_MEM_FRACTION=$fraction timeout 300 python3 benchmarks/sight.py SlicingFruit --robot "$1" --rows "$2" --net "$3" \
+    --engine "$engine" --worlds "${SIGHT_WORLDS:-1000}" --mixed 200000 --starts "${STARTS:-16384}" --updates "${LOOK:-3000}" \
+    --batch "${BATCH:-256}" > "$out/sight/$1-$3.jsonl" 2> "$out/sight/$1-$3.txt"
 }
 
 towel() {  # NAME WORDS...
@@ -54,6 +63,7 @@ run() {
       sample SoakingTowel --grasping physical --split train --count 1024; sample SoakingTowel --grasping physical --split held_out ;;
     humanoid) fruit fruit_humanoid humanoid 80:128 ;;
     fetch) fruit fruit_fetch fetch 60:108 ;;
+    sight) for net in glimpses places; do sight humanoid 80:128 $net & sight fetch 60:108 $net & wait; done ;;
     towel) towel towel_dagger --algo dagger "${pictures[@]}" length=8 ;;
     towel_sac)
       towel towel_sac --algo sac --expert --until 0.95 "${pictures[@]}" gamma=0.99 horizon=5 held=8 std=0.1 guided=0.6 copied=1 \
@@ -66,7 +76,7 @@ run() {
     speed)
       for _ in cold warm; do EVAL_WORLDS=1000 held speed CookingMeat 1000; done
       cut -c1-600 "$out/speed/evaluations.jsonl" ;;
-    *) sed -n '2,15p' "$0"; exit 2 ;;
+    *) sed -n '2,17p' "$0"; exit 2 ;;
   esac
 }
 

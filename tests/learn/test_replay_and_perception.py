@@ -27,20 +27,27 @@ from ig2mj.learn.moments import Moments, RewardScale
 from ig2mj.learn.networks import GLIMPSE, SHAKEN, Actor, Encoder, brightest, coarse, projected, shifted, window
 from ig2mj.learn.perception import FAR, Perception, Seen, shrunk
 from ig2mj.learn.policies import Policy, PolicyMismatch, depends_on, perception_of
+from ig2mj.learn.projection import FRAME, Lens
 from ig2mj.learn.replay import Replay
 from ig2mj.learn.sac import SAC, SACConfig
 
 GAMMA = 0.5
+
+AHEAD = Lens((0.0, 0.0, 0.0), ((0.0, 0.0, -1.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), (1.0, 1.0), 16, (2, 14))
+"""In the middle of the base, looking ahead along x; rows 2 to 14 of 16x16 pixels."""
+
+GOAL = [*(f"goal_pos_{c}" for c in "xyz"), *(f"goal_quat_{c}" for c in "wxyz")]
+"""Of a privileged state."""
 
 
 def told(steps, terminated, truncated):
     """Two worlds; what is seen in step t of world w is 100 w + t, and after it half more; rewards are 1."""
     number = 100.0 * jnp.arange(2) + jnp.asarray(steps, jnp.float32)[:, None]
     picture = jnp.zeros((len(steps), 2, 0), jnp.uint8)
-    ends = [jnp.asarray(e, bool)[:, None] & jnp.array([True, False]) for e in (terminated, truncated)]
+    over, cut = (jnp.asarray(e, bool)[:, None] & jnp.array([True, False]) for e in (terminated, truncated))
     vector = jnp.repeat(number[..., None], 4, axis=-1)
     ones = jnp.ones(number.shape)
-    return Transition(Seen(vector, picture), vector[..., :2], {}, ones, *ends, Seen(vector + 0.5, picture))
+    return Transition(Seen(vector, picture), vector[..., :2], {}, ones, over, cut, Seen(vector + 0.5, picture))
 
 
 @pytest.fixture(scope="module")
@@ -172,8 +179,8 @@ def test_rows_that_are_kept_are_those_of_the_whole_picture():
 @pytest.mark.parametrize("net", ["places", "glimpses"])
 def test_a_policy_that_acts_on_its_guess_takes_it_along(net, tmp_path):
     env = SeenPointMass(2)
-    spaces = {**env.observation_spaces, "privileged_state": Space((3,), np.float32, -np.inf, np.inf)}
-    perception = Perception(spaces, "rgbd", 16, (4, 16), [f"goal_pos_{c}" for c in "xyz"])
+    spaces = {**env.observation_spaces, "privileged_state": Space((7,), np.float32, -np.inf, np.inf)}
+    perception = Perception(spaces, "rgbd", 16, (4, 16), GOAL, AHEAD)
     assert perception.objects == 1
     sac = SAC(perception, 2, SACConfig(actor=(8,), critic=(8,), net=net))
     learner = jax.jit(sac.init)(jax.random.PRNGKey(0))
@@ -184,7 +191,7 @@ def test_a_policy_that_acts_on_its_guess_takes_it_along(net, tmp_path):
     again = Policy.load(tmp_path / "policy.npz")
     sees = perception_of(again, spaces)
     assert sees.picture_shape == (12, 16, 4) and sees.rows == (4, 16)
-    obs = {**env.reset(0).obs, "privileged_state": jnp.zeros((2, 3))}
+    obs = {**env.reset(0).obs, "privileged_state": jnp.zeros((2, 7))}
     wanted = jax.jit(sac._look)(learner.actor, learner.moments, perception(obs))[0]
     assert np.allclose(jax.jit(again.actor(sees))(obs), np.tanh(wanted), atol=0.02), "half precision"
     with pytest.raises(PolicyMismatch, match="rows"):
@@ -211,16 +218,22 @@ def test_a_guess_is_of_rotations_and_not_of_the_sign_of_a_quaternion():
     assert farther - far == pytest.approx(1.0, abs=1e-3)
 
 
-def test_places_of_objects_are_guessed_twice_where_one_point_of_the_picture_has_to_tell_each():
-    names = ["hand_1_pos_x", "hand_1_pos_y", "hand_1_pos_z", "cup_pos_x", "cup_pos_y", "cup_pos_z", "stains"]
-    hidden, vector = Hidden(1, 7, names), jnp.arange(8.0)[None]
-    assert (hidden.size, hidden.objects) == (7, 1)
-    assert hidden(vector, vector).tolist() == [[1, 2, 3, 4, 5, 6, 7]]
-    assert hidden(vector, vector, 10).tolist() == [[1, 2, 3, 4, 5, 6, 7, 4, 5, 6]]
+def test_rows_and_columns_of_objects_are_guessed_where_the_camera_is_known():
+    cup = [*(f"cup_pos_{c}" for c in "xyz"), *(f"cup_quat_{c}" for c in "wxyz")]
+    names = ["hand_1_pos_x", "hand_1_pos_y", "hand_1_pos_z", *cup, "stains"]
+    assert Hidden(1, 11, names).objects == 0
+    hidden, vector = Hidden(1, 11, names, AHEAD), jnp.array([[0.0, 1, 2, 3, 4, 0.5, -0.25, 1, 0, 0, 0, 7]])
+    assert (hidden.size, hidden.objects) == (13, 1)
+    found = np.asarray(hidden(vector, vector, 15))[0]
+    assert np.allclose(found[:13], [1, 2, 3, 4, 0.5, -0.25, 7, 3**0.5, 0, 0, 0, 3**0.5, 0])
+    row, column = found[13:] / FRAME
+    # 4 m ahead, half a metre to the left, a quarter below: a quarter and an eighth of half the picture
+    assert (column + 1) / 2 * 15 == pytest.approx(8 * (1 - 0.125) - 0.5)
+    assert (row + 1) / 2 * 11 + 2 == pytest.approx(8 * (1 + 0.0625) - 0.5)
     actor = Actor(2, (8,), (12, 16, 4), "glimpses", hidden.size, objects=hidden.objects)
     seen = jnp.ones((2, 1)), jnp.ones((2, 768), jnp.uint8)
     shapes = jax.eval_shape(lambda key: actor.init_with_output(key, *seen)[0], jax.random.PRNGKey(0))
-    assert shapes[2].shape == (2, 10)
+    assert shapes[2].shape == (2, 15)
 
 
 def test_a_window_is_what_lies_around_a_point():
@@ -245,7 +258,7 @@ def test_the_depth_at_the_brightest_point_is_seen():
 
 @pytest.mark.parametrize(("net", "moved"), [("places", False), ("glimpses", False), ("points", True)])
 def test_whether_actions_train_the_encoder(net, moved):
-    actor = Actor(2, (8,), (12, 16, 4), net, guess=3, objects=2)
+    actor = Actor(2, (8,), (12, 16, 4), net, guess=15, objects=2)
     vector, picture = jnp.ones((4, 2)), jax.random.randint(jax.random.PRNGKey(0), (4, 768), 0, 256).astype(jnp.uint8)
 
     @jax.jit
@@ -266,6 +279,27 @@ def test_whether_actions_train_the_encoder(net, moved):
     assert of_the_guess > 0, "the guess always does"
 
 
+def test_how_an_object_is_turned_is_learnt_from_its_own_glimpse_which_nothing_else_trains():
+    actor = Actor(2, (8,), (12, 16, 4), "glimpses", guess=15, objects=2)
+    vector, picture = jnp.ones((4, 2)), jax.random.randint(jax.random.PRNGKey(0), (4, 768), 0, 256).astype(jnp.uint8)
+
+    @jax.jit
+    def slopes(key):
+        params = actor.init(key, vector, picture)["params"]
+
+        def of(part):
+            slope = jax.grad(lambda p: jnp.square(actor.apply({"params": p}, vector, picture)[2][:, part] - 1.0).sum())
+            return {k: sum(jnp.abs(a).sum() for a in jax.tree.leaves(v)) for k, v in slope(params)["encoder"].items()}
+
+        return [of(slice(*part)) for part in ((0, 3), (3, 9), (9, 15), (15, 19))]
+
+    places, one, other, points = slopes(jax.random.PRNGKey(1))
+    assert all(v == 0 for k, v in one.items() if k != "glimpse_0") and one["glimpse_0"] > 0
+    assert all(v == 0 for k, v in other.items() if k != "glimpse_1") and other["glimpse_1"] > 0
+    for rest in (places, points):
+        assert rest["glimpse_0"] == rest["glimpse_1"] == 0 and rest["points"] > 0
+
+
 def test_half_precision_on_a_gpu_sees_nearly_the_same(monkeypatch):
     encoder = Encoder((12, 16, 4), "places")
     picture = jax.random.randint(jax.random.PRNGKey(0), (3, 12 * 16 * 4), 0, 256).astype(jnp.uint8)
@@ -283,15 +317,15 @@ def test_glimpses_look_beside_their_points_while_they_learn():
     params = jax.jit(encoder.init)(jax.random.PRNGKey(1), picture)
     looks = jax.jit(lambda *key: encoder.apply(params, picture, rngs=dict(zip([SHAKEN], key, strict=False))))
     still, one, two = np.asarray(looks()), *(np.asarray(looks(jax.random.PRNGKey(k))) for k in (2, 3))
-    seen = slice(6, 6 + 2 * GLIMPSE)
+    seen = slice(4, 4 + 2 * GLIMPSE)
     assert (one[:, seen] != still[:, seen]).any() and (one[:, seen] != two[:, seen]).any()
     assert np.array_equal(np.delete(one, seen, 1), np.delete(still, seen, 1)), "nothing else moves"
     env = SeenPointMass(2)
-    spaces = {**env.observation_spaces, "privileged_state": Space((3,), np.float32, -np.inf, np.inf)}
-    perception = Perception(spaces, "rgbd", 16, None, [f"goal_pos_{c}" for c in "xyz"])
+    spaces = {**env.observation_spaces, "privileged_state": Space((7,), np.float32, -np.inf, np.inf)}
+    perception = Perception(spaces, "rgbd", 16, None, GOAL, AHEAD)
     algorithm = Imitation(perception, 2, DaggerConfig(actor=(8,), net="glimpses", shift=0))
     actor, _ = jax.jit(algorithm.init)(jax.random.PRNGKey(0))
-    own, none = perception({**env.reset(0).obs, "privileged_state": jnp.ones((2, 3))}), jnp.zeros((2, 2))
+    own, none = perception({**env.reset(0).obs, "privileged_state": jnp.ones((2, 7))}), jnp.zeros((2, 2))
     moments = Moments.initial(perception.vector_size)
     loss = jax.jit(lambda key: algorithm.loss(actor, moments, own, none, key)[0])
     assert loss(jax.random.PRNGKey(0)) != loss(jax.random.PRNGKey(1)), "it learns so"

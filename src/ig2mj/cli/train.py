@@ -89,12 +89,15 @@ def run(
     from ig2mj.learn.algorithms import config_of, made
     from ig2mj.learn.bc import begin_as_clone
     from ig2mj.learn.best import SUCCESS, Best
+    from ig2mj.learn.checkpoints import Checkpoints
     from ig2mj.learn.demos import load_demos
     from ig2mj.learn.iteration import AXIS
+    from ig2mj.learn.looking import look
     from ig2mj.learn.memory import is_out_of_memory, too_large
     from ig2mj.learn.options import configured
     from ig2mj.learn.perception import Perception
     from ig2mj.learn.policies import Policy, depends_on, world_of
+    from ig2mj.learn.projection import lens_of
     from ig2mj.learn.train import Run, train
 
     _check(algo, obs, minutes, videos, until, pixels, programs, devices, demos, expert, out)
@@ -127,7 +130,8 @@ def run(
                 pool_size=pool_size or None,
                 mixed=mixed,
             )
-        perception = Perception(world.observation_spaces, obs, pixels, kept_rows, world.privileged_names)
+        lens = lens_of(world, pixels, kept_rows) if obs == "rgbd" else None
+        perception = Perception(world.observation_spaces, obs, pixels, kept_rows, world.privileged_names, lens)
         shown = load_demos(demos, perception, world_of(world)) if demos is not None else None
         algorithm = made(config, perception, world, shown, AXIS if shared else None, expert)
         if out is None:
@@ -138,6 +142,8 @@ def run(
         if shown is not None:
             depends["demos"] = int(shown.reward.shape[0])
             learner = begin_as_clone(algorithm, shown, seed)
+        if getattr(config, "look", 0) and not (resume and Checkpoints(out).numbers()):
+            learner = look(algorithm, seed)
         device = jax.devices()[0]
         card = {
             "command": shlex.join(["ig2mj", *sys.argv[1:]]),

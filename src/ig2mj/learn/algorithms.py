@@ -9,6 +9,7 @@ from ig2mj.envs.experts import expert_of
 from ig2mj.errors import UnknownNameError
 from ig2mj.learn.dagger import Dagger, DaggerConfig
 from ig2mj.learn.demos import Demos
+from ig2mj.learn.looking import start_pictures
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.ppo import PPO, PPOConfig
 from ig2mj.learn.sac import SAC, SACConfig
@@ -65,4 +66,5 @@ def made(
         return SAC(perception, size, config, axis, demos, expert_of(env) if expert else None)
     if isinstance(config, PPOConfig):
         return PPO(perception, size, config, axis)
-    return Dagger(perception, size, expert_of(env), config, axis)
+    starts = start_pictures(env, perception, config.starts) if config.starts else None
+    return Dagger(perception, size, expert_of(env), config, axis, starts)

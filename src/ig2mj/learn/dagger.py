@@ -23,6 +23,7 @@ from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
+from ig2mj.errors import Ig2mjError
 from ig2mj.learn.collect import GUIDED, Advice, Hint, Transition, if_ready
 from ig2mj.learn.guidance import ALONE
 from ig2mj.learn.heads import likeliest
@@ -43,6 +44,10 @@ class DaggerConfig:
       disturbed: share of the expert's steps in which its action is replaced by a random one.
       guess: weight of the actor's guess of the privileged state, from pixels. shift: pixels they are moved by at most.
       lr: learning rate, falling to `last_lr` along a cosine over the run.
+      starts: pictures of so many start states, from which the guess learns, too: half as many samples again in each
+        update. look: updates of the guess on those before the first step.
+      told: samples of an update besides, in which the actor is told what is hidden, as wrong as it guesses it: pictures
+        cost time. For the encoder `glimpses`.
       choices: values of each number of an action that the actor chooses from; 0: it is the mean of a Gaussian.
       actor: sizes of the layers. net: encoder (`networks.NETS`).
     """
@@ -59,6 +64,9 @@ class DaggerConfig:
     shift: int = 2
     lr: float = 1e-3
     last_lr: float = 1e-4
+    starts: int = 0
+    look: int = 0
+    told: int = 0
     choices: int = 21
     actor: tuple[int, ...] = (256, 256, 256)
     net: str = "small"
@@ -100,10 +108,21 @@ class Dagger:
         expert: Hint,
         config: DaggerConfig | None = None,
         axis: str | None = None,
+        starts: Seen | None = None,
     ):
-        """`expert`: see `collect.Hint`. `axis`: the name of an axis of devices over which gradients are averaged."""
+        """`expert`: see `collect.Hint`. `axis`: the name of an axis of devices over which gradients are averaged.
+        `starts`: pictures of start states (`ig2mj.learn.looking`).
+
+        Raises:
+          Ig2mjError: something is to be told to an encoder that cannot be told it, or there is nothing to look at.
+        """
         self.perception, self.action_size, self.hint, self.axis = perception, action_size, expert, axis
         self.config = c = config or DaggerConfig()
+        self.starts = starts
+        if c.look and starts is None:
+            raise Ig2mjError(f"look={c.look}: there are no start states to look at (--set starts=4096)")
+        if c.told and (c.net != "glimpses" or not perception.objects):
+            raise Ig2mjError(f"told={c.told}: only actors of pictures with net=glimpses can be told what is hidden")
         self._imitation = Imitation(perception, action_size, c, axis)
         self.actor = self._imitation.actor
 
@@ -127,10 +146,27 @@ class Dagger:
         moments = Moments.initial(self.perception.vector_size)
         return DaggerLearner(actor, opt, moments, jnp.float32(0), jnp.int32(0))
 
+    def looked(self, learner: DaggerLearner, count: int, key: Array) -> tuple[DaggerLearner, dict[str, Array]]:
+        """A learner whose guess has learnt from so many samples of the start states, and its losses. Not compiled.
+
+        Args:
+          count: updates.
+        """
+        starts, c = self.starts, self.config
+        assert starts is not None, "there is nothing to look at"
+
+        def update(learner: DaggerLearner, key: Array) -> tuple[DaggerLearner, dict[str, Array]]:
+            sample_key, shake_key = jax.random.split(key)
+            seen, none = _some(starts, sample_key, c.batch), jnp.zeros((0, self.action_size))
+            return self._imitation.update(learner, seen, none, shake_key, jnp.float32(c.lr))
+
+        learner, found = jax.lax.scan(update, learner, jax.random.split(key, count))
+        return learner, jax.tree.map(jnp.mean, found)
+
     def memory(self, num_worlds: int) -> Labels:
         """No labels yet."""
         rows = max(self.config.capacity // (num_worlds * self.length), 1) * self.length
-        return Labels.empty(rows, num_worlds, self.perception, self.action_size)
+        return Labels.empty(rows, num_worlds, self.perception, self.action_size, self.starts)
 
     def noise(self, num_worlds: int) -> Turns:
         """Before the first step."""
@@ -187,12 +223,23 @@ class Dagger:
 
         def many(learner: DaggerLearner) -> tuple[DaggerLearner, dict[str, Array]]:
             def update(learner: DaggerLearner, key: Array) -> tuple[DaggerLearner, dict[str, Array]]:
-                sample_key, shift_key = jax.random.split(key)
-                seen, label = memory.sample(sample_key, share_of(c.batch, self.axis))
-                return self._imitation.update(learner, seen, label, shift_key, rate)
+                sample_key, shift_key, start_key, told_key = jax.random.split(key, 4)
+                count = share_of(c.batch, self.axis)
+                seen, label = memory.sample(sample_key, count)
+                if memory.starts is not None:
+                    more = _some(memory.starts, start_key, count // 2)
+                    seen = jax.tree.map(lambda *a: jnp.concatenate(a), seen, more)
+                told = memory.told(told_key, share_of(c.told, self.axis)) if c.told else None
+                return self._imitation.update(learner, seen, label, shift_key, rate, told)
 
             learner, found = jax.lax.scan(update, learner, jax.random.split(key, self.samples))
             return learner, jax.tree.map(jnp.mean, found)
 
         learner, losses = if_ready(ready, many, learner)
         return learner, memory, {**losses, "updates": ready * jnp.float32(self.samples)}
+
+
+def _some(starts: Seen, key: Array, count: int) -> Seen:
+    """So many of them, all equally likely."""
+    row = jax.random.randint(key, (count,), 0, starts.vector.shape[0])
+    return Seen(jnp.asarray(starts.vector)[row], jnp.asarray(starts.picture)[row])

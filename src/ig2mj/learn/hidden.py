@@ -17,6 +17,7 @@ from jaxtyping import Float
 
 from ig2mj.engine.view import Array
 from ig2mj.geometry.poses import quat_rotate
+from ig2mj.learn.projection import FRAME, Lens
 
 FLAT = 0.01
 """Error, in standard deviations, below which a guess's loss is quadratic. Beyond it is the absolute error: centimetres
@@ -27,27 +28,38 @@ class Hidden:
     """Which numbers of a vector are to be guessed. All methods are pure.
 
     Attributes:
-      size: g. objects: how many objects, hands apart, have their place among the numbers.
+      size: g. objects: how many objects, hands apart, have a pose and are to be found in the picture.
+      plain: which numbers of the vector are guessed as they are; they come first in the guess.
+      poses: of each object by name where in the guess its place (3 numbers) is, and how it is turned (6).
     """
 
-    def __init__(self, first: int, count: int, names: Sequence[str] = ()):
+    def __init__(self, first: int, count: int, names: Sequence[str] = (), lens: Lens | None = None):
         """
         Args:
           first, count: of the vector's numbers that an actor does not see.
           names: of these, as `Environment.privileged_names` has them; without names all are guessed as they are.
+          lens: where objects are in the picture; None: that is not guessed.
         """
         names = list(names) or [""] * count
         assert len(names) == count, "a name for each number"
         turns = [k for k, name in enumerate(names) if name.endswith("_quat_w")]  # x, y and z follow
+        turns.sort(key=lambda k: not names[k].startswith("hand_"))  # the objects' are last
         parts = {k + j for k in turns for j in range(4)}
         plain = [k for k, n in enumerate(names) if k not in parts and "_velocity_" not in n]
-        self._plain = first + np.array(plain, int)
+        self.plain = first + np.array(plain, int)
         self._turns = first + np.array([[k + j for j in range(4)] for k in turns], int).reshape(-1, 4)
         self.size = len(plain) + 6 * len(turns)
         self._turned = np.arange(len(plain), self.size)
-        starts = [k for k, name in enumerate(names) if name.endswith("_pos_x") and not name.startswith("hand_")]
+        whole = [n.removesuffix("_quat_w") for n in names if n.endswith("_quat_w") and not n.startswith("hand_")]
+        starts = [names.index(f"{name}_pos_x") for name in whole if f"{name}_pos_x" in names]
         self._spots = first + np.array([[k + j for j in range(3)] for k in starts], int).reshape(-1)
-        self.objects = len(starts)
+        self._lens, self.objects = lens, len(starts) if lens is not None else 0
+        places = [plain.index(k) for k in starts]
+        first_turn = self.size - 6 * len(whole)
+        self.poses = {
+            name: (list(range(place, place + 3)), list(range(first_turn + 6 * k, first_turn + 6 * k + 6)))
+            for k, (name, place) in enumerate(zip(whole, places, strict=False))
+        }
 
     def __call__(
         self, vector: Float[Array, "B v"], normal: Float[Array, "B v"], count: int | None = None
@@ -56,14 +68,15 @@ class Hidden:
 
         Args:
           vector: as it was observed. normal: less its mean, over its deviation.
-          count: of the numbers; where that is more than g, the places of the objects follow once more.
+          count: of the numbers; where that is more than g, rows and columns of the objects in the picture follow.
         """
         quat = vector[:, self._turns]
         columns = [quat_rotate(quat, jnp.asarray(axis)) for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))]
         turned = jnp.sqrt(3.0) * jnp.concatenate(columns, axis=-1)
-        found = [normal[:, self._plain], turned.reshape(vector.shape[0], -1)]
-        if count is not None and count > self.size:
-            found.append(normal[:, self._spots])
+        found = [normal[:, self.plain], turned.reshape(vector.shape[0], -1)]
+        if self._lens is not None and count is not None and count > self.size:
+            places = vector[:, self._spots].reshape(-1, self.objects, 3)
+            found.append(FRAME * self._lens(places).reshape(vector.shape[0], -1))
         return jnp.concatenate(found, axis=-1)
 
     def loss(

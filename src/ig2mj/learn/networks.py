@@ -17,6 +17,7 @@ from jaxtyping import Float, UInt8
 from ig2mj.engine.view import Array
 from ig2mj.errors import UnknownNameError
 from ig2mj.learn.convolution import convolve
+from ig2mj.learn.projection import FRAME
 
 LOG_STD = (-5.0, 0.0)
 """Limits of the logarithm of an actor's standard deviation, before tanh (FlashSAC's recommendation)."""
@@ -67,9 +68,9 @@ class Encoder(nn.Module):
     `points`: `small`'s numbers, and where in the picture each of 32 channels is brightest after two halvings (the
     spatial softmax of Levine et al. 2016), so that the place of a thin object need not be read from four by four coarse
     cells. `places`: the same, with how far away it is there, on a GPU in half precision. Depth times row and column is
-    what a place in the camera's frame is linear in. `glimpses`: the same, and for each of so many `objects` three
-    numbers that follow linearly from one point of the picture (they come first, and are to be where the object is) and
-    then what is around that point at full resolution: how a thin object lies shows in a few pixels, wherever they are.
+    what a place in the camera's frame is linear in. `glimpses`: the same, and for each of so many `objects` two
+    numbers, which come first and are to be learnt as its row and column (`projection.FRAME`), and what is around that
+    point at full resolution: how a thin object lies shows in a few pixels, wherever they are.
     """
 
     shape: tuple[int, int, int]
@@ -83,29 +84,29 @@ class Encoder(nn.Module):
         # processors have no fast way to convolve in half precision
         half = self.net in PRECISE and jax.default_backend() == "gpu"
         places, dtype = jnp.zeros((x.shape[0], 0)), jnp.bfloat16 if half else jnp.float32
-        small, few = (32, 32) if self.net == "glimpses" else (64, 50)
-        for k, channels in enumerate((32, 64, *[small] * (halvings - 2))):
+        first, second, later, few = (16, 32, 32, 32) if self.net == "glimpses" else (32, 64, 64, 50)
+        for k, channels in enumerate((first, second, *[later] * (halvings - 2))):
             x = nn.relu(_conv(channels, 2, dtype)(x))
             if self.net in ("points", *PRECISE) and k == 1:
                 normal = nn.LayerNorm(name="points_norm")(x)
-                maps = _conv(32, 1, dtype, "points")(normal)
+                light = self.net == "glimpses"  # its maps need not be fine: glimpses are
+                maps = (nn.Dense(16, dtype=dtype, name="points") if light else _conv(32, 1, dtype, "points"))(normal)
                 depth = coarse(seen[..., -1], maps.shape[1:3]) if self.net in PRECISE else None
                 places = brightest(SHARP * maps.astype(jnp.float32), depth)
         x = x.reshape(x.shape[0], -1).astype(jnp.float32)
         if self.net == "paper":
             return nn.relu(nn.Dense(256)(x))
         features = [places, jnp.tanh(nn.LayerNorm()(nn.Dense(few)(x)))]
-        if self.net == "glimpses":
-            points = jnp.moveaxis(places.reshape(x.shape[0], 5, -1), -1, 1)[:, : self.objects]
-            spots = [nn.Dense(3, name=f"spot_{k}")(points[:, k]) for k in range(self.objects)]
-            glimpse = Glimpse(dtype, name="glimpse")
-            around = [glimpse(seen, points[:, k, :2]) for k in range(self.objects)]
-            features = [*spots, *around, *features]
+        if self.net == "glimpses" and self.objects:
+            points = nn.Dense(2 * self.objects, name="spots")(jnp.concatenate(features, axis=-1))
+            where = points.reshape(-1, self.objects, 2) / FRAME
+            around = [Glimpse(dtype, name=f"glimpse_{k}")(seen, where[:, k]) for k in range(self.objects)]
+            features = [points, *around, *features]
         return jnp.concatenate(features, axis=-1)
 
 
 class Glimpse(nn.Module):
-    """What is around a point of the picture at full resolution, as `GLIMPSE` numbers; of any object."""
+    """What is around a point of the picture at full resolution, as `GLIMPSE` numbers."""
 
     dtype: Any = jnp.float32
 
@@ -168,8 +169,8 @@ class Actor(nn.Module):
     With `guess`, that many hidden numbers are guessed linearly from the features of the picture, for an auxiliary loss.
     With the encoders `places` and `glimpses` the guess is also what the actor's layers see, and the auxiliary loss
     alone trains the encoder: gradients of actions are larger and noisier, and where both did, places were off by
-    centimetres. With `glimpses` the places of the `objects` follow in the guess once more (`Hidden`), each from one
-    point of the picture, and of the features the actor's layers see the glimpses' alone.
+    centimetres. With `glimpses` the guess ends with how the `objects` are turned, and with their rows and columns
+    (`Hidden`); the actor's layers see the guess alone, so that it can also be told to them.
 
     Raises:
       UnknownNameError: `net` is none of `NETS`.
@@ -195,19 +196,16 @@ class Actor(nn.Module):
 
     @nn.compact
     def __call__(
-        self, vector: Float[Array, "B x"], picture: UInt8[Array, "B q"]
+        self, vector: Float[Array, "B x"], picture: UInt8[Array, "B q"], told: Float[Array, "B g"] | None = None
     ) -> tuple[Float[Array, "B n *K"], Float[Array, "B n"], Float[Array, "B g"]]:
+        """`told`: in place of the guess, with `glimpses`; the picture is not looked at then."""
         guessed = jnp.zeros((vector.shape[0], self.guess))
-        if self.picture_shape is not None:
+        if told is not None:
+            guessed, vector = told, jnp.concatenate([vector, told], axis=-1)
+        elif self.picture_shape is not None:
             features = Encoder(self.picture_shape, self.net, self.objects, name="encoder")(picture)
             if self.guess:
-                known = jnp.concatenate([features, vector], axis=-1)
-                if self.net == "glimpses":
-                    known = jnp.concatenate([known, nn.relu(nn.Dense(128, name="combined")(known))], axis=-1)
-                guessed = nn.Dense(self.guess, name="guess")(known)
-                if self.net == "glimpses":
-                    guessed = jnp.concatenate([guessed, features[:, : 3 * self.objects]], axis=-1)
-                    features = features[:, 3 * self.objects : (3 + GLIMPSE) * self.objects]
+                guessed, features = self._guess(features, vector)
             known = jax.lax.stop_gradient((features, guessed)) if self.uses_guess else (features,)
             vector = jnp.concatenate([vector, *known], axis=-1)
         x = Trunk((256,) if self.net == "paper" else self.sizes, name="trunk")(vector)
@@ -221,6 +219,27 @@ class Actor(nn.Module):
         start = jnp.arctanh(2 * (jnp.log(FIRST_STD) - low) / (high - low) - 1)
         raw = nn.Dense(self.action_size, kernel_init=small, bias_init=nn.initializers.constant(start), name="std")(x)
         return mean, low + (high - low) * (jnp.tanh(raw) + 1) / 2, guessed
+
+    def _guess(
+        self, features: Float[Array, "B f"], vector: Float[Array, "B x"]
+    ) -> tuple[Float[Array, "B g"], Float[Array, "B h"]]:
+        """The guess, and which of the features the actor's layers see, too.
+
+        How an object is turned is guessed from its own glimpse, and nothing else trains that: with the errors of all
+        other numbers in its gradients it does not find out on which side of a blade the edge is.
+        """
+        if self.net != "glimpses" or not self.objects:
+            return nn.Dense(self.guess, name="guess")(jnp.concatenate([features, vector], axis=-1)), features
+        points, around, others = jnp.split(features, [2 * self.objects, (2 + GLIMPSE) * self.objects], axis=-1)
+        known = jnp.concatenate([points, others, vector], axis=-1)
+        known = jnp.concatenate([known, nn.relu(nn.Dense(128, name="combined")(known))], axis=-1)
+        guessed = [nn.Dense(self.guess - 6 * self.objects, name="guess")(known)]
+        place = jnp.concatenate([jax.lax.stop_gradient(points), vector], axis=-1)
+        for k in range(self.objects):
+            own = jnp.concatenate([around[:, k * GLIMPSE : (k + 1) * GLIMPSE], place], axis=-1)
+            own = jnp.concatenate([own, nn.relu(nn.Dense(128, name=f"turning_{k}")(own))], axis=-1)
+            guessed.append(nn.Dense(6, name=f"turn_{k}")(own))
+        return jnp.concatenate([*guessed, points], axis=-1), features[:, :0]
 
 
 class Critic(nn.Module):

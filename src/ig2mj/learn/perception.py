@@ -24,6 +24,7 @@ from jaxtyping import Float, UInt8
 from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError, UnknownNameError
 from ig2mj.learn.hidden import Hidden
+from ig2mj.learn.projection import Lens
 
 MODES = ("state", "rgbd")
 
@@ -62,12 +63,14 @@ class Perception:
         size: int = SIZE,
         rows: tuple[int, int] | None = None,
         hidden_names: Sequence[str] = (),
+        lens: Lens | None = None,
     ):
         """
         Args:
           spaces: of an environment (`Environment.observation_spaces`).
           size: pixels, height and width, to which pictures are averaged down. rows: of those that are kept; None: all.
-          hidden_names: of the privileged state (`Environment.privileged_names`), for `hidden`.
+          hidden_names: of the privileged state (`Environment.privileged_names`), for `hidden`. lens: the camera, from
+            which an actor learns where in the picture objects are.
 
         Raises:
           UnknownNameError: no such mode. Ig2mjError: the environment has no observation that the mode needs.
@@ -83,7 +86,7 @@ class Perception:
         self.actor_size = self.vector_size - hidden
         self._pictures = tuple(n for n in ("rgb", "depth") if n in spaces) if mode == "rgbd" else ()
         self.picture_shape, self.rows = None, rows or (0, size)
-        self.hidden = Hidden(self.actor_size, hidden, hidden_names) if hidden else None
+        self.hidden = Hidden(self.actor_size, hidden, hidden_names, lens) if hidden else None
         if mode == "rgbd":
             if not self._pictures:
                 raise Ig2mjError("pixels were requested, but the environment observes neither rgb nor depth")
@@ -100,7 +103,7 @@ class Perception:
 
     @property
     def objects(self) -> int:
-        """How many objects there are whose places an actor can learn to guess."""
+        """How many objects there are that an actor can learn to find in the picture."""
         return self.hidden.objects if self.hidden else 0
 
     @property

@@ -1,0 +1,59 @@
+"""Looking before the first step: an encoder learns from pictures of start states where things are.
+
+How a thing lies at the start shows best in many start states, and episodes are slow to bring those: one for some dozens
+of pictures. So pictures of start states alone are taken first, and the guess of the hidden numbers learns from them,
+before the first step and along with what the episodes show.
+
+Axes: N start states, W worlds.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+
+from ig2mj.learn.collect import TrainingEnv
+from ig2mj.learn.perception import Perception, Seen
+
+CALL = 50
+"""Updates of one call."""
+
+FIRST = 1_000_003
+"""The first seed of the pictures' worlds: other than those of a run's episodes."""
+
+
+def start_pictures(env: TrainingEnv, perception: Perception, count: int) -> Seen:
+    """What is seen in N = `count` start states: worlds are reset, again and again."""
+    see, found = jax.jit(perception), []
+    for k in range(-(-count // env.num_worlds)):
+        found.append(see(env.reset(FIRST + k).obs))
+    return jax.tree.map(lambda *a: jnp.concatenate(a)[:count], *found)
+
+
+def look(algorithm: Any, seed: int, report: Callable[[int, Any, float], None] | None = None) -> Any:
+    """A learner whose guess has learnt from the algorithm's start states (`Dagger.starts`), `config.look` updates.
+
+    Args:
+      report: called now and then with the updates so far, the learner and the loss; None: that is printed.
+    """
+    key, first_key = jax.random.split(jax.random.PRNGKey(seed))
+    learner, began, many = algorithm.init(first_key), time.monotonic(), algorithm.config.look
+    learner = dataclasses.replace(learner, moments=learner.moments.update(algorithm.starts.vector))
+    program = jax.jit(algorithm.looked, static_argnums=1)
+    for done in range(0, many, CALL):
+        key, now = jax.random.split(key)
+        count = min(CALL, many - done)
+        learner, found = program(learner, count, now)
+        loss = float(found["guess_loss"])
+        if report is not None:
+            report(done + count, learner, loss)
+        elif done // CALL % 10 == 9:
+            print(
+                f"looked {done + count} of {many} times, {time.monotonic() - began:.0f} s, error {loss:.3f}", flush=True
+            )
+    return dataclasses.replace(learner, updates=jnp.zeros_like(learner.updates))
