@@ -12,12 +12,12 @@
 #
 # Below $OUT: the best and the last policy, progress.csv, evaluations.jsonl (the likeliest actions, then drawn ones) and
 # the log of each, copied while it trains. $MINUTES of training (5), $WORLDS, $ENGINE (warp), $FRACTION of a card's memory
-# that JAX takes for each training (0.26), $BATCH, $STARTS and $LOOK: pictures of start states, and updates of the guess
-# on them.
+# that JAX takes for each training (0.26), $BATCH, $CAPACITY, $STARTS and $LOOK: pictures of start states, and updates of
+# the guess on them.
 set -u
 out=${OUT:-out/training}; mkdir -p "$out"
 minutes=${MINUTES:-5} engine=${ENGINE:-warp} fraction=${FRACTION:-0.26}
-pictures=(--set net=glimpses shift=0 actor=192,192 capacity=500000 batch="${BATCH:-1024}")
+pictures=(--set net=glimpses shift=0 actor=192,192 capacity="${CAPACITY:-500000}" batch="${BATCH:-1024}")
 
 sample() { nice -n 10 env JAX_PLATFORMS=cpu python3 -m ig2mj sample-task "$@" >> "$out/pools.txt" 2>&1; }
 

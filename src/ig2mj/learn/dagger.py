@@ -111,7 +111,7 @@ class Dagger:
         starts: Seen | None = None,
     ):
         """`expert`: see `collect.Hint`. `axis`: the name of an axis of devices over which gradients are averaged.
-        `starts`: pictures of start states (`ig2mj.learn.looking`).
+        `starts`: pictures of start states (`ig2mj.learn.looking`), on the host.
 
         Raises:
           Ig2mjError: something is to be told to an encoder that cannot be told it, or there is nothing to look at.
@@ -146,19 +146,17 @@ class Dagger:
         moments = Moments.initial(self.perception.vector_size)
         return DaggerLearner(actor, opt, moments, jnp.float32(0), jnp.int32(0))
 
-    def looked(self, learner: DaggerLearner, count: int, key: Array) -> tuple[DaggerLearner, dict[str, Array]]:
-        """A learner whose guess has learnt from so many samples of the start states, and its losses. Not compiled.
-
-        Args:
-          count: updates.
-        """
-        starts, c = self.starts, self.config
-        assert starts is not None, "there is nothing to look at"
+    def looked(
+        self, learner: DaggerLearner, starts: Seen, count: int, key: Array
+    ) -> tuple[DaggerLearner, dict[str, Array]]:
+        """A learner whose guess has learnt from start states in `count` updates, and its losses. Not compiled."""
+        c = self.config
+        alone = Imitation(self.perception, self.action_size, c)  # on one device
 
         def update(learner: DaggerLearner, key: Array) -> tuple[DaggerLearner, dict[str, Array]]:
             sample_key, shake_key = jax.random.split(key)
             seen, none = _some(starts, sample_key, c.batch), jnp.zeros((0, self.action_size))
-            return self._imitation.update(learner, seen, none, shake_key, jnp.float32(c.lr))
+            return alone.update(learner, seen, none, shake_key, jnp.float32(c.lr))
 
         learner, found = jax.lax.scan(update, learner, jax.random.split(key, count))
         return learner, jax.tree.map(jnp.mean, found)
@@ -166,7 +164,8 @@ class Dagger:
     def memory(self, num_worlds: int) -> Labels:
         """No labels yet."""
         rows = max(self.config.capacity // (num_worlds * self.length), 1) * self.length
-        return Labels.empty(rows, num_worlds, self.perception, self.action_size, self.starts)
+        starts = jax.tree.map(jnp.asarray, self.starts)
+        return Labels.empty(rows, num_worlds, self.perception, self.action_size, starts)
 
     def noise(self, num_worlds: int) -> Turns:
         """Before the first step."""
@@ -242,4 +241,4 @@ class Dagger:
 def _some(starts: Seen, key: Array, count: int) -> Seen:
     """So many of them, all equally likely."""
     row = jax.random.randint(key, (count,), 0, starts.vector.shape[0])
-    return Seen(jnp.asarray(starts.vector)[row], jnp.asarray(starts.picture)[row])
+    return Seen(starts.vector[row], starts.picture[row])

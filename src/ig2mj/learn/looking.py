@@ -16,6 +16,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from ig2mj.learn.collect import TrainingEnv
 from ig2mj.learn.perception import Perception, Seen
@@ -28,11 +29,11 @@ FIRST = 1_000_003
 
 
 def start_pictures(env: TrainingEnv, perception: Perception, count: int) -> Seen:
-    """What is seen in N = `count` start states: worlds are reset, again and again."""
+    """What is seen in N = `count` start states, as arrays of NumPy: worlds are reset, again and again."""
     see, found = jax.jit(perception), []
     for k in range(-(-count // env.num_worlds)):
-        found.append(see(env.reset(FIRST + k).obs))
-    return jax.tree.map(lambda *a: jnp.concatenate(a)[:count], *found)
+        found.append(jax.device_get(see(env.reset(FIRST + k).obs)))
+    return jax.tree.map(lambda *a: np.concatenate(a)[:count], *found)
 
 
 def look(algorithm: Any, seed: int, report: Callable[[int, Any, float], None] | None = None) -> Any:
@@ -43,17 +44,17 @@ def look(algorithm: Any, seed: int, report: Callable[[int, Any, float], None] | 
     """
     key, first_key = jax.random.split(jax.random.PRNGKey(seed))
     learner, began, many = algorithm.init(first_key), time.monotonic(), algorithm.config.look
-    learner = dataclasses.replace(learner, moments=learner.moments.update(algorithm.starts.vector))
-    program = jax.jit(algorithm.looked, static_argnums=1)
+    starts = jax.tree.map(jnp.asarray, algorithm.starts)
+    learner = dataclasses.replace(learner, moments=learner.moments.update(starts.vector))
+    program = jax.jit(algorithm.looked, static_argnums=2)
     for done in range(0, many, CALL):
         key, now = jax.random.split(key)
         count = min(CALL, many - done)
-        learner, found = program(learner, count, now)
+        learner, found = program(learner, starts, count, now)
         loss = float(found["guess_loss"])
         if report is not None:
             report(done + count, learner, loss)
         elif done // CALL % 10 == 9:
-            print(
-                f"looked {done + count} of {many} times, {time.monotonic() - began:.0f} s, error {loss:.3f}", flush=True
-            )
+            told = f"looked {done + count} of {many} times, {time.monotonic() - began:.0f} s, error {loss:.3f}"
+            print(told, flush=True)
     return dataclasses.replace(learner, updates=jnp.zeros_like(learner.updates))
