@@ -58,7 +58,7 @@ def run(
       pool_size: number of start states; 0: all of the split.
       variant: variant of the activity's objects: 1 and 2 use other models of the same categories.
       video: film of the first episode of the first world (.mp4, .gif), or five of its frames side by side (.png,
-        .jpg); needs OpenGL and the native engine.
+        .jpg); needs OpenGL. With it the default engine is native on a GPU, too.
       record: HDF5 file to record all worlds to, for `ig2mj demos replay`.
       format: format of --record: ig2mj; or igibson, which also writes one iGibson log per run to a folder named after
         FILE.
