@@ -288,8 +288,12 @@ def test_how_an_object_is_turned_is_learnt_from_its_own_glimpse_which_nothing_el
         params = actor.init(key, vector, picture)["params"]
 
         def of(part):
-            slope = jax.grad(lambda p: jnp.square(actor.apply({"params": p}, vector, picture)[2][:, part] - 1.0).sum())
-            return {k: sum(jnp.abs(a).sum() for a in jax.tree.leaves(v)) for k, v in slope(params)["encoder"].items()}
+            def loss(params):
+                looked: Any = actor.apply({"params": params}, vector, picture)
+                return jnp.square(looked[2][:, part] - 1.0).sum()
+
+            slope = jax.grad(loss)(params)["encoder"]
+            return {k: sum(jnp.abs(a).sum() for a in jax.tree.leaves(v)) for k, v in slope.items()}
 
         return [of(slice(*part)) for part in ((0, 3), (3, 9), (9, 15), (15, 19))]
 
