@@ -64,7 +64,7 @@ run() {
     humanoid) fruit fruit_humanoid humanoid 80:128 ;;
     fetch) fruit fruit_fetch fetch 60:108 ;;
     sight) for net in glimpses places; do sight humanoid 80:128 $net & sight fetch 60:108 $net & wait; done ;;
-    towel) towel towel_dagger --algo dagger "${pictures[@]}" length=8 ;;
+    towel) towel towel_dagger --algo dagger "${pictures[@]}" length=8 starts="${STARTS:-16384}" look="${LOOK:-3000}" opening=30 ;;
     towel_sac)
       towel towel_sac --algo sac --expert --until 0.95 "${pictures[@]}" gamma=0.99 horizon=5 held=8 std=0.1 guided=0.6 copied=1 \
         copy=2 trust=1 reach=110 alpha=0.003 ;;

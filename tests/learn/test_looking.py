@@ -62,6 +62,20 @@ def test_who_looks_at_start_states_knows_where_things_are_before_the_first_step(
     assert losses["updates"] == 4 and losses["guess_loss"] > 0
 
 
+def test_pictures_of_an_opening_are_of_an_experts_first_steps():
+    env: Any = SeenPointMass(16, pure=False)
+    perception = Perception(env.observation_spaces, "rgbd")
+    found = start_pictures(env, perception, 90, expert, opening=20)
+    starts = start_pictures(env, perception, 32)
+    assert found.vector.shape == (90, 4) and found.picture.shape[0] == 90
+    rounds = [found.vector[k : k + 16] for k in range(0, 90, 16)]
+    np.testing.assert_array_equal(np.concatenate([rounds[0], rounds[3]]), starts.vector)
+    apart = [np.abs(r[:, :2] - r[:, 2:]).mean() for r in rounds[:3]]
+    assert apart[1] < 0.7 * apart[0], "the expert goes to the goal"
+    with pytest.raises(AssertionError, match="expert"):
+        start_pictures(env, perception, 32, opening=7)
+
+
 def test_an_actor_that_is_told_what_is_hidden_learns_labels_without_pictures():
     spaces = {**SeenPointMass.observation_spaces, "privileged_state": Space((7,), np.float32, -np.inf, np.inf)}
     ahead = Lens((0.0, 0.0, 0.0), ((0.0, 0.0, -1.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), (1.0, 1.0), 16, (0, 16))

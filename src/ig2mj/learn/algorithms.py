@@ -66,5 +66,7 @@ def made(
         return SAC(perception, size, config, axis, demos, expert_of(env) if expert else None)
     if isinstance(config, PPOConfig):
         return PPO(perception, size, config, axis)
-    starts = start_pictures(env, perception, config.starts) if config.starts else None
-    return Dagger(perception, size, expert_of(env), config, axis, starts)
+    helper, starts = expert_of(env), None
+    if config.starts:
+        starts = start_pictures(env, perception, config.starts, helper, config.opening)
+    return Dagger(perception, size, helper, config, axis, starts)

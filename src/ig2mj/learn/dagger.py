@@ -45,7 +45,8 @@ class DaggerConfig:
       guess: weight of the actor's guess of the privileged state, from pixels. shift: pixels they are moved by at most.
       lr: learning rate, falling to `last_lr` along a cosine over the run.
       starts: pictures of so many start states, from which the guess learns, too: half as many samples again in each
-        update. look: updates of the guess on those before the first step.
+        update. look: updates of the guess on those before the first step. opening: so many first steps of each such
+        episode are the expert's, and every seventh is among the pictures.
       told: samples of an update besides, in which the actor is told what is hidden, as wrong as it guesses it: pictures
         cost time. For the encoder `glimpses`.
       choices: values of each number of an action that the actor chooses from; 0: it is the mean of a Gaussian.
@@ -65,6 +66,7 @@ class DaggerConfig:
     lr: float = 1e-3
     last_lr: float = 1e-4
     starts: int = 0
+    opening: int = 0
     look: int = 0
     told: int = 0
     choices: int = 21

@@ -2,7 +2,8 @@
 
 How a thing lies at the start shows best in many start states, and episodes are slow to bring those: one for some dozens
 of pictures. So pictures of start states alone are taken first, and the guess of the hidden numbers learns from them,
-before the first step and along with what the episodes show.
+before the first step and along with what the episodes show. Where a hand soon hides what it reaches for, pictures of
+an expert's first steps belong to them.
 
 Axes: N start states, W worlds.
 """
@@ -18,21 +19,35 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ig2mj.learn.collect import TrainingEnv
+from ig2mj.learn.collect import Hint, TrainingEnv
 from ig2mj.learn.perception import Perception, Seen
 
 CALL = 50
 """Updates of one call."""
 
+BETWEEN = 7
+"""Steps of an opening from one picture to the next."""
+
 FIRST = 1_000_003
 """The first seed of the pictures' worlds: other than those of a run's episodes."""
 
 
-def start_pictures(env: TrainingEnv, perception: Perception, count: int) -> Seen:
-    """What is seen in N = `count` start states, as arrays of NumPy: worlds are reset, again and again."""
+def start_pictures(env: TrainingEnv, perception: Perception, count: int, expert: Hint = None, opening: int = 0) -> Seen:
+    """What is seen in N = `count` states, as arrays of NumPy: worlds are reset, again and again.
+
+    Args:
+      opening: so many first steps of each episode are played by the `expert`, and every `BETWEEN`th is seen, too.
+    """
     see, found = jax.jit(perception), []
-    for k in range(-(-count // env.num_worlds)):
-        found.append(jax.device_get(see(env.reset(FIRST + k).obs)))
+    rounds = -(-count // (env.num_worlds * (1 + opening // BETWEEN)))
+    for k in range(rounds):
+        state = env.reset(FIRST + k)
+        found.append(jax.device_get(see(state.obs)))
+        for step in range(1, opening + 1):
+            assert expert is not None, "an opening is played by an expert"
+            state = env.step_autoreset(state, expert(state))
+            if step % BETWEEN == 0:
+                found.append(jax.device_get(see(state.obs)))
     return jax.tree.map(lambda *a: np.concatenate(a)[:count], *found)
 
 
