@@ -76,6 +76,16 @@ def test_pictures_of_an_opening_are_of_an_experts_first_steps():
         start_pictures(env, perception, 32, opening=7)
 
 
+def test_openings_without_start_states_and_start_states_on_several_devices_are_refused():
+    env: Any = SeenPointMass(4, pure=False)
+    perception = Perception(env.observation_spaces, "rgbd")
+    with pytest.raises(Ig2mjError, match="opening=30"):
+        Dagger(perception, 2, expert, DaggerConfig(opening=30))
+    starts = start_pictures(env, perception, 4)
+    with pytest.raises(Ig2mjError, match="for one device"):
+        Dagger(perception, 2, expert, DaggerConfig(starts=4), "devices", starts)
+
+
 def test_an_actor_that_is_told_what_is_hidden_learns_labels_without_pictures():
     spaces = {**SeenPointMass.observation_spaces, "privileged_state": Space((7,), np.float32, -np.inf, np.inf)}
     ahead = Lens((0.0, 0.0, 0.0), ((0.0, 0.0, -1.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), (1.0, 1.0), 16, (0, 16))

@@ -21,7 +21,7 @@ from small_envs import PointMass
 
 from ig2mj.errors import ClusterError, Ig2mjError, InputError, UnknownNameError
 from ig2mj.learn.bc import BCConfig
-from ig2mj.learn.best import BEST, LAST, SUCCESS, Best
+from ig2mj.learn.best import BEST, COUNTED, LAST, SUCCESS, Best
 from ig2mj.learn.checkpoints import Checkpoints, only_run
 from ig2mj.learn.dagger import DaggerConfig
 from ig2mj.learn.networks import Actor
@@ -191,13 +191,15 @@ def test_a_policy_file_acts_as_what_was_trained(done, tmp_path):
 
 
 def test_the_best_policy_of_a_run_is_kept_beside_the_last_one(tmp_path):
-    def policy(success, mark):
-        card = {"format": 1, "depends": {}, "digest": "", "net": {}, SUCCESS: success}
+    def policy(success, mark, count=100):
+        card = {"format": 1, "depends": {}, "digest": "", "net": {}, SUCCESS: success, COUNTED: count}
         return Policy(card, {"mean/bias": np.full(2, mark, np.float32)}, np.zeros(1), np.ones(1))
 
     def kept():
         return [float(Policy.load(tmp_path / name).weights["mean/bias"][0]) for name in (BEST, LAST)]
 
+    best = Best(tmp_path, resumed=False)
+    assert best.offer(policy(1.0, 8, count=4)) and best.offer(policy(0.74, 9)), "four episodes say little"
     best = Best(tmp_path, resumed=False)
     assert best.offer(policy(None, 0)) and best.offer(policy(0.5, 1)) and best.offer(policy(0.9, 2))
     assert not best.offer(policy(0.8, 3)) and kept() == [2, 3]

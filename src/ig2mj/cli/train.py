@@ -88,7 +88,7 @@ def run(
     from ig2mj.errors import Ig2mjError
     from ig2mj.learn.algorithms import config_of, made
     from ig2mj.learn.bc import begin_as_clone
-    from ig2mj.learn.best import SUCCESS, Best
+    from ig2mj.learn.best import COUNTED, SUCCESS, Best
     from ig2mj.learn.checkpoints import Checkpoints
     from ig2mj.learn.demos import load_demos
     from ig2mj.learn.iteration import AXIS
@@ -162,7 +162,7 @@ def run(
 
         def kept(learner: Any, row: dict[str, Any]) -> None:
             made_in = {"minutes": round(row["seconds"] / 60, 2), "env_steps": row["env_steps"]}
-            made_in |= {SUCCESS: row.get("success"), "compile_s": row.get("compile_s")}
+            made_in |= {SUCCESS: row.get("success"), COUNTED: row["counted"], "compile_s": row.get("compile_s")}
             best.offer(Policy.of(algorithm, learner, depends_on(world, perception), {**card, **made_in}))
             films.offer(best.file, row["seconds"])
 

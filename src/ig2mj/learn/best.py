@@ -1,7 +1,8 @@
-"""Which of a run's policies `policy.npz` is: the one whose training episodes succeeded most often.
+"""Which of a run's policies `policy.npz` is: the one whose training episodes succeeded most surely.
 
 The last one is often the best, but not where learning breaks down late, nor where a run is stopped in a dip. The
-success that counts is the one that reports show: of the last episodes, without those that an expert had a part in.
+success that counts is the one that reports show: of the last episodes, without those that an expert had a part in. Of
+it the lower limit of the 95 % confidence interval is compared: all of four early episodes are less than 74 of 100.
 """
 
 from __future__ import annotations
@@ -10,12 +11,16 @@ import contextlib
 import pathlib
 
 from ig2mj.errors import InputError
+from ig2mj.learn.evaluate import wilson
 from ig2mj.learn.policies import Policy
 
 BEST, LAST = "policy.npz", "policy-last.npz"
 
 SUCCESS = "training_success"
 """Where a policy's card has it; None while no episode has counted."""
+
+COUNTED = "training_episodes"
+"""And of how many episodes it is."""
 
 
 class Best:
@@ -41,5 +46,5 @@ class Best:
 
 
 def _success(policy: Policy) -> float:
-    success = policy.card.get(SUCCESS)
-    return -1.0 if success is None else float(success)
+    success, count = policy.card.get(SUCCESS), round(policy.card.get(COUNTED) or 0)
+    return -1.0 if success is None or not count else wilson(round(success * count), count)[0]

@@ -116,11 +116,16 @@ class Dagger:
         `starts`: pictures of start states (`ig2mj.learn.looking`), on the host.
 
         Raises:
-          Ig2mjError: something is to be told to an encoder that cannot be told it, or there is nothing to look at.
+          Ig2mjError: something is to be told to an encoder that cannot be told it, or there is nothing to
+            look at; or start states are to be shared by several devices.
         """
         self.perception, self.action_size, self.hint, self.axis = perception, action_size, expert, axis
         self.config = c = config or DaggerConfig()
         self.starts = starts
+        if c.opening and starts is None:
+            raise Ig2mjError(f"opening={c.opening}: no pictures of start states are taken (--set starts=4096)")
+        if starts is not None and axis is not None:
+            raise Ig2mjError(f"starts={c.starts}: pictures of start states are for one device (--devices 1)")
         if c.look and starts is None:
             raise Ig2mjError(f"look={c.look}: there are no start states to look at (--set starts=4096)")
         if c.told and (c.net != "glimpses" or not perception.objects):

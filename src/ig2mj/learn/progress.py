@@ -52,6 +52,10 @@ class Window:
             found[name] = value / count if count else None
         return found
 
+    def counted(self) -> int:
+        """How many episodes `mean` is of."""
+        return round(sum(s["episodes"] for s in self.last)) if self.last else 0
+
     def solved(self, until: float) -> bool:
         """Of enough episodes so large a share succeeded."""
         episodes, steps = (sum(s[name] for s in self.last) for name in ("episodes", "steps"))

@@ -173,7 +173,7 @@ class _Training:
         zero = logged = time.monotonic()  # `zero`: when the clock was 0
         window = Window(logged, int(np.clip(worlds, *EPISODES)), self.horizon * worlds)
         saved, compile_s, simulator = self.clock, math.nan, math.nan
-        row: dict[str, Any] = {}
+        row, counted = dict[str, Any](), 0
         for done in itertools.count():
             began = time.monotonic()
             play, sums, losses, spent = self._iterate(play, done >= self.waiting)
@@ -202,12 +202,13 @@ class _Training:
                 counters = {"seconds": self.clock, "iteration": self.iteration, "env_steps": self.env_steps}
                 row = {**counters, **window.mean(), **window.rates(now), **losses, "compile_s": compile_s}
                 self.log.row(row)
+                counted = window.counted()
                 logged, window = now, window.next(now)
             if told - saved >= run.checkpoint_every or stopped:
                 self._save()
                 saved = told
                 if team.first:
-                    kept(self.learner, {"seconds": self.clock, "env_steps": self.env_steps, **row})
+                    kept(self.learner, {"seconds": self.clock, "env_steps": self.env_steps, "counted": counted, **row})
                 team.barrier(f"saved {self.iteration}")
             if stopped:
                 self.log.close()
