@@ -94,16 +94,20 @@ class WarpEngine(MjxEngine):
         super().__init__(scene, num_worlds, initial=initial, **options)
         self._scratch = 0
         if own_device().platform == "gpu":  # on processors only some tests make steps
-            device = wp.device_from_jax(own_device())
-            counter = scratch.Counter(device.get_allocator())
-            with wp.ScopedDevice(device):
-                launches = self.launches(counter)
-            self._scratch = counter.block(num_worlds) if self.own_kernels else 0
-            self.serve([own_device()])
-            if compile_beforehand:
-                loading = kernels.load_meanwhile(launches)
-                if compile_beforehand != "meanwhile":
-                    loading.result()
+            self._get_ready(own_device(), compile_beforehand)
+
+    def _get_ready(self, gpu: Any, compile_beforehand: bool | Literal["meanwhile"]) -> None:
+        """Counts and takes the memory that steps need there, and loads their kernels."""
+        device = wp.device_from_jax(gpu)
+        counter = scratch.Counter(device.get_allocator())
+        with wp.ScopedDevice(device):
+            launches = self.launches(counter)
+        self._scratch = counter.block(self.num_worlds) if self.own_kernels else 0
+        self.serve([gpu])
+        if compile_beforehand:
+            loading = kernels.load_meanwhile(launches, device)
+            if compile_beforehand != "meanwhile":
+                loading.result()
 
     def serve(self, devices: Sequence[Any]) -> None:
         """See `Engine.serve`: takes the memory that steps need (`ig2mj.engine.warp.patches.scratch`)."""

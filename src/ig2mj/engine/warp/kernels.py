@@ -119,11 +119,11 @@ def _step_of_one_world(model: mujoco.MjModel, profile: EngineProfile, warns: int
     return act
 
 
-def load(launches: list[Launch], device: str | None = None, workers: int | None = None) -> int:
+def load(launches: list[Launch], device: wp.Device | None = None, workers: int | None = None) -> int:
     """Compiles and loads the modules of kernels, side by side.
 
     Args:
-      device: Warp's name; None: the present one. workers: threads; None: one for each processor of this process.
+      device: Warp's; None: the present one. workers: threads; None: one for each processor of this process.
 
     Returns:
       How many modules were loaded.
@@ -132,7 +132,7 @@ def load(launches: list[Launch], device: str | None = None, workers: int | None 
 
 
 def load_meanwhile(
-    launches: list[Launch], device: str | None = None, workers: int | None = None
+    launches: list[Launch], device: wp.Device | None = None, workers: int | None = None
 ) -> concurrent.futures.Future[int]:
     """As `load`, and returns at once. The first CUDA graph that is captured waits for the end; what could not be loaded
     is loaded again by the launch that needs it, which reports why not.
@@ -151,9 +151,9 @@ def load_meanwhile(
 
     done: concurrent.futures.Future[int] = concurrent.futures.Future()
 
-    first = None
-    if on.is_cuda:
-        first = tiles.builder(not_made(launches), on.get_cuda_output_arch())  # pyright: ignore[reportAttributeAccessIssue]
+    # Of what Warp itself compiles for: with PTX it may be an older one than the device's own (`Device.arch`).
+    architecture = on.get_cuda_compile_arch()
+    first = None if architecture is None else tiles.builder(not_made(launches), architecture)
 
     def load_all() -> None:
         try:
