@@ -4,8 +4,8 @@
     python benchmarks/soak.py --replay DIR/birch_world12.npz
 
 A floating hand of 300 N gets a new target in one of twenty control steps: a place anywhere in the house, any turn, any
-grip. A world is flagged where a buffer overflowed, a number is not finite, an object fell out of the house, is outside
-of its walls, or moved faster than 20 m/s (`ig2mj.worlds.guards`); it counts once, with the object and with the geoms
+grip. A world is flagged where a buffer overflowed, a number is not finite, an object fell out of the house, is beside
+its floors, or moved faster than 20 m/s (`ig2mj.worlds.guards`); it counts once, with the object and with the geoms
 that this object touched last, and starts afresh. A world-step is a physics step of one world (1/120 s).
 
 A few flagged worlds are dumped: where they were up to two seconds before, and the controls since. `--replay` runs such

@@ -11,7 +11,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from rich.console import Console
-from soak_watch import BEYOND, House
+from soak_watch import House
 
 import ig2mj
 from ig2mj.agents.floating_hand import add_floating_hand
@@ -61,7 +61,7 @@ def replay(file: pathlib.Path) -> list[dict[str, Any]]:
     """
     dump, console = Dump.load(file), Console()
     scene = ig2mj.load_scene(dump.home, [functools.partial(add_floating_hand, pos=dump.start)])
-    box, number = House.of(scene, dump.start), scene.object_index(dump.report["object"])
+    house, number = House.of(scene, dump.start), scene.object_index(dump.report["object"])
     engine = NativeEngine(scene)
     physics = engine.load(engine.reset(), dump.row)
     console.print(f"{dump.home}: {dump.report}")
@@ -71,7 +71,7 @@ def replay(file: pathlib.Path) -> list[dict[str, Any]]:
         model, data = engine.to_mujoco(physics, 0)
         place, speed = view.object_com[0, number], float(np.linalg.norm(view.object_linvel[0, number]))
         overlaps = _overlaps(model, data, np.flatnonzero(scene.tables.geom_object == number))
-        out = bool((np.maximum(box.low - place, place - box.high) > BEYOND).any())
+        out = float(house.lost(place)) > 0
         steps.append({"speed": speed, "place": place.tolist(), "overlaps": overlaps})
         if overlaps or out or speed > TOP_SPEED / 4:
             words = ", ".join(f"{name} {1e3 * depth:.0f} mm" for name, depth in overlaps.items())

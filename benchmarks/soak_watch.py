@@ -1,6 +1,6 @@
 """What `soak.py` sees of its worlds: which went wrong, by which object, and what that object touched last.
 
-Axes: W worlds, O objects, G geoms.
+Axes: W worlds, O objects, G geoms, F floors.
 """
 
 from __future__ import annotations
@@ -20,13 +20,14 @@ from ig2mj.scene.scene import Scene
 from ig2mj.worlds import guards
 
 FLAGS = ("overflow", "not_finite", "fell", "outside", "too_fast")
-"""What a world counts as, the first that is true. The guards' flags, and `outside`: beyond the walls or the ceiling."""
+"""What a world counts as, the first that is true. The guards' flags, and `outside`: an object beside the house's floors
+or below them (`House.lost`)."""
 
 OUTSIDE = 1 << 8
 """Beside `guards.Flag`."""
 
-BEYOND = 0.5
-"""Metres beyond the building's box from which an object's centre of mass is outside."""
+BEYOND = guards.BELOW_FLOOR
+"""Metres beside every floor, or below the lowest one's surface, from which an object's centre of mass is outside."""
 
 NEVER = 10**6
 """Control steps since an object was held that never was."""
@@ -36,11 +37,17 @@ _BITS = (guards.Flag.OVERFLOW, guards.Flag.NOT_FINITE, guards.Flag.FELL, OUTSIDE
 
 @dataclasses.dataclass(frozen=True)
 class House:
-    """Box of walls and floors, and where the hand starts. Metres, world frame."""
+    """A building. Metres, world frame.
+
+    Attributes:
+      low, high: box of walls and floors. start: where the hand starts.
+      floors: low and high corner of each floor's box.
+    """
 
     low: Float[np.ndarray, "3"]
     high: Float[np.ndarray, "3"]
     start: Float[np.ndarray, "3"]
+    floors: Float[np.ndarray, "F 2 3"]
 
     @classmethod
     def of(cls, scene: Scene, start: Any) -> House:
@@ -51,12 +58,25 @@ class House:
         turn = data.geom_xmat[geoms].reshape(-1, 3, 3)
         middle = data.geom_xpos[geoms] + np.einsum("gij,gj->gi", turn, model.geom_aabb[geoms, :3])
         half = np.einsum("gij,gj->gi", np.abs(turn), model.geom_aabb[geoms, 3:])
-        low, high = (middle - half).min(0), (middle + half).max(0)
-        return cls(low, high, np.asarray(start, float))
+        boxes = np.stack([middle - half, middle + half], axis=1)
+        floors = boxes[categories[scene.tables.geom_object[geoms]] == "floors"]
+        return cls(boxes[:, 0].min(0), boxes[:, 1].max(0), np.asarray(start, float), floors)
 
     def above_floor(self, floor: float = 0.05) -> House:
         """The same house from a little above its lowest floor."""
         return dataclasses.replace(self, low=np.array([*self.low[:2], floor]))
+
+    def lost(self, com: Float[Array, "*n 3"]) -> Float[Array, "*n"]:
+        """Metres by which centres of mass are beside all floors or below the lowest, whichever is more, less `BEYOND`.
+
+        Above zero is lost: it comes to rest in the house no more. What a hand lifts over the walls, or what flies above
+        the floors, comes down on them, and is lost only where it comes down elsewhere.
+        """
+        place = jnp.asarray(com)[..., None, :]
+        low, high = self.floors[:, 0], self.floors[:, 1]
+        beside = jnp.maximum(low - place, place - high)[..., :2].max(-1).min(-1)
+        below = high[:, 2].min() - place[..., 0, 2]
+        return jnp.maximum(beside, below) - BEYOND
 
 
 @struct.dataclass
@@ -118,7 +138,7 @@ class Watch:
         com, velocity = jnp.asarray(view.object_com), jnp.asarray(view.object_linvel)
         loose = self.loose if used is None else used & ~self.tables.object_fixed
         speed = jnp.where(loose, jnp.linalg.norm(velocity, axis=-1), 0.0)
-        off = jnp.maximum(self.box.low - com, com - self.box.high).max(-1) - BEYOND
+        off = self.box.lost(com)
         away = jnp.where(loose & jnp.isfinite(off), off, -jnp.inf)
         flags = guards.check(self.engine.health(physics), com, np.where(self.loose, self.floor, -np.inf))
         flags = jnp.asarray(flags) | jnp.where((away > 0).any(1), OUTSIDE, 0)

@@ -44,7 +44,12 @@ def thrown(watch, world: int, velocity=(0.0, 0.0, 0.0), pos=None):
 
 @pytest.mark.parametrize(
     ("kind", "place", "velocity"),
-    [("too_fast", (0, 0, 1.5), (0, 0, 25.0)), ("outside", (30, 0, 1.0), (0, 0, 0)), ("fell", (0, 0, -9), (0, 0, 0))],
+    [
+        ("too_fast", (0, 0, 1.5), (0, 0, 25.0)),
+        ("outside", (30, 0, 1.0), (0, 0, 0)),
+        ("outside", (2.6, 0, 4.0), (0, 0, 0)),
+        ("fell", (0, 0, -9), (0, 0, 0)),
+    ],
 )
 def test_what_goes_wrong_is_named(watch, kind, place, velocity):
     physics, _ = thrown(watch, 1, velocity, place)
@@ -56,6 +61,29 @@ def test_what_goes_wrong_is_named(watch, kind, place, velocity):
     after = watch.look(seen, physics, watch.engine.view(thrown(watch, 1)[0]))
     assert int(after.flags[1]) == int(seen.flags[1]), "what a world is first flagged for stands"
     assert not np.asarray(watch.fresh(after, physics, np.array([True] * 3)).flags).any()
+
+
+def test_what_is_above_the_floors_is_not_lost_and_what_comes_down_beside_them_is(watch):
+    physics, _ = thrown(watch, 1, (0.0, 0.0, 2.0), (1.5, 0, 4.0))
+    seen, lost_at = watch.start(physics), {}
+    for world, sideways in ((0, 0.0), (1, 6.0)):
+        physics, _ = thrown(watch, world, (sideways, 0.0, 2.0), (1.5, 0, 4.0))
+        for _ in range(60):
+            physics, view = watch.engine.step(physics)
+            seen = watch.look(seen, physics, view)
+            if int(seen.flags[world]):
+                lost_at.setdefault(world, np.asarray(view.object_com)[world, watch.engine.scene.object_index("box")])
+    assert list(lost_at) == [1] and watch.report(seen, 1)["kind"] == "outside"
+    assert lost_at[1][0] > 2.0 + soak_watch.BEYOND and lost_at[1][2] > 0
+
+
+def test_lost_is_beside_every_floor_or_below_the_lowest():
+    rooms = [[[0, 0, -1.0], [4, 2, 0.0]], [[0, 2, -1.0], [2, 4, 0.0]], [[0, 0, 2.8], [2, 2, 3.0]]]  # an L, and upstairs
+    house = soak_watch.House(np.zeros(3), np.array([4, 4, 6.0]), np.zeros(3), np.array(rooms, float))
+    inside = [(1, 1, 9.0), (3.9, 1, 3.2), (1, 3.9, 1.0), (4.4, 1, 1.0), (2.4, 3.9, 1.0), (1, 1, -0.4)]
+    outside = [(3.9, 3.9, 1.0), (3.9, 3.9, 9.0), (4.6, 1, 9.0), (1, -0.6, 0.1), (1, 1, -0.6)]
+    assert (np.asarray(house.lost(np.array(inside))) < 0).all()
+    assert (np.asarray(house.lost(np.array(outside))) > 0).all()
 
 
 def test_targets_are_anywhere_in_the_house_and_new_in_one_of_twenty_steps(watch):
