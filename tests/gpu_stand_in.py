@@ -30,10 +30,11 @@ def gpu_of_jax() -> types.SimpleNamespace:
     return types.SimpleNamespace(platform="gpu", local_hardware_id=0)
 
 
-def gpu_of_warp(newer_driver: bool = False) -> wp.Device:
+def gpu_of_warp(memory: Memory, newer_driver: bool = False) -> wp.Device:
     """A `warp.Device` that was never initialised: all of its methods, and the attributes that need no driver.
 
     Args:
+      memory: what is allocated on it.
       newer_driver: it knows programs of Warp's toolkit, so that Warp compiles to PTX for an older architecture.
     """
     wp.init()
@@ -42,7 +43,6 @@ def gpu_of_warp(newer_driver: bool = False) -> wp.Device:
     runtime = types.SimpleNamespace(driver_version=(12, 0), toolkit_version=(12, 9), default_device=real.default_device)
     if newer_driver:
         runtime.driver_version = (13, 0)
-    memory = Memory()
     known = {"ordinal": 0, "alias": "cuda:0", "arch": ARCHITECTURE, "is_cubin_supported": True}
     known |= {"runtime": runtime, "context_guard": contextlib.nullcontext(), "default_allocator": memory}
     vars(device).update(known | {"current_allocator": memory, "_custom_allocator": None})

@@ -15,12 +15,16 @@ from jaxtyping import Float
 
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.errors import ActionError
+from ig2mj.sensors.registry import SENSORS
 
 SOON = 3
 """Steps of the short episodes in which the end of an episode is looked at."""
 
 ROUNDING = 1e-5
 """By which numbers of one world may differ that two programs computed."""
+
+JUMPS = 0.01
+"""Share of a world's rays that may jump where steps do not come out the same to the bit (`api_test`'s `within`)."""
 
 
 def api_test(
@@ -41,7 +45,9 @@ def api_test(
       seed: of resets and actions. steps: of each piece of random play.
       other: the same environment with another number of worlds. It is not closed.
       within: by which numbers may differ, absolute and relative, when the same steps are taken again. On a GPU sums are
-        made in any order, so that a step does not come out the same to the bit.
+        made in any order, so that a step does not come out the same to the bit, and a ray that passed an edge by a hair
+        may hit it. So of what a camera or a laser reads in a world, in each step, one ray in a hundred (one where there
+        are fewer) may differ by any amount. Everything else, and all of it where `within` is 0, may not.
     """
     assert env.num_worlds >= 2, "api_test needs an environment with at least two worlds"
     rng = np.random.default_rng(seed)
@@ -92,13 +98,17 @@ def _host(state: EnvState) -> dict[str, Any]:
 
 
 def _same(a: Any, b: Any, what: str, within: float = 0.0) -> None:
-    """Arrays are equal, those of floats to so much, absolute and relative."""
+    """Arrays of all worlds are the same, those of floats to so much, absolute and relative; see `api_test`."""
     for (path, x), (_, y) in zip(
         jax.tree_util.tree_leaves_with_path(a), jax.tree_util.tree_leaves_with_path(b), strict=True
     ):
         close = within if np.issubdtype(x.dtype, np.floating) else 0.0
-        same = np.allclose(x, y, rtol=close, atol=close) if close else np.array_equal(x, y)
-        assert same, f"{what}: {jax.tree_util.keystr(path)} differs"
+        differs = ~np.isclose(x, y, rtol=close, atol=close) if close else x != y
+        name = getattr(path[-1], "key", None)
+        if within and name in SENSORS and SENSORS[name].looks:
+            rays = differs.any(-1).reshape(len(differs), -1)
+            differs = rays.sum(1) > max(1, int(JUMPS * rays.shape[1]))
+        assert not differs.any(), f"{what}: {jax.tree_util.keystr(path)} differs"
 
 
 def _of(worlds: np.ndarray, seen: Any) -> Any:

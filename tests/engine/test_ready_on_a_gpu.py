@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 import warp as wp
-from gpu_stand_in import ARCHITECTURE, gpu_of_jax, gpu_of_warp
+from gpu_stand_in import ARCHITECTURE, Memory, gpu_of_jax, gpu_of_warp
 
 from ig2mj.engine.warp import ahead, kernels, tiles
 from ig2mj.engine.warp.engine import WarpEngine
@@ -37,20 +37,21 @@ def loaded(monkeypatch) -> list:
 
 @pytest.mark.parametrize("beforehand", [True, "meanwhile"])
 def test_an_engine_gets_ready_on_a_gpu(engine, loaded, monkeypatch, beforehand):
-    gpu = gpu_of_warp()
+    memory = Memory()
+    gpu = gpu_of_warp(memory)
     monkeypatch.setattr(wp, "get_cuda_device", lambda number: {0: gpu}[number])
     monkeypatch.setattr(scratch, "_arenas", {})
     engine._get_ready(gpu_of_jax(), beforehand)
-    kernels.load(engine.launches(scratch.Counter(gpu.default_allocator)), gpu)  # begins when the others have ended
+    kernels.load(engine.launches(scratch.Counter(memory)), gpu)  # begins when the others have ended
     block = engine._scratch
-    assert block >= 2 * 1000 and gpu.default_allocator.taken[1] == block, "memory for two worlds is taken"
+    assert block >= 2 * 1000 and memory.taken[1] == block, "memory for two worlds is taken"
     assert loaded.count(ARCHITECTURE) == 2
     assert all(item[0] is gpu for item in loaded if isinstance(item, tuple))
 
 
 def test_tiles_are_made_for_what_warp_compiles_for(loaded):
     prepare_warp()
-    for gpu in (gpu_of_warp(), gpu_of_warp(newer_driver=True)):
+    for gpu in (gpu_of_warp(Memory()), gpu_of_warp(Memory(), newer_driver=True)):
         kernels.load([], gpu)
         assert gpu.get_cuda_compile_arch() in loaded
     oldest = wp.get_device("cpu").runtime.default_ptx_arch

@@ -29,7 +29,7 @@ from jaxtyping import Bool, Float, Int, UInt
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.engine.base import Physics
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.envs.observations import Observer, Space
+from ig2mj.envs.observations import Observer, Space, chosen
 from ig2mj.envs.state import EnvState, Seen
 from ig2mj.errors import ActionError, EngineError
 from ig2mj.predicates.compile import GoalStatus
@@ -42,6 +42,7 @@ from ig2mj.tasks.task import TaskLike
 from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.lazy.of_view import OfView
+from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import pick_rows
 
 Seed = int | np.integer | Array
@@ -105,9 +106,10 @@ class Environment:
             self._reset = Compiled(self.reset_fn, donate_argnums=0)
             self._autoreset = Compiled(self.step_autoreset_fn, donate_argnums=0)
             self._start = Compiled(self._start_fn, donate_argnums=0)
+            self._load, self._resume = Compiled(self._load_fn, donate_argnums=0), Compiled(self._begun)
         else:
             self._step, self._reset, self._start = self.step_fn, self.reset_fn, self._start_fn
-            self._autoreset = self.step_autoreset_fn
+            self._autoreset, self._load, self._resume = self.step_autoreset_fn, self._load_fn, self._begun
 
     @property
     def pure(self) -> bool:
@@ -218,9 +220,13 @@ class Environment:
         rows = np.asarray(rows)
         if rows.shape != (self.num_worlds,) or rows.min() < 0 or rows.max() >= size:
             raise EngineError(f"start_from takes {self.num_worlds} rows, each from 0 to {size - 1}")
-        chosen = self.core.starts.pool.rows(rows)
-        batch = self.core.load(self.core.start(as_seed(seed)), chosen.physics, chosen.states)
-        return self.resume(batch, rows)
+        starts = self.core.starts.pool.rows(rows)
+        with REST:
+            return self._load(self.core.engine.reset(), as_seed(seed), starts, rows.astype(np.int32))
+
+    def _load_fn(self, physics: Physics, seed: int | Int[Array, ""], starts: Pool, rows: Int[Array, "W"]) -> EnvState:
+        batch = self.core.load_fn(self.core.start_fn(physics, seed), starts.physics, starts.states)
+        return self._begun(batch, jnp.ones(self.num_worlds, bool), None, rows)
 
     def resume(
         self,
@@ -234,8 +240,8 @@ class Environment:
         Args:
           mask, before: only these worlds were put somewhere; the others go on from that state. None: all were.
         """
-        chosen = jnp.ones(self.num_worlds, bool) if mask is None else jnp.asarray(mask)
-        return self._begun(batch, chosen, before, jnp.asarray(rows, jnp.int32))
+        mask = np.ones(self.num_worlds, bool) if mask is None else np.asarray(mask)
+        return self._resume(batch, mask, before, np.asarray(rows, np.int32))
 
     def reset_fn(self, state: EnvState, mask: Bool[Array, "W"]) -> EnvState:
         """`reset` of the masked worlds, not compiled."""
@@ -327,8 +333,7 @@ class Environment:
         new = self._seen(view, states, status, controllers, steps, now, terms, none, none, none, zero, zero)
         if before is None:
             return new
-        old = dataclasses.replace(before, obs={name: before.obs[name] for name in new.obs})
-        return jax.tree.map(lambda a, b: _chosen(mask, a, b), new, old)
+        return chosen(mask, new, dataclasses.replace(before, obs={name: before.obs[name] for name in new.obs}))
 
     def _seen(
         self,
@@ -387,7 +392,3 @@ def as_seed(seed: Seed) -> int | Int[Array, ""]:
     if isinstance(seed, jax.Array) and (jnp.issubdtype(seed.dtype, jax.dtypes.prng_key) or seed.ndim == 1):
         return (jax.random.bits(seed, (), jnp.uint32) >> 1).astype(jnp.int32)
     return int(seed) % 2**31 if isinstance(seed, int | np.integer) else jnp.asarray(seed, jnp.int32)
-
-
-def _chosen(mask: Bool[Array, "W"], new: Array, old: Array) -> Array:
-    return jnp.where(mask.reshape(-1, *[1] * (new.ndim - 1)), new, old)
