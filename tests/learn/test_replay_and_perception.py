@@ -335,9 +335,13 @@ def test_glimpses_look_beside_their_points_while_they_learn():
     assert loss(jax.random.PRNGKey(0)) != loss(jax.random.PRNGKey(1)), "it learns so"
 
 
-@pytest.mark.parametrize("vector", [22, 49])
-def test_policies_of_glimpses_are_small_enough_to_ship(vector):
-    """Of the humanoid's and Fetch's SlicingFruit. A file has 1.85 bytes for each number."""
-    actor, picture = Actor(6, (192, 192), (48, 128, 4), "glimpses", 47, 21, 2), jnp.zeros((1, 48 * 128 * 4), jnp.uint8)
-    shapes = jax.eval_shape(actor.init, jax.random.PRNGKey(0), jnp.zeros((1, vector)), picture)
+@pytest.mark.parametrize(("vector", "sizes", "recalled"), [(22, 192, 0), (49, 192, 0), (22, 192, 58), (49, 160, 85)])
+def test_policies_of_glimpses_are_small_enough_to_ship(vector, sizes, recalled):
+    """Of the humanoid's and Fetch's SlicingFruit, without and with memory. A file has 1.85 bytes for each number."""
+    actor, picture = (
+        Actor(6, (sizes, sizes), (48, 128, 4), "glimpses", 47, 21, 2),
+        jnp.zeros((1, 48 * 128 * 4), jnp.uint8),
+    )
+    own, kept = jnp.zeros((1, vector)), jnp.zeros((1, recalled)) if recalled else None
+    shapes = jax.eval_shape(lambda key: actor.init(key, own, picture, None, kept), jax.random.PRNGKey(0))
     assert 1.85 * sum(math.prod(a.shape) for a in jax.tree.leaves(shapes)) < 0.7e6

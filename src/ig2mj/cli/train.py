@@ -131,7 +131,8 @@ def run(
                 mixed=mixed,
             )
         lens = lens_of(world, pixels, kept_rows) if obs == "rgbd" else None
-        perception = Perception(world.observation_spaces, obs, pixels, kept_rows, world.privileged_names, lens)
+        names = world.privileged_names, lens, world.proprioception_names
+        perception = Perception(world.observation_spaces, obs, pixels, kept_rows, *names)
         shown = load_demos(demos, perception, world_of(world)) if demos is not None else None
         algorithm = made(config, perception, world, shown, AXIS if shared else None, expert)
         if out is None:

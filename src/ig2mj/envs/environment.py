@@ -59,6 +59,7 @@ class Environment:
       task, robot, grasping: what is done by whom, and how hands hold (`ig2mj.agents.grasping.MODES`).
       scene, core: the household with its robot, and what steps it. objective: what is measured, rewarded and observed.
       num_worlds: W. action_names: [n]. observation_spaces: of each observation, without the world axis.
+      privileged_names, proprioception_names: what each number of these observations means.
       period: seconds of an agent step.
       made_with: what else `ig2mj.make` was given, by the names of its arguments, so that it can be made again.
     """
@@ -93,6 +94,7 @@ class Environment:
         self._companions, self.made_with = companions, dict[str, Any]()
         self.action_names, self.observation_spaces = action_map.names, observer.spaces
         self.privileged_names = objective.vectors["privileged_state"]
+        self.proprioception_names = core.controllers[0].proprioception_names
         step = core.engine.substeps * core.engine.timestep
         self.period, self._substeps = period, round(period / step)
         if self._substeps < 1 or abs(self._substeps * step - period) > 1e-6:

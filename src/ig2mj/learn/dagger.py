@@ -30,6 +30,10 @@ from ig2mj.learn.heads import likeliest
 from ig2mj.learn.labels import Imitation, Labels
 from ig2mj.learn.moments import Moments, share_of
 from ig2mj.learn.perception import Perception, Seen
+from ig2mj.learn.recall import Recall
+
+RECALLED = "recalled"
+"""The name among a transition's extras of what was remembered."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -49,6 +53,7 @@ class DaggerConfig:
         episode are the expert's, and every seventh is among the pictures.
       told: samples of an update besides, in which the actor is told what is hidden, as wrong as it guesses it: pictures
         cost time. For the encoder `glimpses`.
+      recall: 1: the actor remembers what a hand soon hides (`ig2mj.learn.recall`). For the encoder `glimpses`.
       choices: values of each number of an action that the actor chooses from; 0: it is the mean of a Gaussian.
       actor: sizes of the layers. net: encoder (`networks.NETS`).
     """
@@ -69,6 +74,7 @@ class DaggerConfig:
     opening: int = 0
     look: int = 0
     told: int = 0
+    recall: int = 0
     choices: int = 21
     actor: tuple[int, ...] = (256, 256, 256)
     net: str = "small"
@@ -90,12 +96,14 @@ class Turns:
     """Who acts in each world: a number from 0 to 1; the expert, where its share is larger.
 
     `left`: steps until it is drawn anew. `alone`: the expert has no part in this episode. `helped`: it had one.
+    `recalled`: what the actor remembers.
     """
 
     draw: Float[Array, "W"]
     left: Int[Array, "W"]
     alone: Bool[Array, "W"]
     helped: Bool[Array, "W"]
+    recalled: Float[Array, "W m"]
 
 
 class Dagger:
@@ -128,8 +136,9 @@ class Dagger:
             raise Ig2mjError(f"starts={c.starts}: pictures of start states are for one device (--devices 1)")
         if c.look and starts is None:
             raise Ig2mjError(f"look={c.look}: there are no start states to look at (--set starts=4096)")
-        if c.told and (c.net != "glimpses" or not perception.objects):
-            raise Ig2mjError(f"told={c.told}: only actors of pictures with net=glimpses can be told what is hidden")
+        if (c.told or c.recall) and (c.net != "glimpses" or not perception.objects):
+            what = f"told={c.told}: only actors of pictures with net=glimpses can be told what is hidden"
+            raise Ig2mjError(what if c.told else f"recall={c.recall}: actors of pictures with net=glimpses remember")
         self._imitation = Imitation(perception, action_size, c, axis)
         self.actor = self._imitation.actor
 
@@ -172,12 +181,23 @@ class Dagger:
         """No labels yet."""
         rows = max(self.config.capacity // (num_worlds * self.length), 1) * self.length
         starts = jax.tree.map(jnp.asarray, self.starts)
-        return Labels.empty(rows, num_worlds, self.perception, self.action_size, starts)
+        return Labels.empty(rows, num_worlds, self.perception, self.action_size, starts, self._remembers)
+
+    @property
+    def recall(self) -> Recall | None:
+        """What the actor remembers; None: nothing."""
+        return self._imitation.recall
+
+    @property
+    def _remembers(self) -> int:
+        """Numbers."""
+        return 0 if self.recall is None else self.recall.size
 
     def noise(self, num_worlds: int) -> Turns:
         """Before the first step."""
         no, none = jnp.zeros(num_worlds, bool), jnp.zeros(num_worlds, bool)  # two: buffers are donated
-        return Turns(jnp.zeros(num_worlds), jnp.zeros(num_worlds, jnp.int32), no, none)
+        nothing = jnp.zeros((num_worlds, self._remembers))
+        return Turns(jnp.zeros(num_worlds), jnp.zeros(num_worlds, jnp.int32), no, none, nothing)
 
     def act(
         self, learner: DaggerLearner, turns: Turns, seen: Seen, key: Array, advice: Advice
@@ -192,11 +212,10 @@ class Dagger:
         over = turns.left <= 0
         draw = jnp.where(over, jax.random.uniform(draw_key, over.shape), turns.draw)
         left = jnp.where(over, jax.random.randint(time_key, over.shape, 1, 51), turns.left) - 1
-        own = learner.moments.normal(seen.vector[:, : self.perception.actor_size])
-        looked: Any = self.actor.apply({"params": learner.actor}, own, seen.picture)
-        own_action = likeliest(looked[0])
-        share = jnp.where(learner.updates == 0, 1.0, 1.0 - learner.progress / max(c.alone, 1e-6))
         begins = advice.steps == 0
+        head, recalled = self._imitation.choose(learner.actor, learner.moments, seen, turns.recalled, begins)
+        own_action = likeliest(head)
+        share = jnp.where(learner.updates == 0, 1.0, 1.0 - learner.progress / max(c.alone, 1e-6))
         alone = jnp.where(begins, jax.random.uniform(alone_key, begins.shape) < ALONE, turns.alone)
         expert = (draw < share) & ~(alone & (learner.updates > 0))
         helped = expert | (turns.helped & ~begins)
@@ -205,7 +224,8 @@ class Dagger:
         action = jnp.where(expert[:, None], label, own_action)
         action = action + c.noise * jax.random.normal(noise_key, action.shape)
         action = jnp.where(wild[:, None], jax.random.uniform(any_key, action.shape, minval=-1.0), action)
-        return jnp.clip(action, -1.0, 1.0), {"label": label, GUIDED: helped}, Turns(draw, left, alone, helped)
+        extra = {"label": label, GUIDED: helped, **({RECALLED: recalled} if self._remembers else {})}
+        return jnp.clip(action, -1.0, 1.0), extra, Turns(draw, left, alone, helped, recalled)
 
     def learn(
         self,
@@ -222,7 +242,7 @@ class Dagger:
           progress: share of the run that is over. ready: without it nothing is updated: labels are gathered.
         """
         c = self.config
-        memory = memory.insert(rollout.seen, rollout.extra["label"])
+        memory = memory.insert(rollout.seen, rollout.extra["label"], rollout.extra.get(RECALLED))
         moments = learner.moments.update(rollout.seen.vector, self.axis)
         learner = dataclasses.replace(learner, moments=moments, progress=progress)
         rate = jnp.asarray(optax.cosine_decay_schedule(c.lr, 1, c.last_lr / c.lr)(progress))
@@ -231,12 +251,12 @@ class Dagger:
             def update(learner: DaggerLearner, key: Array) -> tuple[DaggerLearner, dict[str, Array]]:
                 sample_key, shift_key, start_key, told_key = jax.random.split(key, 4)
                 count = share_of(c.batch, self.axis)
-                seen, label = memory.sample(sample_key, count)
+                seen, label, recalled = memory.sample(sample_key, count)
                 if memory.starts is not None:
                     more = _some(memory.starts, start_key, count // 2)
                     seen = jax.tree.map(lambda *a: jnp.concatenate(a), seen, more)
                 told = memory.told(told_key, share_of(c.told, self.axis)) if c.told else None
-                return self._imitation.update(learner, seen, label, shift_key, rate, told)
+                return self._imitation.update(learner, seen, label, shift_key, rate, told, recalled)
 
             learner, found = jax.lax.scan(update, learner, jax.random.split(key, self.samples))
             return learner, jax.tree.map(jnp.mean, found)

@@ -20,15 +20,16 @@ from jaxtyping import UInt
 
 from ig2mj.cluster.work import Piece, WholeRunError
 from ig2mj.engine.view import Array
-from ig2mj.envs.environment import Environment
+from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.pieces import keep_pool
 from ig2mj.envs.registry import make
 from ig2mj.envs.rollout import Act, play
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.policies import Policy, perception_of
 
-Choose = Callable[[Mapping[str, Array], UInt[np.ndarray, "2"]], Array]
-"""Actions [W, n] from observations by name and a key."""
+Choose = Callable[[Mapping[str, Array], Array, Array, UInt[np.ndarray, "2"]], tuple[Array, Array]]
+"""Actions [W, n] and what is remembered, from observations by name, what was remembered, in which worlds an episode
+begins, and a key (`Policy.player`)."""
 
 
 def acting(policy: Policy, env: Environment, file: object, *, drawn: bool = False, seed: int = 0) -> Act:
@@ -40,7 +41,7 @@ def acting(policy: Policy, env: Environment, file: object, *, drawn: bool = Fals
     Raises:
       InputError: the policy is for something else.
     """
-    return _with_keys(_compiled(policy, env, file, drawn), seed)
+    return _with_keys(*_compiled(policy, env, file, drawn), seed)
 
 
 def summary(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -109,10 +110,10 @@ def evaluate_piece(
     try:
         keep_pool(shared, task, split, pool_size)
         made = (task, robot, grasping, engine, worlds, tuple(observations), paper_rl, split, pool_size)
-        env, choose = _player(shared["policy"], file, drawn, *made)
+        env, choose, remembers = _player(shared["policy"], file, drawn, *made)
     except Ig2mjError as e:
         raise WholeRunError(e) from e
-    played = play(env, _with_keys(choose, first // worlds), episodes, in_order=True, first=first)
+    played = play(env, _with_keys(choose, remembers, first // worlds), episodes, in_order=True, first=first)
     metrics = env.metrics(played.state)
     found = {"success": played.success, "success_in_hand": played.success_in_hand, "total": played.total}
     if played.lifted_by_all is not None:
@@ -137,8 +138,9 @@ def _player(
     paper_rl: bool,
     split: str,
     pool_size: int | None,
-) -> tuple[Environment, Choose]:
-    """What is played, and who chooses: the same in all pieces of an evaluation, so that each is compiled once.
+) -> tuple[Environment, Choose, int]:
+    """What is played, who chooses, and how many numbers that remembers: the same in all pieces of an evaluation, so
+    that each is compiled once.
 
     Args:
       content: of the policy's file. The others: of `evaluate_piece`.
@@ -149,17 +151,26 @@ def _player(
         copy = pathlib.Path(folder) / "policy.npz"
         copy.write_bytes(content)
         policy = Policy.load(copy)
-    return env, _compiled(policy, env, file, drawn)
+    return env, *_compiled(policy, env, file, drawn)
 
 
-def _compiled(policy: Policy, env: Environment, file: object, drawn: bool) -> Choose:
-    """Raises InputError: the policy is for something else."""
+def _compiled(policy: Policy, env: Environment, file: object, drawn: bool) -> tuple[Choose, int]:
+    """Who chooses, and how many numbers that remembers. Raises InputError: the policy is for something else."""
     perception = perception_of(policy, env.observation_spaces)
     policy.check(env, perception, file)
-    return jax.jit(policy.actor(perception, drawn=drawn))
+    choose = jax.jit(policy.player(perception, drawn=drawn))
+    return choose, 0 if policy.recall is None else policy.recall.size
 
 
-def _with_keys(choose: Choose, seed: int) -> Act:
-    """Who acts, with a key of that seed for each step."""
-    keys = np.random.default_rng(seed)
-    return lambda state: np.asarray(choose(state.obs, keys.integers(0, 2**32, 2, np.uint32)))
+def _with_keys(choose: Choose, remembers: int, seed: int) -> Act:
+    """Who acts, with a key of that seed for each step, and remembers so many numbers of its episode."""
+    keys, kept = np.random.default_rng(seed), np.zeros((0, remembers), np.float32)
+
+    def act(state: EnvState) -> np.ndarray:
+        nonlocal kept
+        begins = np.asarray(state.info["steps"]) == 0
+        before = kept if len(kept) == len(begins) else np.zeros((len(begins), remembers), np.float32)
+        action, kept = choose(state.obs, before, begins, keys.integers(0, 2**32, 2, np.uint32))
+        return np.asarray(action)
+
+    return act

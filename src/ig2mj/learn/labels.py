@@ -11,7 +11,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 from flax import struct
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from ig2mj.engine.view import Array
 from ig2mj.learn.adam import averaged_adam
@@ -19,25 +19,33 @@ from ig2mj.learn.heads import label_loss, likeliest
 from ig2mj.learn.moments import Moments
 from ig2mj.learn.networks import SHAKEN, Actor, shifted
 from ig2mj.learn.perception import Perception, Seen, blank
+from ig2mj.learn.recall import Recall
 
 
 @struct.dataclass
 class Labels:
     """The last T steps of W worlds. `head`: row that is written next. `size`: rows that are full. `starts`: start
-    states, which have no labels."""
+    states, which have no labels. `recalled`: what was remembered (`ig2mj.learn.recall`)."""
 
     vector: Float[Array, "T W v"]
     picture: UInt8[Array, "T W q"]
     label: Float[Array, "T W n"]
     head: Int[Array, ""]
     size: Int[Array, ""]
+    recalled: Float[Array, "T W m"]
     starts: Seen | None = None
 
     @classmethod
     def empty(
-        cls, steps: int, worlds: int, perception: Perception, action_size: int, starts: Seen | None = None
+        cls,
+        steps: int,
+        worlds: int,
+        perception: Perception,
+        action_size: int,
+        starts: Seen | None = None,
+        recalled: int = 0,
     ) -> Labels:
-        """Room for so many steps of so many worlds."""
+        """Room for so many steps of so many worlds. `recalled`: m."""
         shape = perception.picture_shape
         pixels = 0 if shape is None else shape[0] * shape[1] * shape[2]
         return cls(
@@ -46,10 +54,11 @@ class Labels:
             label=jnp.zeros((steps, worlds, action_size)),
             head=jnp.int32(0),
             size=jnp.int32(0),
+            recalled=jnp.zeros((steps, worlds, recalled)),
             starts=starts,
         )
 
-    def insert(self, seen: Seen, label: Float[Array, "t W n"]) -> Labels:
+    def insert(self, seen: Seen, label: Float[Array, "t W n"], recalled: Float[Array, "t W m"] | None = None) -> Labels:
         """With more steps in place of the oldest; their number must divide T."""
         count, capacity = label.shape[0], self.label.shape[0]
         assert capacity % count == 0, "steps are written without a seam"
@@ -62,36 +71,44 @@ class Labels:
             vector=put(self.vector, seen.vector),
             picture=put(self.picture, seen.picture),
             label=put(self.label, label),
+            recalled=self.recalled if recalled is None else put(self.recalled, recalled),
             head=(self.head + count) % capacity,
             size=jnp.minimum(self.size + count, capacity),
         )
 
-    def sample(self, key: Array, count: int) -> tuple[Seen, Float[Array, "B n"]]:
-        """So many steps, all equally likely."""
-        row_key, world_key = jax.random.split(key)
-        row = jax.random.randint(row_key, (count,), 0, jnp.maximum(self.size, 1))
-        world = jax.random.randint(world_key, (count,), 0, self.label.shape[1])
-        return Seen(self.vector[row, world], self.picture[row, world]), self.label[row, world]
+    def sample(self, key: Array, count: int) -> tuple[Seen, Float[Array, "B n"], Float[Array, "B m"]]:
+        """So many steps, all equally likely: what was seen, the label, and what was remembered."""
+        row, world = self._some(key, count)
+        seen = Seen(self.vector[row, world], self.picture[row, world])
+        return seen, self.label[row, world], self.recalled[row, world]
 
-    def told(self, key: Array, count: int) -> tuple[Float[Array, "B v"], Float[Array, "B n"]]:
+    def told(self, key: Array, count: int) -> tuple[Float[Array, "B v"], Float[Array, "B n"], Float[Array, "B m"]]:
         """So many steps without their pictures."""
+        row, world = self._some(key, count)
+        return self.vector[row, world], self.label[row, world], self.recalled[row, world]
+
+    def _some(self, key: Array, count: int) -> tuple[Int[Array, "B"], Int[Array, "B"]]:
         row_key, world_key = jax.random.split(key)
         row = jax.random.randint(row_key, (count,), 0, jnp.maximum(self.size, 1))
-        world = jax.random.randint(world_key, (count,), 0, self.label.shape[1])
-        return self.vector[row, world], self.label[row, world]
+        return row, jax.random.randint(world_key, (count,), 0, self.label.shape[1])
 
 
 class Imitation:
     """An actor that learns labels. All methods are pure.
 
     Attributes:
-      actor: the network.
+      actor: the network. recall: what it remembers; None: nothing.
     """
 
     def __init__(self, perception: Perception, action_size: int, config: Any, axis: str | None = None):
         """`config`: of cloning or DAgger. `axis`: the name of an axis of devices over which gradients are averaged."""
         guess = perception.hidden.size if perception.hidden and config.guess else 0
         shape = perception.picture_shape
+        self.recall: Recall | None = None
+        if getattr(config, "recall", 0):
+            assert perception.hidden is not None, "without pictures nothing is hidden"
+            poses = [k for parts in perception.hidden.poses.values() for part in parts for k in part]
+            self.recall = Recall(perception.actor_size, poses, perception.grips)
         self.actor = Actor(action_size, config.actor, shape, config.net, guess, config.choices, perception.objects)
         self._perception, self._weight, self._shift, self._axis = perception, config.guess, config.shift, axis
         self._adam = averaged_adam(10.0, axis)
@@ -99,7 +116,8 @@ class Imitation:
     def init(self, key: Array) -> tuple[Any, Any]:
         """Parameters and the optimiser's state, untrained."""
         seen, size = blank(self._perception, 1), self._perception.actor_size
-        params = self.actor.init(jnp.asarray(key), seen.vector[:, :size], seen.picture)["params"]
+        recalled = None if self.recall is None else self.recall.blank(1)
+        params = self.actor.init(jnp.asarray(key), seen.vector[:, :size], seen.picture, recalled=recalled)["params"]
         return params, self._adam.init(params)
 
     def loss(
@@ -109,22 +127,28 @@ class Imitation:
         seen: Seen,
         label: Float[Array, "L n"],
         key: Array,
-        told: tuple[Float[Array, "B v"], Float[Array, "B n"]] | None = None,
+        told: tuple[Float[Array, "B v"], Float[Array, "B n"], Float[Array, "B m"]] | None = None,
+        recalled: Float[Array, "L m"] | None = None,
     ) -> tuple[Array, dict[str, Array]]:
         """How far the actor is from the label ("actor_loss", see `heads.label_loss`; "label_error", the mean absolute
         difference of its action); with pictures, also its guess from the truth of what it cannot see.
 
         Args:
           seen: L samples that have labels, and any number that do not, of which only the guess is learnt.
-          told: more samples without their pictures, and their labels. The actor is told the truth there, with the
-            errors that its guesses have of some of `seen`.
+          told: more samples without their pictures, their labels, and what was remembered. The actor is told the
+            truth there, with the errors that its guesses have of some of `seen`.
+          recalled: what was remembered in the samples that have labels.
         """
         count, normal, found = label.shape[0], moments.normal(seen.vector), dict[str, Array]()
         picture, size = seen.picture, self._perception.actor_size
         if self._perception.picture_shape is not None:
             picture = shifted(picture, self._perception.picture_shape, key, self._shift)
         shake = {SHAKEN: jax.random.fold_in(key, 1)}
-        looked: Any = self.actor.apply({"params": params}, normal[:, :size], picture, rngs=shake)
+        if self.recall is not None:
+            none = jnp.zeros((len(picture) - count, self.recall.size))
+            recalled = none if recalled is None else jnp.concatenate([recalled, none])
+        known = self._recalled(moments, recalled)
+        looked: Any = self.actor.apply({"params": params}, normal[:, :size], picture, None, known, rngs=shake)
         head, _, guess = looked
         loss = jnp.float32(0)
         if count:
@@ -135,22 +159,61 @@ class Imitation:
             found["guess_loss"] = hidden.loss(guess, seen.vector, normal)
             loss += self._weight * found["guess_loss"]
             if told is not None:
-                vector, wanted = told
+                vector, wanted, kept = told
                 wrong = jax.lax.stop_gradient(guess - hidden(seen.vector, normal, guess.shape[-1]))[:count]
                 which = jax.random.randint(jax.random.fold_in(key, 2), wanted.shape[:1], 0, count)
                 own = moments.normal(vector)
                 belief = hidden(vector, own, guess.shape[-1]) + wrong[which]
                 none = jnp.zeros((len(wanted), 0), jnp.uint8)
-                looked = self.actor.apply({"params": params}, own[:, :size], none, belief)
+                looked = self.actor.apply(
+                    {"params": params}, own[:, :size], none, belief, self._recalled(moments, kept)
+                )
                 found["told_loss"] = label_loss(looked[0], wanted)
                 loss += found["told_loss"]
         return loss, found
 
+    def choose(
+        self,
+        params: Any,
+        moments: Moments,
+        seen: Seen,
+        kept: Float[Array, "W m"],
+        begins: Bool[Array, "W"],
+    ) -> tuple[Float[Array, "W n *K"], Float[Array, "W m"]]:
+        """What the actor's last layer says, and what it remembers from now on. `kept`: of the step before."""
+        vector = seen.vector[:, : self._perception.actor_size]
+        own = moments.normal(vector)
+        if self.recall is None:
+            looked: Any = self.actor.apply({"params": params}, own, seen.picture)
+            return looked[0], kept
+        known = self._recalled(moments, kept)
+        looked = self.actor.apply({"params": params}, own, seen.picture, None, known)
+        kept = self.recall.after(kept, begins, vector, looked[2])
+        looked = self.actor.apply(
+            {"params": params}, own, seen.picture[:, :0], looked[2], self._recalled(moments, kept)
+        )
+        return looked[0], kept
+
+    def _recalled(self, moments: Moments, kept: Float[Array, "B m"] | None) -> Float[Array, "B m"] | None:
+        """As the network takes it."""
+        if self.recall is None or kept is None:
+            return None
+        size = self._perception.actor_size
+        return self.recall.normal(kept, moments.mean[:size], jnp.sqrt(moments.var[:size] + 1e-4))
+
     def update(
-        self, learner: Any, seen: Seen, label: Float[Array, "L n"], key: Array, rate: Array, told: Any = None
+        self,
+        learner: Any,
+        seen: Seen,
+        label: Float[Array, "L n"],
+        key: Array,
+        rate: Array,
+        told: Any = None,
+        recalled: Float[Array, "L m"] | None = None,
     ) -> tuple[Any, dict[str, Array]]:
         """One update of a learner that has `actor`, `opt`, `moments` and `updates`; the rest as for `loss`."""
-        slope, found = jax.grad(self.loss, has_aux=True)(learner.actor, learner.moments, seen, label, key, told)
+        also = seen, label, key, told, recalled
+        slope, found = jax.grad(self.loss, has_aux=True)(learner.actor, learner.moments, *also)
         step, opt = self._adam.update(slope, learner.opt)
         actor = jax.tree.map(lambda a, s: a - rate * s, learner.actor, step)
         return dataclasses.replace(learner, actor=actor, opt=opt, updates=learner.updates + 1), found

@@ -196,9 +196,14 @@ class Actor(nn.Module):
 
     @nn.compact
     def __call__(
-        self, vector: Float[Array, "B x"], picture: UInt8[Array, "B q"], told: Float[Array, "B g"] | None = None
+        self,
+        vector: Float[Array, "B x"],
+        picture: UInt8[Array, "B q"],
+        told: Float[Array, "B g"] | None = None,
+        recalled: Float[Array, "B m"] | None = None,
     ) -> tuple[Float[Array, "B n *K"], Float[Array, "B n"], Float[Array, "B g"]]:
-        """`told`: in place of the guess, with `glimpses`; the picture is not looked at then."""
+        """`told`: in place of the guess, with `glimpses`; the picture is not looked at then. `recalled`: what the
+        actor's layers know besides (`ig2mj.learn.recall`)."""
         guessed = jnp.zeros((vector.shape[0], self.guess))
         if told is not None:
             guessed, vector = told, jnp.concatenate([vector, told], axis=-1)
@@ -208,6 +213,8 @@ class Actor(nn.Module):
                 guessed, features = self._guess(features, vector)
             known = jax.lax.stop_gradient((features, guessed)) if self.uses_guess else (features,)
             vector = jnp.concatenate([vector, *known], axis=-1)
+        if recalled is not None:
+            vector = jnp.concatenate([vector, recalled], axis=-1)
         x = Trunk((256,) if self.net == "paper" else self.sizes, name="trunk")(vector)
         small = nn.initializers.orthogonal(0.01)
         if self.choices:

@@ -25,6 +25,7 @@ from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError, UnknownNameError
 from ig2mj.learn.hidden import Hidden
 from ig2mj.learn.projection import Lens
+from ig2mj.learn.recall import grips_of
 
 MODES = ("state", "rgbd")
 
@@ -54,6 +55,7 @@ class Perception:
       picture_shape: height, width, channels; None without pictures.
       rows: the first row of the encoder's picture that is kept, and the first below those.
       hidden: what an actor with pictures can learn to guess; None where it sees everything.
+      grips: which numbers of the vector say whether a hand holds something.
     """
 
     def __init__(
@@ -64,13 +66,15 @@ class Perception:
         rows: tuple[int, int] | None = None,
         hidden_names: Sequence[str] = (),
         lens: Lens | None = None,
+        felt_names: Sequence[str] = (),
     ):
         """
         Args:
           spaces: of an environment (`Environment.observation_spaces`).
           size: pixels, height and width, to which pictures are averaged down. rows: of those that are kept; None: all.
           hidden_names: of the privileged state (`Environment.privileged_names`), for `hidden`. lens: the camera, from
-            which an actor learns where in the picture objects are.
+            which an actor learns where in the picture objects are. felt_names: of the numbers of `proprioception`
+            (`Environment.proprioception_names`), for `grips`.
 
         Raises:
           UnknownNameError: no such mode. Ig2mjError: the environment has no observation that the mode needs.
@@ -82,6 +86,7 @@ class Perception:
         self.vector_names = (*(n for n in flat if n != PRIVILEGED), *(n for n in flat if n == PRIVILEGED))
         self.sizes = tuple(spaces[name].shape[0] for name in self.vector_names)
         self.vector_size = sum(self.sizes)
+        self.grips = grips_of(self.vector_names, self.sizes, felt_names)
         hidden = self.sizes[-1] if mode == "rgbd" and PRIVILEGED in flat else 0
         self.actor_size = self.vector_size - hidden
         self._pictures = tuple(n for n in ("rgb", "depth") if n in spaces) if mode == "rgbd" else ()

@@ -23,13 +23,14 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.engine.view import Array
-from ig2mj.errors import InputError, PolicyMismatch
+from ig2mj.errors import Ig2mjError, InputError, PolicyMismatch
 from ig2mj.learn.checkpoints import refuse_difference
 from ig2mj.learn.heads import drawn as drawn_from
 from ig2mj.learn.heads import likeliest
-from ig2mj.learn.moments import Moments
+from ig2mj.learn.moments import LIMIT, Moments
 from ig2mj.learn.networks import Actor
 from ig2mj.learn.perception import SIZE, Perception
+from ig2mj.learn.recall import Recall
 
 FORMAT_VERSION = 1
 
@@ -111,6 +112,8 @@ class Policy:
             weights = {k: w for k, w in weights.items() if not k.startswith("guess/")}
         if algorithm.actor.choices:
             net["choices"] = algorithm.actor.choices
+        if getattr(algorithm, "recall", None) is not None:
+            net["recall"] = algorithm.recall.card()
         own = dict(depends)
         card = {"format": FORMAT_VERSION, "depends": own, "digest": digest(own), "net": net, **made}
         moments: Moments = jax.device_get(learner.moments)
@@ -165,14 +168,37 @@ class Policy:
         mark.update(np.asarray(self.mean, np.float32).tobytes() + np.asarray(self.deviation, np.float32).tobytes())
         return mark.hexdigest()
 
+    @property
+    def recall(self) -> Recall | None:
+        """What it remembers; None: nothing."""
+        card = self.card["net"].get("recall")
+        return None if card is None else Recall.of(card, len(self.mean))
+
     def actor(self, perception: Perception, *, drawn: bool = False) -> Any:
-        """A pure function from observations by name to actions [W, n].
+        """A pure function from observations by name to actions [W, n], of a policy that remembers nothing.
 
         Args:
           drawn: actions are drawn from the policy's distribution, and the function takes a key, too; else they are the
             middle of it, or the likeliest.
+
+        Raises:
+          Ig2mjError: it remembers something.
         """
-        depends, net = self.card["depends"], self.card["net"]
+        if self.recall is not None:
+            raise Ig2mjError("this policy remembers what it saw: its actions do not follow from what is seen now alone")
+        play = self.player(perception, drawn=drawn)
+
+        def act(obs: Mapping[str, Array], key: Array | None = None) -> Array:
+            worlds = next(iter(obs.values())).shape[0]
+            return play(obs, jnp.zeros((worlds, 0)), jnp.zeros(worlds, bool), key)[0]
+
+        return act
+
+    def player(self, perception: Perception, *, drawn: bool = False) -> Any:
+        """A pure function from observations by name, what is remembered [W, m], in which worlds an episode begins [W],
+        and a key where actions are `drawn`, to actions [W, n] and what is remembered from then on. m is 0 for a policy
+        that remembers nothing (`recall`)."""
+        depends, net, recall = self.card["depends"], self.card["net"], self.recall
         shape = depends["picture"] and tuple(depends["picture"])
         sizes, more = tuple(net["sizes"]), (net.get("guess", 0), net.get("choices", 0), net.get("objects", 0))
         network = Actor(len(depends["actions"]), sizes, shape, net["net"], *more)
@@ -180,17 +206,25 @@ class Policy:
         mean, deviation = jnp.asarray(self.mean), jnp.asarray(self.deviation)
         size = perception.actor_size
 
-        def act(obs: Mapping[str, Array], key: Array | None = None) -> Array:
+        def play(obs: Mapping[str, Array], kept: Array, begins: Array, key: Array | None = None) -> tuple[Array, Array]:
             seen = perception(obs)
-            own = jnp.clip((seen.vector[:, :size] - mean) / deviation, -10.0, 10.0)
-            found: Any = network.apply({"params": params}, own, seen.picture)
+            vector = seen.vector[:, :size]
+            own = jnp.clip((vector - mean) / deviation, -LIMIT, LIMIT)
+            found: Any
+            if recall is None:
+                found = network.apply({"params": params}, own, seen.picture)
+            else:
+                found = network.apply({"params": params}, own, seen.picture, None, recall.normal(kept, mean, deviation))
+                kept = recall.after(kept, begins, vector, found[2])
+                known = recall.normal(kept, mean, deviation)
+                found = network.apply({"params": params}, own, seen.picture[:, :0], found[2], known)
             head, log_std, _ = found
             if not drawn:
-                return likeliest(head)
+                return likeliest(head), kept
             assert key is not None, "a drawn action needs a key"
-            return drawn_from(head, log_std, key)
+            return drawn_from(head, log_std, key), kept
 
-        return act
+        return play
 
 
 def _flat(tree: Mapping[str, Any], before: str = "") -> dict[str, Any]:
