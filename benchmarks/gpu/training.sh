@@ -13,12 +13,13 @@
 # Below $OUT: the best and the last policy, progress.csv, evaluations.jsonl (the likeliest actions, then drawn ones) and
 # the log of each, copied while it trains. $MINUTES of training (5), $WORLDS, $ENGINE (warp), $FRACTION of a card's memory
 # that JAX takes for each training (0.26), $BATCH, $RATE (of learning), $CAPACITY, $STARTS and $LOOK: pictures of start
-# states, and updates of the guess on them.
+# states, and updates of the guess on them; $RECALL=0: actors remember nothing; $READY: seconds until training begins, at
+# most.
 set -u
 out=${OUT:-out/training}; mkdir -p "$out"
 minutes=${MINUTES:-5} engine=${ENGINE:-warp} fraction=${FRACTION:-0.26}
-pictures=(--set net=glimpses shift=0 actor=192,192 capacity="${CAPACITY:-500000}" batch="${BATCH:-512}")
-rates=(lr="${RATE:-2e-3}" last_lr=1e-4)
+pictures=(--set net=glimpses shift=0 actor=160,160 capacity="${CAPACITY:-500000}" batch="${BATCH:-512}")
+dagger=(lr="${RATE:-2e-3}" last_lr=1e-4 recall="${RECALL:-1}")
 
 sample() { nice -n 10 env JAX_PLATFORMS=cpu python3 -m ig2mj sample-task "$@" >> "$out/pools.txt" 2>&1; }
 
@@ -30,7 +31,7 @@ held() {  # NAME POLICY EPISODES WORDS...: adds a line of JSON
 
 learn() {  # NAME EPISODES WORDS...: trains, and plays so many held-out episodes with and without chance
   local name=$1 episodes=$2 run; shift 2; mkdir -p "$out/$name"; run=$(mktemp -d)
-  XLA_PYTHON_CLIENT_MEM_FRACTION=$fraction timeout $((${minutes%.*} * 60 + 200)) \
+  XLA_PYTHON_CLIENT_MEM_FRACTION=$fraction timeout $((${minutes%.*} * 60 + 60 + ${READY:-300})) \
     python3 -m ig2mj train "$@" --obs rgbd --engine "$engine" --out "$run/run" > "$out/$name/log.txt" 2>&1 &
   local job=$!
   while kill -0 $job 2> /dev/null; do sleep 5; cp "$run"/run/*.npz "$run/run/progress.csv" "$out/$name" 2> /dev/null; done
@@ -42,7 +43,7 @@ learn() {  # NAME EPISODES WORDS...: trains, and plays so many held-out episodes
 
 fruit() {  # NAME ROBOT ROWS WORDS...
   learn "$1" 1000 SlicingFruit --robot "$2" --rows "$3" --algo dagger --pixels 128 --worlds "${WORLDS:-2048}" \
-    --pool-size 4096 --mixed 200000 --minutes "$minutes" "${pictures[@]}" "${rates[@]}" starts="${STARTS:-49152}" look="${LOOK:-3000}" "${@:4}"
+    --pool-size 4096 --mixed 200000 --minutes "$minutes" "${pictures[@]}" "${dagger[@]}" starts="${STARTS:-49152}" look="${LOOK:-3000}" "${@:4}"
 }
 
 sight() {  # ROBOT ROWS NET: the guess alone, from start states
@@ -65,7 +66,7 @@ run() {
     humanoid) fruit fruit_humanoid humanoid 80:128 ;;
     fetch) fruit fruit_fetch fetch 60:108 ;;
     sight) for net in glimpses places; do sight humanoid 80:128 $net & sight fetch 60:108 $net & wait; done ;;
-    towel) towel towel_dagger --algo dagger "${pictures[@]}" "${rates[@]}" length=8 starts="${STARTS:-16384}" look="${LOOK:-3000}" opening=30 ;;
+    towel) towel towel_dagger --algo dagger "${pictures[@]}" "${dagger[@]}" length=8 starts="${STARTS:-16384}" look="${LOOK:-3000}" opening=30 ;;
     towel_sac)
       towel towel_sac --algo sac --expert --until 0.95 "${pictures[@]}" gamma=0.99 horizon=5 held=8 std=0.1 guided=0.6 copied=1 \
         copy=2 trust=1 reach=110 alpha=0.003 ;;
