@@ -42,6 +42,8 @@ def test_wrong_options_name_what_is_near(tmp_path, capsys):
         (["train", "CookingMeat", "--set", "updatez=3"], "updates"),
         (["train", "CookingMeat", "--algo", "bc"], "needs --demos"),
         (["train", "CookingMeat", "--algo", "bc", "--expert"], "--expert is for sac"),
+        (["train", "CookingMeat", "--begin-with", "CookingMeat"], "--begin-with is for --algo dagger"),
+        (["train", "CookingMeat", "--algo", "dagger", "--begin-with", "CookingMeet"], "near matches: CookingMeat"),
         (["train", "CookingMeat", "--programs", "3"], "--programs 3"),
         (["train", "CookingMeat", "--minutes", "nan"], "--minutes nan"),
         (["train", "CookingMeat", "--until", "7"], "--until 7.0: a share"),

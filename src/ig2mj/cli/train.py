@@ -31,6 +31,7 @@ def run(
     resume: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     demos: pathlib.Path | None = None,
     expert: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    begin_with: str | None = None,
     save_buffer: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     until: float | None = None,
     programs: int = 1,
@@ -61,6 +62,8 @@ def run(
       demos: file of `ig2mj demos collect`: bc learns from it alone; sac starts as its clone and keeps replaying it.
       expert: for sac: the task's scripted expert begins episodes and corrects the policy, less and less until 70 % of
         the run (--set guided=0.7).
+      begin_with: for dagger: a policy's file, a run's folder or the name of a policy that ships, whose networks are
+        trained further; give its settings with --set; recall=1 lets it remember what it did not before.
       save_buffer: also store the replay buffer in checkpoints; otherwise a resumed run first refills it.
       until: stop once this share of the last episodes succeeds, e.g. 0.98.
       programs: compiled programs per iteration: 1, or 2 to time simulation and learning separately.
@@ -91,6 +94,7 @@ def run(
     from ig2mj.learn.best import COUNTED, SUCCESS, Best
     from ig2mj.learn.checkpoints import Checkpoints
     from ig2mj.learn.demos import load_demos
+    from ig2mj.learn.going_on import further
     from ig2mj.learn.iteration import AXIS
     from ig2mj.learn.looking import look
     from ig2mj.learn.memory import is_out_of_memory, too_large
@@ -98,9 +102,13 @@ def run(
     from ig2mj.learn.perception import Perception
     from ig2mj.learn.policies import Policy, depends_on, world_of
     from ig2mj.learn.projection import lens_of
+    from ig2mj.learn.shipped import find_policy
     from ig2mj.learn.train import Run, train
 
     _check(algo, obs, minutes, videos, until, pixels, programs, devices, demos, expert, out)
+    if begin_with is not None and algo != "dagger":
+        raise Ig2mjError(f"--begin-with is for --algo dagger, not {algo}: a policy's file holds no critics")
+    former = None if begin_with is None else find_policy(begin_with)
     kept_rows = rows_of(rows, pixels)
     if algo == "bc":
         from ig2mj.cli.clone import train_from_demos
@@ -143,7 +151,15 @@ def run(
         if shown is not None:
             depends["demos"] = int(shown.reward.shape[0])
             learner = begin_as_clone(algorithm, shown, seed)
-        if getattr(config, "look", 0) and not (resume and Checkpoints(out).numbers()):
+        goes_on = resume and Checkpoints(out).numbers()
+        if former is not None:
+            if getattr(config, "look", 0):
+                raise Ig2mjError("--begin-with and --set look: a policy that training begins with has looked already")
+            policy = Policy.load(former)
+            policy.check(world, perception, former)
+            depends["begin_with"] = policy.weights_digest
+            learner = None if goes_on else further(algorithm, policy, seed, former)
+        elif getattr(config, "look", 0) and not goes_on:
             learner = look(algorithm, seed)
         device = jax.devices()[0]
         card = {

@@ -36,6 +36,9 @@ FORMAT_VERSION = 1
 
 CARD = "card.json"
 
+HIDDEN = ("hidden_mean", "hidden_deviation")
+"""Names in a file of the scales of what is guessed."""
+
 
 def world_of(env: Any) -> dict[str, Any]:
     """What an environment is, apart from what is seen of it, for JSON; of tests' environments there is less to say."""
@@ -86,13 +89,15 @@ class Policy:
 
     Attributes:
       card: "depends", "digest", "net", and how it was made ("command", "seed", "minutes", "device", "success", ...).
-      weights: by the path of the layer. mean, deviation: of what the actor sees.
+      weights: by the path of the layer. mean, deviation: of what the actor sees. hidden: those of what it guesses;
+        None where it does not.
     """
 
     card: dict[str, Any]
     weights: dict[str, Float[np.ndarray, "..."]]
     mean: Float[np.ndarray, "x"]
     deviation: Float[np.ndarray, "x"]
+    hidden: tuple[Float[np.ndarray, "h"], Float[np.ndarray, "h"]] | None = None
 
     @classmethod
     def of(cls, algorithm: Any, learner: Any, depends: Mapping[str, Any], made: Mapping[str, Any]) -> Policy:
@@ -103,7 +108,7 @@ class Policy:
         """
         config, size = algorithm.config, algorithm.perception.actor_size
         net: dict[str, Any] = {"net": config.net, "sizes": list(config.actor)}
-        weights = {k: np.asarray(v) for k, v in _flat(learner.actor).items()}
+        weights = {k: np.asarray(v) for k, v in flat(learner.actor).items()}
         if algorithm.actor.uses_guess:
             net["guess"] = algorithm.actor.guess
             if config.net == "glimpses":
@@ -117,8 +122,9 @@ class Policy:
         own = dict(depends)
         card = {"format": FORMAT_VERSION, "depends": own, "digest": digest(own), "net": net, **made}
         moments: Moments = jax.device_get(learner.moments)
-        deviation = np.sqrt(moments.var[:size] + 1e-4)
-        return cls(card, weights, np.asarray(moments.mean[:size]), np.asarray(deviation))
+        mean, deviation = np.asarray(moments.mean), np.sqrt(np.asarray(moments.var) + 1e-4)
+        hidden = (mean[size:], deviation[size:]) if algorithm.actor.uses_guess else None
+        return cls(card, weights, mean[:size], deviation[:size], hidden)
 
     def save(self, file: str | os.PathLike) -> None:
         """Writes it. Raises OSError."""
@@ -127,9 +133,10 @@ class Policy:
         beside = path.with_name(f".{os.getpid()}-{path.name}")
         with beside.open("wb") as f:
             card = np.frombuffer(json.dumps(self.card).encode(), np.uint8)
-            np.savez_compressed(
-                f, **{CARD: card, "mean": self.mean, "deviation": self.deviation, **half}  # pyright: ignore[reportArgumentType]
-            )  # fmt: skip
+            scales = {"mean": self.mean, "deviation": self.deviation}
+            if self.hidden is not None:
+                scales |= dict(zip(HIDDEN, self.hidden, strict=True))
+            np.savez_compressed(f, **{CARD: card, **scales, **half})  # pyright: ignore[reportArgumentType]
         beside.replace(path)
 
     @classmethod
@@ -140,6 +147,7 @@ class Policy:
                 card = json.loads(bytes(archive[CARD]).decode())
                 weights = {n[8:]: archive[n].astype(np.float32) for n in archive.files if n.startswith("weights/")}
                 mean, deviation = archive["mean"], archive["deviation"]
+                hidden = (archive[HIDDEN[0]], archive[HIDDEN[1]]) if HIDDEN[0] in archive.files else None
         except FileNotFoundError as e:
             raise InputError(file, "there is no such file") from e
         except Exception as e:  # numpy raises whatever a broken archive makes it stumble over
@@ -147,7 +155,7 @@ class Policy:
             raise InputError(file, f"is not a policy ({type(e).__name__})", fix=fix) from e
         if card.get("format") != FORMAT_VERSION:
             raise InputError(file, f"has format {card.get('format')}, and {FORMAT_VERSION} is what can be read")
-        return cls(card, weights, mean, deviation)
+        return cls(card, weights, mean, deviation, hidden)
 
     @property
     def observations(self) -> tuple[str, ...]:
@@ -202,7 +210,7 @@ class Policy:
         shape = depends["picture"] and tuple(depends["picture"])
         sizes, more = tuple(net["sizes"]), (net.get("guess", 0), net.get("choices", 0), net.get("objects", 0))
         network = Actor(len(depends["actions"]), sizes, shape, net["net"], *more)
-        params = jax.tree.map(jnp.asarray, _nested(self.weights))
+        params = jax.tree.map(jnp.asarray, nested(self.weights))
         mean, deviation = jnp.asarray(self.mean), jnp.asarray(self.deviation)
         size = perception.actor_size
 
@@ -227,16 +235,18 @@ class Policy:
         return play
 
 
-def _flat(tree: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+def flat(tree: Mapping[str, Any], before: str = "") -> dict[str, Any]:
+    """The leaves of nested dictionaries, by their paths."""
     found = {}
     for name, value in tree.items():
-        found |= _flat(value, f"{before}{name}/") if isinstance(value, Mapping) else {f"{before}{name}": value}
+        found |= flat(value, f"{before}{name}/") if isinstance(value, Mapping) else {f"{before}{name}": value}
     return found
 
 
-def _nested(flat: Mapping[str, Any]) -> dict[str, Any]:
+def nested(leaves: Mapping[str, Any]) -> dict[str, Any]:
+    """The other way round."""
     tree: dict[str, Any] = {}
-    for path, value in flat.items():
+    for path, value in leaves.items():
         *folders, name = path.split("/")
         place = tree
         for folder in folders:

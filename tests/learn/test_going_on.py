@@ -1,0 +1,60 @@
+"""Training that begins with a policy's networks (`ig2mj.learn.going_on`)."""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+from small_envs import SeenPointMass
+from test_recall import made
+
+from ig2mj.errors import InputError
+from ig2mj.learn.going_on import further
+from ig2mj.learn.moments import Moments
+from ig2mj.learn.policies import Policy
+
+
+@pytest.fixture(scope="module")
+def policy(tmp_path_factory):
+    """Of an actor that remembers nothing, as a file of it has it."""
+    algorithm = made(recall=0)
+    rng = np.random.default_rng(0)
+    samples = rng.normal(rng.normal(size=9), rng.uniform(0.5, 2.0, 9), (500, 9)).astype(np.float32)
+    learner = jax.jit(algorithm.init)(jax.random.PRNGKey(7))
+    learner = dataclasses.replace(learner, moments=Moments.initial(9).update(jnp.asarray(samples)))
+    file = tmp_path_factory.mktemp("policy") / "policy.npz"
+    Policy.of(algorithm, learner, {"actions": ["x", "y"], "picture": [16, 16, 4]}, {}).save(file)
+    return algorithm, learner, Policy.load(file)
+
+
+def test_an_actor_with_a_memory_first_does_what_the_policy_does(policy):
+    algorithm, learner, loaded = policy
+    remembers = made(recall=1)
+    begun = further(remembers, loaded, 0)
+    np.testing.assert_allclose(begun.moments.mean, learner.moments.mean, atol=1e-6)
+    np.testing.assert_allclose(begun.moments.var, learner.moments.var, rtol=1e-3)
+    seen = algorithm.perception({**SeenPointMass(4).reset(1).obs, "privileged_state": jnp.ones((4, 7))})
+    begins = np.ones(4, bool)
+    before, _ = jax.jit(algorithm._imitation.choose)(learner.actor, learner.moments, seen, jnp.zeros((4, 0)), begins)
+    kept = remembers.recall.blank(4)
+    after, kept = jax.jit(remembers._imitation.choose)(begun.actor, begun.moments, seen, kept, begins)
+    assert np.abs(np.asarray(kept)).max() > 0.01, "it remembers something"
+    np.testing.assert_allclose(after, before, atol=0.01, err_msg="half precision")
+    assert int(begun.updates) > 0, "it acts at once"
+
+
+def test_other_networks_and_files_without_scales_are_refused(policy):
+    _, _, loaded = policy
+    for settings, element in (({"actor": (16,)}, "trunk"), ({"choices": 0}, "choice"), ({"actor": (32, 32)}, "trunk")):
+        with pytest.raises(InputError, match="actor=32 choices=21") as found:
+            further(made(**settings), loaded, 0, "fruit.npz")
+        assert element in str(found.value) and "fruit.npz" in str(found.value)
+    with pytest.raises(InputError, match="scales"):
+        further(made(), dataclasses.replace(loaded, hidden=None), 0)
