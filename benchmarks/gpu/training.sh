@@ -8,6 +8,7 @@
 # by DAgger.  towel_sac: by SAC, which an expert begins for.  choices, mean: the humanoid's fruit for 120 s with choices
 # and with a Gaussian's mean.  sight: what the encoders tell of unseen start states, 60 s each; nobody acts.
 # shipped: three policies that ship, on Warp.
+# updates: of the clone alone, with their kernels.
 # speed: an evaluation of 1,000 worlds, then again with everything compiled (start_seconds, steps_per_second).
 #
 # Below $OUT: the best and the last policy, progress.csv, evaluations.jsonl (the likeliest actions, then drawn ones) and
@@ -78,7 +79,12 @@ run() {
     speed)
       for _ in cold warm; do EVAL_WORLDS=1000 held speed CookingMeat 1000; done
       cut -c1-600 "$out/speed/evaluations.jsonl" ;;
-    *) sed -n '2,17p' "$0"; exit 2 ;;
+    updates)
+      for batch in 256 512 1024; do
+        python3 benchmarks/learner.py --algo dagger --obs rgbd --pixels 128 --rows 80:128 --batch $batch --capacity 200000 --starts 16384 \
+          --seconds 5 --kernels 40 --set "${pictures[@]:1:3}" recall=1 >> "$out/updates.jsonl" 2>> "$out/updates.txt"
+      done ;;
+    *) sed -n '2,19p' "$0"; exit 2 ;;
   esac
 }
 
