@@ -15,11 +15,12 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from small_envs import FarReward, FarRewardThatEnds, PointMass
 
+from ig2mj.envs.observations import Space
 from ig2mj.learn import guidance
-from ig2mj.learn.collect import Advice
+from ig2mj.learn.collect import GUIDED, Advice
 from ig2mj.learn.dagger import Dagger, DaggerConfig
 from ig2mj.learn.guidance import guided, share, uncounted
-from ig2mj.learn.perception import Perception
+from ig2mj.learn.perception import Perception, Seen
 from ig2mj.learn.policies import Policy, depends_on
 from ig2mj.learn.ppo import PPO, PPOConfig
 from ig2mj.learn.sac import SAC, SACConfig
@@ -124,7 +125,7 @@ def test_the_success_that_is_reported_is_not_too_high_when_the_experts_help_ends
         handover = jnp.where(over, fresh, handover)
         wins = np.where(over, (rng.random(worlds) < 0.5) | (np.asarray(handover) > 0), wins)
         left = np.where(over, np.where(wins, rng.integers(5, 36, worlds), 200), left) - 1
-        apart, helpless = uncounted(handover, helpless, limit)
+        apart, helpless = uncounted(handover >= 0, helpless, jnp.round(limit) > 0)
         done = left == 0
         if step >= end - 200:
             counted.append(wins[done & ~np.asarray(apart)])
@@ -132,8 +133,38 @@ def test_the_success_that_is_reported_is_not_too_high_when_the_experts_help_ends
     assert abs(np.concatenate(counted).mean() - 0.5) < 0.06
     assert np.concatenate(naive).mean() > 0.6
     for _ in range(200):
-        apart, helpless = uncounted(handover, helpless, jnp.float32(0))
+        apart, helpless = uncounted(handover >= 0, helpless, jnp.bool_(False))
     assert not np.asarray(apart).any()
+
+
+def test_dagger_s_reported_success_is_not_too_high_when_the_expert_leaves():
+    """Of episodes without the expert half succeed, after 5 to 35 steps; the others take 200. With it all succeed."""
+    rng, worlds, leaves = np.random.default_rng(0), 1000, 600
+    perception = Perception({"proprioception": Space((2,), np.float32, -1.0, 1.0)})
+    algorithm = Dagger(perception, 1, None, DaggerConfig(actor=(4,), alone=0.6, choices=0))
+    learner, turns = algorithm.init(jax.random.PRNGKey(0)), algorithm.noise(worlds)
+    learner = dataclasses.replace(learner, updates=jnp.int32(1))
+    act, seen = jax.jit(algorithm.act), Seen(jnp.zeros((worlds, 2)), jnp.zeros((worlds, 0), jnp.uint8))
+    steps, wins = np.ones(worlds, int), rng.random(worlds) < 0.1
+    left = np.where(wins, 20, rng.integers(1, 201, worlds))  # some ended before, others not
+    counted, naive = [], []
+    for step in range(leaves + 100):
+        learner = dataclasses.replace(learner, progress=jnp.float32(step / 1000))
+        advice = Advice(jnp.asarray(steps), jnp.zeros((worlds, 1)))
+        _, extra, turns = act(learner, turns, seen, jax.random.PRNGKey(step), advice)
+        helped = np.asarray(turns.helped)
+        left = np.where(helped & ~wins, np.minimum(left, 20), left) - 1
+        wins |= helped
+        done, steps = left == 0, steps + 1
+        if step >= leaves - 200:
+            counted.append(wins[done & ~np.asarray(extra[GUIDED])])
+            naive.append(wins[done & ~helped])
+        steps = np.where(done, 0, steps)
+        wins = np.where(done, rng.random(worlds) < 0.5, wins)
+        left = np.where(done, np.where(wins, rng.integers(5, 36, worlds), 200), left)
+    # A little less than half: fewer and fewer of those that begin are of the tenth that counts, and successes are new.
+    assert 0.35 < np.concatenate(counted).mean() < 0.53
+    assert np.concatenate(naive).mean() > 0.62
 
 
 def test_the_expert_acts_up_to_the_handover_and_less_as_the_run_goes_on():

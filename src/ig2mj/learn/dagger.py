@@ -25,7 +25,7 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.collect import GUIDED, Advice, Hint, Transition, if_ready
-from ig2mj.learn.guidance import ALONE
+from ig2mj.learn.guidance import ALONE, uncounted
 from ig2mj.learn.heads import likeliest
 from ig2mj.learn.labels import Imitation, Labels
 from ig2mj.learn.moments import Moments, share_of
@@ -96,13 +96,14 @@ class Turns:
     """Who acts in each world: a number from 0 to 1; the expert, where its share is larger.
 
     `left`: steps until it is drawn anew. `alone`: the expert has no part in this episode. `helped`: it had one.
-    `recalled`: what the actor remembers.
+    `helpless`: steps since the expert's part ended. `recalled`: what the actor remembers.
     """
 
     draw: Float[Array, "W"]
     left: Int[Array, "W"]
     alone: Bool[Array, "W"]
     helped: Bool[Array, "W"]
+    helpless: Int[Array, "W"]
     recalled: Float[Array, "W m"]
 
 
@@ -195,16 +196,19 @@ class Dagger:
 
     def noise(self, num_worlds: int) -> Turns:
         """Before the first step."""
-        no, none = jnp.zeros(num_worlds, bool), jnp.zeros(num_worlds, bool)  # two: buffers are donated
+        # one for each, since buffers are donated
+        no, none = jnp.zeros(num_worlds, bool), jnp.zeros(num_worlds, bool)
+        zero, nought = jnp.zeros(num_worlds, jnp.int32), jnp.zeros(num_worlds, jnp.int32)
         nothing = jnp.zeros((num_worlds, self._remembers))
-        return Turns(jnp.zeros(num_worlds), jnp.zeros(num_worlds, jnp.int32), no, none, nothing)
+        return Turns(jnp.zeros(num_worlds), zero, no, none, nought, nothing)
 
     def act(
         self, learner: DaggerLearner, turns: Turns, seen: Seen, key: Array, advice: Advice
     ) -> tuple[Float[Array, "W n"], dict[str, Array], Turns]:
         """The expert's action in its worlds, the policy's in the others; a world's turn is up to 50 steps long.
 
-        A tenth of the episodes is the policy's alone from the first update on; success is reported of such episodes.
+        A tenth of the episodes is the policy's alone from the first update on; success is reported of those, and of all
+        once the longest episode has passed without the expert.
         """
         assert advice.label is not None, "DAgger needs an expert"
         c = self.config
@@ -224,8 +228,10 @@ class Dagger:
         action = jnp.where(expert[:, None], label, own_action)
         action = action + c.noise * jax.random.normal(noise_key, action.shape)
         action = jnp.where(wild[:, None], jax.random.uniform(any_key, action.shape, minval=-1.0), action)
-        extra = {"label": label, GUIDED: helped, **({RECALLED: recalled} if self._remembers else {})}
-        return jnp.clip(action, -1.0, 1.0), extra, Turns(draw, left, alone, helped, recalled)
+        # Of the episodes that begin alone as the expert's part ends the short ones end first, and those succeed.
+        apart, helpless = uncounted(~alone, turns.helpless, share > 0)
+        extra = {"label": label, GUIDED: helped | apart, **({RECALLED: recalled} if self._remembers else {})}
+        return jnp.clip(action, -1.0, 1.0), extra, Turns(draw, left, alone, helped, helpless, recalled)
 
     def learn(
         self,

@@ -57,14 +57,15 @@ def guided(
 
 
 def uncounted(
-    handover: Int[Array, "W"], helpless: Int[Array, "W"], limit: Float[Array, ""]
+    guided: Bool[Array, "W"], helpless: Int[Array, "W"], helps: Bool[Array, ""]
 ) -> tuple[Bool[Array, "W"], Int[Array, "W"]]:
     """Whether a running episode is left out of the success that is reported, and `helpless` after another step.
 
     All count once the activities' longest episode (`HORIZON`) has passed without help.
 
     Args:
-      helpless: steps of each world since the limit fell to 0.
+      guided: not one of those that are the policy's from the start. helpless: steps of each world since the help ended.
+      helps: it has not.
     """
-    helpless = jnp.where(jnp.round(limit) > 0, 0, helpless + 1)
-    return (handover >= 0) & (helpless <= HORIZON), helpless
+    helpless = jnp.where(helps, 0, helpless + 1)
+    return guided & (helpless <= HORIZON), helpless

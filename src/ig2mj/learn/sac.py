@@ -239,7 +239,7 @@ class SAC:
         limit = self.config.reach * share(learner.progress, self.config.guided)
         noise_key = jax.random.fold_in(key, 1)
         action, label, handover = guided(noise_key, action, advice, noise.handover, limit, self.config.disturbance)
-        apart, helpless = uncounted(handover, noise.helpless, limit)
+        apart, helpless = uncounted(handover >= 0, noise.helpless, jnp.round(limit) > 0)
         return action, {"label": label, GUIDED: apart}, Noise(value, left, handover, helpless)
 
     def _look(self, actor: Any, moments: Moments, seen: Seen, shake: Array | None = None) -> tuple[Array, Array, Array]:
