@@ -3,9 +3,11 @@
     python benchmarks/cold_start.py birch --worlds 4096 --cache /tmp/new          # cold: the folder must not exist
     python benchmarks/cold_start.py birch --worlds 4096 --cache /tmp/new --again  # warm
 
-A process of its own measures: imports, making the worlds, kernels (`WarpEngine.load_kernels`), start, first and second
-step. An engine loads its kernels when it is made; here that is a phase of its own. Kernels and XLA's programs are kept
-in the folder (IG2MJ_CACHE_DIR), and so is what CUDA's driver compiles.
+A process of its own measures: imports, JAX's devices, Warp's devices, the scene (of a home), making the worlds, kernels
+(`WarpEngine.load_kernels`), start, first and second step. An engine loads its kernels when it is made; here that is a
+phase of its own. `processor` has the processor time of the same phases, which is less where something else is waited
+for. Kernels and XLA's programs are kept in the folder (IG2MJ_CACHE_DIR), and so is what CUDA's driver compiles.
+`--devices-beside` lets JAX look for its devices in a thread while modules are imported.
 `missed` names the modules of Warp that no phase but a step compiled: there should be none.
 """
 
@@ -17,31 +19,54 @@ import os
 import pathlib
 import subprocess
 import sys
+import threading
 import time
 
 
-def measure(what: str, worlds: int, beforehand: bool, cache: pathlib.Path, meanwhile: bool = False) -> dict:
-    """Phases of this process, which began just now."""
-    times, names = [time.perf_counter()], []
+def measure(
+    what: str, worlds: int, beforehand: bool, cache: pathlib.Path, meanwhile: bool = False, beside: bool = False
+) -> dict:
+    """Phases of this process, which began just now. `beside`: see the module's text."""
+    times, spent, names = [time.perf_counter()], [time.process_time()], []
     modules: list[set[str]] = []
 
     def tick(name: str) -> None:
         times.append(time.perf_counter())
+        spent.append(time.process_time())
         names.append(name)
         modules.append({folder.name for folder in (cache / "warp").rglob("wp_*") if folder.is_dir()})
 
     import jax
     import numpy as np
 
+    from ig2mj.process import prepare_jax, prepare_warp
+
+    prepare_jax()
+    devices = threading.Thread(target=jax.devices)
+    if beside:
+        devices.start()
+
+    import warp as wp
+
     import ig2mj
     from ig2mj.engine.warp.engine import WarpEngine
     from ig2mj.envs.names import activity_name, short_name
 
     tick("imports")
+    if not beside:
+        devices.start()
+    devices.join()
+    tick("JAX's devices")
+    prepare_warp()
+    wp.init()
+    _ = wp.get_device().context
+    tick("Warp's devices")
     is_home = short_name(what) is None and activity_name(what) is None
     loading = "meanwhile" if meanwhile else False
     if is_home:
-        batch = ig2mj.Worlds(what, worlds, "warp", compile_beforehand=loading)
+        scene = ig2mj.load_scene(what)
+        tick("scene")
+        batch = ig2mj.Worlds(scene, worlds, "warp", compile_beforehand=loading)
         engine = batch.engine
     else:
         env = ig2mj.make(what, worlds=worlds, engine="warp", compile_beforehand=loading)
@@ -65,6 +90,7 @@ def measure(what: str, worlds: int, beforehand: bool, cache: pathlib.Path, meanw
             state = jax.block_until_ready(env.step_autoreset(state, action))
             tick(step)
     seconds = {name: round(end - begin, 2) for name, begin, end in zip(names, times, times[1:], strict=False)}
+    processor = {name: round(end - begin, 2) for name, begin, end in zip(names, spent, spent[1:], strict=False)}
     known = modules[names.index("kernels")] if "kernels" in names else None
     return {
         "what": what,
@@ -72,6 +98,8 @@ def measure(what: str, worlds: int, beforehand: bool, cache: pathlib.Path, meanw
         "beforehand": "meanwhile" if meanwhile else beforehand,
         "to_first_step_s": round(sum(v for k, v in seconds.items() if k != "second step"), 1),
         "seconds": seconds,
+        "processor": processor,
+        "devices_beside": beside,
         "modules": [len(m) for m in modules],
         "missed": None if known is None else sorted(modules[-1] - known),
         "cores": len(os.sched_getaffinity(0)),
@@ -87,12 +115,13 @@ def main() -> None:
     parser.add_argument("--again", action="store_true", help="with what an earlier run left there")
     parser.add_argument("--one-by-one", action="store_true", help="kernels as steps need them, one after the other")
     parser.add_argument("--meanwhile", action="store_true", help="kernels while XLA compiles, not before")
+    parser.add_argument("--devices-beside", action="store_true", help="JAX's devices while modules are imported")
     parser.add_argument("--label", default="", help="a remark for the row")
     parser.add_argument("--rows", type=pathlib.Path, help="the row is added to this file, as a JSON line")
     parser.add_argument("--inside", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.inside:
-        row = measure(args.what, args.worlds, not args.one_by_one, args.cache, args.meanwhile)
+        row = measure(args.what, args.worlds, not args.one_by_one, args.cache, args.meanwhile, args.devices_beside)
         print("ROW " + json.dumps(row), flush=True)
         return
     if args.cache.exists() and not args.again:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import dataclasses
 
+import jax.numpy as jnp
 import numpy as np
 
+from ig2mj.envs.actor import Actor
 from ig2mj.tasks.navigation.task import NAVIGATION
 
 
@@ -23,5 +25,20 @@ def column(env, state, *names):
 def drive(env, state):
     """Turns to the next point of the way, and drives on when it is ahead."""
     x, y = column(env, state, "ahead_x", "ahead_y").T
-    angle = np.arctan2(y, x)
-    return np.stack([np.where(np.abs(angle) < 0.5, 0.8, 0.0), np.clip(angle, -0.3, 0.3)], 1).astype(np.float32)
+    return _towards(x, y, np).astype(np.float32)
+
+
+def driver(env) -> Actor:
+    """Who drives so, on a pure engine many steps in one program."""
+    x, y = (env.privileged_names.index(name) for name in ("ahead_x", "ahead_y"))
+
+    def choose(obs, kept, begins, key):
+        seen = obs["privileged_state"]
+        return _towards(seen[:, x], seen[:, y], jnp), kept
+
+    return Actor(env, choose)
+
+
+def _towards(x, y, xp):
+    angle = xp.arctan2(y, x)
+    return xp.stack([xp.where(xp.abs(angle) < 0.5, 0.8, 0.0), xp.clip(angle, -0.3, 0.3)], 1)

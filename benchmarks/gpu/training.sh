@@ -10,6 +10,8 @@
 # shipped: three policies that ship, on Warp.
 # updates: of the clone alone, with their kernels.
 # speed: an evaluation of 1,000 worlds, then again with everything compiled (start_seconds, steps_per_second).
+# steps: what a step called from Python costs beside twenty in one program, and which CUDA graphs are captured anew; then
+# with graphs that copy what lies elsewhere. A minute each where kernels are compiled.
 #
 # Below $OUT: the best and the last policy, progress.csv, evaluations.jsonl (the likeliest actions, then drawn ones) and
 # the log of each, copied while it trains. $MINUTES of training (5), $WORLDS, $ENGINE (warp), $FRACTION of a card's memory
@@ -84,7 +86,14 @@ run() {
         python3 benchmarks/learner.py --algo dagger --obs rgbd --pixels 128 --rows 80:128 --batch $batch --capacity 200000 --starts 16384 \
           --seconds 5 --kernels 40 --set "${pictures[@]:1:3}" recall=1 >> "$out/updates.jsonl" 2>> "$out/updates.txt"
       done ;;
-    *) sed -n '2,19p' "$0"; exit 2 ;;
+    steps)
+      mkdir -p "$out/steps"
+      for mode in "" "--graph-mode WARP_STAGED"; do
+        timeout 150 python3 benchmarks/steps_from_python.py CookingMeat --worlds "${EVAL_WORLDS:-1000}" $mode \
+          --rows "$out/steps/rows.jsonl" >> "$out/steps/log.txt" 2>&1
+      done
+      cut -c1-600 "$out/steps/rows.jsonl" ;;
+    *) sed -n '2,20p' "$0"; exit 2 ;;
   esac
 }
 

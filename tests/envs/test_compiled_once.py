@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from navigating import small
 
 import ig2mj
+from ig2mj.envs.actor import Actor
+from ig2mj.envs.rollout import play
+from ig2mj.errors import ActionError
 from ig2mj.sensors.base import SensorOptions
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]
@@ -40,7 +44,7 @@ def compiled() -> Iterator[list[str]]:
 
 
 def test_starts_from_rows_are_one_program(env, compiled):
-    """They were 371, and two more each time: operations one by one, 30 s before the first step."""
+    """They were 371, operations one by one, and two more each time."""
     action = np.zeros((WORLDS, *env.action_space.shape), np.float32)
     state = env.start_from(np.arange(WORLDS))
     assert len(compiled) <= 3
@@ -52,3 +56,33 @@ def test_starts_from_rows_are_one_program(env, compiled):
     assert not compiled
     assert np.asarray(state.info["steps"]).tolist() == [2, 2]
     assert (np.asarray(state.obs["scan"]) < 1).any()
+
+
+def test_an_actor_takes_the_steps_that_python_would_take(env, compiled):
+    """Twenty in a program; worlds whose episodes are over wait, and what is remembered begins anew with an episode."""
+
+    def choose(obs, kept, begins, key):
+        kept = jnp.where(begins[:, None], 0.0, kept) + 0.01
+        ahead = jnp.abs(obs["task_obs"][:, 1]) < 0.5
+        noise = 0.1 * jax.random.uniform(key, (WORLDS,))
+        turn = jnp.clip(obs["task_obs"][:, 1], -0.3, 0.3) + noise + kept[:, 0]
+        return jnp.stack([jnp.where(ahead, 0.8, 0.0), turn], 1), kept
+
+    short = env.with_horizon(25)
+    actor, stepwise = Actor(short, choose, 1), Actor(short, choose, 1, seed=7)
+    by_python = play(short, lambda state: stepwise(state), 2, in_order=True)
+    by_program = play(short, actor.seeded(7), 2, in_order=True)
+    assert np.allclose(by_program.total, by_python.total, atol=1e-3)
+    assert by_program.success == by_python.success and by_program.steps == by_python.steps
+    assert 2 * 20 < by_program.steps <= 2 * 25
+    compiled.clear()
+    again = play(short, actor.seeded(8), 3, in_order=True, first=1)
+    assert not compiled
+    assert len(again.total) == len(again.success) == 3 and again.lifted_by_all is None
+    wrong = Actor(short, _not_finite, parameters=jnp.float32(jnp.nan))
+    with pytest.raises(ActionError, match="4 numbers of actions of PointNavigation are not finite"):
+        play(short, wrong, 2, in_order=True)
+
+
+def _not_finite(obs, kept, begins, key, much):
+    return jnp.full((WORLDS, 2), much), kept

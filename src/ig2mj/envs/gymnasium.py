@@ -12,6 +12,7 @@ All arrays are fresh in every step, never buffers that are used again.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
@@ -175,7 +176,8 @@ class GymVectorEnv(gymnasium.vector.VectorEnv):
 
 def _restarted(state: EnvState, over: np.ndarray) -> EnvState:
     """NEXT_STEP: the step of a world that was done before is its reset."""
-    return state.replace(  # pyright: ignore[reportAttributeAccessIssue]  flax adds it
+    return dataclasses.replace(
+        state,
         reward=np.where(over, 0.0, state.reward).astype(np.float32),
         terminated=np.asarray(state.terminated) & ~over,
         truncated=np.asarray(state.truncated) & ~over,

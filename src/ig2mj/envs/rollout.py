@@ -10,10 +10,11 @@ import math
 import time
 from collections.abc import Callable, Mapping
 
-import jax.numpy as jnp
+import jax
 import numpy as np
 
 from ig2mj.engine.view import Array
+from ig2mj.envs.actor import STEPS, Actor, Tally, ending, lifted_by_all, resting
 from ig2mj.envs.environment import Environment, EnvState
 
 Act = Callable[[EnvState], Array]
@@ -89,39 +90,31 @@ def _drawn(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | 
 
 def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None, start: int = 0) -> Played:
     size, worlds = env.core.starts.pool.size, env.num_worlds
-    success, in_hand, lifted, total = [], [], [], []
-    steps, pace, state, lifts = 0, Pace(), None, None
+    tallies, pace, state = list[Tally](), Pace(), None
     for first in range(0, episodes, worlds):
         state = env.start_from((start + first + np.arange(worlds)) % size, seed)
         _look(watch, state)
-        lifts = Lifts(state.info, worlds)
-        going, won, holding = np.ones(worlds, bool), np.zeros(worlds, bool), np.zeros(worlds, bool)
-        running = np.zeros(worlds)
-        while going.any():
-            state = env.step(state, resting(act(state), going))
-            _look(watch, state)
-            steps += worlds
-            running += np.where(going, np.asarray(state.reward), 0.0)
-            pace.stepped(worlds)
-            ends = going & np.asarray(state.done)
-            won |= ends & np.asarray(state.info["success"])
-            holding |= ends & np.asarray(state.info.get("success_in_hand", state.info["success"]))
-            lifts.see(state.info, np.asarray(state.done), going)
-            going &= ~ends
-        count = min(worlds, episodes - first)
-        success += won[:count].tolist()
-        in_hand += holding[:count].tolist()
-        lifted += (won & lifts.by_all)[:count].tolist()
-        total += running[:count].tolist()
-    assert state is not None and lifts is not None
-    return Played(success, in_hand, lifted if lifts.told else None, total, steps, pace.steps_per_second(), state)
+        tally = Tally.begun(state)
+        while tally.going.any():
+            before = int(tally.steps)
+            if isinstance(act, Actor) and env.pure and watch is None:
+                state, tally = act.several(state, tally, STEPS if pace.begun else 1)
+            else:
+                state = env.step(state, resting(act(state), tally.going))
+                _look(watch, state)
+                tally = tally.after(jax.device_get(ending(state)))
+            pace.stepped(worlds * (int(tally.steps) - before))
+        tallies.append(jax.device_get(tally))
 
+    def told(name: str) -> list:
+        return np.concatenate([getattr(tally, name) for tally in tallies])[:episodes].tolist()
 
-def resting(action: Array, going: np.ndarray) -> Array:
-    """Zeros where the episode is over. A world waits there for the others, and a policy that was trained up to the end
-    of episodes only would go on: a knife is pressed through the table with all force, until nothing is finite."""
-    where = np.where if isinstance(action, np.ndarray) else jnp.where
-    return where(going[:, None], action, np.float32(0.0))
+    assert state is not None
+    both = (
+        [won and by_all for won, by_all in zip(told("won"), told("by_all"), strict=True)] if tallies[0].told else None
+    )
+    steps = worlds * sum(int(tally.steps) for tally in tallies)
+    return Played(told("won"), told("in_hand"), both, told("total"), steps, pace.steps_per_second(), state)
 
 
 class Pace:
@@ -130,12 +123,17 @@ class Pace:
     def __init__(self) -> None:
         self._steps, self._began = 0, math.nan
 
+    @property
+    def begun(self) -> bool:
+        """A step was taken."""
+        return not math.isnan(self._began)
+
     def stepped(self, worlds: int) -> None:
-        """After a step of so many worlds, whose results are there."""
-        if math.isnan(self._began):
-            self._began = time.monotonic()
-        else:
+        """After a step of so many worlds, or steps of fewer, whose results are there."""
+        if self.begun:
             self._steps += worlds
+        else:
+            self._began = time.monotonic()
 
     def steps_per_second(self) -> float:
         """0 where there was one step at most."""
@@ -164,9 +162,9 @@ class Lifts:
         """
         if not self.told:
             return
-        off, held = np.array(info["off_floor"]), np.asarray(info["held_by_all"])
-        self.by_all = np.where(off & ~self._off & going, held, self.by_all)
-        self._off = off & ~done  # a new episode begins on the floor
+        now = {name: np.array(info[name]) for name in ("off_floor", "held_by_all")}
+        self.by_all = lifted_by_all(self.by_all, self._off, now, going)
+        self._off = now["off_floor"] & ~done  # a new episode begins on the floor
 
 
 def _look(watch: Watch | None, state: EnvState) -> None:

@@ -11,28 +11,22 @@ import math
 import pathlib
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-import jax
 import numpy as np
-from jaxtyping import UInt
 
 from ig2mj.cluster.work import Piece, WholeRunError
-from ig2mj.engine.view import Array
-from ig2mj.envs.environment import Environment, EnvState
+from ig2mj.envs.actor import Actor
+from ig2mj.envs.environment import Environment
 from ig2mj.envs.pieces import keep_pool
 from ig2mj.envs.registry import make
-from ig2mj.envs.rollout import Act, play
+from ig2mj.envs.rollout import play
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.policies import Policy, perception_of
 
-Choose = Callable[[Mapping[str, Array], Array, Array, UInt[np.ndarray, "2"]], tuple[Array, Array]]
-"""Actions [W, n] and what is remembered, from observations by name, what was remembered, in which worlds an episode
-begins, and a key (`Policy.player`)."""
 
-
-def acting(policy: Policy, env: Environment, file: object, *, drawn: bool = False, seed: int = 0) -> Act:
+def acting(policy: Policy, env: Environment, file: object, *, drawn: bool = False, seed: int = 0) -> Actor:
     """A policy as who acts in an environment.
 
     Args:
@@ -41,7 +35,10 @@ def acting(policy: Policy, env: Environment, file: object, *, drawn: bool = Fals
     Raises:
       InputError: the policy is for something else.
     """
-    return _with_keys(*_compiled(policy, env, file, drawn), seed)
+    perception = perception_of(policy, env.observation_spaces)
+    policy.check(env, perception, file)
+    remembers = 0 if policy.recall is None else policy.recall.size
+    return Actor(env, policy.player(perception, drawn=drawn), remembers, seed, policy.parameters())
 
 
 def summary(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -110,10 +107,10 @@ def evaluate_piece(
     try:
         keep_pool(shared, task, split, pool_size)
         made = (task, robot, grasping, engine, worlds, tuple(observations), paper_rl, split, pool_size)
-        env, choose, remembers = _player(shared["policy"], file, drawn, *made)
+        env, actor = _player(shared["policy"], file, drawn, *made)
     except Ig2mjError as e:
         raise WholeRunError(e) from e
-    played = play(env, _with_keys(choose, remembers, first // worlds), episodes, in_order=True, first=first)
+    played = play(env, actor.seeded(first // worlds), episodes, in_order=True, first=first)
     metrics = env.metrics(played.state)
     found = {"success": played.success, "success_in_hand": played.success_in_hand, "total": played.total}
     if played.lifted_by_all is not None:
@@ -138,9 +135,8 @@ def _player(
     paper_rl: bool,
     split: str,
     pool_size: int | None,
-) -> tuple[Environment, Choose, int]:
-    """What is played, who chooses, and how many numbers that remembers: the same in all pieces of an evaluation, so
-    that each is compiled once.
+) -> tuple[Environment, Actor]:
+    """What is played, and who acts: the same in all pieces of an evaluation, so that each is compiled once.
 
     Args:
       content: of the policy's file. The others: of `evaluate_piece`.
@@ -151,26 +147,4 @@ def _player(
         copy = pathlib.Path(folder) / "policy.npz"
         copy.write_bytes(content)
         policy = Policy.load(copy)
-    return env, *_compiled(policy, env, file, drawn)
-
-
-def _compiled(policy: Policy, env: Environment, file: object, drawn: bool) -> tuple[Choose, int]:
-    """Who chooses, and how many numbers that remembers. Raises InputError: the policy is for something else."""
-    perception = perception_of(policy, env.observation_spaces)
-    policy.check(env, perception, file)
-    choose = jax.jit(policy.player(perception, drawn=drawn))
-    return choose, 0 if policy.recall is None else policy.recall.size
-
-
-def _with_keys(choose: Choose, remembers: int, seed: int) -> Act:
-    """Who acts, with a key of that seed for each step, and remembers so many numbers of its episode."""
-    keys, kept = np.random.default_rng(seed), np.zeros((0, remembers), np.float32)
-
-    def act(state: EnvState) -> np.ndarray:
-        nonlocal kept
-        begins = np.asarray(state.info["steps"]) == 0
-        before = kept if len(kept) == len(begins) else np.zeros((len(begins), remembers), np.float32)
-        action, kept = choose(state.obs, before, begins, keys.integers(0, 2**32, 2, np.uint32))
-        return np.asarray(action)
-
-    return act
+    return env, acting(policy, env, file, drawn=drawn)

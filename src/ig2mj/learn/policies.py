@@ -205,16 +205,20 @@ class Policy:
     def player(self, perception: Perception, *, drawn: bool = False) -> Any:
         """A pure function from observations by name, what is remembered [W, m], in which worlds an episode begins [W],
         and a key where actions are `drawn`, to actions [W, n] and what is remembered from then on. m is 0 for a policy
-        that remembers nothing (`recall`)."""
+        that remembers nothing (`recall`).
+
+        It also takes `parameters` instead of the policy's own: as constants they would make another program of each
+        policy."""
         depends, net, recall = self.card["depends"], self.card["net"], self.recall
         shape = depends["picture"] and tuple(depends["picture"])
         sizes, more = tuple(net["sizes"]), (net.get("guess", 0), net.get("choices", 0), net.get("objects", 0))
         network = Actor(len(depends["actions"]), sizes, shape, net["net"], *more)
-        params = jax.tree.map(jnp.asarray, nested(self.weights))
-        mean, deviation = jnp.asarray(self.mean), jnp.asarray(self.deviation)
-        size = perception.actor_size
+        size, mine = perception.actor_size, self.parameters()
 
-        def play(obs: Mapping[str, Array], kept: Array, begins: Array, key: Array | None = None) -> tuple[Array, Array]:
+        def play(
+            obs: Mapping[str, Array], kept: Array, begins: Array, key: Array | None = None, parameters: Any = mine
+        ) -> tuple[Array, Array]:
+            params, mean, deviation = parameters
             seen = perception(obs)
             vector = seen.vector[:, :size]
             own = jnp.clip((vector - mean) / deviation, -LIMIT, LIMIT)
@@ -233,6 +237,10 @@ class Policy:
             return drawn_from(head, log_std, key), kept
 
         return play
+
+    def parameters(self) -> tuple[Any, Array, Array]:
+        """What was learned, as arrays of JAX: weights, and mean and deviation of what the network is told."""
+        return jax.tree.map(jnp.asarray, (nested(self.weights), self.mean, self.deviation))
 
 
 def flat(tree: Mapping[str, Any], before: str = "") -> dict[str, Any]:

@@ -40,7 +40,7 @@ class OneKernel:
           function: pure, of pytrees of arrays, always of the same shapes. compiler_options: of XLA.
         """
         self._function, self._options = function, dict(compiler_options or {})
-        self._call: Callable[..., Any] | None = None
+        self._call: Any = None  # made by `jax.jit`
         self.is_one = False
 
     def __call__(self, *arguments: Any) -> Any:
@@ -51,7 +51,7 @@ class OneKernel:
 
     def _cache_size(self) -> int:
         """How many programs were compiled; the name that JAX's own functions have for it."""
-        return 0 if self._call is None else self._call._cache_size()  # pyright: ignore
+        return 0 if self._call is None else self._call._cache_size()
 
     def _first(self, arguments: tuple[Any, ...]) -> Any:
         import jax

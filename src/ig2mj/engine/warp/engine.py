@@ -92,7 +92,7 @@ class WarpEngine(MjxEngine):
         if initial is None and not holds_everything(self.profile, scene.model):
             initial = settle(scene)
         super().__init__(scene, num_worlds, initial=initial, **options)
-        self._scratch = 0
+        self._scratch, self._launches = 0, list[kernels.Launch]()
         if own_device().platform == "gpu":  # on processors only some tests make steps
             self._get_ready(own_device(), compile_beforehand)
 
@@ -101,11 +101,11 @@ class WarpEngine(MjxEngine):
         device = wp.device_from_jax(gpu)
         counter = scratch.Counter(device.get_allocator())
         with wp.ScopedDevice(device):
-            launches = self.launches(counter)
+            self._launches = self.launches(counter)
         self._scratch = counter.block(self.num_worlds) if self.own_kernels else 0
         self.serve([gpu])
         if compile_beforehand:
-            loading = kernels.load_meanwhile(launches, device)
+            loading = kernels.load_meanwhile(self._launches, device)
             if compile_beforehand != "meanwhile":
                 loading.result()
 
@@ -120,7 +120,7 @@ class WarpEngine(MjxEngine):
         Args:
           workers: threads; None: one for each processor of this process.
         """
-        return kernels.load(self.launches(), workers=workers)
+        return kernels.load(self._launches or self.launches(), workers=workers)
 
     def launches(self, counter: scratch.Counter | None = None) -> list[kernels.Launch]:
         """The kernels of a step, of a forward pass and of the contact filter. `counter`: see `launches_of_step`."""

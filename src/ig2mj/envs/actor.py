@@ -1,0 +1,170 @@
+"""`Actor`: who acts by a pure function, such as a policy; and `Tally`, how episodes that run side by side end.
+
+On a pure engine an actor becomes part of the program that steps the worlds: many steps are one call, after which little
+is fetched. A step that is called from Python lets a GPU wait for Python.
+
+Axes: W worlds, n numbers of an action, m numbers that are remembered.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from flax import struct
+from jaxtyping import Bool, Float, Int, UInt
+
+from ig2mj.engine.view import Array
+from ig2mj.envs.environment import Environment
+from ig2mj.envs.state import EnvState
+from ig2mj.errors import ActionError
+from ig2mj.process.collector import Compiled
+
+STEPS = 20
+"""The most agent steps of one call."""
+
+Choose = Callable[..., tuple[Array, Array]]
+"""Actions [W, n] and what is remembered [W, m], from observations by name, what was remembered, in which worlds an
+episode begins [W], a key and, where an actor has them, parameters. Pure."""
+
+Ending = tuple[Array, Array, Array, dict[str, Array]]
+"""Reward, `terminated`, `truncated` and what a tally needs of `info`."""
+
+
+@struct.dataclass
+class Tally:
+    """How the first episodes of all worlds go on and end. All of it may be NumPy's, or traced.
+
+    Attributes:
+      going: not over yet. won, in_hand: success, and success in the hand. total: the return. steps: that were taken.
+      off, by_all: the object is off the floor, and both hands held it when it last left it; None where one hand acts.
+    """
+
+    going: Bool[Array, "W"]
+    won: Bool[Array, "W"]
+    in_hand: Bool[Array, "W"]
+    total: Float[Array, "W"]
+    steps: Int[Array, ""] | np.int32
+    off: Bool[Array, "W"] | None
+    by_all: Bool[Array, "W"] | None
+
+    @property
+    def told(self) -> bool:
+        """The environment tells who lifts the object."""
+        return self.by_all is not None
+
+    @classmethod
+    def begun(cls, state: EnvState) -> Tally:
+        """At the start of episodes."""
+        none = np.zeros(np.shape(state.reward), bool)
+        off = np.array(state.info["off_floor"]) if "off_floor" in state.info else None
+        return cls(~none, none, none, none.astype(np.float32), np.int32(0), off, None if off is None else none)
+
+    def after(self, ending: Ending) -> Tally:
+        """After a step of all worlds, of which those that were over count no more."""
+        reward, terminated, truncated, info = ending
+        ends, going = self.going & (terminated | truncated), self.going & ~(terminated | truncated)
+        off, by_all = self.off, self.by_all
+        if off is not None and by_all is not None:
+            off, by_all = info["off_floor"], lifted_by_all(by_all, off, info, self.going)
+        return Tally(
+            going,
+            self.won | (ends & info["success"]),
+            self.in_hand | (ends & info.get("success_in_hand", info["success"])),
+            self.total + reward * self.going,
+            self.steps + np.int32(1),
+            off,
+            by_all,
+        )
+
+
+def ending(state: EnvState) -> Ending:
+    """What a tally needs of a state."""
+    names = ("success", "success_in_hand", "off_floor", "held_by_all")
+    return state.reward, state.terminated, state.truncated, {n: state.info[n] for n in names if n in state.info}
+
+
+def lifted_by_all(by_all: Array, off: Array, info: Mapping[str, Array], going: Array) -> Array:
+    """Whether all hands held the object when it last left the floor, [W]: anew where it does so now.
+
+    Args:
+      by_all: what was found before. off: it was off the floor before. going: worlds that count; others keep it.
+    """
+    leaves = info["off_floor"] & ~off & going
+    return (leaves & info["held_by_all"]) | (~leaves & by_all)
+
+
+class Actor:
+    """Who acts in an environment by a pure function of observations and a key: an `ig2mj.envs.rollout.Act`."""
+
+    def __init__(self, env: Environment, choose: Choose, remembers: int = 0, seed: int = 0, parameters: Any = None):
+        """Nothing is compiled before it acts.
+
+        Args:
+          remembers: m. seed: of the keys.
+          parameters: last argument of `choose`, a pytree; None: it takes none. What differs between policies belongs
+            here: with other constants physics would be compiled anew.
+        """
+        self._env, self._choose = env, jax.jit(choose)
+        self._more = () if parameters is None else (parameters,)
+        self._several = Compiled(self._several_fn, donate_argnums=0)
+        self._random, self._kept = np.random.default_rng(seed), np.zeros((env.num_worlds, remembers), np.float32)
+
+    def seeded(self, seed: int) -> Actor:
+        """The same actor, whose keys begin anew."""
+        self._random = np.random.default_rng(seed)
+        return self
+
+    def __call__(self, state: EnvState) -> Array:
+        """Actions [W, n] of NumPy's."""
+        begins = np.asarray(state.info["steps"]) == 0
+        action, self._kept = self._choose(state.obs, self._kept, begins, self._keys(), *self._more)
+        return np.asarray(action)
+
+    def several(self, state: EnvState, tally: Tally, most: int = STEPS) -> tuple[EnvState, Tally]:
+        """Steps of a pure engine until all episodes are over, `most` and no more than `STEPS`. Uses up the state.
+
+        Raises:
+          ActionError: numbers of an action were not finite.
+        """
+        keys = np.zeros((STEPS, 2), np.uint32)
+        keys[:most] = self._keys(most)
+        given = (self._kept, keys, np.int32(most), *self._more)
+        state, tally, self._kept = self._several(state, tally, *given)
+        if count := int(np.asarray(state.bad_actions).sum()):
+            raise ActionError(f"{count} numbers of actions of {self._env.task.name} are not finite")
+        return state, tally
+
+    def _several_fn(
+        self,
+        state: EnvState,
+        tally: Tally,
+        kept: Float[Array, "W m"],
+        keys: UInt[Array, "s 2"],
+        most: Int[Array, ""] | np.int32,
+        *more: Any,
+    ) -> tuple[EnvState, Tally, Float[Array, "W m"]]:
+        def go_on(carry: Any) -> Bool[Array, ""]:
+            _, tally, _, k = carry
+            return tally.going.any() & (k < most)
+
+        def step(carry: Any) -> Any:
+            state, tally, kept, k = carry
+            action, kept = self._choose(state.obs, kept, state.info["steps"] == 0, keys[k], *more)
+            state = self._env.step_fn(state, resting(action, tally.going))
+            return state, tally.after(ending(state)), kept, k + 1
+
+        return jax.lax.while_loop(go_on, step, (state, tally, kept, jnp.int32(0)))[:3]
+
+    def _keys(self, *shape: int) -> UInt[np.ndarray, "... 2"]:
+        return self._random.integers(0, 2**32, (*shape, 2), np.uint32)
+
+
+def resting(action: Array, going: Bool[Array, "W"]) -> Array:
+    """Zeros where the episode is over. A world waits there for the others, and a policy that was trained up to the end
+    of episodes only would go on: a knife is pressed through the table with all force, until nothing is finite."""
+    where = np.where if isinstance(action, np.ndarray) else jnp.where
+    return where(going[:, None], action, np.float32(0.0))
