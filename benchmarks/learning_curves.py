@@ -43,6 +43,10 @@ PointNavigation and Reaching were trained on processors, the others on one H200,
 on the card ("sac+expert" alone). "Held out": of the mean actions of the last policy, on 1,000 start states that
 training never saw. With DAgger and with "sac+expert" (`--expert`) the scripted expert helps; the paper's runs had
 none. The DAgger runs here stopped too early, since success then counted episodes that the expert had a part in.
+"dagger_glimpses": three runs side by side on the card, cut off at second 410 of 450; until second 183 success is of
+the short episodes that ended first after the expert had left (minute two: 99 and 100 %), and what was played on
+held-out states are the policies of minute two. "dagger_glimpses_memory" goes on from the humanoid's last policy with
+`recall=1` on one core of a processor for 62 minutes; its held-out episodes were played with drawn actions (`--drawn`).
 SlicingFruit with `--expert`: the first run was cut off; "48_updates" has `guided=0.4 copied=0.25 reach=30 updates=48`;
 "trusted" `guided=0.4 copied=0.4 trust=1 reach=30 updates=48`; "rgbd64" the same with `--pixels 64`, cut off at second
 161. In these the peak after the expert's help has ended is one of counting: all worlds then begin alone at one moment,
