@@ -17,6 +17,7 @@ from ig2mj.cli import call
 from ig2mj.errors import InputError, PolicyMismatch, UnknownNameError
 from ig2mj.learn import shipped
 from ig2mj.learn.bc import BC, BCConfig
+from ig2mj.learn.evaluate import draws
 from ig2mj.learn.moments import Moments
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy, depends_of, world_of
@@ -136,3 +137,9 @@ def test_the_shell_lists_shows_and_adds(run, monkeypatch, capsys):
     monkeypatch.setattr(shipped, "shipped", lambda: {"CookingMeat-state": target / "CookingMeat-state.npz"})
     assert call(["policies", "list", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["CookingMeat-state"]["evaluation"]["episodes"] == 1000
+
+
+def test_who_plays_a_policy_draws_its_actions_where_its_success_is_of_drawn_ones():
+    found = {name: draws(Policy.load(shipped.find_policy(name))) for name in ("SlicingFruit", "GraspingBook")}
+    assert found == {"SlicingFruit": True, "GraspingBook": False}
+    assert not draws(made()), "it was not evaluated"

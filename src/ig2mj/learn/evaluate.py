@@ -26,11 +26,12 @@ from ig2mj.errors import Ig2mjError
 from ig2mj.learn.policies import Policy, perception_of
 
 
-def acting(policy: Policy, env: Environment, file: object, *, drawn: bool = False, seed: int = 0) -> Actor:
+def acting(policy: Policy, env: Environment, file: object, *, drawn: bool | None = None, seed: int = 0) -> Actor:
     """A policy as who acts in an environment.
 
     Args:
-      file: of the policy, for messages. drawn: see `Policy.actor`. seed: of drawn actions.
+      file: of the policy, for messages. seed: of drawn actions.
+      drawn: see `Policy.actor`; None: as the policy was evaluated, where it ships, else not.
 
     Raises:
       InputError: the policy is for something else.
@@ -38,7 +39,13 @@ def acting(policy: Policy, env: Environment, file: object, *, drawn: bool = Fals
     perception = perception_of(policy, env.observation_spaces)
     policy.check(env, perception, file)
     remembers = 0 if policy.recall is None else policy.recall.size
+    drawn = draws(policy) if drawn is None else drawn
     return Actor(env, policy.player(perception, drawn=drawn), remembers, seed, policy.parameters())
+
+
+def draws(policy: Policy) -> bool:
+    """Whether a policy ships with the success of drawn actions."""
+    return bool(policy.card.get("evaluation", {}).get("drawn"))
 
 
 def summary(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
