@@ -120,8 +120,7 @@ class Actor:
 
     def __call__(self, state: EnvState) -> Array:
         """Actions [W, n] of NumPy's."""
-        begins = np.asarray(state.info["steps"]) == 0
-        action, self._kept = self._choose(state.obs, self._kept, begins, self._keys(), *self._more)
+        action, self._kept = self._choose(state.obs, self._kept, begins(state), self._keys(), *self._more)
         return np.asarray(action)
 
     def several(self, state: EnvState, tally: Tally, most: int = STEPS) -> tuple[EnvState, Tally]:
@@ -153,7 +152,7 @@ class Actor:
 
         def step(carry: Any) -> Any:
             state, tally, kept, k = carry
-            action, kept = self._choose(state.obs, kept, state.info["steps"] == 0, keys[k], *more)
+            action, kept = self._choose(state.obs, kept, begins(state), keys[k], *more)
             state = self._env.step_fn(state, resting(action, tally.going))
             return state, tally.after(ending(state)), kept, k + 1
 
@@ -161,6 +160,12 @@ class Actor:
 
     def _keys(self, *shape: int) -> UInt[np.ndarray, "... 2"]:
         return self._random.integers(0, 2**32, (*shape, 2), np.uint32)
+
+
+def begins(state: EnvState) -> Bool[Array, "W"]:
+    """In which worlds what is observed is the first of an episode: after a start, and after a step that ended one where
+    the next begins by itself. Its `info` is then of the end."""
+    return (state.info["steps"] == 0) | state.terminated | state.truncated
 
 
 def resting(action: Array, going: Bool[Array, "W"]) -> Array:
