@@ -102,7 +102,7 @@ class BC:
             row_key, noise_key, shift_key = jax.random.split(key, 3)
             row = rows[jax.random.randint(row_key, (c.batch,), 0, rows.shape[0])]
             vector = demos.seen.vector[row]
-            deviation = jnp.sqrt(learner.moments.var + 1e-4)
+            _, deviation = learner.moments.scales(len(learner.moments.var))
             vector += c.noise * deviation * jax.random.normal(noise_key, vector.shape)
             seen = Seen(vector, demos.seen.picture[row])
             rate = jnp.asarray(optax.cosine_decay_schedule(c.lr, c.steps, c.last_lr / c.lr)(learner.updates))

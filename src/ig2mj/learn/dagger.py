@@ -137,9 +137,9 @@ class Dagger:
             raise Ig2mjError(f"starts={c.starts}: pictures of start states are for one device (--devices 1)")
         if c.look and starts is None:
             raise Ig2mjError(f"look={c.look}: there are no start states to look at (--set starts=4096)")
-        if (c.told or c.recall) and (c.net != "glimpses" or not perception.objects):
-            what = f"told={c.told}: only actors of pictures with net=glimpses can be told what is hidden"
-            raise Ig2mjError(what if c.told else f"recall={c.recall}: actors of pictures with net=glimpses remember")
+        for name, value in (("told", c.told), ("recall", c.recall)):
+            if value and (c.net != "glimpses" or not perception.objects):
+                raise Ig2mjError(f"{name}={value}: only for actors of pictures with net=glimpses, which guess")
         self._imitation = Imitation(perception, action_size, c, axis)
         self.actor = self._imitation.actor
 
@@ -168,12 +168,11 @@ class Dagger:
     ) -> tuple[DaggerLearner, dict[str, Array]]:
         """A learner whose guess has learnt from start states in `count` updates, and its losses. Not compiled."""
         c = self.config
-        alone = Imitation(self.perception, self.action_size, c)  # on one device
 
         def update(learner: DaggerLearner, key: Array) -> tuple[DaggerLearner, dict[str, Array]]:
             sample_key, shake_key = jax.random.split(key)
             seen, none = _some(starts, sample_key, c.batch), jnp.zeros((0, self.action_size))
-            return alone.update(learner, seen, none, shake_key, jnp.float32(c.lr))
+            return self._imitation.update(learner, seen, none, shake_key, jnp.float32(c.lr))
 
         learner, found = jax.lax.scan(update, learner, jax.random.split(key, count))
         return learner, jax.tree.map(jnp.mean, found)

@@ -55,10 +55,9 @@ def further(algorithm: Any, policy: Policy, seed: int, file: object = "the polic
             fix = "policies of now do: train it anew"
             raise InputError(file, "does not say in which scales it guesses what is hidden", fix=fix)
         mean, deviation = (np.concatenate(pair) for pair in zip((mean, deviation), policy.hidden, strict=True))
-    var = np.maximum(np.square(deviation) - 1e-4, 0.0)
-    moments = Moments(jnp.asarray(mean, jnp.float32), jnp.asarray(var, jnp.float32), jnp.float32(KNOWN))
     # One update lies behind it, so that it acts at once.
-    return dataclasses.replace(learner, actor=nested(new), moments=moments, updates=jnp.int32(1))
+    scales = Moments.of(mean, deviation, KNOWN)
+    return dataclasses.replace(learner, actor=nested(new), moments=scales, updates=jnp.int32(1))
 
 
 def _settings(policy: Policy) -> str:

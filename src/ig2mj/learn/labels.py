@@ -19,7 +19,7 @@ from ig2mj.learn.heads import label_loss, likeliest
 from ig2mj.learn.moments import Moments
 from ig2mj.learn.networks import SHAKEN, Actor, shifted
 from ig2mj.learn.perception import Perception, Seen, blank
-from ig2mj.learn.recall import Recall
+from ig2mj.learn.recall import Recall, looked
 
 
 @struct.dataclass
@@ -182,24 +182,18 @@ class Imitation:
     ) -> tuple[Float[Array, "W n *K"], Float[Array, "W m"]]:
         """What the actor's last layer says, and what it remembers from now on. `kept`: of the step before."""
         vector = seen.vector[:, : self._perception.actor_size]
-        own = moments.normal(vector)
-        if self.recall is None:
-            looked: Any = self.actor.apply({"params": params}, own, seen.picture)
-            return looked[0], kept
-        known = self._recalled(moments, kept)
-        looked = self.actor.apply({"params": params}, own, seen.picture, None, known)
-        kept = self.recall.after(kept, begins, vector, looked[2])
-        looked = self.actor.apply(
-            {"params": params}, own, seen.picture[:, :0], looked[2], self._recalled(moments, kept)
-        )
-        return looked[0], kept
+
+        def look(*given: Any) -> Any:
+            return self.actor.apply({"params": params}, *given)
+
+        said, kept = looked(look, self.recall, moments.scales(vector.shape[-1]), vector, seen.picture, kept, begins)
+        return said[0], kept
 
     def _recalled(self, moments: Moments, kept: Float[Array, "B m"] | None) -> Float[Array, "B m"] | None:
         """As the network takes it."""
         if self.recall is None or kept is None:
             return None
-        size = self._perception.actor_size
-        return self.recall.normal(kept, moments.mean[:size], jnp.sqrt(moments.var[:size] + 1e-4))
+        return self.recall.normal(kept, *moments.scales(self._perception.actor_size))
 
     def update(
         self,

@@ -18,6 +18,15 @@ LIMIT = 10.0
 """Normalized numbers are clipped to this."""
 
 
+FLOOR = 1e-4
+"""Added to variances, so that a number which never changes is not blown up."""
+
+
+def normal(values: Float[Array, "*b x"], mean: Float[Array, "x"], deviation: Float[Array, "x"]) -> Float[Array, "*b x"]:
+    """Numbers with mean 0 and deviation 1, within `LIMIT`."""
+    return jnp.clip((values - mean) / deviation, -LIMIT, LIMIT)
+
+
 @struct.dataclass
 class Moments:
     """Mean and variance of every number of a vector. `count`: how many samples they are of."""
@@ -45,9 +54,17 @@ class Moments:
 
     def normal(self, values: Float[Array, "*b x"]) -> Float[Array, "*b x"]:
         """The first x numbers of a vector with mean 0 and deviation 1; those that never change are 0."""
-        size = values.shape[-1]
-        deviation = jnp.sqrt(self.var[:size] + 1e-4)
-        return jnp.clip((values - self.mean[:size]) / deviation, -LIMIT, LIMIT)
+        return normal(values, *self.scales(values.shape[-1]))
+
+    def scales(self, size: int) -> tuple[Float[Array, "x"], Float[Array, "x"]]:
+        """Mean and deviation of the first x = `size` numbers."""
+        return self.mean[:size], jnp.sqrt(self.var[:size] + FLOOR)
+
+    @classmethod
+    def of(cls, mean: Float[Array, "v"], deviation: Float[Array, "v"], count: float) -> Moments:
+        """With these `scales`, as of so many samples."""
+        var = jnp.maximum(jnp.square(jnp.asarray(deviation, jnp.float32)) - FLOOR, 0.0)
+        return cls(jnp.asarray(mean, jnp.float32), var, jnp.float32(count))
 
 
 RARE = 500

@@ -27,10 +27,10 @@ from ig2mj.errors import Ig2mjError, InputError, PolicyMismatch
 from ig2mj.learn.checkpoints import refuse_difference
 from ig2mj.learn.heads import drawn as drawn_from
 from ig2mj.learn.heads import likeliest
-from ig2mj.learn.moments import LIMIT, Moments
+from ig2mj.learn.moments import Moments
 from ig2mj.learn.networks import Actor
 from ig2mj.learn.perception import SIZE, Perception
-from ig2mj.learn.recall import Recall
+from ig2mj.learn.recall import Recall, looked
 
 FORMAT_VERSION = 1
 
@@ -122,7 +122,7 @@ class Policy:
         own = dict(depends)
         card = {"format": FORMAT_VERSION, "depends": own, "digest": digest(own), "net": net, **made}
         moments: Moments = jax.device_get(learner.moments)
-        mean, deviation = np.asarray(moments.mean), np.sqrt(np.asarray(moments.var) + 1e-4)
+        mean, deviation = (np.asarray(a) for a in moments.scales(len(moments.mean)))
         hidden = (mean[size:], deviation[size:]) if algorithm.actor.uses_guess else None
         return cls(card, weights, mean[:size], deviation[:size], hidden)
 
@@ -218,19 +218,14 @@ class Policy:
         def play(
             obs: Mapping[str, Array], kept: Array, begins: Array, key: Array | None = None, parameters: Any = mine
         ) -> tuple[Array, Array]:
-            params, mean, deviation = parameters
+            params, *scales = parameters
             seen = perception(obs)
-            vector = seen.vector[:, :size]
-            own = jnp.clip((vector - mean) / deviation, -LIMIT, LIMIT)
-            found: Any
-            if recall is None:
-                found = network.apply({"params": params}, own, seen.picture)
-            else:
-                found = network.apply({"params": params}, own, seen.picture, None, recall.normal(kept, mean, deviation))
-                kept = recall.after(kept, begins, vector, found[2])
-                known = recall.normal(kept, mean, deviation)
-                found = network.apply({"params": params}, own, seen.picture[:, :0], found[2], known)
-            head, log_std, _ = found
+
+            def look(*given: Any) -> Any:
+                return network.apply({"params": params}, *given)
+
+            given = seen.vector[:, :size], seen.picture, kept, begins
+            (head, log_std, _), kept = looked(look, recall, (scales[0], scales[1]), *given)
             if not drawn:
                 return likeliest(head), kept
             assert key is not None, "a drawn action needs a key"

@@ -12,15 +12,15 @@ that are remembered.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, UInt8
 
 from ig2mj.engine.view import Array
-from ig2mj.learn.moments import LIMIT
+from ig2mj.learn.moments import LIMIT, normal
 
 GRIPS = ("is_grasping", "has_grasped", "grasp_0")
 """How names end of what a robot feels of whether a hand holds something."""
@@ -88,5 +88,28 @@ class Recall:
     ) -> Float[Array, "*b m"]:
         """For a network: what was felt with mean 0 and deviation 1, as guesses have anyway."""
         guesses, felt = jnp.split(kept, self._parts[1:], axis=-1)
-        felt = jnp.clip((felt - mean) / deviation, -LIMIT, LIMIT)
-        return jnp.concatenate([jnp.clip(guesses, -LIMIT, LIMIT), felt], axis=-1)
+        return jnp.concatenate([jnp.clip(guesses, -LIMIT, LIMIT), normal(felt, mean, deviation)], axis=-1)
+
+
+def looked(
+    look: Callable[..., Any],
+    recall: Recall | None,
+    scales: tuple[Float[Array, "x"], Float[Array, "x"]],
+    vector: Float[Array, "W x"],
+    picture: UInt8[Array, "W q"],
+    kept: Float[Array, "W m"],
+    begins: Bool[Array, "W"],
+) -> tuple[Any, Float[Array, "W m"]]:
+    """What an actor says that may remember something, and what it remembers from then on.
+
+    Args:
+      look: the actor (`networks.Actor`) with its weights. scales: mean and deviation of the vector, which is as it was
+        observed. kept, begins: see `Recall.after`; kept as it is without a `recall`.
+    """
+    own = normal(vector, *scales)
+    if recall is None:
+        return look(own, picture), kept
+    _, _, guess = look(own, picture, None, recall.normal(kept, *scales))
+    kept = recall.after(kept, begins, vector, guess)
+    # the guess is what it knows of the picture, which need not be looked at again
+    return look(own, picture[:, :0], guess, recall.normal(kept, *scales)), kept
