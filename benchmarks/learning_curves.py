@@ -38,6 +38,9 @@ PAPER = {
 }
 """Success in per cent of the bimanual humanoid with mittens, and of Fetch without them (appendix A.3)."""
 
+LONG = 20
+"""Minutes beyond which the axis is a logarithm's: most runs end within ten."""
+
 REMARK = """
 PointNavigation and Reaching were trained on processors, the others on one H200, from rgbd with another run beside them
 on the card ("sac+expert" alone). "Held out": of the mean actions of the last policy, on 1,000 start states that
@@ -156,6 +159,7 @@ def main() -> None:
     lines.append("|---|---|---|--:|--:|--:|--:|--:|--:|")
     for (environment, robot), runs in groups.items():
         figure, axes = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
+        axes.set_prop_cycle(color=plt.get_cmap("tab20").colors)  # pyright: ignore[reportAttributeAccessIssue]
         paper = PAPER.get(environment, (None, None))[0 if robot == "humanoid" else 1]
         for label, curve, unseen in runs:
             axes.plot([s / 60 for s, _, _ in curve], [p for _, _, p in curve], label=label, linewidth=1.4)
@@ -171,6 +175,8 @@ def main() -> None:
             )
         axes.set(xlabel="minutes of training (compilation apart)", ylabel="success, %", ylim=(-3, 103))
         axes.set_title(f"{environment}, {robot}", fontsize=10)
+        if axes.get_xlim()[1] > LONG:
+            axes.set_xscale("log")
         axes.legend(fontsize=7)
         figure.savefig(FOLDER / f"{environment}-{robot}.png", dpi=130)
         plt.close(figure)
