@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import itertools
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 from hand_world import HandWorld, Item, step
 
 from ig2mj.states import StateModel, initial_states
+from ig2mj.states.definitions import water
 from ig2mj.states.definitions.water import DROP_RADIUS, NUM_DROPS
 from ig2mj.states.definitions.wetness import set_soaked, soaked
+from ig2mj.states.relations.worklist import Worklist
 
 PLATE = (((0, 0, 0), (0.2, 0.2, 0.01)),)
 SINK = Item(
@@ -219,3 +222,41 @@ def test_table_a5_soaked_sets_the_level_to_the_threshold_or_zero():
 def test_a_nan_pose_catches_no_drop():
     _, history = _run(KITCHEN, [KITCHEN.view({"rag": (0, np.nan, 0.3)})] * 20)
     assert float(history[-1].wetness[0, 1]) == 0.0
+
+
+@pytest.mark.parametrize("search", [True, False])
+def test_drops_of_many_worlds_move_as_they_do_in_a_world_alone(monkeypatch, search):
+    """Eleven worlds, four at a time: in some no drop is out, in the others drops are above, on and beside a rag."""
+    rng, worlds = np.random.default_rng(0), 11
+    model, view = KITCHEN.model(), KITCHEN.view(worlds=worlds)
+    low, high = np.array([-0.5, -0.5, -0.2]), np.array([0.5, 0.5, 0.6])
+    rag = rng.uniform(low, high, (worlds, 3)).astype(np.float32)
+    view = view.replace(body_pos=np.array(view.body_pos).copy())
+    view.body_pos[:, 1 + KITCHEN.index["rag"]] = rag
+    drops = water.no_drops(worlds, 1)
+    shape = drops.active.shape
+    drops = drops.replace(
+        active=(rng.random(shape) < 0.6) & (np.arange(worlds) % 3 != 1)[:, None, None],
+        pos=rng.uniform(low, high, (*shape, 3)).astype(np.float32),
+        speed=rng.choice([0.0, 1.0, 8.0], shape).astype(np.float32),
+        age=rng.integers(0, 9, shape).astype(np.int32),
+    )
+    on = rng.random((worlds, 3)) < 0.5
+
+    class Searching(Worklist):
+        of = classmethod(lambda cls, mask, count: Worklist.of(mask, count, search))
+
+    monkeypatch.setattr(water, "Worklist", Searching)
+    monkeypatch.setattr(water, "WORLDS_AT_ONCE", 4)
+    together = jax.jit(water.update, static_argnums=0)(model, drops, view, on)
+    assert np.asarray(together[1]).any() and not np.asarray(together[1]).all()
+    for w in range(worlds):
+        one_drops, one_view = jax.tree.map(lambda a, w=w: a[w : w + 1], (drops, view))
+        alone = jax.jit(water.update, static_argnums=0)(model, one_drops, one_view, on[w : w + 1])
+        for name, a, b in zip(
+            ["active", "pos", "speed", "age", "waited", "running", "contacts"],
+            [*jax.tree.leaves(alone[0]), alone[1]],
+            [*jax.tree.leaves(together[0]), together[1]],
+            strict=True,
+        ):
+            np.testing.assert_array_equal(np.asarray(a)[0], np.asarray(b)[w], err_msg=f"{name} in world {w}")

@@ -13,6 +13,7 @@ Axes: K pieces, V points of the largest, N links.
 
 from __future__ import annotations
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
@@ -63,14 +64,32 @@ def core_boxes(
 
     `radius` None says that no piece is round. Gradients are finite, also of an upright cylinder.
     """
-    turned = rotation @ points
-    low, high = turned.min(-1), turned.max(-1)
+    low, high = _extent(rotation, points)
     if radius is None:
         return low, high
     xp = rotation.__array_namespace__()
     along = (rotation @ axis[..., None])[..., 0]
     reach = radius * xp.sqrt(xp.maximum(1.0 - along * along, EDGE_ON))
     return low - reach, high + reach
+
+
+def _extent(rotation: Float[AnyArray, "*b K 3 3"], points: Float[AnyArray, "K 3 V"]) -> Boxes:
+    """The least and the greatest coordinates of turned points.
+
+    In JAX point by point, so that no turned point is ever stored: of 585 pieces with 32 points each that would be
+    225 kB a world, written and read twice.
+    """
+    if isinstance(rotation, np.ndarray):
+        turned = rotation @ points
+        return turned.min(-1), turned.max(-1)
+    points = jax.lax.optimization_barrier(jnp.asarray(points, rotation.dtype))  # one array, not a constant a point
+    low = high = None
+    for v in range(points.shape[-1]):
+        x, y, z = (rotation[..., i] * points[:, None, i, v] for i in range(3))
+        turned = x + y + z
+        low = turned if low is None else jnp.minimum(low, turned)
+        high = turned if high is None else jnp.maximum(high, turned)
+    return low, high
 
 
 def turned_boxes(

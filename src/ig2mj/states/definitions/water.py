@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -33,6 +33,7 @@ from ig2mj.geometry.poses import quat_rotate_inverse
 from ig2mj.geometry.targets import RayTargets, fall_contact
 from ig2mj.scene.tables import LinkKind
 from ig2mj.states.model import StateModel
+from ig2mj.states.relations.worklist import Worklist
 from ig2mj.states.spec import EventStep, Saved, StateSpec, nothing_inherited
 
 if TYPE_CHECKING:
@@ -64,6 +65,18 @@ OLDEST = 2**30
 
 SINK_REACH = 0.1
 """Metres around a sink link that is a point, not a box: drops this near are taken."""
+
+WORLDS_AT_ONCE = 256
+"""Worlds whose drops are moved together: of a larger batch only those in which any is out."""
+
+
+class Poses(NamedTuple):
+    """What of the view drops fall on: poses of bodies and of annotated links, m, world frame."""
+
+    body_pos: Float[Array, "W B 3"]
+    body_quat: Float[Array, "W B 4"]
+    link_pos: Float[Array, "W L 3"]
+    link_quat: Float[Array, "W L 4"]
 
 
 @struct.dataclass
@@ -111,11 +124,15 @@ def update(
         return water, jnp.zeros((num_worlds, model.tables.num_objects), jnp.int32)
 
     emitting, waited = _emission(model, water)
-    moved, contacts = jax.lax.cond(
-        jnp.any(water.active),
-        lambda: _fall(model, water, view),
-        lambda: (water, jnp.zeros((num_worlds, model.tables.num_objects), jnp.int32)),
-    )
+    poses = Poses(*(jnp.asarray(getattr(view, name)) for name in Poses._fields))
+    if num_worlds <= WORLDS_AT_ONCE:
+        moved, contacts = jax.lax.cond(
+            jnp.any(water.active),
+            lambda: _fall(model, water, poses),
+            lambda: (water, jnp.zeros((num_worlds, model.tables.num_objects), jnp.int32)),
+        )
+    else:
+        moved, contacts = _fall_in_turns(model, water, poses)
     tap = jnp.asarray(view.link_pos)[:, parameters.water_link] - np.array([0.0, 0.0, SPAWN_BELOW], np.float32)
     switched = model.parameters.has("toggleable")[parameters.water_object]
     updated = WaterDrops(
@@ -143,7 +160,26 @@ def _emission(model: StateModel, water: WaterDrops) -> tuple[Bool[Array, "W C N"
     return emitting, jnp.where(due, 0, jnp.where(able, jnp.minimum(water.waited + 1, period), water.waited))
 
 
-def _fall(model: StateModel, water: WaterDrops, view: PhysicsView) -> tuple[WaterDrops, Int[Array, "W O"]]:
+def _fall_in_turns(model: StateModel, water: WaterDrops, poses: Poses) -> tuple[WaterDrops, Int[Array, "W O"]]:
+    """`_fall` of those worlds in which a drop is out, `WORLDS_AT_ONCE` at a time.
+
+    In a batch of thousands hardly any tap runs, while the drops of all worlds against all pieces are the dearest rule
+    of a home.
+    """
+    num_worlds, objects = water.active.shape[0], model.tables.num_objects
+    out = jnp.any(water.active, axis=(1, 2))
+    listed = Worklist.of(out, WORLDS_AT_ONCE)
+
+    def some(turn: Int[jax.Array, ""], done: tuple[WaterDrops, jax.Array]) -> tuple[WaterDrops, jax.Array]:
+        worlds = listed.places(turn * WORLDS_AT_ONCE)  # beyond the last: `num_worlds`, which reads any and writes none
+        own_water, own_poses = jax.tree.map(lambda a: a[jnp.minimum(worlds, num_worlds - 1)], (water, poses))
+        return jax.tree.map(lambda a, b: a.at[worlds].set(b, mode="drop"), done, _fall(model, own_water, own_poses))
+
+    turns = (jnp.sum(out) + WORLDS_AT_ONCE - 1) // WORLDS_AT_ONCE
+    return jax.lax.fori_loop(0, turns, some, (water, jnp.zeros((num_worlds, objects), jnp.int32)))
+
+
+def _fall(model: StateModel, water: WaterDrops, poses: Poses) -> tuple[WaterDrops, Int[Array, "W O"]]:
     """Moves the drops that are out, lands them, gives them back."""
     parameters, tables = model.parameters, model.tables
     dt = model.options.timestep
@@ -153,8 +189,8 @@ def _fall(model: StateModel, water: WaterDrops, view: PhysicsView) -> tuple[Wate
 
     reach = fall_contact(
         RayTargets.build(tables, objects),
-        view.body_pos,
-        view.body_quat,
+        poses.body_pos,
+        poses.body_quat,
         water.pos.reshape(num_worlds, -1, 3),
         fall.reshape(num_worlds, -1),
         inflate=DROP_RADIUS + TOUCHING,
@@ -168,8 +204,8 @@ def _fall(model: StateModel, water: WaterDrops, view: PhysicsView) -> tuple[Wate
     soaking = on & np.isfinite(parameters.wetness_soaked)
     gone = jnp.any(on & takes_back(model)[:, None, :], axis=-1)
     if model.paper:
-        gone |= jnp.any(soaking, axis=-1) | _in_sink(model, pos, view)
-        tap = jnp.asarray(view.link_pos)[:, parameters.water_link, 2]
+        gone |= jnp.any(soaking, axis=-1) | _in_sink(model, pos, poses)
+        tap = poses.link_pos[:, parameters.water_link, 2]
         gone |= ~(pos[..., 2] >= tap[..., None] - LOST_BELOW)
     moved = dataclasses.replace(
         water,
@@ -189,14 +225,14 @@ def takes_back(model: StateModel) -> Bool[np.ndarray, "C O"]:
     return own | parameters.has("waterSink") | parameters.has("waterSource")
 
 
-def _in_sink(model: StateModel, pos: Float[Array, "W C N 3"], view: PhysicsView) -> Bool[Array, "W C N"]:
+def _in_sink(model: StateModel, pos: Float[Array, "W C N 3"], poses: Poses) -> Bool[Array, "W C N"]:
     """Whether drops are at an annotated sink link (paper table A.3, DropletSinkLink)."""
     links = np.flatnonzero(model.tables.link_kind == LinkKind.WATER_SINK)
     if len(links) == 0:
         return jnp.zeros(pos.shape[:-1], bool)
-    offset = pos[..., None, :] - jnp.asarray(view.link_pos)[:, None, None, links]
+    offset = pos[..., None, :] - poses.link_pos[:, None, None, links]
     half = model.tables.link_half[links]
-    local = quat_rotate_inverse(jnp.asarray(view.link_quat)[:, None, None, links], offset)
+    local = quat_rotate_inverse(poses.link_quat[:, None, None, links], offset)
     within_box = jnp.all(jnp.abs(local) <= half + DROP_RADIUS, axis=-1)
     within_reach = jnp.sum(offset * offset, axis=-1) <= SINK_REACH**2
     return jnp.any(jnp.where(np.any(half > 0, axis=-1), within_box, within_reach), axis=-1)
