@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import functools
 import itertools
 
 import jax
@@ -231,11 +233,13 @@ def test_drops_of_many_worlds_move_as_they_do_in_a_world_alone(monkeypatch, sear
     model, view = KITCHEN.model(), KITCHEN.view(worlds=worlds)
     low, high = np.array([-0.5, -0.5, -0.2]), np.array([0.5, 0.5, 0.6])
     rag = rng.uniform(low, high, (worlds, 3)).astype(np.float32)
-    view = view.replace(body_pos=np.array(view.body_pos).copy())
-    view.body_pos[:, 1 + KITCHEN.index["rag"]] = rag
+    body_pos = np.array(view.body_pos)
+    body_pos[:, 1 + KITCHEN.index["rag"]] = rag
+    view = dataclasses.replace(view, body_pos=body_pos)
     drops = water.no_drops(worlds, 1)
     shape = drops.active.shape
-    drops = drops.replace(
+    drops = dataclasses.replace(
+        drops,
         active=(rng.random(shape) < 0.6) & (np.arange(worlds) % 3 != 1)[:, None, None],
         pos=rng.uniform(low, high, (*shape, 3)).astype(np.float32),
         speed=rng.choice([0.0, 1.0, 8.0], shape).astype(np.float32),
@@ -243,10 +247,7 @@ def test_drops_of_many_worlds_move_as_they_do_in_a_world_alone(monkeypatch, sear
     )
     on = rng.random((worlds, 3)) < 0.5
 
-    class Searching(Worklist):
-        of = classmethod(lambda cls, mask, count: Worklist.of(mask, count, search))
-
-    monkeypatch.setattr(water, "Worklist", Searching)
+    monkeypatch.setattr(water.Worklist, "of", functools.partial(Worklist.of, search=search))
     monkeypatch.setattr(water, "WORLDS_AT_ONCE", 4)
     together = jax.jit(water.update, static_argnums=0)(model, drops, view, on)
     assert np.asarray(together[1]).any() and not np.asarray(together[1]).all()

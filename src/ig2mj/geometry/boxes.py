@@ -80,15 +80,17 @@ def _extent(rotation: Float[AnyArray, "*b K 3 3"], points: Float[AnyArray, "K 3 
     225 kB a world, written and read twice.
     """
     if isinstance(rotation, np.ndarray):
-        turned = rotation @ points
-        return turned.min(-1), turned.max(-1)
+        stored = rotation @ points
+        return stored.min(-1), stored.max(-1)
     points = jax.lax.optimization_barrier(jnp.asarray(points, rotation.dtype))  # one array, not a constant a point
-    low = high = None
-    for v in range(points.shape[-1]):
+
+    def turned(v: int) -> Float[Array, "*b K 3"]:
         x, y, z = (rotation[..., i] * points[:, None, i, v] for i in range(3))
-        turned = x + y + z
-        low = turned if low is None else jnp.minimum(low, turned)
-        high = turned if high is None else jnp.maximum(high, turned)
+        return x + y + z
+
+    low = high = turned(0)
+    for v in range(1, points.shape[-1]):
+        low, high = jnp.minimum(low, turned(v)), jnp.maximum(high, turned(v))
     return low, high
 
 
