@@ -1,34 +1,45 @@
 """Seconds until the first step of a batch, by phase, and which kernels were compiled after those compiled beforehand.
 
-    python benchmarks/cold_start.py birch --worlds 4096 --cache /tmp/new          # cold: the folder must not exist
+    python benchmarks/cold_start.py birch --worlds 4096 --cache /tmp/new --both   # cold, then warm; a new folder
     python benchmarks/cold_start.py birch --worlds 4096 --cache /tmp/new --again  # warm
 
-A process of its own measures: imports, JAX's devices, Warp's devices, the scene (of a home), making the worlds, kernels
-(`WarpEngine.load_kernels`), start, first and second step. An engine loads its kernels when it is made; here that is a
-phase of its own. `processor` has the processor time of the same phases, which is less where something else is waited
-for. Kernels and XLA's programs are kept in the folder (IG2MJ_CACHE_DIR), and so is what CUDA's driver compiles.
-`--devices-beside` lets JAX look for its devices in a thread while modules are imported.
-`missed` names the modules of Warp that no phase but a step compiled: there should be none.
+A process of its own measures, from its start to the first step's result: interpreter, imports, JAX's devices, Warp's
+devices, the scene (of a home), making the worlds, start, first and second step. As for a user, kernels are compiled and
+loaded in threads from the making on, and the start waits for them; `kernels` has the seconds, since the process began,
+at which they were there. `--before` waits for them in the making. `processor` has the processor time of the phases, of
+all threads, which is less where something else is waited for, and more where threads work beside. `programs` has what
+JAX traced, lowered and compiled that took a twentieth of a second. Kernels and XLA's programs are kept in the folder
+(IG2MJ_CACHE_DIR), and so is what CUDA's driver compiles. `--devices-beside` lets JAX look for its devices in a thread
+while modules are imported. `--profile` writes what Python did in the main thread, which makes everything slower.
+`missed` names the modules of Warp that were compiled after the start: there should be none.
 """
 
 from __future__ import annotations
 
 import argparse
+import cProfile
+import functools
 import json
 import os
 import pathlib
+import pstats
 import subprocess
 import sys
 import threading
 import time
 
+BEGAN = "COLD_START_BEGAN"
+"""Variable with the time at which the process was started."""
 
-def measure(
-    what: str, worlds: int, beforehand: bool, cache: pathlib.Path, meanwhile: bool = False, beside: bool = False
-) -> dict:
-    """Phases of this process, which began just now. `beside`: see the module's text."""
-    times, spent, names = [time.perf_counter()], [time.process_time()], []
+
+def measure(what: str, worlds: int, beforehand: bool | str, cache: pathlib.Path, beside: bool = False) -> dict:
+    """Phases of this process. `beforehand`: `compile_beforehand` of the engine; `beside`: see the module's text."""
+    process_began = float(os.environ[BEGAN])
+    began = time.perf_counter() - (time.time() - process_began)
+    times, spent, names = [began], [0.0], []
     modules: list[set[str]] = []
+    kernels_there: list[float] = []
+    programs: list[tuple[str, str, float, float]] = []
 
     def tick(name: str) -> None:
         times.append(time.perf_counter())
@@ -36,16 +47,27 @@ def measure(
         names.append(name)
         modules.append({folder.name for folder in (cache / "warp").rglob("wp_*") if folder.is_dir()})
 
+    def note(event: str, duration_secs: float, **about: str | int) -> None:
+        if duration_secs > 0.05 and "/compile/" in event:
+            part = event.rsplit("/", 1)[1].removesuffix("_duration")
+            end = time.perf_counter() - began
+            programs.append((part, str(about.get("fun_name", "")), round(end, 2), round(duration_secs, 2)))
+
+    tick("interpreter")
+
     import jax
     import numpy as np
 
     from ig2mj.process import prepare_jax, prepare_warp
+    from ig2mj.process.imports import import_mjx
 
     prepare_jax()
+    jax.monitoring.register_event_duration_secs_listener(note)
     devices = threading.Thread(target=jax.devices)
     if beside:
         devices.start()
 
+    import_mjx()
     import warp as wp
 
     import ig2mj
@@ -62,20 +84,18 @@ def measure(
     _ = wp.get_device().context
     tick("Warp's devices")
     is_home = short_name(what) is None and activity_name(what) is None
-    loading = "meanwhile" if meanwhile else False
     if is_home:
         scene = ig2mj.load_scene(what)
         tick("scene")
-        batch = ig2mj.Worlds(scene, worlds, "warp", compile_beforehand=loading)
+        batch = ig2mj.Worlds(scene, worlds, "warp", compile_beforehand=beforehand)
         engine = batch.engine
     else:
-        env = ig2mj.make(what, worlds=worlds, engine="warp", compile_beforehand=loading)
+        env = ig2mj.make(what, worlds=worlds, engine="warp", compile_beforehand=beforehand)
         engine = env.core.engine
+    assert isinstance(engine, WarpEngine)
+    if engine.loading is not None:
+        engine.loading.add_done_callback(lambda _: kernels_there.append(round(time.perf_counter() - began, 2)))
     tick("making")
-    if beforehand and not meanwhile:
-        assert isinstance(engine, WarpEngine)
-        engine.load_kernels()
-        tick("kernels")
     if is_home:
         state = jax.block_until_ready(batch.start(0))
         tick("start")
@@ -91,14 +111,16 @@ def measure(
             tick(step)
     seconds = {name: round(end - begin, 2) for name, begin, end in zip(names, times, times[1:], strict=False)}
     processor = {name: round(end - begin, 2) for name, begin, end in zip(names, spent, spent[1:], strict=False)}
-    known = modules[names.index("kernels")] if "kernels" in names else None
+    known = None if engine.loading is None else modules[names.index("start")]
     return {
         "what": what,
         "worlds": worlds,
-        "beforehand": "meanwhile" if meanwhile else beforehand,
+        "beforehand": beforehand,
         "to_first_step_s": round(sum(v for k, v in seconds.items() if k != "second step"), 1),
         "seconds": seconds,
         "processor": processor,
+        "kernels": kernels_there[0] if kernels_there else None,
+        "programs": programs,
         "devices_beside": beside,
         "modules": [len(m) for m in modules],
         "missed": None if known is None else sorted(modules[-1] - known),
@@ -113,32 +135,52 @@ def main() -> None:
     parser.add_argument("--worlds", type=int, default=4096)
     parser.add_argument("--cache", type=pathlib.Path, required=True, help="folder for everything compiled")
     parser.add_argument("--again", action="store_true", help="with what an earlier run left there")
+    parser.add_argument("--both", action="store_true", help="cold, then again")
+    parser.add_argument("--before", action="store_true", help="kernels before the worlds are made, not beside XLA")
     parser.add_argument("--one-by-one", action="store_true", help="kernels as steps need them, one after the other")
-    parser.add_argument("--meanwhile", action="store_true", help="kernels while XLA compiles, not before")
     parser.add_argument("--devices-beside", action="store_true", help="JAX's devices while modules are imported")
+    parser.add_argument("--profile", type=pathlib.Path, help="a table of Python's functions goes to this file")
+    parser.add_argument("--patience", type=float, default=300, help="seconds after which the process is ended")
     parser.add_argument("--label", default="", help="a remark for the row")
     parser.add_argument("--rows", type=pathlib.Path, help="the row is added to this file, as a JSON line")
     parser.add_argument("--inside", action="store_true", help=argparse.SUPPRESS)
     args = parser.parse_args()
     if args.inside:
-        row = measure(args.what, args.worlds, not args.one_by_one, args.cache, args.meanwhile, args.devices_beside)
+        beforehand = False if args.one_by_one else (True if args.before else "meanwhile")
+        profile = cProfile.Profile()
+        measured = functools.partial(measure, args.what, args.worlds, beforehand, args.cache, args.devices_beside)
+        row = profile.runcall(measured) if args.profile else measured()
         print("ROW " + json.dumps(row), flush=True)
+        if args.profile:
+            with args.profile.open("w") as file:
+                for order in ("cumtime", "tottime"):
+                    pstats.Stats(profile, stream=file).sort_stats(order).print_stats(150)
         return
     if args.cache.exists() and not args.again:
         raise SystemExit(f"error: {args.cache} exists, so this would be no cold start; name another folder, or --again")
-    env = {**os.environ, "IG2MJ_CACHE_DIR": str(args.cache.resolve()), "CUDA_CACHE_PATH": str(args.cache / "cuda")}
+    cases = ["again"] if args.again else ["cold", "again"] if args.both else ["cold"]
+    for case in cases:
+        import results
+
+        results.keep_row(run(args.cache, args.patience) | {"case": case, "label": args.label}, args.rows)
+
+
+def run(cache: pathlib.Path, patience: float) -> dict:
+    """The row of a process that measures."""
+    env = {**os.environ, "IG2MJ_CACHE_DIR": str(cache.resolve()), "CUDA_CACHE_PATH": str(cache / "cuda")}
     env.pop("JAX_COMPILATION_CACHE_DIR", None)
     env.pop("WARP_CACHE_PATH", None)
-    began = time.time()
-    done = subprocess.run([sys.executable, *sys.argv, "--inside"], env=env, stdout=subprocess.PIPE, text=True)
-    line = next((line for line in done.stdout.splitlines() if line.startswith("ROW ")), None)
+    env[BEGAN] = repr(began := time.time())
+    command = [sys.executable, *sys.argv, "--inside"]
+    try:
+        printed = subprocess.run(command, env=env, stdout=subprocess.PIPE, timeout=patience).stdout
+        ended = True
+    except subprocess.TimeoutExpired as late:
+        printed, ended = late.stdout or b"", False
+    line = next((line for line in printed.decode().splitlines() if line.startswith("ROW ")), None)
     if line is None:
-        raise SystemExit(f"error: no row; the process ended with {done.returncode}")
-    row = json.loads(line[4:]) | {"case": "again" if args.again else "cold", "label": args.label}
-    row["process_s"] = round(time.time() - began, 1)
-    import results
-
-    results.keep_row(row, args.rows)
+        raise SystemExit("error: the process that measures has printed no row")
+    return json.loads(line[4:]) | {"process_s": round(time.time() - began, 1) if ended else None}
 
 
 if __name__ == "__main__":

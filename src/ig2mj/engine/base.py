@@ -119,8 +119,17 @@ class Engine(Protocol):
         """Makes ready for programs on other devices of this process, before they run: memory on each."""
         ...
 
+    def awaited(self) -> Physics | None:
+        """Shapes of what `reset` will return, while it would have to wait for something that is being compiled: there
+        is time to compile programs. None: it would wait for nothing."""
+        ...
+
     def reset(self) -> Physics:
-        """All worlds at the scene's initial state (its first keyframe, else its zero pose), everything awake."""
+        """All worlds at the scene's initial state (its first keyframe, else its zero pose), everything awake.
+
+        Raises:
+          EngineError: something that steps need could not be compiled.
+        """
         ...
 
     def first_world(self) -> tuple[Snapshot, PhysicsView]:

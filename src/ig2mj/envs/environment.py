@@ -107,7 +107,7 @@ class Environment:
             self._step = Compiled(self.step_fn, donate_argnums=0)
             self._reset = Compiled(self.reset_fn, donate_argnums=0)
             self._autoreset = Compiled(self.step_autoreset_fn, donate_argnums=0)
-            self._start = Compiled(self._start_fn, donate_argnums=0)
+            self._start: Any = Compiled(self._start_fn, donate_argnums=0)
             self._load, self._resume = Compiled(self._load_fn, donate_argnums=0), Compiled(self._begun)
         else:
             self._step, self._reset, self._start = self.step_fn, self.reset_fn, self._start_fn
@@ -205,6 +205,8 @@ class Environment:
         """
         if isinstance(seed, EnvState):
             return self._reset(seed, np.ones(self.num_worlds, bool) if mask is None else mask)
+        if (physics := self.core.engine.awaited()) is not None:
+            self._start.prepare(physics, as_seed(seed))
         with REST:
             return self._start(self.core.engine.reset(), as_seed(seed))
 

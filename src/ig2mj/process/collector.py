@@ -67,5 +67,19 @@ class Compiled:
         with REST:
             return self._compiled(*args, **kwargs)
 
+    def prepare(self, *args: Any) -> Any:
+        """Compiles it for arguments of such shapes (arrays or `jax.ShapeDtypeStruct`) and runs nothing.
+
+        A call with such arguments finds the program.
+
+        Returns:
+          Shapes of what the call will return.
+        """
+        import jax
+
+        with REST:
+            self._compiled.lower(*args).compile()
+            return jax.eval_shape(self._compiled, *args)
+
     def __getattr__(self, name: str) -> Any:
         return getattr(self._compiled, name)

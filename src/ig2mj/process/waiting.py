@@ -36,7 +36,8 @@ class Work:
 
 
 class Waiting:
-    """Work in progress, in any thread; a thread of its own tells of it while there is some."""
+    """Work in progress, in any thread; a thread of its own tells of it while there is some: of the latest piece of the
+    row, and of the latest that is a wait of its own."""
 
     def __init__(self) -> None:
         self._changed = threading.Condition()
@@ -86,12 +87,14 @@ class Waiting:
     def _tell_while_working(self) -> None:
         with self._changed:
             while self._works:
-                in_terminal, now, work = sys.stderr.isatty(), time.monotonic(), self._works[-1]
-                due = max(work.began + PATIENCE, self._told + (REDRAW if in_terminal else EVERY))
+                in_terminal, now = sys.stderr.isatty(), time.monotonic()
+                rows = [[w for w in self._works if w.in_row is in_row] for in_row in (True, False)]
+                works = [row[-1] for row in rows if row]
+                due = max(min(w.began for w in works) + PATIENCE, self._told + (REDRAW if in_terminal else EVERY))
                 if now < due:
                     self._changed.wait(due - now)
                     continue
-                line = f"{work.text()} ({now - work.began:.0f} s)"
+                line = "; ".join(f"{w.text()} ({now - w.began:.0f} s)" for w in works if now >= w.began + PATIENCE)
                 _write(f"\r{_cut(line)}\x1b[K" if in_terminal else f"{line}\n")
                 self._drawn, self._told = in_terminal, now
             self._thread = None

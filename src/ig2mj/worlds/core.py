@@ -97,10 +97,10 @@ class Core:
         self._chosen = jax.jit(chosen)
         if engine.pure:
             self.advance, self.grasp = Compiled(self.advance_fn), jax.jit(self.hands.act)
-            self._step = Compiled(self.step_fn, donate_argnums=0)
+            self._step: Any = Compiled(self.step_fn, donate_argnums=0)
             self._reset = Compiled(self.reset_fn, donate_argnums=0)
             self._rollout = Compiled(self._scanned, static_argnums=(2, 3), donate_argnums=(0, 1))
-            self._begin = Compiled(self.start_fn, donate_argnums=0)
+            self._begin: Any = Compiled(self.start_fn, donate_argnums=0)
             self._write = Compiled(self.write_fn, donate_argnums=0)
             self._load = Compiled(self.load_fn, donate_argnums=0)
             self._react = rules.step if rules is not None else self._no_rules
@@ -253,7 +253,14 @@ class Core:
 
         Args:
           seed: of everything random. first: global number of the first world, where a batch is a part of all worlds.
+
+        Raises:
+          EngineError: kernels of the engine could not be compiled.
         """
+        if (physics := self.engine.awaited()) is not None:
+            shape = (self.engine.num_worlds, len(self.controls.low))
+            action = jax.ShapeDtypeStruct(shape, jnp.float32) if self.controllers else None
+            self._step.prepare(self._begin.prepare(physics, seed, first), action)
         return self._begin(self.engine.reset(), seed, first)
 
     def start_fn(self, physics: Physics, seed: int | Int[Array, ""] = 0, first: int | Int[Array, ""] = 0) -> Batch:

@@ -34,6 +34,7 @@ from ig2mj.engine.snapshot import Snapshot, fitted, make_snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_jax
+from ig2mj.process.collector import Compiled
 from ig2mj.scene.scene import Scene
 
 
@@ -93,7 +94,7 @@ class MjxEngine(abc.ABC):
         except (NotImplementedError, ValueError) as e:
             raise EngineError(f"MJX ({self.name}) cannot run scene '{scene.name}': {e}") from e
         # One program each, not hundreds of little ones; and what several programs contain is traced once.
-        self._first = jax.jit(self._start_all)
+        self._first = Compiled(self._start_all)
         self._row = jax.jit(lambda physics, world: jax.tree.map(lambda a: a[world], self.snapshot(physics)))
         self._view = jax.jit(self._make_view)
         self._mapped = jax.jit(self._map, static_argnums=0)
@@ -133,6 +134,9 @@ class MjxEngine(abc.ABC):
 
     @abc.abstractmethod
     def serve(self, devices: Sequence[Any]) -> None: ...
+
+    @abc.abstractmethod
+    def awaited(self) -> MjxPhysics | None: ...
 
     def reset(self) -> MjxPhysics:
         """All worlds at the initial state."""

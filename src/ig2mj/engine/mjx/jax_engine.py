@@ -38,6 +38,9 @@ class JaxEngine(MjxEngine):
     def serve(self, devices: Sequence[Any]) -> None:
         """Nothing: a program finds its own memory."""
 
+    def awaited(self) -> None:
+        """See `Engine.awaited`."""
+
     def _host_model(self, model: mujoco.MjModel) -> mujoco.MjModel:
         own = super()._host_model(model)
         own.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_SLEEP)

@@ -202,6 +202,9 @@ class NativeEngine:
         self._shares = np.array_split(np.arange(num_worlds), self.threads)
         self._pool = ThreadPoolExecutor(self.threads, "ig2mj-native") if self.threads > 1 else None
 
+    def awaited(self) -> None:
+        """See `Engine.awaited`."""
+
     def reset(self) -> NativePhysics:
         """New worlds at the scene's initial state: its first keyframe, else the zero pose; everything awake."""
         arrays = self._working_arrays(self.num_worlds)

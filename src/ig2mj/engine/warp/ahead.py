@@ -76,5 +76,7 @@ def compile_for(launches: list[kernels.Launch], architecture: int, workers: int 
         finally:
             module.options["block_dim"] = usual
 
-    kernels.side_by_side(by_size, compile_module, workers, tiles.builder(kernels.not_made(launches), architecture))
+    kernels.side_by_side(
+        by_size, compile_module, workers, tiles.builder(kernels.not_made(launches), architecture, workers)
+    )
     return sum(map(len, by_size.values()))

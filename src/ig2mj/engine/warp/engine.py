@@ -7,6 +7,7 @@ sleeping state.
 
 from __future__ import annotations
 
+import concurrent.futures
 import functools
 import sys
 from collections.abc import Sequence
@@ -45,6 +46,7 @@ class WarpEngine(MjxEngine):
     Attributes:
       profile: sizes of its buffers.
       own_kernels: its programs run our functions in place of some of MuJoCo Warp's (`ig2mj.engine.warp.patches`).
+      loading: of its kernels, which may have ended; None: they are not loaded beforehand.
     """
 
     name = "warp"
@@ -60,7 +62,7 @@ class WarpEngine(MjxEngine):
         ls_iterations: int | None = None,
         print_overflow: bool = False,
         graph_mode: str | None = None,
-        compile_beforehand: bool | Literal["meanwhile"] = True,
+        compile_beforehand: bool | Literal["meanwhile"] = "meanwhile",
         **options: Any,
     ):
         """Makes an engine.
@@ -74,10 +76,13 @@ class WarpEngine(MjxEngine):
           graph_mode: how CUDA graphs of a step are kept, a name of `warp.JaxCallableGraphMode`: "WARP" captures a step
             anew wherever its buffers have other addresses, "WARP_STAGED" copies them to addresses that stay. None:
             MJX's choice, which is "WARP" on a GPU.
-          compile_beforehand: on a GPU compile and load all kernels of a step now, side by side (`load_kernels`);
-            "meanwhile": the same, but do not wait for them before the first step does; False: the first step does it,
-            one after the other.
+          compile_beforehand: on a GPU all kernels of a step are compiled and loaded, side by side. "meanwhile": this
+            begins now, and `reset` waits for the end, so that programs can be compiled in the same time (`awaited`);
+            True: it is waited for here; False: the first step does it, one after the other.
           print_overflow: let Warp print a line per overflowing world and step. The flags are kept in any case.
+
+        Raises:
+          EngineError: see `MjxEngine`; or a kernel cannot be compiled, which otherwise `reset` reports.
         """
         prepare_warp()
         _say_once_if_slow()
@@ -93,11 +98,13 @@ class WarpEngine(MjxEngine):
             initial = settle(scene)
         super().__init__(scene, num_worlds, initial=initial, **options)
         self._scratch, self._launches = 0, list[kernels.Launch]()
+        self.loading: concurrent.futures.Future[int] | None = None
         if own_device().platform == "gpu":  # on processors only some tests make steps
             self._get_ready(own_device(), compile_beforehand)
 
     def _get_ready(self, gpu: Any, compile_beforehand: bool | Literal["meanwhile"]) -> None:
         """Counts and takes the memory that steps need there, and loads their kernels."""
+        kernels.wait_for_others()
         device = wp.device_from_jax(gpu)
         counter = scratch.Counter(device.get_allocator())
         with wp.ScopedDevice(device):
@@ -105,9 +112,29 @@ class WarpEngine(MjxEngine):
         self._scratch = counter.block(self.num_worlds) if self.own_kernels else 0
         self.serve([gpu])
         if compile_beforehand:
-            loading = kernels.load_meanwhile(self._launches, device)
-            if compile_beforehand != "meanwhile":
-                loading.result()
+            self.loading = kernels.load_meanwhile(self._launches, device)
+        if compile_beforehand is True:
+            self._wait_for_kernels()
+
+    def _wait_for_kernels(self) -> None:
+        """Raises an EngineError, each time, where they could not be compiled or loaded."""
+        if self.loading is not None:
+            kernels.loaded(self.loading, self.scene.name)
+
+    def awaited(self) -> MjxPhysics | None:
+        """See `Engine.awaited`. Compiles the program of `reset`, which need not wait for kernels."""
+        if self.loading is None or self.loading.done():
+            return None
+        return self._first.prepare(self._template, self._initial)
+
+    def reset(self) -> MjxPhysics:
+        """All worlds at the initial state, when the kernels are there that steps from it need.
+
+        Raises:
+          EngineError: a kernel could not be compiled or loaded.
+        """
+        self._wait_for_kernels()
+        return super().reset()
 
     def serve(self, devices: Sequence[Any]) -> None:
         """See `Engine.serve`: takes the memory that steps need (`ig2mj.engine.warp.patches.scratch`)."""

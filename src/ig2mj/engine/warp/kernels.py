@@ -3,7 +3,8 @@
 MuJoCo Warp has a module for nearly every kernel, and Warp compiles a module when one of its kernels is first launched:
 one after the other, on one processor. Here a step is made of which only the launches are written down (`launches_of`);
 what they need is then compiled and loaded by as many threads as there are processors (`load`), while the caller goes on
-where it wants to (`load_meanwhile`): XLA's programs can be compiled in the same time.
+where it wants to (`load_meanwhile`): XLA's programs are compiled in the same time. The caller asks for the end, and is
+told of an error, before it runs anything on the device (`loaded`).
 """
 
 from __future__ import annotations
@@ -26,10 +27,14 @@ from ig2mj.engine.warp import patches, tiles
 from ig2mj.engine.warp.patches import scratch
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile
+from ig2mj.errors import EngineError
+from ig2mj.process.crew import ENDING, Crew, spawn
 from ig2mj.process.warp_repairs import AWAITED
 
 Launch = tuple[wp.Kernel, int]
 """A kernel, and the number of threads of its blocks."""
+
+_TURN = threading.Lock()
 
 DEFAULT_BLOCK = 256
 """Threads of a block where nobody says how many; Warp's."""
@@ -134,26 +139,26 @@ def load(launches: list[Launch], device: wp.Device | None = None, workers: int |
 def load_meanwhile(
     launches: list[Launch], device: wp.Device | None = None, workers: int | None = None
 ) -> concurrent.futures.Future[int]:
-    """As `load`, and returns at once. The first CUDA graph that is captured waits for the end; what could not be loaded
-    is loaded again by the launch that needs it, which reports why not.
+    """As `load`, and returns at once. Nothing that needs these kernels may run before `loaded` has returned; a CUDA
+    graph that is captured all the same waits for the end.
 
-    Begins when what was begun before has ended: names of modules are hashes, which change while others are built.
+    Begins when what was begun before has ended (`wait_for_others`).
     """
-    concurrent.futures.wait(list(AWAITED))
     on = wp.get_device(device)
-    by_size = modules_of(launches, one_thread=on.is_cpu)
-    # MJX's own has no kernels, but JAX's first call loads it.
-    by_size.setdefault(DEFAULT_BLOCK, []).append(wp.get_module(ffi.__name__))
+    with _TURN:
+        wait_for_others()
+        by_size = modules_of(launches, one_thread=on.is_cpu)
+        # MJX's own has no kernels, but JAX's first call loads it.
+        by_size.setdefault(DEFAULT_BLOCK, []).append(wp.get_module(ffi.__name__))
+        # Of what Warp itself compiles for: with PTX it may be an older one than the device's own (`Device.arch`).
+        architecture = on.get_cuda_compile_arch()
+        first = None if architecture is None else tiles.builder(not_made(launches), architecture, workers)
+        done: concurrent.futures.Future[int] = concurrent.futures.Future()
+        AWAITED.add(done)
 
     def load_module(module: wp.Module, sizes: list[int]) -> None:
         for size in sizes:
             wp.force_load(on, [module], block_dim=size, max_workers=1)
-
-    done: concurrent.futures.Future[int] = concurrent.futures.Future()
-
-    # Of what Warp itself compiles for: with PTX it may be an older one than the device's own (`Device.arch`).
-    architecture = on.get_cuda_compile_arch()
-    first = None if architecture is None else tiles.builder(not_made(launches), architecture)
 
     def load_all() -> None:
         try:
@@ -165,9 +170,29 @@ def load_meanwhile(
         finally:
             AWAITED.discard(done)
 
-    AWAITED.add(done)
-    threading.Thread(target=load_all, name="ig2mj-kernels", daemon=True).start()
+    spawn(load_all, "ig2mj-kernels")
     return done
+
+
+def wait_for_others() -> None:
+    """Returns when what other engines are loading is loaded, or has failed.
+
+    Names of modules are hashes, which change while others are built: no kernels may be made or hashed meanwhile.
+    """
+    concurrent.futures.wait(list(AWAITED))
+
+
+def loaded(loading: concurrent.futures.Future[int], scene: str) -> int:
+    """What `load_meanwhile` gave, when it has ended: how many modules were loaded.
+
+    Raises:
+      EngineError: a module could not be compiled or loaded, or the process ends.
+    """
+    try:
+        return loading.result()
+    except Exception as failure:
+        why = next(iter(str(failure).splitlines()), "") or type(failure).__name__
+        raise EngineError(f"the kernels of scene '{scene}' cannot be compiled for this GPU: {why}") from failure
 
 
 def side_by_side(
@@ -188,11 +213,11 @@ def side_by_side(
     convex = [module for module in sizes if "_ccd_" in module.name]
     plain = [module for module in sizes if module not in convex and sizes[module] == [DEFAULT_BLOCK]]
     last = [module for module in sizes if module not in convex and module not in plain]
-    with alone(), concurrent.futures.ThreadPoolExecutor(workers or len(os.sched_getaffinity(0))) as pool:
-        before = [pool.submit(first)] if first else []
-        jobs = [pool.submit(act, module, sizes[module]) for module in convex + plain]
+    with alone(), Crew(workers or len(os.sched_getaffinity(0)), "ig2mj-kernels") as crew:
+        before = [crew.submit(first)] if first else []
+        jobs = [crew.submit(act, module, sizes[module]) for module in convex + plain]
         concurrent.futures.wait(before)
-        for done in before + jobs + [pool.submit(act, module, sizes[module]) for module in last]:
+        for done in before + jobs + [crew.submit(act, module, sizes[module]) for module in last]:
             done.result()
 
 
@@ -222,7 +247,8 @@ def modules_of(launches: list[Launch], one_thread: bool = False) -> dict[int, li
 
 @contextlib.contextmanager
 def alone() -> Iterator[None]:
-    """Programs that start together compile in turn: the others find in the cache what the first has made."""
+    """Programs that start together compile in turn: the others find in the cache what the first has made. At the end of
+    the process nobody waits for a turn."""
     with contextlib.ExitStack() as stack:
         with contextlib.suppress(OSError, ImportError):  # where there are no such locks each compiles for itself
             import fcntl
@@ -231,5 +257,10 @@ def alone() -> Iterator[None]:
             folder = pathlib.Path(wp.config.kernel_cache_dir)
             folder.mkdir(parents=True, exist_ok=True)
             file = stack.enter_context((folder / ".compiling").open("a"))
-            fcntl.flock(file, fcntl.LOCK_EX)
+            while not ENDING.is_set():
+                try:
+                    fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    break
+                except BlockingIOError:
+                    ENDING.wait(0.05)
         yield

@@ -3,23 +3,27 @@
 A kernel that factorises a tile calls functions that Warp takes from NVIDIA's cuSOLVERDx. Each takes about two seconds,
 `birch` needs ten, and Warp makes them while it writes the first kernel that calls them, when no other kernel can be
 written. It keeps them in files of their own. So they are made first, beside the kernels that call none, and are found
-there; one after the other, since the library makes one at a time, whatever threads there are.
+there. The library makes one at a time in a process, whatever threads there are, so that each is made in its own.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import inspect
-import types
-from collections.abc import Callable, Iterable
+import json
+import os
+import pathlib
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 import warp as wp
 
 from ig2mj.engine.warp.patches.compact_solver import TILE
-
-FLOAT32 = 5
-"""cuSOLVERDx's number for single precision."""
+from ig2mj.process import tile_maker
+from ig2mj.process.crew import ENDING
 
 
 class Tile(NamedTuple):
@@ -67,45 +71,44 @@ def _blocked(threads: int) -> tuple[Tile, ...]:
     )
 
 
-def builder(launches: Iterable[tuple[wp.Kernel, int]], architecture: int) -> Callable[[], None]:
+def builder(
+    launches: Iterable[tuple[wp.Kernel, int]], architecture: int, workers: int | None = None
+) -> Callable[[], None]:
     """A function that puts what these kernels call into Warp's cache, where it is not there.
 
-    It calls a function of Warp's that is not public: where that is another one nothing is made, and kernels take
-    longer.
+    What cannot be made (the processes call a function of Warp's that is not public) is left to the kernel that needs
+    it: that takes longer, and reports what is wrong.
 
     Args:
-      architecture: compute capability times ten.
+      architecture: compute capability times ten. workers: processes at most; None: one for each processor.
     """
     tiles = tiles_of(launches)
+    folder = str(wp.config.kernel_cache_dir)
+    count = min(len(tiles), workers or len(os.sched_getaffinity(0)))
 
     def build() -> None:
-        for tile in tiles:
-            _build(tile, architecture)
+        orders = [{"folder": folder, "architecture": architecture, "tiles": tiles[k::count]} for k in range(count)]
+        with contextlib.suppress(OSError), contextlib.ExitStack() as stack:
+            makers = [stack.enter_context(_maker(order)) for order in orders]
+            while any(maker.poll() is None for maker in makers) and not ENDING.wait(0.02):
+                pass
 
     return build
 
 
-def _build(tile: Tile, architecture: int) -> None:
-    from warp._src import build  # private: used where it is as in the Warp that is known
-
-    nowhere: Any = types.SimpleNamespace(ltoirs={}, ltoirs_decl={}, fatbins={})
+@contextlib.contextmanager
+def _maker(order: dict[str, Any]) -> Iterator[subprocess.Popen]:
+    """A process that makes tiles; it is ended with the block. It needs no GPU, and gets none."""
+    command = [sys.executable, "-m", tile_maker.__name__]
+    nothing = subprocess.DEVNULL
+    cache = str(pathlib.Path(order["folder"]).parent)  # Warp adds its version
+    environment = {**os.environ, "CUDA_VISIBLE_DEVICES": "", "WARP_CACHE_PATH": cache}
+    maker = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=nothing, stderr=nothing, env=environment)
     try:
-        build.build_lto_solver(
-            tile.rows,
-            tile.columns,
-            1,
-            tile.name,
-            tile.function,
-            tile.side,
-            tile.diagonal,
-            tile.first,
-            tile.second,
-            tile.triangle,
-            architecture,
-            FLOAT32,
-            tile.threads,
-            "",
-            nowhere,
-        )
-    except Exception:  # whatever it is, the kernel that needs the tile will meet and report it
-        return
+        assert maker.stdin is not None
+        maker.stdin.write(json.dumps(order).encode())
+        maker.stdin.close()
+        yield maker
+    finally:
+        maker.kill()
+        maker.wait()
