@@ -2,7 +2,7 @@
 
 Points are spread evenly by area over the outside of the collision pieces of all bodies of the object, where the surface
 does not face down by more than 45 degrees below the horizontal: iGibson's limit of 135 degrees to the vertical
-(iGibson's particles.py).
+(iGibson's particles.py). Floors take them on top alone: their sides are under the house.
 """
 
 from __future__ import annotations
@@ -20,6 +20,9 @@ from ig2mj.states.particles import NUM_PARTICLES
 
 STEEPEST = np.cos(np.deg2rad(135.0))
 """Smallest z of a normal that takes a particle."""
+
+TOP = np.cos(np.deg2rad(45.0))
+"""The same of floors."""
 
 TRIES = 40
 """Points drawn for each particle wanted."""
@@ -40,6 +43,7 @@ def sample_places(
 ) -> SurfacePlaces:
     """Draws the places of all particles of one object as it stands in a world; fewer are valid where few exist."""
     found: list[tuple[int, np.ndarray, np.ndarray]] = []
+    least = TOP if tables.object_is_floor[obj] else STEEPEST
     surfaces = object_surfaces(tables, obj)
     if surfaces:
         areas = np.array([s.area for s in surfaces.values()])
@@ -51,7 +55,7 @@ def sample_places(
                 sample_surface(surface, int(count), rng), *shape, tables.piece_pos[k], tables.piece_quat[k]
             )
             up = sample.normals @ matrices_on_host(np.asarray(view.body_quat)[world, [body]])[0, 2]
-            found += [(body, p, n) for p, n, z in zip(sample.points, sample.normals, up, strict=True) if z >= STEEPEST]
+            found += [(body, p, n) for p, n, z in zip(sample.points, sample.normals, up, strict=True) if z >= least]
     order = rng.permutation(len(found))[:NUM_PARTICLES]
     body, pos = np.zeros((1, NUM_PARTICLES), np.int32), np.zeros((1, NUM_PARTICLES, 3), np.float32)
     normal, valid = np.zeros_like(pos), np.zeros((1, NUM_PARTICLES), bool)

@@ -16,6 +16,7 @@ import mujoco
 from ig2mj.errors import InputError, UnknownNameError, without_lines
 from ig2mj.scene.additions import Addition, add_objects
 from ig2mj.scene.build_tables import build_tables
+from ig2mj.scene.floors import deepen_floors
 from ig2mj.scene.grasp_equalities import add_grasp_equalities
 from ig2mj.scene.manifest import AgentEntry, Manifest, ObjectEntry, load_manifest
 from ig2mj.scene.paths import MANIFEST_FILE, SHIPPED_HOMES, model_file
@@ -101,6 +102,7 @@ class Scene:
             spec = _spec_from_text(add_objects(file, own, [a.wanted for a in self.additions])[0], file)
         else:
             spec = read_spec(file)
+        deepen_floors(spec, self.manifest)
         _attach_all(self.agents, spec, self.manifest)
         return spec
 
@@ -134,12 +136,13 @@ def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: S
     folder = file.parent
     manifest = load_manifest(folder / MANIFEST_FILE)
     additions: list[Addition] = []
-    spec = None
     if objects:
         text, manifest, additions = add_objects(file, manifest, objects)
         spec = _spec_from_text(text, file)
+    else:
+        spec = read_spec(file)
+    deepen_floors(spec, manifest)
     if agents:
-        spec = spec or read_spec(file)
         manifest = copy.copy(manifest)
         manifest.agents = [*manifest.agents, *_attach_all(agents, spec, manifest)]
     model = _compile(spec, file, generated=bool(objects))
@@ -180,9 +183,9 @@ def _spec_from_text(text: str, file: pathlib.Path) -> mujoco.MjSpec:
         raise _not_mjcf(file, without_lines(e)) from e
 
 
-def _compile(spec: mujoco.MjSpec | None, file: pathlib.Path, generated: bool) -> mujoco.MjModel:
+def _compile(spec: mujoco.MjSpec, file: pathlib.Path, generated: bool) -> mujoco.MjModel:
     try:
-        return mujoco.MjModel.from_xml_path(str(file)) if spec is None else spec.compile()
+        return spec.compile()
     except (ValueError, OSError) as e:
         raise _not_mjcf(file, without_lines(e) if generated else e) from e
 

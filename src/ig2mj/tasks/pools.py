@@ -32,7 +32,7 @@ from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.tasks.task import Task
 from ig2mj.worlds.pool import Pool, load_pool, save_pool, stack
 
-VERSION = 2
+VERSION = 3
 """Of the rules by which pools of tasks are made. Raise it when the sampler's results change."""
 
 SEEDS = {"train": 1_000_003, "held_out": 2_000_003}

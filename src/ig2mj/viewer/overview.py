@@ -34,7 +34,7 @@ def home_overview(scene: Scene, data: mujoco.MjData, azimuth: float = 90.0, elev
         half = np.array([_world_half_size(scene.model, data, g) for g in floors.tolist()])
         low[:2] = np.min(data.geom_xpos[floors] - half, axis=0)[:2]
         high[:2] = np.max(data.geom_xpos[floors] + half, axis=0)[:2]
-        low[2] = float(np.min(data.geom_xpos[floors, 2]))
+        low[2] = float(np.min((data.geom_xpos[floors] + half)[:, 2]))  # the surface of the lowest
         high[2] = min(high[2], low[2] + 3.0)  # one storey
     x, y, z = ((low + high) / 2).tolist()
     return FreeView((x, y, z), DISTANCE_IN_RADII * float(np.linalg.norm(high - low)) / 2, azimuth, elevation)

@@ -1,0 +1,37 @@
+"""Dust and stains lie where they can be seen and wiped: of floors on the surface alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import ig2mj
+from ig2mj.engine.registry import make_engine
+from ig2mj.sampling.surface_particles import sample_places
+
+
+@pytest.fixture(scope="module")
+def home():
+    scene = ig2mj.load_scene("small_home")
+    engine = make_engine("native", scene, 1)
+    return scene, engine.view(engine.reset())
+
+
+def normals(home, name: str, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Places and normals of an object's particles, in its body's frame, which is not turned."""
+    scene, view = home
+    places = sample_places(scene.tables, view, scene.object_index(name), np.random.default_rng(seed))
+    assert places.valid.all()
+    return places.pos[0], places.normal[0]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_floors_are_dusty_on_top_and_not_on_their_deep_sides(home, seed):
+    pos, normal = normals(home, "floors", seed)
+    assert np.abs(pos[:, 2]).max() < 1e-6
+    assert np.allclose(normal, [0, 0, 1])
+
+
+def test_sides_of_furniture_are_dusty_too(home):
+    _, normal = normals(home, "fridge_0", 0)
+    assert (np.abs(normal[:, 2]) < 0.1).any()
