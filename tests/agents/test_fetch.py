@@ -110,6 +110,20 @@ def test_base_head_and_gripper(tiny_home_folder):
     assert upright[2] > 0.999
 
 
+def test_a_pinned_base_stays_where_it_is_while_the_arm_works(tiny_home_folder):
+    """Free, it rocks on its wheels and turns as the arm is swung aside."""
+    moved = []
+    for pinned in (False, True):
+        world = RobotWorld(tiny_home_folder, Fetch(pos=START, proprioception="experiments", pinned=pinned))
+        before = np.r_[world.body("fetch"), world.quat("fetch")]
+        world.act(times=10, eef_y=1, eef_x=-1, forward=0.3)
+        world.act(times=10, eef_y=-1, eef_z=1)
+        moved.append(np.abs(np.r_[world.body("fetch"), world.quat("fetch")] - before).max())
+        felt = world.proprioception()
+        assert len(felt) == 49 and np.isfinite(list(felt.values())).all()
+    assert moved[0] > 0.05 and moved[1] == 0.0
+
+
 def test_the_experiments_proprioception_is_49_numbers_with_the_servos_torques(tiny_home_folder):
     """The paper's: gripper's position, Euler angles in the base's frame, has grasped, (q, qd, torque) of 14 joints."""
     world = RobotWorld(tiny_home_folder, Fetch(pos=START, proprioception="experiments"))

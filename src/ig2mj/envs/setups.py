@@ -93,7 +93,7 @@ def setup_activity(
     elif robot not in ROBOTS:
         raise UnknownNameError("robot", robot, ROBOTS)
     else:
-        body = make_robot(task, robot)
+        body = make_robot(task, robot, drives=control.whole)
     scene = load_scene(task.home, agents=[body], objects=task.objects)
     rules = rules_of(task, scene, paper_rl)
     controller = control.controller(body, scene)

@@ -181,12 +181,16 @@ BOTH = (0, 1)
 """Hands of the humanoid."""
 
 
-def make_robot(task: Task, robot: str) -> Robot:
-    """The robot at its start in a task. Raises UnknownNameError."""
+def make_robot(task: Task, robot: str, *, drives: bool = False) -> Robot:
+    """The robot at its start in a task. Fetch's base is pinned there, as in iGibson's experiments, unless it `drives`.
+
+    Raises:
+      UnknownNameError: the robot cannot do the task.
+    """
     import math
 
     acts = task.acts(robot)
     half = math.radians(acts.yaw) / 2
     camera = {"camera_tilt": acts.camera_tilt, "camera_pan": acts.camera_pan}
-    options = {"proprioception": "experiments", **camera} if robot == "fetch" else {}
+    options = {"proprioception": "experiments", "pinned": not drives, **camera} if robot == "fetch" else {}
     return ROBOTS[robot](pos=acts.pos, quat=(math.cos(half), 0.0, 0.0, math.sin(half)), **options)

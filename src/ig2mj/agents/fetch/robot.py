@@ -73,6 +73,8 @@ class Fetch:
       proprioception: "default", iGibson's 41 numbers, or "experiments", the 49 of its activities.
       camera_tilt: rad, downwards, at the start; None: iGibson's, 0.45, or 0 with a tucked arm.
       camera_pan: rad, to the left, at the start.
+      pinned: the base stays where it is, as in iGibson's experiments with an arm alone, which hold it with a constraint
+        of 10 kN.
     """
 
     name: str = "fetch"
@@ -82,6 +84,7 @@ class Fetch:
     proprioception: str = "default"
     camera_tilt: float | None = None
     camera_pan: float = 0.0
+    pinned: bool = False
 
     def __post_init__(self) -> None:
         if self.pose not in ARM_POSES:
@@ -92,7 +95,8 @@ class Fetch:
     def attach(self, spec: mujoco.MjSpec, pos: Vector | None = None, quat: Vector | None = None) -> AgentEntry:
         pos, quat = self.pos if pos is None else pos, normalized(self.quat if quat is None else quat)
         base = spec.worldbody.add_body(name=self.name, pos=list(pos), quat=list(quat))
-        base.add_freejoint(name=f"{self.name}/free")
+        if not self.pinned:
+            base.add_freejoint(name=f"{self.name}/free")
         set_inertia(base, *_joined(BASE, TORSO))
         look = Look.of(spec, self.name)
         draw_link(base, "base_link", look)
@@ -111,7 +115,8 @@ class Fetch:
         )
         exclude_all(spec, [body.name for body in links.values()])
         controls = [0.0, 0.0, *start[2:]]
-        extend_keyframes(spec, [*map(float, pos), *quat, *start], 6 + len(JOINTS), controls)
+        free = [] if self.pinned else [*map(float, pos), *map(float, quat)]
+        extend_keyframes(spec, [*free, *start], 6 * (not self.pinned) + len(JOINTS), controls)
         return AgentEntry(
             name=self.name,
             body=self.name,
