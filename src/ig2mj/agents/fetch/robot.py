@@ -53,6 +53,9 @@ FINGER_REACH, FINGER_EDGE, FINGER_FACE = 0.03, 0.0115, 0.0155
 """m: corners of the fingers' inner faces in their frames, where rays run (iGibson's, on its own fingers: 0.04, 0.014
 and 0.012). Ours are 6 cm long, and the grasp point is in their middle, where the gripper's frame is."""
 
+LIFTED = 0.007
+"""m: of a pinned base above its place, so that its wheels do not press on the floor for ever."""
+
 CASTERS = ((0.16, 0.11), (0.16, -0.11), (-0.21, 0.11), (-0.21, -0.11))
 """m: where they stand in the base's frame."""
 
@@ -94,7 +97,8 @@ class Fetch:
 
     def attach(self, spec: mujoco.MjSpec, pos: Vector | None = None, quat: Vector | None = None) -> AgentEntry:
         pos, quat = self.pos if pos is None else pos, normalized(self.quat if quat is None else quat)
-        base = spec.worldbody.add_body(name=self.name, pos=list(pos), quat=list(quat))
+        lifted = [*pos[:2], pos[2] + LIFTED * self.pinned]
+        base = spec.worldbody.add_body(name=self.name, pos=lifted, quat=list(quat))
         if not self.pinned:
             base.add_freejoint(name=f"{self.name}/free")
         set_inertia(base, *_joined(BASE, TORSO))
