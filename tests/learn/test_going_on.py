@@ -58,3 +58,15 @@ def test_other_networks_and_files_without_scales_are_refused(policy):
         assert element in str(found.value) and "fruit.npz" in str(found.value)
     with pytest.raises(InputError, match="scales"):
         further(made(), dataclasses.replace(loaded, hidden=None), 0)
+
+
+def test_who_guesses_nothing_needs_no_scales_of_what_is_hidden(tmp_path):
+    algorithm = made(net="small", guess=0.0, recall=0)
+    learner = jax.jit(algorithm.init)(jax.random.PRNGKey(7))
+    Policy.of(algorithm, learner, {"actions": ["x", "y"], "picture": [16, 16, 4]}, {}).save(tmp_path / "policy.npz")
+    loaded = Policy.load(tmp_path / "policy.npz")
+    assert loaded.hidden is None
+    begun = further(algorithm, loaded, 0)
+    assert begun.moments.mean.shape == learner.moments.mean.shape and np.isfinite(begun.moments.mean).all()
+    for ours, theirs in zip(jax.tree.leaves(begun.actor), jax.tree.leaves(learner.actor), strict=True):
+        np.testing.assert_allclose(ours, theirs, atol=2e-3, err_msg="half precision")

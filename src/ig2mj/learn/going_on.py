@@ -51,10 +51,12 @@ def further(algorithm: Any, policy: Policy, seed: int, file: object = "the polic
     hidden = algorithm.perception.vector_size - algorithm.perception.actor_size
     mean, deviation = policy.mean, policy.deviation
     if hidden:
-        if policy.hidden is None:
+        unseen = policy.hidden
+        if unseen is None and algorithm.actor.uses_guess:
             fix = "policies of now do: train it anew"
             raise InputError(file, "does not say in which scales it guesses what is hidden", fix=fix)
-        mean, deviation = (np.concatenate(pair) for pair in zip((mean, deviation), policy.hidden, strict=True))
+        unseen = unseen or (np.zeros(hidden, np.float32), np.ones(hidden, np.float32))  # whoever guesses nothing
+        mean, deviation = (np.concatenate(pair) for pair in zip((mean, deviation), unseen, strict=True))
     # One update lies behind it, so that it acts at once.
     scales = Moments.of(mean, deviation, KNOWN)
     return dataclasses.replace(learner, actor=nested(new), moments=scales, updates=jnp.int32(1))
