@@ -50,6 +50,8 @@ none. The DAgger runs here stopped too early, since success then counted episode
 the short episodes that ended first after the expert had left (minute two: 99 and 100 %), and what was played on
 held-out states are the policies of minute two. "dagger_glimpses_memory" goes on from the humanoid's last policy with
 `recall=1` on one core of a processor for 62 minutes; its held-out episodes were played with drawn actions (`--drawn`).
+"dagger_memory_at_once": `recall=1` from the beginning, three runs side by side on the card, cut off at second 260 of
+570; "memory_base_free": Fetch's two beside it, from before its base was pinned.
 SlicingFruit with `--expert`: the first run was cut off; "48_updates" has `guided=0.4 copied=0.25 reach=30 updates=48`;
 "trusted" `guided=0.4 copied=0.4 trust=1 reach=30 updates=48`; "rgbd64" the same with `--pixels 64`, cut off at second
 161. In these the peak after the expert's help has ended is one of counting: all worlds then begin alone at one moment,
@@ -158,7 +160,7 @@ def main() -> None:
     ]
     lines.append("|---|---|---|--:|--:|--:|--:|--:|--:|")
     for (environment, robot), runs in groups.items():
-        figure, axes = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
+        figure, axes = plt.subplots(figsize=(6.4, 3.4 + 0.16 * len(runs)), layout="constrained")
         axes.set_prop_cycle(color=plt.get_cmap("tab20").colors)  # pyright: ignore[reportAttributeAccessIssue]
         paper = PAPER.get(environment, (None, None))[0 if robot == "humanoid" else 1]
         for label, curve, unseen in runs:
@@ -177,7 +179,7 @@ def main() -> None:
         axes.set_title(f"{environment}, {robot}", fontsize=10)
         if axes.get_xlim()[1] > LONG:
             axes.set_xscale("log")
-        axes.legend(fontsize=7)
+        figure.legend(fontsize=7, loc="outside lower center")
         figure.savefig(FOLDER / f"{environment}-{robot}.png", dpi=130)
         plt.close(figure)
     (FOLDER / "curves.md").write_text("\n".join(lines) + "\n" + REMARK)
