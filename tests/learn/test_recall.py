@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 sys.path.insert(0, str(Path(__file__).parent))
 from small_envs import SeenPointMass
@@ -21,7 +22,7 @@ from ig2mj.learn.heads import likeliest
 from ig2mj.learn.perception import Perception, Seen
 from ig2mj.learn.policies import Policy
 from ig2mj.learn.projection import Lens
-from ig2mj.learn.recall import Recall, grips_of
+from ig2mj.learn.recall import Recall, grips_of, hands_of
 
 NAMES = [*(f"goal_pos_{c}" for c in "xyz"), *(f"goal_quat_{c}" for c in "wxyz")]
 
@@ -55,7 +56,7 @@ def test_the_first_guess_is_kept_and_the_last_taking():
             wanted = [*guess[f, world, [1, 3]], *guess[t, world, [1, 3]], *felt[t, world]]
             np.testing.assert_array_equal(found[k][world], np.array(wanted, np.float32), err_msg=f"{k} {world}")
     mean, deviation = np.array([1.0, 0.0, 0.0]), np.array([0.5, 1.0, 0.01])
-    normal = np.asarray(recall.normal(found[-1], mean, deviation))
+    normal = np.asarray(recall.normal(found[-1], felt[-1], mean, deviation))
     np.testing.assert_allclose(normal[:, :4], found[-1][:, :4])
     np.testing.assert_allclose(normal[:, 4], 2 * (found[-1][:, 4] - 1), rtol=1e-5)
     assert np.abs(normal).max() <= 10
@@ -69,6 +70,55 @@ def test_robots_feel_whether_a_hand_holds_something():
     assert found == (3 + EXPERIMENTS.index("has_grasped"),)
     assert grips_of(["task_obs"], [3], EXPERIMENTS) == ()
     assert made().perception.grips == (1,)
+
+
+def test_robots_feel_where_a_hand_is_that_may_hold_something():
+    from ig2mj.agents.fetch.proprioception import EXPERIMENTS
+
+    names, sizes = ["task_obs", "proprioception"], [3, len(EXPERIMENTS)]
+    grips = grips_of(names, sizes, EXPERIMENTS)
+    assert hands_of(grips, names, sizes, EXPERIMENTS) == (3 + EXPERIMENTS.index("eef_0_pos_x"),)
+    humanoid = [f"{side}_hand_{n}" for side in ("left", "right") for n in ("x", "y", "z", "roll", "pitch", "yaw")]
+    humanoid += [f"{side}_hand_is_grasping" for side in ("left", "right")]
+    grips = grips_of(["proprioception"], [14], humanoid)
+    assert grips == (12, 13) and hands_of(grips, ["proprioception"], [14], humanoid) == (0, 6)
+    assert hands_of((0,), ["proprioception"], [1], ["grasp_0"]) == () and made().perception.hands == ()
+
+
+def test_how_a_thing_lies_by_now_is_reckoned_from_how_it_lay_and_where_the_hand_that_took_it_is():
+    """Two objects and two hands; the second hand takes something in step 1 and lets go of it in step 3."""
+    rng, worlds = np.random.default_rng(0), 5
+    recall = Recall(14, range(18), (12, 13), (0, 6), [[14, 15, 16], [17, 18, 19]])
+    assert recall.shown == recall.size + 2 * 2 * 9 and Recall.of(recall.card(), 14).card() == recall.card()
+    mean, deviation = rng.normal(size=20).astype(np.float32), rng.uniform(0.5, 2.0, 20).astype(np.float32)
+    felt = rng.uniform(-1, 1, (5, worlds, 14)).astype(np.float32)
+    felt[..., 12], felt[..., 13] = -1.0, np.array([-1.0, 1.0, 1.0, -1.0, -1.0])[:, None]
+    place = rng.normal(size=(worlds, 2, 3)).astype(np.float32)
+    turns = Rotation.from_quat(rng.normal(size=(worlds * 2, 4)))
+    columns = turns.as_matrix().reshape(worlds, 2, 3, 3)[..., :2].swapaxes(-1, -2)
+    guess = np.concatenate(
+        [(place - mean[14:].reshape(2, 3)) / deviation[14:].reshape(2, 3), np.sqrt(3) * columns.reshape(worlds, 2, 6)],
+        axis=-1,
+    ).reshape(worlds, 18)
+    kept = recall.blank(worlds)
+    for k in range(5):
+        seen = guess if k == 0 else rng.normal(size=guess.shape)  # what it guesses later does not count
+        kept = recall.after(kept, np.full(worlds, k == 0), felt[k], seen.astype(np.float32))
+        found = np.asarray(recall.carried(kept, felt[k], mean, deviation)).reshape(worlds, 2, 2, 9)
+        np.testing.assert_allclose(
+            found[:, 0].reshape(worlds, 18), guess, atol=1e-5, err_msg="the hand that takes none"
+        )
+        expected = guess.reshape(worlds, 2, 9)
+        if k in (1, 2):
+            then, now = (Rotation.from_euler("xyz", felt[j, :, 9:12]) for j in (1, k))
+            moved = [now.apply(then.inv().apply(place[:, o] - felt[1, :, 6:9])) + felt[k, :, 6:9] for o in range(2)]
+            turned = [[(now * then.inv()).apply(np.sqrt(3) * columns[:, o, c]) for c in range(2)] for o in range(2)]
+            moved = (np.stack(moved, 1) - mean[14:].reshape(2, 3)) / deviation[14:].reshape(2, 3)
+            turned = np.transpose(np.array(turned), (2, 0, 1, 3)).reshape(worlds, 2, 6)
+            expected = np.concatenate([moved, turned], axis=-1)
+        np.testing.assert_allclose(found[:, 1], expected, atol=2e-5, err_msg=f"step {k}")
+        shown = np.asarray(recall.normal(kept, felt[k], mean, deviation))
+        assert shown.shape == (worlds, recall.shown) and np.abs(shown).max() <= 10
 
 
 def test_labels_that_only_the_first_picture_tells_are_learnt():

@@ -107,8 +107,10 @@ class Imitation:
         self.recall: Recall | None = None
         if getattr(config, "recall", 0):
             assert perception.hidden is not None, "without pictures nothing is hidden"
-            poses = [k for parts in perception.hidden.poses.values() for part in parts for k in part]
-            self.recall = Recall(perception.actor_size, poses, perception.grips)
+            parts = perception.hidden.poses.values()
+            poses = [k for place, turned in parts for k in (*place, *turned)]
+            places = [[int(perception.hidden.plain[k]) for k in place] for place, _ in parts]
+            self.recall = Recall(perception.actor_size, poses, perception.grips, perception.hands, places)
         self.actor = Actor(action_size, config.actor, shape, config.net, guess, config.choices, perception.objects)
         self._perception, self._weight, self._shift, self._axis = perception, config.guess, config.shift, axis
         self._adam = averaged_adam(10.0, axis)
@@ -116,7 +118,7 @@ class Imitation:
     def init(self, key: Array) -> tuple[Any, Any]:
         """Parameters and the optimiser's state, untrained."""
         seen, size = blank(self._perception, 1), self._perception.actor_size
-        recalled = None if self.recall is None else self.recall.blank(1)
+        recalled = None if self.recall is None else jnp.zeros((1, self.recall.shown))
         params = self.actor.init(jnp.asarray(key), seen.vector[:, :size], seen.picture, recalled=recalled)["params"]
         return params, self._adam.init(params)
 
@@ -147,7 +149,7 @@ class Imitation:
         if self.recall is not None:
             none = jnp.zeros((len(picture) - count, self.recall.size))
             recalled = none if recalled is None else jnp.concatenate([recalled, none])
-        known = self._recalled(moments, recalled)
+        known = self._recalled(moments, recalled, seen.vector)
         looked: Any = self.actor.apply({"params": params}, normal[:, :size], picture, None, known, rngs=shake)
         head, _, guess = looked
         loss = jnp.float32(0)
@@ -166,7 +168,7 @@ class Imitation:
                 belief = hidden(vector, own, guess.shape[-1]) + wrong[which]
                 none = jnp.zeros((len(wanted), 0), jnp.uint8)
                 looked = self.actor.apply(
-                    {"params": params}, own[:, :size], none, belief, self._recalled(moments, kept)
+                    {"params": params}, own[:, :size], none, belief, self._recalled(moments, kept, vector)
                 )
                 found["told_loss"] = label_loss(looked[0], wanted)
                 loss += found["told_loss"]
@@ -186,14 +188,17 @@ class Imitation:
         def look(*given: Any) -> Any:
             return self.actor.apply({"params": params}, *given)
 
-        said, kept = looked(look, self.recall, moments.scales(vector.shape[-1]), vector, seen.picture, kept, begins)
+        scales = moments.scales(seen.vector.shape[-1])
+        said, kept = looked(look, self.recall, scales, vector, seen.picture, kept, begins)
         return said[0], kept
 
-    def _recalled(self, moments: Moments, kept: Float[Array, "B m"] | None) -> Float[Array, "B m"] | None:
+    def _recalled(
+        self, moments: Moments, kept: Float[Array, "B m"] | None, vector: Float[Array, "B v"]
+    ) -> Float[Array, "B n"] | None:
         """As the network takes it."""
         if self.recall is None or kept is None:
             return None
-        return self.recall.normal(kept, *moments.scales(self._perception.actor_size))
+        return self.recall.normal(kept, vector, *moments.scales(vector.shape[-1]))
 
     def update(
         self,

@@ -25,7 +25,7 @@ from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError, UnknownNameError
 from ig2mj.learn.hidden import Hidden
 from ig2mj.learn.projection import Lens
-from ig2mj.learn.recall import grips_of
+from ig2mj.learn.recall import grips_of, hands_of
 
 MODES = ("state", "rgbd")
 
@@ -55,7 +55,7 @@ class Perception:
       picture_shape: height, width, channels; None without pictures.
       rows: the first row of the encoder's picture that is kept, and the first below those.
       hidden: what an actor with pictures can learn to guess; None where it sees everything.
-      grips: which numbers of the vector say whether a hand holds something.
+      grips, hands: which numbers of the vector say whether a hand holds something, and where it is (`recall.hands_of`).
     """
 
     def __init__(
@@ -87,6 +87,7 @@ class Perception:
         self.sizes = tuple(spaces[name].shape[0] for name in self.vector_names)
         self.vector_size = sum(self.sizes)
         self.grips = grips_of(self.vector_names, self.sizes, felt_names)
+        self.hands = hands_of(self.grips, self.vector_names, self.sizes, felt_names)
         hidden = self.sizes[-1] if mode == "rgbd" and PRIVILEGED in flat else 0
         self.actor_size = self.vector_size - hidden
         self._pictures = tuple(n for n in ("rgb", "depth") if n in spaces) if mode == "rgbd" else ()

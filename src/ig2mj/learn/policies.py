@@ -234,8 +234,11 @@ class Policy:
         return play
 
     def parameters(self) -> tuple[Any, Array, Array]:
-        """What was learned, as arrays of JAX: weights, and mean and deviation of what the network is told."""
-        return jax.tree.map(jnp.asarray, (nested(self.weights), self.mean, self.deviation))
+        """What was learned, as arrays of JAX: weights, and mean and deviation of what the network is told and
+        of what it guesses."""
+        hidden = self.hidden or (np.zeros(0, np.float32), np.zeros(0, np.float32))
+        scales = (np.concatenate(pair) for pair in zip((self.mean, self.deviation), hidden, strict=True))
+        return jax.tree.map(jnp.asarray, (nested(self.weights), *scales))
 
 
 def flat(tree: Mapping[str, Any], before: str = "") -> dict[str, Any]:
