@@ -146,10 +146,11 @@ class Imitation:
         if self._perception.picture_shape is not None:
             picture = shifted(picture, self._perception.picture_shape, key, self._shift)
         shake = {SHAKEN: jax.random.fold_in(key, 1)}
+        known = None
         if self.recall is not None:
             none = jnp.zeros((len(picture) - count, self.recall.size))
             recalled = none if recalled is None else jnp.concatenate([recalled, none])
-        known = self._recalled(moments, recalled, seen.vector)
+            known = self._recalled(moments, recalled, seen.vector)
         looked: Any = self.actor.apply({"params": params}, normal[:, :size], picture, None, known, rngs=shake)
         head, _, guess = looked
         loss = jnp.float32(0)
