@@ -224,7 +224,7 @@ def reference_forces(simulation: ig2mj.Simulation) -> np.ndarray:
 @pytest.mark.parametrize("cone", [mujoco.mjtCone.mjCONE_PYRAMIDAL, mujoco.mjtCone.mjCONE_ELLIPTIC])
 def test_link_force_is_the_largest_normal_force_of_any_physics_step(tiny_home, cone):
     """Unlike iGibson's slicer: the largest of all substeps, not the last one's."""
-    scene = dataclasses.replace(tiny_home, model=mujoco.MjModel.from_xml_path(str(tiny_home.folder / "scene.xml")))
+    scene = dataclasses.replace(tiny_home, model=tiny_home.spec().compile())
     scene.model.opt.cone = cone
     simulation = ig2mj.Simulation(scene)
     simulation.set_object_pose("knife", [-0.2, -0.2, 1.2], [0.7071, 0, 0.7071, 0])  # point down

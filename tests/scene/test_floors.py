@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import ig2mj
+import ig2mj.scene.scene as scenes
 from ig2mj.scene.floors import DEPTH, TIME_CONSTANT, deepen_floors
 from ig2mj.scene.manifest import FORMAT_VERSION, Manifest, ObjectEntry
 from ig2mj.scene.pieces import mesh_corners
@@ -31,6 +32,12 @@ def deepened(geoms: str, body: str = "", **meshes: str) -> mujoco.MjModel:
     entry = ObjectEntry("floors", "floors", "made", ["floors"], True, (1, 1, 1), 1.0)
     deepen_floors(spec, Manifest(FORMAT_VERSION, "made", [entry]))
     return spec.compile()
+
+
+@pytest.fixture(autouse=True)
+def without_ceilings(monkeypatch: pytest.MonkeyPatch):
+    """A home differs from what its scene.xml compiles to in its floors only."""
+    monkeypatch.setattr(scenes, "add_ceiling", lambda spec, manifest: None)
 
 
 def test_a_homes_floors_are_deep_and_their_surfaces_where_they_were():

@@ -12,10 +12,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from ig2mj.scene.geom_groups import COLLISION_GROUP
 from ig2mj.scene.scene import Scene
-
-COLLISION_GROUP = 3
-"""Geoms that collide are in this group (docs/architecture.md, names in MJCF)."""
 
 
 class Probe:

@@ -40,7 +40,7 @@ def deepen_floors(spec: mujoco.MjSpec, manifest: Manifest) -> None:
     last case there is a room between them.
     """
     level = []
-    for part in _parts(spec, manifest):
+    for part in building_parts(spec, manifest, "floors"):
         part.geom.solref = [max(part.geom.solref[0], TIME_CONSTANT), part.geom.solref[1]]
         if part.is_level():
             level.append(part)
@@ -50,14 +50,14 @@ def deepen_floors(spec: mujoco.MjSpec, manifest: Manifest) -> None:
         if missing > 0 and not _above_another(box, boxes):
             if part.geom.type == mujoco.mjtGeom.mjGEOM_BOX:
                 part.geom.size = part.geom.size + missing / 2 * np.round(np.abs(part.turn[2]))
-                part.geom.pos = part.geom.pos + _matrix(part.body.quat).T @ np.array([0.0, 0.0, -missing / 2])
+                part.geom.pos = part.geom.pos + rotation_of(part.body.quat).T @ np.array([0.0, 0.0, -missing / 2])
             else:
                 _extend_mesh(spec, part, box, f"deep_floor_{number}")
 
 
 @dataclasses.dataclass
-class _Part:
-    """A collision geom of a floor.
+class BuildingPart:
+    """A collision geom of a floor or wall.
 
     Attributes:
       body: it stands in the world. turn: of the geom's frame, to the world.
@@ -79,30 +79,30 @@ class _Part:
         return _area(top) > (1.0 - UNEVEN) * _area(self.corners)
 
 
-def _parts(spec: mujoco.MjSpec, manifest: Manifest) -> Iterator[_Part]:
-    """All collision geoms of floors."""
+def building_parts(spec: mujoco.MjSpec, manifest: Manifest, category: str) -> Iterator[BuildingPart]:
+    """All collision geoms of a category of the building, in a scene that is not compiled yet."""
     found = [
         (body, number, geom)
         for entry in manifest.objects
-        if entry.category == "floors"
+        if entry.category == category
         for body in (spec.body(name) for name in entry.bodies)
         for number, geom in enumerate(body.geoms)
         if geom.contype or geom.conaffinity
     ]
     compiled = None
     for body, number, geom in found:
-        turn, corners = _matrix(body.quat) @ _matrix(geom.quat), np.zeros((0, 3))
+        turn, corners = rotation_of(body.quat) @ rotation_of(geom.quat), np.zeros((0, 3))
         if {body.alt.type, geom.alt.type} == {mujoco.mjtOrientation.mjORIENTATION_QUAT}:
             if geom.type == mujoco.mjtGeom.mjGEOM_BOX:
                 half = np.abs(turn) @ geom.size
-                corners = body.pos + _matrix(body.quat) @ geom.pos + np.array([-half, half])
+                corners = body.pos + rotation_of(body.quat) @ geom.pos + np.array([-half, half])
             elif geom.type == mujoco.mjtGeom.mjGEOM_MESH:
                 copy, model = compiled = compiled or _compiled(spec)
                 g = copy.body(body.name).geoms[number].id
-                turned = _matrix(body.quat) @ _matrix(model.geom_quat[g])
-                middle = body.pos + _matrix(body.quat) @ model.geom_pos[g]
+                turned = rotation_of(body.quat) @ rotation_of(model.geom_quat[g])
+                middle = body.pos + rotation_of(body.quat) @ model.geom_pos[g]
                 corners = mesh_corners(model, int(model.geom_dataid[g])) @ turned.T + middle
-        yield _Part(body, geom, turn, corners)
+        yield BuildingPart(body, geom, turn, corners)
 
 
 def _compiled(spec: mujoco.MjSpec) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
@@ -111,10 +111,10 @@ def _compiled(spec: mujoco.MjSpec) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
     return copy, copy.compile()
 
 
-def _extend_mesh(spec: mujoco.MjSpec, part: _Part, box: Float[np.ndarray, "2 3"], name: str) -> None:
+def _extend_mesh(spec: mujoco.MjSpec, part: BuildingPart, box: Float[np.ndarray, "2 3"], name: str) -> None:
     """Gives the geom a mesh of its own, which reaches down to `DEPTH` below its surface."""
     below = part.corners * (1, 1, 0) + (0, 0, box[1, 2] - DEPTH)
-    local = (np.concatenate([part.corners, below]) - part.body.pos) @ _matrix(part.body.quat)
+    local = (np.concatenate([part.corners, below]) - part.body.pos) @ rotation_of(part.body.quat)
     spec.add_mesh(name=name, uservert=local.ravel())
     part.geom.meshname, part.geom.pos, part.geom.quat = name, (0, 0, 0), (1, 0, 0, 0)
 
@@ -134,7 +134,8 @@ def _above_another(box: Float[np.ndarray, "2 3"], boxes: Float[np.ndarray, "n 2 
     return bool((~beside.any(1) & (boxes[:, 1, 2] <= box[0, 2] + LEVEL)).any())
 
 
-def _matrix(quat: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3 3"]:
+def rotation_of(quat: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3 3"]:
+    """The matrix that turns as a quaternion of any length does."""
     matrix = np.zeros(9)
     mujoco.mju_quat2Mat(matrix, np.asarray(quat) / np.linalg.norm(quat))
     return matrix.reshape(3, 3)

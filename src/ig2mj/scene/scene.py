@@ -16,6 +16,7 @@ import mujoco
 from ig2mj.errors import InputError, UnknownNameError, without_lines
 from ig2mj.scene.additions import Addition, add_objects
 from ig2mj.scene.build_tables import build_tables
+from ig2mj.scene.ceilings import add_ceiling
 from ig2mj.scene.floors import deepen_floors
 from ig2mj.scene.grasp_equalities import add_grasp_equalities
 from ig2mj.scene.manifest import AgentEntry, Manifest, ObjectEntry, load_manifest
@@ -103,6 +104,7 @@ class Scene:
         else:
             spec = read_spec(file)
         deepen_floors(spec, self.manifest)
+        add_ceiling(spec, self.manifest)
         _attach_all(self.agents, spec, self.manifest)
         return spec
 
@@ -142,6 +144,7 @@ def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: S
     else:
         spec = read_spec(file)
     deepen_floors(spec, manifest)
+    add_ceiling(spec, manifest)
     if agents:
         manifest = copy.copy(manifest)
         manifest.agents = [*manifest.agents, *_attach_all(agents, spec, manifest)]
