@@ -51,7 +51,9 @@ the short episodes that ended first after the expert had left (minute two: 99 an
 held-out states are the policies of minute two. "dagger_glimpses_memory" goes on from the humanoid's last policy with
 `recall=1` on one core of a processor for 62 minutes; its held-out episodes were played with drawn actions (`--drawn`).
 "dagger_memory_at_once": `recall=1` from the beginning, three runs side by side on the card, cut off at second 260 of
-570; "memory_base_free": Fetch's two beside it, from before its base was pinned.
+570; "memory_base_free": Fetch's two beside it, from before its base was pinned, as all of Fetch's but those with
+"base_pinned" in their names. Of these the book's goes on from the policy that had shipped, for 14 minutes on one core
+of a processor; the fruit's from "memory_base_free", with what is reckoned, for 15 minutes on one busy core.
 SlicingFruit with `--expert`: the first run was cut off; "48_updates" has `guided=0.4 copied=0.25 reach=30 updates=48`;
 "trusted" `guided=0.4 copied=0.4 trust=1 reach=30 updates=48`; "rgbd64" the same with `--pixels 64`, cut off at second
 161. In these the peak after the expert's help has ended is one of counting: all worlds then begin alone at one moment,
