@@ -19,8 +19,8 @@ import numpy as np
 import results
 import tyro
 from jaxtyping import Float, Int
+from loose_objects import added, floor_cells
 
-import ig2mj
 from ig2mj.scene.scene import Scene
 from ig2mj.worlds.guards import TOP_SPEED
 
@@ -77,15 +77,9 @@ def with_floors(scene: Scene, depth: float | None, time_constant: float | None) 
 
 def free_place(scene: Scene) -> Float[np.ndarray, "2"]:
     """World x and y (m) of floor with the most free floor around it. Raises where there is less than `ROOM`."""
-    import scipy.ndimage
-
-    rooms = scene.rooms
-    assert rooms is not None and rooms.traversable is not None, f"{scene.name} has no map of its free floor"
-    away = np.asarray(scipy.ndimage.distance_transform_edt(np.pad(rooms.traversable, 1)))[1:-1, 1:-1]
-    row, column = np.unravel_index(away.argmax(), away.shape)
-    assert away.max() * rooms.trav_resolution > ROOM
-    half = np.array(away.shape)[::-1] / 2
-    return (np.array([column, row]) + 0.5 - half) * rooms.trav_resolution
+    places, room = floor_cells(scene)
+    assert room.max() > ROOM
+    return places[room.argmax()]
 
 
 @dataclasses.dataclass
@@ -128,8 +122,7 @@ def fall(model: mujoco.MjModel, data: mujoco.MjData, name: str, bottom: float) -
 
 def run(args: Args, category: str) -> dict[str, Any]:
     """Drops one object again and again; the row."""
-    scene = ig2mj.load_scene(args.home, objects=[category])
-    name = next(addition.name for addition in scene.additions if scene.object(addition.name).part_of is None)
+    scene, name = added(args.home, category)
     model = with_floors(scene, args.depth, args.time_constant)
     data, place = mujoco.MjData(model), free_place(scene)
     floors = [model.geom(scene.model.geom(int(g)).name) for g in floors_of(scene)]
@@ -162,11 +155,7 @@ def run(args: Args, category: str) -> dict[str, Any]:
 
 
 def main(args: Args) -> list[dict[str, Any]]:
-    rows = []
-    for category in args.categories:
-        rows.append(run(args, category))
-        results.keep_row(rows[-1], args.rows)
-    return rows
+    return results.keep_rows((run(args, category) for category in args.categories), args.rows)
 
 
 if __name__ == "__main__":

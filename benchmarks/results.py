@@ -11,7 +11,7 @@ import platform
 import shlex
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import msgspec
@@ -29,6 +29,15 @@ def keep_row(row: dict[str, Any], file: pathlib.Path | None) -> None:
     if file is not None:
         with file.open("a", encoding="utf-8") as opened:
             opened.write(line + "\n")
+
+
+def keep_rows(rows: Iterable[dict[str, Any]], file: pathlib.Path | None) -> list[dict[str, Any]]:
+    """`keep_row` of each as soon as it is there; all of them."""
+    kept = []
+    for row in rows:
+        keep_row(row, file)
+        kept.append(row)
+    return kept
 
 
 def machine(core: int) -> dict[str, Any]:

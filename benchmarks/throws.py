@@ -18,9 +18,9 @@ import numpy as np
 import results
 import tyro
 from jaxtyping import Float
+from loose_objects import added, floor_cells
 from soak_watch import House
 
-import ig2mj
 from ig2mj.scene.ceilings import CEILING
 from ig2mj.scene.scene import Scene
 from ig2mj.worlds.guards import TOP_SPEED
@@ -70,19 +70,13 @@ def model_of(scene: Scene, without_ceiling: bool) -> mujoco.MjModel:
 
 def free_places(scene: Scene) -> Float[np.ndarray, "N 2"]:
     """World x and y (m) of all cells of floor with `ROOM` around them."""
-    import scipy.ndimage
-
-    rooms = scene.rooms
-    assert rooms is not None and rooms.traversable is not None, f"{scene.name} has no map of its free floor"
-    away = np.asarray(scipy.ndimage.distance_transform_edt(np.pad(rooms.traversable, 1)))[1:-1, 1:-1]
-    cells = np.argwhere(away * rooms.trav_resolution > ROOM)[:, ::-1]
-    return (cells + 0.5 - np.array(away.shape)[::-1] / 2) * rooms.trav_resolution
+    places, room = floor_cells(scene)
+    return places[room > ROOM]
 
 
 def run(args: Args, category: str) -> dict[str, Any]:
     """Throws one object again and again; the row."""
-    scene = ig2mj.load_scene(args.home, objects=[category])
-    name = next(addition.name for addition in scene.additions if scene.object(addition.name).part_of is None)
+    scene, name = added(args.home, category)
     model, house, places = model_of(scene, args.open), House.of(scene, (0, 0, 0)), free_places(scene)
     settled, data = mujoco.MjData(model), mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, settled, 0)
@@ -119,11 +113,7 @@ def run(args: Args, category: str) -> dict[str, Any]:
 
 
 def main(args: Args) -> list[dict[str, Any]]:
-    rows = []
-    for category in args.categories:
-        rows.append(run(args, category))
-        results.keep_row(rows[-1], args.rows)
-    return rows
+    return results.keep_rows((run(args, category) for category in args.categories), args.rows)
 
 
 if __name__ == "__main__":

@@ -21,12 +21,17 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from ig2mj.engine.view import Array
-from ig2mj.geometry.poses import quat_conjugate, quat_multiply, quat_rotate, rpy_to_quat
+from ig2mj.geometry.poses import (
+    inverse_transform_points,
+    quat_rotate,
+    quat_rotate_inverse,
+    rpy_to_quat,
+    transform_points,
+)
 from ig2mj.learn.moments import LIMIT, normal
 
 GRIPS = ("is_grasping", "has_grasped", "grasp_0")
 """How names end of what a robot feels of whether a hand holds something."""
-
 
 PLACES = {"has_grasped": "eef_0_pos_x", "is_grasping": "x"}
 """Where a hand is, by how the number that says whether it holds something ends: how the first of six ends in the place
@@ -159,11 +164,12 @@ class Recall:
         middle, spread = jnp.asarray(mean)[places], jnp.asarray(deviation)[places]
         place, columns = poses[..., :3] * spread + middle, poses[..., 3:].reshape(*poses.shape[:-1], 2, 3)
         for grip, hand in zip(self.grips, self.hands, strict=True):
-            before, now = felt[..., hand : hand + 6], vector[..., hand : hand + 6]
-            turn = quat_multiply(rpy_to_quat(now[..., 3:]), quat_conjugate(rpy_to_quat(before[..., 3:])))
-            turn = turn[..., None, :]
-            moved = now[..., None, :3] + quat_rotate(turn, place - before[..., None, :3])
-            turned = quat_rotate(turn[..., None, :], columns).reshape(poses[..., 3:].shape)
+            (at, was), (to, now) = (
+                (v[..., hand : hand + 3], rpy_to_quat(v[..., hand + 3 : hand + 6])) for v in (felt, vector)
+            )
+            moved = transform_points(to, now, inverse_transform_points(at, was, place))
+            was, now = was[..., None, None, :], now[..., None, None, :]
+            turned = quat_rotate(now, quat_rotate_inverse(was, columns)).reshape(poses[..., 3:].shape)
             held = jnp.concatenate([(moved - middle) / spread, turned], axis=-1)
             holds = (vector[..., grip] > 0.5) & (felt[..., grip] > 0.5)
             found.append(jnp.where(holds[..., None, None], held, poses).reshape(*first.shape[:-1], -1))
