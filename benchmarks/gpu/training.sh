@@ -17,7 +17,7 @@
 # the log of each, copied while it trains. $MINUTES of training (5), $WORLDS, $ENGINE (warp), $FRACTION of a card's memory
 # that JAX takes for each training (0.26), $BATCH, $RATE (of learning), $CAPACITY, $STARTS and $LOOK: pictures of start
 # states, and updates of the guess on them; $RECALL=0: actors remember nothing; $READY: seconds until training begins, at
-# most.
+# most; $PLAY=0: no evaluation on the card.
 set -u
 out=${OUT:-out/training}; mkdir -p "$out"
 minutes=${MINUTES:-5} engine=${ENGINE:-warp} fraction=${FRACTION:-0.26}
@@ -39,9 +39,11 @@ learn() {  # NAME EPISODES WORDS...: trains, and plays so many held-out episodes
   local job=$!
   while kill -0 $job 2> /dev/null; do sleep 5; cp "$run"/run/*.npz "$run/run/progress.csv" "$out/$name" 2> /dev/null; done
   wait $job; echo "$name: trained, ended with $? after $SECONDS s" | tee -a "$out/times.txt"
-  held "$name" "$out/$name/policy.npz" "$episodes"
-  held "$name" "$out/$name/policy.npz" 500 --drawn
-  echo "$name: played after $SECONDS s" | tee -a "$out/times.txt"; rm -rf "$run"; cut -c1-600 "$out/$name/evaluations.jsonl"
+  if [ "${PLAY:-1}" = 1 ]; then
+    held "$name" "$out/$name/policy.npz" "$episodes"
+    held "$name" "$out/$name/policy.npz" 500 --drawn
+  fi
+  echo "$name: played after $SECONDS s" | tee -a "$out/times.txt"; rm -rf "$run"; [ ! -f "$out/$name/evaluations.jsonl" ] || cut -c1-600 "$out/$name/evaluations.jsonl"
 }
 
 fruit() {  # NAME ROBOT ROWS WORDS...
