@@ -81,6 +81,25 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log):
     return Sharing(config, log)
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _programs_from_shapes():
+    """JAX describes arguments of a lowered program in trees whose leaves are no arrays: not checked there."""
+    from ig2mj.process.collector import Compiled
+
+    prepare = Compiled.prepare
+
+    def unchecked(self, *args):
+        jaxtyping.config.update("jaxtyping_disable", True)
+        try:
+            return prepare(self, *args)
+        finally:
+            jaxtyping.config.update("jaxtyping_disable", False)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Compiled, "prepare", unchecked)
+        yield
+
+
 @pytest.fixture(scope="session")
 def repository() -> Path:
     """Root folder of the checkout."""
