@@ -9,9 +9,9 @@ loaded in threads from the making on, and the start waits for them; `kernels` ha
 at which they were there. `--before` waits for them in the making. `processor` has the processor time of the phases, of
 all threads, which is less where something else is waited for, and more where threads work beside. `programs` has what
 JAX traced, lowered and compiled that took a twentieth of a second. Kernels and XLA's programs are kept in the folder
-(IG2MJ_CACHE_DIR), and so is what CUDA's driver compiles. `--devices-beside` lets JAX look for its devices in a thread
-while modules are imported. `--profile` writes what Python did in the main thread, which makes everything slower.
-`missed` names the modules of Warp that were compiled after the start: there should be none.
+(IG2MJ_CACHE_DIR), and so is what CUDA's driver compiles. `--bytecode` keeps Python's in the folder, too, for machines
+that keep none of what is installed on them. `--profile` writes what Python did in the main thread, which makes
+everything slower. `missed` names the modules of Warp that were compiled after the start: there should be none.
 """
 
 from __future__ import annotations
@@ -25,15 +25,14 @@ import pathlib
 import pstats
 import subprocess
 import sys
-import threading
 import time
 
 BEGAN = "COLD_START_BEGAN"
 """Variable with the time at which the process was started."""
 
 
-def measure(what: str, worlds: int, beforehand: bool | str, cache: pathlib.Path, beside: bool = False) -> dict:
-    """Phases of this process. `beforehand`: `compile_beforehand` of the engine; `beside`: see the module's text."""
+def measure(what: str, worlds: int, beforehand: bool | str, cache: pathlib.Path) -> dict:
+    """Phases of this process. `beforehand`: `compile_beforehand` of the engine."""
     process_began = float(os.environ[BEGAN])
     began = time.perf_counter() - (time.time() - process_began)
     times, spent, names = [began], [0.0], []
@@ -55,29 +54,29 @@ def measure(what: str, worlds: int, beforehand: bool | str, cache: pathlib.Path,
 
     tick("interpreter")
 
+    from ig2mj.process.collector import REST
+
+    REST.begin()  # as `ig2mj.Worlds` and `make_engine` do, which import the same in this order
     import jax
     import numpy as np
 
+    import ig2mj
+    from ig2mj.envs.names import activity_name, short_name
     from ig2mj.process import prepare_jax, prepare_warp
-    from ig2mj.process.imports import import_mjx
+    from ig2mj.process.imports import find_devices, import_mjx
 
+    _ = ig2mj.Worlds, ig2mj.load_scene, ig2mj.make
     prepare_jax()
     jax.monitoring.register_event_duration_secs_listener(note)
-    devices = threading.Thread(target=jax.devices)
-    if beside:
-        devices.start()
-
+    find_devices()
     import_mjx()
     import warp as wp
 
-    import ig2mj
     from ig2mj.engine.warp.engine import WarpEngine
-    from ig2mj.envs.names import activity_name, short_name
 
+    REST.end()
     tick("imports")
-    if not beside:
-        devices.start()
-    devices.join()
+    jax.devices()
     tick("JAX's devices")
     prepare_warp()
     wp.init()
@@ -121,7 +120,6 @@ def measure(what: str, worlds: int, beforehand: bool | str, cache: pathlib.Path,
         "processor": processor,
         "kernels": kernels_there[0] if kernels_there else None,
         "programs": programs,
-        "devices_beside": beside,
         "modules": [len(m) for m in modules],
         "missed": None if known is None else sorted(modules[-1] - known),
         "cores": len(os.sched_getaffinity(0)),
@@ -138,7 +136,7 @@ def main() -> None:
     parser.add_argument("--both", action="store_true", help="cold, then again")
     parser.add_argument("--before", action="store_true", help="kernels before the worlds are made, not beside XLA")
     parser.add_argument("--one-by-one", action="store_true", help="kernels as steps need them, one after the other")
-    parser.add_argument("--devices-beside", action="store_true", help="JAX's devices while modules are imported")
+    parser.add_argument("--bytecode", action="store_true", help="Python's bytecode is kept in the folder, too")
     parser.add_argument("--profile", type=pathlib.Path, help="a table of Python's functions goes to this file")
     parser.add_argument("--patience", type=float, default=300, help="seconds after which the process is ended")
     parser.add_argument("--label", default="", help="a remark for the row")
@@ -148,7 +146,7 @@ def main() -> None:
     if args.inside:
         beforehand = False if args.one_by_one else (True if args.before else "meanwhile")
         profile = cProfile.Profile()
-        measured = functools.partial(measure, args.what, args.worlds, beforehand, args.cache, args.devices_beside)
+        measured = functools.partial(measure, args.what, args.worlds, beforehand, args.cache)
         row = profile.runcall(measured) if args.profile else measured()
         print("ROW " + json.dumps(row), flush=True)
         if args.profile:
@@ -162,14 +160,18 @@ def main() -> None:
     for case in cases:
         import results
 
-        results.keep_row(run(args.cache, args.patience) | {"case": case, "label": args.label}, args.rows)
+        row = run(args.cache, args.patience, args.bytecode) | {"case": case, "bytecode": args.bytecode}
+        results.keep_row(row | {"label": args.label}, args.rows)
 
 
-def run(cache: pathlib.Path, patience: float) -> dict:
+def run(cache: pathlib.Path, patience: float, bytecode: bool) -> dict:
     """The row of a process that measures."""
     env = {**os.environ, "IG2MJ_CACHE_DIR": str(cache.resolve()), "CUDA_CACHE_PATH": str(cache / "cuda")}
     env.pop("JAX_COMPILATION_CACHE_DIR", None)
     env.pop("WARP_CACHE_PATH", None)
+    if bytecode:
+        env.pop("PYTHONDONTWRITEBYTECODE", None)
+        env["PYTHONPYCACHEPREFIX"] = str((cache / "bytecode").resolve())
     env[BEGAN] = repr(began := time.time())
     command = [sys.executable, *sys.argv, "--inside"]
     try:

@@ -84,19 +84,21 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log):
 @pytest.fixture(scope="session", autouse=True)
 def _programs_from_shapes():
     """JAX describes arguments of a lowered program in trees whose leaves are no arrays: not checked there."""
-    from ig2mj.process.collector import Compiled
+    from ig2mj.process.collector import Compiled, Traced
 
-    prepare = Compiled.prepare
+    def unchecked(method):
+        def call(self, *args):
+            jaxtyping.config.update("jaxtyping_disable", True)
+            try:
+                return method(self, *args)
+            finally:
+                jaxtyping.config.update("jaxtyping_disable", False)
 
-    def unchecked(self, *args):
-        jaxtyping.config.update("jaxtyping_disable", True)
-        try:
-            return prepare(self, *args)
-        finally:
-            jaxtyping.config.update("jaxtyping_disable", False)
+        return call
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Compiled, "prepare", unchecked)
+        patch.setattr(Compiled, "traced", unchecked(Compiled.traced))
+        patch.setattr(Traced, "compiling", unchecked(Traced.compiling))
         yield
 
 

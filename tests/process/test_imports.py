@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -40,3 +41,23 @@ assert type(trimesh.Trimesh(corners)) is trimesh.Trimesh
 def test_libraries_that_are_there_already_stay():
     code = "import trimesh; before = trimesh\nfrom ig2mj.process.imports import import_mjx; import_mjx()\n"
     assert "mujoco.mjx" in imported(code + "from mujoco.mjx._src import mesh; assert mesh.trimesh is before")
+
+
+def test_devices_are_found_beside_imports_and_whoever_asks_is_told_what_is_wrong():
+    code = """
+import threading, time
+from ig2mj.process.imports import find_devices
+find_devices()
+while any(thread.name == "ig2mj-devices" for thread in threading.enumerate()):
+    time.sleep(0.01)
+import jax
+jax.devices()
+"""
+    done = {
+        platform: subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, "JAX_PLATFORMS": platform}
+        )
+        for platform in ("cpu", "none")
+    }
+    assert done["cpu"].returncode == 0 and done["none"].returncode != 0
+    assert "in thread" not in done["none"].stderr.lower() and "RuntimeError" in done["none"].stderr

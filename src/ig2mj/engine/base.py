@@ -27,6 +27,7 @@ from ig2mj.engine.model_fields import ModelFields
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
+from ig2mj.process.collector import Traced
 from ig2mj.scene.scene import Scene
 from ig2mj.scene.tables import SceneTables
 
@@ -119,9 +120,9 @@ class Engine(Protocol):
         """Makes ready for programs on other devices of this process, before they run: memory on each."""
         ...
 
-    def awaited(self) -> Physics | None:
-        """Shapes of what `reset` will return, while it would have to wait for something that is being compiled: there
-        is time to compile programs. None: it would wait for nothing."""
+    def awaited(self) -> Traced | None:
+        """The program of `reset` before it runs for the first time, where something else is compiled or loaded for it
+        meanwhile: whoever calls it has time to compile programs, this one too. None: it would wait for nothing."""
         ...
 
     def reset(self) -> Physics:

@@ -8,7 +8,7 @@ from typing import Any
 from ig2mj.engine.base import Engine
 from ig2mj.errors import UnknownNameError
 from ig2mj.process.collector import REST
-from ig2mj.process.imports import import_mjx
+from ig2mj.process.imports import find_devices, import_mjx
 from ig2mj.scene.scene import Scene
 
 ENGINES = {
@@ -33,6 +33,7 @@ def make_engine(name: str, scene: Scene, num_worlds: int = 1, **options: Any) ->
     if name not in ENGINES:
         raise UnknownNameError("engine", name, ENGINES)
     if name != "native":
+        find_devices()
         import_mjx()
     module, kind = ENGINES[name].split(":")
     return getattr(importlib.import_module(module), kind)(scene, num_worlds, **options)

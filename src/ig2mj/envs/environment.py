@@ -33,7 +33,7 @@ from ig2mj.envs.observations import Observer, Space, chosen
 from ig2mj.envs.state import EnvState, Seen
 from ig2mj.errors import ActionError, EngineError
 from ig2mj.predicates.compile import GoalStatus
-from ig2mj.process.collector import REST, Compiled
+from ig2mj.process.collector import REST, Compiled, compile_together
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.actions import ActionMap
@@ -206,7 +206,7 @@ class Environment:
         if isinstance(seed, EnvState):
             return self._reset(seed, np.ones(self.num_worlds, bool) if mask is None else mask)
         if (physics := self.core.engine.awaited()) is not None:
-            self._start.prepare(physics, as_seed(seed))
+            compile_together([self._start.traced(physics.returned, as_seed(seed)), physics])
         with REST:
             return self._start(self.core.engine.reset(), as_seed(seed))
 

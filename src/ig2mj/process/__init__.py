@@ -23,7 +23,8 @@ or earlier by whoever wants to; a second call does nothing. What the user has de
   - `warp.config.kernel_cache_dir`: below IG2MJ_CACHE_DIR, where that is set and Warp's own folder was not chosen.
   - Three repairs of Warp 1.18, of its streams, graph captures and devices (`ig2mj.process.warp_repairs`).
 
-Where engines are imported and made, worlds are started and programs are traced, and while Warp captures a graph:
+Where engines are imported and made, their kernels loaded, worlds started and programs traced, and while Warp captures a
+graph:
   - Python's cyclic garbage collector is off, and on again afterwards if it was (`ig2mj.process.collector`).
 
 `use_gl` (the first picture):

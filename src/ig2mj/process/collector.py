@@ -9,11 +9,14 @@ graph it must not run at all (`ig2mj.process.warp_repairs`).
 
 from __future__ import annotations
 
+import concurrent.futures
 import contextlib
 import gc
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
+
+from ig2mj.process.crew import spawn
 
 
 class CollectorRest(contextlib.ContextDecorator):
@@ -67,19 +70,48 @@ class Compiled:
         with REST:
             return self._compiled(*args, **kwargs)
 
-    def prepare(self, *args: Any) -> Any:
-        """Compiles it for arguments of such shapes (arrays or `jax.ShapeDtypeStruct`) and runs nothing.
-
-        A call with such arguments finds the program.
-
-        Returns:
-          Shapes of what the call will return.
-        """
-        import jax
-
+    def traced(self, *args: Any) -> Traced:
+        """Traces it for arguments of such shapes (arrays or `jax.ShapeDtypeStruct`), for `compile_together`."""
         with REST:
-            self._compiled.lower(*args).compile()
-            return jax.eval_shape(self._compiled, *args)
+            return Traced(self._compiled.trace(*args))
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._compiled, name)
+
+
+class Traced:
+    """A program that has been traced and is neither lowered nor compiled yet.
+
+    Attributes:
+      returned: shapes of what a call will return.
+    """
+
+    def __init__(self, traced: Any):
+        """`traced`: `jax.stages.Traced`."""
+        self.returned = traced.out_info
+        self._traced = traced
+
+    def compiling(self) -> concurrent.futures.Future[Any]:
+        """Lowers it, and compiles it in a thread: ends when a call finds the program."""
+        with REST:
+            lowered = self._traced.lower()
+        done: concurrent.futures.Future[Any] = concurrent.futures.Future()
+
+        def compile_it() -> None:
+            try:
+                done.set_result(lowered.compile())
+            except BaseException as failure:
+                done.set_exception(failure)
+
+        spawn(compile_it, "ig2mj-program")
+        return done
+
+
+def compile_together(programs: Sequence[Traced]) -> None:
+    """Compiles programs, or reads them where they are cached, and runs nothing: calls find them.
+
+    Python is needed for lowering, one program after the other, and not for the rest, which goes on meanwhile. So the
+    longest should come first.
+    """
+    for compiling in [program.compiling() for program in programs]:
+        compiling.result()

@@ -1,4 +1,6 @@
-"""`import_mjx`: MJX without the two libraries that only its JAX implementation calls, and only for meshes.
+"""`find_devices`: JAX's devices are found while modules are imported.
+
+`import_mjx`: MJX without the two libraries that only its JAX implementation calls, and only for meshes.
 
 MJX imports trimesh and SciPy's spatial algorithms, which with all that they import take 0.7 s of processor time of the
 2.5 that MJX takes. While MJX is imported, something stands in their place that imports them when it is called.
@@ -6,10 +8,14 @@ MJX imports trimesh and SciPy's spatial algorithms, which with all that they imp
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import sys
 import types
 from typing import Any
+
+from ig2mj.process.collector import REST
+from ig2mj.process.crew import spawn
 
 SPARED = ("trimesh", "scipy.spatial")
 
@@ -31,6 +37,21 @@ class _CalledLater:
         return getattr(importlib.import_module(self._module), self._name)(*args, **kwargs)
 
 
+def find_devices() -> None:
+    """JAX begins to look for its devices, in a thread: half a second with a GPU, most of it without Python.
+
+    Whoever asks for a device waits until they are found, and is told what went wrong.
+    """
+    import jax
+
+    def find() -> None:
+        with contextlib.suppress(Exception):
+            jax.devices()
+
+    spawn(find, "ig2mj-devices")
+
+
+@REST
 def import_mjx() -> None:
     """Imports `mujoco.mjx`, if it is not yet; other modules that import the two libraries meanwhile may get ours."""
     if "mujoco.mjx" in sys.modules:

@@ -37,7 +37,7 @@ from ig2mj.engine.base import Engine, Physics, Write
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.predicates.compile import GoalStatus
-from ig2mj.process.collector import REST, Compiled
+from ig2mj.process.collector import REST, Compiled, compile_together
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
 from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Batch
@@ -257,10 +257,11 @@ class Core:
         Raises:
           EngineError: kernels of the engine could not be compiled.
         """
-        if (physics := self.engine.awaited()) is not None:
+        if (reset := self.engine.awaited()) is not None:
             shape = (self.engine.num_worlds, len(self.controls.low))
             action = jax.ShapeDtypeStruct(shape, jnp.float32) if self.controllers else None
-            self._step.prepare(self._begin.prepare(physics, seed, first), action)
+            begin = self._begin.traced(reset.returned, seed, first)
+            compile_together([self._step.traced(begin.returned, action), begin, reset])
         return self._begin(self.engine.reset(), seed, first)
 
     def start_fn(self, physics: Physics, seed: int | Int[Array, ""] = 0, first: int | Int[Array, ""] = 0) -> Batch:

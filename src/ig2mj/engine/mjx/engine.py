@@ -34,7 +34,7 @@ from ig2mj.engine.snapshot import Snapshot, fitted, make_snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_jax
-from ig2mj.process.collector import Compiled
+from ig2mj.process.collector import Compiled, Traced
 from ig2mj.scene.scene import Scene
 
 
@@ -136,7 +136,7 @@ class MjxEngine(abc.ABC):
     def serve(self, devices: Sequence[Any]) -> None: ...
 
     @abc.abstractmethod
-    def awaited(self) -> MjxPhysics | None: ...
+    def awaited(self) -> Traced | None: ...
 
     def reset(self) -> MjxPhysics:
         """All worlds at the initial state."""

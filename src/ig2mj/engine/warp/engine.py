@@ -37,6 +37,7 @@ from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile, fit, holds_everything, profile_of_scene
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_warp
+from ig2mj.process.collector import Traced
 from ig2mj.scene.scene import Scene
 
 
@@ -99,6 +100,7 @@ class WarpEngine(MjxEngine):
         super().__init__(scene, num_worlds, initial=initial, **options)
         self._scratch, self._launches = 0, list[kernels.Launch]()
         self.loading: concurrent.futures.Future[int] | None = None
+        self._has_begun = False
         if own_device().platform == "gpu":  # on processors only some tests make steps
             self._get_ready(own_device(), compile_beforehand)
 
@@ -121,11 +123,11 @@ class WarpEngine(MjxEngine):
         if self.loading is not None:
             kernels.loaded(self.loading, self.scene.name)
 
-    def awaited(self) -> MjxPhysics | None:
-        """See `Engine.awaited`. Compiles the program of `reset`, which need not wait for kernels."""
-        if self.loading is None or self.loading.done():
+    def awaited(self) -> Traced | None:
+        """See `Engine.awaited`."""
+        if self.loading is None or self._has_begun:
             return None
-        return self._first.prepare(self._template, self._initial)
+        return self._first.traced(self._template, self._initial)
 
     def reset(self) -> MjxPhysics:
         """All worlds at the initial state, when the kernels are there that steps from it need.
@@ -134,6 +136,7 @@ class WarpEngine(MjxEngine):
           EngineError: a kernel could not be compiled or loaded.
         """
         self._wait_for_kernels()
+        self._has_begun = True
         return super().reset()
 
     def serve(self, devices: Sequence[Any]) -> None:

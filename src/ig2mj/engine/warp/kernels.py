@@ -28,6 +28,7 @@ from ig2mj.engine.warp.patches import scratch
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile
 from ig2mj.errors import EngineError
+from ig2mj.process.collector import REST
 from ig2mj.process.crew import ENDING, Crew, spawn
 from ig2mj.process.warp_repairs import AWAITED
 
@@ -142,7 +143,8 @@ def load_meanwhile(
     """As `load`, and returns at once. Nothing that needs these kernels may run before `loaded` has returned; a CUDA
     graph that is captured all the same waits for the end.
 
-    Begins when what was begun before has ended (`wait_for_others`).
+    Begins when what was begun before has ended (`wait_for_others`). Python's collector rests until the end: it would
+    look through all that was just imported and made, while programs are still to be traced.
     """
     on = wp.get_device(device)
     with _TURN:
@@ -155,6 +157,7 @@ def load_meanwhile(
         first = None if architecture is None else tiles.builder(not_made(launches), architecture, workers)
         done: concurrent.futures.Future[int] = concurrent.futures.Future()
         AWAITED.add(done)
+        REST.begin()
 
     def load_module(module: wp.Module, sizes: list[int]) -> None:
         for size in sizes:
@@ -169,6 +172,7 @@ def load_meanwhile(
             done.set_result(sum(map(len, by_size.values())))
         finally:
             AWAITED.discard(done)
+            REST.end()
 
     spawn(load_all, "ig2mj-kernels")
     return done
