@@ -24,6 +24,7 @@ from mujoco.mjx.third_party import mujoco_warp
 from mujoco.mjx.warp import ffi
 
 from ig2mj.engine.warp import patches, tiles
+from ig2mj.engine.warp.hashing import shared_hashes
 from ig2mj.engine.warp.patches import scratch
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile
@@ -100,9 +101,10 @@ def launches_of_step(
         Warp's (`ig2mj.engine.warp.patches`). warns: the engine's `opt.warn_overflow`.
       counter: of the memory that they need besides, on a CUDA device, the present one.
     """
-    act = _step_of_one_world(model, profile, warns)
+    with patches.counted_quickly(own):
+        act = _step_of_one_world(model, profile, warns)
     counted = wp.ScopedAllocator(wp.get_device(), counter) if counter else contextlib.nullcontext()
-    with patches.engine_kernels() if own else patches.upstream_kernels(), counted:
+    with patches.engine_kernels() if own else patches.upstream_kernels(), counted, shared_hashes():
         return launches_of(act)
 
 
@@ -243,9 +245,10 @@ def modules_of(launches: list[Launch], one_thread: bool = False) -> dict[int, li
     found: dict[int, dict[wp.Module, None]] = {}
     for kernel, block_dim in launches:
         found.setdefault(block_dim, {})[kernel.module] = None
-    for block_dim, modules in found.items():
-        for module in modules:
-            module.get_module_hash(1 if one_thread else block_dim)
+    with shared_hashes():
+        for block_dim, modules in found.items():
+            for module in modules:
+                module.get_module_hash(1 if one_thread else block_dim)
     return {block_dim: list(modules) for block_dim, modules in found.items()}
 
 

@@ -57,6 +57,7 @@ from ig2mj.engine.warp.patches.replacements import KERNELS
 
 __all__ = [
     "awake_kernels",
+    "counted_quickly",
     "engine_kernels",
     "fit",
     "for_new_engines",
@@ -122,6 +123,18 @@ def engine_kernels() -> Iterator[None]:
 
         with noted():
             yield
+
+
+@contextlib.contextmanager
+def counted_quickly(own: bool) -> Iterator[None]:
+    """Inside the block this thread makes data with sizes counted by our function (`contact_nnz`), where `own`."""
+    if not own:
+        yield
+        return
+    from ig2mj.engine.warp.patches.contact_nnz import COUNTED
+
+    with COUNTED.entered():
+        yield
 
 
 def launched(kernel: wp.Kernel, dim: Any = 1, tiled: bool = False) -> wp.Kernel:
