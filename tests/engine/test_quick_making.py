@@ -6,6 +6,7 @@ import mujoco
 import pytest
 import warp as wp
 from mujoco.mjx.third_party.mujoco_warp._src import io
+from warp._src import context
 
 from ig2mj.engine.warp import ahead, hashing, kernels, patches
 from ig2mj.engine.warp.engine import WarpEngine
@@ -72,7 +73,7 @@ def test_names_in_the_cache_are_the_same_with_shared_hashes(tiny_home):
     assert len(modules) > 40
     for module, size in modules:
         options = module.resolve_options(wp.config, block_dim=size)
-        alone = wp._src.context.ModuleHasher(module._get_live_kernels(), options).get_hash()
+        alone = context.ModuleHasher(module._get_live_kernels(), options).get_hash()
         assert module.get_module_hash(size) == alone
 
 
@@ -109,12 +110,12 @@ def test_functions_with_another_overload_are_hashed_anew(made):
     alone = made("alone")
     with shared_hashes():
         assert made("shared") == alone
-        assert wp._src.context.ModuleHasher is not hashing._originals["hasher"]
+        assert context.ModuleHasher is not hashing._originals["hasher"]
     assert len({*alone}) == 3 and not hashing._originals
 
 
 def test_other_versions_of_warp_hash_as_they_do(monkeypatch):
     monkeypatch.setattr(wp.config, "version", "1.19.0")
-    before = wp._src.context.ModuleHasher
+    before = context.ModuleHasher
     with shared_hashes():
-        assert wp._src.context.ModuleHasher is before
+        assert context.ModuleHasher is before

@@ -42,7 +42,8 @@ def shared_hashes() -> Iterator[None]:
 def _replaced() -> Iterator[None]:
     """While a block is entered in any thread, Warp's classes are those that share."""
     global _entered
-    context = wp._src.context
+    from warp._src import context  # not before: other versions may have none
+
     with _lock:
         if _entered == 0:
             _put(context)
