@@ -23,7 +23,7 @@ _entered = 0
 
 @contextlib.contextmanager
 def shared_hashes() -> Iterator[None]:
-    """Modules that this thread hashes inside the block share hashes of functions, until a function is made or built.
+    """Modules that this thread hashes inside the block share hashes of functions, until one is changed or built.
 
     Hashes are the same as outside. Other threads hash as ever. Without effect where Warp is another version.
     """
@@ -86,9 +86,10 @@ def _put(context: Any) -> None:
             finally:
                 _forget()
 
-    def register_function(*args: Any, **kwargs: Any) -> Any:
-        _forget()
-        return register(*args, **kwargs)
+    def register_function(module: Any, function: Any, scope: dict[str, Any], *args: Any, **kwargs: Any) -> Any:
+        if isinstance(scope.get(function.func.__name__), context.Function):
+            _forget()  # that one gets another overload
+        return register(module, function, scope, *args, **kwargs)
 
     _originals.update(hasher=hasher, builder=builder, register=register)
     context.ModuleHasher, context.ModuleBuilder = SharingHasher, ForgettingBuilder
