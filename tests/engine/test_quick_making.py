@@ -69,12 +69,16 @@ def test_changed_sources_are_noticed(monkeypatch):
 def test_names_in_the_cache_are_the_same_with_shared_hashes(tiny_home):
     launches = ahead.launches_on_gpu(WarpEngine(tiny_home, 2))
     kernels.modules_of(launches)
-    modules = {(kernel.module, size) for kernel, size in launches}
-    assert len(modules) > 40
-    for module, size in modules:
-        options = module.resolve_options(wp.config, block_dim=size)
-        alone = context.ModuleHasher(module._get_live_kernels(), options).get_hash()
-        assert module.get_module_hash(size) == alone
+    modules = {kernel.module: size for kernel, size in launches}
+
+    def hashed() -> list[bytes]:
+        options = [module.resolve_options(wp.config, block_dim=size) for module, size in modules.items()]
+        both = zip(modules, options, strict=True)
+        return [context.ModuleHasher(module._get_live_kernels(), option).get_hash() for module, option in both]
+
+    alone = hashed()
+    with shared_hashes():
+        assert hashed() == alone and len({*alone}) > 40
 
 
 SCALED = """

@@ -38,6 +38,25 @@ assert type(trimesh.Trimesh(corners)) is trimesh.Trimesh
     assert {"mujoco.mjx", "trimesh", "scipy.spatial"} <= imported(code)
 
 
+def test_only_kernels_of_mjx_are_not_searched_for_what_they_depend_on(tmp_path):
+    code = """
+import warp as wp
+search = wp._src.context.Module._find_references
+from ig2mj.process.imports import import_mjx
+import_mjx()
+from mujoco.mjx.third_party.mujoco_warp._src import math, smooth
+assert not wp.get_module(math.__name__).dependents
+assert wp._src.context.Module._find_references is search
+@wp.kernel
+def turn(x: wp.array(dtype=wp.quat)):
+    x[0] = math.mul_quat(x[0], x[1])
+assert wp.get_module(math.__name__).dependents == {turn.module}
+"""
+    file = tmp_path / "turns.py"  # Warp reads the sources of kernels
+    file.write_text(code)
+    subprocess.run([sys.executable, str(file)], check=True)
+
+
 def test_libraries_that_are_there_already_stay():
     code = "import trimesh; before = trimesh\nfrom ig2mj.process.imports import import_mjx; import_mjx()\n"
     assert "mujoco.mjx" in imported(code + "from mujoco.mjx._src import mesh; assert mesh.trimesh is before")

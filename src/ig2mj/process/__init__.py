@@ -27,6 +27,9 @@ Where engines are imported and made, their kernels loaded, worlds started and pr
 graph:
   - Python's cyclic garbage collector is off, and on again afterwards if it was (`ig2mj.process.collector`).
 
+While MJX is imported by an engine (`ig2mj.process.imports`):
+  - Something stands in for trimesh and SciPy's spatial algorithms, and Warp does not note what MJX's kernels depend on.
+
 `use_gl` (the first picture):
   - The class of OpenGL contexts that `mujoco.Renderer` makes. Environment variables are not changed.
 

@@ -12,6 +12,7 @@ import contextlib
 import importlib
 import sys
 import types
+from collections.abc import Iterator
 from typing import Any
 
 from ig2mj.process.collector import REST
@@ -51,6 +52,32 @@ def find_devices() -> None:
     spawn(find, "ig2mj-devices")
 
 
+@contextlib.contextmanager
+def _unsearched() -> Iterator[None]:
+    """Warp does not search the kernels of MJX, which are made inside the block, for modules that they depend on.
+
+    It needs them only where `importlib.reload` is called on one of those modules, and takes 0.2 s for 690 kernels and
+    functions. Kernels of others are searched. Without effect where Warp's inner workings are not those of 1.18.
+    """
+    import warp as wp
+
+    kind = getattr(getattr(getattr(wp, "_src", None), "context", None), "Module", None)
+    search = getattr(kind, "_find_references", None)
+    if kind is None or search is None or not wp.config.version.startswith("1.18."):
+        yield
+        return
+
+    def search_others(module: Any, adjoint: Any) -> None:
+        if not adjoint.func.__module__.startswith("mujoco.mjx."):
+            search(module, adjoint)
+
+    kind._find_references = search_others
+    try:
+        yield
+    finally:
+        kind._find_references = search
+
+
 @REST
 def import_mjx() -> None:
     """Imports `mujoco.mjx`, if it is not yet; other modules that import the two libraries meanwhile may get ours."""
@@ -59,7 +86,8 @@ def import_mjx() -> None:
     later = {name: _Later(name) for name in SPARED if name not in sys.modules}
     sys.modules.update(later)
     try:
-        importlib.import_module("mujoco.mjx")
+        with _unsearched():
+            importlib.import_module("mujoco.mjx")
     finally:
         for name, module in later.items():
             if sys.modules.get(name) is module:

@@ -96,7 +96,7 @@ class MjxEngine(abc.ABC):
         # One program each, not hundreds of little ones; and what several programs contain is traced once.
         self._first = Compiled(self._start_all)
         self._row = jax.jit(lambda physics, world: jax.tree.map(lambda a: a[world], self.snapshot(physics)))
-        self._view = jax.jit(self._make_view)
+        self._view, self._placed = jax.jit(self._make_view), jax.jit(self._kinematics)
         self._mapped = jax.jit(self._map, static_argnums=0)
 
     # What the implementations differ in.
@@ -172,7 +172,7 @@ class MjxEngine(abc.ABC):
             carry, _ = jax.lax.scan(substep, carry, length=self.substeps)
         data, (link_force, finger_force), overflow, awake = carry
         touching = self._touching(data, physics.touching, awake)
-        data = self._kinematics(data)
+        data = self._placed(data)
         physics = dataclasses.replace(
             physics,
             data=data,
@@ -283,7 +283,7 @@ class MjxEngine(abc.ABC):
         data = self._replaced(self._with_sleep(data, asleep, asleep < 0), chosen)
         return dataclasses.replace(
             physics,
-            data=self._kinematics(data),
+            data=self._placed(data),
             fields=jax.tree.map(put, merged(snapshot.model_fields, ModelFields(snapshot.eq_data)), physics.fields),
             ignored=put(snapshot.agents.ignored_contacts, physics.ignored),
             touching=put(all_units(snapshot), physics.touching),

@@ -103,6 +103,7 @@ class WarpEngine(MjxEngine):
         self._has_begun = False
         if own_device().platform == "gpu":  # on processors only some tests make steps
             self._get_ready(own_device(), compile_beforehand)
+        self._models_put.clear()
 
     def _get_ready(self, gpu: Any, compile_beforehand: bool | Literal["meanwhile"]) -> None:
         """Counts and takes the memory that steps need there, and loads their kernels."""
@@ -155,7 +156,8 @@ class WarpEngine(MjxEngine):
     def launches(self, counter: scratch.Counter | None = None) -> list[kernels.Launch]:
         """The kernels of a step, of a forward pass and of the contact filter. `counter`: see `launches_of_step`."""
         warns = int(self.model.opt._impl.warn_overflow)
-        found = kernels.launches_of_step(self.host_model, self.profile, self.own_kernels, warns, counter)
+        put = self._models_put[0] if self._models_put else None
+        found = kernels.launches_of_step(self.host_model, self.profile, self.own_kernels, warns, counter, put)
         if self._filters and len(self.tables.hand_body):
             found.append((DROP, 256))  # pyright: ignore[reportArgumentType]
         return found
@@ -194,7 +196,8 @@ class WarpEngine(MjxEngine):
         return ignored
 
     def _put_model(self, model: mujoco.MjModel) -> mjx.Model:
-        put = mjx.put_model(model, own_device(), impl="warp", graph_mode=self._graph_mode)
+        with kernels.models_put() as self._models_put:
+            put = mjx.put_model(model, own_device(), impl="warp", graph_mode=self._graph_mode)
         if len(self.tables.hand_body) and self._filters:
             code = encode(geom_hands(model, self.tables), self.tables.geom_object, self.tables.num_objects)
             put = put.tree_replace({"_impl.geom_adhesion": jnp.asarray(code)})

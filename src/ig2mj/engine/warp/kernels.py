@@ -93,6 +93,7 @@ def launches_of_step(
     own: bool,
     warns: int = 0,
     counter: scratch.Counter | None = None,
+    put: Any = None,
 ) -> list[Launch]:
     """The kernels of a step and of a forward pass of one world.
 
@@ -100,16 +101,32 @@ def launches_of_step(
       profile: buffer sizes; some kernels are compiled for them. own: with our functions in place of some of MuJoCo
         Warp's (`ig2mj.engine.warp.patches`). warns: the engine's `opt.warn_overflow`.
       counter: of the memory that they need besides, on a CUDA device, the present one.
+      put: MuJoCo Warp's model, on whatever device, where it was made before (`models_put`); its options are changed.
     """
     with patches.counted_quickly(own):
-        act = _step_of_one_world(model, profile, warns)
+        act = _step_of_one_world(model, profile, warns, put)
     counted = wp.ScopedAllocator(wp.get_device(), counter) if counter else contextlib.nullcontext()
     with patches.engine_kernels() if own else patches.upstream_kernels(), counted, shared_hashes():
         return launches_of(act)
 
 
-def _step_of_one_world(model: mujoco.MjModel, profile: EngineProfile, warns: int) -> Callable[[], None]:
-    put = mujoco_warp.put_model(model)
+@contextlib.contextmanager
+def models_put() -> Iterator[list[Any]]:
+    """The models of MuJoCo Warp that this thread makes inside the block; MJX makes one of its own and drops it."""
+    made: list[Any] = []
+    kept = ScopedReplacement()
+
+    def put_model(*args: Any, **kwargs: Any) -> Any:
+        made.append(kept.original(mujoco_warp, "put_model")(*args, **kwargs))
+        return made[-1]
+
+    kept.add({(mujoco_warp, "put_model"): put_model})
+    with kept.entered():
+        yield made
+
+
+def _step_of_one_world(model: mujoco.MjModel, profile: EngineProfile, warns: int, put: Any) -> Callable[[], None]:
+    put = put or mujoco_warp.put_model(model)
     put.opt.warn_overflow = int(warns)  # printing is compiled in or left out
     data = mujoco_warp.make_data(
         model,
