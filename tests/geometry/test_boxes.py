@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from ig2mj.geometry import boxes
-from ig2mj.geometry.poses import quat_to_matrix
+from ig2mj.geometry.poses import quat_to_matrix, quats_to_matrices
 from ig2mj.scene.tables import PieceKind
 
 SEEDS = st.integers(0, 2**31)
@@ -77,6 +77,21 @@ def test_numpy_and_jax_give_the_same_boxes(shapes, seed):
     low, high = boxes.core_boxes(quat_to_matrix(quat), points, radius, axis)
     assert isinstance(low, jax.Array)
     np.testing.assert_allclose((pos + low, pos + high), tight_boxes(shapes, pos, quat), atol=2e-6)
+
+
+@given(SEEDS)
+def test_reaches_with_worlds_last_are_the_boxes(shapes, seed):
+    rng = np.random.default_rng(seed)
+    rotation = np.stack([quat_to_matrix(shapes.scatter(rng, 1.0)[1]) for _ in range(3)])  # W K 3 3
+    points, radius, axis = cores(shapes)
+    center, half = points.mean(-1), np.ptp(points, axis=-1) / 2
+    worlds_last = jnp.asarray(rotation.transpose(2, 3, 1, 0), jnp.float32)
+    for reach, (low, high) in (
+        (boxes.core_reaches(worlds_last, points, radius, axis), boxes.core_boxes(rotation, points, radius, axis)),
+        (boxes.core_reaches(worlds_last, points, None, axis), boxes.core_boxes(rotation, points, None, axis)),
+        (boxes.turned_reaches(worlds_last, center, half), boxes.turned_boxes(rotation, center, half)),
+    ):
+        np.testing.assert_allclose(reach.transpose(0, 3, 2, 1), (-low, high), atol=2e-6)
 
 
 def test_igibsons_box_is_that_of_the_turned_local_box():
@@ -170,6 +185,6 @@ def test_the_tight_box_of_an_upright_cylinder_has_finite_gradients(shapes):
     @jax.jit
     @jax.grad
     def gradient(quat):
-        return sum(jnp.sum(b) for b in boxes.core_boxes(quat_to_matrix(quat), points, radius, axis))
+        return jnp.sum(boxes.core_reaches(quats_to_matrices(quat[..., None]), points, radius, axis))
 
     assert np.all(np.isfinite(gradient(jnp.tile(IDENTITY, (shapes.count, 1)))))

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import dataclasses
 
+import jax
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from ig2mj.engine.layout import ModelLayout
-from ig2mj.geometry.boxes import Boxes, core_boxes, link_boxes, piece_cores, turned_boxes
+from ig2mj.geometry.boxes import Boxes, core_boxes, core_reaches, link_boxes, piece_cores, turned_boxes, turned_reaches
 from ig2mj.geometry.poses import AnyArray
 from ig2mj.scene.tables import SceneTables
 
@@ -49,6 +50,12 @@ class BoxTable:
         if self.rule == "tight":
             return core_boxes(rotation, self.points, self.radius if self.any_round else None, self.axis)
         return turned_boxes(rotation, self.center, self.half)
+
+    def reaches(self, rotation: Float[jax.Array, "3 3 K W"]) -> Float[jax.Array, "2 3 K W"]:
+        """The same in JAX, for many worlds, as `core_reaches` gives it."""
+        if self.rule == "tight":
+            return core_reaches(rotation, self.points, self.radius if self.any_round else None, self.axis)
+        return turned_reaches(rotation, self.center, self.half)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

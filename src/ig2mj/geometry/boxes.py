@@ -8,7 +8,7 @@ it looser (`turned_boxes`; iGibson's aabb.py).
 
 An object without pieces has the empty box, low = inf and high = -inf: no point is in it and its gap to any box is inf.
 
-Axes: K pieces, V points of the largest, N links.
+Axes: K pieces, V points of the largest, N links, W worlds.
 """
 
 from __future__ import annotations
@@ -28,6 +28,9 @@ BULLET_MARGIN_SINGLE, BULLET_MARGIN_COMPOUND = 0.003, 0.004
 
 EDGE_ON = 1e-14
 """Of the squared sine of the angle between a cylinder's axis and a world axis: below, the gradient is cut to 0."""
+
+OUTWARDS = np.array([-1.0, 1.0], np.float32)[:, None, None, None, None]
+"""Directions of a box's sides along an axis, in front of axes 3 3 K W."""
 
 
 def piece_cores(
@@ -62,9 +65,10 @@ def core_boxes(
 ) -> Boxes:
     """The tight rule: boxes (low, high) about the origin of each piece's frame, which `rotation` turns into the world.
 
-    `radius` None says that no piece is round. Gradients are finite, also of an upright cylinder.
+    `radius` None says that no piece is round.
     """
-    low, high = _extent(rotation, points)
+    turned = rotation @ points
+    low, high = turned.min(-1), turned.max(-1)
     if radius is None:
         return low, high
     xp = rotation.__array_namespace__()
@@ -73,25 +77,33 @@ def core_boxes(
     return low - reach, high + reach
 
 
-def _extent(rotation: Float[AnyArray, "*b K 3 3"], points: Float[AnyArray, "K 3 V"]) -> Boxes:
-    """The least and the greatest coordinates of turned points.
+def core_reaches(
+    rotation: Float[Array, "3 3 K W"],
+    points: Float[AnyArray, "K 3 V"],
+    radius: Float[AnyArray, "K 1"] | None,
+    axis: Float[AnyArray, "K 3"],
+) -> Float[Array, "2 3 K W"]:
+    """`core_boxes` in JAX, with worlds last: how far pieces reach against (-low) and along (high) the world's axes.
 
-    In JAX point by point, so that no turned point is ever stored: of 585 pieces with 32 points each that would be
-    225 kB a world, written and read twice.
+    For GPUs: one kernel in which each thread goes through a piece's points, beside neighbours that read neighbouring
+    numbers. Both sides are one maximum, since XLA stores what a minimum and a maximum share: of 585 pieces with 32
+    points those were 225 kB a world. Gradients are finite, also of an upright cylinder.
     """
-    if isinstance(rotation, np.ndarray):
-        stored = rotation @ points
-        return stored.min(-1), stored.max(-1)
     points = jax.lax.optimization_barrier(jnp.asarray(points, rotation.dtype))  # one array, not a constant a point
+    outwards = OUTWARDS * rotation
 
-    def turned(v: int) -> Float[Array, "*b K 3"]:
-        x, y, z = (rotation[..., i] * points[:, None, i, v] for i in range(3))
+    def turned(v: int) -> Float[Array, "2 3 K W"]:
+        x, y, z = (outwards[:, :, i] * points[:, i, v, None] for i in range(3))
         return x + y + z
 
-    low = high = turned(0)
+    reach = turned(0)
     for v in range(1, points.shape[-1]):
-        low, high = jnp.minimum(low, turned(v)), jnp.maximum(high, turned(v))
-    return low, high
+        reach = jnp.maximum(reach, turned(v))
+    if radius is None:
+        return reach
+    x, y, z = (rotation[:, i] * axis[:, i, None] for i in range(3))
+    along = x + y + z
+    return reach + radius * jnp.sqrt(jnp.maximum(1.0 - along * along, EDGE_ON))
 
 
 def turned_boxes(
@@ -106,6 +118,15 @@ def turned_boxes(
     middle = (rotation @ center[..., None])[..., 0]
     reach = (abs(rotation) @ half[..., None])[..., 0]
     return middle - reach, middle + reach
+
+
+def turned_reaches(
+    rotation: Float[Array, "3 3 K W"], center: Float[AnyArray, "K 3"], half: Float[AnyArray, "K 3"]
+) -> Float[Array, "2 3 K W"]:
+    """`turned_boxes` as `core_reaches` gives the tight rule's."""
+    x, y, z = (rotation[:, i] * center[:, i, None] for i in range(3))
+    u, v, w = (abs(rotation[:, i]) * half[:, i, None] for i in range(3))
+    return OUTWARDS[:, 0] * (x + y + z) + (u + v + w)
 
 
 def link_boxes(

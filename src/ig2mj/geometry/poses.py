@@ -80,13 +80,21 @@ def quat_rotate_inverse(q: Quat, v: Vec) -> Float[Array, "*b 3"]:
 
 def quat_to_matrix(q: Quat) -> Float[Array, "*b 3 3"]:
     """Rotation matrix whose columns are the child's axes in the parent frame."""
-    w, x, y, z = (q[..., i] for i in range(4))
-    rows = [
+    rows = _matrix_rows(*(q[..., i] for i in range(4)))
+    return jnp.stack([jnp.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def quats_to_matrices(q: Float[Array, "n 4 W"]) -> Float[Array, "3 3 n W"]:
+    """`quat_to_matrix` with worlds last."""
+    return jnp.stack([jnp.stack(row) for row in _matrix_rows(*(q[:, i] for i in range(4)))])
+
+
+def _matrix_rows(w: AnyArray, x: AnyArray, y: AnyArray, z: AnyArray) -> list[list[AnyArray]]:
+    return [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
     ]
-    return jnp.stack([jnp.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def matrices_on_host(q: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 3 3"]:

@@ -87,10 +87,13 @@ def touching_units(
     geom_unit = jnp.asarray(layout.geom_unit)
     unit = geom_unit[jnp.maximum(contacts.geom, 0)]
     near = contacts.valid & (unit >= 0).all(-1) & (contacts.geom >= 0).all(-1) & (contacts.dist <= tolerance)
-    world = jnp.where(near, contacts.world, remembered.shape[0])  # out of range: dropped
-    now = jnp.zeros_like(remembered).at[world, unit[:, 0], unit[:, 1]].set(True, mode="drop")
-    fresh = unit_fresh[:, :, None] | unit_fresh[:, None, :]
-    return jnp.where(fresh, now | now.swapaxes(1, 2), remembered)
+    one, other = unit[:, 0], unit[:, 1]
+    known = jnp.clip(contacts.world, 0, len(remembered) - 1)
+    near &= unit_fresh[known, one] | unit_fresh[known, other]
+    world = jnp.where(near, contacts.world, len(remembered))  # out of range: dropped
+    kept = remembered & ~(unit_fresh[:, :, None] | unit_fresh[:, None, :])
+    # Each contact both ways, instead of an array of all pairs of its own and its transpose.
+    return kept.at[world, one, other].set(True, mode="drop").at[world, other, one].set(True, mode="drop")
 
 
 def without_ignored(

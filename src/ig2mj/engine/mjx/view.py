@@ -14,13 +14,16 @@ import dataclasses
 import jax.numpy as jnp
 import mujoco
 import numpy as np
+from jax.experimental.layout import Layout, with_layout_constraint
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.layout import ModelLayout
+from ig2mj.engine.mjx.touching import of_owners, packed
 from ig2mj.engine.mjx.velocities import JointsAbove, Moved, body_velocities, joints_above
 from ig2mj.engine.object_boxes import BoxTable, make_box_table
 from ig2mj.engine.view import AgentView, Array, PhysicsView
-from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
+from ig2mj.geometry.boxes import OUTWARDS
+from ig2mj.geometry.poses import compose, quat_rotate, quats_to_matrices
 from ig2mj.scene.tables import SceneTables
 
 
@@ -88,7 +91,7 @@ def make_view(
     """The view of poses, velocities, contacts and sleep. `touching` is of units; forces in newtons."""
     tables, layout = plan.tables, plan.layout
     body_pos, body_quat = moved.xpos, moved.xquat
-    root, count = tables.object_root, layout.num_object_units
+    root, words = tables.object_root, packed(touching)
     object_pos, object_quat = body_pos[:, root], body_quat[:, root]
     linvel, angvel = _object_velocities(plan, moved.qvel, object_quat)
     link_pos, link_quat = compose(
@@ -111,16 +114,16 @@ def make_view(
         link_pos=link_pos,
         link_quat=link_quat,
         joint_pos=moved.qpos[:, tables.openable_qposadr],
-        touching=object_touching(plan, touching[:, :count, :count]),
+        touching=of_owners(words, plan.unit_slots, plan.unit_slots) & ~np.eye(tables.num_objects, dtype=bool),
         link_force=link_force,
         awake=_any_of(tree_awake, layout.object_trees),
         held=_held(plan, eq_active),
-        agent=_agents(plan, moved, touching, finger_force),
+        agent=_agents(plan, moved, of_owners(words, plan.agent_slots, plan.unit_slots), finger_force),
     )
 
 
 def _agents(
-    plan: ViewPlan, moved: Moved, touching: Bool[Array, "W U U"], finger_force: Float[Array, "W F Y"]
+    plan: ViewPlan, moved: Moved, touching: Bool[Array, "W A O"], finger_force: Float[Array, "W F Y"]
 ) -> AgentView:
     tables, body_pos, body_quat = plan.tables, moved.xpos, moved.xquat
     eye_pos, eye_quat = compose(
@@ -131,7 +134,6 @@ def _agents(
     )
     base_linvel, base_angvel = body_velocities(plan.base_joints, moved)
     hand_linvel, hand_angvel = body_velocities(plan.hand_joints, moved)
-    touched = _any_over_slots(touching[:, :, : plan.layout.num_object_units], plan.agent_slots)  # W A V
     return AgentView(
         base_pos=body_pos[:, tables.agent_body],
         base_quat=body_quat[:, tables.agent_body],
@@ -148,7 +150,7 @@ def _agents(
         finger_pos=body_pos[:, tables.finger_body],
         finger_quat=body_quat[:, tables.finger_body],
         finger_force=finger_force,
-        touching=_any_over_slots(touched.swapaxes(1, 2), plan.unit_slots).swapaxes(1, 2),
+        touching=touching,
     )
 
 
@@ -169,27 +171,25 @@ def object_boxes(
     plan: ViewPlan, body_pos: Float[Array, "W B 3"], body_quat: Float[Array, "W B 4"]
 ) -> tuple[Float[Array, "W O 3"], Float[Array, "W O 3"]]:
     """World boxes of all objects, low and high corners (m); as `ig2mj.engine.object_boxes.world_boxes` makes them."""
-    table = plan.boxes
-    rotation = quat_to_matrix(body_quat[:, table.body])  # W K 3 3
-    low, high = table.boxes(rotation)
-    position = body_pos[:, table.body]
-    low, high = low + position, high + position
-    taken = (plan.box_slots >= 0)[..., None]
-    return (
-        jnp.where(taken, low[:, plan.box_slots], jnp.inf).min(2),
-        jnp.where(taken, high[:, plan.box_slots], -jnp.inf).max(2),
-    )
+    bodies = plan.boxes.body
+    position, rotation = _worlds_last(body_pos), quats_to_matrices(_worlds_last(body_quat))
+    reach = plan.boxes.reaches(rotation[:, :, bodies]) + OUTWARDS[:, 0] * position[bodies].swapaxes(0, 1)  # 2 3 K W
+    slot = np.where(plan.box_slots >= 0, plan.box_slots, plan.box_slots[:, :1])  # every object has at least one box
+    farthest = reach[:, :, slot[:, 0]]
+    for s in range(1, slot.shape[1]):
+        farthest = jnp.maximum(farthest, reach[:, :, slot[:, s]])
+    low, high = jnp.moveaxis(_in_order(farthest), -1, 1).swapaxes(2, 3)
+    return -low, high
 
 
-def object_touching(plan: ViewPlan, touching: Bool[Array, "W U U"]) -> Bool[Array, "W O O"]:
-    """Touching of objects from touching of their units; an object does not touch itself."""
-    slot = plan.unit_slots
-    num_objects = len(slot)
-    if slot.shape[1] == 1 and np.array_equal(slot[:, 0], np.arange(num_objects)):
-        return touching
-    rows = _any_over_slots(touching, slot)  # W O U
-    both = _any_over_slots(rows.swapaxes(1, 2), slot)  # W O O, transposed, and symmetric as `touching` is
-    return both & ~np.eye(num_objects, dtype=bool)
+def _worlds_last(values: Float[Array, "W n c"]) -> Float[Array, "n c W"]:
+    return _in_order(jnp.moveaxis(jnp.asarray(values), 0, -1))
+
+
+def _in_order(values: Float[Array, "*n"]) -> Float[Array, "*n"]:
+    """The same in memory in the order of its axes; else XLA would call another order a transposed array, and each
+    thread of a GPU would read far from its neighbour's."""
+    return with_layout_constraint(values, Layout(range(values.ndim)))
 
 
 def slots(owner: np.ndarray, count: int) -> np.ndarray:
@@ -238,4 +238,7 @@ def _held(plan: ViewPlan, eq_active: Bool[Array, "W E"]) -> Bool[Array, "W H O"]
     shape = worlds, len(tables.hand_body), tables.num_objects
     if not len(plan.layout.grasp_equality):
         return jnp.zeros(shape, bool)
-    return _any_over_slots(eq_active[:, :, None], plan.grasp_slots).reshape(shape)
+    held = jnp.zeros((worlds, len(plan.grasp_slots)), bool)
+    for slot in plan.grasp_slots.T:
+        held |= eq_active[:, slot] & (slot >= 0)
+    return held.reshape(shape)
