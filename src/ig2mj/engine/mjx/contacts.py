@@ -153,35 +153,44 @@ def no_forces(tables: SceneTables, num_worlds: int) -> tuple[Float[jax.Array, "W
     return link, jnp.zeros((num_worlds, len(tables.finger_body), len(tables.graspable_body)), jnp.float32)
 
 
-def step_forces(
-    contacts: Contacts, efc_force: Float[Array, "W N"], layout: ModelLayout, tables: SceneTables, pyramidal: bool
+def larger_forces(
+    forces: tuple[Float[Array, "W L O"], Float[Array, "W F Y"]],
+    contacts: Contacts,
+    efc_force: Float[Array, "W N"],
+    layout: ModelLayout,
+    tables: SceneTables,
+    pyramidal: bool,
 ) -> tuple[Float[Array, "W L O"], Float[Array, "W F Y"]]:
-    """Forces of the physics step that made the contacts: of annotated links on objects, of fingers on graspable bodies.
-    What the scene lacks costs nothing."""
-    link, finger = no_forces(tables, efc_force.shape[0])
+    """The larger of `forces` and of those of the physics step that made the contacts: of annotated links on objects, of
+    fingers on graspable bodies. What the scene lacks costs nothing."""
+    link, finger = forces
     has_links, has_fingers = (tables.link_geom >= 0).any(), finger.size > 0
     if not has_links and not has_fingers:
         return link, finger
     normal = normal_forces(contacts, efc_force, pyramidal)
     if has_links:
-        link = link_forces(contacts, layout, tables, normal, efc_force.shape[0])
+        link = larger_link_forces(link, contacts, layout, tables, normal)
     if has_fingers:
-        finger = finger_forces(contacts, layout, tables, normal, efc_force.shape[0])
+        finger = jnp.maximum(finger, finger_forces(contacts, layout, tables, normal, efc_force.shape[0]))
     return link, finger
 
 
-def link_forces(
-    contacts: Contacts, layout: ModelLayout, tables: SceneTables, normal: Float[Array, "C"], num_worlds: int
+def larger_link_forces(
+    force: Float[Array, "W L O"],
+    contacts: Contacts,
+    layout: ModelLayout,
+    tables: SceneTables,
+    normal: Float[Array, "C"],
 ) -> Float[Array, "W L O"]:
-    """Largest normal force (N) of a single contact between each annotated link's geom and each object."""
+    """The larger of `force` and of the normal force (N) of any single contact between each annotated link's geom and
+    each object."""
     geom = jnp.maximum(contacts.geom, 0)
     link = jnp.asarray(layout.link_of_geom)[geom]
     thing = jnp.asarray(tables.geom_object)[geom]
-    force, _ = no_forces(tables, num_worlds)
     for side in (0, 1):
         usable = contacts.valid & (link[:, side] >= 0) & (thing[:, 1 - side] >= 0)
-        world = jnp.where(usable, contacts.world, num_worlds)
-        force = force.at[world, link[:, side], thing[:, 1 - side]].max(normal, mode="drop")
+        world = jnp.where(usable, contacts.world, len(force))  # out of range: dropped
+        force = jnp.asarray(force).at[world, link[:, side], thing[:, 1 - side]].max(normal, mode="drop")
     return force
 
 

@@ -23,7 +23,7 @@ from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Write
 from ig2mj.engine.controls import check_shape, clip
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
-from ig2mj.engine.mjx.contacts import Contacts, no_forces, step_forces, touching_units, without_ignored
+from ig2mj.engine.mjx.contacts import Contacts, larger_forces, no_forces, touching_units, without_ignored
 from ig2mj.engine.mjx.physics import STATE_FIELDS, MjxPhysics, all_units, mujoco_of, uncommitted
 from ig2mj.engine.mjx.view import Moved, ViewPlan, make_view, plan_view
 from ig2mj.engine.mjx.writing import apply_write, reaches, trees_joined, with_islands
@@ -159,8 +159,8 @@ class MjxEngine(abc.ABC):
             data, forces, overflow, _ = carry
             awake = self._tree_asleep(data) < 0
             data = self._mapped(mjx.step, self.model, data, physics.fields, physics.ignored)
-            now = step_forces(self._contacts(data), self._efc_force(data), self.layout, self.tables, self._pyramidal)
-            forces = jax.tree.map(jnp.maximum, forces, now)
+            made = self._contacts(data), self._efc_force(data)
+            forces = larger_forces(forces, *made, self.layout, self.tables, self._pyramidal)
             return (data, forces, overflow | self._overflow(data), awake), None
 
         none = no_forces(self.tables, self.num_worlds)

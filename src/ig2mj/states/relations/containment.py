@@ -37,8 +37,9 @@ LINES = np.concatenate([HORIZONTAL_LINES, VERTICAL_LINE])
 SMALLEST_CHUNK = 8
 """Pairs that are computed together at least."""
 
-CHUNKS_PER_WORLD = 1 / 4
-"""Chunks grow with the number of worlds, so that their number does not."""
+CHUNKS_PER_WORLD = {"cpu": 1 / 4}
+"""Chunks grow with the number of worlds, so that their number does not. Elsewhere one for each world: on a GPU a turn
+is sixteen small kernels and a wait for the host, 90 us for a quarter of 8,192 worlds, and one container took four."""
 
 ALIKE = 4
 """Containers whose pieces differ less than this in number share a loop, in which all cost as much as the largest."""
@@ -76,7 +77,8 @@ class ContainerPairs:
     def inside(self, view: PhysicsView, needed: Bool[Array, "W P"]) -> Bool[Array, "W P"]:
         """Whether each object is inside; false where `needed` is."""
         worlds, count = needed.shape
-        chunk = min(worlds * count, max(SMALLEST_CHUNK, round(CHUNKS_PER_WORLD * worlds)))
+        share = CHUNKS_PER_WORLD.get(jax.default_backend(), 1)
+        chunk = min(worlds * count, max(SMALLEST_CHUNK, round(share * worlds)))
         # Container by container, and within one world by world: number = place in `order` * W + world.
         listed = Worklist.of(needed[:, self.order].T.reshape(-1), chunk)
         before = jnp.concatenate([jnp.zeros(1, listed.until.dtype), listed.until])[self.start * worlds]
