@@ -158,7 +158,9 @@ def test_gaps_are_mujocos_box_distances_symmetric_and_move_along(seed):
 
 def test_box_gap_uses_all_three_axes():
     low = np.zeros(3, np.float32)
-    np.testing.assert_allclose(boxes.box_gap(low, low + 1, low + np.float32([2, 3, 1]), low + 4), np.sqrt(5), rtol=1e-6)
+    np.testing.assert_allclose(
+        boxes.box_gap(low, low + 1, low + np.array([2, 3, 1], np.float32), low + 4), np.sqrt(5), rtol=1e-6
+    )
 
 
 def test_a_point_on_the_face_is_in_the_box_and_nan_is_not():

@@ -90,7 +90,7 @@ def core_reaches(
     points those were 225 kB a world. Gradients are finite, also of an upright cylinder.
     """
     points = jax.lax.optimization_barrier(jnp.asarray(points, rotation.dtype))  # one array, not a constant a point
-    outwards = OUTWARDS * rotation
+    outwards = jnp.asarray(OUTWARDS) * rotation
 
     def turned(v: int) -> Float[Array, "2 3 K W"]:
         x, y, z = (outwards[:, :, i] * points[:, i, v, None] for i in range(3))
@@ -103,7 +103,7 @@ def core_reaches(
         return reach
     x, y, z = (rotation[:, i] * axis[:, i, None] for i in range(3))
     along = x + y + z
-    return reach + radius * jnp.sqrt(jnp.maximum(1.0 - along * along, EDGE_ON))
+    return reach + jnp.asarray(radius) * jnp.sqrt(jnp.maximum(1.0 - along * along, EDGE_ON))
 
 
 def turned_boxes(
@@ -126,7 +126,7 @@ def turned_reaches(
     """`turned_boxes` as `core_reaches` gives the tight rule's."""
     x, y, z = (rotation[:, i] * center[:, i, None] for i in range(3))
     u, v, w = (abs(rotation[:, i]) * half[:, i, None] for i in range(3))
-    return OUTWARDS[:, 0] * (x + y + z) + (u + v + w)
+    return jnp.asarray(OUTWARDS[:, 0] * (x + y + z) + (u + v + w))
 
 
 def link_boxes(

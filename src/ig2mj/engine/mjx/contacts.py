@@ -91,7 +91,7 @@ def touching_units(
     known = jnp.clip(contacts.world, 0, len(remembered) - 1)
     near &= unit_fresh[known, one] | unit_fresh[known, other]
     world = jnp.where(near, contacts.world, len(remembered))  # out of range: dropped
-    kept = remembered & ~(unit_fresh[:, :, None] | unit_fresh[:, None, :])
+    kept = jnp.asarray(remembered & ~(unit_fresh[:, :, None] | unit_fresh[:, None, :]))
     # Each contact both ways, instead of an array of all pairs of its own and its transpose.
     return kept.at[world, one, other].set(True, mode="drop").at[world, other, one].set(True, mode="drop")
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 
+import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
@@ -91,7 +92,7 @@ def make_view(
     """The view of poses, velocities, contacts and sleep. `touching` is of units; forces in newtons."""
     tables, layout = plan.tables, plan.layout
     body_pos, body_quat = moved.xpos, moved.xquat
-    root, words = tables.object_root, packed(touching)
+    root, words = tables.object_root, packed(jnp.asarray(touching))
     object_pos, object_quat = body_pos[:, root], body_quat[:, root]
     linvel, angvel = _object_velocities(plan, moved.qvel, object_quat)
     link_pos, link_quat = compose(
@@ -182,14 +183,14 @@ def object_boxes(
     return -low, high
 
 
-def _worlds_last(values: Float[Array, "W n c"]) -> Float[Array, "n c W"]:
+def _worlds_last(values: Float[Array, "W n c"]) -> Float[jax.Array, "n c W"]:
     return _in_order(jnp.moveaxis(jnp.asarray(values), 0, -1))
 
 
-def _in_order(values: Float[Array, "*n"]) -> Float[Array, "*n"]:
+def _in_order(values: Float[jax.Array, "*n"]) -> Float[jax.Array, "*n"]:
     """The same in memory in the order of its axes; else XLA would call another order a transposed array, and each
     thread of a GPU would read far from its neighbour's."""
-    return with_layout_constraint(values, Layout(range(values.ndim)))
+    return with_layout_constraint(values, Layout(tuple(range(values.ndim))))
 
 
 def slots(owner: np.ndarray, count: int) -> np.ndarray:
