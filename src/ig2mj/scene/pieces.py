@@ -7,10 +7,12 @@ and moves the geom's pose the other way, so the compiled vertices and the compil
 from __future__ import annotations
 
 import dataclasses
+import pathlib
 
 import mujoco
 import numpy as np
 
+from ig2mj.scene.kept_hulls import hulls_of
 from ig2mj.scene.tables import PieceKind
 
 SAME_FACET = 1e-3
@@ -46,7 +48,7 @@ def hull_planes(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     Returns:
       planes [m, 4], corners [k, 3] in the order of `vertices`.
     """
-    import scipy.spatial  # not needed to read a household's manifest
+    import scipy.spatial  # not needed where hulls are known
 
     try:
         hull = scipy.spatial.ConvexHull(vertices)
@@ -86,18 +88,17 @@ def make_pieces(model: mujoco.MjModel, geoms: np.ndarray) -> list[Piece]:
     Raises:
       ValueError: a geom is not a convex solid (plane, height field, ellipsoid, SDF); the message is its name.
     """
-    meshes: dict[int, tuple[np.ndarray, np.ndarray]] = {}
-    pieces = []
+    of_mesh = [int(model.geom_dataid[g]) for g in geoms if model.geom_type[g] == mujoco.mjtGeom.mjGEOM_MESH]
+    meshes = list(dict.fromkeys(of_mesh))
+    hulls = hulls_of([mesh_corners(model, mesh) for mesh in meshes], hull_planes, pathlib.Path(__file__))
+    known, pieces = dict(zip(meshes, hulls, strict=True)), []
     for geom in geoms:
         shape, size = mujoco.mjtGeom(int(model.geom_type[geom])), np.asarray(model.geom_size[geom])
         kind = SUPPORTED.get(shape)
         if kind is None:
             raise ValueError(model.geom(geom).name)
         if shape == mujoco.mjtGeom.mjGEOM_MESH:
-            mesh = int(model.geom_dataid[geom])
-            if mesh not in meshes:
-                meshes[mesh] = hull_planes(mesh_corners(model, mesh))
-            planes, vertices = meshes[mesh]
+            planes, vertices = known[int(model.geom_dataid[geom])]
         else:
             radius = size[0]
             half = {
