@@ -134,8 +134,8 @@ def test_labels_that_only_the_first_picture_tells_are_learnt():
     )
     choose = jax.jit(imitation.choose)
     yes, no = np.ones(64, bool), np.zeros(64, bool)
-    _, kept = choose(learner.actor, learner.moments, first, algorithm.recall.blank(64), yes)
-    _, same = choose(learner.actor, learner.moments, later, kept, no)
+    _, kept, _ = choose(learner.actor, learner.moments, first, algorithm.recall.blank(64), yes)
+    _, same, _ = choose(learner.actor, learner.moments, later, kept, no)
     np.testing.assert_array_equal(kept, same)
     assert np.ptp(np.asarray(kept)[:, :3], axis=0).min() > 0, "pictures differ"
     label = jnp.tanh(3 * (kept[:, :2] - kept[:, :2].mean(0)) / kept[:, :2].std(0))

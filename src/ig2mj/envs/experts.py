@@ -14,7 +14,7 @@ import jax
 from jaxtyping import Float
 
 from ig2mj.engine.view import Array
-from ig2mj.envs.environment import Environment, EnvState
+from ig2mj.envs.environment import Environment
 from ig2mj.errors import UnknownNameError
 from ig2mj.tasks.experts import Expert
 from ig2mj.tasks.experts.expert import PLANS
@@ -30,11 +30,12 @@ def make_expert(env: Environment) -> Expert:
     return Expert(env.task, env.robot, env.scene, rules.model, env.grasping)
 
 
-def expert_of(env: Environment) -> Callable[[EnvState], Float[Array, "W n"]]:
-    """What acts in all worlds of an environment, compiled.
+def expert_of(env: Environment) -> Callable[..., Float[Array, "W n"]]:
+    """What acts in all worlds of an environment, compiled: from a state, and where it takes objects to be, as
+    `ig2mj.tasks.experts.Expert` does, to actions.
 
     Raises:
       UnknownNameError: the task has no expert.
     """
     acts = jax.jit(make_expert(env))
-    return lambda state: acts(state.batch.world.view, state.batch.world.states)
+    return lambda state, beliefs=None: acts(state.batch.world.view, state.batch.world.states, beliefs)

@@ -21,6 +21,7 @@ from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
+from ig2mj.learn.belief import true_at
 from ig2mj.learn.perception import Perception, Seen
 
 FINAL = "final_obs"
@@ -111,8 +112,9 @@ GUIDED = "guided"
 """The name among a transition's extras of whether the expert had a part in the episode [W]; such episodes are left out
 of the success that is reported."""
 
-Hint = Callable[[Any], Array] | None
-"""An expert: from the environment's state to actions [W, n] (`ig2mj.envs.experts.expert_of`)."""
+Hint = Callable[..., Array] | None
+"""An expert: from the environment's state to actions [W, n] (`ig2mj.envs.experts.expert_of`), and where the policy's
+memory has `beliefs`, from those as well: where the policy took objects to be in the step before."""
 
 
 def begin(env: TrainingEnv, memory: Any, seed: int) -> Play:
@@ -133,14 +135,21 @@ def collect_fn(
 
     def step(play: Play, key: Array) -> tuple[Play, tuple[Transition, dict[str, Array]]]:
         seen = perception(play.state.obs)
-        advice = Advice(play.steps, None if hint is None else hint(play.state))
-        action, extra, memory = act(learned, play.memory, seen, key, advice)
+        action, extra, memory = act(learned, play.memory, seen, key, _advice(hint, play))
         state = env.step_autoreset_fn(play.state, action)
         new, kept = _stepped(perception, play, seen, action, extra, memory, state)
         return dataclasses.replace(new, state=_kept(state)), kept
 
     play, (rollout, sums) = jax.lax.scan(step, play, jax.random.split(key, length))
     return play, rollout, jax.tree.map(lambda a: a.sum(0), sums)
+
+
+def _advice(hint: Hint, play: Play) -> Advice:
+    """What is known beside what is seen. In an episode's first step nothing is believed yet."""
+    if hint is None:
+        return Advice(play.steps)
+    believed = getattr(play.memory, "beliefs", None)
+    return Advice(play.steps, hint(play.state, true_at(play.steps == 0, believed)) if believed else hint(play.state))
 
 
 class NativeCollector:
@@ -164,7 +173,7 @@ class NativeCollector:
         """As `collect_fn`; also the seconds that were spent in the environment."""
         rollout, sums, spent = [], [], 0.0
         for k in np.asarray(jax.random.split(key, length)):
-            advice = Advice(play.steps, None if self._hint is None else self._hint(play.state))
+            advice = _advice(self._hint, play)
             seen, action, extra, memory = self._before(learned, play.memory, play.state.obs, k, advice)
             action = np.asarray(action)
             began = time.perf_counter()

@@ -24,6 +24,8 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError
+from ig2mj.learn.belief import beliefs_of
+from ig2mj.learn.belief import nothing as nothing_believed
 from ig2mj.learn.collect import GUIDED, Advice, Hint, Transition, if_ready
 from ig2mj.learn.guidance import ALONE, uncounted
 from ig2mj.learn.heads import likeliest
@@ -31,6 +33,8 @@ from ig2mj.learn.labels import Imitation, Labels
 from ig2mj.learn.moments import Moments, share_of
 from ig2mj.learn.perception import Perception, Seen
 from ig2mj.learn.recall import Recall
+from ig2mj.tasks.experts.sight import Belief
+from ig2mj.tasks.task import HORIZON
 
 RECALLED = "recalled"
 """The name among a transition's extras of what was remembered."""
@@ -54,6 +58,7 @@ class DaggerConfig:
       told: samples of an update besides, in which the actor is told what is hidden, as wrong as it guesses it: pictures
         cost time. For the encoder `glimpses`.
       recall: 1: the actor remembers what a hand soon hides (`ig2mj.learn.recall`). For the encoder `glimpses`.
+      believed: 1: the expert's labels are for where such an actor takes objects to be (`ig2mj.learn.belief`).
       choices: values of each number of an action that the actor chooses from; 0: it is the mean of a Gaussian.
       actor: sizes of the layers. net: encoder (`networks.NETS`).
     """
@@ -75,6 +80,7 @@ class DaggerConfig:
     look: int = 0
     told: int = 0
     recall: int = 0
+    believed: int = 0
     choices: int = 21
     actor: tuple[int, ...] = (256, 256, 256)
     net: str = "small"
@@ -96,7 +102,8 @@ class Turns:
     """Who acts in each world: a number from 0 to 1; the expert, where its share is larger.
 
     `left`: steps until it is drawn anew. `alone`: the expert has no part in this episode. `helped`: it had one.
-    `helpless`: steps since the expert's part ended. `recalled`: what the actor remembers.
+    `helpless`: steps since the expert's part ended. `recalled`: what the actor remembers. `beliefs`: where it takes
+    objects to be, if the expert is to know.
     """
 
     draw: Float[Array, "W"]
@@ -105,6 +112,7 @@ class Turns:
     helped: Bool[Array, "W"]
     helpless: Int[Array, "W"]
     recalled: Float[Array, "W m"]
+    beliefs: dict[str, Belief] | None = None
 
 
 class Dagger:
@@ -140,6 +148,8 @@ class Dagger:
         for name, value in (("told", c.told), ("recall", c.recall)):
             if value and (c.net != "glimpses" or not perception.objects):
                 raise Ig2mjError(f"{name}={value}: only for actors of pictures with net=glimpses, which guess")
+        if c.believed and not c.recall:
+            raise Ig2mjError(f"believed={c.believed}: only an actor that remembers believes anything (--set recall=1)")
         self._imitation = Imitation(perception, action_size, c, axis)
         self.actor = self._imitation.actor
 
@@ -199,7 +209,9 @@ class Dagger:
         no, none = jnp.zeros(num_worlds, bool), jnp.zeros(num_worlds, bool)
         zero, nought = jnp.zeros(num_worlds, jnp.int32), jnp.zeros(num_worlds, jnp.int32)
         nothing = jnp.zeros((num_worlds, self._remembers))
-        return Turns(jnp.zeros(num_worlds), zero, no, none, nought, nothing)
+        hidden = self.perception.hidden
+        beliefs = nothing_believed(hidden, num_worlds) if self.config.believed and hidden is not None else None
+        return Turns(jnp.zeros(num_worlds), zero, no, none, nought, nothing, beliefs)
 
     def act(
         self, learner: DaggerLearner, turns: Turns, seen: Seen, key: Array, advice: Advice
@@ -216,7 +228,7 @@ class Dagger:
         draw = jnp.where(over, jax.random.uniform(draw_key, over.shape), turns.draw)
         left = jnp.where(over, jax.random.randint(time_key, over.shape, 1, 51), turns.left) - 1
         begins = advice.steps == 0
-        head, recalled = self._imitation.choose(learner.actor, learner.moments, seen, turns.recalled, begins)
+        head, recalled, guess = self._imitation.choose(learner.actor, learner.moments, seen, turns.recalled, begins)
         own_action = likeliest(head)
         share = jnp.where(learner.updates == 0, 1.0, 1.0 - learner.progress / max(c.alone, 1e-6))
         alone = jnp.where(begins, jax.random.uniform(alone_key, begins.shape) < ALONE, turns.alone)
@@ -227,10 +239,23 @@ class Dagger:
         action = jnp.where(expert[:, None], label, own_action)
         action = action + c.noise * jax.random.normal(noise_key, action.shape)
         action = jnp.where(wild[:, None], jax.random.uniform(any_key, action.shape, minval=-1.0), action)
-        # Of the episodes that begin alone as the expert's part ends the short ones end first, and those succeed.
+        # Of the episodes that begin alone as the expert's part ends the short ones end first, and those succeed; as do
+        # those of the first that the policy has alone.
         apart, helpless = uncounted(~alone, turns.helpless, share > 0)
+        apart |= learner.updates < HORIZON * c.updates
         extra = {"label": label, GUIDED: helped | apart, **({RECALLED: recalled} if self._remembers else {})}
-        return jnp.clip(action, -1.0, 1.0), extra, Turns(draw, left, alone, helped, helpless, recalled)
+        beliefs = self._beliefs(learner.moments, seen, recalled, guess)
+        return jnp.clip(action, -1.0, 1.0), extra, Turns(draw, left, alone, helped, helpless, recalled, beliefs)
+
+    def _beliefs(
+        self, moments: Moments, seen: Seen, recalled: Float[Array, "W m"], guess: Float[Array, "W g"]
+    ) -> dict[str, Belief] | None:
+        """Where the actor takes objects to be, for the expert."""
+        recall, hidden = self.recall, self.perception.hidden
+        if not self.config.believed or recall is None or hidden is None:
+            return None
+        scales = moments.scales(seen.vector.shape[-1])
+        return beliefs_of(recall, hidden, scales, seen.vector, recalled, guess)
 
     def learn(
         self,

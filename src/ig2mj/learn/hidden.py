@@ -31,6 +31,7 @@ class Hidden:
       size: g. objects: how many objects, hands apart, have a pose and are to be found in the picture.
       plain: which numbers of the vector are guessed as they are; they come first in the guess.
       poses: of each object by name where in the guess its place (3 numbers) is, and how it is turned (6).
+      quats: [objects with poses, 4] which of the vector's numbers say how these are turned.
     """
 
     def __init__(self, first: int, count: int, names: Sequence[str] = (), lens: Lens | None = None):
@@ -49,8 +50,9 @@ class Hidden:
         self.plain = first + np.array(plain, int)
         self._turns = first + np.array([[k + j for j in range(4)] for k in turns], int).reshape(-1, 4)
         self.size = len(plain) + 6 * len(turns)
-        self._turned = np.arange(len(plain), self.size)
         whole = [n.removesuffix("_quat_w") for n in names if n.endswith("_quat_w") and not n.startswith("hand_")]
+        self.quats = self._turns[len(turns) - len(whole) :]
+        self._turned = np.arange(len(plain), self.size)
         starts = [names.index(f"{name}_pos_x") for name in whole if f"{name}_pos_x" in names]
         self._spots = first + np.array([[k + j for j in range(3)] for k in starts], int).reshape(-1)
         self._lens, self.objects = lens, len(starts) if lens is not None else 0

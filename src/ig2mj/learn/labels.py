@@ -182,8 +182,8 @@ class Imitation:
         seen: Seen,
         kept: Float[Array, "W m"],
         begins: Bool[Array, "W"],
-    ) -> tuple[Float[Array, "W n *K"], Float[Array, "W m"]]:
-        """What the actor's last layer says, and what it remembers from now on. `kept`: of the step before."""
+    ) -> tuple[Float[Array, "W n *K"], Float[Array, "W m"], Float[Array, "W g"]]:
+        """What the actor's last layer says, what it remembers from now on, and its guess. `kept`: of the last step."""
         vector = seen.vector[:, : self._perception.actor_size]
 
         def look(*given: Any) -> Any:
@@ -191,7 +191,7 @@ class Imitation:
 
         scales = moments.scales(seen.vector.shape[-1])
         said, kept = looked(look, self.recall, scales, vector, seen.picture, kept, begins)
-        return said[0], kept
+        return said[0], kept, said[2]
 
     def _recalled(
         self, moments: Moments, kept: Float[Array, "B m"] | None, vector: Float[Array, "B v"]

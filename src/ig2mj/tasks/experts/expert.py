@@ -5,7 +5,7 @@ Axes: W worlds, n numbers of an action.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import jax.numpy as jnp
 import numpy as np
@@ -14,7 +14,7 @@ from jaxtyping import Float
 from ig2mj.agents.base import ACTION_PERIOD, Robot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import UnknownNameError
-from ig2mj.geometry.poses import quat_rotate_inverse
+from ig2mj.geometry.poses import quat_conjugate, quat_multiply, quat_rotate, quat_rotate_inverse
 from ig2mj.scene.scene import Scene
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
@@ -28,7 +28,7 @@ from ig2mj.tasks.experts import (
     soaking_towel,
 )
 from ig2mj.tasks.experts.motion import Wish
-from ig2mj.tasks.experts.sight import Sight
+from ig2mj.tasks.experts.sight import Belief, Sight
 from ig2mj.tasks.task import Task
 
 Plan = Callable[[Sight], list[Wish]]
@@ -75,8 +75,15 @@ class Expert:
         rays = [hand for agent in scene.agents if isinstance(agent, Robot) for hand in agent.hand_rays()]
         self._grips = np.stack([hand.grasp_point for hand in rays]).astype(np.float32)
 
-    def __call__(self, view: PhysicsView, states: ExtendedStates) -> Float[Array, "W n"]:
-        """The action of every world, -1 to 1."""
+    def __call__(
+        self, view: PhysicsView, states: ExtendedStates, beliefs: Mapping[str, Belief] | None = None
+    ) -> Float[Array, "W n"]:
+        """The action of every world, -1 to 1.
+
+        Args:
+          beliefs: where it takes objects to be, in the frame of the robot's base; None: where they are.
+        """
+        base = jnp.asarray(view.agent.base_quat)[:, 0]
         see = Sight(
             view,
             states,
@@ -87,8 +94,8 @@ class Expert:
             self._hands,
             self._grips,
             self.grasping,
+            {name: _of_the_world(base, belief) for name, belief in (beliefs or {}).items()},
         )
-        base = jnp.asarray(view.agent.base_quat)[:, 0]
         return jnp.concatenate([self._action(base, wish) for wish in self._plan(see)], axis=1)
 
     def _action(self, base: Float[Array, "W 4"], wish: Wish) -> Float[Array, "W k"]:
@@ -99,6 +106,12 @@ class Expert:
             opens = -1.0 if self.robot == "humanoid" else 1.0
             parts.append(jnp.where(wish.close, -opens, opens)[:, None])
         return jnp.concatenate(parts, axis=1)
+
+
+def _of_the_world(base: Float[Array, "W 4"], belief: Belief) -> Belief:
+    """What is believed in the frame of a base, in the world's."""
+    turn = quat_multiply(quat_multiply(base, belief.turn), quat_conjugate(base))
+    return Belief(quat_rotate(base, belief.move), turn)
 
 
 def _limited(v: Float[Array, "W 3"]) -> Float[Array, "W 3"]:

@@ -6,14 +6,16 @@ Axes: W worlds.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from flax import struct
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.poses import quat_rotate
+from ig2mj.geometry.poses import quat_multiply, quat_rotate
 from ig2mj.scene.scene import Scene
 from ig2mj.scene.tables import LinkKind
 from ig2mj.states.model import StateModel
@@ -21,14 +23,27 @@ from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.points import Located, Point, locator
 
 
+@struct.dataclass
+class Belief:
+    """How wrong somebody is about where an object is.
+
+    Attributes:
+      move: from the object's origin to where it is believed to be, m. turn: what turns it as it is believed to lie.
+    """
+
+    move: Float[Array, "W 3"]
+    turn: Float[Array, "W 4"]
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Sight:
-    """All worlds of a scene as they are now; positions in the world frame, m.
+    """All worlds of a scene as they are now, or as they are believed to be; positions in the world frame, m.
 
     Attributes:
       robot: name of the robot that acts. objects: names of what the task is about, the first object first.
       hands: numbers of the acting hands among all hands of the scene.
       grips: [H, 3] grasp point of every hand in the hand's frame. grasping: the mode.
+      beliefs: of objects by name, world frame; the others are seen where they are.
     """
 
     view: PhysicsView
@@ -40,6 +55,7 @@ class Sight:
     hands: tuple[int, ...]
     grips: Float[np.ndarray, "H 3"]
     grasping: str = "mitten"
+    beliefs: Mapping[str, Belief] = dataclasses.field(default_factory=dict)
 
     @property
     def physical(self) -> bool:
@@ -102,24 +118,33 @@ class Sight:
         """Where an object's first annotated link of a kind is."""
         tables = self.model.tables
         found = np.flatnonzero((tables.link_object == self.scene.object_index(name)) & (tables.link_kind == kind))
-        return jnp.asarray(self.view.link_pos)[:, int(found[0])]
+        return self._believed(name, jnp.asarray(self.view.link_pos)[:, int(found[0])])
 
     def pos(self, name: str) -> Float[Array, "W 3"]:
         """Origin of an object's frame."""
-        return jnp.asarray(self.view.object_pos)[:, self.scene.object_index(name)]
+        return self._believed(name, jnp.asarray(self.view.object_pos)[:, self.scene.object_index(name)])
 
     def com(self, name: str) -> Float[Array, "W 3"]:
         """An object's centre of mass."""
-        return jnp.asarray(self.view.object_com)[:, self.scene.object_index(name)]
+        return self._believed(name, jnp.asarray(self.view.object_com)[:, self.scene.object_index(name)])
 
     def quat(self, name: str) -> Float[Array, "W 4"]:
         """An object's orientation."""
-        return jnp.asarray(self.view.object_quat)[:, self.scene.object_index(name)]
+        quat = jnp.asarray(self.view.object_quat)[:, self.scene.object_index(name)]
+        return quat_multiply(self.beliefs[name].turn, quat) if name in self.beliefs else quat
 
     def box(self, name: str) -> tuple[Float[Array, "W 3"], Float[Array, "W 3"]]:
-        """An object's lowest and highest corner."""
+        """An object's lowest and highest corner, of the size that it has as it lies."""
         index = self.scene.object_index(name)
-        return jnp.asarray(self.view.aabb_low)[:, index], jnp.asarray(self.view.aabb_high)[:, index]
+        move = self.beliefs[name].move if name in self.beliefs else 0.0
+        return jnp.asarray(self.view.aabb_low)[:, index] + move, jnp.asarray(self.view.aabb_high)[:, index] + move
+
+    def _believed(self, name: str, place: Float[Array, "W 3"]) -> Float[Array, "W 3"]:
+        """Where a point of an object is believed to be that is at `place`."""
+        if name not in self.beliefs:
+            return place
+        belief, origin = self.beliefs[name], jnp.asarray(self.view.object_pos)[:, self.scene.object_index(name)]
+        return origin + belief.move + quat_rotate(belief.turn, place - origin)
 
     def point(self, point: Point) -> Located:
         """A point of a task, and whether it exists."""

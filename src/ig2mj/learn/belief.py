@@ -1,0 +1,90 @@
+"""What an actor believes of where objects are, for experts that answer as if it were so.
+
+An actor that remembers (`ig2mj.learn.recall`) is wrong by about a centimetre for a whole episode. An expert that sees
+the truth asks it to go on from where it takes itself to be right, now here, now there, and what it learns is the mean:
+to stay. Told what the actor believes, the expert answers with what can be learnt; where the actor is too wrong to be
+near what it remembers, with the truth.
+
+Axes: W worlds, K objects, C ways to believe, others as in `ig2mj.learn.recall`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float
+
+from ig2mj.engine.view import Array
+from ig2mj.geometry.poses import length, matrix_to_quat, quat_conjugate, quat_multiply, quat_to_rotation_vector
+from ig2mj.learn.hidden import Hidden
+from ig2mj.learn.recall import POSE, Recall
+from ig2mj.tasks.experts.sight import Belief
+
+NEAR = 0.05
+"""m: who is farther off does not know where an object is."""
+
+TURNED = 0.6
+"""rad: nor how it lies."""
+
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0], np.float32)
+
+
+def nothing(hidden: Hidden, worlds: int) -> dict[str, Belief]:
+    """Objects are believed to be where they are."""
+    return {n: Belief(jnp.zeros((worlds, 3)), jnp.tile(UPRIGHT, (worlds, 1))) for n in hidden.poses}
+
+
+def true_at(where: Bool[Array, "W"], beliefs: Mapping[str, Belief]) -> dict[str, Belief]:
+    """The same, but right in some worlds."""
+    right = jnp.asarray(where)[:, None]
+    return {n: Belief(jnp.where(right, 0.0, b.move), jnp.where(right, UPRIGHT, b.turn)) for n, b in beliefs.items()}
+
+
+def beliefs_of(
+    recall: Recall,
+    hidden: Hidden,
+    scales: tuple[Float[Array, "v"], Float[Array, "v"]],
+    vector: Float[Array, "W v"],
+    kept: Float[Array, "W m"],
+    guess: Float[Array, "W g"],
+) -> dict[str, Belief]:
+    """How wrong an actor is about each object that it guesses, in the frame of the robot's base.
+
+    It takes an object to be where it lay at first or, if a hand took it, where that brings it, whichever is nearer to
+    the truth; where both are far off, to be where it sees it now.
+
+    Args:
+      scales: mean and deviation of the vector. vector: as it was observed. kept: what is remembered now.
+    """
+    mean, deviation = scales
+    worlds, names, places = len(vector), list(hidden.poses), np.array(recall.places, int)
+    first = kept[:, : len(recall.poses)].reshape(worlds, 1, -1, POSE)
+    now = guess[:, np.array(recall.poses, int)].reshape(worlds, 1, -1, POSE)
+    ways = [first, now]
+    if recall.hands:
+        ways.insert(1, recall.carried(kept, vector, mean, deviation).reshape(worlds, -1, len(names), POSE))
+    believed = jnp.concatenate(ways, axis=1)  # [W, C, K, POSE], what is seen now last
+    middle, spread = jnp.asarray(mean)[places], jnp.asarray(deviation)[places]
+    moves = believed[..., :3] * spread + middle - vector[:, None, places]
+    errors = length(moves)
+    remembered = errors[:, :-1].argmin(axis=1)
+    sees = jnp.min(errors[:, :-1], axis=1) > NEAR
+    which = jnp.where(sees, believed.shape[1] - 1, remembered)[:, None, :, None]
+    move = jnp.take_along_axis(moves, which, axis=1)[:, 0]
+    turned = _quats(jnp.take_along_axis(believed[..., 3:], which, axis=1)[:, 0])
+    turn = quat_multiply(turned, quat_conjugate(vector[:, hidden.quats]))
+    lost = (length(move) > NEAR)[..., None]
+    move = jnp.where(lost, 0.0, move)
+    turn = jnp.where(lost | (length(quat_to_rotation_vector(turn)) > TURNED)[..., None], UPRIGHT, turn)
+    return {name: Belief(move[:, k], turn[:, k]) for k, name in enumerate(names)}
+
+
+def _quats(columns: Float[Array, "W K 6"]) -> Float[Array, "W K 4"]:
+    """The rotation whose first two columns are nearest to these, the first before the second."""
+    x, y = columns[..., :3], columns[..., 3:]
+    x /= jnp.maximum(length(x), 1e-6)[..., None]
+    y -= x * jnp.sum(x * y, axis=-1, keepdims=True)
+    y /= jnp.maximum(length(y), 1e-6)[..., None]
+    return matrix_to_quat(jnp.stack([x, y, jnp.cross(x, y)], axis=-1))
