@@ -1,9 +1,12 @@
 """Rays against merged meshes (`ig2mj.sensors.merged_meshes`), in MJX-Warp's ray caster.
 
-Only the function that finds what a ray hits is ours; upstream's kernel shades what it found. Rays first look for what
-never moves, in one tree that all worlds share, and then for what does, as far as they came: upstream takes everything
-in the order of a tree. Hits are the same up to rounding, but for surfaces in the same place: there upstream shows the
-geom with the larger number, and within a merged mesh either is shown.
+Only the function that finds what a ray hits is ours; upstream's kernel shades what it found, but for `LIGHT`. Rays
+first look for what never moves, in one tree that all worlds share, and then for what does, as far as they came:
+upstream takes everything in the order of a tree. Hits are the same up to rounding, but for surfaces in the same place:
+there upstream shows the geom with the larger number, and within a merged mesh either is shown.
+
+Light is limited as OpenGL does: what falls on a surface first, to all of it, and then the texture takes its share.
+Upstream multiplies first, so that under two bright lights textures were up to a fifth too bright.
 """
 
 # Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
@@ -12,6 +15,7 @@ geom with the larger number, and within a merged mesh either is shown.
 # pyright: reportPrivateUsage=false
 # ruff: noqa: SIM102, UP018, RUF046 (of two conditions the first is one of the compiler's; variables, not constants)
 
+import inspect
 import types
 from collections.abc import Sequence
 from typing import Any, no_type_check
@@ -21,6 +25,7 @@ import numpy as np
 import warp as wp
 from mujoco.mjx.third_party.mujoco_warp._src import bvh, ray, render
 
+from ig2mj.engine.warp.patches.sources import defined
 from ig2mj.sensors.merged_meshes import MESH, Tables
 
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = range(7)
@@ -28,6 +33,26 @@ PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = range(7)
 
 CONSTRUCTOR, LEAF = "sah", 2
 """How trees of merged meshes are built; they are built once."""
+
+
+LIGHT = (
+    (
+        "    base_color = wp.vec3(color[0], color[1], color[2])\n",
+        "    most = wp.vec3(1.0, 1.0, 1.0)\n    shine = wp.vec3(0.0)\n",
+    ),
+    ("          base_color = wp.cw_mul(base_color, tex_color)\n", "          most = tex_color\n"),
+)
+"""Lines of upstream's kernel, and what follows them in ours."""
+
+SHINE = (
+    (
+        "wp.cw_mul(base_color, diff_rgb) + spec_rgb\n",
+        "wp.cw_mul(base_color, diff_rgb)\n      shine = shine + spec_rgb\n",
+    ),
+    ("wp.cw_mul(base_color, hl_diff) + hl_spec\n", "wp.cw_mul(base_color, hl_diff)\n      shine = shine + hl_spec\n"),
+    ("wp.min(result, wp.vec3(1.0, 1.0, 1.0))\n", "wp.min(wp.min(result, most) + shine, wp.vec3(1.0, 1.0, 1.0))\n"),
+)
+"""Parts of its lines, and what stands in their place: highlights are not limited by a texture."""
 
 
 def use_merged(contexts: Sequence[Any], host: mujoco.MjModel, tables: Tables, nworld: int) -> None:
@@ -68,14 +93,17 @@ def use_merged(contexts: Sequence[Any], host: mujoco.MjModel, tables: Tables, nw
 
 
 def _kernel(context: Any, host: mujoco.MjModel, tables: Tables) -> wp.Kernel:
-    """Upstream's kernel with `_cast_ray` in place of the function that finds what a ray hits."""
+    """Upstream's kernel with `_cast_ray` in place of the function that finds what a ray hits, and with `LIGHT`."""
 
     def make_cast_ray(geom_ray_types: tuple[int, ...], first_hit: bool = False) -> wp.Function:
         return _cast_ray(geom_ray_types, first_hit, host.ngeom, host.nmesh, tables.still)
 
     build = render._build_megakernel
-    names = {**build.__globals__, "_make_cast_ray": make_cast_ray}
-    own = types.FunctionType(build.__code__, names, build.__name__, build.__defaults__, build.__closure__)
+    text = inspect.getsource(build)
+    for old, new in (*((line, line + more) for line, more in LIGHT), *SHINE):
+        assert text.count(old) == 1, f"MuJoCo Warp's kernel has changed: {old}"
+        text = text.replace(old, new)
+    own = defined(build.__name__, text, {**build.__globals__, "_make_cast_ray": make_cast_ray})
     return own(types.SimpleNamespace(nlight=host.nlight), context)
 
 
