@@ -43,7 +43,7 @@ def test_an_actor_is_wrong_by_as_much_as_what_it_remembers():
     hidden, recall, scales = setting()
     rng = np.random.default_rng(0)
     place = rng.uniform(-0.5, 0.5, (2, WORLDS, 3))
-    turns = [Rotation.random(WORLDS, random_state=k) for k in range(2)]
+    turns = [Rotation.from_quat(rng.normal(size=(WORLDS, 4))) for _ in range(2)]
     off = rng.uniform(-0.02, 0.02, (2, WORLDS, 3))
     wrong = Rotation.from_rotvec(rng.uniform(-0.2, 0.2, (WORLDS, 3)))
     hands = Rotation.from_euler("xyz", rng.uniform(-1, 1, (2, WORLDS, 3)))

@@ -164,7 +164,7 @@ def test_a_policy_file_remembers_as_what_was_trained(tmp_path):
         obs = {**env.reset(k).obs, "privileged_state": jnp.ones((4, 7))}
         begins = np.array([k == 0, k == 0, k in (0, 2), True])
         action, kept = play(obs, kept, begins)
-        head, also = choose(learner.actor, learner.moments, algorithm.perception(obs), also, begins)
+        head, also, _ = choose(learner.actor, learner.moments, algorithm.perception(obs), also, begins)
         np.testing.assert_allclose(kept, also, atol=0.02, err_msg="half precision")
         np.testing.assert_allclose(action, likeliest(head), atol=0.02)
     assert np.abs(np.asarray(kept)[0, :18] - np.asarray(kept)[3, :18]).max() > 0.05, "one looked at another picture"
