@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import ig2mj
 from ig2mj.envs.experts import expert_of
-from ig2mj.learn.belief import NEAR, beliefs_of, nothing, true_at
+from ig2mj.learn.belief import NEAR, SAME, beliefs_of, errors_of, nothing, true_at
 from ig2mj.learn.hidden import Hidden
 from ig2mj.learn.recall import Recall
 from ig2mj.tasks.experts.sight import Belief
@@ -57,7 +57,9 @@ def test_an_actor_is_wrong_by_as_much_as_what_it_remembers():
     seen = vector(0, [lying(place[0] + off[0], wrong * turns[0]), lying(place[1] + off[1], turns[1])])
     guess = told(hidden, scales, seen)
     kept = recall.after(recall.blank(WORLDS), np.ones(WORLDS, bool), true[:, :OWN], guess)
-    found = beliefs_of(recall, hidden, scales, true, kept, guess)
+    at_first = errors_of(recall, scales, true, guess)
+    np.testing.assert_allclose(at_first, np.linalg.norm(off, axis=-1).T, atol=1e-5)
+    found = beliefs_of(recall, hidden, scales, true, kept, guess, at_first)
     for k, name in enumerate(("knife", "apple")):
         np.testing.assert_allclose(found[name].move, off[k], atol=1e-5)
     np.testing.assert_allclose(
@@ -69,7 +71,7 @@ def test_an_actor_is_wrong_by_as_much_as_what_it_remembers():
     moved = hands[1] * hands[0].inv()
     carried = lying(moved.apply(place[0] - at[0]) + at[1], moved * turns[0])
     later = vector(1, [carried, true[:, OWN + 7 :]])
-    found = beliefs_of(recall, hidden, scales, later, kept, rng.normal(size=guess.shape).astype(np.float32))
+    found = beliefs_of(recall, hidden, scales, later, kept, rng.normal(size=guess.shape).astype(np.float32), at_first)
     np.testing.assert_allclose(found["knife"].move, moved.apply(off[0]), atol=1e-5)
     np.testing.assert_allclose(found["apple"].move, off[1], atol=1e-5)
 
@@ -83,16 +85,22 @@ def test_who_is_far_off_is_told_the_truth_and_who_sees_it_now_believes_that():
     rolled = np.concatenate([own, lying(place, still), lying(place + rolls, still)], axis=1)
     off = np.array([0.01, 0.0, -0.02])
     sees = np.concatenate([own, lying(place, still), lying(place + rolls + off, still)], axis=1)
-    found = beliefs_of(recall, hidden, scales, rolled, kept, told(hidden, scales, sees))
+    right = np.zeros((WORLDS, 2), np.float32)
+    found = beliefs_of(recall, hidden, scales, rolled, kept, told(hidden, scales, sees), right)
     np.testing.assert_allclose(found["apple"].move, np.tile(off, (WORLDS, 1)), atol=1e-5)
-    found = beliefs_of(recall, hidden, scales, rolled, kept, told(hidden, scales, first))
-    assert NEAR < 0.3
+    found = beliefs_of(recall, hidden, scales, rolled, kept, told(hidden, scales, first), right)
+    assert NEAR < rolls.max()
     np.testing.assert_array_equal(found["apple"].move, 0)
     np.testing.assert_array_equal(found["apple"].turn, np.tile([1.0, 0, 0, 0], (WORLDS, 1)))
+    little = np.array([0.0, 0.02, 0.0])
+    nudged = np.concatenate([own, lying(place, still), lying(place + little, still)], axis=1)
+    assert SAME < little.max() < NEAR
+    found = beliefs_of(recall, hidden, scales, nudged, kept, told(hidden, scales, nudged), right)
+    np.testing.assert_allclose(found["apple"].move, 0, atol=1e-5, err_msg="it is not where it lay, and that is seen")
     half = np.arange(WORLDS) < 3
-    right = true_at(half, {"apple": Belief(jnp.ones((WORLDS, 3)), jnp.zeros((WORLDS, 4)))})["apple"]
-    np.testing.assert_array_equal(right.move[:, 0], 1.0 * ~half)
-    np.testing.assert_array_equal(right.turn[:, 0], 1.0 * half)
+    true = true_at(half, {"apple": Belief(jnp.ones((WORLDS, 3)), jnp.zeros((WORLDS, 4)))})["apple"]
+    np.testing.assert_array_equal(true.move[:, 0], 1.0 * ~half)
+    np.testing.assert_array_equal(true.turn[:, 0], 1.0 * half)
 
 
 @pytest.fixture(scope="module")

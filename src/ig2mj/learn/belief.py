@@ -2,8 +2,8 @@
 
 An actor that remembers (`ig2mj.learn.recall`) is wrong by about a centimetre for a whole episode. An expert that sees
 the truth asks it to go on from where it takes itself to be right, now here, now there, and what it learns is the mean:
-to stay. Told what the actor believes, the expert answers with what can be learnt; where the actor is too wrong to be
-near what it remembers, with the truth.
+to stay. Told what the actor believes, the expert answers with what can be learnt; where an object lies elsewhere by now
+than an actor can know, with the truth.
 
 Axes: W worlds, K objects, C ways to believe, others as in `ig2mj.learn.recall`.
 """
@@ -25,6 +25,10 @@ from ig2mj.tasks.experts.sight import Belief
 NEAR = 0.05
 """m: who is farther off does not know where an object is."""
 
+SAME = 0.01
+"""m by which what is remembered may be off by more or less than it was at first: else the object has moved since. An
+expert that is not told so finds a fruit cut that has rolled away, and wants nothing more."""
+
 TURNED = 0.6
 """rad: nor how it lies."""
 
@@ -42,6 +46,26 @@ def true_at(where: Bool[Array, "W"], beliefs: Mapping[str, Belief]) -> dict[str,
     return {n: Belief(jnp.where(right, 0.0, b.move), jnp.where(right, UPRIGHT, b.turn)) for n, b in beliefs.items()}
 
 
+def errors_of(
+    recall: Recall, scales: tuple[Float[Array, "v"], Float[Array, "v"]], vector: Float[Array, "W v"], guess: Array
+) -> Float[Array, "W K"]:
+    """How far off a guess [W, g] is from where each object is, m. Other arguments as of `beliefs_of`."""
+    now = guess[:, np.array(recall.poses, int)].reshape(len(vector), -1, POSE)
+    return length(_moves(recall, scales, vector, now[:, None]))[:, 0]
+
+
+def _moves(
+    recall: Recall,
+    scales: tuple[Float[Array, "v"], Float[Array, "v"]],
+    vector: Float[Array, "W v"],
+    poses: Float[Array, "W C K p"],
+) -> Float[Array, "W C K 3"]:
+    """From where objects are to where they are believed to be."""
+    places = np.array(recall.places, int)
+    middle, spread = (jnp.asarray(scale)[places] for scale in scales)
+    return poses[..., :3] * spread + middle - vector[:, None, places]
+
+
 def beliefs_of(
     recall: Recall,
     hidden: Hidden,
@@ -49,28 +73,29 @@ def beliefs_of(
     vector: Float[Array, "W v"],
     kept: Float[Array, "W m"],
     guess: Float[Array, "W g"],
+    at_first: Float[Array, "W K"],
 ) -> dict[str, Belief]:
     """How wrong an actor is about each object that it guesses, in the frame of the robot's base.
 
     It takes an object to be where it lay at first or, if a hand took it, where that brings it, whichever is nearer to
-    the truth; where both are far off, to be where it sees it now.
+    the truth; if it is at neither of them any more, to be where it sees it now.
 
     Args:
-      scales: mean and deviation of the vector. vector: as it was observed. kept: what is remembered now.
+      scales: mean and deviation of the vector. vector: as it was observed. kept: what is remembered now. at_first: by
+        how much it was off in the episode's first step (`errors_of`).
     """
     mean, deviation = scales
-    worlds, names, places = len(vector), list(hidden.poses), np.array(recall.places, int)
+    worlds, names = len(vector), list(hidden.poses)
     first = kept[:, : len(recall.poses)].reshape(worlds, 1, -1, POSE)
     now = guess[:, np.array(recall.poses, int)].reshape(worlds, 1, -1, POSE)
     ways = [first, now]
     if recall.hands:
         ways.insert(1, recall.carried(kept, vector, mean, deviation).reshape(worlds, -1, len(names), POSE))
     believed = jnp.concatenate(ways, axis=1)  # [W, C, K, POSE], what is seen now last
-    middle, spread = jnp.asarray(mean)[places], jnp.asarray(deviation)[places]
-    moves = believed[..., :3] * spread + middle - vector[:, None, places]
+    moves = _moves(recall, scales, vector, believed)
     errors = length(moves)
     remembered = errors[:, :-1].argmin(axis=1)
-    sees = jnp.min(errors[:, :-1], axis=1) > NEAR
+    sees = jnp.abs(jnp.min(errors[:, :-1], axis=1) - at_first) > SAME
     which = jnp.where(sees, believed.shape[1] - 1, remembered)[:, None, :, None]
     move = jnp.take_along_axis(moves, which, axis=1)[:, 0]
     turned = _quats(jnp.take_along_axis(believed[..., 3:], which, axis=1)[:, 0])

@@ -8,7 +8,7 @@ What is learned is for each number of the action how likely each of some values 
 SAC's and PPO's (`ig2mj.learn.heads`). An iteration is `length` steps of all worlds, then
 `updates` updates for each of them, on samples of all steps that are kept.
 
-Axes: W worlds, T steps, B samples, n numbers of an action.
+Axes: W worlds, T steps, B samples, K objects, n numbers of an action.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError
-from ig2mj.learn.belief import beliefs_of
+from ig2mj.learn.belief import beliefs_of, errors_of
 from ig2mj.learn.belief import nothing as nothing_believed
 from ig2mj.learn.collect import GUIDED, Advice, Hint, Transition, if_ready
 from ig2mj.learn.guidance import ALONE, uncounted
@@ -103,7 +103,7 @@ class Turns:
 
     `left`: steps until it is drawn anew. `alone`: the expert has no part in this episode. `helped`: it had one.
     `helpless`: steps since the expert's part ended. `recalled`: what the actor remembers. `beliefs`: where it takes
-    objects to be, if the expert is to know.
+    objects to be, if the expert is to know. `at_first`: m by which it was off in the episode's first step.
     """
 
     draw: Float[Array, "W"]
@@ -113,6 +113,7 @@ class Turns:
     helpless: Int[Array, "W"]
     recalled: Float[Array, "W m"]
     beliefs: dict[str, Belief] | None = None
+    at_first: Float[Array, "W K"] | None = None
 
 
 class Dagger:
@@ -209,9 +210,11 @@ class Dagger:
         no, none = jnp.zeros(num_worlds, bool), jnp.zeros(num_worlds, bool)
         zero, nought = jnp.zeros(num_worlds, jnp.int32), jnp.zeros(num_worlds, jnp.int32)
         nothing = jnp.zeros((num_worlds, self._remembers))
-        hidden = self.perception.hidden
-        beliefs = nothing_believed(hidden, num_worlds) if self.config.believed and hidden is not None else None
-        return Turns(jnp.zeros(num_worlds), zero, no, none, nought, nothing, beliefs)
+        new, hidden = Turns(jnp.zeros(num_worlds), zero, no, none, nought, nothing), self.perception.hidden
+        if not self._believes or hidden is None:
+            return new
+        at_first = jnp.zeros((num_worlds, len(hidden.poses)))
+        return dataclasses.replace(new, beliefs=nothing_believed(hidden, num_worlds), at_first=at_first)
 
     def act(
         self, learner: DaggerLearner, turns: Turns, seen: Seen, key: Array, advice: Advice
@@ -244,18 +247,26 @@ class Dagger:
         apart, helpless = uncounted(~alone, turns.helpless, share > 0)
         apart |= learner.updates < HORIZON * c.updates
         extra = {"label": label, GUIDED: helped | apart, **({RECALLED: recalled} if self._remembers else {})}
-        beliefs = self._beliefs(learner.moments, seen, recalled, guess)
-        return jnp.clip(action, -1.0, 1.0), extra, Turns(draw, left, alone, helped, helpless, recalled, beliefs)
+        new = Turns(draw, left, alone, helped, helpless, recalled)
+        if self._believes:
+            new = self._with_beliefs(new, turns, learner.moments, seen, guess, begins)
+        return jnp.clip(action, -1.0, 1.0), extra, new
 
-    def _beliefs(
-        self, moments: Moments, seen: Seen, recalled: Float[Array, "W m"], guess: Float[Array, "W g"]
-    ) -> dict[str, Belief] | None:
-        """Where the actor takes objects to be, for the expert."""
+    @property
+    def _believes(self) -> bool:
+        """The expert is to know where the actor takes objects to be."""
+        return bool(self.config.believed) and self.recall is not None and self.perception.hidden is not None
+
+    def _with_beliefs(
+        self, new: Turns, old: Turns, moments: Moments, seen: Seen, guess: Float[Array, "W g"], begins: Bool[Array, "W"]
+    ) -> Turns:
+        """`new` with where the actor takes objects to be. `old`: of the step before."""
         recall, hidden = self.recall, self.perception.hidden
-        if not self.config.believed or recall is None or hidden is None:
-            return None
-        scales = moments.scales(seen.vector.shape[-1])
-        return beliefs_of(recall, hidden, scales, seen.vector, recalled, guess)
+        assert recall is not None and hidden is not None and old.at_first is not None
+        scales, vector = moments.scales(seen.vector.shape[-1]), seen.vector
+        at_first = jnp.where(begins[:, None], errors_of(recall, scales, vector, guess), old.at_first)
+        beliefs = beliefs_of(recall, hidden, scales, vector, new.recalled, guess, at_first)
+        return dataclasses.replace(new, beliefs=beliefs, at_first=at_first)
 
     def learn(
         self,
