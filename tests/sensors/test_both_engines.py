@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from perceiving import Perceiving
 
+import ig2mj
 from ig2mj.agents.humanoid import Humanoid
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.process.opengl import GL_BACKENDS, probe_gl
@@ -75,15 +76,36 @@ def test_readings_are_the_same_but_for_edges(seen, name, close, share):
     assert (apart(seen, name) <= close).mean() >= share
 
 
-def test_colours_of_objects_are_the_same(seen):
-    """Textures, lights and glass: the mean colour of everything that covers 30 pixels or more."""
+def colours(seen):
+    """Mean colour on each engine of everything that covers 30 pixels or more, by its number."""
     instance = seen["native"]["ins_seg"][..., 0]
     same = instance == seen["warp"]["ins_seg"][..., 0]
+    found = {}
     for number in np.unique(instance):
         pixels = same & (instance == number)
         if pixels.sum() >= 30:
-            native, warp = (seen[e]["rgb"][pixels].astype(float).mean(0) for e in ("native", "warp"))
-            np.testing.assert_allclose(native, warp, atol=8, err_msg=f"instance {number}")
+            found[int(number)] = [seen[e]["rgb"][pixels].astype(float).mean(0) for e in ("native", "warp")]
+    return found
+
+
+def test_colours_of_objects_are_the_same(seen):
+    """Textures, lights and glass."""
+    for number, (native, warp) in colours(seen).items():
+        np.testing.assert_allclose(native, warp, atol=8, err_msg=f"instance {number}")
+
+
+def test_light_is_limited_before_a_texture_takes_its_share():
+    """Where an activity's two lamps shine, textures would be 40 of 255 brighter than OpenGL's otherwise."""
+    found = {}
+    for engine in ("native", "warp"):
+        env = ig2mj.make(
+            "SlicingFruit", robot="fetch", worlds=1, engine=engine, pool_size=2, observations=("rgb", "ins_seg")
+        )
+        found[engine] = {name: np.asarray(value) for name, value in env.reset(0).obs.items()}
+    pairs = colours(found)
+    assert max(native.max() for native, _ in pairs.values()) > 200, "something is lit brightly"
+    for number, (native, warp) in pairs.items():
+        np.testing.assert_allclose(native, warp, atol=8, err_msg=f"instance {number}")
 
 
 def test_textures_are_as_coarse_as_the_pixels(seen):
