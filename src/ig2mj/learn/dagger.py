@@ -26,7 +26,7 @@ from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.belief import beliefs_of, errors_of
 from ig2mj.learn.belief import nothing as nothing_believed
-from ig2mj.learn.collect import GUIDED, Advice, Hint, Transition, if_ready
+from ig2mj.learn.collect import GUIDED, RESCUED, Advice, Hint, Transition, if_ready
 from ig2mj.learn.guidance import ALONE, uncounted
 from ig2mj.learn.heads import likeliest
 from ig2mj.learn.labels import Imitation, Labels
@@ -49,6 +49,8 @@ class DaggerConfig:
       batch: samples of an update, of all devices together.
       capacity: labels that are kept, of all worlds together. warm_up: steps of each world before the first update.
       alone: share of the run after which the expert acts no more. noise: deviation of what is added to actions.
+      rescue: step of an episode from which the expert acts, so that worlds in which the policy is stuck do not fill the
+        memory; such an episode counts as lost. 0: never.
       disturbed: share of the expert's steps in which its action is replaced by a random one.
       guess: weight of the actor's guess of the privileged state, from pixels. shift: pixels they are moved by at most.
       lr: learning rate, falling to `last_lr` along a cosine over the run.
@@ -70,6 +72,7 @@ class DaggerConfig:
     warm_up: int = 12
     alone: float = 0.2
     noise: float = 0.1
+    rescue: int = 0
     disturbed: float = 0.1
     guess: float = 1.0
     shift: int = 2
@@ -237,6 +240,8 @@ class Dagger:
         alone = jnp.where(begins, jax.random.uniform(alone_key, begins.shape) < ALONE, turns.alone)
         expert = (draw < share) & ~(alone & (learner.updates > 0))
         helped = expert | (turns.helped & ~begins)
+        rescued = (advice.steps >= c.rescue) if c.rescue else jnp.zeros_like(expert)
+        expert |= rescued
         label = jnp.clip(advice.label, -1.0, 1.0)
         wild = (jax.random.uniform(which_key, expert.shape) < c.disturbed) & expert
         action = jnp.where(expert[:, None], label, own_action)
@@ -247,6 +252,7 @@ class Dagger:
         apart, helpless = uncounted(~alone, turns.helpless, share > 0)
         apart |= learner.updates < HORIZON * c.updates
         extra = {"label": label, GUIDED: helped | apart, **({RECALLED: recalled} if self._remembers else {})}
+        extra |= {RESCUED: rescued} if c.rescue else {}
         new = Turns(draw, left, alone, helped, helpless, recalled)
         if self._believes:
             new = self._with_beliefs(new, turns, learner.moments, seen, guess, begins)
