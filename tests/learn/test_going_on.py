@@ -42,9 +42,9 @@ def test_an_actor_with_a_memory_first_does_what_the_policy_does(policy):
     np.testing.assert_allclose(begun.moments.var, learner.moments.var, rtol=1e-3)
     seen = algorithm.perception({**SeenPointMass(4).reset(1).obs, "privileged_state": jnp.ones((4, 7))})
     begins = np.ones(4, bool)
-    before, _ = jax.jit(algorithm._imitation.choose)(learner.actor, learner.moments, seen, jnp.zeros((4, 0)), begins)
+    before, _, _ = jax.jit(algorithm._imitation.choose)(learner.actor, learner.moments, seen, jnp.zeros((4, 0)), begins)
     kept = remembers.recall.blank(4)
-    after, kept = jax.jit(remembers._imitation.choose)(begun.actor, begun.moments, seen, kept, begins)
+    after, kept, _ = jax.jit(remembers._imitation.choose)(begun.actor, begun.moments, seen, kept, begins)
     assert np.abs(np.asarray(kept)).max() > 0.01, "it remembers something"
     np.testing.assert_allclose(after, before, atol=0.01, err_msg="half precision")
     assert int(begun.updates) > 0, "it acts at once"

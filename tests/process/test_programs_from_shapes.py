@@ -1,4 +1,4 @@
-"""`Compiled.prepare`: programs compiled before there is anything to run them on."""
+"""`Compiled.traced` and `compile_together`: programs compiled before there is anything to run them on."""
 
 import dataclasses
 
@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ig2mj.engine.snapshot import ScenePart
-from ig2mj.process.collector import Compiled
+from ig2mj.process.collector import Compiled, compile_together
 
 WIDTHS = {"eq_data": (2, 12), "mocap_pos": (1, 3), "mocap_quat": (1, 4), "touching": (3, 3)}
 KINDS = {"eq_active": bool, "touching": bool, "tree_asleep": np.int32}
@@ -31,9 +31,12 @@ def test_calls_find_programs_that_were_compiled_from_the_shapes_of_what_others_r
         return dataclasses.replace(state, qpos=state.qpos + by)
 
     first, second, number = Compiled(begin), Compiled(step), jnp.float32(0.5)
-    started = first.prepare(number)
+    begins = first.traced(number)
+    started = begins.returned
     assert started.qpos.shape == (4, 2) and started.tree_asleep.dtype == np.int32
-    assert second.prepare(started, number).qpos.shape == (4, 2)
+    steps = second.traced(started, number)
+    assert steps.returned.qpos.shape == (4, 2)
+    compile_together([steps, begins])
     assert traced == ["begin", "step (4, 2)"]
     np.testing.assert_array_equal(second(first(number), number).qpos, np.ones((4, 2)))
     assert traced == ["begin", "step (4, 2)"]

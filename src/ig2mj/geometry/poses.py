@@ -89,7 +89,8 @@ def quats_to_matrices(q: Float[Array, "n 4 W"]) -> Float[Array, "3 3 n W"]:
     return jnp.stack([jnp.stack(row) for row in _matrix_rows(*(q[:, i] for i in range(4)))])
 
 
-def _matrix_rows(w: AnyArray, x: AnyArray, y: AnyArray, z: AnyArray) -> list[list[AnyArray]]:
+def _matrix_rows(w: AnyArray, x: AnyArray, y: AnyArray, z: AnyArray) -> list[list[Any]]:
+    """Of one rotation, too, whose entries are numbers."""
     return [
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
