@@ -139,7 +139,13 @@ def test_the_shell_lists_shows_and_adds(run, monkeypatch, capsys):
     assert json.loads(capsys.readouterr().out)["CookingMeat-state"]["evaluation"]["episodes"] == 1000
 
 
-def test_who_plays_a_policy_draws_its_actions_where_its_success_is_of_drawn_ones():
-    found = {name: draws(Policy.load(shipped.find_policy(name))) for name in ("SlicingFruit", "GraspingBook")}
-    assert found == {"SlicingFruit": True, "GraspingBook": False}
+@pytest.mark.parametrize("drawn", [False, True])
+def test_who_plays_a_policy_draws_its_actions_where_its_success_is_of_drawn_ones(run, capsys, drawn):
+    folder, evaluation, ships = run
+    said = json.loads(evaluation.read_text().splitlines()[1]) | {"drawn": drawn}
+    evaluation.write_text(json.dumps(said))
+    assert call(["policies", "add", str(folder), "--evaluation", str(evaluation), "--folder", str(ships)]) == 0
+    capsys.readouterr()
+    (added,) = ships.glob("*.npz")
+    assert draws(Policy.load(added)) == drawn
     assert not draws(made()), "it was not evaluated"
