@@ -141,10 +141,16 @@ class BatchCamera:
         _KEPT.setdefault(self.engine, []).append(self._context)
         if self._sectors:  # before the kernel is built: whether rays are displaced is compiled into it
             set_rays(self._context, self._sectors, len(self.cameras) * self.width * self.height)
+        contexts = list(self._context._contexts.values())
         if self._merged is not None:
             from ig2mj.sensors.ray_caster import use_merged
 
-            use_merged(list(self._context._contexts.values()), self._host, self._merged, self.engine.num_worlds)
+            use_merged(contexts, self._host, self._merged, self.engine.num_worlds)
+        elif not pins.mismatches():
+            from ig2mj.sensors.shading import limit_light
+
+            for context in contexts:
+                limit_light(context, self._host.nlight)
         self._handle = self._context.pytree()
         self._check_addresses()
         self._tiled = self._order_rays()

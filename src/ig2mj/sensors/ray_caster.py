@@ -1,12 +1,10 @@
 """Rays against merged meshes (`ig2mj.sensors.merged_meshes`), in MJX-Warp's ray caster.
 
-Only the function that finds what a ray hits is ours; upstream's kernel shades what it found, but for `LIGHT`. Rays
-first look for what never moves, in one tree that all worlds share, and then for what does, as far as they came:
-upstream takes everything in the order of a tree. Hits are the same up to rounding, but for surfaces in the same place:
-there upstream shows the geom with the larger number, and within a merged mesh either is shown.
-
-Light is limited as OpenGL does: what falls on a surface first, to all of it, and then the texture takes its share.
-Upstream multiplies first, so that under two bright lights textures were up to a fifth too bright.
+Only the function that finds what a ray hits is ours; the kernel around it is upstream's but for its light
+(`ig2mj.sensors.shading`). Rays first look for what never moves, in one tree that all worlds share, and then for what
+does, as far as they came: upstream takes everything in the order of a tree. Hits are the same up to rounding, but for
+surfaces in the same place: there upstream shows the geom with the larger number, and within a merged mesh either is
+shown.
 """
 
 # Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
@@ -15,7 +13,6 @@ Upstream multiplies first, so that under two bright lights textures were up to a
 # pyright: reportPrivateUsage=false
 # ruff: noqa: SIM102, UP018, RUF046 (of two conditions the first is one of the compiler's; variables, not constants)
 
-import inspect
 import types
 from collections.abc import Sequence
 from typing import Any, no_type_check
@@ -23,36 +20,16 @@ from typing import Any, no_type_check
 import mujoco
 import numpy as np
 import warp as wp
-from mujoco.mjx.third_party.mujoco_warp._src import bvh, ray, render
+from mujoco.mjx.third_party.mujoco_warp._src import bvh, ray
 
-from ig2mj.engine.warp.patches.sources import defined
 from ig2mj.sensors.merged_meshes import MESH, Tables
+from ig2mj.sensors.shading import limit_light
 
 PLANE, HFIELD, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = range(7)
 """Geom types, as in `mujoco.mjtGeom`."""
 
 CONSTRUCTOR, LEAF = "sah", 2
 """How trees of merged meshes are built; they are built once."""
-
-
-LIGHT = (
-    (
-        "    base_color = wp.vec3(color[0], color[1], color[2])\n",
-        "    most = wp.vec3(1.0, 1.0, 1.0)\n    shine = wp.vec3(0.0)\n",
-    ),
-    ("          base_color = wp.cw_mul(base_color, tex_color)\n", "          most = tex_color\n"),
-)
-"""Lines of upstream's kernel, and what follows them in ours."""
-
-SHINE = (
-    (
-        "wp.cw_mul(base_color, diff_rgb) + spec_rgb\n",
-        "wp.cw_mul(base_color, diff_rgb)\n      shine = shine + spec_rgb\n",
-    ),
-    ("wp.cw_mul(base_color, hl_diff) + hl_spec\n", "wp.cw_mul(base_color, hl_diff)\n      shine = shine + hl_spec\n"),
-    ("wp.min(result, wp.vec3(1.0, 1.0, 1.0))\n", "wp.min(wp.min(result, most) + shine, wp.vec3(1.0, 1.0, 1.0))\n"),
-)
-"""Parts of its lines, and what stands in their place: highlights are not limited by a texture."""
 
 
 def use_merged(contexts: Sequence[Any], host: mujoco.MjModel, tables: Tables, nworld: int) -> None:
@@ -62,6 +39,10 @@ def use_merged(contexts: Sequence[Any], host: mujoco.MjModel, tables: Tables, nw
       contexts: of MuJoCo Warp, of cameras of the render model, made with `tables.absorbed` in no group that is seen.
     """
     assert host.nflex == 0, "flexes' arrays carry the tables"
+
+    def make_cast_ray(geom_ray_types: tuple[int, ...], first_hit: bool = False) -> wp.Function:
+        return _cast_ray(geom_ray_types, first_hit, host.ngeom, host.nmesh, tables.still)
+
     data = mujoco.MjData(host)
     mujoco.mj_forward(host, data)
     known = {name: getattr(host, name) for name in dir(host) if name.startswith(("geom_", "flex_"))}
@@ -89,22 +70,7 @@ def use_merged(contexts: Sequence[Any], host: mujoco.MjModel, tables: Tables, nw
             context.flex_geom_edgeid = wp.array(rows.astype(np.int32), dtype=int)
             context.geom_ray_types = tuple(sorted({*context.geom_ray_types, MESH}))
             bvh.build_scene_bvh(as_merged, data, context, nworld)
-            context._megakernel = _kernel(context, host, tables)
-
-
-def _kernel(context: Any, host: mujoco.MjModel, tables: Tables) -> wp.Kernel:
-    """Upstream's kernel with `_cast_ray` in place of the function that finds what a ray hits, and with `LIGHT`."""
-
-    def make_cast_ray(geom_ray_types: tuple[int, ...], first_hit: bool = False) -> wp.Function:
-        return _cast_ray(geom_ray_types, first_hit, host.ngeom, host.nmesh, tables.still)
-
-    build = render._build_megakernel
-    text = inspect.getsource(build)
-    for old, new in (*((line, line + more) for line, more in LIGHT), *SHINE):
-        assert text.count(old) == 1, f"MuJoCo Warp's kernel has changed: {old}"
-        text = text.replace(old, new)
-    own = defined(build.__name__, text, {**build.__globals__, "_make_cast_ray": make_cast_ray})
-    return own(types.SimpleNamespace(nlight=host.nlight), context)
+            limit_light(context, host.nlight, make_cast_ray)
 
 
 @no_type_check

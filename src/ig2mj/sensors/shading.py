@@ -1,0 +1,55 @@
+"""Light as OpenGL limits it, in MJX-Warp's ray caster.
+
+What falls on a surface is limited first, all of it together, and then a texture takes its share. Upstream multiplies
+first, so that under two bright lights textures are up to a fifth too bright. Its kernel is used with the lines changed
+that say so.
+"""
+
+# pyright: reportPrivateUsage=false
+
+from __future__ import annotations
+
+import inspect
+import types
+from collections.abc import Callable
+from typing import Any
+
+import warp as wp
+from mujoco.mjx.third_party.mujoco_warp._src import render
+
+from ig2mj.engine.warp.patches.sources import defined
+
+LIGHT = (
+    (
+        "    base_color = wp.vec3(color[0], color[1], color[2])\n",
+        "    most = wp.vec3(1.0, 1.0, 1.0)\n    shine = wp.vec3(0.0)\n",
+    ),
+    ("          base_color = wp.cw_mul(base_color, tex_color)\n", "          most = tex_color\n"),
+)
+"""Lines of upstream's kernel, and what follows them in ours."""
+
+SHINE = (
+    (
+        "wp.cw_mul(base_color, diff_rgb) + spec_rgb\n",
+        "wp.cw_mul(base_color, diff_rgb)\n      shine = shine + spec_rgb\n",
+    ),
+    ("wp.cw_mul(base_color, hl_diff) + hl_spec\n", "wp.cw_mul(base_color, hl_diff)\n      shine = shine + hl_spec\n"),
+    ("wp.min(result, wp.vec3(1.0, 1.0, 1.0))\n", "wp.min(wp.min(result, most) + shine, wp.vec3(1.0, 1.0, 1.0))\n"),
+)
+"""Parts of its lines, and what stands in their place: highlights are not limited by a texture."""
+
+
+def limit_light(context: Any, lights: int, make_cast_ray: Callable[..., wp.Function] = render._make_cast_ray) -> None:
+    """Lets a render context of MuJoCo Warp shade as OpenGL does, once all else in it is as it stays.
+
+    Args:
+      lights: of the render model.
+      make_cast_ray: makes the function that finds what a ray hits, from what upstream's takes; left out, upstream's.
+    """
+    build = render._build_megakernel
+    text = inspect.getsource(build)
+    for old, new in (*((line, line + more) for line, more in LIGHT), *SHINE):
+        assert text.count(old) == 1, f"MuJoCo Warp's kernel has changed: {old}"
+        text = text.replace(old, new)
+    own = defined(build.__name__, text, {**build.__globals__, "_make_cast_ray": make_cast_ray})
+    context._megakernel = own(types.SimpleNamespace(nlight=lights), context)
