@@ -80,7 +80,7 @@ def xla_text(program: str) -> str:
 def report_warp_compilation() -> None:
     """From now on this process reports on stderr that Warp compiles kernels, instead of Warp's own lines on stdout.
 
-    Once per process; without effect where Warp's inner workings are not those of 1.18.
+    Once per process; without effect where Warp has no such function inside.
     """
     import warp as wp
 

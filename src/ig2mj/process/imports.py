@@ -20,6 +20,9 @@ from ig2mj.process.crew import spawn
 
 SPARED = ("trimesh", "scipy.spatial")
 
+WARP_VERSION = "1.18."
+"""Beginning of the version of Warp whose inner workings are known to us: they are others before and after."""
+
 
 class _Later(types.ModuleType):
     """Stands for a module; what it has are functions that import the module when they are called."""
@@ -57,13 +60,13 @@ def _unsearched() -> Iterator[None]:
     """Warp does not search the kernels of MJX, which are made inside the block, for modules that they depend on.
 
     It needs them only where `importlib.reload` is called on one of those modules, and takes 0.13 s for 690 kernels and
-    functions. Kernels of others are searched. Without effect where Warp's inner workings are not those of 1.18.
+    functions. Kernels of others are searched. Without effect where Warp is another version.
     """
     import warp as wp
 
     kind = getattr(getattr(getattr(wp, "_src", None), "context", None), "Module", None)
     search = getattr(kind, "_find_references", None)
-    if kind is None or search is None or not wp.config.version.startswith("1.18."):
+    if kind is None or search is None or not wp.config.version.startswith(WARP_VERSION):
         yield
         return
 

@@ -7,18 +7,19 @@ these again for every module: on an H200's host two thirds of a second at a warm
 from __future__ import annotations
 
 import contextlib
+import functools
 import threading
 from collections.abc import Iterator
 from typing import Any
 
 import warp as wp
 
-VERSION = "1.18."
-"""Of Warp: its inner workings are others before and after."""
+from ig2mj.engine.warp.patches.scope import ScopedReplacement
+from ig2mj.process.imports import WARP_VERSION
 
+_SHARED = ScopedReplacement()
 _here = threading.local()
-_lock = threading.Lock()
-_entered = 0
+"""With `known`: the hashes that this thread's modules share."""
 
 
 @contextlib.contextmanager
@@ -27,76 +28,43 @@ def shared_hashes() -> Iterator[None]:
 
     Hashes are the same as outside. Other threads hash as ever. Without effect where Warp is another version.
     """
-    if not wp.config.version.startswith(VERSION) or getattr(_here, "known", None) is not None:
+    if not wp.config.version.startswith(WARP_VERSION) or _SHARED.active:
         yield
         return
+    _add_own()
     _here.known = {}
     try:
-        with _replaced():
+        with _SHARED.entered():
             yield
     finally:
-        _here.known = None
+        del _here.known
 
 
-@contextlib.contextmanager
-def _replaced() -> Iterator[None]:
-    """While a block is entered in any thread, Warp's classes are those that share."""
-    global _entered
+@functools.cache
+def _add_own() -> None:
     from warp._src import context  # not before: other versions may have none
 
-    with _lock:
-        if _entered == 0:
-            _put(context)
-        _entered += 1
-    try:
-        yield
-    finally:
-        with _lock:
-            _entered -= 1
-            if _entered == 0:
-                context.ModuleHasher, context.ModuleBuilder = _originals.pop("hasher"), _originals.pop("builder")
-                context.Module.register_function = _originals.pop("register")
+    hash_place = context.ModuleHasher, "hash_function"
+    build_place = context.ModuleBuilder, "__init__"
+    register_place = context.Module, "register_function"
 
+    def hash_function(hasher: Any, function: Any) -> bytes:
+        found = _here.known.get(function)
+        if found is None:
+            found = _here.known[function] = _SHARED.original(*hash_place)(hasher, function)
+        return found
 
-_originals: dict[str, Any] = {}
-
-
-def _put(context: Any) -> None:
-    hasher, builder, register = context.ModuleHasher, context.ModuleBuilder, context.Module.register_function
-
-    class SharingHasher(hasher):
-        """Keeps hashes of functions where the thread has them."""
-
-        @property
-        def function_hashes(self) -> dict[Any, bytes]:
-            known = getattr(_here, "known", None)
-            return self.__dict__["function_hashes"] if known is None else known
-
-        @function_hashes.setter
-        def function_hashes(self, empty: dict[Any, bytes]) -> None:
-            self.__dict__["function_hashes"] = empty
-
-    class ForgettingBuilder(builder):
+    def build(*args: Any, **kwargs: Any) -> None:
         """Building changes functions: expressions that stand for constants get their values."""
-
-        def __init__(self, *args: Any, **kwargs: Any):
-            _forget()
-            try:
-                super().__init__(*args, **kwargs)
-            finally:
-                _forget()
+        _here.known.clear()
+        try:
+            _SHARED.original(*build_place)(*args, **kwargs)
+        finally:
+            _here.known.clear()
 
     def register_function(module: Any, function: Any, scope: dict[str, Any], *args: Any, **kwargs: Any) -> Any:
         if isinstance(scope.get(function.func.__name__), context.Function):
-            _forget()  # that one gets another overload
-        return register(module, function, scope, *args, **kwargs)
+            _here.known.clear()  # that one gets another overload
+        return _SHARED.original(*register_place)(module, function, scope, *args, **kwargs)
 
-    _originals.update(hasher=hasher, builder=builder, register=register)
-    context.ModuleHasher, context.ModuleBuilder = SharingHasher, ForgettingBuilder
-    context.Module.register_function = register_function
-
-
-def _forget() -> None:
-    known = getattr(_here, "known", None)
-    if known is not None:
-        known.clear()
+    _SHARED.add({hash_place: hash_function, build_place: build, register_place: register_function})

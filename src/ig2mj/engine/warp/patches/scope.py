@@ -14,8 +14,8 @@ from collections.abc import Callable, Iterator, Mapping
 from types import ModuleType
 from typing import Any
 
-Place = tuple[ModuleType, str]
-"""A module, and the name of a function in it."""
+Place = tuple[ModuleType | type, str]
+"""A module or a class, and the name of a function in it."""
 
 
 class ScopedReplacement:
@@ -51,10 +51,10 @@ class ScopedReplacement:
             self._here.active = before
             self._take_back()
 
-    def original(self, module: ModuleType, name: str) -> Any:
-        """The function that stands in the library under this name."""
-        place = (module, name)
-        return self._originals[place] if place in self._originals else getattr(module, name)
+    def original(self, holder: ModuleType | type, name: str) -> Any:
+        """The function that stands in the library under this name, in a module or a class."""
+        place = (holder, name)
+        return self._originals[place] if place in self._originals else getattr(holder, name)
 
     def _put(self) -> None:
         with self._lock:

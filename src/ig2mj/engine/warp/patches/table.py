@@ -1,6 +1,8 @@
 """Which function of MuJoCo Warp each of ours stands in for. Imported only where the pinned version is installed."""
 
 import functools
+from collections.abc import Callable
+from typing import Any
 
 import warp as wp
 from mujoco.mjx.third_party.mujoco_warp._src import (
@@ -27,8 +29,9 @@ from ig2mj.engine.warp.patches import (
     spared,
     velocity,
 )
+from ig2mj.engine.warp.patches.scope import Place
 
-OWN = {
+OWN: dict[Place, Callable[..., Any]] = {
     (solver, "_cholesky_factorize_solve"): compact_solver.cholesky_factorize_solve,
     (solver, "_update_gradient_init_h_sparse"): compact_solver.init_hessian,
     (solver, "_solve"): solver_loop.solve,
