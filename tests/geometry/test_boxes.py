@@ -71,12 +71,13 @@ def test_a_piece_may_stand_anywhere_in_its_frame(shapes, seed):
 
 
 @given(SEEDS)
-def test_numpy_and_jax_give_the_same_boxes(shapes, seed):
-    pos, quat = shapes.scatter(np.random.default_rng(seed), 1.0)
-    points, radius, axis = (jnp.asarray(a, jnp.float32) for a in cores(shapes))
-    low, high = boxes.core_boxes(quat_to_matrix(quat), points, radius, axis)
-    assert isinstance(low, jax.Array)
-    np.testing.assert_allclose((pos + low, pos + high), tight_boxes(shapes, pos, quat), atol=2e-6)
+def test_turned_boxes_are_the_same_with_numpy_and_with_jax(shapes, seed):
+    _, quat = shapes.scatter(np.random.default_rng(seed), 1.0)
+    _, center, half = boxes.link_boxes(np.arange(shapes.count), *cores(shapes))
+    in_jax = boxes.turned_boxes(quat_to_matrix(quat), center, half)
+    in_numpy = boxes.turned_boxes(Rotation.from_quat(quat, scalar_first=True).as_matrix(), center, half)
+    assert all(isinstance(a, jax.Array) for a in in_jax) and all(isinstance(a, np.ndarray) for a in in_numpy)
+    np.testing.assert_allclose(in_jax, in_numpy, atol=2e-6)
 
 
 @given(SEEDS)

@@ -16,7 +16,6 @@ from jaxtyping import Float
 
 from ig2mj.engine.layout import ModelLayout
 from ig2mj.geometry.boxes import Boxes, core_boxes, core_reaches, link_boxes, piece_cores, turned_boxes, turned_reaches
-from ig2mj.geometry.poses import AnyArray
 from ig2mj.scene.tables import SceneTables
 
 
@@ -42,11 +41,8 @@ class BoxTable:
     half: np.ndarray
     any_round: bool
 
-    def boxes(self, rotation: Float[AnyArray, "*b K 3 3"]) -> Boxes:
-        """Boxes (low, high) of all items about their bodies' origins; `rotation` turns the bodies into the world.
-
-        Works on NumPy arrays and on JAX's alike and returns what it is given.
-        """
+    def boxes(self, rotation: Float[np.ndarray, "K 3 3"]) -> Boxes:
+        """Boxes (low, high) of all items about their bodies' origins; `rotation` turns the bodies into the world."""
         if self.rule == "tight":
             return core_boxes(rotation, self.points, self.radius if self.any_round else None, self.axis)
         return turned_boxes(rotation, self.center, self.half)

@@ -4,7 +4,8 @@ Tight: the smallest box around the object's pieces (`core_boxes`). iGibson's: pe
 in the link's frame, widened by Bullet's margin (`link_boxes`, made once), and then turned into the world, which makes
 it looser (`turned_boxes`; iGibson's aabb.py).
 
-`core_boxes` and `turned_boxes` work on NumPy arrays and on JAX's alike and return what they are given.
+`core_boxes` takes NumPy arrays, with `core_reaches` beside it for JAX; `turned_boxes` takes both and returns what it is
+given.
 
 An object without pieces has the empty box, low = inf and high = -inf: no point is in it and its gap to any box is inf.
 
@@ -58,11 +59,11 @@ def piece_cores(
 
 
 def core_boxes(
-    rotation: Float[AnyArray, "*b K 3 3"],
-    points: Float[AnyArray, "K 3 V"],
-    radius: Float[AnyArray, "K 1"] | None,
-    axis: Float[AnyArray, "K 3"],
-) -> Boxes:
+    rotation: Float[np.ndarray, "*b K 3 3"],
+    points: Float[np.ndarray, "K 3 V"],
+    radius: Float[np.ndarray, "K 1"] | None,
+    axis: Float[np.ndarray, "K 3"],
+) -> tuple[Float[np.ndarray, "*b K 3"], Float[np.ndarray, "*b K 3"]]:
     """The tight rule: boxes (low, high) about the origin of each piece's frame, which `rotation` turns into the world.
 
     `radius` None says that no piece is round.
@@ -71,9 +72,8 @@ def core_boxes(
     low, high = turned.min(-1), turned.max(-1)
     if radius is None:
         return low, high
-    xp = rotation.__array_namespace__()
     along = (rotation @ axis[..., None])[..., 0]
-    reach = radius * xp.sqrt(xp.maximum(1.0 - along * along, EDGE_ON))
+    reach = radius * np.sqrt(np.maximum(1.0 - along * along, EDGE_ON))
     return low - reach, high + reach
 
 
