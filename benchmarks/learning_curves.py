@@ -56,8 +56,9 @@ held-out states are the policies of minute two. "dagger_glimpses_memory" goes on
 "base_pinned" in their names. Of these the book's goes on from the policy that had shipped, for 14 minutes on one core
 of a processor; the fruit's from "memory_base_free", with what is reckoned, for 15 minutes on one busy core.
 "dagger_reckoned": three runs side by side for 9.5 minutes, with what is reckoned from the beginning; "believed": two
-for nine minutes, with pictures as bright as OpenGL's and labels for where the actor takes things to be. Both were
-played with drawn actions; until second 150 success is of the episodes that ended first.
+for nine minutes, with pictures as bright as OpenGL's and labels for where the actor takes things to be
+(of what had moved by less than 5 cm by mistake for where it lay at first). Both were played with drawn actions, the
+towel of "believed" with the likeliest, too; until second 150 success is of the episodes that ended first.
 SlicingFruit with `--expert`: the first run was cut off; "48_updates" has `guided=0.4 copied=0.25 reach=30 updates=48`;
 "trusted" `guided=0.4 copied=0.4 trust=1 reach=30 updates=48`; "rgbd64" the same with `--pixels 64`, cut off at second
 161. In these the peak after the expert's help has ended is one of counting: all worlds then begin alone at one moment,
