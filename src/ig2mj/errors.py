@@ -82,6 +82,10 @@ class EngineError(Ig2mjError):
     """An engine cannot run the scene, or a step of it went wrong."""
 
 
+class LostWorldError(EngineError):
+    """A world's positions or velocities are not finite any more. It stays as it is until it is loaded or reset."""
+
+
 class ClusterError(Ig2mjError):
     """Processes or machines that are to work together cannot: out of reach, of other versions, or one has died."""
 

@@ -79,3 +79,26 @@ def test_a_book_that_was_pushed_off_is_no_success_in_the_hand():
         outcome = play(env, expert_of(env), 2, in_order=True)
         assert outcome.success == [True, True]
         assert outcome.success_in_hand == [in_hand, in_hand] and outcome.lifted_by_all is None
+
+
+def test_an_episode_whose_world_is_lost_counts_as_lost_and_the_others_count_as_ever(cooking_meat):
+    """Of eight episodes that ran beside each other none was counted, since the engine's error ended them all."""
+    env = cooking_meat.with_horizon(6)
+    still = np.zeros((2, *env.action_space.shape), np.float32)
+
+    def played(watch=None):
+        return play(env, lambda state: still, 4, in_order=True, watch=watch)
+
+    rounds = []
+
+    def lose_the_second(state):
+        """In the first of two rounds."""
+        rounds.append(int(np.asarray(state.info["steps"])[0]))
+        if rounds == [0, 1, 2]:
+            state.batch.world.physics.worlds[1].data.qvel[:] = np.nan
+
+    whole, found = played(), played(lose_the_second)
+    assert rounds == [0, 1, 2, 3, 4, 5, 6] * 2
+    assert len(found.success) == 4 and not any(found.success)
+    assert found.total[0] == whole.total[0] and found.total[2:] == whole.total[2:] and np.isfinite(found.total).all()
+    assert found.metrics["not_finite"] == 1 and whole.metrics["not_finite"] == 0

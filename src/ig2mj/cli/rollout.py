@@ -128,7 +128,6 @@ def run(
     if record is not None and format == "igibson":
         _write_igibson(record)
     successes, in_hand = sum(outcome.success), sum(outcome.success_in_hand)
-    metrics = played.metrics(outcome.state)
     result = {
         "env": played.task.name,
         "robot": played.robot,
@@ -144,8 +143,8 @@ def run(
         **({} if outcome.lifted_by_all is None else {"lifted_by_all_rate": sum(outcome.lifted_by_all) / episodes}),
         "mean_return": float(np.mean(outcome.total)),
         "steps_per_second": round(outcome.steps_per_second, 1),
-        "overflow": metrics["overflow"],
-        "non_finite": metrics["not_finite"],
+        "overflow": outcome.metrics["overflow"],
+        "non_finite": outcome.metrics["not_finite"],
     }
     if film is not None and not json:
         print(f"film: {video}")

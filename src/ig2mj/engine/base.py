@@ -153,7 +153,9 @@ class Engine(Protocol):
           that led to it.
 
         Raises:
-          EngineError: the controls have another shape; (native engine) a world's state is not finite any more.
+          EngineError: the controls have another shape.
+          LostWorldError: (native engine) a world is not finite any more, and stays so until it is loaded. The others
+            were stepped, and go on with the same physics.
         """
         ...
 

@@ -5,6 +5,7 @@ Axis: W worlds.
 
 from __future__ import annotations
 
+import collections
 import dataclasses
 import math
 import time
@@ -33,7 +34,7 @@ class Played:
       lifted_by_all: success, and both hands held the object when it last left the floor; None where one hand acts.
       steps: agent steps that were taken in all worlds together.
       steps_per_second: of them on the wall, without the first step, which compiles.
-      state: of all worlds at the end.
+      metrics: `Environment.metrics` of all episodes together. state: of all worlds at the end.
     """
 
     success: list[bool]
@@ -42,6 +43,7 @@ class Played:
     total: list[float]
     steps: int
     steps_per_second: float
+    metrics: dict[str, int]
     state: EnvState
 
 
@@ -85,12 +87,13 @@ def _drawn(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | 
             in_hand.append(bool(np.asarray(state.info.get("success_in_hand", won))[world]))
             lifted.append(bool(won[world] & lifts.by_all[world]))
         running[done] = 0.0
-    return Played(success, in_hand, lifted if lifts.told else None, total, steps, pace.steps_per_second(), state)
+    both = lifted if lifts.told else None
+    return Played(success, in_hand, both, total, steps, pace.steps_per_second(), env.metrics(state), state)
 
 
 def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None, start: int = 0) -> Played:
     size, worlds = env.core.starts.pool.size, env.num_worlds
-    tallies, pace, state = list[Tally](), Pace(), None
+    tallies, pace, state, metrics = list[Tally](), Pace(), None, collections.Counter[str]()
     for first in range(0, episodes, worlds):
         state = env.start_from((start + first + np.arange(worlds)) % size, seed)
         _look(watch, state)
@@ -105,6 +108,7 @@ def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch
                 tally = tally.after(jax.device_get(ending(state)))
             pace.stepped(worlds * (int(tally.steps) - before))
         tallies.append(jax.device_get(tally))
+        metrics.update(env.metrics(state))
 
     def told(name: str) -> list:
         return np.concatenate([getattr(tally, name) for tally in tallies])[:episodes].tolist()
@@ -114,7 +118,8 @@ def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch
         [won and by_all for won, by_all in zip(told("won"), told("by_all"), strict=True)] if tallies[0].told else None
     )
     steps = worlds * sum(int(tally.steps) for tally in tallies)
-    return Played(told("won"), told("in_hand"), both, told("total"), steps, pace.steps_per_second(), state)
+    pace_now = pace.steps_per_second()
+    return Played(told("won"), told("in_hand"), both, told("total"), steps, pace_now, dict(metrics), state)
 
 
 class Pace:

@@ -118,11 +118,10 @@ def evaluate_piece(
     except Ig2mjError as e:
         raise WholeRunError(e) from e
     played = play(env, actor.seeded(first // worlds), episodes, in_order=True, first=first)
-    metrics = env.metrics(played.state)
     found = {"success": played.success, "success_in_hand": played.success_in_hand, "total": played.total}
     if played.lifted_by_all is not None:
         found["lifted_by_all"] = played.lifted_by_all
-    trouble = {"overflow": metrics["overflow"], "non_finite": metrics["not_finite"]}
+    trouble = {"overflow": played.metrics["overflow"], "non_finite": played.metrics["not_finite"]}
     stepping = (played.steps - worlds) / played.steps_per_second if played.steps_per_second else 0.0
     start = time.monotonic() - began - stepping
     return json.dumps({**found, "steps": played.steps, "start_seconds": start, **trouble}).encode()

@@ -207,7 +207,8 @@ class Simulation(Recorded):
           ctrl: [nu] controls of the agents' actuators; None keeps the last ones.
 
         Raises:
-          EngineError: ctrl has another length than the model has actuators, or the physics went wrong.
+          EngineError: ctrl has another length than the model has actuators.
+          LostWorldError: the world is not finite any more; nothing changes it but `reset` and what loads another.
         """
         row = None if ctrl is None else np.asarray(ctrl, np.float64)
         if row is not None and row.shape != (self.scene.model.nu,):

@@ -36,6 +36,7 @@ from ig2mj.agents.grasping import Grasping
 from ig2mj.engine.base import Engine, Physics, Write
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.errors import LostWorldError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.process.collector import REST, Compiled, compile_together
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
@@ -168,7 +169,11 @@ class Core:
     def _control_step(self, batch: Batch, ctrl: Float[Array, "W nu"] | None) -> tuple[Batch, GoalStatus]:
         """One control step of MuJoCo's controls."""
         world, controllers = batch.world, batch.controllers
-        physics, view, states, status = self.advance_fn(world.physics, world.states, ctrl, controllers)
+        try:
+            physics, view = self._physics_step(world.physics, ctrl)
+        except LostWorldError:  # the other worlds were stepped; guards flag this one
+            physics, view = world.physics, self.engine.view(world.physics)
+        physics, view, states, status = self._reacted(physics, view, world.states, controllers)
         physics, after, grasps = self.hands.act(physics, view, batch.grasps, controllers)
         if after is not view:
             view = self.eyes.seen(after, controllers)
@@ -193,8 +198,17 @@ class Core:
           ctrl: MuJoCo's controls; None keeps the last ones.
           controllers: what the robots' controllers remember, which may be where their eyes are; none: eyes are where
             they were compiled.
+
+        Raises:
+          LostWorldError: (native engine) a world is not finite any more, which `step` only flags.
         """
         physics, view = self._physics_step(physics, ctrl)
+        return self._reacted(physics, view, states, controllers)
+
+    def _reacted(
+        self, physics: Physics, view: PhysicsView, states: States, controllers: tuple[Any, ...]
+    ) -> tuple[Physics, PhysicsView, States, GoalStatus]:
+        """The rest of `advance_fn`, after physics."""
         view = self.eyes.seen(view, controllers)
         states, swap, status = self._react(states, view)
         if swap is not None:

@@ -79,7 +79,7 @@ class DebugWorlds:
         """For every flag, the number that is beyond its limit."""
         engine, physics, scene = self.core.engine, batch.world.physics, self.scene
         row = engine.export(physics, world)
-        finite = np.isfinite(row.qpos).all() and np.isfinite(row.qvel).all()
+        finite = _finite(np.asarray(row.qpos)) and _finite(np.asarray(row.qvel))
         said = []
         if flags & guards.Flag.OVERFLOW and isinstance(engine, HasBuffers):
             usage, profile, worlds = engine.usage(physics), engine.profile, engine.num_worlds
@@ -106,10 +106,13 @@ class DebugWorlds:
     def _first_lost(self, row: Snapshot) -> str:
         """The first body whose position or velocity is not a number any more."""
         model = self.scene.model
-        lost = [
-            int(model.jnt_bodyid[j]) for j in range(model.njnt) if not np.isfinite(_coordinates(model, row, j)).all()
-        ]
+        lost = [int(model.jnt_bodyid[j]) for j in range(model.njnt) if not _finite(_coordinates(model, row, j))]
         return model.body(lost[0]).name
+
+
+def _finite(numbers: np.ndarray) -> bool:
+    """All are numbers, and none is so large that MuJoCo takes it for none."""
+    return bool((np.abs(numbers) < mujoco.mjMAXVAL).all())
 
 
 def _coordinates(model: mujoco.MjModel, row: Snapshot, joint: int) -> np.ndarray:

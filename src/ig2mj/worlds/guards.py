@@ -1,6 +1,7 @@
 """Guards: worlds that went wrong are flagged, counted, and put right at the next reset.
 
 A flagged world goes on being stepped with the others; whatever it says is not to be believed, and `reset` replaces it.
+On the native engine one that is not finite stays as it was in the step before.
 """
 
 from __future__ import annotations

@@ -41,7 +41,7 @@ from ig2mj.engine.native.writing import apply_write
 from ig2mj.engine.object_boxes import make_box_table
 from ig2mj.engine.snapshot import Snapshot, fitted
 from ig2mj.engine.view import SCHEMA, AgentView, Array, PhysicsView, axis_sizes
-from ig2mj.errors import EngineError
+from ig2mj.errors import EngineError, LostWorldError
 from ig2mj.process import prepare_jax, prepare_mujoco
 from ig2mj.scene.scene import Scene
 
@@ -243,7 +243,8 @@ class NativeEngine:
     def step(
         self, physics: NativePhysics, ctrl: Float[Array, "W nu"] | None = None
     ) -> tuple[NativePhysics, PhysicsView]:
-        """One control step of every world; see `Engine.step`. Raises EngineError where a state is not finite."""
+        """One control step of every world; see `Engine.step`. Raises LostWorldError where a world is lost, after the
+        others were stepped: who wants them goes on with the same physics and its view."""
         if ctrl is None:
             if self.num_worlds == 1:  # by far the most frequent case, in which a list would be a fifth of the time
                 if physics.view is not None and physics.worlds[0].only_time_passes():
@@ -253,12 +254,16 @@ class NativeEngine:
                 moving = [not world.only_time_passes() for world in physics.worlds]
                 if physics.view is not None and not any(moving):
                     return physics, physics.view
-            changed = self._run(physics, lambda w: w.step(None) if moving[w.number] else Changed.NOTHING)
+            changed = self._run(physics, lambda w: Changed.NOTHING if w.lost or not moving[w.number] else w.step(None))
         else:
             rows = np.asarray(ctrl, np.float64)
             check_shape(rows, self.num_worlds, self._slots[0].model.nu)
-            changed = self._run(physics, lambda world: world.step(rows[world.number]))
-        return physics, physics.update(changed)
+            changed = self._run(physics, lambda w: Changed.NOTHING if w.lost else w.step(rows[w.number]))
+        view = physics.update(changed)
+        for world in physics.worlds:
+            if world.lost:
+                raise LostWorldError(world.lost)
+        return physics, view
 
     def view(self, physics: NativePhysics) -> PhysicsView:
         """The view of the present state; the same object as the last one when nothing changed."""
@@ -269,13 +274,15 @@ class NativeEngine:
         return np.array([world.data.time for world in physics.worlds])
 
     def write(self, physics: NativePhysics, write: Write) -> NativePhysics:
-        """Applies a change in place; see `Engine.write`."""
+        """Applies a change in place, but to worlds that are lost; see `Engine.write`."""
         check_written(write.model_fields, self._statics.own_fields, self._slots[0].model, self.num_worlds)
         values = {field.name: getattr(write, field.name) for field in dataclasses.fields(Write)}
         values |= {"model_fields": None} | given(write.model_fields)
         rows = {name: np.asarray(value) for name, value in values.items() if value is not None}
 
         def apply(world: World) -> int:
+            if world.lost:
+                return Changed.NOTHING
             return apply_write(world, {name: value[world.number] for name, value in rows.items()})
 
         physics.update(self._run(physics, apply))
@@ -289,14 +296,14 @@ class NativeEngine:
         count = self.num_worlds
         velocity = np.empty((count, *self._free_dofs.shape), np.float32)
         positions = np.empty((count, self._slots[0].model.nq))
-        wrong = np.zeros(count, bool)
+        wrong, lost = np.zeros(count, bool), np.zeros(count, bool)
         for row, world in enumerate(physics.worlds):
             velocity[row], positions[row] = world.data.qvel[self._free_dofs], world.data.qpos
-            wrong[row] = world.wrong_controls
+            wrong[row], lost[row] = world.wrong_controls, bool(world.lost)
         squares = np.einsum("wnk,wnk->wn", velocity, velocity)
         return Health(
             overflow=np.zeros(count, np.int32),
-            finite=np.asarray(np.isfinite(positions).all(1) & np.isfinite(velocity).all((1, 2))),
+            finite=np.asarray(np.isfinite(positions).all(1) & np.isfinite(velocity).all((1, 2)) & ~lost),
             top_speed=np.sqrt(squares.max(1, initial=0.0)),
             wrong_controls=wrong,
         )

@@ -14,13 +14,14 @@ from ig2mj.engine.layout import ModelLayout
 from ig2mj.engine.model_fields import ModelFields, given
 from ig2mj.engine.native.contacts import FINGER, LINK, NOTHING_MET, ForcePlan, Met, StepContacts, touching_units
 from ig2mj.engine.native.later import RAW, AgentContacts, LaterPlan, agents_touching, of_owners
+from ig2mj.engine.native.lost import why_lost
 from ig2mj.engine.native.model_slot import ModelSlot
 from ig2mj.engine.native.sleep import restore_sleep, wake_trees
 from ig2mj.engine.native.vicinity import Masks, Vicinity, VicinityTable
 from ig2mj.engine.native.view_rows import Changed, PosePlan, PoseRows
 from ig2mj.engine.snapshot import AXIS, Snapshot, make_snapshot
 from ig2mj.engine.view import Array
-from ig2mj.errors import EngineError
+from ig2mj.errors import LostWorldError
 from ig2mj.scene.tables import SceneTables
 
 _STATE = tuple(name for name in AXIS if name not in ("eq_data", "tree_asleep"))
@@ -62,6 +63,8 @@ class World:
       fields: fields of the model that this world has for itself, by name; its engine puts them into the model that the
         worlds of a thread share before it does anything with the world. Always there: eq_data and `own_fields`.
       ignored: [H, O] contacts that are dropped. wrong_controls: some control was clipped since the world was loaded.
+      lost: why it is neither stepped nor written to until it is loaded, in one line; "" while all is finite. Its rows
+        keep the poses of the control step before, and no forces.
     """
 
     def __init__(self, statics: Statics, slot: ModelSlot, masks: Masks, rows: dict[str, np.ndarray], number: int):
@@ -97,12 +100,12 @@ class World:
         self._has_grasps = len(statics.layout.grasp_equality) > 0
         outside = (self.data.qvel, self.data.xfrc_applied, self.data.qfrc_applied)
         self._from_outside = tuple((array, np.zeros_like(array).tobytes()) for array in outside)
-        self.wrong_controls = False
+        self.wrong_controls, self.lost = False, ""
         self._never_left_alone = model.nmocap > 0
 
     def step(self, ctrl: np.ndarray | None) -> int:
         """One control step, and the refresh after it. The data stands after `mj_step1` before and after."""
-        model, data, statics = self.model, self.data, self.statics
+        data = self.data
         if ctrl is not None:
             if not (ctrl.dot(ctrl) <= LARGEST**2):  # true for NaN, too
                 clipped, wrong = clip(ctrl[None], data.ctrl[None])
@@ -111,6 +114,21 @@ class World:
         if self.only_time_passes():
             return Changed.NOTHING
         changed = self.clear_force()
+        try:
+            steps = self._physics_steps()
+        except mujoco.FatalError:  # between bodies that are nowhere there may be more contacts than memory
+            self._check_finite()
+            raise
+        finally:
+            self.masks.open()  # nobody else is to see a model with masks
+        for contacts in steps:
+            if contacts is not None:
+                changed |= self._note_forces(contacts)
+        return changed | self.refresh()
+
+    def _physics_steps(self) -> list[StepContacts | None]:
+        """The physics steps of a control step, and the contacts of each whose forces are of interest."""
+        model, data, statics = self.model, self.data, self.statics
         self._near.begin()
         self._let_near()
         mujoco.mj_step2(model, data)
@@ -124,11 +142,7 @@ class World:
         self._near.moved()
         self._let_near()
         mujoco.mj_step1(model, data)
-        self.masks.open()  # nobody else is to see a model with masks
-        for contacts in steps:
-            if contacts is not None:
-                changed |= self._note_forces(contacts)
-        return changed | self.refresh()
+        return steps
 
     def _collect(self) -> StepContacts | None:
         forces, data = self.statics.forces, self.data
@@ -244,7 +258,7 @@ class World:
     def load(self, snapshot: Snapshot) -> int:
         """Takes a snapshot without the world axis, and refreshes everything."""
         self.disturbed()
-        self.wrong_controls = False
+        self.wrong_controls, self.lost = False, ""
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)
         self.set_fields(eq_data=np.asarray(snapshot.eq_data), **given(snapshot.model_fields))
@@ -306,21 +320,14 @@ class World:
         return changed
 
     def _check_finite(self) -> None:
-        data, model, (qpos, qvel) = self.data, self.model, self._numbers
+        qpos, qvel = self._numbers
         if qpos.dot(qpos) < mujoco.mjMAXVAL and qvel.dot(qvel) < mujoco.mjMAXVAL:
             return  # false for NaN, too; what is larger is looked at closely
-        wrong = ~(np.abs(data.qvel) < mujoco.mjMAXVAL)
-        bodies = set(model.dof_bodyid[wrong])
-        coordinates = np.flatnonzero(~(np.abs(data.qpos) < mujoco.mjMAXVAL))
-        bodies |= set(model.jnt_bodyid[np.searchsorted(model.jnt_qposadr, coordinates, side="right") - 1])
-        if not bodies:
-            return
-        names = [f"'{model.body(int(b)).name}'" for b in sorted(bodies)]
-        listed = ", ".join(names[:6]) + (f" and {len(names) - 6} more" if len(names) > 6 else "")
-        raise EngineError(
-            f"world {self.number}: position or velocity is not finite at t = {data.time:.3f} s of {listed} "
-            "(reset the world; a smaller timestep or weaker controls may fix it)"
-        )
+        self.lost = why_lost(self.number, self.model, self.data)
+        if self.lost:
+            self.clear_force()
+            self._none_awake = False  # no time passes
+            raise LostWorldError(self.lost)
 
     def _plan(self, trees: np.ndarray | None) -> PosePlan:
         """What moves with the given trees [T]; None: everything there is."""
