@@ -18,7 +18,7 @@ from ig2mj.envs.observations import Space
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.dagger import Dagger, DaggerConfig
 from ig2mj.learn.iteration import OneDevice
-from ig2mj.learn.labels import Imitation
+from ig2mj.learn.labels import Imitation, Labels
 from ig2mj.learn.looking import look, start_pictures
 from ig2mj.learn.moments import Moments
 from ig2mj.learn.perception import Perception, Seen
@@ -95,6 +95,9 @@ def test_an_actor_that_is_told_what_is_hidden_learns_labels_without_pictures():
     moments, rng = Moments.initial(9), np.random.default_rng(0)
     vector = jnp.asarray(rng.uniform(-1, 1, (64, 9)), jnp.float32)
     label = 0.8 * vector[:, 2:4]
+    hidden, actor = perception.hidden, imitation.actor
+    guess = hidden(vector, moments.normal(vector), actor.guess + 2 * actor.objects)
+    guess += jnp.asarray(rng.normal(0.0, 0.3, guess.shape), jnp.float32)
     seen, none = Seen(vector[:4], jnp.zeros((4, 16 * 16 * 4), jnp.uint8)), label[:4]
 
     def loss(params, key, told):
@@ -104,11 +107,23 @@ def test_an_actor_that_is_told_what_is_hidden_learns_labels_without_pictures():
     assert "told_loss" not in found
     both, told = jax.jit(jax.value_and_grad(lambda *a: loss(*a)[1]["told_loss"])), []
     for k in range(60):
-        value, slope = both(params, jax.random.PRNGKey(k), (vector, label, jnp.zeros((64, 0))))
+        value, slope = both(params, jax.random.PRNGKey(k), (vector, label, jnp.zeros((64, 0)), guess))
         told.append(float(value))
         params = jax.tree.map(lambda a, s: a - 0.2 * s, params, slope)
     assert all((np.asarray(a) == 0).all() for a in jax.tree.leaves(slope["encoder"])), "pictures have no part in it"
-    assert np.mean(told[-5:]) < 0.6 * told[0], "though what it is told is as wrong as its first guesses"
+    assert np.mean(told[-5:]) < 0.6 * told[0], "though what it is told is not right"
+
+
+def test_what_an_actor_is_told_it_guessed_in_that_very_step():
+    perception = Perception(SeenPointMass.observation_spaces, "rgbd")
+    labels = Labels.empty(4, 3, perception, 2, guess=5)
+    vector = jnp.arange(2 * 3 * perception.vector_size, dtype=jnp.float32).reshape(2, 3, -1)
+    seen = Seen(vector, jnp.zeros((2, 3, labels.picture.shape[-1]), jnp.uint8))
+    labels = labels.insert(seen, vector[..., :2], guess=vector[..., :1] + jnp.arange(5.0))
+    found, label, recalled, guess = labels.told(jax.random.PRNGKey(0), 64)
+    assert len(np.unique(found[:, 0])) == 6 and recalled.shape == (64, 0)
+    np.testing.assert_array_equal(label, found[:, :2])
+    np.testing.assert_array_equal(guess, found[:, :1] + np.arange(5.0))
 
 
 def test_what_cannot_be_looked_at_or_told_is_refused():

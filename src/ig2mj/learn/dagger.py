@@ -39,6 +39,9 @@ from ig2mj.tasks.task import HORIZON
 RECALLED = "recalled"
 """The name among a transition's extras of what was remembered."""
 
+GUESSED = "guessed"
+"""And of the actor's guess, where it is kept."""
+
 
 @dataclasses.dataclass(frozen=True)
 class DaggerConfig:
@@ -57,8 +60,8 @@ class DaggerConfig:
       starts: pictures of so many start states, from which the guess learns, too: half as many samples again in each
         update. look: updates of the guess on those before the first step. opening: so many first steps of each such
         episode are the expert's, and every seventh is among the pictures.
-      told: samples of an update besides, in which the actor is told what is hidden, as wrong as it guesses it: pictures
-        cost time. For the encoder `glimpses`.
+      told: samples of an update besides, of which only the actor's layers learn: what it guessed of their pictures as
+        it acted is kept. Pictures cost time, these next to none. For the encoder `glimpses`.
       recall: 1: the actor remembers what a hand soon hides (`ig2mj.learn.recall`). For the encoder `glimpses`.
       believed: 1: the expert's labels are for where such an actor takes objects to be (`ig2mj.learn.belief`).
       choices: values of each number of an action that the actor chooses from; 0: it is the mean of a Gaussian.
@@ -195,7 +198,8 @@ class Dagger:
         """No labels yet."""
         rows = max(self.config.capacity // (num_worlds * self.length), 1) * self.length
         starts = jax.tree.map(jnp.asarray, self.starts)
-        return Labels.empty(rows, num_worlds, self.perception, self.action_size, starts, self._remembers)
+        kept = self.actor.guess + 2 * self.actor.objects if self.config.told else 0
+        return Labels.empty(rows, num_worlds, self.perception, self.action_size, starts, self._remembers, kept)
 
     @property
     def recall(self) -> Recall | None:
@@ -252,7 +256,7 @@ class Dagger:
         apart, helpless = uncounted(~alone, turns.helpless, share > 0)
         apart |= learner.updates < HORIZON * c.updates
         extra = {"label": label, GUIDED: helped | apart, **({RECALLED: recalled} if self._remembers else {})}
-        extra |= {RESCUED: rescued} if c.rescue else {}
+        extra |= ({RESCUED: rescued} if c.rescue else {}) | ({GUESSED: guess} if c.told else {})
         new = Turns(draw, left, alone, helped, helpless, recalled)
         if self._believes:
             new = self._with_beliefs(new, turns, learner.moments, seen, guess, begins)
@@ -289,7 +293,8 @@ class Dagger:
           progress: share of the run that is over. ready: without it nothing is updated: labels are gathered.
         """
         c = self.config
-        memory = memory.insert(rollout.seen, rollout.extra["label"], rollout.extra.get(RECALLED))
+        extra = rollout.extra
+        memory = memory.insert(rollout.seen, extra["label"], extra.get(RECALLED), extra.get(GUESSED))
         moments = learner.moments.update(rollout.seen.vector, self.axis)
         learner = dataclasses.replace(learner, moments=moments, progress=progress)
         rate = jnp.asarray(optax.cosine_decay_schedule(c.lr, 1, c.last_lr / c.lr)(progress))

@@ -22,10 +22,15 @@ from ig2mj.learn.perception import Perception, Seen, blank
 from ig2mj.learn.recall import Recall, looked
 
 
+Told = tuple[Float[Array, "B v"], Float[Array, "B n"], Float[Array, "B m"], Float[Array, "B g"]]
+"""Steps without their pictures (`Labels.told`)."""
+
+
 @struct.dataclass
 class Labels:
     """The last T steps of W worlds. `head`: row that is written next. `size`: rows that are full. `starts`: start
-    states, which have no labels. `recalled`: what was remembered (`ig2mj.learn.recall`)."""
+    states, which have no labels. `recalled`: what was remembered (`ig2mj.learn.recall`). `guess`: what the actor
+    guessed as it acted."""
 
     vector: Float[Array, "T W v"]
     picture: UInt8[Array, "T W q"]
@@ -33,6 +38,7 @@ class Labels:
     head: Int[Array, ""]
     size: Int[Array, ""]
     recalled: Float[Array, "T W m"]
+    guess: Float[Array, "T W g"]
     starts: Seen | None = None
 
     @classmethod
@@ -44,8 +50,9 @@ class Labels:
         action_size: int,
         starts: Seen | None = None,
         recalled: int = 0,
+        guess: int = 0,
     ) -> Labels:
-        """Room for so many steps of so many worlds. `recalled`: m."""
+        """Room for so many steps of so many worlds. `recalled`: m. `guess`: g; 0 where guesses are not kept."""
         shape = perception.picture_shape
         pixels = 0 if shape is None else shape[0] * shape[1] * shape[2]
         return cls(
@@ -55,10 +62,17 @@ class Labels:
             head=jnp.int32(0),
             size=jnp.int32(0),
             recalled=jnp.zeros((steps, worlds, recalled)),
+            guess=jnp.zeros((steps, worlds, guess)),
             starts=starts,
         )
 
-    def insert(self, seen: Seen, label: Float[Array, "t W n"], recalled: Float[Array, "t W m"] | None = None) -> Labels:
+    def insert(
+        self,
+        seen: Seen,
+        label: Float[Array, "t W n"],
+        recalled: Float[Array, "t W m"] | None = None,
+        guess: Float[Array, "t W g"] | None = None,
+    ) -> Labels:
         """With more steps in place of the oldest; their number must divide T."""
         count, capacity = label.shape[0], self.label.shape[0]
         assert capacity % count == 0, "steps are written without a seam"
@@ -72,6 +86,7 @@ class Labels:
             picture=put(self.picture, seen.picture),
             label=put(self.label, label),
             recalled=self.recalled if recalled is None else put(self.recalled, recalled),
+            guess=self.guess if guess is None else put(self.guess, guess),
             head=(self.head + count) % capacity,
             size=jnp.minimum(self.size + count, capacity),
         )
@@ -82,10 +97,10 @@ class Labels:
         seen = Seen(self.vector[row, world], self.picture[row, world])
         return seen, self.label[row, world], self.recalled[row, world]
 
-    def told(self, key: Array, count: int) -> tuple[Float[Array, "B v"], Float[Array, "B n"], Float[Array, "B m"]]:
-        """So many steps without their pictures."""
+    def told(self, key: Array, count: int) -> Told:
+        """So many steps without their pictures: vector, label, what was remembered, and the guess."""
         row, world = self._some(key, count)
-        return self.vector[row, world], self.label[row, world], self.recalled[row, world]
+        return self.vector[row, world], self.label[row, world], self.recalled[row, world], self.guess[row, world]
 
     def _some(self, key: Array, count: int) -> tuple[Int[Array, "B"], Int[Array, "B"]]:
         row_key, world_key = jax.random.split(key)
@@ -129,7 +144,7 @@ class Imitation:
         seen: Seen,
         label: Float[Array, "L n"],
         key: Array,
-        told: tuple[Float[Array, "B v"], Float[Array, "B n"], Float[Array, "B m"]] | None = None,
+        told: Told | None = None,
         recalled: Float[Array, "L m"] | None = None,
     ) -> tuple[Array, dict[str, Array]]:
         """How far the actor is from the label ("actor_loss", see `heads.label_loss`; "label_error", the mean absolute
@@ -137,8 +152,8 @@ class Imitation:
 
         Args:
           seen: L samples that have labels, and any number that do not, of which only the guess is learnt.
-          told: more samples without their pictures, their labels, and what was remembered. The actor is told the
-            truth there, with the errors that its guesses have of some of `seen`.
+          told: more samples without their pictures. There the actor is told what it guessed as it acted, so that its
+            layers, which cost little, learn from more samples than its encoder can.
           recalled: what was remembered in the samples that have labels.
         """
         count, normal, found = label.shape[0], moments.normal(seen.vector), dict[str, Array]()
@@ -162,15 +177,10 @@ class Imitation:
             found["guess_loss"] = hidden.loss(guess, seen.vector, normal)
             loss += self._weight * found["guess_loss"]
             if told is not None:
-                vector, wanted, kept = told
-                wrong = jax.lax.stop_gradient(guess - hidden(seen.vector, normal, guess.shape[-1]))[:count]
-                which = jax.random.randint(jax.random.fold_in(key, 2), wanted.shape[:1], 0, count)
-                own = moments.normal(vector)
-                belief = hidden(vector, own, guess.shape[-1]) + wrong[which]
-                none = jnp.zeros((len(wanted), 0), jnp.uint8)
-                looked = self.actor.apply(
-                    {"params": params}, own[:, :size], none, belief, self._recalled(moments, kept, vector)
-                )
+                vector, wanted, kept, guessed = told
+                none, own = jnp.zeros((len(wanted), 0), jnp.uint8), moments.normal(vector)[:, :size]
+                known = self._recalled(moments, kept, vector)
+                looked = self.actor.apply({"params": params}, own, none, guessed, known)
                 found["told_loss"] = label_loss(looked[0], wanted)
                 loss += found["told_loss"]
         return loss, found
