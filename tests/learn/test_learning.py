@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
 import sys
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from small_envs import FarReward, FarRewardThatEnds, PointMass
 
 from ig2mj.envs.observations import Space
 from ig2mj.learn import guidance
-from ig2mj.learn.collect import GUIDED, RESCUED, Advice, begin, collect_fn
+from ig2mj.learn.collect import GUIDED, Advice
 from ig2mj.learn.dagger import Dagger, DaggerConfig
 from ig2mj.learn.guidance import guided, share, uncounted
 from ig2mj.learn.perception import Perception, Seen
@@ -169,31 +168,6 @@ def test_dagger_s_reported_success_is_not_too_high_when_the_expert_leaves():
     # A little less than half: fewer and fewer of those that begin are of the tenth that counts, and successes are new.
     assert 0.35 < np.concatenate(counted).mean() < 0.53
     assert np.concatenate(naive).mean() > 0.62
-
-
-def test_an_episode_that_is_rescued_counts_as_lost_and_ends():
-    """An untrained policy that acts alone: from step 10 of 40 on the expert does, and reaches the goal."""
-    env = PointMass(32, horizon=40)
-    config = DaggerConfig(updates=4, batch=64, capacity=4000, actor=(16,), disturbed=0.0, rescue=10)
-
-    def expert(state):
-        return jnp.clip(10 * (state.goal - state.pos), -1, 1)
-
-    algorithm = Dagger(Perception(env.observation_spaces), 2, expert, config)
-    learner = algorithm.init(jax.random.PRNGKey(0))
-    learner = dataclasses.replace(learner, progress=jnp.float32(1), updates=jnp.int32(10_000))
-    long_ago = dataclasses.replace(algorithm.noise(32), helpless=jnp.full(32, 1000))  # the expert's own part ended
-    play = begin(env, long_ago, 0)
-    run = jax.jit(functools.partial(collect_fn, env, algorithm.perception, algorithm.act, expert, length=40))
-    _, rollout, sums = run(learner, play, jax.random.PRNGKey(1))
-    rescued = np.asarray(rollout.extra[RESCUED])
-    assert not rescued[:10].any() and rescued[10].any()
-    np.testing.assert_allclose(rollout.action[10][rescued[10]], rollout.extra["label"][10][rescued[10]], atol=0.5)
-    done = np.asarray(rollout.terminated)
-    ends, wins = done[rescued].sum(), done[~rescued].sum()
-    assert ends > 20, "who is rescued arrives"
-    assert not np.asarray(rollout.extra[GUIDED]).any(), "they count"
-    assert float(sums["success"]) == wins < 10 and float(sums["episodes"]) >= wins + ends
 
 
 def test_the_expert_acts_up_to_the_handover_and_less_as_the_run_goes_on():

@@ -96,6 +96,7 @@ def test_an_actor_that_is_told_what_is_hidden_learns_labels_without_pictures():
     vector = jnp.asarray(rng.uniform(-1, 1, (64, 9)), jnp.float32)
     label = 0.8 * vector[:, 2:4]
     hidden, actor = perception.hidden, imitation.actor
+    assert hidden is not None
     guess = hidden(vector, moments.normal(vector), actor.guess + 2 * actor.objects)
     guess += jnp.asarray(rng.normal(0.0, 0.3, guess.shape), jnp.float32)
     seen, none = Seen(vector[:4], jnp.zeros((4, 16 * 16 * 4), jnp.uint8)), label[:4]

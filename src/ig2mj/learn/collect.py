@@ -112,10 +112,6 @@ GUIDED = "guided"
 """The name among a transition's extras of whether the expert had a part in the episode [W]; such episodes are left out
 of the success that is reported."""
 
-RESCUED = "rescued"
-"""The name among a transition's extras of whether the expert has taken over an episode that was as good as lost [W];
-such episodes count as lost."""
-
 Hint = Callable[..., Array] | None
 """An expert: from the environment's state to actions [W, n] (`ig2mj.envs.experts.expert_of`), and where the policy's
 memory has `beliefs`, from those as well: where the policy took objects to be in the step before."""
@@ -226,8 +222,6 @@ def _sums(transition: Transition, total: Array, steps: Array, info: Mapping[str,
     if GUIDED in transition.extra:
         over = over * ~transition.extra[GUIDED]
     success = jnp.asarray(info.get("success", transition.terminated), jnp.float32)
-    if RESCUED in transition.extra:
-        success = success * ~transition.extra[RESCUED]
     sums = {
         "episodes": over.sum(),
         "return": (over * total).sum(),

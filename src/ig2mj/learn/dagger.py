@@ -26,9 +26,10 @@ from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.belief import beliefs_of, errors_of
 from ig2mj.learn.belief import nothing as nothing_believed
-from ig2mj.learn.collect import GUIDED, RESCUED, Advice, Hint, Transition, if_ready
+from ig2mj.learn.collect import GUIDED, Advice, Hint, Transition, if_ready
 from ig2mj.learn.guidance import ALONE, uncounted
 from ig2mj.learn.heads import likeliest
+from ig2mj.learn.hidden import Hidden
 from ig2mj.learn.labels import Imitation, Labels
 from ig2mj.learn.moments import Moments, share_of
 from ig2mj.learn.perception import Perception, Seen
@@ -52,8 +53,6 @@ class DaggerConfig:
       batch: samples of an update, of all devices together.
       capacity: labels that are kept, of all worlds together. warm_up: steps of each world before the first update.
       alone: share of the run after which the expert acts no more. noise: deviation of what is added to actions.
-      rescue: step of an episode from which the expert acts, so that worlds in which the policy is stuck do not fill the
-        memory; such an episode counts as lost. 0: never.
       disturbed: share of the expert's steps in which its action is replaced by a random one.
       guess: weight of the actor's guess of the privileged state, from pixels. shift: pixels they are moved by at most.
       lr: learning rate, falling to `last_lr` along a cosine over the run.
@@ -75,7 +74,6 @@ class DaggerConfig:
     warm_up: int = 12
     alone: float = 0.2
     noise: float = 0.1
-    rescue: int = 0
     disturbed: float = 0.1
     guess: float = 1.0
     shift: int = 2
@@ -217,9 +215,10 @@ class Dagger:
         no, none = jnp.zeros(num_worlds, bool), jnp.zeros(num_worlds, bool)
         zero, nought = jnp.zeros(num_worlds, jnp.int32), jnp.zeros(num_worlds, jnp.int32)
         nothing = jnp.zeros((num_worlds, self._remembers))
-        new, hidden = Turns(jnp.zeros(num_worlds), zero, no, none, nought, nothing), self.perception.hidden
-        if not self._believes or hidden is None:
+        new = Turns(jnp.zeros(num_worlds), zero, no, none, nought, nothing)
+        if self._believer is None:
             return new
+        _, hidden = self._believer
         at_first = jnp.zeros((num_worlds, len(hidden.poses)))
         return dataclasses.replace(new, beliefs=nothing_believed(hidden, num_worlds), at_first=at_first)
 
@@ -244,8 +243,6 @@ class Dagger:
         alone = jnp.where(begins, jax.random.uniform(alone_key, begins.shape) < ALONE, turns.alone)
         expert = (draw < share) & ~(alone & (learner.updates > 0))
         helped = expert | (turns.helped & ~begins)
-        rescued = (advice.steps >= c.rescue) if c.rescue else jnp.zeros_like(expert)
-        expert |= rescued
         label = jnp.clip(advice.label, -1.0, 1.0)
         wild = (jax.random.uniform(which_key, expert.shape) < c.disturbed) & expert
         action = jnp.where(expert[:, None], label, own_action)
@@ -256,23 +253,30 @@ class Dagger:
         apart, helpless = uncounted(~alone, turns.helpless, share > 0)
         apart |= learner.updates < HORIZON * c.updates
         extra = {"label": label, GUIDED: helped | apart, **({RECALLED: recalled} if self._remembers else {})}
-        extra |= ({RESCUED: rescued} if c.rescue else {}) | ({GUESSED: guess} if c.told else {})
+        extra |= {GUESSED: guess} if c.told else {}
         new = Turns(draw, left, alone, helped, helpless, recalled)
-        if self._believes:
-            new = self._with_beliefs(new, turns, learner.moments, seen, guess, begins)
+        if self._believer is not None:
+            new = self._with_beliefs(*self._believer, new, turns, learner.moments, seen, guess, begins)
         return jnp.clip(action, -1.0, 1.0), extra, new
 
     @property
-    def _believes(self) -> bool:
-        """The expert is to know where the actor takes objects to be."""
-        return bool(self.config.believed) and self.recall is not None and self.perception.hidden is not None
+    def _believer(self) -> tuple[Recall, Hidden] | None:
+        """What the actor remembers and guesses, if the expert is to know where it takes objects to be; else None."""
+        recall, hidden = self.recall, self.perception.hidden
+        return (recall, hidden) if self.config.believed and recall is not None and hidden is not None else None
 
     def _with_beliefs(
-        self, new: Turns, old: Turns, moments: Moments, seen: Seen, guess: Float[Array, "W g"], begins: Bool[Array, "W"]
+        self,
+        recall: Recall,
+        hidden: Hidden,
+        new: Turns,
+        old: Turns,
+        moments: Moments,
+        seen: Seen,
+        guess: Float[Array, "W g"],
+        begins: Bool[Array, "W"],
     ) -> Turns:
         """`new` with where the actor takes objects to be. `old`: of the step before."""
-        recall, hidden = self.recall, self.perception.hidden
-        assert recall is not None and hidden is not None and old.at_first is not None
         scales, vector = moments.scales(seen.vector.shape[-1]), seen.vector
         at_first = jnp.where(begins[:, None], errors_of(recall, scales, vector, guess), old.at_first)
         beliefs = beliefs_of(recall, hidden, scales, vector, new.recalled, guess, at_first)

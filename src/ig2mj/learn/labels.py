@@ -21,7 +21,6 @@ from ig2mj.learn.networks import SHAKEN, Actor, shifted
 from ig2mj.learn.perception import Perception, Seen, blank
 from ig2mj.learn.recall import Recall, looked
 
-
 Told = tuple[Float[Array, "B v"], Float[Array, "B n"], Float[Array, "B m"], Float[Array, "B g"]]
 """Steps without their pictures (`Labels.told`)."""
 
