@@ -277,6 +277,7 @@ class Dagger:
         begins: Bool[Array, "W"],
     ) -> Turns:
         """`new` with where the actor takes objects to be. `old`: of the step before."""
+        assert old.at_first is not None
         scales, vector = moments.scales(seen.vector.shape[-1]), seen.vector
         at_first = jnp.where(begins[:, None], errors_of(recall, scales, vector, guess), old.at_first)
         beliefs = beliefs_of(recall, hidden, scales, vector, new.recalled, guess, at_first)

@@ -75,7 +75,7 @@ def plan(see: Sight) -> list[Wish]:
     if see.robot == "fetch":
         turn += far_out(see, goal)
         slow = jnp.where(length(see.grip() - handle) < WITHIN, -SLOWLY, -jnp.inf)
-        take = Wish(take.move.at[:, 2].max(slow), far_out(see, handle), take.close)
+        take = Wish(jnp.asarray(take.move).at[:, 2].max(slow), far_out(see, handle), take.close)
     exact = EXACT[see.robot]
     cut = wish(over(blade, goal, top + CLEARANCE, near=exact, blend=exact), turn, close=True)
     return [where(done, still, where(see.holds(KNIFE), cut, take))]
