@@ -89,7 +89,9 @@ def test_how_a_thing_lies_by_now_is_reckoned_from_how_it_lay_and_where_the_hand_
     """Two objects and two hands; the second hand takes something in step 1 and lets go of it in step 3."""
     rng, worlds = np.random.default_rng(0), 5
     recall = Recall(14, range(18), (12, 13), (0, 6), [[14, 15, 16], [17, 18, 19]])
-    assert recall.shown == recall.size + 2 * 2 * 9 and Recall.of(recall.card(), 14).card() == recall.card()
+    whole = Recall.of({k: v for k, v in recall.card().items() if k != "whole"}, 14)
+    assert recall.shown == 18 + 2 * 2 * 9 and Recall.of(recall.card(), 14).card() == recall.card()
+    assert whole.shown == whole.size + 2 * 2 * 9, "files of before that was said show all that is remembered"
     mean, deviation = rng.normal(size=20).astype(np.float32), rng.uniform(0.5, 2.0, 20).astype(np.float32)
     felt = rng.uniform(-1, 1, (5, worlds, 14)).astype(np.float32)
     felt[..., 12], felt[..., 13] = -1.0, np.array([-1.0, 1.0, 1.0, -1.0, -1.0])[:, None]
@@ -119,6 +121,8 @@ def test_how_a_thing_lies_by_now_is_reckoned_from_how_it_lay_and_where_the_hand_
         np.testing.assert_allclose(found[:, 1], expected, atol=2e-5, err_msg=f"step {k}")
         shown = np.asarray(recall.normal(kept, felt[k], mean, deviation))
         assert shown.shape == (worlds, recall.shown) and np.abs(shown).max() <= 10
+        more = np.asarray(whole.normal(kept, felt[k], mean, deviation))
+        np.testing.assert_array_equal(np.delete(more, np.s_[18:50], axis=1), shown)
 
 
 def test_labels_that_only_the_first_picture_tells_are_learnt():

@@ -61,7 +61,8 @@ class DaggerConfig:
         episode are the expert's, and every seventh is among the pictures.
       told: samples of an update besides, of which only the actor's layers learn: what it guessed of their pictures as
         it acted is kept. Pictures cost time, these next to none. For the encoder `glimpses`.
-      recall: 1: the actor remembers what a hand soon hides (`ig2mj.learn.recall`). For the encoder `glimpses`.
+      recall: 1: the actor remembers what a hand soon hides (`ig2mj.learn.recall`). 2: it also sees what was felt and
+        guessed when a hand last took something, as older policies do. For the encoder `glimpses`.
       believed: 1: the expert's labels are for where such an actor takes objects to be (`ig2mj.learn.belief`).
       choices: values of each number of an action that the actor chooses from; 0: it is the mean of a Gaussian.
       actor: sizes of the layers. net: encoder (`networks.NETS`).

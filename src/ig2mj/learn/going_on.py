@@ -66,4 +66,6 @@ def _settings(policy: Policy) -> str:
     """What to train with."""
     net = policy.card["net"]
     found = {"net": net["net"], "actor": ",".join(map(str, net["sizes"])), "choices": net.get("choices", 0)}
+    if "recall" in net:
+        found["recall"] = 2 if net["recall"].get("hands") and net["recall"].get("whole", True) else 1
     return "its settings: --set " + " ".join(f"{name}={value}" for name, value in found.items())

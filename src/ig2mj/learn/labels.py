@@ -124,7 +124,9 @@ class Imitation:
             parts = perception.hidden.poses.values()
             poses = [k for place, turned in parts for k in (*place, *turned)]
             places = [[int(perception.hidden.plain[k]) for k in place] for place, _ in parts]
-            self.recall = Recall(perception.actor_size, poses, perception.grips, perception.hands, places)
+            self.recall = Recall(
+                perception.actor_size, poses, perception.grips, perception.hands, places, config.recall > 1
+            )
         self.actor = Actor(action_size, config.actor, shape, config.net, guess, config.choices, perception.objects)
         self._perception, self._weight, self._shift, self._axis = perception, config.guess, config.shift, axis
         self._adam = averaged_adam(10.0, axis)

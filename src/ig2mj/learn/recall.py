@@ -4,8 +4,10 @@ A gripper covers what it takes, and an arm what lies behind it: on which side of
 pictures, and in hardly any while the knife is held. An actor therefore keeps how things lay by its guess in the
 episode's first step, and that guess and what it felt when a hand last took something or let go of it: where the hand
 was says how it holds what had not moved until then. From that and from where the hand is now follows how it lies by
-now, which a small network would have to learn to multiply: it is reckoned (`Recall.carried`). Nothing of this is
-learnt, so labels are learnt from single steps, as without memory.
+now, which a small network would have to learn to multiply: it is reckoned (`Recall.carried`). The network is then shown
+how things lay at first and how they would lie if carried; what was felt and guessed at the taking tells it no more, but
+an episode is known by it, by heart. Nothing of this is learnt, so labels are learnt from single steps, as without
+memory.
 
 Axes: W worlds, x numbers of a vector that an actor sees, v with those that are hidden from it, g of a guess, p of those
 that are kept, m = 2 p + x numbers that are remembered, n that a network is shown of it.
@@ -75,6 +77,7 @@ class Recall:
       size: m. shown: n. poses: [p] which numbers of a guess are kept, of each object place and turn (`POSE`). grips:
         which of the vector say whether a hand holds something. hands: see `hands_of`; none: nothing is reckoned.
       places: [objects, 3] which of a vector with what is hidden are the places that are guessed.
+      whole: all that is remembered is shown; without hands it always is.
     """
 
     def __init__(
@@ -84,24 +87,28 @@ class Recall:
         grips: Sequence[int],
         hands: Sequence[int] = (),
         places: Sequence[Sequence[int]] = (),
+        whole: bool = False,
     ):
         """`vector`: x."""
         self.size, self.poses, self.grips = 2 * len(poses) + vector, tuple(poses), tuple(grips)
         self.hands, self.places = tuple(hands), tuple(tuple(place) for place in places)
         assert not self.hands or (len(self.hands) == len(self.grips) and POSE * len(self.places) == len(poses))
-        self.shown = self.size + POSE * len(self.hands) * len(self.places)
+        self.whole = whole or not self.hands
+        self.shown = (self.size if self.whole else len(poses)) + POSE * len(self.hands) * len(self.places)
         self._vector, self._parts = vector, [len(poses), 2 * len(poses)]
 
     @classmethod
     def of(cls, card: Mapping[str, Any], vector: int) -> Recall:
         """What `card` gave of another."""
-        return cls(vector, card["poses"], card["grips"], card.get("hands", ()), card.get("places", ()))
+        whole = card.get("whole", True)  # as it was for all, when cards did not say it
+        return cls(vector, card["poses"], card["grips"], card.get("hands", ()), card.get("places", ()), whole)
 
     def card(self) -> dict[str, Any]:
         """For JSON."""
         found: dict[str, Any] = {"poses": list(self.poses), "grips": list(self.grips)}
         if self.hands:
             found |= {"hands": list(self.hands), "places": [list(place) for place in self.places]}
+            found["whole"] = self.whole
         return found
 
     def blank(self, worlds: int) -> Float[Array, "W m"]:
@@ -134,14 +141,15 @@ class Recall:
         mean: Float[Array, "_"],
         deviation: Float[Array, "_"],
     ) -> Float[Array, "*b n"]:
-        """For a network: what was felt with mean 0 and deviation 1, as guesses have anyway, then what is reckoned.
+        """For a network: guesses, what was felt with mean 0 and deviation 1, as guesses have anyway, what is reckoned.
 
         Args:
           vector: as it is observed now, x numbers or v. mean, deviation: of v numbers (of x where nothing is reckoned).
         """
-        guesses, felt = jnp.split(kept, self._parts[1:], axis=-1)
-        own = mean[: self._vector], deviation[: self._vector]
-        parts = [jnp.clip(guesses, -LIMIT, LIMIT), normal(felt, *own)]
+        first, taking, felt = jnp.split(kept, self._parts, axis=-1)
+        parts = [jnp.clip(first, -LIMIT, LIMIT)]
+        if self.whole:
+            parts += [jnp.clip(taking, -LIMIT, LIMIT), normal(felt, mean[: self._vector], deviation[: self._vector])]
         if self.hands:
             parts.append(jnp.clip(self.carried(kept, vector, mean, deviation), -LIMIT, LIMIT))
         return jnp.concatenate(parts, axis=-1)
