@@ -23,7 +23,7 @@ from kernel_times import profiled
 
 from ig2mj.envs.observations import Space
 from ig2mj.learn.collect import Transition
-from ig2mj.learn.dagger import RECALLED, Dagger, DaggerConfig
+from ig2mj.learn.dagger import GUESSED, RECALLED, Dagger, DaggerConfig
 from ig2mj.learn.options import configured
 from ig2mj.learn.perception import Perception, Seen
 from ig2mj.learn.ppo import PPO, PPOConfig
@@ -85,6 +85,7 @@ def made_up(algorithm: SAC | PPO | Dagger, worlds: int) -> Transition:
     extra: dict[str, Any] = {"raw": raw, "chance": normal()} if algorithm.name == "ppo" else {}
     if isinstance(algorithm, Dagger):
         extra = {"label": jnp.tanh(raw), **({RECALLED: normal(algorithm.recall.size)} if algorithm.recall else {})}
+        extra |= {GUESSED: normal(algorithm.guesses)} if algorithm.guesses else {}
     terminated = jnp.asarray(ends & (rng.random((length, worlds)) < 0.5))
     seen = seen_by(perception, length, worlds)
     return Transition(seen, jnp.tanh(raw), extra, normal(), terminated, jnp.asarray(ends) & ~terminated, seen)

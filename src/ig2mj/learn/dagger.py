@@ -197,8 +197,13 @@ class Dagger:
         """No labels yet."""
         rows = max(self.config.capacity // (num_worlds * self.length), 1) * self.length
         starts = jax.tree.map(jnp.asarray, self.starts)
-        kept = self.actor.guess + 2 * self.actor.objects if self.config.told else 0
-        return Labels.empty(rows, num_worlds, self.perception, self.action_size, starts, self._remembers, kept)
+        kept = self._remembers, self.guesses
+        return Labels.empty(rows, num_worlds, self.perception, self.action_size, starts, *kept)
+
+    @property
+    def guesses(self) -> int:
+        """Numbers of a guess that are kept with each label; 0: none are."""
+        return self.actor.guess + 2 * self.actor.objects if self.config.told else 0
 
     @property
     def recall(self) -> Recall | None:
@@ -254,7 +259,7 @@ class Dagger:
         apart, helpless = uncounted(~alone, turns.helpless, share > 0)
         apart |= learner.updates < HORIZON * c.updates
         extra = {"label": label, GUIDED: helped | apart, **({RECALLED: recalled} if self._remembers else {})}
-        extra |= {GUESSED: guess} if c.told else {}
+        extra |= {GUESSED: guess} if self.guesses else {}
         new = Turns(draw, left, alone, helped, helpless, recalled)
         if self._believer is not None:
             new = self._with_beliefs(*self._believer, new, turns, learner.moments, seen, guess, begins)
