@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import pathlib
-import types
 
 import pytest
 import warp as wp
@@ -33,16 +32,17 @@ def test_kernels_of_a_step_become_programs_of_a_gpu(tiny_home, tmp_path, monkeyp
 def test_no_kernel_waits_for_a_tile_while_it_is_written(tiny_home, tmp_path, monkeypatch):
     from warp._src import build
 
-    made, base = [], build._build_lto_base
+    here, base, folder = [], build._build_lto_base, tmp_path / wp.config.version  # as Warp names it
 
-    def noted(symbol, compile_it, builder, *rest):
+    def noted(symbol, compile_it, *rest):
         def compile_now(paths):
-            made.append((symbol, isinstance(builder, types.SimpleNamespace)))
+            here.append(symbol)
             return compile_it(paths)
 
-        return base(symbol, compile_now, builder, *rest)
+        return base(symbol, compile_now, *rest)
 
-    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(tmp_path))
+    folder.mkdir()
+    monkeypatch.setattr(wp.config, "kernel_cache_dir", str(folder))
     monkeypatch.setattr(build, "_build_lto_base", noted)
     monkeypatch.setattr(build, "build_cuda", lambda source, arch, out, *a, **k: pathlib.Path(out).touch())
     there = ahead.launches_on_gpu(WarpEngine(tiny_home, 2))
@@ -50,7 +50,8 @@ def test_no_kernel_waits_for_a_tile_while_it_is_written(tiny_home, tmp_path, mon
     called += [launch for launch in there if "actorize" in launch[0].key and launch not in called]
     assert len(called) > 3
     ahead.compile_for(called, 90, workers=2)
-    assert len(made) > 6 and all(beforehand for _, beforehand in made)
+    tiles = [path for path in folder.rglob("*.lto") if path.stat().st_size]
+    assert len(tiles) > 6 and here == [], "processes of their own made them"
 
 
 def test_kernels_are_chosen_as_on_a_gpu():
