@@ -58,6 +58,11 @@ def test_other_networks_and_files_without_scales_are_refused(policy):
         assert element in str(found.value) and "fruit.npz" in str(found.value)
     with pytest.raises(InputError, match="scales"):
         further(made(), dataclasses.replace(loaded, hidden=None), 0)
+    recall = {"poses": [0], "grips": [0], "hands": [0], "places": [[0, 1, 2]]}  # of a file from before `whole` was said
+    for more, setting in (({}, 2), ({"whole": True}, 2), ({"whole": False}, 1)):
+        net = {**loaded.card["net"], "recall": {**recall, **more}}
+        with pytest.raises(InputError, match=f"choices=21 recall={setting}"):
+            further(made(actor=(16,)), dataclasses.replace(loaded, card={**loaded.card, "net": net}), 0)
 
 
 def test_who_guesses_nothing_needs_no_scales_of_what_is_hidden(tmp_path):
