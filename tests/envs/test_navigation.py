@@ -56,6 +56,14 @@ def test_the_goal_is_seen_in_polar_coordinates_of_the_base(point):
     assert (way > straight - 0.1).all()
 
 
+def test_robots_begin_at_rest(point):
+    """One that only touched the floor would drive off otherwise in single precision; see `starts._sunk`."""
+    state = point.reset(4)
+    before = np.array(state.batch.world.view.agent.base_pos)
+    state = point.step(state, np.zeros((4, 2), np.float32))
+    assert np.abs(np.asarray(state.batch.world.view.agent.base_pos) - before).max() < 2e-5, "0.15 mm from touching it"
+
+
 @pytest.mark.slow
 def test_who_drives_into_a_wall_pays_for_every_step_of_it(point):
     state = point.reset(2)
