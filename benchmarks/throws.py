@@ -1,9 +1,10 @@
 """Loose objects thrown about a home, natively: what leaves it, with its solid ceiling and without?
 
-    python benchmarks/throws.py [CATEGORY ...] [--home birch] [--throws 1000] [--open] [--rows FILE]
+    python benchmarks/throws.py [CATEGORY ...] [--home birch] [--throws 1000] [--open] [--thin] [--free] [--rows FILE]
 
 Each throw begins over free floor at a place drawn at random, turned at random, upwards or sideways at any angle, and is
-watched for `SECONDS`. `--open` takes the ceiling away.
+watched for `SECONDS`. `--open` takes the ceiling away, `--thin` leaves outer walls as thin as they are drawn and
+windows without panes, `--free` sets no limits to speeds.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import copy
 import dataclasses
 import pathlib
 from typing import Any
+from unittest import mock
 
 import mujoco
 import numpy as np
@@ -21,6 +23,9 @@ from jaxtyping import Float
 from loose_objects import added, floor_cells
 from soak_watch import House
 
+import ig2mj.scene.scene as scenes
+from ig2mj.engine.base import SUBSTEPS
+from ig2mj.engine.speed_limits import SpeedLimits
 from ig2mj.scene.ceilings import CEILING
 from ig2mj.scene.scene import Scene
 from ig2mj.worlds.guards import TOP_SPEED
@@ -53,18 +58,22 @@ class Args:
     """Of the object's frame above the floor, m."""
     open: bool = False
     """Without the ceiling."""
+    thin: bool = False
+    """Without deep outer walls and panes."""
+    free: bool = False
+    """Without limits of speeds."""
     seed: int = 0
     """Of places, turns and directions."""
     rows: pathlib.Path | None = None
     """Rows are added to this file, as JSON lines."""
 
 
-def model_of(scene: Scene, without_ceiling: bool) -> mujoco.MjModel:
-    """The scene's model, or one without its ceiling."""
-    if not without_ceiling:
-        return scene.model
-    spec = scene.spec()
-    spec.delete(spec.body(CEILING))
+def model_of(scene: Scene, args: Args) -> mujoco.MjModel:
+    """The scene's model, or one without its ceiling or with thin walls."""
+    with mock.patch.object(scenes, "deepen_walls", (lambda *_: None) if args.thin else scenes.deepen_walls):
+        spec = scene.spec()
+    if args.open:
+        spec.delete(spec.body(CEILING))
     return spec.compile()
 
 
@@ -77,11 +86,12 @@ def free_places(scene: Scene) -> Float[np.ndarray, "N 2"]:
 def run(args: Args, category: str) -> dict[str, Any]:
     """Throws one object again and again; the row."""
     scene, name = added(args.home, category)
-    model, house, places = model_of(scene, args.open), House.of(scene, (0, 0, 0)), free_places(scene)
+    model, house, places = model_of(scene, args), House.of(scene, (0, 0, 0)), free_places(scene)
     settled, data = mujoco.MjData(model), mujoco.MjData(model)
     mujoco.mj_resetDataKeyframe(model, settled, 0)
     for _ in range(round(SETTLE_SECONDS / model.opt.timestep)):
         mujoco.mj_step(model, settled)
+    limits = SpeedLimits(model, scene.tables.body_agent)
     joint, body = model.joint(f"{name}/free"), model.body(name).id
     seat, dof = int(joint.qposadr[0]), int(joint.dofadr[0])
     rng, fastest, ends = np.random.default_rng(args.seed), np.zeros(args.throws), np.zeros((args.throws, 3))
@@ -91,8 +101,10 @@ def run(args: Args, category: str) -> dict[str, Any]:
         direction = np.array([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)])
         data.qpos[seat : seat + 7] = [*rng.choice(places), args.height, *(quat / np.linalg.norm(quat))]
         data.qvel[dof : dof + 6] = [*direction * rng.uniform(*args.speed), *rng.normal(0, SPIN, 3)]
-        for _ in range(round(SECONDS / model.opt.timestep)):
+        for step in range(1, round(SECONDS / model.opt.timestep) + 1):
             mujoco.mj_step(model, data)
+            if not args.free and step % SUBSTEPS == 0 and limits.exceeded(data.qvel):
+                data.qvel[:] = limits.limited(data.qvel)
             fastest[number] = max(fastest[number], float(np.linalg.norm(data.qvel[dof : dof + 3])))
             if data.xipos[body, 2] < house.floors[:, 0, 2].min():
                 break
@@ -102,6 +114,8 @@ def run(args: Args, category: str) -> dict[str, Any]:
         "home": scene.name,
         "object": category,
         "ceiling": not args.open,
+        "deep_walls": not args.thin,
+        "speed_limits": not args.free,
         "throws": args.throws,
         "speed_m_s": list(args.speed),
         "height_m": args.height,

@@ -23,6 +23,7 @@ from ig2mj.scene.manifest import AgentEntry, Manifest, ObjectEntry, load_manifes
 from ig2mj.scene.paths import MANIFEST_FILE, SHIPPED_HOMES, model_file
 from ig2mj.scene.rooms import Rooms, load_rooms
 from ig2mj.scene.tables import SceneTables
+from ig2mj.scene.walls import deepen_walls
 
 
 @runtime_checkable
@@ -105,6 +106,7 @@ class Scene:
             spec = read_spec(file)
         deepen_floors(spec, self.manifest)
         add_ceiling(spec, self.manifest)
+        deepen_walls(spec, self.manifest)
         _attach_all(self.agents, spec, self.manifest)
         return spec
 
@@ -145,6 +147,7 @@ def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: S
         spec = read_spec(file)
     deepen_floors(spec, manifest)
     add_ceiling(spec, manifest)
+    deepen_walls(spec, manifest)
     if agents:
         manifest = copy.copy(manifest)
         manifest.agents = [*manifest.agents, *_attach_all(agents, spec, manifest)]

@@ -31,6 +31,7 @@ from ig2mj.engine.model_fields import MOVING, ModelFields, check_names, check_wr
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.native.sleep import FULLY_AWAKE
 from ig2mj.engine.snapshot import Snapshot, fitted, make_snapshot
+from ig2mj.engine.speed_limits import SpeedLimits
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_jax
@@ -87,6 +88,7 @@ class MjxEngine(abc.ABC):
         # C MuJoCo's start: all engines begin alike, and MJX need not compile a forward pass.
         ways = {"timestep": timestep, "touch_tolerance": touch_tolerance, "boxes": boxes, "model_fields": model_fields}
         self._initial, self._first_view = NativeEngine(scene, **ways).first_world(initial)
+        self._speed_limits = SpeedLimits(self.host_model, self.tables.body_agent)
         self._pyramidal = self.host_model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
         try:
             self.model = uncommitted(self._put_model(self.host_model))
@@ -171,6 +173,7 @@ class MjxEngine(abc.ABC):
         else:
             carry, _ = jax.lax.scan(substep, carry, length=self.substeps)
         data, (link_force, finger_force), overflow, awake = carry
+        data = data.replace(qvel=self._speed_limits.limited(data.qvel))
         touching = self._touching(data, physics.touching, awake)
         data = self._placed(data)
         physics = dataclasses.replace(

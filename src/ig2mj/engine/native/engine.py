@@ -40,6 +40,7 @@ from ig2mj.engine.native.view_rows import FIELDS, OF_AGENTS, Changed, PoseRows
 from ig2mj.engine.native.writing import apply_write
 from ig2mj.engine.object_boxes import make_box_table
 from ig2mj.engine.snapshot import Snapshot, fitted
+from ig2mj.engine.speed_limits import SpeedLimits
 from ig2mj.engine.view import SCHEMA, AgentView, Array, PhysicsView, axis_sizes
 from ig2mj.errors import EngineError, LostWorldError
 from ig2mj.process import prepare_jax, prepare_mujoco
@@ -192,6 +193,7 @@ class NativeEngine:
                 model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL,
                 (len(self.tables.finger_body), len(self.tables.graspable_body)),
             ),
+            speed_limits=SpeedLimits(model, self.tables.body_agent),
             tolerance=touch_tolerance,
             own_fields=check_names(model_fields),
             substeps=substeps,

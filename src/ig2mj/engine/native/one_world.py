@@ -20,6 +20,7 @@ from ig2mj.engine.native.sleep import restore_sleep, wake_trees
 from ig2mj.engine.native.vicinity import Masks, Vicinity, VicinityTable
 from ig2mj.engine.native.view_rows import Changed, PosePlan, PoseRows
 from ig2mj.engine.snapshot import AXIS, Snapshot, make_snapshot
+from ig2mj.engine.speed_limits import SpeedLimits
 from ig2mj.engine.view import Array
 from ig2mj.errors import LostWorldError
 from ig2mj.scene.tables import SceneTables
@@ -48,6 +49,7 @@ class Statics:
     layers: BitLayers
     forces: ForcePlan
     own_fields: tuple[str, ...]
+    speed_limits: SpeedLimits
     tolerance: float
     substeps: int
 
@@ -139,6 +141,8 @@ class World:
             mujoco.mj_step(model, data)
             if steps:
                 steps.append(self._collect())
+        if statics.speed_limits.exceeded(data.qvel):
+            data.qvel[:] = statics.speed_limits.limited(data.qvel)
         self._near.moved()
         self._let_near()
         mujoco.mj_step1(model, data)
