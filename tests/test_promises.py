@@ -8,9 +8,9 @@ from navigating import small
 
 import ig2mj
 from ig2mj.sensors.base import SensorOptions
-from ig2mj.testing import _host, _same
+from ig2mj.testing import Likeness, _host, _same
 
-WITHIN = 1e-3
+WITHIN = Likeness(1e-3)
 
 
 def _seen(rays: int = 400, **changes: np.ndarray) -> dict[str, dict[str, np.ndarray]]:
@@ -33,7 +33,7 @@ def test_some_rays_of_a_world_may_jump_and_no_more():
         with pytest.raises(AssertionError, match=r"\['obs'\]\['lidar'\] differs"):
             _same(_seen(rays), _seen(rays, lidar=_jumped(rays, count)), "more", WITHIN)
     with pytest.raises(AssertionError, match="lidar"):
-        _same(_seen(), _seen(lidar=_jumped(400, 1)), "to the bit", 0.0)
+        _same(_seen(), _seen(lidar=_jumped(400, 1)), "to the bit", Likeness())
 
 
 def test_of_a_picture_of_numbers_a_hundredth_of_the_pixels_may_be_another_object():
@@ -50,6 +50,18 @@ def test_nothing_else_may_jump():
     other[0, 0] += 0.01
     with pytest.raises(AssertionError, match="task_obs"):
         _same(_seen(), _seen(task_obs=other), "one number", WITHIN)
+
+
+def test_no_more_worlds_than_are_said_to_may_go_astray():
+    other = np.ones((3, 4), np.float32)
+    other[0] = 5.0
+    jumped = _jumped(400, 400, world=0)
+    _same(_seen(), _seen(task_obs=other, lidar=jumped), "one of three", Likeness(1e-3, 0.34))
+    for like in (Likeness(1e-3, 0.33), Likeness(0.0, 0.34)):
+        with pytest.raises(AssertionError, match=r"lidar.*task_obs.* differs in 1 of 3 worlds"):
+            _same(_seen(), _seen(task_obs=other, lidar=jumped), "one of three", like)
+    with pytest.raises(AssertionError, match="differs in 2 of 3 worlds"):
+        _same(_seen(), _seen(task_obs=other, lidar=_jumped(400, 400)), "two of three", Likeness(1e-3, 0.34))
 
 
 @pytest.mark.slow

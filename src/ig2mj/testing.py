@@ -7,6 +7,7 @@ Use it on environments of your own, too. It takes an environment with at least t
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import jax
@@ -28,7 +29,12 @@ JUMPS = 0.01
 
 
 def api_test(
-    env: Environment, seed: int = 0, steps: int = 4, other: Environment | None = None, within: float = 0.0
+    env: Environment,
+    seed: int = 0,
+    steps: int = 4,
+    other: Environment | None = None,
+    within: float = 0.0,
+    astray: float = 0.0,
 ) -> None:
     """Raises AssertionError, with what is wrong, where an environment breaks a promise.
 
@@ -48,8 +54,11 @@ def api_test(
         made in any order, so that a step does not come out the same to the bit, and a ray that passed an edge by a hair
         may hit it. So of what a camera or a laser reads in a world, in each step, one ray in a hundred (one where there
         are fewer) may differ by any amount. Everything else, and all of it where `within` is 0, may not.
+      astray: share of worlds in which everything may differ then. Where contacts come and go, as under a robot that
+        rears up as it drives off, a few steps make centimetres of a rounding.
     """
     assert env.num_worlds >= 2, "api_test needs an environment with at least two worlds"
+    like = Likeness(within, astray)
     rng = np.random.default_rng(seed)
     actions = [rng.uniform(-1, 1, (env.num_worlds, *env.action_space.shape)).astype(np.float32) for _ in range(steps)]
 
@@ -58,14 +67,14 @@ def api_test(
     again = _play(env, seed, actions)
     assert _programs(env) == programs, "the second reset and the second step compiled something again"
     for k, (a, b) in enumerate(zip(first, again, strict=True)):
-        _same(a, b, f"step {k} of the same seed", within)
+        _same(a, b, f"step {k} of the same seed", like)
         assert set(a["info"]) == set(first[0]["info"]), f"step {k}: info has other keys than after the reset"
     if other is not None:
-        _alike_in(other, seed, actions, first, max(within, ROUNDING))
+        _alike_in(other, seed, actions, first, Likeness(max(within, ROUNDING), astray))
     _spaces_hold(env, first)
-    _partial_reset(env, seed, actions, within)
-    _ends(env, seed, actions[0], within)
-    _bad_actions(env, seed, within)
+    _partial_reset(env, seed, actions, like)
+    _ends(env, seed, actions[0], like)
+    _bad_actions(env, seed, like)
     env.close()
     env.close()
 
@@ -81,7 +90,7 @@ def _play(env: Environment, seed: int, actions: list[np.ndarray]) -> list[dict[s
 
 
 def _alike_in(
-    other: Environment, seed: int, actions: list[np.ndarray], seen: list[dict[str, Any]], within: float
+    other: Environment, seed: int, actions: list[np.ndarray], seen: list[dict[str, Any]], like: Likeness
 ) -> None:
     """The worlds that two batches have in common are the same, but for rounding: programs of other sizes are others."""
     assert other.num_worlds != len(actions[0]), "the other environment must have another number of worlds"
@@ -89,7 +98,7 @@ def _alike_in(
     more = [np.resize(action, (other.num_worlds, *action.shape[1:])) for action in actions]
     for k, (a, b) in enumerate(zip(seen, _play(other, seed, more), strict=True)):
         what = f"step {k} in a batch of {other.num_worlds} instead of {len(actions[0])}"
-        _same(_of(common, a), _of(common, b), what, within)
+        _same(_of(common, a), _of(common, b), what, like)
 
 
 def _host(state: EnvState) -> dict[str, Any]:
@@ -97,8 +106,18 @@ def _host(state: EnvState) -> dict[str, Any]:
     return jax.tree.map(lambda a: np.array(a), seen)
 
 
-def _same(a: Any, b: Any, what: str, within: float = 0.0) -> None:
-    """Arrays of all worlds are the same, those of floats to so much, absolute and relative; see `api_test`."""
+@dataclasses.dataclass(frozen=True)
+class Likeness:
+    """How alike worlds must be; see `api_test`."""
+
+    within: float = 0.0
+    astray: float = 0.0
+
+
+def _same(a: Any, b: Any, what: str, like: Likeness) -> None:
+    """Arrays of all worlds are the same, those of floats to so much, absolute and relative, but for worlds astray."""
+    different: dict[str, np.ndarray] = {}
+    within = like.within
     for (path, x), (_, y) in zip(
         jax.tree_util.tree_leaves_with_path(a), jax.tree_util.tree_leaves_with_path(b), strict=True
     ):
@@ -108,7 +127,11 @@ def _same(a: Any, b: Any, what: str, within: float = 0.0) -> None:
         if within and name in SENSORS and SENSORS[name].looks:
             rays = differs.any(-1).reshape(len(differs), -1)
             differs = rays.sum(1) > max(1, int(JUMPS * rays.shape[1]))
-        assert not differs.any(), f"{what}: {jax.tree_util.keystr(path)} differs"
+        if differs.any():
+            different[jax.tree_util.keystr(path)] = differs.reshape(len(differs), -1).any(1)
+    worlds = np.logical_or.reduce(list(different.values())) if different else np.zeros(1, bool)
+    allowed = like.astray if within else 0.0
+    assert worlds.mean() <= allowed, f"{what}: {', '.join(different)} differs in {worlds.sum()} of {len(worlds)} worlds"
 
 
 def _of(worlds: np.ndarray, seen: Any) -> Any:
@@ -139,23 +162,23 @@ def _spaces_hold(env: Environment, seen: list[dict[str, Any]]) -> None:
         assert np.allclose(np.sum(terms, axis=0), step["reward"], atol=1e-5), f"step {k}: terms are not the reward"
 
 
-def _partial_reset(env: Environment, seed: int, actions: list[np.ndarray], within: float) -> None:
+def _partial_reset(env: Environment, seed: int, actions: list[np.ndarray], like: Likeness) -> None:
     state = env.reset(seed)
     for action in actions:
         state = env.step(state, action)
     before, mask = _host(state), np.arange(env.num_worlds) % 2 == 0
     state = env.reset(state, mask)
     after = _host(state)
-    _same(_of(~mask, before), _of(~mask, after), "worlds that were not reset")
+    _same(_of(~mask, before), _of(~mask, after), "worlds that were not reset", Likeness())
     assert (after["info"]["steps"][mask] == 0).all(), "a world that was reset does not count its steps from 0"
     assert (after["info"]["steps"][~mask] == len(actions)).all(), "a reset changed the steps of other worlds"
     for action in actions:
         state = env.step(state, action)
     alone = _play(env, seed, actions + actions)[-1]
-    _same(_of(~mask, _host(state)), _of(~mask, alone), "worlds beside others that were reset", within)
+    _same(_of(~mask, _host(state)), _of(~mask, alone), "worlds beside others that were reset", like)
 
 
-def _ends(env: Environment, seed: int, action: Float[np.ndarray, "W n"], within: float) -> None:
+def _ends(env: Environment, seed: int, action: Float[np.ndarray, "W n"], like: Likeness) -> None:
     """Short episodes: the horizon truncates, and `final_obs` is what was seen before."""
     short = env.with_horizon(SOON)
     state = short.reset(seed)
@@ -168,11 +191,11 @@ def _ends(env: Environment, seed: int, action: Float[np.ndarray, "W n"], within:
     over = last["terminated"] | last["truncated"]
     assert over.all(), "episodes do not end at the horizon"
     assert (last["truncated"] == ~last["terminated"]).all(), "the horizon terminates instead of truncating"
-    _same(last["obs"], jax.tree.map(np.array, state.info["final_obs"]), "final_obs", within)
+    _same(last["obs"], jax.tree.map(np.array, state.info["final_obs"]), "final_obs", like)
     assert (np.asarray(state.batch.world.step) == 0).all(), "autoreset did not start a new episode"
 
 
-def _bad_actions(env: Environment, seed: int, within: float) -> None:
+def _bad_actions(env: Environment, seed: int, like: Likeness) -> None:
     shape = (env.num_worlds, *env.action_space.shape)
     nan = np.zeros(shape, np.float32)
     nan[0, 0] = np.nan
@@ -180,7 +203,7 @@ def _bad_actions(env: Environment, seed: int, within: float) -> None:
     assert np.asarray(state.info["bad_actions"]).tolist() == [1] + [0] * (env.num_worlds - 1), "NaN is not counted"
     bad = _host(state)
     fine = _host(env.step(env.reset(seed), np.zeros(shape, np.float32)))
-    _same(bad["obs"], fine["obs"], "NaN in place of 0", within)
+    _same(bad["obs"], fine["obs"], "NaN in place of 0", like)
     shapes = (np.zeros(shape[1:], np.float32), np.zeros((shape[0], shape[1] + 1), np.float32))
     for wrong, what in (*((a, f"of shape {a.shape}") for a in shapes), (nan, "with NaN")):
         try:
