@@ -25,7 +25,7 @@ def point(gpu):
 
 
 def test_every_promise_is_kept(point):
-    """Natively, with a rounding's noise (1e-7 to 1e-6 m) in every step, up to 4 of 16 worlds go apart in eight steps."""
+    """Natively, with noise of a rounding (1e-7 to 1e-6 m) in every step, up to 4 of 16 worlds go apart in 8 steps."""
     api_test(point, within=1e-3, astray=0.25)
 
 

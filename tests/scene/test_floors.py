@@ -35,9 +35,10 @@ def deepened(geoms: str, body: str = "", **meshes: str) -> mujoco.MjModel:
 
 
 @pytest.fixture(autouse=True)
-def without_ceilings(monkeypatch: pytest.MonkeyPatch):
+def with_floors_alone(monkeypatch: pytest.MonkeyPatch):
     """A home differs from what its scene.xml compiles to in its floors only."""
-    monkeypatch.setattr(scenes, "add_ceiling", lambda spec, manifest: None)
+    for name in ("add_ceiling", "deepen_walls"):
+        monkeypatch.setattr(scenes, name, lambda spec, manifest: None)
 
 
 def test_a_homes_floors_are_deep_and_their_surfaces_where_they_were():

@@ -77,6 +77,12 @@ class ModelLayout:
         """V: units of objects are the first ones."""
         return int((self.unit_object >= 0).sum())
 
+    @property
+    def object_linear_dofs(self) -> Int[np.ndarray, "N 3"]:
+        """Degrees of freedom in which each free body of an object moves along the axes."""
+        first = np.concatenate([self.object_dofadr[self.object_dofadr >= 0], self.extra_dofadr])
+        return first[:, None].astype(int) + np.arange(3)
+
 
 def make_layout(model: mujoco.MjModel, tables: SceneTables) -> ModelLayout:
     """Derives the layout of a compiled scene."""

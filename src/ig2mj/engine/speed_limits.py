@@ -48,9 +48,10 @@ class SpeedLimits:
         self._limits = np.array(limits)
         self._group = group  # of each degree of freedom, from 1; 0: an agent's, without a limit
 
-    def exceeded(self, qvel: Float[np.ndarray, "nv"]) -> bool:
-        """Whether one may be; quick, and false where a speed is no number."""
-        return bool(qvel.dot(qvel) > min(TOP_LINEAR, TOP_ANGULAR) ** 2)
+    def hold(self, qvel: Float[np.ndarray, "nv"]) -> None:
+        """Limits speeds in place; quick where none can be beyond its limit. Where one is no number nothing is done."""
+        if qvel.dot(qvel) > min(TOP_LINEAR, TOP_ANGULAR) ** 2:
+            qvel[:] = self.limited(qvel)
 
     def limited(self, qvel: Float[Array, "*W nv"]) -> Float[Array, "*W nv"]:
         """Speeds within their limits, each in its direction. What is slower stays as it is, to the bit."""

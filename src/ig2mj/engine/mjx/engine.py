@@ -165,17 +165,15 @@ class MjxEngine(abc.ABC):
             forces = larger_forces(forces, *made, self.layout, self.tables, self._pyramidal)
             return (data, forces, overflow | self._overflow(data), awake), None
 
-        none = no_forces(self.tables, self.num_worlds)
-        carry = (data, none, physics.overflow, self._tree_asleep(data) < 0)
+        carry = (data, no_forces(self.tables, self.num_worlds), physics.overflow, self._tree_asleep(data) < 0)
         if self.unrolled:
             for _ in range(self.substeps):
                 carry, _ = substep(carry, None)
         else:
             carry, _ = jax.lax.scan(substep, carry, length=self.substeps)
         data, (link_force, finger_force), overflow, awake = carry
-        data = data.replace(qvel=self._speed_limits.limited(data.qvel))
         touching = self._touching(data, physics.touching, awake)
-        data = self._placed(data)
+        data = self._placed(data.replace(qvel=self._speed_limits.limited(data.qvel)))
         physics = dataclasses.replace(
             physics,
             data=data,
@@ -299,8 +297,7 @@ class MjxEngine(abc.ABC):
     def health(self, physics: MjxPhysics) -> Health:
         """What went wrong in each world; see `ig2mj.engine.health`."""
         data = physics.data
-        free = np.concatenate([self.layout.object_dofadr[self.layout.object_dofadr >= 0], self.layout.extra_dofadr])
-        velocity = data.qvel[:, free[:, None] + np.arange(3)]
+        velocity = data.qvel[:, self.layout.object_linear_dofs]
         return Health(
             overflow=physics.overflow,
             finite=jnp.isfinite(data.qpos).all(1) & jnp.isfinite(data.qvel).all(1),

@@ -198,8 +198,7 @@ class NativeEngine:
             own_fields=check_names(model_fields),
             substeps=substeps,
         )
-        free = np.concatenate([self.layout.object_dofadr[self.layout.object_dofadr >= 0], self.layout.extra_dofadr])
-        self._free_dofs = free[:, None].astype(int) + np.arange(3)
+        self._free_dofs = self.layout.object_linear_dofs
         self._masks = [Masks(self._statics.vicinity, slot.model) for slot in self._slots]
         self._shares = np.array_split(np.arange(num_worlds), self.threads)
         self._pool = ThreadPoolExecutor(self.threads, "ig2mj-native") if self.threads > 1 else None

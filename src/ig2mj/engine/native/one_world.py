@@ -34,8 +34,7 @@ class Statics:
 
     Attributes:
       later: plan of the fields that are made later. has_agents: there is one.
-      layers: the contact filter.
-      forces: what forces of contacts are of interest.
+      layers: the contact filter. forces: what forces of contacts are of interest.
       own_fields: fields of the model that each world has for itself besides eq_data.
       See `ig2mj.engine.layout`, `ig2mj.engine.native.view_rows` and `ig2mj.engine.native.vicinity` for the rest.
     """
@@ -141,8 +140,7 @@ class World:
             mujoco.mj_step(model, data)
             if steps:
                 steps.append(self._collect())
-        if statics.speed_limits.exceeded(data.qvel):
-            data.qvel[:] = statics.speed_limits.limited(data.qvel)
+        statics.speed_limits.hold(data.qvel)
         self._near.moved()
         self._let_near()
         mujoco.mj_step1(model, data)
