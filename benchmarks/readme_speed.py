@@ -57,7 +57,7 @@ def _one_gpu() -> list[tuple[str, str]]:
     peers = [json.loads(line) for line in (RESULTS / "peers" / "rows.jsonl").read_text().splitlines()]
     ours = {(row["scene"], row["worlds"], row["what"]): row for row in peers if row["engine"] == "ig2mj"}
     alone = {(scene, worlds, what): _scaling(case, 1) for case, (scene, worlds, what) in SCALING.items()}
-    known = {**measured, **ours, **alone}  # the newer ones last
+    known = {**ours, **measured, **alone}  # the newer ones last
 
     def speed(scene: str, worlds: int, what: str = "full") -> str:
         return _thousands(known[scene, worlds, what]["control_steps_per_s"])
