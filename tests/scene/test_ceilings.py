@@ -5,9 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
+import solid_homes
 
-import ig2mj
-import ig2mj.scene.scene as scenes
 from ig2mj.sampling.probe import cast_rays
 from ig2mj.scene.ceilings import CEILING, CLEARANCE, add_ceiling
 from ig2mj.scene.floors import DEPTH, TIME_CONSTANT
@@ -70,11 +69,7 @@ def test_it_is_raised_over_what_can_move_and_is_higher_than_the_walls(place, und
 
 @pytest.fixture(scope="module")
 def with_and_without() -> tuple[Scene, Scene]:
-    """The small home with a bowl, as it comes, and without its ceiling."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scenes, "add_ceiling", lambda spec, manifest: None)
-        without = ig2mj.load_scene("small_home", objects=["bowl"])
-    return ig2mj.load_scene("small_home", objects=["bowl"]), without
+    return solid_homes.with_and_without("add_ceiling")
 
 
 def test_a_bowl_thrown_up_comes_back_and_without_the_ceiling_does_not(with_and_without):

@@ -5,9 +5,8 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 import pytest
+import solid_homes
 
-import ig2mj
-import ig2mj.scene.scene as scenes
 from ig2mj.sampling.probe import cast_rays
 from ig2mj.scene.floors import DEPTH, TIME_CONSTANT
 from ig2mj.scene.manifest import FORMAT_VERSION, JointEntry, Manifest, ObjectEntry
@@ -113,6 +112,19 @@ def test_no_pane_is_where_a_sash_opens_to_the_outside(way, closed):
     assert len(boxes_of(spec.compile(), PANES)) == closed
 
 
+@pytest.mark.parametrize(("y", "fixed", "side"), [(2.6, False, 2.2), (2.6, True, 3.2), (3.6, False, 3.2)])
+def test_a_wall_is_as_it_was_where_something_loose_stands_outside(y, fixed, side):
+    bin_ = ObjectEntry("bin", "trash_can", "made", ["bin"], fixed, (0.4, 0.4, 0.4), 1.0)
+    walls, floors = (ObjectEntry(n, n, "made", [n], True, (1, 1, 1), 1.0) for n in ("walls", "floors"))
+    outer = wall(2, 0.1, 1.25, "0 2.1 1.25")
+    spec = mujoco.MjSpec.from_string(
+        f'<mujoco><worldbody><body name="walls">{outer}</body><body name="floors">{FLOOR}</body>'
+        f'<body name="bin" pos="0 {y} 0.2"/></worldbody></mujoco>'
+    )
+    deepen_walls(spec, Manifest(FORMAT_VERSION, "made", [walls, floors, bin_]))
+    assert boxes_of(spec.compile(), "walls") == [[[-2, 2, 0], [2, side, 2.5]]]
+
+
 @pytest.mark.parametrize("deep", [True, False])
 def test_what_is_thrown_out_of_a_window_stays_only_where_it_has_a_pane(deep):
     spec = mujoco.MjSpec.from_string(
@@ -132,11 +144,7 @@ def test_what_is_thrown_out_of_a_window_stays_only_where_it_has_a_pane(deep):
 
 @pytest.fixture(scope="module")
 def with_and_without() -> tuple[Scene, Scene]:
-    """The small home with a bowl, as it comes, and with thin walls."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(scenes, "deepen_walls", lambda spec, manifest: None)
-        without = ig2mj.load_scene("small_home", objects=["bowl"])
-    return ig2mj.load_scene("small_home", objects=["bowl"]), without
+    return solid_homes.with_and_without("deepen_walls")
 
 
 def test_tables_do_not_know_of_it(with_and_without):

@@ -1,22 +1,20 @@
 """The solid ceiling of a home: one box over its walls that nobody sees, so that nothing flies out over them.
 
-Homes are converted with ceilings that everything passes. This one belongs to the compiled model only: it is no object,
-so tables, predicates and maps do not know it, and it is transparent in the group of what collides, so that neither
-pictures nor rays, which leave out what is transparent, meet it. `benchmarks/throws.py`.
+Homes are converted with ceilings that everything passes. This one belongs to the compiled model only
+(`scene/unseen.py`). `benchmarks/throws.py`.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
 
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from ig2mj.scene.floors import DEPTH, TIME_CONSTANT, building_parts, rotation_of
-from ig2mj.scene.geom_groups import COLLISION_GROUP
-from ig2mj.scene.manifest import Manifest
+from ig2mj.scene.floors import DEPTH, building_parts, rotation_of
+from ig2mj.scene.manifest import Manifest, ObjectEntry
+from ig2mj.scene.unseen import add_unseen
 
 CEILING = "solid_ceiling"
 """Name of its body."""
@@ -47,33 +45,20 @@ def add_ceiling(spec: mujoco.MjSpec, manifest: Manifest) -> None:
     floors = [part.corners[:, :2] for part in building_parts(spec, manifest, "floors") if len(part.corners)]
     if not any(_meet(low, high, *2 * ((floor.min(0) + floor.max(0)) / 2,)) for floor in floors):
         return
-    for corners in _corners_of_movable(spec, manifest):
+    movable = [entry for entry in manifest.objects if entry.joints or not entry.fixed]
+    for corners in (corners_of(spec, entry) for entry in movable):
         if _meet(low, high, corners.min(0)[:2], corners.max(0)[:2]):
             top = max(top, corners[:, 2].max() + CLEARANCE)
-    wall = walls[0].geom
-    spec.worldbody.add_body(name=CEILING).add_geom(
-        name=f"{CEILING}/collision_0",
-        type=mujoco.mjtGeom.mjGEOM_BOX,
-        pos=[*(low + high) / 2, top + DEPTH / 2],
-        size=[*(high - low) / 2, DEPTH / 2],
-        group=COLLISION_GROUP,
-        rgba=[0.0, 0.0, 0.0, 0.0],
-        mass=0.0,
-        friction=wall.friction,
-        gap=wall.gap,
-        margin=wall.margin,
-        solref=[TIME_CONSTANT, 1.0],
-    )
+    box = np.array([[*low, top], [*high, top + DEPTH]])
+    add_unseen(spec, CEILING, [box], walls[0].geom)
 
 
-def _corners_of_movable(spec: mujoco.MjSpec, manifest: Manifest) -> Iterator[Float[np.ndarray, "8 3"]]:
-    """Corners of the boxes of objects that are free or have joints, where the scene has them, world frame."""
+def corners_of(spec: mujoco.MjSpec, entry: ObjectEntry) -> Float[np.ndarray, "8 3"]:
+    """Corners of an object's box where the scene has it, world frame."""
     signs = np.array(list(itertools.product((-0.5, 0.5), repeat=3)))
-    for entry in manifest.objects:
-        if entry.joints or not entry.fixed:
-            body = spec.body(entry.bodies[0])
-            local = entry.base_link_offset + signs * entry.bounding_box
-            yield local @ rotation_of(body.quat).T + body.pos
+    body = spec.body(entry.bodies[0])
+    local = entry.base_link_offset + signs * entry.bounding_box
+    return local @ rotation_of(body.quat).T + body.pos
 
 
 def _meet(low: np.ndarray, high: np.ndarray, other_low: np.ndarray, other_high: np.ndarray) -> bool:

@@ -104,9 +104,7 @@ class Scene:
             spec = _spec_from_text(add_objects(file, own, [a.wanted for a in self.additions])[0], file)
         else:
             spec = read_spec(file)
-        deepen_floors(spec, self.manifest)
-        add_ceiling(spec, self.manifest)
-        deepen_walls(spec, self.manifest)
+        _make_solid(spec, self.manifest)
         _attach_all(self.agents, spec, self.manifest)
         return spec
 
@@ -120,6 +118,13 @@ class Scene:
 
     def __repr__(self) -> str:
         return f"Scene('{self.name}', {len(self.object_names)} objects, {self.folder})"
+
+
+def _make_solid(spec: mujoco.MjSpec, manifest: Manifest) -> None:
+    """What only physics knows of a building. The ceiling lies on walls as thin as they are drawn."""
+    deepen_floors(spec, manifest)
+    add_ceiling(spec, manifest)
+    deepen_walls(spec, manifest)
 
 
 def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: Sequence[str] = ()) -> Scene:
@@ -145,9 +150,7 @@ def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: S
         spec = _spec_from_text(text, file)
     else:
         spec = read_spec(file)
-    deepen_floors(spec, manifest)
-    add_ceiling(spec, manifest)
-    deepen_walls(spec, manifest)
+    _make_solid(spec, manifest)
     if agents:
         manifest = copy.copy(manifest)
         manifest.agents = [*manifest.agents, *_attach_all(agents, spec, manifest)]

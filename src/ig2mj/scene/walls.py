@@ -14,15 +14,16 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from ig2mj.scene.ceilings import corners_of
 from ig2mj.scene.floors import DEPTH, LEVEL, TIME_CONSTANT, BuildingPart, building_parts, rotation_of
-from ig2mj.scene.geom_groups import COLLISION_GROUP
 from ig2mj.scene.manifest import Manifest, ObjectEntry
+from ig2mj.scene.unseen import add_unseen
 
 THIN = 0.5
 """Metres: walls are no thicker. A box that is thicker both ways is a pillar."""
 
 PANES = "solid_panes"
-"""Name of their body. As with the solid ceiling, tables, predicates, maps, pictures and rays do not know it."""
+"""Name of their body."""
 
 Box = Float[np.ndarray, "2 3"]
 
@@ -30,18 +31,19 @@ Box = Float[np.ndarray, "2 3"]
 def deepen_walls(spec: mujoco.MjSpec, manifest: Manifest) -> None:
     """Gives outer walls `DEPTH` and `TIME_CONSTANT`, in a scene that is not compiled yet; for boxes along x and y.
 
-    A wall is made deeper on a side where no floor begins within `DEPTH`. Its other side stays where it is, and so does
-    what only draws it. Between two walls of which one stands over the other and that were made deeper to the same side,
-    at a window, a pane closes that depth, unless a sash opens to the outside.
+    A wall is made deeper on a side where within `DEPTH` no floor begins and nothing loose stands. Its other side stays
+    where it is, and so does what only draws it. Between two walls of which one stands over the other and that were made
+    deeper to the same side, at a window, a pane closes that depth, unless a sash opens to the outside.
     """
-    parts = [part for part in building_parts(spec, manifest, "floors") if len(part.corners)]
-    floors = [np.array([part.corners.min(0), part.corners.max(0)]) for part in parts]
+    floors = [part.corners for part in building_parts(spec, manifest, "floors") if len(part.corners)]
     if not floors:
         return
+    loose = [corners_of(spec, entry) for entry in manifest.objects if not entry.fixed]
+    kept_free = [np.array([corners.min(0), corners.max(0)]) for corners in (*floors, *loose)]
     added: dict[tuple[int, int], list[Box]] = {}
     pattern = None
     for part in list(building_parts(spec, manifest, "walls")):
-        box = _deepened(part, floors, added)
+        box = _deepened(part, kept_free, added)
         if box is not None:
             pattern = part.geom
             _resize(part, box)
@@ -52,10 +54,10 @@ def deepen_walls(spec: mujoco.MjSpec, manifest: Manifest) -> None:
         if not any(_opens_into(spec, entry, pane, axis, side) for entry in manifest.objects if entry.joints)
     ]
     if pattern is not None and panes:
-        _add_panes(spec, pattern, panes)
+        add_unseen(spec, PANES, panes, pattern)
 
 
-def _deepened(part: BuildingPart, floors: list[Box], added: dict[tuple[int, int], list[Box]]) -> Box | None:
+def _deepened(part: BuildingPart, kept_free: list[Box], added: dict[tuple[int, int], list[Box]]) -> Box | None:
     """The wall as it is to be; None: as it is. What it is deeper by is added by axis and side."""
     aligned = np.allclose(np.abs(part.turn).max(0), 1.0, atol=LEVEL)
     if part.geom.type != mujoco.mjtGeom.mjGEOM_BOX or not len(part.corners) or not aligned:
@@ -68,15 +70,15 @@ def _deepened(part: BuildingPart, floors: list[Box], added: dict[tuple[int, int]
             beyond = part.corners.copy()
             beyond[1 - side, axis] = box[side, axis]
             beyond[side, axis] += DEPTH if side else -DEPTH
-            if not any(_overlap(beyond, floor) for floor in floors):
+            if not any(_overlap(beyond, other) for other in kept_free):
                 added.setdefault((axis, side), []).append(beyond)
                 box[side, axis] = beyond[side, axis]
     return box if (box != part.corners).any() else None
 
 
-def _overlap(box: Box, floor: Box) -> bool:
+def _overlap(box: Box, other: Box) -> bool:
     """Whether two boxes do, seen from above."""
-    return bool((np.minimum(box[1], floor[1]) - np.maximum(box[0], floor[0]) > LEVEL)[:2].all())
+    return bool((np.minimum(box[1], other[1]) - np.maximum(box[0], other[0]) > LEVEL)[:2].all())
 
 
 def _resize(part: BuildingPart, box: Box) -> None:
@@ -129,21 +131,3 @@ def _frame_of(body: mujoco.MjsBody) -> tuple[Float[np.ndarray, "3 3"], Float[np.
         turn = rotation_of(body.quat)
         frame, at = turn @ frame, body.pos + turn @ at
     return frame, at
-
-
-def _add_panes(spec: mujoco.MjSpec, wall: mujoco.MjsGeom, panes: list[Box]) -> None:
-    body = spec.worldbody.add_body(name=PANES)
-    for number, pane in enumerate(panes):
-        body.add_geom(
-            name=f"{PANES}/collision_{number}",
-            type=mujoco.mjtGeom.mjGEOM_BOX,
-            pos=pane.mean(0),
-            size=(pane[1] - pane[0]) / 2,
-            group=COLLISION_GROUP,
-            rgba=[0.0, 0.0, 0.0, 0.0],
-            mass=0.0,
-            friction=wall.friction,
-            gap=wall.gap,
-            margin=wall.margin,
-            solref=[TIME_CONSTANT, 1.0],
-        )
