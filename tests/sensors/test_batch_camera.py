@@ -17,6 +17,7 @@ from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.sensors.batch_camera import BatchCamera
+from ig2mj.sensors.images import RayPattern
 from ig2mj.sensors.particle_slots import fill_slots
 from ig2mj.sensors.render_model import make_render_model
 from ig2mj.sensors.tints import TINTS, UNTINTED, tinted, tints, tints_of_geoms
@@ -190,6 +191,41 @@ def test_programs_on_a_second_device_see_the_same(scene, model):
             now = jax.device_put(physics, device)
             seen.append(np.asarray(jax.jit(lambda now: camera(now, engine.view(now), states).rgb)(now)))
     np.testing.assert_array_equal(seen[0], seen[1])
+
+
+@pytest.mark.slow
+def test_a_world_that_is_not_drawn_sees_nothing_and_the_other_what_it_saw(engine, model, physics, scene):
+    rays = RayPattern("around", np.eye(3)[:2], 0.05, 10.0)
+    options = {"width": WIDTH, "height": HEIGHT, "depth": True, "segmentation": True, "rays": [rays]}
+    camera = BatchCamera(engine, model, ["front", "hand/eye"], **options)
+    call, view, states = jax.jit(camera.__call__), engine.view(physics), initial_states(model, 2)
+    above = np.tile(np.array([0, 0, TOP + 0.5], np.float32), (2, 1)), np.tile(np.eye(4, dtype=np.float32)[0], (2, 1))
+    eyes = {"around": above}
+    whole = call(physics, view, states, eyes, np.ones(2, bool))
+    half = call(physics, view, states, eyes, np.array([False, True]))
+    as_before = call(physics, view, states, eyes)
+    for name in ("rgb", "depth", "geom"):
+        pictures, seen = getattr(half, name), getattr(as_before, name)
+        np.testing.assert_array_equal(getattr(whole, name), seen)
+        np.testing.assert_array_equal(pictures[1], seen[1])
+    assert (np.asarray(as_before.geom[0]) >= 0).any(), "there is something to be seen"
+    assert (np.asarray(half.geom[0]) < 0).all() and not np.asarray(half.depth[0]).any()
+    assert np.isinf(half.rays["around"][0]).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rows", [(8, 32), (5, 28)], ids=["of whole tiles", "of any"])
+def test_rows_are_those_of_the_whole_picture(engine, model, physics, rows):
+    options = {"width": WIDTH, "height": HEIGHT, "depth": True, "segmentation": True, "particles": 0}
+    view, states = engine.view(physics), initial_states(model, 2)
+    cameras = ["front", "hand/eye"]
+    whole = jax.jit(BatchCamera(engine, model, cameras, **options).__call__)(physics, view, states)
+    part = jax.jit(BatchCamera(engine, model, cameras, rows=rows, **options).__call__)(physics, view, states)
+    for name, nothing in (("rgb", 0), ("depth", 0), ("segmentation", -1), ("geom", -1)):
+        expected, seen = np.array(getattr(whole, name)), np.asarray(getattr(part, name))
+        assert (expected[:, :, slice(*rows)] != nothing).any(), "there is something to be seen"
+        expected[:, :, : rows[0]] = expected[:, :, rows[1] :] = nothing
+        np.testing.assert_array_equal(seen, expected, err_msg=name)
 
 
 @pytest.mark.slow

@@ -61,6 +61,28 @@ def test_depth_and_instances_are_those_of_mujocos_rays(world):
         assert [names[int(c)] for c in classes] == [category if category in names.values() else "other"]
 
 
+def test_only_worlds_that_matter_are_drawn(world):
+    """After a reset of some worlds, those that go on keep their pictures."""
+    suite = world.suite("rgb", "depth", **SIZE)
+    given = world.physics, world.engine.view(world.physics), world.states, world.state
+    whole, _ = suite.look_fn(*given)
+    half, _ = suite.look_fn(*given, drawn=np.array([False, True]))
+    for name in ("rgb", "depth"):
+        assert np.asarray(whole[name][0]).any() and not np.asarray(half[name][0]).any()
+        np.testing.assert_array_equal(half[name][1], whole[name][1])
+
+
+def test_rows_that_nobody_looks_at_show_nothing(world):
+    names = ("rgb", "depth", "ins_seg")
+    whole, part = world.see(*names, **SIZE), world.see(*names, **SIZE, rows=(6, 20))
+    for name in names:
+        assert whole[name][:, 20:].any()
+        np.testing.assert_array_equal(part[name][:, 6:20], whole[name][:, 6:20])
+        assert not part[name][:, :6].any() and not part[name][:, 20:].any()
+    with pytest.raises(EngineError, match="there are none"):
+        world.see("rgb", **SIZE, rows=(10, 25))
+
+
 def test_hands_before_the_eye_are_not_cut_off(world):
     """MuJoCo's near plane grows with the scene; the sensors' is at 1 cm."""
     seen = world.see("ins_seg", "depth", **SIZE)

@@ -14,6 +14,9 @@ WORLDS = {"native": 32}
 
 PURE_WORLDS = 2048
 
+SIDE = 128
+"""Pixels, height and width of a camera's pictures."""
+
 
 def run(
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")],
@@ -104,6 +107,7 @@ def run(
     from ig2mj.learn.projection import lens_of
     from ig2mj.learn.shipped import find_policy
     from ig2mj.learn.train import Run, train
+    from ig2mj.sensors.base import SensorOptions
 
     _check(algo, obs, minutes, videos, until, pixels, programs, devices, demos, expert, out)
     if begin_with is not None and algo != "dagger":
@@ -137,6 +141,7 @@ def run(
                 paper_rl=paper_rl,
                 pool_size=pool_size or None,
                 mixed=mixed,
+                sensors=SensorOptions(rows=drawn_rows(kept_rows, pixels)),
             )
         lens = lens_of(world, pixels, kept_rows) if obs == "rgbd" else None
         names = world.privileged_names, lens, world.proprioception_names
@@ -222,8 +227,8 @@ def _check(
         raise Ig2mjError(f"--minutes {minutes}, --videos {videos}: finite, more than 0, and 0 or more")
     if until is not None and not 0 < until <= 1:
         raise Ig2mjError(f"--until {until}: a share is more than 0 and at most 1")
-    if pixels < 1 or 128 % pixels:
-        raise Ig2mjError(f"--pixels {pixels}: a divisor of 128 is needed")
+    if pixels < 1 or SIDE % pixels:
+        raise Ig2mjError(f"--pixels {pixels}: a divisor of {SIDE} is needed")
     if programs not in (1, 2):
         raise Ig2mjError(f"--programs {programs}: 1 or 2 are possible")
     if devices != "all" and not (devices.isdigit() and int(devices)):
@@ -247,6 +252,14 @@ def rows_of(words: str | None, pixels: int) -> tuple[int, int] | None:
     if not (top.isdigit() and bottom.isdigit() and int(top) < int(bottom) <= pixels):
         raise Ig2mjError(f"--rows {words}: two numbers such as 80:128, of at most {pixels} rows (--pixels)")
     return int(top), int(bottom)
+
+
+def drawn_rows(rows: tuple[int, int] | None, pixels: int) -> tuple[int, int] | None:
+    """The rows of a camera's picture that are averaged down to these `rows_of`."""
+    if rows is None:
+        return None
+    side = SIDE // pixels
+    return rows[0] * side, rows[1] * side
 
 
 def _devices(wanted: str, processes: int) -> list[Any]:

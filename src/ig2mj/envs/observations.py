@@ -98,9 +98,13 @@ class Observer:
         if begun is not None:
             memory = chosen(begun, self._sensors.memory(world.view, controller_state), memory)
         keys = self._keys(world.key, world.step) if self._sensors.noisy else None
-        found, memory = self._sensors.look_fn(world.physics, world.view, world.states, controller_state, memory, keys)
-        if begun is not None and last is not None:
-            found = chosen(begun, found, {name: last[0][name] for name in found})
+        before = None if begun is None or last is None else last[0]
+        drawn = None if before is None else begun
+        found, memory = self._sensors.look_fn(
+            world.physics, world.view, world.states, controller_state, memory, keys, drawn
+        )
+        if begun is not None and before is not None:
+            found = chosen(begun, found, {name: before[name] for name in found})
         return found, memory
 
 

@@ -70,7 +70,11 @@ class OneDevice:
     """A rollout and what is learned from it: one program on a pure engine, else the parts in turn."""
 
     def __init__(self, env: TrainingEnv, algorithm: Algorithm, programs: int = 1):
-        """`programs`: 1 or 2, on a pure engine; with 2 the simulator's time is known."""
+        """`programs`: 1 or 2, on a pure engine; with 2 the simulator's time is known.
+
+        Where there are two, or the engine is not pure, they are `play` (learner, play, key -> play, rollout, sums,
+        seconds) and `learn` (learner, memory, rollout, key, progress, ready -> learner, memory, losses).
+        """
         self._env, self._algorithm, self.num_worlds = env, algorithm, env.num_worlds
         self._whole = None
         if env.pure and programs == 1:
@@ -95,7 +99,7 @@ class OneDevice:
                 env, algorithm.perception, algorithm.act, algorithm.hint, learner, play, key, algorithm.length
             )
 
-        self._learn = jax.jit(learn, donate_argnums=(0, 1))
+        self.learn = jax.jit(learn, donate_argnums=(0, 1))
         if env.pure:
             program = jax.jit(collect, donate_argnums=1)
 
@@ -104,10 +108,10 @@ class OneDevice:
                 found = jax.block_until_ready(program(learner, play, key))
                 return *found, time.perf_counter() - began
 
-            self._collect = timed
+            self.play: Callable[..., tuple[Play, Any, dict[str, Any], float]] = timed
         else:
             native = NativeCollector(env, algorithm.perception, algorithm.act, algorithm.hint)
-            self._collect = lambda learner, play, key: native(learner, play, key, algorithm.length)
+            self.play = lambda learner, play, key: native(learner, play, key, algorithm.length)
 
     def memory(self) -> Any:
         """What belongs to the worlds, at first."""
@@ -131,8 +135,8 @@ class OneDevice:
             spent = None
         else:
             play_key, learn_key = jax.random.split(key)
-            play, rollout, sums, spent = self._collect(learner, play, play_key)
-            learner, memory, losses = self._learn(learner, memory, rollout, learn_key, share, go)
+            play, rollout, sums, spent = self.play(learner, play, play_key)
+            learner, memory, losses = self.learn(learner, memory, rollout, learn_key, share, go)
         sums, losses = jax.device_get((sums, losses))
         return learner, memory, play, floats(sums), {**floats(losses), "clock": clock}, spent
 

@@ -47,6 +47,8 @@ class SensorOptions:
       lidar_beams: of the lidar, from 15 degrees below its horizon to 15 above. lidar_columns: rays of a beam in a
         quarter turn. lidar_near, lidar_far: m, its range; nearer is the robot's own head.
       particles: the most particles of dust, stains and water that a picture shows.
+      rows: of all pictures the first row that is made and the first below those; the others are as if nothing were
+        there. For those who look at no others: on a GPU they cost nothing then. None: all.
       shadows: whether pictures have them; they cost six times the rest natively, twice on a GPU.
     """
 
@@ -69,6 +71,7 @@ class SensorOptions:
     lidar_far: float | int = 100.0
     particles: int = 64
     shadows: bool = False
+    rows: tuple[int, int] | None = None
 
     def __post_init__(self) -> None:
         """Raises EngineError where a setting is out of range."""

@@ -20,7 +20,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import warp as wp
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 
 from ig2mj.engine.base import Engine
@@ -34,7 +34,7 @@ from ig2mj.scene.geom_groups import VISIBLE_GROUPS
 from ig2mj.sensors.images import NOTHING, Images, Pose, RayPattern, check_request
 from ig2mj.sensors.merged_meshes import HIDDEN, Tables, alpha, mergeable, rigid_parts, tables_of
 from ig2mj.sensors.particle_slots import Slots, fill_slots
-from ig2mj.sensors.ray_cameras import sectors_of, set_rays
+from ig2mj.sensors.ray_cameras import sectors_of, set_rays, set_rows
 from ig2mj.sensors.render_model import BACKGROUND, make_render_model, mean_colours
 from ig2mj.sensors.texture_filter import fit_textures
 from ig2mj.sensors.tints import UNTINTED, tinted, tints, tints_of_geoms
@@ -43,6 +43,9 @@ from ig2mj.states.world import ExtendedStates
 
 TILE = 8
 """Pixels a side of what a block of 64 threads sees: a third faster than rows of 64 pixels."""
+
+ABOVE, UPWARDS = (0.0, 0.0, 1e5), (0.0, 1.0, 0.0, 0.0)
+"""m and w-x-y-z: from where, and how turned, a camera sees nothing at all, so that its rays end before they begin."""
 
 _KEPT: weakref.WeakKeyDictionary[Engine, list[Any]] = weakref.WeakKeyDictionary()
 """What the ray caster keeps, for as long as the engine whose worlds it sees: a compiled program that outlives its
@@ -70,6 +73,7 @@ class BatchCamera:
         cull_backfaces: bool = False,
         rays: Sequence[RayPattern] = (),
         merge_meshes: bool = True,
+        rows: tuple[int, int] | None = None,
     ):
         """Compiles the render model.
 
@@ -87,16 +91,20 @@ class BatchCamera:
           merge_meshes: cast rays against one mesh for all that never moves and one for each rigid part that does
             (`ig2mj.sensors.merged_meshes`; a quarter less time); what is invisible in the compiled scene then is in
             every world. Scenes with flexes or height fields are not merged.
+          rows: of each picture the first that is made and the first below those; the others are as if nothing were
+            there, and cost nothing. None: all.
 
         Raises:
           EngineError: not the Warp engine, or nothing is to be made. UnknownNameError: no such camera.
         """
         if not isinstance(engine, MjxEngine) or engine.name != "warp":
             raise EngineError(f"the {engine.name} engine has no batched cameras (take the warp engine)")
-        check_request(cameras, rays, (rgb, depth, segmentation), width, height)
+        check_request(cameras, rays, (rgb, depth, segmentation), width, height, rows)
         self.engine, self.model = engine, model
         self.width, self.height, self.slots = width, height, particles
-        self._wants = (rgb, depth, segmentation)
+        self._wants, self._shown = (rgb, depth, segmentation), rows or (0, height)
+        # lines of rays; where kernels are not those that we know all are cast
+        self._lines = height if pins.mismatches() else self._shown[1] - self._shown[0]
         self._sectors = sectors_of(rays)
         self._patterns = {pattern.name: len(pattern.directions) for pattern in rays}
         self._host = host = make_render_model(engine.scene, particles, [s.camera for s in self._sectors])
@@ -111,7 +119,7 @@ class BatchCamera:
         self._template = mjx.put_data(host, data, own_device(), impl="warp", naconmax=1, naccdmax=1, njmax=1)
         self._settings: dict[str, Any] = dict(
             nworld=engine.num_worlds,
-            cam_res=[(width, height)] * len(cameras) + [(len(s.rays), 1) for s in self._sectors],
+            cam_res=[(width, self._lines)] * len(cameras) + [(len(s.rays), 1) for s in self._sectors],
             render_rgb=self._for_each(rgb, False),
             render_depth=self._for_each(depth, True),
             render_seg=self._for_each(segmentation, False),
@@ -139,8 +147,10 @@ class BatchCamera:
         """What the ray caster keeps, on each device. What compiled programs know of stays as long as the engine."""
         self._context = mjx.create_render_context(self._host, devices=self._served, **self._settings)
         _KEPT.setdefault(self.engine, []).append(self._context)
+        if self._lines < self.height:
+            set_rows(self._context, self._host, self.cameras, (self.width, self.height), self._shown)
         if self._sectors:  # before the kernel is built: whether rays are displaced is compiled into it
-            set_rays(self._context, self._sectors, len(self.cameras) * self.width * self.height)
+            set_rays(self._context, self._sectors, self._pixels)
         contexts = list(self._context._contexts.values())
         if self._merged is not None:
             from ig2mj.sensors.ray_caster import use_merged
@@ -176,18 +186,20 @@ class BatchCamera:
         view: PhysicsView,
         states: ExtendedStates,
         eyes: Mapping[str, Pose] | None = None,
+        drawn: Bool[Array, "W"] | None = None,
     ) -> Images:
         """Pictures of the present state of every world. Pure: to be jitted, alone or with a step.
 
         Args:
           eyes: poses in the world of cameras that do not ride on their bodies, by name: what `Controller.eye` of an
             agent gives that moves its eye without joints. Poses of all ray patterns, by their names.
+          drawn: the worlds that matter; None: all. See `images.Camera`.
 
         Raises:
           UnknownNameError: there is no such camera.
         """
         slots = fill_slots(self.model, states, view, self.slots)
-        moved = self._moved(physics, slots, eyes or {})
+        moved = self._moved(physics, slots, eyes or {}, drawn)
         look = self._look(physics, states, slots)
 
         def cast(data: Any, look: dict[str, Array]) -> tuple[Array, Array, Array]:
@@ -204,16 +216,16 @@ class BatchCamera:
         return Images(
             rgb=_unpack(self._rows(packed)) if self._wants[0] else None,
             depth=self._rows(depth[:, :pixels]) if self._wants[1] else None,
-            segmentation=self._rows(self._objects(geom, slots)) if self._wants[2] else None,
-            geom=self._rows(geom) if self._wants[2] else None,
+            segmentation=self._rows(self._objects(geom, slots), NOTHING) if self._wants[2] else None,
+            geom=self._rows(geom, NOTHING) if self._wants[2] else None,
             slots=slots,
             rays=self._distances(depth[:, pixels:]),
         )
 
     @property
     def _pixels(self) -> int:
-        """Of all pictures of a world."""
-        return len(self.cameras) * self.width * self.height
+        """Of all pictures of a world, as far as they are made."""
+        return len(self.cameras) * self.width * self._lines
 
     def _for_each(self, of_pictures: bool, of_rays: bool) -> list[bool]:
         return [of_pictures] * len(self.cameras) + [of_rays] * len(self._sectors)
@@ -231,10 +243,10 @@ class BatchCamera:
 
     def _order_rays(self) -> bool:
         """Lets each block of threads cast the rays of a tile, which meet the same geoms; says whether it can."""
-        contexts, pixels = list(self._context._contexts.values()), self.height * self.width
-        if self.height % TILE or self.width % TILE:
+        contexts, pixels = list(self._context._contexts.values()), self._lines * self.width
+        if self._lines % TILE or self.width % TILE:
             return False
-        tiles = np.arange(pixels).reshape(self.height // TILE, TILE, self.width // TILE, TILE).swapaxes(1, 2).ravel()
+        tiles = np.arange(pixels).reshape(self._lines // TILE, TILE, self.width // TILE, TILE).swapaxes(1, 2).ravel()
         order = (np.arange(len(self.cameras))[:, None] * pixels + tiles).ravel()
         for context in contexts:
             for rays in (context.ray, context.ray_offset):
@@ -243,18 +255,20 @@ class BatchCamera:
                     rays.assign(np.concatenate([old[order], old[len(order) :]]))
         return True
 
-    def _rows(self, pixels: Array) -> Array:
-        """Pictures [W, C, Y, X] of what the rays saw, in the order in which they are cast."""
+    def _rows(self, pixels: Array, nothing: int = 0) -> Array:
+        """Pictures [W, C, Y, X] of what the rays saw, in the order in which they are cast. `nothing`: in other rows."""
         shape = (self.engine.num_worlds, len(self.cameras))
-        if not self._tiled:
-            return pixels.reshape(*shape, self.height, self.width)
-        tiles = pixels.reshape(*shape, self.height // TILE, self.width // TILE, TILE, TILE)
-        return tiles.swapaxes(3, 4).reshape(*shape, self.height, self.width)
+        if self._tiled:
+            pixels = pixels.reshape(*shape, self._lines // TILE, self.width // TILE, TILE, TILE).swapaxes(3, 4)
+        seen, (top, bottom) = pixels.reshape(*shape, self._lines, self.width), self._shown
+        if self._lines == self.height:
+            seen = seen[:, :, top:bottom]
+        return jnp.pad(seen, ((0, 0), (0, 0), (top, self.height - bottom), (0, 0)), constant_values=nothing)
 
     def _check_addresses(self) -> None:
         """Pictures, and then rays, lie one after the other in the ray caster's buffers."""
         context = self._context
-        sizes = np.array([self.width * self.height] * len(self.cameras) + [len(s.rays) for s in self._sectors])
+        sizes = np.array([self.width * self._lines] * len(self.cameras) + [len(s.rays) for s in self._sectors])
         made = [np.array(self._for_each(w, r)) for w, r in zip(self._wants, (False, True, False), strict=True)]
         for address, which in zip((context.rgb_adr, context.depth_adr, context.seg_adr), made, strict=True):
             expected = np.cumsum(np.where(which, sizes, 0)) - sizes
@@ -270,8 +284,10 @@ class BatchCamera:
         self._camera_in_body = (host.cam_bodyid, _f32(host.cam_pos), _f32(host.cam_quat))
         self._light_in_body = (host.light_bodyid, _f32(host.light_pos), _f32(host.light_dir))
 
-    def _moved(self, physics: MjxPhysics, slots: Slots, eyes: Mapping[str, Pose]) -> Any:
-        """Render data [W] with everything where physics has it."""
+    def _moved(
+        self, physics: MjxPhysics, slots: Slots, eyes: Mapping[str, Pose], drawn: Bool[Array, "W"] | None
+    ) -> Any:
+        """Render data [W] with everything where physics has it, and cameras out of the way where nothing is drawn."""
         data, worlds = physics.data, self.engine.num_worlds
         body, pos, quat = self._camera_in_body
         own = physics.fields
@@ -283,6 +299,10 @@ class BatchCamera:
         for name, (eye_pos, eye_quat) in {**of_cameras, **of_sectors}.items():
             camera = _camera_id(self._host, name)
             camera_pos, camera_quat = camera_pos.at[:, camera].set(eye_pos), camera_quat.at[:, camera].set(eye_quat)
+        if drawn is not None:
+            there = jnp.asarray(drawn)[:, None, None]
+            camera_pos = jnp.where(there, camera_pos, jnp.asarray(ABOVE))
+            camera_quat = jnp.where(there, camera_quat, jnp.asarray(UPWARDS))
         body, pos, direction = self._light_in_body
         light_quat = data.xquat[:, body]
         light_pos = data.xpos[:, body] + quat_rotate(light_quat, jnp.asarray(pos))

@@ -11,7 +11,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from flax import struct
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
@@ -66,15 +66,28 @@ class Camera(Protocol):
     """`BatchCamera` or `NativeCamera`."""
 
     def __call__(
-        self, physics: Any, view: PhysicsView, states: ExtendedStates, eyes: Mapping[str, Pose] | None = None
+        self,
+        physics: Any,
+        view: PhysicsView,
+        states: ExtendedStates,
+        eyes: Mapping[str, Pose] | None = None,
+        drawn: Bool[Array, "W"] | None = None,
     ) -> Images:
-        """Pictures of the present state of every world."""
+        """Pictures of the present state of every world. `drawn`: the worlds that matter; those of the others cost next
+        to nothing, and mean nothing. None: all."""
         ...
 
 
 def check_request(
-    cameras: Sequence[str], rays: Sequence[RayPattern], wanted: Sequence[bool], width: int, height: int
+    cameras: Sequence[str],
+    rays: Sequence[RayPattern],
+    wanted: Sequence[bool],
+    width: int,
+    height: int,
+    rows: tuple[int, int] | None = None,
 ) -> None:
     """Raises EngineError where there is nothing to make pictures of, or with."""
+    if rows is not None and not 0 <= rows[0] < rows[1] <= height:
+        raise EngineError(f"rows {rows[0]} to {rows[1]} of pictures of {height} rows: there are none")
     if (cameras and (not any(wanted) or min(width, height) < 1)) or not (cameras or rays):
         raise EngineError("a camera must have pixels and make at least one of rgb, depth and segmentation")

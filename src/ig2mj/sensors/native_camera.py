@@ -19,7 +19,7 @@ from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.base import Engine
 from ig2mj.engine.native.engine import NativeEngine
-from ig2mj.engine.view import PhysicsView
+from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.frustum import spheres_in_view
 from ig2mj.scene.geom_groups import HIDDEN_GROUP, VISIBLE_GROUPS
@@ -50,6 +50,7 @@ class NativeCamera:
         groups: Sequence[int] = VISIBLE_GROUPS,
         shadows: bool = False,
         rays: Sequence[RayPattern] = (),
+        rows: tuple[int, int] | None = None,
     ):
         """See `BatchCamera`. OpenGL is started by the first picture; rays need none.
 
@@ -58,7 +59,8 @@ class NativeCamera:
         """
         if not isinstance(engine, NativeEngine):
             raise EngineError(f"the {engine.name} engine's worlds are not drawn by MuJoCo's renderer")
-        check_request(cameras, rays, (rgb, depth, segmentation), width, height)
+        check_request(cameras, rays, (rgb, depth, segmentation), width, height, rows)
+        self._rows = slice(*rows) if rows is not None else slice(None)
         self.engine, self.model = engine, model
         self.width, self.height, self.slots = width, height, particles
         self._wants, self._shadows, self._patterns = (rgb, depth, segmentation), shadows, tuple(rays)
@@ -79,6 +81,7 @@ class NativeCamera:
         view: PhysicsView,
         states: ExtendedStates,
         eyes: Mapping[str, Pose] | None = None,
+        drawn: Bool[Array, "W"] | None = None,
     ) -> Images:
         """Pictures of the present state of every world; see `BatchCamera`."""
         eyes = {name: (np.asarray(pos), np.asarray(quat)) for name, (pos, quat) in (eyes or {}).items()}
@@ -91,7 +94,7 @@ class NativeCamera:
         slots = None
         if self.cameras:
             tint, slots = jax.tree.map(np.asarray, self._look(states, view.body_pos, view.body_quat))
-        for w in range(count):
+        for w in range(count) if drawn is None else np.flatnonzero(np.asarray(drawn)).tolist():
             live, data = self.engine.to_mujoco(physics, w)
             for colours, own in ((self._drawn.geom_rgba, live.geom_rgba), (self._drawn.mat_rgba, live.mat_rgba)):
                 colours[:] = own
@@ -108,7 +111,7 @@ class NativeCamera:
                 one = self._draw(data, number, pose, slots, w)
                 for images, image in zip((colour, far, geom), one, strict=True):
                     if images is not None and image is not None:
-                        images[w, c] = image
+                        images[w, c, self._rows] = image[self._rows]
         return Images(
             rgb=colour,
             depth=far,

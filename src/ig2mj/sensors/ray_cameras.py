@@ -15,8 +15,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import jax.numpy as jnp
+import mujoco
 import numpy as np
+import warp as wp
 from jaxtyping import Float, Int
+from mujoco.mjx.third_party.mujoco_warp._src import render_util
 
 from ig2mj.engine.view import Array
 from ig2mj.geometry.poses import quat_multiply
@@ -98,3 +101,27 @@ def set_rays(context: Any, sectors: Sequence[Sector], first: int) -> None:
         own.ray.assign(rays)
         own.ray_offset.assign(offsets)
         own.has_orthographic_camera = True
+
+
+def set_rows(
+    context: Any, host: mujoco.MjModel, cameras: Sequence[int], size: tuple[int, int], rows: tuple[int, int]
+) -> None:
+    """Lets the cameras of a render context, made with so few lines, show these rows of a larger picture.
+
+    Args:
+      cameras: ids in the model, in the order of the context, which has their rays first.
+      size: width and height of the whole picture, pixels. rows: the first, and the first below those.
+    """
+    (width, height), znear = size, float(host.vis.map.znear * host.stat.extent)
+    for own in context._contexts.values():
+        rays = own.ray.numpy()
+        for at, camera in enumerate(cameras):
+            with wp.ScopedDevice(own.ray.device):
+                whole, offsets = (wp.zeros(width * height, dtype=wp.vec3) for _ in range(2))
+                lens = int(host.cam_projection[camera]), float(host.cam_fovy[camera])
+                sensor, intrinsic = wp.vec2(*host.cam_sensorsize[camera]), wp.vec4(*host.cam_intrinsic[camera])
+                inputs = [0, width, height, *lens, sensor, intrinsic, znear, 1, 0, 0]
+                wp.launch(render_util._build_rays, dim=(width, height), inputs=inputs, outputs=[whole, offsets])
+            shown = whole.numpy().reshape(height, width, 3)[slice(*rows)].reshape(-1, 3)
+            rays[at * len(shown) : (at + 1) * len(shown)] = shown
+        own.ray.assign(rays)

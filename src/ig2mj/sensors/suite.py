@@ -16,7 +16,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import UInt32
+from jaxtyping import Bool, UInt32
 
 from ig2mj.agents.base import Controller
 from ig2mj.engine.base import Engine, Physics
@@ -87,6 +87,7 @@ class SensorSuite:
             "height": options.height,
             "particles": options.particles,
             "shadows": options.shadows,
+            "rows": options.rows,
             "rays": [pattern for pattern, _ in self._patterns.values()],
             **{name: name in wanted for name in ("rgb", "depth", "segmentation")},
         }
@@ -165,16 +166,21 @@ class SensorSuite:
         controller: Any,
         memory: Memory | None = None,
         keys: UInt32[Array, "W 2"] | None = None,
+        drawn: Bool[Array, "W"] | None = None,
     ) -> tuple[Readings, Memory | None]:
-        """Readings of the sensors that need pictures or rays; see `read`. On a pure engine not compiled."""
+        """Readings of the sensors that need pictures or rays; see `read`. On a pure engine not compiled.
+
+        Args:
+          drawn: the worlds whose readings matter; None: all.
+        """
         if self._camera is None:
             return {}, None
         if self._pure:
             eye, poses = self._poses_fn(view, controller)
-            images = self._camera(physics, view, states, poses)
+            images = self._camera(physics, view, states, poses, drawn)
             return self._finish_fn(view, states, controller, eye, images, memory, keys)
         eye, poses = self._poses(view, controller)
-        images = self._camera(physics, view, states, poses)
+        images = self._camera(physics, view, states, poses, drawn)
         return self._finish(view, states, controller, eye, images, memory, keys)
 
     def _stages(self, *arguments: Any) -> tuple[Readings, Memory | None]:
