@@ -13,8 +13,9 @@ One process for each GPU. Worlds do not talk to each other, so that the processe
 those of a learner average gradients by one collective program (`ig2mj.learn.iteration`). A learner of several GPUs can
 run in several ways (`--ways`): `processes`; `graphs`, the same with the exchange of gradients inside XLA's CUDA graphs;
 `together`, one process with all GPUs. With `--kernels` there is `apart`, too: one GPU, on which the worlds and the
-learning are two programs as they are on several. Rows of several GPUs and of `apart` tell the two's shares. Everything
-is made ready side by side, then measured one after the other while the rest waits. A speed is all the work over the
+learning are two programs as they are on several. Rows of several GPUs and of `apart` tell the two's shares, and how
+long a process waits in the mean for the worlds of the slowest, which differs from iteration to iteration. Everything is
+made ready side by side, then measured one after the other while the rest waits. A speed is all the work over the
 slowest process's time. Every row says how many worlds overflowed or lost their numbers; a row with any does not count.
 """
 
@@ -29,6 +30,7 @@ import sys
 import time
 from typing import Annotated, Any, Literal
 
+import numpy as np
 import results
 import tyro
 from waiting import Process, end_all
@@ -101,8 +103,16 @@ def settings_of(case: str, args: Args) -> tuple[str, dict[str, Any]]:
     if case == "learner":
         small = {"env": "CookingMeat", "obs": "rgbd", "engine": "warp", "pool_size": 64}
         if args.cpu:
-            return case, {**small, "obs": "state", "worlds": 2, "batch": 32, "capacity": 64, "pool_size": 2}
-        return case, {**small, "worlds": 2048, "batch": 1024, "capacity": 204_800}
+            return case, {
+                **small,
+                "obs": "state",
+                "worlds": 2,
+                "batch": 32,
+                "capacity": 64,
+                "pool_size": 2,
+                "learnt": 1,
+            }
+        return case, {**small, "worlds": 2048, "batch": 1024, "capacity": 204_800, "learnt": 50}
     pictures = case == "birch_pictures"
     home, worlds, steps = ("birch", 8192, 8) if pictures else (str(WORK / "made_60"), 16384, 15)
     if args.cpu:
@@ -192,10 +202,14 @@ def measure(group: Group, number: int, args: Args, until: float) -> dict[str, An
     }
     if "updates" in answers[0]:
         row["updates_per_s"] = round(answers[0]["updates"] / seconds, 2)
-    if "worlds_seconds" in answers[0]:
-        share, updates = max(d["worlds_seconds"] for d in answers), answers[0]["updates"]
-        row["worlds_ms_per_update"] = round(1e3 * share / updates, 3)
-        row["learning_ms_per_update"] = round(1e3 * (seconds - share) / updates, 3)
+    if "graphs_captured" in answers[0]:
+        row["graphs_captured"] = sum(d["graphs_captured"] for d in answers)
+    if "worlds_each" in answers[0]:
+        each = np.array([d["worlds_each"] for d in answers])  # of processes, iterations
+        own, last, per = each.mean(0).sum(), each.max(0).sum(), 1e3 / answers[0]["updates"]
+        row["worlds_ms_per_update"] = round(per * own, 3)
+        row["waiting_ms_per_update"] = round(per * (last - own), 3)
+        row["learning_ms_per_update"] = round(per * (seconds - last), 3)
     return row
 
 

@@ -23,7 +23,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import results
-import warp as wp
+from captures import Counts
 
 import ig2mj
 from ig2mj.envs.actor import STEPS, Actor, Tally, ending
@@ -31,32 +31,6 @@ from ig2mj.envs.environment import Environment
 from ig2mj.envs.state import EnvState
 
 WAYS = ("python", "ahead", "actor")
-
-
-class Counts:
-    """Of this process: graphs that Warp captured, seconds of that, and programs that XLA compiled or found cached."""
-
-    def __init__(self) -> None:
-        self.graphs, self.seconds, self.programs, self._began = 0, 0.0, 0, 0.0
-        enter, leave = wp.ScopedCapture.__enter__, wp.ScopedCapture.__exit__
-
-        def begin(capture: Any) -> Any:
-            self._began = time.perf_counter()
-            return enter(capture)
-
-        def end(capture: Any, *failure: Any) -> None:
-            leave(capture, *failure)
-            self.graphs, self.seconds = self.graphs + 1, self.seconds + time.perf_counter() - self._began
-
-        def compiled(event: str, duration_secs: float, **kwargs: str | int) -> None:
-            self.programs += event == "/jax/core/compile/backend_compile_duration"
-
-        capture: Any = wp.ScopedCapture
-        capture.__enter__, capture.__exit__ = begin, end
-        jax.monitoring.register_event_duration_secs_listener(compiled)
-
-    def now(self) -> tuple[int, float, int]:
-        return self.graphs, self.seconds, self.programs
 
 
 def steps(env: Environment, actor: Actor, state: EnvState, way: str, count: int) -> EnvState:

@@ -96,19 +96,21 @@ def test_a_learner_of_two_gpus_is_compared_with_that_of_one(tmp_path, monkeypatc
 
 
 def test_ways_to_learn_on_two_gpus_are_told_apart(tmp_path, monkeypatch):
-    parts = {"updates": 4, "worlds_seconds": 1.5}
+    parts, others = ({"updates": 4, "worlds_each": each} for each in ([1.0, 0.5], [0.75, 0.75]))
     workers = {
         "learner-1": [GOOD],
         "learner-1-apart": [{**GOOD, "steps": 90, "more": parts}],
-        "learner-2": [{**GOOD, "steps": 80, "more": parts}] * 2,
+        "learner-2": [{**GOOD, "steps": 80, "more": parts}, {**GOOD, "steps": 80, "more": others}],
         "learner-2-together": [{**GOOD, "steps": 190, "more": parts}],
     }
     kernels = tmp_path / "kernels"
     kernels.mkdir()
     rows = measured(tmp_path, monkeypatch, workers, limit=40.0, ways=("processes", "together"), kernels=kernels)
     shares = [(r["gpus"], r.get("way"), r["weak_scaling"], r.get("learning_ms_per_update")) for r in rows]
-    two = [(2, "processes", 1.6, 125.0), (2, "together", 1.9, 125.0)]
+    two = [(2, "processes", 1.6, 62.5), (2, "together", 1.9, 125.0)]
     assert shares == [(1, None, 1.0, None), (1, "apart", 0.9, 125.0), *two]
+    waiting = [r.get("waiting_ms_per_update") for r in rows]
+    assert waiting == [None, 0.0, 62.5, 0.0], "in each iteration the slower one's worlds are waited for"
     named = {file.name for file in kernels.iterdir()}
     assert named == {f"learner-{n}.json" for n in ("1-apart-0", "2-processes-0", "2-processes-1", "2-together-0")}
     told = [(r["gpus"], r.get("way")) for r in scale_tables.runs(tmp_path / "rows.jsonl")]
