@@ -59,6 +59,8 @@ of a processor; the fruit's from "memory_base_free", with what is reckoned, for 
 for nine minutes, with pictures as bright as OpenGL's and labels for where the actor takes things to be
 (of what had moved by less than 5 cm by mistake for where it lay at first). Both were played with drawn actions, the
 towel of "believed" with the likeliest, too; until second 150 success is of the episodes that ended first.
+"32_updates" and "48_updates_1024_worlds" ran side by side on an H100 each, cut off at seconds 531 and 401; what was
+played of the first is the policy of second 480.
 SlicingFruit with `--expert`: the first run was cut off; "48_updates" has `guided=0.4 copied=0.25 reach=30 updates=48`;
 "trusted" `guided=0.4 copied=0.4 trust=1 reach=30 updates=48`; "rgbd64" the same with `--pixels 64`, cut off at second
 161. In these the peak after the expert's help has ended is one of counting: all worlds then begin alone at one moment,
