@@ -16,8 +16,8 @@
 # Below $OUT: the best and the last policy, progress.csv, evaluations.jsonl (the likeliest actions, then drawn ones) and
 # the log of each, copied while it trains. $MINUTES of training (5), $WORLDS, $ENGINE (warp), $FRACTION of a card's memory
 # that JAX takes for each training (0.26), $BATCH, $RATE (of learning), $CAPACITY, $STARTS and $LOOK: pictures of start
-# states, and updates of the guess on them; $UPDATES: of each step of the worlds; $TOLD: samples of an update without pictures; $BELIEVED=0: labels are for
-# where things are; with $RECALL=0 also: actors remember nothing; $READY: seconds
+# states, and updates of the guess on them; $UPDATES: for each step of the worlds; $TOLD: samples of an update without
+# pictures; $BELIEVED=0: labels are for where things are; with $RECALL=0 also: actors remember nothing; $READY: seconds
 # until training begins, at most; $PLAY=0: no evaluation on the card.
 set -u
 out=${OUT:-out/training}; mkdir -p "$out"

@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from small_envs import PointMass, SeenPointMass
 
+from ig2mj.cli.train import drawn_rows
 from ig2mj.envs.observations import Space
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.collect import Transition
@@ -345,3 +346,15 @@ def test_policies_of_glimpses_are_small_enough_to_ship(vector, sizes, recalled):
     own, kept = jnp.zeros((1, vector)), jnp.zeros((1, recalled)) if recalled else None
     shapes = jax.eval_shape(lambda key: actor.init(key, own, picture, None, kept), jax.random.PRNGKey(0))
     assert 1.85 * sum(math.prod(a.shape) for a in jax.tree.leaves(shapes)) < 0.7e6
+
+
+@pytest.mark.parametrize(("pixels", "rows"), [(128, (60, 108)), (32, (20, 28)), (64, (0, 64))])
+def test_a_training_draws_the_rows_that_its_networks_see(pixels, rows):
+    whole = np.random.default_rng(0).integers(1, 256, (2, 128, 128, 3), np.uint8)
+    drawn = drawn_rows(rows, pixels)
+    assert drawn is not None and drawn_rows(None, pixels) is None
+    part = np.zeros_like(whole)
+    part[:, slice(*drawn)] = whole[:, slice(*drawn)]
+    seen = [np.asarray(shrunk(picture, "rgb", pixels, *rows)) for picture in (whole, part)]
+    np.testing.assert_array_equal(*seen)
+    assert seen[0].all() and drawn[1] - drawn[0] == (rows[1] - rows[0]) * 128 // pixels
