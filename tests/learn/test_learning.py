@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from jax.flatten_util import ravel_pytree
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -17,7 +18,7 @@ from small_envs import FarReward, FarRewardThatEnds, PointMass
 
 from ig2mj.envs.observations import Space
 from ig2mj.learn import guidance
-from ig2mj.learn.collect import GUIDED, Advice
+from ig2mj.learn.collect import GUIDED, Advice, Transition
 from ig2mj.learn.dagger import Dagger, DaggerConfig
 from ig2mj.learn.guidance import guided, share, uncounted
 from ig2mj.learn.perception import Perception, Seen
@@ -184,3 +185,25 @@ def test_the_expert_acts_up_to_the_handover_and_less_as_the_run_goes_on():
     assert set(np.asarray(late).tolist()) == {-1, 0}  # the same tenth is marked when there is no help any more
     limits = [float(share(jnp.float32(p), 0.5)) for p in (0.0, 0.25, 0.5, 1.0)]
     assert limits == [1.0, 0.5, 0.0, 0.0]
+
+
+def test_dagger_s_actor_is_a_running_mean_of_what_it_learns():
+    """Plain at first; later each iteration counts as its updates do among `average`."""
+    perception = Perception({"proprioception": Space((2,), np.float32, -1.0, 1.0)})
+    config = DaggerConfig(actor=(4,), choices=0, average=16, length=2, updates=2, batch=8, capacity=16)
+    algorithm = Dagger(perception, 1, None, config)
+    learner, memory = algorithm.init(jax.random.PRNGKey(0)), algorithm.memory(4)
+    learn, rng = jax.jit(algorithm.learn), np.random.default_rng(0)
+    quick, mean = [], None
+    for k in range(12):
+        seen = Seen(jnp.asarray(rng.normal(size=(2, 4, 2)), jnp.float32), jnp.zeros((2, 4, 0), jnp.uint8))
+        label, no, none = seen.vector[..., :1], jnp.zeros((2, 4), bool), jnp.zeros((2, 4))
+        rollout = Transition(seen, label, {"label": label}, none, no, no, seen)
+        learner, memory, _ = learn(learner, memory, rollout, jax.random.PRNGKey(k), jnp.float32(0.1), jnp.bool_(k > 0))
+        if k == 0:  # labels are gathered
+            np.testing.assert_array_equal(*(ravel_pytree(tree)[0] for tree in (learner.actor, learner.quick)))
+            continue
+        quick.append(ravel_pytree(learner.quick)[0])
+        mean = np.mean(quick, axis=0) if k <= 4 else 0.75 * mean + 0.25 * quick[-1]
+        np.testing.assert_allclose(ravel_pytree(learner.actor)[0], mean, atol=1e-6)
+    assert np.abs(mean - quick[-1]).max() > 1e-4

@@ -64,6 +64,7 @@ class DaggerConfig:
       recall: 1: the actor remembers what a hand soon hides (`ig2mj.learn.recall`). 2: it also sees what was felt and
         guessed when a hand last took something, as older policies do. For the encoder `glimpses`.
       believed: 1: the expert's labels are for where such an actor takes objects to be (`ig2mj.learn.belief`).
+      average: updates over which the weights of the actor that acts are averaged; 0: it acts with the last ones.
       choices: values of each number of an action that the actor chooses from; 0: it is the mean of a Gaussian.
       actor: sizes of the layers. net: encoder (`networks.NETS`).
     """
@@ -86,6 +87,7 @@ class DaggerConfig:
     told: int = 0
     recall: int = 0
     believed: int = 0
+    average: int = 0
     choices: int = 21
     actor: tuple[int, ...] = (256, 256, 256)
     net: str = "small"
@@ -93,13 +95,15 @@ class DaggerConfig:
 
 @struct.dataclass
 class DaggerLearner:
-    """All that is learned. `progress`: share of the run that was over at the last iteration."""
+    """All that is learned. `actor`: weights of what acts. `progress`: share of the run that was over at the last
+    iteration. `quick`: the last update's weights, where those of `actor` are a mean; else None."""
 
     actor: Any
     opt: Any
     moments: Moments
     progress: Float[Array, ""]
     updates: Int[Array, ""]
+    quick: Any = None
 
 
 @struct.dataclass
@@ -177,7 +181,21 @@ class Dagger:
         """Untrained."""
         actor, opt = self._imitation.init(key)
         moments = Moments.initial(self.perception.vector_size)
-        return DaggerLearner(actor, opt, moments, jnp.float32(0), jnp.int32(0))
+        return self.begun(DaggerLearner(actor, opt, moments, jnp.float32(0), jnp.int32(0)))
+
+    def begun(self, learner: DaggerLearner) -> DaggerLearner:
+        """The same, its mean of weights begun anew with those that it acts with."""
+        return dataclasses.replace(learner, quick=jax.tree.map(jnp.copy, learner.actor) if self.config.average else None)
+
+    def averaged(self, learner: DaggerLearner, learnt: DaggerLearner) -> DaggerLearner:
+        """`learnt`, whose `actor` has been updated from `learner.quick`, acting with a mean of weights.
+
+        That is a running mean, by iterations, and as long as fewer updates lie behind it the plain one.
+        """
+        before = jnp.float32(learner.updates) / self.samples
+        part = jnp.maximum(1.0 / (1.0 + before), min(self.samples / self.config.average, 1.0))
+        mean = jax.tree.map(lambda old, new: old + part * (new - old), learner.actor, learnt.actor)
+        return dataclasses.replace(learnt, actor=mean, quick=learnt.actor)
 
     def looked(
         self, learner: DaggerLearner, starts: Seen, count: int, key: Array
@@ -191,7 +209,7 @@ class Dagger:
             return self._imitation.update(learner, seen, none, shake_key, jnp.float32(c.lr))
 
         learner, found = jax.lax.scan(update, learner, jax.random.split(key, count))
-        return learner, jax.tree.map(jnp.mean, found)
+        return self.begun(learner), jax.tree.map(jnp.mean, found)
 
     def memory(self, num_worlds: int) -> Labels:
         """No labels yet."""
@@ -321,7 +339,9 @@ class Dagger:
                 told = memory.told(told_key, share_of(c.told, self.axis)) if c.told else None
                 return self._imitation.update(learner, seen, label, shift_key, rate, told, recalled)
 
-            learner, found = jax.lax.scan(update, learner, jax.random.split(key, self.samples))
+            last = learner if learner.quick is None else dataclasses.replace(learner, actor=learner.quick)
+            learnt, found = jax.lax.scan(update, last, jax.random.split(key, self.samples))
+            learner = learnt if learner.quick is None else self.averaged(learner, learnt)
             return learner, jax.tree.map(jnp.mean, found)
 
         learner, losses = if_ready(ready, many, learner)

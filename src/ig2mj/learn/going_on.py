@@ -59,7 +59,7 @@ def further(algorithm: Any, policy: Policy, seed: int, file: object = "the polic
         mean, deviation = (np.concatenate(pair) for pair in zip((mean, deviation), unseen, strict=True))
     # One update lies behind it, so that it acts at once.
     scales = Moments.of(mean, deviation, KNOWN)
-    return dataclasses.replace(learner, actor=nested(new), moments=scales, updates=jnp.int32(1))
+    return algorithm.begun(dataclasses.replace(learner, actor=nested(new), moments=scales, updates=jnp.int32(1)))
 
 
 def _settings(policy: Policy) -> str:
