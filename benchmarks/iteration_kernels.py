@@ -21,7 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 import results
 import tyro
-from captures import Counts
+from captures import Counts, Moves
 from kernel_times import profiled
 
 import ig2mj.learn.train
@@ -85,10 +85,13 @@ def main() -> None:
     at = sys.argv.index("--") if "--" in sys.argv else len(sys.argv)
     args, words = tyro.cli(Args, description=__doc__, args=sys.argv[1:at]), sys.argv[at + 1 :]
 
+    moves = Moves()
+
     def instead(env: Any, algorithm: Any, run: Any, depends: Any = None, learner: Any = None, *_: Any) -> Any:
         for programs in args.programs:
             row = measured(args, programs, env, algorithm, learner, run.seed)
-            results.keep_row({**row, "command": words}, args.rows)
+            results.keep_row({**row, "moves": moves.rows.copy(), "command": words}, args.rows)
+            moves.rows.clear()
         raise SystemExit(0)
 
     ig2mj.learn.train.train = instead  # the command takes it from there when it runs

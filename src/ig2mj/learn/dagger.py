@@ -185,7 +185,8 @@ class Dagger:
 
     def begun(self, learner: DaggerLearner) -> DaggerLearner:
         """The same, its mean of weights begun anew with those that it acts with."""
-        return dataclasses.replace(learner, quick=jax.tree.map(jnp.copy, learner.actor) if self.config.average else None)
+        copy = jax.tree.map(jnp.copy, learner.actor) if self.config.average else None
+        return dataclasses.replace(learner, quick=copy)
 
     def averaged(self, learner: DaggerLearner, learnt: DaggerLearner) -> DaggerLearner:
         """`learnt`, whose `actor` has been updated from `learner.quick`, acting with a mean of weights.
