@@ -4,8 +4,8 @@
 
 Behind `--` are the words of `ig2mj train`. Everything is made as that command makes it; then iterations run as one
 program and as two, of which the second half is timed. Each row also tells how many CUDA graphs Warp captured in each
-iteration: after the first few it should be none. The worlds' program is not profiled: under the profiler it has ended
-processes (a failed launch of a graph).
+iteration (after the first few it should be none), and `moves` which arrays of which call lay elsewhere. The worlds'
+program is not profiled: under the profiler it has ended processes (a failed launch of a graph).
 """
 
 from __future__ import annotations

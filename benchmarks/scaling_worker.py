@@ -101,9 +101,9 @@ def simulator(settings: dict[str, Any]) -> tuple[dict[str, Any], Measure]:
 def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measure, Profile]:
     """SAC from pixels on an environment, as `ig2mj train` runs it: on one GPU one program for all of an iteration.
 
-    It learns for `learnt` iterations before anything is measured. Where the worlds are a program of their own, their
-    arrays lie elsewhere in each of the first iterations, and Warp captures its CUDA graphs anew for each place: 65 ms
-    of a processor. Some thirty iterations, of the thousands of a run, end that; `graphs_captured` says if they did.
+    It learns for `learnt` iterations before anything is measured. Where the worlds are a program of their own, arrays
+    come to lie elsewhere, most often in the first iterations, and Warp captures a CUDA graph anew for each place: 65 ms
+    of a processor. `graphs_captured` says how often that still was so.
 
     With `apart` the worlds and the learning are two programs there, too. Only such a learner can list its kernels: the
     worlds are left out, since with them a process of two once ended under the profiler (a failed launch of a graph).

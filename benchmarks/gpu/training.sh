@@ -98,7 +98,7 @@ run() {
           --rows "$out/steps/rows.jsonl" >> "$out/steps/log.txt" 2>&1
       done
       cut -c1-600 "$out/steps/rows.jsonl" ;;
-    *) sed -n '2,21p' "$0"; exit 2 ;;
+    *) sed -n '2,/^set /{/^#/p}' "$0"; exit 2 ;;
   esac
 }
 
