@@ -69,17 +69,20 @@ class Moves:
 
     def note(self, name: str, found: dict[str, Any]) -> None:
         """A capture. `found`: the callback's variables."""
-        places = [place or 0 for place in (*found["ip"], *found["op"])]  # an array without elements lies nowhere
+        places = [place or 0 for place in (*found["ip"], *found["op"])]  # an array without elements may lie nowhere
+        call = found["self"]
+        names = [call.input_args[k].name for k in call.array_input_indices]
+        names += [f"output {k}" for k in call.array_output_indices]
         before = self._last.get((name, found["call_id"]))
         self._last[name, found["call_id"]] = places
         row: dict[str, Any] = {"call": name, "id": found["call_id"], "arrays": len(places), "inputs": len(found["ip"])}
         if before is not None:
             by: collections.Counter[int] = collections.Counter()
-            which = collections.defaultdict[int, list[int]](list)
-            for k, (old, new) in enumerate(zip(before, places, strict=True)):
+            which = collections.defaultdict[int, list[str]](list)
+            for called, old, new in zip(names, before, places, strict=True):
                 if new != old:
                     by[new - old] += 1
-                    which[new - old].append(k)
-            row["moved_by"] = [[bytes_, count, which[bytes_][:6]] for bytes_, count in by.most_common(4)]
+                    which[new - old].append(called)
+            row["moved_by"] = [[bytes_, count, which[bytes_][:8]] for bytes_, count in by.most_common(6)]
             row["moved"] = sum(by.values())
         self.rows.append(row)

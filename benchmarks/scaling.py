@@ -11,8 +11,8 @@
 
 One process for each GPU. Worlds do not talk to each other, so that the processes of the simulator only begin together;
 those of a learner average gradients by one collective program (`ig2mj.learn.iteration`). A learner of several GPUs can
-run in several ways (`--ways`): `processes`; `graphs`, the same with the exchange of gradients inside XLA's CUDA graphs;
-`together`, one process with all GPUs. With `--kernels` there is `apart`, too: one GPU, on which the worlds and the
+run in several ways (`--ways`): `processes`; `scratch`, the same with XLA's scratch memory in a pool of its own, where
+it stays; `graphs`, with the exchange of gradients inside XLA's CUDA graphs; `together`, one process with all GPUs. With `--kernels` there is `apart`, too: one GPU, on which the worlds and the
 learning are two programs as they are on several. Rows of several GPUs and of `apart` tell the two's shares, and how
 long a process waits in the mean for the worlds of the slowest, which differs from iteration to iteration. Everything is
 made ready side by side, then measured one after the other while the rest waits. A speed is all the work over the
@@ -46,10 +46,13 @@ SLACK = 4.0
 
 Case = Literal["made_60", "birch_pictures", "learner"]
 
-Way = Literal["processes", "graphs", "together"]
+Way = Literal["processes", "scratch", "graphs", "together"]
 
 GRAPHS = "--xla_gpu_enable_command_buffer=+COLLECTIVES"
 """XLA leaves collectives out of its CUDA graphs, which then end before and begin anew after each."""
+
+SCRATCH = "--xla_gpu_temp_buffer_use_separate_color=true"
+"""Else scratch memory lies wherever other programs left room, and Warp captures a CUDA graph for each place."""
 
 PROFILED = "--xla_enable_command_buffers_during_profiling=true"
 """Without it XLA launches each kernel by itself while a profiler looks on, which is another program."""
@@ -127,6 +130,7 @@ def start(case: str, count: int, args: Args, way: str = "") -> list[Process]:
     together = way == "together"
     flags = os.environ.get("XLA_FLAGS", "").split()
     flags += [GRAPHS] if way == "graphs" else []
+    flags += [SCRATCH] if way == "scratch" and not args.cpu else []
     flags += [PROFILED] if args.kernels is not None and word == "learner" and not args.cpu else []
     flags += [f"--xla_force_host_platform_device_count={count}"] if together and args.cpu else []
     with socket.create_server(("127.0.0.1", 0)) as free:
@@ -204,6 +208,7 @@ def measure(group: Group, number: int, args: Args, until: float) -> dict[str, An
         row["updates_per_s"] = round(answers[0]["updates"] / seconds, 2)
     if "graphs_captured" in answers[0]:
         row["graphs_captured"] = sum(d["graphs_captured"] for d in answers)
+        row["moves"] = answers[0].get("moves", [])
     if "worlds_each" in answers[0]:
         each = np.array([d["worlds_each"] for d in answers])  # of processes, iterations
         own, last, per = each.mean(0).sum(), each.max(0).sum(), 1e3 / answers[0]["updates"]

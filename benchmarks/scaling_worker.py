@@ -22,7 +22,7 @@ from typing import Any
 
 import jax
 import numpy as np
-from captures import Counts
+from captures import Counts, Moves
 from kernel_times import profiled_to
 from throughput import device, memory, program
 
@@ -103,7 +103,7 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
 
     It learns for `learnt` iterations before anything is measured. Where the worlds are a program of their own, arrays
     come to lie elsewhere, most often in the first iterations, and Warp captures a CUDA graph anew for each place: 65 ms
-    of a processor. `graphs_captured` says how often that still was so.
+    of a processor. `graphs_captured` says how often that still was so, `moves` which arrays did.
 
     With `apart` the worlds and the learning are two programs there, too. Only such a learner can list its kernels: the
     worlds are left out, since with them a process of two once ended under the profiler (a failed launch of a graph).
@@ -115,7 +115,7 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
     from ig2mj.learn.iteration import AXIS, ManyDevices, OneDevice
     from ig2mj.learn.perception import Perception
 
-    worlds, count = settings["worlds"], jax.device_count()
+    worlds, count, moves = settings["worlds"], jax.device_count(), Moves()
     apart = count > 1 or settings["apart"]
     names = VECTORS if settings["obs"] == "state" else (*VECTORS, "rgb", "depth")
     env: Any = ig2mj.make(
@@ -149,6 +149,7 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
         rounds[0] += 1
         team.barrier(f"round {rounds[0]}")
         iterations = max(3, round(seconds / each))
+        moves.rows.clear()
         began, before = time.perf_counter(), counts.now()
         done = [one(True) for _ in range(iterations)]
         took = time.perf_counter() - began
@@ -160,6 +161,7 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
             "updates": sum(losses["updates"] for _, _, losses, _ in done),
             "finite": all(np.isfinite(list(losses.values())).all() for _, _, losses, _ in done),
             "graphs_captured": counts.now()[0] - before[0],
+            "moves": moves.rows[:20],
             **({"worlds_each": [spent or 0.0 for *_, spent in done]} if apart else {}),
             "overflow": sum(t["overflow"] for t in troubles),
             "non_finite": sum(t["not_finite"] for t in troubles),

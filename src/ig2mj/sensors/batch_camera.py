@@ -27,7 +27,7 @@ from ig2mj.engine.base import Engine
 from ig2mj.engine.mjx.engine import MjxEngine, MjxPhysics
 from ig2mj.engine.mjx.physics import own_device
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.engine.warp.patches import pins
+from ig2mj.engine.warp.patches import graphs_kept, pins
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.poses import compose, quat_rotate, quat_to_matrix
 from ig2mj.scene.geom_groups import VISIBLE_GROUPS
@@ -210,7 +210,8 @@ class BatchCamera:
             packed, depth, _ = mjx.render(model, data, self._handle)
             return packed, depth, jnp.zeros((0, 2), jnp.int32)
 
-        packed, depth, seen = jax.vmap(cast)(moved, look)
+        with graphs_kept():
+            packed, depth, seen = jax.vmap(cast)(moved, look)
         pixels = self._pixels if self._wants[1] else 0
         geom = seen[..., 0]
         return Images(

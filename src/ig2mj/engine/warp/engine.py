@@ -174,7 +174,7 @@ class WarpEngine(MjxEngine):
         return own
 
     def _map(self, act: Any, *arguments: Any) -> mjx.Data:
-        with patches.traced_with(self.own_kernels):
+        with patches.traced_with(self.own_kernels), patches.graphs_kept():
             return super()._map(act, *arguments)
 
     def _act(self, act: Any, model: mjx.Model, data: mjx.Data, ignored: Bool[Array, "H O"] | None) -> mjx.Data:

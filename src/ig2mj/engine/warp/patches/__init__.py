@@ -20,6 +20,7 @@ these in their place; results are the same up to rounding:
 - Gravity compensation is launched for every (world, body, degree of freedom). Here it is for every (world, body).
 - Islands get a numbering that nobody reads (`spared`).
 - Each captured CUDA graph has memory of its own for a step's arrays. Here they lie in one block (`scratch`).
+- A graph is captured anew where an array without elements lies elsewhere, too. Here those do not count (`graphs`).
 - The velocity stage runs again at the end of a step with sleep, only to renew derived quantities (`cvel`,
   `qfrc_bias`) that the next step computes anew from positions and velocities. Here they are those of the step's
   beginning, as they are without sleep.
@@ -52,6 +53,7 @@ from typing import Any
 import warp as wp
 
 from ig2mj.engine.warp.patches import pins
+from ig2mj.engine.warp.patches.graphs import graphs_kept
 from ig2mj.engine.warp.patches.programs import traced_with
 from ig2mj.engine.warp.patches.replacements import KERNELS
 
@@ -61,6 +63,7 @@ __all__ = [
     "engine_kernels",
     "fit",
     "for_new_engines",
+    "graphs_kept",
     "launched",
     "traced_with",
     "upstream_kernels",

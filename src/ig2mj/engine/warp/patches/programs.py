@@ -15,7 +15,6 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
-import warp as wp
 from mujoco.mjx.warp import ffi
 
 from ig2mj.engine.warp.patches import pins
@@ -25,10 +24,6 @@ from ig2mj.engine.warp.patches.scratch import used
 
 REGISTER = "jax_callable_variadic_tuple"
 """Name of MJX's function that registers another with XLA."""
-
-GRAPHS = 128
-"""CUDA graphs of a step that are kept. Warp keeps 32; an environment that is stepped from Python may need more in turn,
-as JAX gives it other buffers, and would capture each anew in every step."""
 
 _here = threading.local()
 _registrations = ScopedReplacement()
@@ -55,12 +50,7 @@ def _register(function: Callable[..., Any], *args: Any, **kwargs: Any) -> Any:
     return _registrations.original(ffi, REGISTER)(_choosing(function, _here.own), *args, **kwargs)
 
 
-def _callable(*args: Any, **kwargs: Any) -> Any:
-    more = {"graph_cache_max": GRAPHS} if _here.own else {}
-    return _registrations.original(wp, "jax_callable")(*args, **kwargs, **more)
-
-
-_registrations.add({(ffi, REGISTER): _register, (wp, "jax_callable"): _callable})
+_registrations.add({(ffi, REGISTER): _register})
 
 
 @contextlib.contextmanager
