@@ -27,8 +27,6 @@ from kernel_times import profiled
 
 import ig2mj.learn.train
 from ig2mj.cli import main as command
-from ig2mj.engine.warp.engine import WarpEngine
-from ig2mj.learn.collect import collect_fn
 from ig2mj.learn.iteration import OneDevice
 
 
@@ -42,43 +40,13 @@ class Args:
     """Of an iteration."""
     kernels: int = 40
     """Of the learning to list; 0: no profile."""
-    donate: bool = False
-    """Of two programs, the worlds' writes its rollout over the last one's arrays, so that nothing is allocated for it."""
-    graph_mode: str | None = None
-    """How Warp keeps CUDA graphs (`WarpEngine`)."""
     rows: pathlib.Path | None = None
     """A row is added to this file, as JSON."""
-
-
-def over_the_last(step: Any) -> None:
-    """`--donate`: `step.play` then gives its rollout's arrays back to itself."""
-    env, algorithm = step._env, step._algorithm
-    last: list[Any] = []
-
-    def collect(learner: Any, play: Any, key: Any, over: Any) -> Any:
-        return collect_fn(
-            env, algorithm.perception, algorithm.act, algorithm.hint, learner, play, key, algorithm.length
-        )
-
-    program = jax.jit(collect, donate_argnums=(1, 3), keep_unused=True)
-
-    def play(learner: Any, play: Any, key: Any) -> Any:
-        if not last:
-            shapes = jax.eval_shape(collect, learner, play, key, None)[1]
-            last.append(jax.tree.map(lambda a: jnp.zeros(a.shape, a.dtype), shapes))
-        began = time.perf_counter()
-        play, rollout, sums = jax.block_until_ready(program(learner, play, key, last.pop()))
-        last.append(rollout)
-        return play, rollout, sums, time.perf_counter() - began
-
-    step.play = play
 
 
 def measured(args: Args, programs: int, env: Any, algorithm: Any, learner: Any, seed: int) -> dict[str, Any]:
     """Seconds of an iteration's parts, and what runs in them."""
     step, counts = OneDevice(env, algorithm, programs), Counts()
-    if args.donate and programs == 2:
-        over_the_last(step)
     learner = algorithm.init(jax.random.PRNGKey(seed)) if learner is None else jax.tree.map(jnp.copy, learner)
     learner, memory = step.place(learner, step.memory())
     play, key = step.begin(seed), jax.random.PRNGKey(seed)
@@ -95,8 +63,6 @@ def measured(args: Args, programs: int, env: Any, algorithm: Any, learner: Any, 
     half = args.iterations // 2
     row: dict[str, Any] = {
         "programs": programs,
-        "donate": args.donate,
-        "graph_mode": args.graph_mode,
         "xla_flags": os.environ.get("XLA_FLAGS", ""),
         "worlds": env.num_worlds,
         "steps": algorithm.length,
@@ -122,14 +88,6 @@ def main() -> None:
     args, words = tyro.cli(Args, description=__doc__, args=sys.argv[1:at]), sys.argv[at + 1 :]
 
     moves = Moves()
-    if args.graph_mode:
-        made = WarpEngine.__init__
-
-        def begin(engine: Any, *given: Any, **named: Any) -> None:
-            made(engine, *given, **{**named, "graph_mode": args.graph_mode})
-
-        hooked: Any = WarpEngine
-        hooked.__init__ = begin
 
     def instead(env: Any, algorithm: Any, run: Any, depends: Any = None, learner: Any = None, *_: Any) -> Any:
         for programs in args.programs:

@@ -11,12 +11,14 @@
 
 One process for each GPU. Worlds do not talk to each other, so that the processes of the simulator only begin together;
 those of a learner average gradients by one collective program (`ig2mj.learn.iteration`). A learner of several GPUs can
-run in several ways (`--ways`): `processes`; `scratch`, the same with XLA's scratch memory in a pool of its own, where
-it stays; `graphs`, with the exchange of gradients inside XLA's CUDA graphs; `together`, one process with all GPUs. With `--kernels` there is `apart`, too: one GPU, on which the worlds and the
-learning are two programs as they are on several. Rows of several GPUs and of `apart` tell the two's shares, and how
-long a process waits in the mean for the worlds of the slowest, which differs from iteration to iteration. Everything is
-made ready side by side, then measured one after the other while the rest waits. A speed is all the work over the
-slowest process's time. Every row says how many worlds overflowed or lost their numbers; a row with any does not count.
+run in several ways (`--ways`): `processes`; `moving`, the same with XLA's scratch memory wherever there is room, which
+`ig2mj train` on several devices keeps in place (`ig2mj.process.keep_scratch_in_place`); `graphs`, as `processes` with
+the exchange of gradients inside XLA's CUDA graphs; `together`, one process with all GPUs. With `--kernels` there is
+`apart`, too: one GPU, on which the worlds and the learning are two programs as they are on several. Rows of several
+GPUs and of `apart` tell the two's shares, and how long a process waits in the mean for the worlds of the slowest, which
+differs from iteration to iteration. Everything is made ready side by side, then measured one after the other while the
+rest waits. A speed is all the work over the slowest process's time. Every row says how many worlds overflowed or lost
+their numbers; a row with any does not count.
 """
 
 from __future__ import annotations
@@ -35,6 +37,8 @@ import results
 import tyro
 from waiting import Process, end_all
 
+from ig2mj.process.settings import SCRATCH_IN_PLACE
+
 HERE = pathlib.Path(__file__).resolve().parent
 WORK = HERE.parent / "out" / "benchmarks"
 
@@ -46,13 +50,10 @@ SLACK = 4.0
 
 Case = Literal["made_60", "birch_pictures", "learner"]
 
-Way = Literal["processes", "scratch", "graphs", "together"]
+Way = Literal["processes", "moving", "graphs", "together"]
 
 GRAPHS = "--xla_gpu_enable_command_buffer=+COLLECTIVES"
 """XLA leaves collectives out of its CUDA graphs, which then end before and begin anew after each."""
-
-SCRATCH = "--xla_gpu_temp_buffer_use_separate_color=true"
-"""Else scratch memory lies wherever other programs left room, and Warp captures a CUDA graph for each place."""
 
 PROFILED = "--xla_enable_command_buffers_during_profiling=true"
 """Without it XLA launches each kernel by itself while a profiler looks on, which is another program."""
@@ -130,7 +131,7 @@ def start(case: str, count: int, args: Args, way: str = "") -> list[Process]:
     together = way == "together"
     flags = os.environ.get("XLA_FLAGS", "").split()
     flags += [GRAPHS] if way == "graphs" else []
-    flags += [SCRATCH] if way == "scratch" and not args.cpu else []
+    flags += [f"--{SCRATCH_IN_PLACE}=true"] if way not in ("", "apart", "moving") else []
     flags += [PROFILED] if args.kernels is not None and word == "learner" and not args.cpu else []
     flags += [f"--xla_force_host_platform_device_count={count}"] if together and args.cpu else []
     with socket.create_server(("127.0.0.1", 0)) as free:

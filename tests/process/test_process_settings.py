@@ -50,6 +50,26 @@ def test_what_the_user_decided_stands(tmp_path):
     assert in_a_process_of_its_own(code, **chosen).splitlines() == ["/theirs", "True True"]
 
 
+@pytest.mark.parametrize(
+    ("theirs", "after"),
+    [
+        ("", "--xla_gpu_temp_buffer_use_separate_color=true"),
+        ("--xla_dump_to=there", "--xla_dump_to=there --xla_gpu_temp_buffer_use_separate_color=true"),
+        ("--xla_gpu_temp_buffer_use_separate_color=false", "--xla_gpu_temp_buffer_use_separate_color=false"),
+    ],
+)
+def test_scratch_memory_stays_where_the_user_did_not_decide(monkeypatch, theirs, after):
+    monkeypatch.setenv("XLA_FLAGS", theirs)
+    settings.keep_scratch_in_place()
+    settings.keep_scratch_in_place()
+    assert os.environ["XLA_FLAGS"] == after
+
+
+def test_xla_knows_the_option_that_keeps_scratch_memory_in_place():
+    code = "from ig2mj import process; process.keep_scratch_in_place(); print(jax.jit(lambda x: x + 1)(1))"
+    assert in_a_process_of_its_own(code, XLA_FLAGS="") == "2"
+
+
 def test_no_other_module_changes_the_process(repository: pathlib.Path):
     """Options of JAX and Warp, environment variables and other libraries' classes; tests of sources, line by line."""
     setters = re.compile(

@@ -107,6 +107,7 @@ def run(
     from ig2mj.learn.projection import lens_of
     from ig2mj.learn.shipped import find_policy
     from ig2mj.learn.train import Run, train
+    from ig2mj.process import keep_scratch_in_place
     from ig2mj.sensors.base import SensorOptions
 
     _check(algo, obs, minutes, videos, until, pixels, programs, devices, demos, expert, out)
@@ -118,7 +119,10 @@ def run(
         from ig2mj.cli.clone import train_from_demos
 
         return train_from_demos(env, demos, robot, grasping, obs, pixels, kept_rows, minutes, seed, out, resume, set)
-    team = Team.join(place_of(os.environ))
+    place = place_of(os.environ)
+    if devices != "1" or (place and place.count > 1):
+        keep_scratch_in_place()
+    team = Team.join(place)
     with team.together():
         if engine is None:
             engine = "warp" if jax.default_backend() == "gpu" else "native"

@@ -15,6 +15,9 @@ or earlier by whoever wants to; a second call does nothing. What the user has de
 `use_processor_only` (processes that sample rows of pools):
   - JAX's option `jax_platforms` is "cpu".
 
+`keep_scratch_in_place` (`ig2mj train` on several devices):
+  - XLA_FLAGS gets XLA's option `xla_gpu_temp_buffer_use_separate_color`, unless it has it.
+
 `prepare_mujoco` (every engine):
   - MuJoCo's user warning: what it warns of goes to the logger "ig2mj.mujoco", not to a file in the working folder.
 
@@ -42,6 +45,7 @@ from __future__ import annotations
 
 from ig2mj.process.compilation import CACHE_VARIABLE, cache_folder
 from ig2mj.process.settings import (
+    keep_scratch_in_place,
     prepare_jax,
     prepare_mujoco,
     prepare_warp,
@@ -55,6 +59,7 @@ from ig2mj.process.settings import (
 __all__ = [
     "CACHE_VARIABLE",
     "cache_folder",
+    "keep_scratch_in_place",
     "prepare_jax",
     "prepare_mujoco",
     "prepare_warp",

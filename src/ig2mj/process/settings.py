@@ -63,6 +63,24 @@ def run_programs_inline() -> None:
         jax.config.update("jax_cpu_enable_async_dispatch", False)
 
 
+SCRATCH_IN_PLACE = "xla_gpu_temp_buffer_use_separate_color"
+"""XLA's option for scratch memory in a pool of its own."""
+
+
+def keep_scratch_in_place() -> None:
+    """XLA's scratch memory on GPUs gets a pool of its own, where each program finds its own in one place every time.
+
+    Else it lies wherever other programs left room. Where a training's iteration is more than one program, Warp then
+    captures CUDA graphs anew in most iterations (`ig2mj.engine.warp.patches.graphs`). The pool grows as needed, beside
+    the memory that JAX takes at its start (XLA_PYTHON_CLIENT_MEM_FRACTION).
+
+    Has an effect only before JAX is first used. Does nothing where XLA_FLAGS has the option already.
+    """
+    flags = os.environ.get("XLA_FLAGS", "")
+    if SCRATCH_IN_PLACE not in flags:
+        os.environ["XLA_FLAGS"] = f"{flags} --{SCRATCH_IN_PLACE}=true".lstrip()
+
+
 def use_processor_only() -> None:
     """Keeps JAX off the GPU in this process; only before JAX is first used."""
     import jax
