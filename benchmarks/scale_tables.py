@@ -31,6 +31,10 @@ LATENCY = 20e-6
 """Seconds of an all-reduce for each doubling of the number of GPUs: of the order of NCCL's trees over InfiniBand."""
 
 
+CARD = "H200"
+"""What speeds are of."""
+
+
 def speeds() -> dict[str, float]:
     """Of one H200, steps a second: control steps of the simulator, agent steps of environments and of the learner."""
     rows = json.loads((RESULTS / "throughput" / "result.json").read_text())["rows"]
@@ -43,13 +47,14 @@ def speeds() -> dict[str, float]:
     for row in lines(RESULTS / "environments" / "h200.jsonl"):
         name = "environment_pictures" if row["observations"] else "environment"
         found[name] = max(found.get(name, 0.0), row["agent_steps_per_s"])
+    share = 1.0
     for row in runs(RESULTS / "scaling" / "rows.jsonl"):  # the newest of a GPU at work alone
-        if row["gpus"] == 1 and "gpu" not in row:
+        if row["gpus"] == 1 and "gpu" not in row and CARD in row["device"]:
             found[row["case"]] = row["steps_per_s"]
             found["updates"] = row.get("updates_per_s", found.get("updates"))
-        if row["gpus"] == 2 and row["case"] == "learner":
-            found["updates_of_two"] = row["updates_per_s"]
-    return found
+        if row["gpus"] == 2 and row["case"] == "learner":  # of whichever card: what sharing costs is much the same
+            share = row["weak_scaling"] / 2
+    return {**found, "updates_of_two": share * found["updates"]}
 
 
 def memory() -> list[tuple[str, int, float]]:
@@ -119,7 +124,7 @@ def update_seconds(gpus: int, one: dict[str, float], sizes: dict[str, int], insi
     The last is what an update on two GPUs was measured to take beyond one's, at any number of them.
     """
     alone = 1.0 / one["updates"]
-    shared = 1.0 / one["updates_of_two"] - alone if gpus > 1 and "updates_of_two" in one else 0.0
+    shared = 1.0 / one["updates_of_two"] - alone if gpus > 1 else 0.0
     return alone + shared + exchange(gpus, sizes, inside, between)
 
 
