@@ -75,6 +75,14 @@ def test_an_actor_is_wrong_by_as_much_as_what_it_remembers():
     np.testing.assert_allclose(found["knife"].move, moved.apply(off[0]), atol=1e-5)
     np.testing.assert_allclose(found["apple"].move, off[1], atol=1e-5)
 
+    # it has slipped in the hand: who carries it cannot know, and what is seen of it now, if right, does not count
+    slip = np.array([0.0, 0.02, 0.0])
+    slipped = vector(1, [lying(moved.apply(place[0] - at[0]) + at[1] + slip, moved * turns[0]), true[:, OWN + 7 :]])
+    found = beliefs_of(recall, hidden, scales, slipped, kept, told(hidden, scales, slipped), at_first)
+    near = np.linalg.norm(moved.apply(off[0]) - slip, axis=1) < NEAR
+    assert near.any()
+    np.testing.assert_allclose(found["knife"].move, np.where(near[:, None], moved.apply(off[0]) - slip, 0), atol=1e-5)
+
 
 def test_who_is_far_off_is_told_the_truth_and_who_sees_it_now_believes_that():
     hidden, recall, scales = setting()
@@ -97,6 +105,10 @@ def test_who_is_far_off_is_told_the_truth_and_who_sees_it_now_believes_that():
     assert SAME < little.max() < NEAR
     found = beliefs_of(recall, hidden, scales, nudged, kept, told(hidden, scales, nudged), right)
     np.testing.assert_allclose(found["apple"].move, 0, atol=1e-5, err_msg="it is not where it lay, and that is seen")
+    wrong = np.concatenate([own, lying(place, still), lying(place - little, still)], axis=1)
+    found = beliefs_of(recall, hidden, scales, nudged, kept, told(hidden, scales, wrong), right)
+    off_by = np.tile(-little, (WORLDS, 1))
+    np.testing.assert_allclose(found["apple"].move, off_by, atol=1e-5, err_msg="what is seen is worse than the memory")
     half = np.arange(WORLDS) < 3
     true = true_at(half, {"apple": Belief(jnp.ones((WORLDS, 3)), jnp.zeros((WORLDS, 4)))})["apple"]
     np.testing.assert_array_equal(true.move[:, 0], 1.0 * ~half)

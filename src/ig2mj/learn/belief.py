@@ -27,7 +27,8 @@ NEAR = 0.05
 
 SAME = 0.01
 """m by which what is remembered may be off by more or less than it was at first: else the object has moved since. An
-expert that is not told so finds a fruit cut that has rolled away, and wants nothing more."""
+expert that is not told so finds a fruit cut that has rolled away, and wants nothing more. By more than that what is
+seen now must be nearer to the truth."""
 
 TURNED = 0.6
 """rad: nor how it lies."""
@@ -78,7 +79,9 @@ def beliefs_of(
     """How wrong an actor is about each object that it guesses, in the frame of the robot's base.
 
     It takes an object to be where it lay at first or, if a hand took it, where that brings it, whichever is nearer to
-    the truth; if it is at neither of them any more, to be where it sees it now.
+    the truth; if it has moved from where it lay at first, to be where it sees it now, should that be nearer. What a
+    hand holds it sees worse than it remembers it: an expert that now and then answered for what is seen of that would
+    be followed by nobody, who cannot know when.
 
     Args:
       scales: mean and deviation of the vector. vector: as it was observed. kept: what is remembered now. at_first: by
@@ -95,7 +98,9 @@ def beliefs_of(
     moves = _moves(recall, scales, vector, believed)
     errors = length(moves)
     remembered = errors[:, :-1].argmin(axis=1)
-    sees = jnp.abs(jnp.min(errors[:, :-1], axis=1) - at_first) > SAME
+    least = jnp.min(errors[:, :-1], axis=1)
+    moved, nearer = jnp.abs(least - at_first) > SAME, least - errors[:, -1] > SAME
+    sees = moved & nearer & (remembered == 0)  # without a hand that holds something all ways but the last are one
     which = jnp.where(sees, believed.shape[1] - 1, remembered)[:, None, :, None]
     move = jnp.take_along_axis(moves, which, axis=1)[:, 0]
     turned = _quats(jnp.take_along_axis(believed[..., 3:], which, axis=1)[:, 0])
