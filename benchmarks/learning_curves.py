@@ -63,7 +63,7 @@ towel of "believed" with the likeliest, too; until second 150 success is of the 
 played of the first is the policy of second 480. "rows_averaged" (the actor that acts is a mean of weights) and the
 same with "told_16384" ran side by side on an H100 each, scheduled for 486 s and cut off at seconds 407 and 399.
 "remembered": as "rows_averaged", to the end, with labels for what a hand holds as it is remembered; "deeper" beside it
-on another H100 with layers of 120,120,120,120. Of both the best policy of the run was played, as always.
+on another H100 with layers of 120,120,120,120. What was played are the policies of seconds 419 and 421, the best ones.
 SlicingFruit with `--expert`: the first run was cut off; "48_updates" has `guided=0.4 copied=0.25 reach=30 updates=48`;
 "trusted" `guided=0.4 copied=0.4 trust=1 reach=30 updates=48`; "rgbd64" the same with `--pixels 64`, cut off at second
 161. In these the peak after the expert's help has ended is one of counting: all worlds then begin alone at one moment,

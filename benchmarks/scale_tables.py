@@ -135,7 +135,8 @@ def forecast(gpus: int, one: dict[str, float], sizes: dict[str, int], args: argp
 
 def success(row: dict[str, Any]) -> str:
     """A training's time and steps, or how far it came."""
-    steps = f"{row['seconds']:.0f} s, {amount(row['env_steps'])} steps"
+    card = f" ({row['device']})" if "device" in row else ""
+    steps = f"{row['seconds']:.0f} s, {amount(row['env_steps'])} steps{card}"
     return steps if row["solved"] else f"{steps}: {100 * (row['success'] or 0.0):.0f} %"
 
 
@@ -235,7 +236,8 @@ def tables(args: argparse.Namespace) -> str:
     parts += ["### A billion agent steps", table(head, rows)]
     assumed = (
         f"Forecasts (~) take {args.inside:g} GB/s between a host's {HOST} GPUs, {args.between:g} GB/s between hosts "
-        f"and {1e6 * LATENCY:g} us for each doubling of the number of GPUs; nothing of them is measured."
+        f"and {1e6 * LATENCY:g} us for each doubling of the number of GPUs; nothing of them is measured. "
+        f"What sharing costs an update is that of the newest two cards above, whichever they were."
     )
     return "\n\n".join([*parts, assumed])
 

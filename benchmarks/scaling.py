@@ -131,7 +131,7 @@ def start(case: str, count: int, args: Args, way: str = "") -> list[Process]:
     together = way == "together"
     flags = os.environ.get("XLA_FLAGS", "").split()
     flags += [GRAPHS] if way == "graphs" else []
-    flags += [f"--{SCRATCH_IN_PLACE}=true"] if way not in ("", "apart", "moving") else []
+    flags += [f"--{SCRATCH_IN_PLACE}=false"] if way == "moving" else []
     flags += [PROFILED] if args.kernels is not None and word == "learner" and not args.cpu else []
     flags += [f"--xla_force_host_platform_device_count={count}"] if together and args.cpu else []
     with socket.create_server(("127.0.0.1", 0)) as free:
@@ -149,7 +149,8 @@ def start(case: str, count: int, args: Args, way: str = "") -> list[Process]:
         if word == "learner" and count > 1 and not together:
             environment["JAX_COORDINATOR_ADDRESS"] = f"127.0.0.1:{port}"
             environment["JAX_NUM_PROCESSES"], environment["JAX_PROCESS_ID"] = str(count), str(k)
-        words = [str(HERE / "scaling_worker.py"), word, json.dumps({**settings, "apart": way == "apart"})]
+        more = {"apart": way == "apart", "several": word == "learner" and count > 1}
+        words = [str(HERE / "scaling_worker.py"), word, json.dumps({**settings, **more})]
         found.append(Process(words, args.logs / f"{name_of(case, count, way)}-{k}.log", environment))
     return found
 

@@ -28,6 +28,7 @@ from throughput import device, memory, program
 
 from ig2mj.cluster.place import place_of
 from ig2mj.cluster.team import Team
+from ig2mj.process import keep_scratch_in_place
 
 Measure = Callable[[float], dict[str, Any]]
 Profile = Callable[[pathlib.Path], dict[str, Any]]
@@ -200,6 +201,8 @@ def _bytes(tree: Any) -> int:
 def main() -> None:
     began = time.time()
     case, settings = sys.argv[1], json.loads(sys.argv[2])
+    if settings["several"]:
+        keep_scratch_in_place()  # as `ig2mj train` does
     team = Team.join(place_of(os.environ))
     with team.together():
         profile = None

@@ -12,6 +12,8 @@ import pathlib
 import sys
 from typing import Any
 
+import jax
+
 import ig2mj.learn.train
 from ig2mj.cli import train as command
 
@@ -34,6 +36,7 @@ def main() -> None:
     command.run(**settings)
     row, stopped = results[0].row, results[0].stopped
     about = {name: row.get(name) for name in ("seconds", "env_steps", "success", "compile_s")}
+    about["device"] = jax.devices()[0].device_kind
     print(f"DONE {json.dumps({**about, 'stopped': stopped})}", flush=True)
 
 

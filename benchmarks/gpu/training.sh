@@ -18,8 +18,8 @@
 # that JAX takes for each training (0.26), $BATCH, $RATE (of learning), $CAPACITY, $STARTS and $LOOK: pictures of start
 # states, and updates of the guess on them; $UPDATES: for each step of the worlds; $AVERAGE: of how many updates the weights
 # that act are the mean (0); $TOLD: samples of an update without pictures; $BELIEVED=0: labels are for where things are;
-# with $RECALL=0 also: actors remember nothing; $ACTOR: sizes of the layers after the encoder (160,160); $READY: seconds until training begins, at most; $PLAY=0: no evaluation
-# on the card.
+# with $RECALL=0 also: actors remember nothing; $ACTOR: sizes of the layers after the encoder (160,160); $READY: seconds
+# until training begins, at most; $PLAY=0: no evaluation on the card.
 set -u
 out=${OUT:-out/training}; mkdir -p "$out"
 minutes=${MINUTES:-5} engine=${ENGINE:-warp} fraction=${FRACTION:-0.26}

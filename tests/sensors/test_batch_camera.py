@@ -15,6 +15,7 @@ from bench_scene import TOP
 
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.warp.engine import WarpEngine
+from ig2mj.engine.warp.patches.graphs import Filled
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.sensors.batch_camera import BatchCamera
 from ig2mj.sensors.images import RayPattern
@@ -160,6 +161,25 @@ def shoot(engine, model, physics):
     call = jax.jit(camera.__call__)
     view = engine.view(physics)
     return lambda states, now=physics: jax.tree.map(np.asarray, call(now, view, states))
+
+
+def test_pictures_find_their_cuda_graphs_by_arrays_with_elements(engine, model, physics, monkeypatch):
+    called, trace = [], Filled.__call__
+
+    def noted(filled, *arrays, **named):
+        called.append((filled, arrays))
+        return trace(filled, *arrays, **named)
+
+    monkeypatch.setattr(Filled, "__call__", noted)
+    camera = BatchCamera(engine, model, ["front"], width=8, height=8, particles=0)
+    view, states = engine.view(physics), initial_states(model, 2)
+    jax.jit(lambda: camera(physics, view, states).rgb).trace()
+    assert called
+    for filled, arrays in called:
+        counted = set(filled._call.array_input_indices)
+        without = [filled._call.input_args[k].name for k in filled._indices if not arrays[k].size]
+        assert "flexvert_xpos" in without  # there is nothing soft in it
+        assert counted == {k for k in filled._indices if arrays[k].size}
 
 
 @pytest.mark.slow

@@ -51,6 +51,10 @@ _callables.add({(wp, "jax_callable"): _callable})
 
 @contextlib.contextmanager
 def graphs_kept() -> Iterator[None]:
-    """Calls of Warp that this thread traces inside the block find their graphs by arrays with elements alone."""
+    """Calls of Warp that this thread traces inside the block find their graphs by arrays with elements alone.
+
+    MJX keeps what it registered of a function. Its cameras are the same functions for everybody: theirs find graphs so
+    for all users in the process, or for none where another one drew first.
+    """
     with _callables.entered():
         yield
