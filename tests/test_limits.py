@@ -28,7 +28,7 @@ def test_a_call_returns_its_value_and_what_it_took():
 
 
 def test_memory_above_the_limit_fails_the_check():
-    with pytest.raises(AssertionError, match="took .* MiB"):
+    with pytest.raises(AssertionError, match=r"took .* MiB"):
         run_limited(allocate, 1500).check()
     run_limited(allocate, 4000).check(MemoryError)
 
