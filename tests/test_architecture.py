@@ -19,6 +19,7 @@ SRC = ROOT / "src" / "ig2mj"
 LAYERS = [
     "errors",
     "install_hint",
+    "files",
     "process",
     "cluster",
     "knowledge",
@@ -49,6 +50,7 @@ LAYERS = [
 ]
 #: Room -> packages that must not appear in it, not even inside a function.
 FORBIDDEN = {
+    "files": {"jax", "flax", "mujoco", "warp"},
     "knowledge": {"jax", "flax", "mujoco", "warp", "numpy", "bddl"},
     "geometry": {"mujoco", "warp"},
     "states": {"mujoco", "warp"},
@@ -56,7 +58,7 @@ FORBIDDEN = {
 }
 #: Packages beside `ig2mj` -> what they may import of it.
 GUESTS = {
-    "converters": ("ig2mj.knowledge", "ig2mj.scene.manifest", "ig2mj.errors", "ig2mj.install_hint"),
+    "converters": ("ig2mj.knowledge", "ig2mj.scene.manifest", "ig2mj.errors", "ig2mj.install_hint", "ig2mj.files"),
     "homes": ("ig2mj.knowledge", "ig2mj.errors", "ig2mj.install_hint"),
 }
 GUEST_NAMES = {"ig2mj_converters", "ig2mj_homes"}

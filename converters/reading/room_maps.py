@@ -5,6 +5,7 @@ All layout images are square, 0.01 m per pixel, centred on the world's origin, r
 
 from __future__ import annotations
 
+import collections
 import io
 import os
 import pathlib
@@ -23,6 +24,7 @@ SEG_RESOLUTION = 0.1  # m, of the room maps (seg_map_resolution)
 TRAV_RESOLUTION = 0.1  # m, of the traversability maps (trav_map_resolution)
 TRAV_EROSION = 2  # cells (trav_map_erosion)
 MAX_SIDE = 20_000  # pixels: a home of 200 m
+MOST_ROOMS = 32_767  # instances: a cell of the room map is an int16
 
 
 def read_room_maps(
@@ -58,14 +60,17 @@ def name_rooms(
     """(room map, names, types) from the resized maps [n, n]: a room's type is that of its first pixel, row by row.
 
     Raises:
-      InputError: a room's first pixel has no type, or one beyond room_categories.txt.
+      InputError: a room's first pixel has no type, or one beyond room_categories.txt; or there are too many rooms.
     """
-    room_map = np.zeros(instance.shape, dtype=np.int16)
+    rooms, first, number = np.unique(instance, return_index=True, return_inverse=True)
+    inside = rooms != 0
+    if inside.sum() > MOST_ROOMS:
+        raise InputError(file, f"the instance map has {inside.sum()} rooms, and the limit is {MOST_ROOMS}")
     names: list[str] = []
     types: list[str] = []
-    for room in np.unique(instance[instance != 0]):
-        cells = instance == room
-        value = int(semantic.flat[np.argmax(cells)])
+    counts = collections.Counter[str]()
+    for room, at in zip(rooms[inside], first[inside], strict=True):
+        value = int(semantic.flat[at])
         if not 1 <= value <= len(room_types):
             raise InputError(
                 file,
@@ -73,9 +78,11 @@ def name_rooms(
                 element=f"room instance {room}",
             )
         kind = room_types[value - 1]
-        names.append(f"{kind}_{types.count(kind)}")
+        names.append(f"{kind}_{counts[kind]}")
         types.append(kind)
-        room_map[cells] = len(names)
+        counts[kind] += 1
+    place = np.where(inside, np.cumsum(inside), 0).astype(np.int16)
+    room_map = place[number].reshape(instance.shape)
     return room_map, names, types
 
 

@@ -31,6 +31,8 @@ from ig2mj.demos.reader import Run
 from ig2mj.demos.replay import Replayed, Replayer
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.errors import InputError
+from ig2mj.files.hdf5 import Hdf5File
+from ig2mj.files.npz import refuse_nonfinite
 from ig2mj.scene.scene import Scene
 
 METADATA = "/metadata/"
@@ -172,36 +174,23 @@ def read_igibson(file: str | os.PathLike) -> IGibsonLog:
     Raises:
       InputError: it is missing, broken, or no such log; the message names the field.
     """
-    import h5py
-
-    path = pathlib.Path(file)
-    try:
-        with h5py.File(path, "r") as opened:
-            return _log(path, opened)
-    except OSError as e:
-        raise InputError(path, "is not an HDF5 file, or a broken one") from e
+    with Hdf5File(file, fix="it is not an iGibson log") as opened:
+        return _log(opened)
 
 
-def _log(path: pathlib.Path, opened: Any) -> IGibsonLog:
-    import h5py
-
-    metadata = {str(k).removeprefix(METADATA): _plain(v) for k, v in opened.attrs.items()}
-    group = opened.get("physics_data")
-    if not isinstance(group, h5py.Group):
-        raise InputError(path, "is missing", element="physics_data", fix="it is not an iGibson log")
+def _log(opened: Hdf5File) -> IGibsonLog:
+    metadata = {name.removeprefix(METADATA): value for name, value in opened.attributes().items()}
     known = _names(str(metadata.get("obj_body_id_to_name", "")))
     found: dict[str, dict[str, np.ndarray]] = {kind: {} for kind in ("position", "orientation", "joint_state")}
-    names = {str(body): known.get(str(body), str(body)) for body in group}
+    names = {body: known.get(body, body) for body in opened.names("physics_data")}
     for body, name in names.items():
         for kind, rows in found.items():
-            rows[name] = _array(path, opened, f"physics_data/{body}/{kind}", WIDTHS.get(kind))
+            rows[name] = _array(opened, f"physics_data/{body}/{kind}", WIDTHS.get(kind))
     lengths = {len(rows) for of in found.values() for rows in of.values()}
     if len(lengths) > 1:
-        raise InputError(path, f"have {sorted(lengths)} frames", element="physics_data", fix="it is cut off")
-    actions: dict[str, np.ndarray] = {}
-    for folder in ("agent_actions", "action"):
-        if isinstance(opened.get(folder), h5py.Group):
-            opened[folder].visititems(lambda name, at, f=folder: _note(path, opened, actions, f"{f}/{name}", at))
+        raise InputError(opened.file, f"have {sorted(lengths)} frames", element="physics_data", fix="it is cut off")
+    folders = [folder for folder in ("agent_actions", "action") if opened.has(folder)]
+    actions = {f"{f}/{name}": _array(opened, f"{f}/{name}", None) for f in folders for name in opened.names(f)}
     goal = "goal_status/satisfied"
     return IGibsonLog(
         metadata,
@@ -209,52 +198,28 @@ def _log(path: pathlib.Path, opened: Any) -> IGibsonLog:
         found["position"],
         {name: rows[:, [3, 0, 1, 2]] for name, rows in found["orientation"].items()},
         found["joint_state"],
-        _array(path, opened, goal, None) if goal in opened else None,
+        _array(opened, goal, None) if opened.has(goal) else None,
         actions,
     )
 
 
-def _note(path: pathlib.Path, opened: Any, actions: dict[str, np.ndarray], name: str, at: Any) -> None:
-    if hasattr(at, "shape"):
-        actions[name] = _array(path, opened, name, None)
-
-
-def _array(path: pathlib.Path, opened: Any, name: str, width: int | None) -> np.ndarray:
+def _array(opened: Hdf5File, name: str, width: int | None) -> np.ndarray:
     """[N, width] numbers that are in this file. Raises InputError."""
-    import h5py
-
-    link = opened.get(name, getlink=True)
-    array = opened.get(name) if isinstance(link, h5py.HardLink) else None
-    if not isinstance(array, h5py.Dataset) or array.ndim != 2 or array.dtype.kind not in "fiu":
-        raise InputError(path, "is not a table of numbers", element=name)
+    array = opened.array(name, kinds="fiu", ndim=2)
     if width is not None and array.shape[1] != width:
-        raise InputError(path, f"has {array.shape[1]} numbers a frame, and must have {width}", element=name)
-    if array.is_virtual or array.external or array.shape[0] > LONGEST or array.shape[1] > 4096 or not _there(array):
-        raise InputError(path, f"claims {array.shape[0]} frames that are not there", element=name)
-    try:
-        return np.asarray(array[:], np.float64)
-    except (OSError, RuntimeError) as e:
-        raise InputError(path, f"cannot be read: {' '.join(str(e).split())}", element=name) from e
-
-
-def _there(array: Any) -> bool:
-    if not array.size:
-        return True
-    if array.chunks is None:
-        return array.id.get_storage_size() == array.nbytes
-    needed = -(-array.shape[0] // array.chunks[0]) * -(-array.shape[1] // array.chunks[1])
-    return array.id.get_num_chunks() >= needed and array.chunks[0] * array.chunks[1] <= 2**24
+        raise opened.broken(name, f"has {array.shape[1]} numbers a frame, and must have {width}")
+    if array.shape[0] > LONGEST or array.shape[1] > 4096:
+        raise opened.broken(name, f"has shape {array.shape}: no log is as large")
+    values = opened.read(name, kinds="fiu", ndim=2).astype(np.float64)
+    refuse_nonfinite(values, opened.file, name)
+    return values
 
 
 def _names(text: str) -> dict[str, str]:
     """Of bodies, from JSON or from YAML's lines "12: name"."""
     try:
         found = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         pairs = (line.partition(":") for line in text.splitlines())
         found = {key.strip(" '\""): name.strip(" '\"") for key, colon, name in pairs if colon}
     return {str(k): str(v) for k, v in found.items()} if isinstance(found, dict) else {}
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value

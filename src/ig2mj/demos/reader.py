@@ -6,7 +6,7 @@ time than some hundred rows. No pickle, no links out of the file.
 
 from __future__ import annotations
 
-import json
+import math
 import os
 import pathlib
 from typing import Any
@@ -15,14 +15,16 @@ import numpy as np
 
 from ig2mj.demos.writer import FLUSH, FORMAT, FORMAT_VERSION
 from ig2mj.errors import InputError
+from ig2mj.files.content import decode_json
+from ig2mj.files.hdf5 import Hdf5File
 
 FIX = "`ig2mj rollout --record FILE` and `ig2mj.demos.record` write such files"
 
 ATTRIBUTES = ("mujoco", "ig2mj", "scene", "scene_hash", "model_hash")
 """What every recording says of itself."""
 
-LARGEST_CHUNK = 2**28
-"""Bytes that are unpacked at a time."""
+LARGEST_ROWS = 2**28
+"""Bytes of the rows that are read at a time."""
 
 
 class Run:
@@ -33,10 +35,10 @@ class Run:
       names, step_names: of its arrays, without "frames/" and "steps/".
     """
 
-    def __init__(self, recording: Recording, group: Any):
+    def __init__(self, recording: Recording, name: str, attributes: dict[str, Any]):
         """Looks at what it claims to be, and reads no array. Raises InputError."""
-        self.file, self.name, self._recording = recording.file, str(group.name).strip("/"), recording
-        self.attributes: dict[str, Any] = {name: _plain(value) for name, value in group.attrs.items()}
+        self.file, self.name, self._recording = recording.file, name, recording
+        self.attributes = attributes
         self.frames = self._whole_number("frames")
         self.world, self.row = self._whole_number("world"), self._whole_number("row", 0)
         self.names = [name[7:] for name in recording.columns if name.startswith("frames/")]
@@ -82,14 +84,15 @@ class Run:
 
     def _read_parts(self, parts: Any) -> np.ndarray:
         """[n, 2] stretches of the file's index."""
-        if not isinstance(parts, np.ndarray) or parts.dtype.kind not in "iu" or parts.shape[1:] != (2,):
+        if not isinstance(parts, np.ndarray) or parts.dtype.kind not in "iu" or parts.shape != (len(parts), 2):
             raise self.broken("attribute parts", "must be pairs of whole numbers")
         parts = parts.astype(np.int64)
         count = self._recording.index.shape[0]
         if (parts < 0).any() or (parts[:, 0] > count).any() or (parts[:, 1] > count - parts[:, 0]).any():
             raise self.broken("attribute parts", f"names frames that are not there; the file has {count}")
-        if parts[:, 1].sum() != self.frames:
-            raise self.broken("attribute frames", f"claims {self.frames} frames, and {parts[:, 1].sum()} are there")
+        if parts[:, 1].sum() != self.frames or self.frames > count:
+            there = min(parts[:, 1].sum(), count)
+            raise self.broken("attribute frames", f"claims {self.frames} frames, and {there} are there")
         return parts
 
     def kept(self, start: int, stop: int) -> np.ndarray:
@@ -132,15 +135,8 @@ class Recording:
 
     def __init__(self, file: str | os.PathLike):
         """Opens it. Raises InputError: it is missing, broken, of another kind, or not what it claims to be."""
-        import h5py
-
         self.file = path = pathlib.Path(file)
-        if not path.is_file():
-            raise InputError(path, "there is no such file", fix=FIX)
-        try:
-            self._opened = h5py.File(path, "r")
-        except OSError as e:
-            raise InputError(path, "is not an HDF5 file, or a broken one", fix=FIX) from e
+        self._opened = Hdf5File(path, fix=FIX)
         try:
             self._read()
         except InputError:
@@ -151,9 +147,7 @@ class Recording:
             raise InputError(path, f"is broken: {' '.join(str(e).split())}", fix=FIX) from e
 
     def _read(self) -> None:
-        import h5py
-
-        self.header: dict[str, Any] = {name: _plain(value) for name, value in self._opened.attrs.items()}
+        self.header: dict[str, Any] = self._opened.attributes()
         if self.header.get("format") != FORMAT or self.header.get("version") != FORMAT_VERSION:
             raise InputError(self.file, f"is not {FORMAT}, version {FORMAT_VERSION}", element="format", fix=FIX)
         for name in ATTRIBUTES:
@@ -163,34 +157,25 @@ class Recording:
         if not all(isinstance(name, str) and name.startswith(("frames/", "steps/")) for name in columns):
             raise InputError(self.file, "must be names of arrays", element="attribute columns", fix=FIX)
         self.columns: dict[str, int] = {name: k for k, name in enumerate(columns)}
-        self.index = self._array("index")
-        if self.index.ndim != 2 or self.index.shape[1] != len(columns) or self.index.dtype.kind != "i":
+        if len(self.columns) < len(columns):
+            raise InputError(self.file, "names an array twice", element="attribute columns", fix=FIX)
+        self.index = self._array("index", "i", 2)
+        if self.index.shape[1] != len(columns):
             raise InputError(self.file, f"must have {len(columns)} columns", element="index", fix=FIX)
         # A process that was killed at once has written no array yet.
-        there = {name: self._array(name) for name in columns if self.index.shape[0] or name in self._opened}
+        there = {name: self._array(name) for name in columns if self.index.shape[0] or self._opened.has(name)}
         self.arrays: dict[str, Any] = {name: array for name, array in there.items() if array is not None}
         self.runs: list[Run] = []
-        for name in sorted(set(self._opened) - {"index", "frames", "steps"}):
-            group = _hard(self._opened, name)
-            if not isinstance(group, h5py.Group):
-                raise InputError(self.file, "is not a run", element=name, fix=FIX)
-            self.runs.append(Run(self, group))
+        for name in self._opened.names():
+            if name not in ("index", "frames", "steps"):
+                self.runs.append(Run(self, name, self._opened.attributes(name)))
 
-    def _array(self, name: str) -> Any:
+    def _array(self, name: str, kinds: str = "biuf", ndim: int | None = None) -> Any:
         """An array of numbers that is in this very file. Raises InputError."""
-        import h5py
-
-        array: Any = self._opened
-        for part in name.split("/"):
-            array = _hard(array, part) if isinstance(array, h5py.Group) else None
-        if not isinstance(array, h5py.Dataset) or array.ndim < 1:
-            raise InputError(self.file, "is missing", element=name, fix=FIX)
-        if array.is_virtual or array.external or array.dtype.kind not in "biuf":
-            raise InputError(
-                self.file, f"is not an array of numbers in this file ({array.dtype})", element=name, fix=FIX
-            )
-        if array.shape[0] and array.size and not _there(array):
-            raise InputError(self.file, f"claims {array.shape[0]} rows that are not there", element=name, fix=FIX)
+        array = self._opened.array(name, kinds=kinds, ndim=ndim)
+        row = array.dtype.itemsize * math.prod(array.shape[1:])
+        if row * FLUSH > LARGEST_ROWS:
+            raise InputError(self.file, f"has rows of {row} bytes", element=name, fix=FIX)
         return array
 
     def read(self, name: str, start: int, stop: int) -> np.ndarray:
@@ -204,43 +189,17 @@ class Recording:
         """An attribute of the file of this type; lists and tables are written as JSON. Raises InputError."""
         value = self.header.get(name)
         if kind in (list, dict):
-            try:
-                value = json.loads(str(value))
-            except ValueError:
-                value = None
+            value = decode_json(str(value), self.file, fix=FIX)
         if not isinstance(value, kind) or isinstance(value, bool):
             raise InputError(self.file, f"is not of type {kind.__name__}", element=f"attribute {name}", fix=FIX)
         return value
 
     def close(self) -> None:
         """May be called twice."""
-        if self._opened:
-            self._opened.close()
+        self._opened.close()
 
     def __enter__(self) -> Recording:
         return self
 
     def __exit__(self, *error: object) -> None:
         self.close()
-
-
-def _hard(group: Any, name: str) -> Any:
-    """What a group has under a name in this very file, or None."""
-    import h5py
-
-    link = group.get(name, getlink=True)
-    return group[name] if isinstance(link, h5py.HardLink) else None
-
-
-def _there(array: Any) -> bool:
-    """Whether all rows of an array are in the file, and none is of more than a reasonable size."""
-    row = array.dtype.itemsize * int(np.prod(array.shape[1:], dtype=np.int64))
-    if array.chunks is None:
-        return array.id.get_storage_size() == array.nbytes
-    if array.chunks[0] > 4 * FLUSH or array.chunks[1:] != array.shape[1:] or array.chunks[0] * row > LARGEST_CHUNK:
-        return False
-    return array.id.get_num_chunks() * array.chunks[0] >= array.shape[0]
-
-
-def _plain(value: Any) -> Any:
-    return value.item() if isinstance(value, np.generic) else value

@@ -149,8 +149,8 @@ class Replayer:
         Raises:
           InputError: an array of the file is broken.
         """
-        rows = run.frame_rows(self._names, frame, frame + 1, self._like)
-        return self._put({run.world: [array[0, ...] for array in rows]}, {run.world: run}, used)
+        rows = [array[0, ...] for array in run.frame_rows(self._names, frame, frame + 1, self._like)]
+        return self._put({run.world: rows if frame else self._start(rows, run)}, {run.world: run}, used)
 
     def rounds(self, runs: Sequence[Run]) -> Iterator[dict[int, Run]]:
         """Runs that are replayed beside each other, by their worlds."""
@@ -173,7 +173,7 @@ class Replayer:
         readers = {world: self._frames(run) for world, run in now.items()}
         actions = {world: self._actions(run) for world, run in now.items()}
         recorded = {world: next(reader) for world, reader in readers.items()}
-        state = self._put({world: self._there(rows, now[world]) for world, rows in recorded.items()}, now)
+        state = self._put({world: self._start(rows, now[world]) for world, rows in recorded.items()}, now)
         longest, zero = max(run.frames for run in now.values()), np.zeros(self.env.action_space.shape, np.float32)
         for k in range(longest):
             if k:
@@ -204,15 +204,19 @@ class Replayer:
             there = {world: rows for world, reader in readers.items() if (rows := next(reader, None)) is not None}
             if not there:
                 continue
-            last |= there
+            last |= there if k else {world: self._start(rows, now[world]) for world, rows in there.items()}
             state = self._put(last, now, state)
             if watch is not None:
                 watch(state, {w: now[w] for w in there}, k)
         return []
 
-    def _there(self, rows: list[np.ndarray] | None, run: Run) -> list[np.ndarray]:
+    def _start(self, rows: list[np.ndarray] | None, run: Run) -> list[np.ndarray]:
+        """A first frame. Raises InputError: there is none, or a world cannot begin with it."""
         if rows is None:
             raise run.broken("frames", "has no first frame")
+        for name, row in zip(self._names, rows, strict=True):
+            if name.startswith("physics/") and row.dtype.kind == "f" and not np.isfinite(row).all():
+                raise run.broken(f"frames/{name}", "begins with numbers that are not finite")
         return rows
 
     def _put(self, rows: dict[int, list[np.ndarray]], now: dict[int, Run], used: EnvState | None = None) -> EnvState:

@@ -15,11 +15,11 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-import pathlib
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import jax.numpy as jnp
+import msgspec
 import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float
@@ -27,6 +27,9 @@ from jaxtyping import Bool, Float
 from ig2mj.engine.view import Array
 from ig2mj.envs.observations import Space
 from ig2mj.errors import Ig2mjError, InputError
+from ig2mj.files.content import decode_json
+from ig2mj.files.hdf5 import Hdf5File
+from ig2mj.files.npz import refuse_nonfinite
 from ig2mj.learn.checkpoints import refuse_difference
 from ig2mj.learn.collect import FINAL, TrainingEnv
 from ig2mj.learn.perception import Perception, Seen, blank
@@ -41,6 +44,10 @@ HOPELESS = 50
 """Failures after which too few successes end a collection."""
 
 _FIX = "`ig2mj demos collect` writes such files"
+
+_Type = Literal["bool", "uint8", "uint16", "uint32", "int8", "int16", "int32", "int64", "float16", "float32", "float64"]
+_Shape = tuple[tuple[Annotated[int, msgspec.Meta(ge=0, le=2**20)], ...], _Type]
+"""Of an observation: shape of one world, and type."""
 
 
 @struct.dataclass
@@ -166,11 +173,21 @@ def _stacked(rows: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
 
 def about(file: str | os.PathLike) -> tuple[dict[str, Any], dict[str, Space]]:
     """What a file is of: the environment (`policies.world_of`), and its observations. Raises InputError."""
-    with _opened(pathlib.Path(file)) as found:
-        spaces = json.loads(str(found.attrs["spaces"]))
-        world = json.loads(str(found.attrs["world"]))
-    made = {n: Space(tuple(shape), np.dtype(kind).type, -np.inf, np.inf) for n, (shape, kind) in spaces.items()}
-    return world, made
+    with _opened(file) as found:
+        return _about(found)
+
+
+def _about(found: Hdf5File) -> tuple[dict[str, Any], dict[str, Space]]:
+    header = found.attributes()
+    element = "attributes world and spaces"
+    if not all(isinstance(header.get(name), str) for name in ("world", "spaces")):
+        raise found.broken(element, "are missing: it does not say what it is of")
+    world, spaces = (decode_json(header[name], found.file, kind=dict, fix=_FIX) for name in ("world", "spaces"))
+    try:
+        known = msgspec.convert(spaces, dict[str, _Shape])
+        return world, {n: Space(shape, np.dtype(kind).type, -np.inf, np.inf) for n, (shape, kind) in known.items()}
+    except (msgspec.ValidationError, RecursionError, TypeError, ValueError) as e:
+        raise found.broken(element, e) from e
 
 
 def load_demos(file: str | os.PathLike, perception: Perception, world: Mapping[str, Any] | None = None) -> Demos:
@@ -182,69 +199,65 @@ def load_demos(file: str | os.PathLike, perception: Perception, world: Mapping[s
     Raises:
       InputError: no such file, one of another kind or environment, or a broken one; names the run and the field.
     """
-    path = pathlib.Path(file)
-    _, spaces = about(path)
-    missing = [name for name in perception.names if name not in spaces]
-    if missing:
-        fix = "`ig2mj demos collect --obs rgbd` records pictures; `ig2mj train --algo sac --expert` needs no file"
-        raise InputError(path, f"holds no {' and no '.join(missing)}", fix=fix)
-    parts = list(_runs(path, perception, world))
-    if not parts:
-        raise InputError(path, "holds no run", fix=_FIX)
+    with _opened(file) as found:
+        own, spaces = _about(found)
+        if world is not None:
+            refuse_difference(found.file, own, world)
+        missing = [name for name in perception.names if name not in spaces]
+        if missing:
+            fix = "`ig2mj demos collect --obs rgbd` records pictures; `ig2mj train --algo sac --expert` needs no file"
+            raise InputError(found.file, f"holds no {' and no '.join(missing)}", fix=fix)
+        actions = len(own["actions"]) if isinstance(own.get("actions"), list) else None
+        parts = [_read(found, name, perception, spaces, actions) for name in found.names()]
+        if not parts:
+            raise InputError(found.file, "holds no run", fix=_FIX)
+        if len({part["action"].shape[1] for part in parts}) > 1:
+            raise found.broken("action", "has another width in another run")
     fields = {name: jnp.asarray(np.concatenate([p[name] for p in parts])) for name in parts[0]}
     seen, after = (Seen(fields.pop(f"{k}_vector"), fields.pop(f"{k}_picture")) for k in ("seen", "after"))
     return Demos(seen=seen, after=after, **fields)
 
 
-def _runs(
-    path: pathlib.Path, perception: Perception, world: Mapping[str, Any] | None
-) -> Iterator[dict[str, np.ndarray]]:
-    with _opened(path) as found:
-        if world is not None:
-            refuse_difference(path, json.loads(str(found.attrs["world"])), world)
-        for name in sorted(found):
-            try:
-                yield _read(found[name], perception)
-            except (KeyError, OSError, ValueError, TypeError) as e:
-                raise InputError(path, f"cannot be read: {' '.join(str(e).split())}", element=name) from e
-
-
 @contextlib.contextmanager
-def _opened(path: pathlib.Path) -> Iterator[Any]:
+def _opened(file: str | os.PathLike) -> Iterator[Hdf5File]:
     """An open file of demonstrations. Raises InputError."""
-    import h5py
-
-    if not path.is_file():
-        raise InputError(path, "there is no such file", fix=_FIX)
-    try:
-        opened = h5py.File(path, "r")
-    except OSError as e:
-        raise InputError(path, "is not an HDF5 file, or a broken one", fix=_FIX) from e
-    with opened as found:
-        if found.attrs.get("format") != FORMAT or found.attrs.get("version") != FORMAT_VERSION:
-            raise InputError(path, f"is not a file of {FORMAT}, version {FORMAT_VERSION}", fix=_FIX)
-        if not {"world", "spaces"} <= set(found.attrs):
-            raise InputError(path, "does not say what it is of", element="attributes world and spaces", fix=_FIX)
+    with Hdf5File(file, fix=_FIX) as found:
+        header = found.attributes()
+        if header.get("format") != FORMAT or header.get("version") != FORMAT_VERSION:
+            raise InputError(found.file, f"is not a file of {FORMAT}, version {FORMAT_VERSION}", fix=_FIX)
         yield found
 
 
-def _read(group: Any, perception: Perception) -> dict[str, np.ndarray]:
-    """One run; ValueError, KeyError where it is not what it should be."""
-    names = ("action", "label", "reward", "terminated", "truncated")
-    count = group["action"].shape[0]
+def _read(
+    found: Hdf5File, run: str, perception: Perception, spaces: Mapping[str, Space], actions: int | None
+) -> dict[str, np.ndarray]:
+    """One run. Raises InputError where it is not what it should be."""
+
+    def read(name: str, kinds: str, inner: tuple[int, ...], rows: int | None) -> np.ndarray:
+        element = f"{run}/{name}"
+        array = found.array(element, kinds=kinds)
+        if array.shape[1:] != inner or (rows is not None and array.shape[0] != rows):
+            wanted = ", ".join(map(str, ("any" if rows is None else rows, *inner)))
+            raise found.broken(element, f"has shape {array.shape}, and must have ({wanted})")
+        values = found.read(element, kinds=kinds)
+        refuse_nonfinite(values, found.file, element, _FIX)
+        return values
+
+    width = found.array(f"{run}/action", kinds="f", ndim=2).shape[1] if actions is None else actions
+    action = read("action", "f", (width,), None)
+    count = len(action)
     if not 0 < count <= LONGEST:
-        raise ValueError(f"action has {count} steps, at most {LONGEST} are read")
+        raise found.broken(f"{run}/action", f"has {count} steps, and at most {LONGEST} are read")
+    done = {name: read(name, "b", (), count) for name in ("terminated", "truncated")}
+    steps = {"action": action, "label": read("label", "f", (width,), count), "reward": read("reward", "f", (), count)}
+    of = {n: read(f"obs/{n}", np.dtype(spaces[n].dtype).kind, spaces[n].shape, count + 1) for n in perception.names}
     wanted = blank(perception, 1)
-    for name in names:
-        if group[name].shape[0] != count:
-            raise ValueError(f"{name} has {group[name].shape[0]} steps, and action {count}")
-    for name in perception.names:
-        if group[f"obs/{name}"].shape[0] != count + 1:
-            raise ValueError(f"obs/{name} has {group[f'obs/{name}'].shape[0]} rows, {count + 1} are expected")
-    run = {name: np.asarray(group[name]) for name in names}
-    seen = perception({name: np.asarray(group[f"obs/{name}"]) for name in perception.names})
+    try:
+        seen = perception(of)
+    except (ValueError, TypeError) as e:  # shapes that the file itself states, and that no picture has
+        raise found.broken(f"{run}/obs", e) from e
     vector, picture = np.asarray(seen.vector), np.asarray(seen.picture)
     if vector.shape[1] != wanted.vector.shape[1] or picture.shape[1] != wanted.picture.shape[1]:
-        raise ValueError(f"{vector.shape[1]} numbers are observed, {wanted.vector.shape[1]} are expected")
+        raise found.broken(f"{run}/obs", f"has {vector.shape[1]} numbers, and {wanted.vector.shape[1]} are expected")
     seen_after = {"seen_vector": vector[:-1], "seen_picture": picture[:-1]}
-    return {**run, **seen_after, "after_vector": vector[1:], "after_picture": picture[1:]}
+    return {**steps, **done, **seen_after, "after_vector": vector[1:], "after_picture": picture[1:]}

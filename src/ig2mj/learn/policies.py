@@ -12,6 +12,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+import math
 import os
 import pathlib
 from collections.abc import Mapping
@@ -24,12 +25,15 @@ from jaxtyping import Float
 
 from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError, InputError, PolicyMismatch
+from ig2mj.files.content import decode_json
+from ig2mj.files.npz import read_npz
 from ig2mj.learn.checkpoints import refuse_difference
 from ig2mj.learn.heads import drawn as drawn_from
 from ig2mj.learn.heads import likeliest
 from ig2mj.learn.moments import Moments
 from ig2mj.learn.networks import Actor
 from ig2mj.learn.perception import SIZE, Perception
+from ig2mj.learn.policy_checks import check_arrays, check_card, check_play, check_scales
 from ig2mj.learn.recall import Recall, looked
 
 FORMAT_VERSION = 1
@@ -90,7 +94,7 @@ class Policy:
     Attributes:
       card: "depends", "digest", "net", and how it was made ("command", "seed", "minutes", "device", "success", ...).
       weights: by the path of the layer. mean, deviation: of what the actor sees. hidden: those of what it guesses;
-        None where it does not.
+        None where it does not. file: where it was read from, for messages.
     """
 
     card: dict[str, Any]
@@ -98,6 +102,7 @@ class Policy:
     mean: Float[np.ndarray, "x"]
     deviation: Float[np.ndarray, "x"]
     hidden: tuple[Float[np.ndarray, "h"], Float[np.ndarray, "h"]] | None = None
+    file: object = "the policy"
 
     @classmethod
     def of(cls, algorithm: Any, learner: Any, depends: Mapping[str, Any], made: Mapping[str, Any]) -> Policy:
@@ -142,20 +147,27 @@ class Policy:
     @classmethod
     def load(cls, file: str | os.PathLike) -> Policy:
         """Reads it. Raises InputError."""
-        try:
-            with pathlib.Path(file).open("rb") as opened, np.load(opened, allow_pickle=False) as archive:
-                card = json.loads(bytes(archive[CARD]).decode())
-                weights = {n[8:]: archive[n].astype(np.float32) for n in archive.files if n.startswith("weights/")}
-                mean, deviation = archive["mean"], archive["deviation"]
-                hidden = (archive[HIDDEN[0]], archive[HIDDEN[1]]) if HIDDEN[0] in archive.files else None
-        except FileNotFoundError as e:
-            raise InputError(file, "there is no such file") from e
-        except Exception as e:  # numpy raises whatever a broken archive makes it stumble over
-            fix = "`ig2mj train` writes policies"
-            raise InputError(file, f"is not a policy ({type(e).__name__})", fix=fix) from e
+        fix = "`ig2mj train` writes policies"
+        arrays = read_npz(file, fix=fix)
+        raw = arrays.pop(CARD, np.zeros(0))
+        if raw.dtype != np.uint8:
+            raise InputError(file, "is missing", element=CARD, fix=fix)
+        card = decode_json(raw.tobytes(), file, kind=dict, fix=fix)
         if card.get("format") != FORMAT_VERSION:
             raise InputError(file, f"has format {card.get('format')}, and {FORMAT_VERSION} is what can be read")
-        return cls(card, weights, mean, deviation, hidden)
+        check_card(card, file)
+        check_arrays(arrays, file)
+        try:
+            weights = {name[8:]: a.astype(np.float32) for name, a in arrays.items() if name.startswith("weights/")}
+            nested(weights)
+            mean, deviation = arrays["mean"], arrays["deviation"]
+            hidden = (arrays[HIDDEN[0]], arrays[HIDDEN[1]]) if HIDDEN[0] in arrays else None
+        except (KeyError, TypeError, AttributeError) as e:  # missing, or a weight inside another one
+            raise InputError(file, f"is missing, or not an array: {e}", fix=fix) from e
+        check_scales(mean, deviation, file, "deviation")
+        if hidden is not None:
+            check_scales(*hidden, file, HIDDEN[1])
+        return cls(card, weights, mean, deviation, hidden, file)
 
     @property
     def observations(self) -> tuple[str, ...]:
@@ -215,17 +227,22 @@ class Policy:
         network = Actor(len(depends["actions"]), sizes, shape, net["net"], *more)
         size, mine = perception.actor_size, self.parameters()
 
-        def play(
-            obs: Mapping[str, Array], kept: Array, begins: Array, key: Array | None = None, parameters: Any = mine
-        ) -> tuple[Array, Array]:
+        def heads(vector: Array, picture: Array, kept: Array, begins: Array, parameters: Any) -> Any:
             params, *scales = parameters
-            seen = perception(obs)
 
             def look(*given: Any) -> Any:
                 return network.apply({"params": params}, *given)
 
-            given = seen.vector[:, :size], seen.picture, kept, begins
-            (head, log_std, _), kept = looked(look, recall, (scales[0], scales[1]), *given)
+            return looked(look, recall, (scales[0], scales[1]), vector, picture, kept, begins)
+
+        pixels, remembered = math.prod(shape) if shape else 0, 0 if recall is None else recall.size
+        check_play(heads, mine, size, pixels, remembered, self.file)
+
+        def play(
+            obs: Mapping[str, Array], kept: Array, begins: Array, key: Array | None = None, parameters: Any = mine
+        ) -> tuple[Array, Array]:
+            seen = perception(obs)
+            (head, log_std, _), kept = heads(seen.vector[:, :size], seen.picture, kept, begins, parameters)
             if not drawn:
                 return likeliest(head), kept
             assert key is not None, "a drawn action needs a key"

@@ -11,11 +11,12 @@ import importlib.metadata
 import os
 import pathlib
 import threading
-import zipfile
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from ig2mj.errors import InputError
+from ig2mj.files.npz import read_npz
 from ig2mj.process.compilation import cache_folder
 
 Hull = tuple[np.ndarray, np.ndarray]
@@ -23,9 +24,6 @@ Hull = tuple[np.ndarray, np.ndarray]
 
 FOLDER = "pieces"
 """Below ig2mj's cache folder."""
-
-BROKEN = (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile)
-"""What reading a file that was not written to its end can raise."""
 
 
 def hulls_of(meshes: Sequence[np.ndarray], make: Callable[[np.ndarray], Hull], source: pathlib.Path) -> list[Hull]:
@@ -59,11 +57,15 @@ def _key(meshes: Sequence[np.ndarray], source: pathlib.Path) -> str:
 def _read(file: pathlib.Path, count: int) -> list[Hull] | None:
     """None: there is no such file, or not with so many hulls."""
     try:
-        with file.open("rb") as opened, np.load(opened) as arrays:
-            planes, corners, numbers = arrays["planes"], arrays["corners"], arrays["numbers"]
-    except BROKEN:
+        arrays = read_npz(file)
+        planes, corners, numbers = arrays["planes"], arrays["corners"], arrays["numbers"]
+    except (InputError, KeyError):  # it was not written to its end, or somebody changed it
         return None
-    if numbers.shape != (count, 2) or tuple(numbers.sum(0)) != (len(planes), len(corners)):
+    if planes.shape[1:] != (4,) or corners.shape[1:] != (3,) or {planes.dtype.kind, corners.dtype.kind} != {"f"}:
+        return None
+    if numbers.shape != (count, 2) or numbers.dtype.kind != "i" or (numbers < 0).any():
+        return None
+    if tuple(numbers.sum(0)) != (len(planes), len(corners)):
         return None
     ends = np.cumsum(numbers, 0)[:-1]
     return list(zip(np.split(planes, ends[:, 0]), np.split(corners, ends[:, 1]), strict=True))

@@ -5,13 +5,23 @@ from __future__ import annotations
 import dataclasses
 import os
 import pathlib
-import zipfile
 
 import numpy as np
 
 from ig2mj.errors import InputError
+from ig2mj.files.npz import read_npz
 
 FORMAT_VERSION = 1
+
+MOST_ROOMS = 32_767
+"""Room instances of a home: a cell of the map is an int16."""
+
+_OPTIONAL = ("traversable", "traversable_no_obj")
+_ARRAYS = {
+    "format_version": ("iu", 0), "names": ("U", 1), "types": ("U", 1), "room_map": ("iu", 2), "resolution": ("fiu", 0),
+    "trav_resolution": ("fiu", 0), **{name: ("biu", 2) for name in _OPTIONAL},
+}  # fmt: skip
+"""Kinds of dtypes, and numbers of axes."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,31 +76,37 @@ def load_rooms(path: str | os.PathLike) -> Rooms:
     if file.is_dir():
         file = file / "rooms.npz"
     fix = "convert the scene again"
-    try:
-        with file.open("rb") as stream, np.load(stream, allow_pickle=False) as data:
-            version = int(data["format_version"])
-            if version != FORMAT_VERSION:
-                raise InputError(file, f"has format version {version}, this ig2mj reads {FORMAT_VERSION}", fix=fix)
-            rooms = Rooms(
-                names=tuple(str(n) for n in data["names"]),
-                types=tuple(str(t) for t in data["types"]),
-                room_map=data["room_map"],
-                resolution=float(data["resolution"]),
-                traversable=data.get("traversable"),
-                traversable_no_obj=data.get("traversable_no_obj"),
-                trav_resolution=float(data["trav_resolution"]),
-            )
-    except KeyError as e:
-        raise InputError(file, f"lacks an array: {e.args[0]}", fix=fix) from e
-    except FileNotFoundError as e:
-        raise InputError(file, "does not exist", fix=fix) from e
-    except (OSError, ValueError, TypeError, AttributeError, EOFError, zipfile.BadZipFile) as e:
-        raise InputError(file, f"cannot be read: {e}", fix=fix) from e
-    shape = rooms.room_map.shape
-    if len(shape) != 2 or shape[0] != shape[1] or len(rooms.names) != len(rooms.types):
-        raise InputError(file, "its arrays do not fit together", fix=fix)
-    if rooms.room_map.size and not 0 <= rooms.room_map.min() <= rooms.room_map.max() <= len(rooms.names):
+    arrays = read_npz(file, fix=fix)
+    for name, (kinds, axes) in _ARRAYS.items():
+        if name not in arrays:
+            if name in _OPTIONAL:
+                continue
+            raise InputError(file, f"lacks an array: {name}", fix=fix)
+        if arrays[name].dtype.kind not in kinds or arrays[name].ndim != axes:
+            raise InputError(file, f"is {arrays[name].ndim}-dimensional {arrays[name].dtype}", element=name, fix=fix)
+    version = int(arrays["format_version"])
+    if version != FORMAT_VERSION:
+        raise InputError(file, f"has format version {version}, this ig2mj reads {FORMAT_VERSION}", fix=fix)
+    free = {name: arrays[name].astype(bool) for name in _OPTIONAL if name in arrays}
+    for name, array in (("room_map", arrays["room_map"]), *free.items()):
+        if array.shape[0] != array.shape[1] or not array.size:
+            raise InputError(file, f"has shape {array.shape}, and a map is square", element=name, fix=fix)
+    names, types, room_map = (arrays[name] for name in ("names", "types", "room_map"))
+    if len(names) != len(types) or len(set(names.tolist())) < len(names):
+        raise InputError(file, "names and types do not fit together", element="names", fix=fix)
+    if len(names) > MOST_ROOMS:
+        raise InputError(file, f"has {len(names)} rooms, and the limit is {MOST_ROOMS}", element="names", fix=fix)
+    if not 0 <= int(room_map.min()) <= int(room_map.max()) <= len(names):
         raise InputError(file, "room_map names rooms that do not exist", element="room_map", fix=fix)
-    if not rooms.resolution > 0 or not rooms.trav_resolution > 0:
-        raise InputError(file, "a resolution is not positive", element="resolution", fix=fix)
-    return rooms
+    for name in ("resolution", "trav_resolution"):
+        if not 1e-4 <= float(arrays[name]) <= 1e4:
+            raise InputError(file, f"is {float(arrays[name]):g} m, and must be in [1e-4, 1e4]", element=name, fix=fix)
+    return Rooms(
+        names=tuple(str(n) for n in names),
+        types=tuple(str(t) for t in types),
+        room_map=room_map.astype(np.int16),
+        resolution=float(arrays["resolution"]),
+        traversable=free.get("traversable"),
+        traversable_no_obj=free.get("traversable_no_obj"),
+        trav_resolution=float(arrays["trav_resolution"]),
+    )

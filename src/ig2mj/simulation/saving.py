@@ -15,7 +15,7 @@ from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import InputError
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
-from ig2mj.worlds.archive import load_tree, save_tree
+from ig2mj.worlds.archive import check_finite, load_tree, save_tree
 from ig2mj.worlds.hands import Held
 
 if TYPE_CHECKING:
@@ -77,6 +77,7 @@ def load_world(file: str | os.PathLike, like: SavedWorld, scene: Scene) -> Saved
         raise InputError(file, f"has version {header.get('version')}, this ig2mj reads {VERSION}")
     if header.get("objects") != list(scene.object_names):
         raise InputError(file, f"is of scene '{header.get('scene')}'", fix="restore it in that scene")
+    check_finite(found.physics, file)
     return found
 
 

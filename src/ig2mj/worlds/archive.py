@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import io
 import os
 import pathlib
 import typing
-import zipfile
-import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 import jax
@@ -18,6 +15,8 @@ import msgspec
 import numpy as np
 
 from ig2mj.errors import InputError
+from ig2mj.files.content import decode_struct
+from ig2mj.files.npz import read_npz, refuse_nonfinite
 
 HEADER = "header"
 
@@ -52,15 +51,12 @@ def pack(tree: Any, header: dict[str, Any]) -> bytes:
 
 def unpack(packed: bytes) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     """Arrays by path, and the header, of what `pack` gave. Raises InputError."""
-    with _open(packed) as archive:
-        header = _header(archive, "packed arrays")
-        return {name: archive[name] for name in archive.files if name != HEADER}, header
+    return _read(packed)
 
 
 def read_header(file: str | os.PathLike) -> dict[str, Any]:
     """The header of a file that `save_tree` wrote. Raises InputError."""
-    with _open(file) as archive:
-        return _header(archive, file)
+    return _read(file, lambda name: False)[1]
 
 
 def load_tree(file: str | os.PathLike, like: Tree) -> tuple[Tree, dict[str, Any]]:
@@ -71,45 +67,49 @@ def load_tree(file: str | os.PathLike, like: Tree) -> tuple[Tree, dict[str, Any]
     Raises:
       InputError: the file is missing, no such archive, or of another structure.
     """
-    with _open(file) as archive:
-        header = _header(archive, file)
+    arrays, header = _read(file)
 
-        def leaf(keys: Any, wanted: Any) -> np.ndarray:
-            name = _name(keys)
-            if name not in archive.files:
-                raise InputError(file, "is missing", element=name, fix="make the file again with this version")
-            try:
-                array = archive[name]
-            except (ValueError, OSError, zipfile.BadZipFile, zlib.error) as e:
-                raise InputError(file, f"is damaged: {e}", element=name) from e
-            if array.ndim != wanted.ndim or array.shape[1:] != wanted.shape[1:]:
-                raise InputError(
-                    file,
-                    f"has shape {array.shape}, the scene needs (any, {', '.join(map(str, wanted.shape[1:]))})",
-                    element=name,
-                    fix="make the file again for this scene",
-                )
-            return array.astype(wanted.dtype)
+    def leaf(keys: Any, wanted: Any) -> np.ndarray:
+        name = _name(keys)
+        if name not in arrays:
+            raise InputError(file, "is missing", element=name, fix="make the file again with this version")
+        check_array(arrays[name], wanted, file, name)
+        return arrays[name].astype(wanted.dtype)
 
-        return jax.tree_util.tree_map_with_path(leaf, like), header
+    return jax.tree_util.tree_map_with_path(leaf, like), header
+
+
+def check_array(array: np.ndarray, wanted: Any, file: str | os.PathLike, name: str) -> None:
+    """Raises InputError where an array is not of the kind, the rank or the inner shape of `wanted`, another array."""
+    if array.ndim != wanted.ndim or array.shape[1:] != wanted.shape[1:]:
+        raise InputError(
+            file,
+            f"has shape {array.shape}, the scene needs (any, {', '.join(map(str, wanted.shape[1:]))})",
+            element=name,
+            fix="make the file again for this scene",
+        )
+    if not np.can_cast(array.dtype, wanted.dtype, "same_kind"):
+        raise InputError(file, f"is of type {array.dtype}, and {wanted.dtype} is needed", element=name)
+
+
+def check_finite(tree: Any, file: str | os.PathLike) -> None:
+    """Raises InputError, with the name of the array, where a leaf of a pytree holds NaN or an infinity."""
+    for keys, leaf in jax.tree_util.tree_leaves_with_path(tree):
+        refuse_nonfinite(leaf, file, _name(keys))
 
 
 def read_arrays(file: str | os.PathLike, prefix: str) -> dict[str, np.ndarray]:
     """The arrays of a file that `save_tree` wrote whose paths begin with `prefix`, which is taken off. Raises
     InputError."""
-    with _open(file) as archive:
-        _header(archive, file)
-        try:
-            return {n.removeprefix(prefix): archive[n] for n in archive.files if n.startswith(prefix)}
-        except (ValueError, OSError, zipfile.BadZipFile, zlib.error) as e:
-            raise InputError(file, f"is damaged: {e}") from e
+    arrays, _ = _read(file, lambda name: name.startswith(prefix))
+    return {name.removeprefix(prefix): array for name, array in arrays.items()}
 
 
 def build(kind: type[Tree], arrays: Mapping[str, np.ndarray], file: str | os.PathLike, prefix: str = "") -> Tree:
     """A dataclass of arrays and of such dataclasses, from arrays by path.
 
     Raises:
-      InputError: an array is missing.
+      InputError: an array is missing, or one that should be of numbers is of text.
     """
     hints, fields = typing.get_type_hints(kind), {}
     for field in dataclasses.fields(typing.cast(Any, kind)):
@@ -117,6 +117,8 @@ def build(kind: type[Tree], arrays: Mapping[str, np.ndarray], file: str | os.Pat
         if dataclasses.is_dataclass(hint):
             fields[field.name] = build(typing.cast(type, hint), arrays, file, f"{name}.")
         elif name in arrays:
+            if arrays[name].dtype.kind not in "biuf":
+                raise InputError(file, f"is of type {arrays[name].dtype}, not of numbers", element=name)
             fields[field.name] = arrays[name]
         elif field.default is not None:  # one whose default is None may be left out
             raise InputError(file, "is missing", element=name, fix="make the file again with this version")
@@ -127,28 +129,12 @@ def _name(keys: Any) -> str:
     return jax.tree_util.keystr(keys, simple=True, separator=".")
 
 
-@contextlib.contextmanager
-def _open(file: str | os.PathLike | bytes) -> Iterator[Any]:
-    """The archive, closed afterwards. Raises InputError."""
-    named = "packed arrays" if isinstance(file, bytes) else file
-    try:
-        stream = io.BytesIO(file if isinstance(file, bytes) else pathlib.Path(file).read_bytes())
-    except OSError as e:
-        raise InputError(str(file), f"cannot be read: {e.strerror or e}") from e
-    try:
-        archive = np.load(stream, allow_pickle=False)
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as e:
-        raise InputError(named, "is not an npz archive, or broken") from e
-    if not hasattr(archive, "files"):  # a single array
-        raise InputError(named, "is not an npz archive")
-    with archive:
-        yield archive
-
-
-def _header(archive: Any, file: str | os.PathLike) -> dict[str, Any]:
-    if HEADER not in archive.files:
-        raise InputError(file, "is not an archive of this project", element=HEADER)
-    try:
-        return msgspec.json.decode(archive[HEADER].tobytes(), type=dict)
-    except (msgspec.DecodeError, ValueError, OSError, zipfile.BadZipFile, zlib.error) as e:
-        raise InputError(file, f"is damaged: {e}", element=HEADER) from e
+def _read(
+    file: str | os.PathLike | bytes, wanted: Callable[[str], bool] = lambda name: True
+) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
+    """The wanted arrays without the header, and the header. Raises InputError."""
+    said = "packed arrays" if isinstance(file, bytes) else file
+    arrays = read_npz(file, lambda name: name == HEADER or wanted(name))
+    if HEADER not in arrays:
+        raise InputError(said, "is not an archive of this project", element=HEADER)
+    return arrays, decode_struct(arrays.pop(HEADER).tobytes(), dict, said)

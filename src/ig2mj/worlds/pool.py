@@ -15,18 +15,22 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import msgspec
 import numpy as np
 from flax import struct
 from jaxtyping import Int
 
+from ig2mj.engine.layout import make_layout
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.errors import InputError
 from ig2mj.scene.additions import Addition
 from ig2mj.scene.library import find_model
 from ig2mj.scene.scene import Agent, Scene, load_scene
+from ig2mj.states.initial import initial_states
+from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
-from ig2mj.worlds.archive import HEADER, build, read_arrays, read_header, save_tree
+from ig2mj.worlds.archive import build, check_array, check_finite, read_arrays, read_header, save_tree
 
 FORMAT_VERSION = 2
 """1: scene and agents were not separate (`ig2mj.engine.snapshot`)."""
@@ -88,11 +92,11 @@ def load_pool_scene(
     """
     header = _pool_header(file)
     wanted = []
-    for entry in header.get("additions", ()):
+    for entry in header["additions"]:
         model = find_model(f"{entry['category']}/{entry['model']}")
         if model.sha256 != entry["sha256"]:
             raise InputError(file, f"was made with another '{model.category}/{model.model}' added", fix=_FIX)
-        at = entry.get("place")
+        at = entry["place"]
         wanted.append(Addition(**{**entry, "place": None if at is None else tuple(at)}).wanted)
     return load_scene(header["scene"] if scene is None else scene, agents, wanted)
 
@@ -116,23 +120,79 @@ def load_pool(file: str | os.PathLike, scene: Scene | None = None) -> Pool:
     fix = _FIX
     if scene is not None and header.get("scene") != scene.name:
         raise InputError(file, f"is a pool of scene '{header.get('scene')}', not of '{scene.name}'", fix=fix)
-    if scene is not None and [a["name"] for a in header.get("additions", ())] != [a.name for a in scene.additions]:
+    if scene is not None and [a["name"] for a in header["additions"]] != [a.name for a in scene.additions]:
         raise InputError(file, "was made with other objects added", fix="load the scene with `load_pool_scene`")
     if scene is not None and header.get("digest") != scene.digest:
         raise InputError(file, f"was made before '{scene.name}' was converted as it is now", fix=fix)
     arrays = read_arrays(file, "")
-    arrays.pop(HEADER)
     pool = build(Pool, arrays, file)
     lengths = {len(array) if array.ndim else 0 for array in arrays.values()}
     if len(lengths) != 1:
         raise InputError(file, f"has arrays of different lengths: {', '.join(map(str, sorted(lengths)))}", fix=fix)
     if not pool.size:
         raise InputError(file, "has no rows", fix=fix)
+    _check_values(pool, file)
+    if scene is not None:
+        _check_widths(pool, scene, file)
     return dataclasses.replace(pool, digest=header.get("digest"))
 
 
+def _check_values(pool: Pool, file: str | os.PathLike) -> None:
+    """Refuses what is not finite, which a world would start with unnoticed; what has never been warm has no maximum."""
+    check_finite({"physics": pool.physics}, file)
+    warmest = np.asarray(pool.states.max_temperature)
+    known = np.where(np.isneginf(warmest), 0.0, warmest) if warmest.dtype.kind == "f" else warmest
+    check_finite({"states": dataclasses.replace(pool.states, max_temperature=known)}, file)
+
+
+def _check_widths(pool: Pool, scene: Scene, file: str | os.PathLike) -> None:
+    """Refuses arrays of other kinds and widths than the scene's, and numbers of trees and bodies that it has not."""
+    layout = make_layout(scene.model, scene.tables)
+    units, sizes = layout.num_object_units, dict(layout.scene_sizes)
+    inner = {"eq_data": (12,), "mocap_pos": (3,), "mocap_quat": (4,)}
+    shapes = {name: (1, size, *inner.get(name, ())) for name, size in sizes.items()} | {"touching": (1, units, units)}
+    kinds = {"eq_active": np.bool_, "tree_asleep": np.int32, "touching": np.bool_}
+    for name, shape in shapes.items():
+        wanted = np.empty(shape, kinds.get(name, np.float64))
+        check_array(getattr(pool.physics.scene, name), wanted, file, f"physics.scene.{name}")
+    states = initial_states(StateModel.of_manifest(scene.tables, scene.manifest), 1)
+
+    def check(keys: Any, wanted: Any, found: Any) -> None:
+        check_array(found, wanted, file, f"states.{jax.tree_util.keystr(keys, simple=True, separator='.')}")
+
+    jax.tree_util.tree_map_with_path(check, states, pool.states)
+    numbers = {"physics.scene.tree_asleep": (pool.physics.scene.tree_asleep, sizes["tree_asleep"])}
+    numbers |= {f"states.{n}.body": (getattr(pool.states, n).body, scene.model.nbody) for n in ("dust", "stain")}
+    for name, (array, count) in numbers.items():
+        if np.asarray(array).size and int(np.asarray(array).max()) >= count:
+            raise InputError(file, f"names number {int(np.asarray(array).max())} of {count}", element=name, fix=_FIX)
+
+
 def _pool_header(file: str | os.PathLike) -> dict[str, Any]:
+    """The header, in which "scene" is a text and "additions" are whole. Raises InputError."""
     header = read_header(file)
     if header.get("kind") != "pool" or header.get("format_version") != FORMAT_VERSION:
         raise InputError(file, f"is not a pool of format {FORMAT_VERSION}", fix=_FIX)
-    return header
+    try:
+        known = msgspec.convert(header, _Header)
+    except (msgspec.ValidationError, RecursionError) as e:
+        raise InputError(file, str(e), element="header", fix=_FIX) from e
+    return {**header, "additions": msgspec.to_builtins(known.additions)}
+
+
+class _Added(msgspec.Struct):
+    """An `Addition` in a header."""
+
+    name: str
+    category: str
+    model: str
+    sha256: str
+    place: tuple[float, float, float, float] | None = None
+
+
+class _Header(msgspec.Struct):
+    """What must be in a header."""
+
+    scene: str
+    digest: str | None = None
+    additions: list[_Added] = []
