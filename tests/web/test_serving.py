@@ -7,6 +7,7 @@ import random
 import socket
 import ssl
 import subprocess
+import sys
 import urllib.error
 import urllib.request
 
@@ -234,3 +235,54 @@ def test_files_named_by_their_content_may_be_kept_and_nothing_else():
                 kept[path] = answer.headers.get_all("Cache-Control"), answer.read()
     assert kept["/"] == (["no-store"], b"page")
     assert kept["/a-1.js"] == (["private, max-age=31536000, immutable"], b"x" * 1000)
+
+
+def status_of(server: PageServer, target: str, host: str | None = None) -> int:
+    """Of a request written by hand: clients correct what is odd."""
+    lines = [f"GET {target} HTTP/1.1", *([] if host == "" else [f"Host: {host or f'localhost:{server.port}'}"])]
+    with socket.create_connection(("127.0.0.1", server.port), timeout=10) as raw:
+        raw.sendall("\r\n".join([*lines, "", ""]).encode())
+        answer = raw.makefile("rb").readline()
+    return int(answer.split()[1])
+
+
+@pytest.mark.parametrize("token", [None, TOKEN])
+def test_odd_addresses_are_bad_requests(token):
+    with serving(token) as server:
+        assert [status_of(server, target) for target in ("//[", "//[/a.js", "http://[")] == [400] * 3
+        wanted = 200 if token is None else 401
+        assert status_of(server, "/") == wanted
+
+
+@pytest.mark.parametrize(
+    "host",
+    [
+        "evil.example@127.0.0.1",
+        "evil.example:80@127.0.0.1",
+        "evil.example@a.localhost",
+        "evil.example/.localhost",
+        "evil.example#.localhost",
+        "127.0.0.1.evil.example",
+        "[evil.example].localhost",
+        "[127.0.0.1",
+        "localhost:port",
+        "localhost:8080:8080",
+        "",
+    ],
+)
+def test_hosts_that_only_look_like_this_machine_are_refused(host):
+    assert not is_loopback(host)
+    with serving() as server:
+        assert status_of(server, "/", host) in (400, 403)
+        assert status_of(server, "/", "[::1]") == 200
+
+
+def test_many_unwanted_messages_do_not_pile_up(monkeypatch):
+    """More in one go than Python's stack is deep."""
+    monkeypatch.setattr("ig2mj.web.serving.BURST", 1e9)
+    monkeypatch.setattr("ig2mj.web.serving.MESSAGES_PER_SECOND", 1e9)
+    with serving() as server, connect(f"ws://127.0.0.1:{server.port}/", open_timeout=10) as page:
+        for _ in range(3 * sys.getrecursionlimit()):
+            page.send("unwanted")
+        page.send("ping")
+        assert page.recv(timeout=30) == "ping"

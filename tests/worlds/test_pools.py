@@ -124,7 +124,7 @@ def broken(pool: Pool, file, kind: str, scene: ig2mj.Scene) -> str:
     data = file.read_bytes()
     if kind == "absent":
         file.unlink()
-        return "cannot be read"
+        return "there is no such file"
     if kind == "text":
         file.write_text("pool")
         return "is not an npz archive"

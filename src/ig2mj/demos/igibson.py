@@ -190,7 +190,7 @@ def _log(opened: Hdf5File) -> IGibsonLog:
     if len(lengths) > 1:
         raise InputError(opened.file, f"have {sorted(lengths)} frames", element="physics_data", fix="it is cut off")
     folders = [folder for folder in ("agent_actions", "action") if opened.has(folder)]
-    actions = {f"{f}/{name}": _array(opened, f"{f}/{name}", None) for f in folders for name in opened.names(f)}
+    actions = {name: _array(opened, name, None) for folder in folders for name in opened.arrays_below(folder)}
     goal = "goal_status/satisfied"
     return IGibsonLog(
         metadata,

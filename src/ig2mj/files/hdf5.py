@@ -19,7 +19,7 @@ import numpy as np
 
 from ig2mj.errors import InputError
 from ig2mj.files.content import regular_file
-from ig2mj.files.limits import refuse_bomb
+from ig2mj.files.limits import refuse_bomb, refuse_more
 
 LARGEST_CHUNK = 2**26
 """Bytes that are unpacked at a time."""
@@ -74,6 +74,24 @@ class Hdf5File:
             return sorted(_text(name) for name in group)
         except (OSError, RuntimeError, ValueError) as e:
             raise self.broken(path or "/", f"cannot be read: {e}") from e
+
+    def arrays_below(self, path: str, depth: int = 4) -> list[str]:
+        """Paths of the arrays below a group, sorted, at most so many groups down: hard links can make circles.
+
+        Raises:
+          InputError: there is no such group, or it holds too many arrays.
+        """
+        import h5py
+
+        found: list[str] = []
+        for name in self.names(path):
+            inner = f"{path}/{name}"
+            if not isinstance(self._find(inner), h5py.Group):
+                found.append(inner)
+            elif depth:
+                found += self.arrays_below(inner, depth - 1)
+            refuse_more("ARRAYS", len(found), "holds", self.file, path, unit=" arrays")
+        return found
 
     def group(self, path: str = "") -> Any:
         """The group of this path. Raises InputError: there is none in this file."""

@@ -14,11 +14,11 @@ import pathlib
 import struct
 import zipfile
 from collections.abc import Callable
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
-from ig2mj.errors import InputError
+from ig2mj.errors import Ig2mjError, InputError
 from ig2mj.files.content import regular_file
 from ig2mj.files.limits import refuse_bomb, refuse_more
 
@@ -65,13 +65,15 @@ def read_npz(
         if fix and not e.fix:
             raise type(e)(e.file, e.problem, element=e.element, fix=fix) from e
         raise
+    except Ig2mjError:
+        raise
     except OSError as e:
         raise InputError(said, f"cannot be read: {e.strerror or e}", fix=fix) from e
     except Exception as e:  # zipfile, zlib and NumPy raise whatever a damaged archive makes them stumble over
         raise InputError(said, f"is not an npz archive, or a damaged one: {e or type(e).__name__}", fix=fix) from e
 
 
-def _check_directory(stream: IO[bytes], size: int, file: object) -> None:
+def _check_directory(stream: Any, size: int, file: object) -> None:
     """Refuses a directory that `zipfile`, which reads all of it at once, would need too much memory for."""
     stream.seek(max(size - 2**16 - 22, 0))
     tail = stream.read()
@@ -134,7 +136,7 @@ def _read(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, file: object) -> np.
     return array.astype(dtype.newbyteorder("="), copy=False)
 
 
-def _header(stream: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype]:
+def _header(stream: Any) -> tuple[tuple[int, ...], bool, np.dtype]:
     version = np.lib.format.read_magic(stream)
     if version == (1, 0):
         return np.lib.format.read_array_header_1_0(stream, LONGEST_HEADER)
@@ -143,7 +145,7 @@ def _header(stream: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype]:
     raise ValueError(f"an array of version {version}")
 
 
-def _fill(stream: IO[bytes], flat: np.ndarray) -> None:
+def _fill(stream: Any, flat: np.ndarray) -> None:
     if not flat.nbytes:
         return
     buffer, at = memoryview(flat.view(np.uint8)), 0  # pyright: ignore[reportArgumentType]

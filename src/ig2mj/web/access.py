@@ -6,6 +6,7 @@ import dataclasses
 import ipaddress
 import os
 import pathlib
+import re
 import secrets
 import socket
 import ssl
@@ -93,8 +94,9 @@ def access_for(
 
 def is_loopback(host: str) -> bool:
     """Whether an address or name is this machine's own; names other than localhost count as not."""
-    name = host.strip("[]").rstrip(".").lower()
-    if name == "localhost" or name.endswith(".localhost"):
+    bracketed = host.startswith("[") and host.endswith("]")
+    name = (host[1:-1] if bracketed else host).rstrip(".").lower()
+    if re.fullmatch(r"(?:[a-z0-9-]+\.)*localhost", name, re.ASCII):
         return True
     try:
         return ipaddress.ip_address(name).is_loopback

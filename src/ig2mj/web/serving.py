@@ -21,6 +21,7 @@ import logging
 import mimetypes
 import os
 import pathlib
+import re
 import secrets
 import threading
 import time
@@ -47,6 +48,10 @@ MOST_PAGES = 32
 Talk = Callable[[ServerConnection], Awaitable[None]]
 Check = Callable[[str | bytes], bool]
 """Whether a message is wanted; raises ValueError for one that no page of ours sends."""
+
+_HOST = re.compile(
+    r"(?:\[(?P<address>[0-9A-Fa-f:.]{1,45})\]|(?P<name>[0-9A-Za-z._-]{1,253}))(?::(?P<port>\d{1,5}))?", re.ASCII
+)
 
 _SILENT = logging.getLogger("ig2mj.web.websockets")
 _SILENT.addHandler(logging.NullHandler())
@@ -92,15 +97,14 @@ class Gate:
         try:
             answer = self._admit(connection, request)
         except (MultipleValuesError, CookieError, ValueError):
-            answer = page(http.HTTPStatus.BAD_REQUEST, b"bad request", "text/plain")
+            answer = bad_request()
         if answer is not None and answer.status_code != http.HTTPStatus.SEE_OTHER:
             self.refused += 1
         return answer
 
     def _admit(self, connection: ServerConnection, request: Request) -> Response | None:
         host = request.headers.get("Host", "")
-        name = urllib.parse.urlsplit(f"//{host}").hostname or ""
-        if self.access.token is None and not is_loopback(name):
+        if self.access.token is None and not is_loopback(host_name(host)):
             # A site whose name was made to point here (DNS rebinding) is not a page of ours.
             return page(http.HTTPStatus.FORBIDDEN, b"this server is for this machine alone", "text/plain")
         socket = request.headers.get("Upgrade", "").lower() == "websocket"
@@ -119,7 +123,7 @@ class Gate:
 
     def _name(self, request: Request) -> str:
         """Cookies are shared by all ports of a host."""
-        return f"{self._cookie}_{urllib.parse.urlsplit('//' + request.headers.get('Host', '')).port or 0}"
+        return f"{self._cookie}_{host_port(request.headers.get('Host', ''))}"
 
     def _ask(self, request: Request, socket: bool) -> Response:
         parts = urllib.parse.urlsplit(request.path)
@@ -151,7 +155,13 @@ class Gate:
 
         def process(connection: ServerConnection, request: Request) -> Response | None:
             refusal = gate.admit(connection, request)
-            return refusal if refusal is not None else answer(connection, request)
+            if refusal is not None:
+                return refusal
+            try:
+                return answer(connection, request)
+            except (MultipleValuesError, ValueError):
+                gate.refused += 1
+                return bad_request()
 
         return {
             "process_request": process,
@@ -176,23 +186,25 @@ class GuardedConnection(ServerConnection):
 
     async def recv(self, decode: bool | None = None) -> Any:
         """As of `websockets`. Raises ConnectionClosed, also for messages that are turned away."""
-        message = await super().recv(decode)
-        now = time.monotonic()
-        self._allowance = min(BURST, self._allowance + (now - self._since) * MESSAGES_PER_SECOND) - 1
-        self._since = now
-        reason = "too many messages" if self._allowance < 0 else ""
-        if not reason and self.gate.check is not None:
-            try:
-                if not self.gate.check(message):
-                    return await self.recv(decode)
-            except ValueError:
-                reason = "malformed message"
-        if reason:
-            self.gate.refused += 1
-            await self.close(1008, reason)
-            await self.wait_closed()
-            raise self.protocol.close_exc
-        return message
+        while True:
+            message = await super().recv(decode)
+            now = time.monotonic()
+            self._allowance = min(BURST, self._allowance + (now - self._since) * MESSAGES_PER_SECOND) - 1
+            self._since = now
+            reason = "too many messages" if self._allowance < 0 else ""
+            wanted = True
+            if not reason and self.gate.check is not None:
+                try:
+                    wanted = self.gate.check(message)
+                except ValueError:
+                    reason = "malformed message"
+            if reason:
+                self.gate.refused += 1
+                await self.close(1008, reason)
+                await self.wait_closed()
+                raise self.protocol.close_exc
+            if wanted:
+                return message
 
 
 class Pages:
@@ -251,6 +263,25 @@ def content_type(name: str) -> str:
     known |= {".glb": "model/gltf-binary", ".html": "text/html; charset=utf-8", ".css": "text/css; charset=utf-8"}
     ending = pathlib.PurePosixPath(name).suffix.lower()
     return known.get(ending) or mimetypes.guess_type(name)[0] or "application/octet-stream"
+
+
+def host_name(host: str) -> str:
+    """The name or address in a Host header, without brackets; "" where it is no such header (a user before an "@")."""
+    match = _HOST.fullmatch(host)
+    return (match["address"] or match["name"]) if match else ""
+
+
+def host_port(host: str) -> int:
+    """The port in a Host header; 0 where it has none. Raises ValueError: it is no such header."""
+    match = _HOST.fullmatch(host)
+    if match is None:
+        raise ValueError("Host")
+    return int(match["port"] or 0)
+
+
+def bad_request() -> Response:
+    """The answer to what no browser sends."""
+    return page(http.HTTPStatus.BAD_REQUEST, b"bad request", "text/plain")
 
 
 def page(status: http.HTTPStatus, body: bytes, kind: str = "text/html; charset=utf-8") -> Response:

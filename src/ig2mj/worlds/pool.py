@@ -157,10 +157,9 @@ def _check_widths(pool: Pool, scene: Scene, file: str | os.PathLike) -> None:
         check_array(getattr(pool.physics.scene, name), wanted, file, f"physics.scene.{name}")
     states = initial_states(StateModel.of_manifest(scene.tables, scene.manifest), 1)
 
-    def check(keys: Any, wanted: Any, found: Any) -> None:
+    leaves = zip(jax.tree_util.tree_leaves_with_path(states), jax.tree.leaves(pool.states), strict=True)
+    for (keys, wanted), found in leaves:
         check_array(found, wanted, file, f"states.{jax.tree_util.keystr(keys, simple=True, separator='.')}")
-
-    jax.tree_util.tree_map_with_path(check, states, pool.states)
     numbers = {"physics.scene.tree_asleep": (pool.physics.scene.tree_asleep, sizes["tree_asleep"])}
     numbers |= {f"states.{n}.body": (getattr(pool.states, n).body, scene.model.nbody) for n in ("dust", "stain")}
     for name, (array, count) in numbers.items():
