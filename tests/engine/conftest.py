@@ -6,6 +6,7 @@ import pathlib
 
 import engine_bench
 import pytest
+import warp as wp
 
 ENGINES = [
     "native",
@@ -30,3 +31,13 @@ def small(request, bench_folder) -> engine_bench.Bench:
 def full(request, bench_folder) -> engine_bench.Bench:
     """The whole bench with its hand in two worlds, on the engines that can sleep."""
     return engine_bench.bench(bench_folder, request.param, 2, False)
+
+
+@pytest.fixture(params=["cpu", pytest.param("cuda", marks=pytest.mark.gpu)])
+def kernel_device(request):
+    """Warp's device while the test runs. On the CPU a block has one thread: barriers and atomics are not tested."""
+    if request.param == "cuda" and not wp.is_cuda_available():
+        pytest.skip("Warp sees no CUDA device; on a machine that has one: make test-gpu")
+    device = wp.get_cuda_device() if request.param == "cuda" else wp.get_device("cpu")
+    with wp.ScopedDevice(device):
+        yield device

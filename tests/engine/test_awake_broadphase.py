@@ -53,7 +53,7 @@ def _pairs(put, data, before: np.ndarray | None) -> set[tuple[int, int, int]]:
 
 @pytest.mark.parametrize("second_pass", [False, True])
 @pytest.mark.slow
-def test_it_finds_the_pairs_that_upstream_finds(second_pass: bool):
+def test_it_finds_the_pairs_that_upstream_finds(kernel_device, second_pass: bool):
     model = _model()
     put = mujoco_warp.put_model(model)
     room = 400 * WORLDS
@@ -85,7 +85,7 @@ def test_models_that_reach_further_than_spheres_say_keep_upstreams():
 
 
 @pytest.mark.slow
-def test_too_many_pairs_are_flagged_though_the_second_pass_finds_none():
+def test_too_many_pairs_are_flagged_though_the_second_pass_finds_none(kernel_device):
     """Everything is awake and lies close: the first pass has all pairs, the second none."""
     model, flag = _model(), int(types.OverflowType.BROADPHASE)
     put = mujoco_warp.put_model(model)

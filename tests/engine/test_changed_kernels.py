@@ -34,18 +34,18 @@ def _arguments():
 
 def _run(kernel: wp.Kernel, dim: tuple[int, ...], more: list | None = None) -> np.ndarray:
     total = wp.full((WORLDS, ROWS), -1.0, dtype=float)
-    wp.launch(kernel, dim=dim, inputs=[*(more or []), *_arguments()], outputs=[total], device="cpu")
+    wp.launch(kernel, dim=dim, inputs=[*(more or []), *_arguments()], outputs=[total])
     return total.numpy()
 
 
-def test_few_threads_do_what_a_thread_for_each_row_did_and_leave_loops_where_it_returned():
+def test_few_threads_do_what_a_thread_for_each_row_did_and_leave_loops_where_it_returned(kernel_device):
     expected = _run(_sums, (WORLDS, ROWS, 1))
     assert (expected[0] >= 0).any() and (expected[0] < 0).any(), "some rows end early"
     few = strided(_sums, "row", "count[world]", 4, "ig2mj_test_strided")
     assert np.array_equal(_run(few, (WORLDS, 4)), expected)
 
 
-def test_a_guarded_kernel_does_nothing_where_the_guard_holds():
+def test_a_guarded_kernel_does_nothing_where_the_guard_holds(kernel_device):
     awake = wp.array(np.array([1, 1, 0], np.int32), dtype=int)
     with_guard = guarded(_sums, "awake[world] == 0", {"awake": wp.array(dtype=int)}, {}, module="ig2mj_test_guarded")
     found, expected = _run(with_guard, (WORLDS, ROWS, 1), [awake]), _run(_sums, (WORLDS, ROWS, 1))

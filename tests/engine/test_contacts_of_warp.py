@@ -54,7 +54,7 @@ def _slanted(worlds) -> int:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("tilt", [1e-4, 1.0])
-def test_a_floors_contacts_point_up(tilt: float):
+def test_a_floors_contacts_point_up(kernel_device, tilt: float):
     put, worlds, qpos = _things_on_a_floor(tilt)
     collision_driver.collision(put, worlds)
     assert _slanted(worlds) > 0, "upstream is sound by now: `contacts` may go"
@@ -72,7 +72,7 @@ def test_a_floors_contacts_point_up(tilt: float):
 
 
 @pytest.mark.slow
-def test_what_lies_outside_either_geom_is_dropped_and_the_rest_is_kept():
+def test_what_lies_outside_either_geom_is_dropped_and_the_rest_is_kept(kernel_device):
     put, worlds, qpos = _things_on_a_floor(0.0)
     qpos[:, 3:] = [1, 0, 0, 0]
     worlds.qpos.assign(qpos.astype(np.float32))
@@ -102,7 +102,7 @@ def test_what_lies_outside_either_geom_is_dropped_and_the_rest_is_kept():
     ],
 )
 @pytest.mark.slow
-def test_only_shallow_contacts_on_a_face_are_set_upright(dist: float, offset: tuple, upright: bool):
+def test_only_shallow_contacts_on_a_face_are_set_upright(kernel_device, dist: float, offset: tuple, upright: bool):
     put, worlds, _ = _things_on_a_floor(0.0)
     worlds.qpos.assign(np.tile(np.array([1, 1, HALF[2], 1, 0, 0, 0], np.float32), (WORLDS, 1)))
     mujoco_warp.kinematics(put, worlds)

@@ -18,7 +18,7 @@ WORLDS, TREES = 64, 12
 
 
 @pytest.mark.slow
-def test_rings_and_velocities_are_those_of_upstream():
+def test_rings_and_velocities_are_those_of_upstream(kernel_device):
     rng = np.random.default_rng(0)
     dofs = rng.integers(1, 7, TREES)
     starts = np.concatenate([[0], np.cumsum(dofs)[:-1]])

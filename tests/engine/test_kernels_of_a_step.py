@@ -37,7 +37,7 @@ def test_what_is_launched_for_nothing_is_not_noted():
     assert not kernels.launches_of(lambda: wp.launch(_count, dim=(3, 0), inputs=[count]))
 
 
-def test_both_branches_and_the_body_of_a_loop_are_noted():
+def test_both_branches_and_the_body_of_a_loop_are_noted(kernel_device):
     count = wp.zeros(1, dtype=int)
 
     def launch(dim: int) -> None:
@@ -62,7 +62,7 @@ def test_islands_are_compiled_without_derivatives():
 
 
 @pytest.mark.slow
-def test_a_step_launches_no_other_kernels():
+def test_a_step_launches_no_other_kernels(kernel_device):
     model = mujoco.MjModel.from_xml_string(SCENE)
     profile = EngineProfile(awake_dofs=13, constraints=100, contacts=40, convex_contacts=20)
     noted = {kernel.key for kernel, _ in kernels.launches_of_step(model, profile, own=True)}

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
+import warp as wp
 from mujoco.mjx.third_party import mujoco_warp
 from mujoco.mjx.third_party.mujoco_warp._src import sleep
 
@@ -69,8 +70,18 @@ FIELDS = [
 ]
 
 
-def test_a_step_that_passes_over_what_rests_is_the_same_to_the_bit():
-    """An arm pushes boxes that sleep, in one world; both come to rest again."""
+STATE = ("qpos", "qvel", "qacc_warmstart")
+
+
+def _same(device: wp.Device, mine: np.ndarray, theirs: np.ndarray) -> bool:
+    """To the bit on a processor. A GPU adds constraint forces in any order, which changes last digits."""
+    if not device.is_cuda or not np.issubdtype(mine.dtype, np.floating):
+        return np.array_equal(mine, theirs)
+    return bool(np.abs(mine - theirs).max(initial=0) < 1e-4 * (1 + np.abs(theirs).max(initial=0)))
+
+
+def test_a_step_that_passes_over_what_rests_is_the_same_to_the_bit(kernel_device):
+    """An arm pushes boxes that sleep, in one world; both come to rest again. On a GPU both begin each step alike."""
     model = mujoco.MjModel.from_xml_string(SCENE)
     start = mujoco.MjData(model)
     mujoco.mj_step(model, start, nstep=240)
@@ -86,13 +97,16 @@ def test_a_step_that_passes_over_what_rests_is_the_same_to_the_bit():
     ctrl, awake, fell = np.zeros((2, model.nu), np.float32), [], 0
     for step in range(160):
         ctrl[:, 0] = np.array([0.1, 0.4]) * (min(1.0, step / 50) if step < 60 else 0.0)
+        if kernel_device.is_cuda:
+            for name in STATE:
+                wp.copy(getattr(plain, name), getattr(own, name))
         for data, kernels in ((own, engine_kernels), (plain, awake_kernels)):
             data.ctrl.assign(ctrl)
             with kernels():
                 mujoco_warp.step(put, data)
         for name in FIELDS:
             mine, theirs = getattr(own, name).numpy(), getattr(plain, name).numpy()
-            assert np.array_equal(mine, theirs), (step, name)
+            assert _same(kernel_device, mine, theirs), (step, name)
         awake.append(own.nv_awake.numpy().copy())
         fell += int((own.tree_awake.numpy() == FELL_ASLEEP).sum())
     assert awake[0].tolist() == [3, 3]
@@ -100,7 +114,7 @@ def test_a_step_that_passes_over_what_rests_is_the_same_to_the_bit():
     assert fell >= 1, "something falls asleep again"
 
 
-def test_forces_and_velocities_wake_the_trees_that_upstream_wakes():
+def test_forces_and_velocities_wake_the_trees_that_upstream_wakes(kernel_device):
     model = mujoco.MjModel.from_xml_string(SCENE)
     start = mujoco.MjData(model)
     mujoco.mj_step(model, start, nstep=240)

@@ -74,7 +74,7 @@ class _Pair:
 
 
 @pytest.mark.parametrize("wide", [0, 2])
-def test_iterations_accelerations_and_forces_are_upstreams(monkeypatch, wide):
+def test_iterations_accelerations_and_forces_are_upstreams(kernel_device, monkeypatch, wide):
     """In one world nothing touches anything, in two an arm pushes boxes that slept."""
     pair = _Pair(monkeypatch, *_start(), wide)
     most = np.zeros(len(PUSHES), int)
@@ -92,7 +92,7 @@ def test_iterations_accelerations_and_forces_are_upstreams(monkeypatch, wide):
 
 
 @pytest.mark.parametrize("iterations", [1, 3])
-def test_who_does_not_converge_stops_at_the_limit_and_says_so(monkeypatch, iterations):
+def test_who_does_not_converge_stops_at_the_limit_and_says_so(kernel_device, monkeypatch, iterations):
     pair = _Pair(monkeypatch, *_start(iterations=iterations))
     for step in range(60):
         pair.step(np.stack([PUSHES * min(1.0, step / 50), np.zeros(3)], 1))
@@ -102,7 +102,7 @@ def test_who_does_not_converge_stops_at_the_limit_and_says_so(monkeypatch, itera
     assert pair.of("solver_niter")[0].max() == iterations
 
 
-def test_a_world_without_constraints_and_one_without_numbers_end_as_upstream(monkeypatch):
+def test_a_world_without_constraints_and_one_without_numbers_end_as_upstream(kernel_device, monkeypatch):
     pair = _Pair(monkeypatch, *_start(friction=False, iterations=7))
     pair.step(np.zeros((3, 2)))
     assert pair.own.nefc.numpy().tolist() == [0, 0, 0]

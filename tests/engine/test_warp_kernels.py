@@ -50,7 +50,7 @@ def _roll(model: mujoco.MjModel, start: mujoco.MjData) -> tuple[np.ndarray, np.n
 
 
 @pytest.mark.slow
-def test_an_arm_among_sleeping_boxes_moves_as_upstream():
+def test_an_arm_among_sleeping_boxes_moves_as_upstream(kernel_device):
     model = mujoco.MjModel.from_xml_string(SCENE)
     assert model.nv > AWAKE
     start = mujoco.MjData(model)
@@ -70,7 +70,7 @@ def test_an_arm_among_sleeping_boxes_moves_as_upstream():
 
 
 @pytest.mark.slow
-def test_a_world_without_constraints_reads_nothing_that_was_never_written():
+def test_a_world_without_constraints_reads_nothing_that_was_never_written(kernel_device):
     """Freed memory is filled with what is no number before each step; arrays of a solve are likely to lie in it."""
     model = mujoco.MjModel.from_xml_string(SCENE.replace('frictionloss="0.001"', ""))
     start = mujoco.MjData(model)

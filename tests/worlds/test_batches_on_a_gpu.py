@@ -204,13 +204,16 @@ def test_a_world_of_many_goes_on_natively(batch_of_many, pushed, scene):
 
 
 def test_resets_inside_a_program_put_flagged_worlds_right(batch_of_many, scene):
-    """One world in eight loses an object through the floor; it is flagged, counted, replaced."""
+    """One world in eight has lost an object, half of them one that sleeps; each is flagged, counted, replaced."""
     batch = batch_of_many.start(seed=9)
     engine = batch_of_many.engine
     rows = jax.tree.map(np.array, engine.snapshot(batch.world.physics))
     movable = np.flatnonzero(engine.layout.object_qposadr >= 0)[0]
-    rows.qpos[::8, engine.layout.object_qposadr[movable] + 2] = -3.0
-    rows.tree_asleep[::8] = FULLY_AWAKE
+    drop = np.asarray(batch.world.view.object_com)[::8, movable, 2] - (batch_of_many.starts.floor[movable] - 0.5)
+    qpos, asleep = np.array(rows.qpos), np.array(rows.tree_asleep)
+    qpos[::8, engine.layout.object_qposadr[movable] + 2] -= drop  # its centre of mass, not its frame
+    asleep[::16] = FULLY_AWAKE
+    rows = rows.with_whole(qpos=qpos, tree_asleep=asleep)
     physics = jax.jit(engine.load)(batch.world.physics, rows)
     batch = dataclasses.replace(batch, world=dataclasses.replace(batch.world, physics=physics))
 

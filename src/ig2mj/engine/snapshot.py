@@ -112,12 +112,15 @@ class Snapshot:
     model_fields: ModelFields = ModelFields()
 
     def whole(self, name: str) -> Array:
-        """One of MuJoCo's arrays (`AXIS`), of scene and agents together."""
+        """One of MuJoCo's arrays (`AXIS`), of scene and agents together. To change it: `with_whole`."""
         scene, agents, axis = getattr(self.scene, name), getattr(self.agents, name), AXIS[name]
         if not agents.shape[axis]:
             return scene
-        jaxed = isinstance(scene, jax.Array) or isinstance(agents, jax.Array)
-        return (jnp if jaxed else np).concatenate([scene, agents], axis)
+        if isinstance(scene, jax.Array) or isinstance(agents, jax.Array):
+            return jnp.concatenate([scene, agents], axis)
+        both = np.concatenate([scene, agents], axis)
+        both.flags.writeable = False  # a copy: what is written to it would be lost without a word
+        return both
 
     def with_whole(self, **fields: Any) -> Snapshot:
         """The snapshot with others of MuJoCo's arrays, of scene and agents together."""
