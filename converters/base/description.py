@@ -13,6 +13,16 @@ from typing import Any
 
 import numpy as np
 
+Rgba = tuple[float, float, float, float]
+
+
+@dataclasses.dataclass(frozen=True)
+class PackedImage:
+    """An image that lies inside another file (a GLB). name: for messages and file names. content: the image file."""
+
+    name: str
+    content: bytes = dataclasses.field(repr=False)
+
 
 @dataclasses.dataclass
 class Mesh:
@@ -35,7 +45,7 @@ class Shape:
       grouped: the file had groups; each is a convex piece by iGibson's convention.
       scale: the element's mesh scale, per axis.
       file: where the mesh came from. encrypted: it is there but unreadable by design; `meshes` is empty.
-      rgba: flat colour, where the source had one. texture: image file and uv per vertex, where usable.
+      rgba: flat colour, where the source had one. texture: image and uv per vertex, where usable.
       was_primitive: a mesh that an uneven scale made of a primitive.
     """
 
@@ -48,8 +58,8 @@ class Shape:
     file: pathlib.Path | None = None
     encrypted: bool = False
     name: str = ""
-    rgba: tuple[float, float, float, float] | None = None
-    texture: pathlib.Path | None = None
+    rgba: Rgba | None = None
+    texture: pathlib.Path | PackedImage | None = None
     uv: list[np.ndarray] | None = None  # per mesh [n, 2]
     was_primitive: bool = False
 

@@ -70,8 +70,17 @@ class FileGuard:
     def resolve(self, filename: str, element: str, base: pathlib.Path | None = None) -> pathlib.Path:
         """Path of a file that is named in the URDF, or in a file in the folder `base`.
 
+        A name with percent signs that is no file is read as the percent-encoding of one, as URIs have it.
         The path need not exist. Raises OutsideError where it may not be read, InputError for names that are none.
         """
+        path = self._resolve(filename, element, base)
+        if "%" in filename and not inputs.is_file(path):
+            plain = urllib.parse.unquote(filename, errors="replace")
+            if plain != filename:
+                return self._resolve(plain, element, base)
+        return path
+
+    def _resolve(self, filename: str, element: str, base: pathlib.Path | None) -> pathlib.Path:
         name = filename.strip().replace("\\", "/")
         said = shortened(name)
         if not name or any(ord(c) < 32 for c in name):

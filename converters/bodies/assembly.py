@@ -8,11 +8,12 @@ joint leads to a body of its own. All lengths are scaled already. Poses are 4x4.
 from __future__ import annotations
 
 import dataclasses
+import pathlib
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..base.description import Inertial, Joint, ObjectModel, Shape
+from ..base.description import Inertial, Joint, ObjectModel, PackedImage, Shape
 from ..base.transforms import apply
 from ..hulls.pieces import Piece
 from .joint_limits import clamp, is_locked, motion
@@ -36,7 +37,7 @@ class VisualPart:
     faces: np.ndarray | None = None
     uv: np.ndarray | None = None
     rgba: tuple[float, float, float, float] | None = None
-    texture: str | None = None  # image file
+    texture: pathlib.Path | PackedImage | None = None
 
 
 @dataclasses.dataclass
@@ -311,7 +312,7 @@ def _visual_parts(shape: Shape, at: np.ndarray) -> list[VisualPart]:
             faces=np.concatenate([mesh.faces + start for mesh, start in zip(meshes, starts, strict=True)]),
             uv=uv,
             rgba=shape.rgba,
-            texture=str(shape.texture) if textured else None,
+            texture=shape.texture if textured else None,
         )
     ]
 

@@ -9,8 +9,9 @@ import pathlib
 import mujoco
 from PIL import Image
 
-from ..base import inputs
 from ..base.naming import file_slug
+from ..reading.images import ImageError, open_image
+from ..reading.looks import Texture, content_of
 
 #: Longer edges are scaled down to this many pixels: a home has hundreds of textures, and all of them lie in memory.
 MAX_EDGE = 1024
@@ -21,7 +22,7 @@ class TextureStore:
 
     def __init__(self, spec: mujoco.MjSpec, folder: pathlib.Path):
         self._spec, self._folder = spec, folder
-        self._by_file: dict[str, str | None] = {}
+        self._by_image: dict[Texture, str | None] = {}
         self._names: set[str] = set()
         self.warnings: list[str] = []
 
@@ -30,19 +31,19 @@ class TextureStore:
         """Names of the files written so far, sorted."""
         return sorted(f"{name}.png" for name in self._names)
 
-    def material(self, image: str) -> str | None:
-        """Name of the material that shows an image file; None (and a warning) where it cannot be read."""
-        if image not in self._by_file:
-            self._by_file[image] = self._register(pathlib.Path(image))
-        return self._by_file[image]
+    def material(self, image: Texture) -> str | None:
+        """Name of the material that shows an image; None (and a warning) where it cannot be read."""
+        if image not in self._by_image:
+            self._by_image[image] = self._register(image)
+        return self._by_image[image]
 
-    def _register(self, image: pathlib.Path) -> str | None:
+    def _register(self, image: Texture) -> str | None:
         try:
-            data = _png(image)
-        except Exception as e:  # Pillow's decoders raise a dozen kinds of errors on broken files
+            data = _png(content_of(image))
+        except (OSError, ImageError) as e:
             self.warnings.append(f"{image.name}: texture left out: {e}")
             return None
-        name = f"{file_slug(image.stem, 40)}-{hashlib.sha256(data).hexdigest()[:12]}"
+        name = f"{file_slug(pathlib.PurePath(image.name).stem, 40)}-{hashlib.sha256(data).hexdigest()[:12]}"
         if name not in self._names:
             self._names.add(name)
             self._folder.mkdir(parents=True, exist_ok=True)
@@ -54,9 +55,9 @@ class TextureStore:
         return name
 
 
-def _png(image: pathlib.Path) -> bytes:
-    """An image file as PNG bytes, RGB, no longer edge than MAX_EDGE, no metadata."""
-    with Image.open(io.BytesIO(inputs.content(image))) as opened:
+def _png(raw: bytes) -> bytes:
+    """An image file as PNG bytes, RGB, no longer edge than MAX_EDGE, no metadata. Raises ImageError."""
+    with open_image(raw) as opened:
         picture = opened.convert("RGB")
     if max(picture.size) > MAX_EDGE:
         picture.thumbnail((MAX_EDGE, MAX_EDGE), Image.Resampling.LANCZOS)

@@ -15,7 +15,7 @@ from ..base.description import Instance, ObjectModel, SceneDescription
 from ..base.file_access import FileGuard, OutsideError
 from ..bodies.inertia import DEFAULT_DENSITY
 from .dataset_files import CategorySpec, read_lines, read_overlaps, read_specs, read_version
-from .mesh_files import encrypted_twin
+from .looks import encrypted_twin
 from .metadata import read_metadata
 from .room_maps import read_room_maps, room_at
 from .scene_urdf import FIXED_FURNITURE, SceneOptions, read_scene

@@ -11,13 +11,18 @@ import numpy as np
 
 from ig2mj.errors import InputError
 
+from ..base.read_limits import check_limit
+from .text import without_mark
 from .xml_reader import MAX_NUMBER, read_bytes
 
 MAX_JSON_BYTES = 64 * 2**20
 
 
 def decode_json(text: str | bytes, file: object, element: str = "") -> Any:
-    """Raises InputError: no JSON, or nested too deeply."""
+    """Raises InputError: no JSON, nested too deeply, or over the limit `json_values`."""
+    raw = text.encode("utf-8", errors="surrogatepass") if isinstance(text, str) else text
+    count = sum(raw.count(sign) for sign in (b",", b":", b"[", b"{"))
+    check_limit("json_values", count, file, "values", element=element)
     try:
         return json.loads(text)
     except RecursionError as e:
@@ -28,7 +33,7 @@ def decode_json(text: str | bytes, file: object, element: str = "") -> Any:
 
 def read_json(file: str | os.PathLike, kind: type) -> Any:
     """A JSON file whose top is a `kind` (dict or list). Raises InputError."""
-    value = decode_json(read_bytes(pathlib.Path(file), MAX_JSON_BYTES).removeprefix(b"\xef\xbb\xbf"), file)
+    value = decode_json(without_mark(read_bytes(pathlib.Path(file), MAX_JSON_BYTES)), file)
     if not isinstance(value, kind):
         raise InputError(file, f"holds a {type(value).__name__} instead of a {kind.__name__}")
     return value

@@ -5,15 +5,13 @@
   X_UP (x, y, z) -> (-y, x, z) after the unit, as Gazebo does (RViz leaves the axis alone).
 - GLB, glTF: Y up by its standard, turned to Z up the same way, as Drake and Blender do. Metres.
 
-Textures are named only where they are image files on disk; an image packed into a GLB gives its mean colour.
+Images that the files name or hold are opened by `looks` alone, never by the libraries that read the geometry.
 """
 
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import io
-import json
 import logging
 import pathlib
 import warnings as python_warnings
@@ -22,71 +20,75 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from PIL import Image
 from trimesh.resolvers import Resolver
-from trimesh.visual.material import SimpleMaterial
 
 from ig2mj.errors import InputError
 
 from ..base import inputs
-from ..base.description import Mesh
+from ..base.description import Mesh, Rgba
 from ..base.file_access import FileGuard
-from .mesh_limits import MAX_FACES, MAX_MESH_BYTES, MeshError, check_vertices, too_many_faces
+from ..base.read_limits import check_limit, limits
+from .collada import Y_UP, read_collada
+from .geometry_parts import Geometry, MeshPart, Placed, parts_of
+from .gltf import read_gltf
+from .looks import Look, TextureReader, mean_vertex_colour
+from .mesh_limits import MeshError, check_faces
 from .obj_files import Material, ObjFile, group_meshes, material_meshes, read_mtl, read_obj
-from .xml_reader import decode_xml, parse_number, parse_strictly, read_bytes
+from .text import without_mark
+from .xml_reader import read_bytes
 
-MAX_PIXELS = 16384 * 16384
-MAX_SCENE_FILE_BYTES = 128 * 2**20  # DAE and glTF
 FORMATS = (".obj", ".stl", ".dae", ".glb", ".gltf", ".ply")
-_IMAGES = (".png", ".jpg", ".jpeg", ".bmp", ".tga", ".tif", ".tiff")
-
-Y_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-X_UP = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
 
 
-@dataclasses.dataclass
-class MeshPart:
-    """Triangles with one look. uv: [n, 2] of the one mesh, origin at the image's lower left, as in OBJ."""
-
-    meshes: list[Mesh]
-    rgba: tuple[float, float, float, float] | None = None
-    texture: pathlib.Path | None = None
-    uv: list[np.ndarray] | None = None
-
-
-def is_encrypted(file: pathlib.Path) -> bool:
-    """A BEHAVIOR file that only iGibson's renderer may open: name `*.encrypted.*`."""
-    return ".encrypted." in file.name.lower()
-
-
-def encrypted_twin(file: pathlib.Path) -> pathlib.Path | None:
-    """The `x.encrypted.obj` that stands where `x.obj` is named and missing."""
-    twin = file.with_name(f"{file.stem}.encrypted{file.suffix}")
-    return twin if not inputs.is_file(file) and inputs.is_file(twin) else None
-
-
-def read_collision(file: pathlib.Path, guard: FileGuard) -> tuple[list[Mesh], bool]:
+def read_collision(file: pathlib.Path, guard: FileGuard, warnings: list[str] | None = None) -> tuple[list[Mesh], bool]:
     """(meshes, grouped) of a collision file: one mesh per `o`/`g` group of an OBJ, else one per piece of the file.
 
+    warnings: gets what of the file cannot be read while the rest can.
+
     Raises:
-      MeshError: missing, unreadable, empty, over `MAX_FACES`, or a vertex that is not finite.
+      MeshError: missing, unreadable, empty, over a limit, or a vertex that is not finite.
       OutsideError: it refers to a file outside the guard's folders.
     """
     if _suffix(file) == ".obj":
         obj = read_obj(_existing(file))
+        check_limit("mesh_groups", obj.group_count, file, "groups", error=MeshError)
         meshes = group_meshes(obj)
         if not meshes:
             raise MeshError(file, "is empty: all its faces are degenerate")
         return meshes, obj.grouped
-    return [mesh for part in _read_with_trimesh(file, guard) for mesh in part.meshes], False
+    parts = _read_scene_file(file, guard, None, [] if warnings is None else warnings)
+    return [mesh for part in parts for mesh in part.meshes], False
 
 
 def read_visual(file: pathlib.Path, guard: FileGuard, element: str, warnings: list[str]) -> list[MeshPart]:
     """One part per material of a visual file. Raises as `read_collision`; lost materials are warnings."""
-    if _suffix(file) == ".obj":
-        obj = read_obj(_existing(file))
-        return _obj_parts(obj, file, guard, element, warnings)
-    return _read_with_trimesh(file, guard)
+    suffix = _suffix(file)
+    textures = TextureReader(guard, element, file.parent, warnings)
+    if suffix == ".obj":
+        parts = _obj_parts(read_obj(_existing(file)), file, textures)
+    else:
+        parts = _read_scene_file(file, guard, textures, warnings)
+    return _few(parts, file, warnings)
+
+
+def _few(parts: list[MeshPart], file: pathlib.Path, warnings: list[str]) -> list[MeshPart]:
+    """Parts of equal looks joined, and all in one colour, where there are more than `ReadLimits.mesh_materials`."""
+    most = limits().mesh_materials
+    if len(parts) <= most:
+        return parts
+    looks: dict[Any, MeshPart] = {}
+    for part in parts:
+        key = (part.rgba, part.texture, part.uv is None)
+        uv: list[np.ndarray] | None = None if part.uv is None else []
+        joined = looks.setdefault(key, MeshPart([], part.rgba, part.texture, uv))
+        joined.meshes += part.meshes
+        if joined.uv is not None and part.uv is not None:
+            joined.uv += part.uv
+    if len(looks) <= most:
+        return list(looks.values())
+    option = "--limit mesh-materials=N"
+    warnings.append(f"{file.name} has {len(looks)} materials, the limit is {most} ({option}): drawn in one colour")
+    return [MeshPart([mesh for part in parts for mesh in part.meshes], parts[0].rgba)]
 
 
 def _suffix(file: pathlib.Path) -> str:
@@ -104,67 +106,50 @@ def _existing(file: pathlib.Path) -> pathlib.Path:
     return file
 
 
-def _obj_parts(obj: ObjFile, file: pathlib.Path, guard: FileGuard, element: str, warnings: list[str]) -> list[MeshPart]:
+def _obj_parts(obj: ObjFile, file: pathlib.Path, textures: TextureReader) -> list[MeshPart]:
     materials: dict[str, Material] = {}
-    for library in obj.libraries:
+    for library in obj.libraries[:MAX_LIBRARIES]:
         try:
-            materials |= read_mtl(guard.resolve(library, element, base=file.parent))
+            materials |= read_mtl(textures.guard.resolve(library, textures.element, base=file.parent))
         except InputError as e:
-            warnings.append(f"materials of {file.name} are left out: {e}")
+            textures.warn(f"materials of {file.name} are left out: {e}")
+    if unknown := [name for name in obj.materials[1:] if name not in materials]:
+        textures.warn(f"{file.name} uses materials that no MTL file defines: {', '.join(unknown[:5])[:200]}")
+    images: dict[str, pathlib.Path | None] = {}
     parts = []
-    for name, mesh, uv in material_meshes(obj):
-        look = materials.get(name, Material())
-        texture = _texture(look.texture, file.parent, guard, element, warnings) if look.texture else None
-        usable = uv if texture is not None else None
-        parts.append(
-            MeshPart([mesh], look.rgba, texture if usable is not None else None, None if usable is None else [usable])
-        )
+    for name, mesh, uv, vertices in material_meshes(obj):
+        material = materials.get(name, Material())
+        look = Look(material.rgba)
+        if material.texture:
+            if material.texture not in images:
+                images[material.texture] = textures.file(material.texture)
+            if (image := images[material.texture]) is not None:
+                look = Look(material.rgba, image) if uv is not None else textures.flat(Look(material.rgba, image))
+        if look == Look() and obj.colours is not None:
+            look = Look(_vertex_colour(obj.colours[vertices], file, textures))
+        parts.append(MeshPart([mesh], look.rgba, look.texture, None if uv is None else [uv]))
     if not parts:
         raise MeshError(file, "is empty: all its faces are degenerate")
     return parts
 
 
-def _texture(
-    name: str, folder: pathlib.Path, guard: FileGuard, element: str, warnings: list[str]
-) -> pathlib.Path | None:
-    """Path of a texture that opens as an image; None (with a warning unless it is encrypted) otherwise."""
-    try:
-        path = guard.resolve(name, element, base=folder)
-    except InputError as e:
-        warnings.append(f"a texture is left out: {e}")
-        return None
-    if is_encrypted(path) or encrypted_twin(path):
-        return None
-    try:
-        if path.suffix.lower() not in _IMAGES:
-            raise OSError("not an image format that is read")
-        with Image.open(io.BytesIO(inputs.content(path))) as image:
-            if image.size[0] * image.size[1] > MAX_PIXELS:
-                raise OSError(f"{image.size[0]} x {image.size[1]} pixels are too many")
-            image.verify()
-    except Exception as e:  # Pillow raises many kinds for broken images
-        warnings.append(f"texture {path.name} is left out: {e}")
-        return None
-    return path
+def _vertex_colour(colours: np.ndarray, file: pathlib.Path, textures: TextureReader) -> Rgba:
+    rgba, vary = mean_vertex_colour(colours)
+    if vary:
+        textures.warn(f"{file.name} has colours per vertex: their mean is drawn")
+    return rgba
 
 
-class _GuardedFiles(Resolver):
-    """Gives trimesh the files that a DAE or glTF names, and remembers the images among them."""
+class _Files(Resolver):
+    """Gives trimesh an image of one pixel for whatever a PLY names, so that it keeps texture coordinates and opens
+    nothing that a stranger made."""
 
-    def __init__(self, file: pathlib.Path, guard: FileGuard):
-        self.file, self.guard = file, guard
-        self.images: list[pathlib.Path] = []
-        self.refused: InputError | None = None
+    def __init__(self):
+        self.image: str | None = None
 
     def get(self, key: str) -> bytes:  # pyright: ignore[reportIncompatibleMethodOverride]
-        try:
-            path = self.guard.resolve(str(key), self.file.name, base=self.file.parent)
-        except InputError as e:
-            self.refused = e
-            raise
-        if path.suffix.lower() in _IMAGES:
-            self.images.append(path)
-        return read_bytes(path, MAX_SCENE_FILE_BYTES)
+        self.image = str(key)
+        return _PIXEL
 
     def keys(self) -> list[str]:
         return []
@@ -172,136 +157,94 @@ class _GuardedFiles(Resolver):
     def write(self, name: str, data: Any) -> None:
         raise NotImplementedError("meshes are only read")
 
-    def namespaced(self, namespace: str) -> _GuardedFiles:
+    def namespaced(self, namespace: str) -> _Files:
         raise NotImplementedError("meshes have no namespaces")
 
 
-def _read_with_trimesh(file: pathlib.Path, guard: FileGuard) -> list[MeshPart]:
+_PIXEL = bytes.fromhex(
+    "89504e470d0a1a0a0000000d4948445200000001000000010802000000907753de0000000c49444154789c63f8ffff3f0005fe02fe0def46b8"
+    "0000000049454e44ae426082"
+)
+"""A PNG of one white pixel."""
+
+MAX_LIBRARIES = 20
+"""MTL files that an OBJ may name."""
+
+
+def _read_scene_file(
+    file: pathlib.Path, guard: FileGuard, textures: TextureReader | None, warnings: list[str]
+) -> list[MeshPart]:
+    """Parts of a DAE, GLB, glTF, STL or PLY; textures: None for a collision file."""
     suffix = _suffix(file)
-    raw = read_bytes(_existing(file), MAX_SCENE_FILE_BYTES if suffix in (".dae", ".glb", ".gltf") else MAX_MESH_BYTES)
+    raw = read_bytes(_existing(file), "scene_bytes" if suffix in (".dae", ".glb", ".gltf") else "mesh_bytes")
     if raw.startswith(b"version https://git-lfs"):
         raise MeshError(file, "is a Git LFS pointer, not the mesh", fix="run git lfs pull")
-    if suffix == ".stl" and len(raw) > 50 * (MAX_FACES + 100) and not raw.lstrip().startswith(b"solid"):
-        raise too_many_faces(file, (len(raw) - 84) // 50)
     turn = np.eye(4)
-    if suffix == ".dae":
-        turn, raw = _collada_frame(raw, file)
-    elif suffix in (".glb", ".gltf"):
-        turn[:3, :3] = Y_UP
-        if suffix == ".gltf":
-            _check_gltf_json(raw, file)
-    files = _GuardedFiles(file, guard)
     try:
         with python_warnings.catch_warnings(), _quiet_trimesh(), np.errstate(all="ignore"):
             python_warnings.simplefilter("ignore")
-            loaded = trimesh.load_scene(io.BytesIO(raw), file_type=suffix[1:], resolver=files, process=False)
-            pieces = [(loaded.geometry[n], m) for m, n in map(loaded.graph.get, sorted(loaded.graph.nodes_geometry))]
-    except MemoryError:
+            if suffix == ".dae":
+                found = read_collada(raw, file, textures)
+                placed, turn = found.placed, found.turn
+                if placed and found.lost:
+                    warnings.append(f"parts of {file.name} cannot be read: {found.lost[0]}"[:300])
+            elif suffix in (".glb", ".gltf"):
+                turn[:3, :3] = Y_UP
+
+                def load(uri: str) -> bytes:
+                    path = guard.resolve(uri, file.name, base=file.parent)
+                    return read_bytes(path, "scene_bytes")
+
+                placed = read_gltf(raw, file, load, textures)
+            else:
+                placed = _with_trimesh(raw, file, suffix, textures)
+            return parts_of(placed, turn, file, textures)
+    except (InputError, MemoryError):
         raise
-    except Exception as e:  # the readers behind trimesh raise whatever the broken file leads them to
-        if files.refused is not None:
-            raise files.refused from e
-        raise MeshError(file, f"cannot be read as {suffix[1:].upper()}: {type(e).__name__}: {e}") from e
-    parts = [_trimesh_part(geometry, turn @ matrix, files, file) for geometry, matrix in pieces]
-    parts = [p for p in parts if p is not None]
-    if not parts:
-        raise MeshError(file, "is empty: it has no faces")
-    if (count := sum(len(m.faces) for p in parts for m in p.meshes)) > MAX_FACES:
-        raise too_many_faces(file, count)
-    return parts
+    except Exception as e:  # the readers behind trimesh and pycollada raise whatever the broken file leads them to
+        raise MeshError(file, f"cannot be read as {suffix[1:].upper()}: {type(e).__name__}: {e}"[:500]) from e
 
 
-def _trimesh_part(geometry: Any, matrix: np.ndarray, files: _GuardedFiles, file: pathlib.Path) -> MeshPart | None:
-    if not isinstance(geometry, trimesh.Trimesh) or not len(geometry.faces):
-        return None  # points and lines
-    check_vertices(np.asarray(geometry.vertices), file)
-    check_vertices(matrix, file)
-    if geometry.faces.min() < 0 or geometry.faces.max() >= len(geometry.vertices):
-        raise MeshError(file, "a face names a vertex that does not exist")
-    with np.errstate(all="ignore"):
-        rgba, image = _look(geometry)
-    texture = _same_image(image, files) if image is not None else None
-    uv = getattr(geometry.visual, "uv", None) if texture is not None else None
-    if image is not None and (texture is None or uv is None):
-        rgba, texture = _mean_colour(image, rgba), None
-    vertices, faces = np.asarray(geometry.vertices, dtype=float), np.asarray(geometry.faces, dtype=np.int64)
-    rows = vertices if uv is None else np.column_stack([vertices, uv])
-    used, index = np.unique(rows, axis=0, return_inverse=True)  # STL and DAE repeat vertices per face
-    faces = index.reshape(-1)[faces]
-    a, b, c = faces.T
-    faces = faces[(a != b) & (b != c) & (c != a)]
-    if not len(faces):
-        return None
-    if np.linalg.det(matrix[:3, :3]) < 0:
-        faces = faces[:, ::-1]
-    placed = used[:, :3] @ matrix[:3, :3].T + matrix[:3, 3]
-    return MeshPart([Mesh(placed, faces)], rgba, texture, None if texture is None else [used[:, 3:]])
-
-
-def _look(geometry: trimesh.Trimesh) -> tuple[tuple[float, float, float, float] | None, Any]:
-    """(colour or None, PIL image or None) of a trimesh geometry."""
-    visual: Any = geometry.visual
-    if visual.kind == "texture":
-        material = visual.material
-        image = getattr(material, "baseColorTexture", None) or getattr(material, "image", None)
-        simple = isinstance(material, SimpleMaterial)
-        colour = material.diffuse if simple else material.baseColorFactor
-        if colour is None or (simple and image is not None):
-            return None, image  # nothing said: the texture alone, or the URDF's colour
-    elif visual.kind in ("vertex", "face"):
-        image, colour = None, np.mean(visual.vertex_colors, axis=0)
+def _with_trimesh(raw: bytes, file: pathlib.Path, suffix: str, textures: TextureReader | None) -> list[Placed]:
+    """STL and PLY."""
+    raw = without_mark(raw)
+    if suffix == ".stl":
+        # Three words in four of an ASCII facet are numbers; in binary a facet takes 50 bytes.
+        ascii_ = raw.lstrip()[:5].lower() == b"solid" and b"facet" in raw[:4096].lower()
+        check_faces(raw.lower().count(b"endfacet") if ascii_ else (len(raw) - 84) // 50, file)
     else:
-        return None, None
-    values = np.asarray(colour, dtype=float).reshape(-1)
-    values = values / 255.0 if np.asarray(colour).dtype.kind in "ui" or np.max(values) > 1.0 else values
-    r, g, b, a = (float(v) for v in np.clip(np.append(values, 1.0)[:4], 0.0, 1.0))
-    return (r, g, b, a), image
+        _check_ply(raw, file)
+    files = _Files()
+    loaded = trimesh.load_scene(io.BytesIO(raw), file_type=suffix[1:], resolver=files, process=False)
+    placed = []
+    for name in sorted(loaded.geometry):
+        geometry: Any = loaded.geometry[name]
+        if not isinstance(geometry, trimesh.Trimesh) or not len(geometry.faces):
+            continue  # points and lines
+        visual: Any = geometry.visual
+        uv = colours = None
+        if textures is not None and visual.kind == "texture":
+            uv = visual.uv
+        elif textures is not None and visual.kind in ("vertex", "face"):
+            colours = np.asarray(visual.vertex_colors, dtype=float) / 255.0
+        image = None if textures is None or files.image is None else textures.file(files.image)
+        found = Geometry(np.asarray(geometry.vertices), np.asarray(geometry.faces), uv, colours)
+        placed.append(Placed(found, np.eye(4), Look(None, image)))
+    return placed
 
 
-def _same_image(image: Any, files: _GuardedFiles) -> pathlib.Path | None:
-    """The file among those read that holds this image."""
-    try:
-        for path in files.images:
-            with Image.open(io.BytesIO(inputs.content(path))) as candidate:
-                if candidate.size == image.size and candidate.tobytes() == image.tobytes():
-                    return path
-    except Exception:  # a broken image is not a texture
-        return None
-    return None
-
-
-def _mean_colour(image: Any, rgba: tuple[float, float, float, float] | None) -> tuple[float, float, float, float]:
-    factor = rgba or (1.0, 1.0, 1.0, 1.0)
-    try:
-        r, g, b = (
-            float(v) / 255.0 for v in np.asarray(image.convert("RGB").resize((1, 1), Image.Resampling.BOX))[0, 0]
-        )
-    except Exception:  # a broken image
-        return factor
-    return (r * factor[0], g * factor[1], b * factor[2], factor[3])
-
-
-def _collada_frame(raw: bytes, file: pathlib.Path) -> tuple[np.ndarray, bytes]:
-    """4x4 from the file's unit and axes to metres and Z up, and the file's text without XML entities."""
-    text = decode_xml(raw, file)
-    turn = np.eye(4)
-    root = parse_strictly(text, file)
-    axis = root.findtext("{*}asset/{*}up_axis") or "Y_UP"
-    turn[:3, :3] = {"X_UP": X_UP, "Z_UP": np.eye(3)}.get(axis.strip(), Y_UP)
-    unit = root.find("{*}asset/{*}unit")
-    if unit is not None and unit.get("meter") is not None:
-        metres = parse_number(unit.get("meter").strip())
-        if metres is None or metres <= 0:
-            raise MeshError(file, f"unit meter='{unit.get('meter')}' is not a positive number")
-        turn[:3, :3] *= metres
-    return turn, text.encode()
-
-
-def _check_gltf_json(raw: bytes, file: pathlib.Path) -> None:
-    try:
-        json.loads(raw)
-    except (ValueError, RecursionError) as e:
-        raise MeshError(file, f"is not a glTF file: {e}") from e
+def _check_ply(raw: bytes, file: pathlib.Path) -> None:
+    """The counts that a PLY's header declares."""
+    head = raw[: max(raw.find(b"end_header"), 0)].split(b"\n")
+    if not head or head == [b""]:
+        raise MeshError(file, "cannot be read as PLY: its header does not end")
+    for line in head:
+        words = line.split()
+        if len(words) == 3 and words[0] == b"element" and words[2].isdigit():
+            if int(words[2][:18]) > len(raw):
+                raise MeshError(file, f"declares more elements ({words[2][:18].decode()}) than it has bytes")
+            if words[1] == b"face":
+                check_faces(int(words[2][:18]), file)
 
 
 @contextlib.contextmanager

@@ -1,4 +1,4 @@
-"""What a mesh file may be at most, and the error of one that cannot be used."""
+"""Checks that every mesh reader makes, and the error of a mesh that cannot be used."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ import numpy as np
 
 from ig2mj.errors import InputError
 
-MAX_FACES = 1_000_000  # triangles of one file; MuJoCo takes such a mesh, hulls and pictures of it take minutes
-MAX_MESH_BYTES = 512 * 2**20
+from ..base.read_limits import check_limit
+
 MAX_COORDINATE = 1e7
 """Of a vertex, in the file's own unit: 10 km in millimetres."""
 
@@ -24,7 +24,6 @@ def check_vertices(vertices: np.ndarray, file: object) -> None:
         raise MeshError(file, f"has a vertex {far:.3g} units away, the limit is {MAX_COORDINATE:.0e}")
 
 
-def too_many_faces(file: object, count: int) -> MeshError:
-    return MeshError(
-        file, f"has {count} or more faces, the limit is {MAX_FACES}", fix="simplify the mesh, for example in Blender"
-    )
+def check_faces(count: int, file: object) -> None:
+    """Raises MeshError for more triangles than `ReadLimits.mesh_faces`."""
+    check_limit("mesh_faces", count, file, "faces", fix="simplify the mesh, for example in Blender", error=MeshError)

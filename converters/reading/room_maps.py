@@ -6,7 +6,6 @@ All layout images are square, 0.01 m per pixel, centred on the world's origin, r
 from __future__ import annotations
 
 import collections
-import io
 import os
 import pathlib
 
@@ -18,12 +17,13 @@ from ig2mj.errors import InputError
 
 from ..base import inputs
 from ..base.description import RoomMaps
+from .images import ImageError, open_image
 
 PIXEL = 0.01  # m, of the layout images
 SEG_RESOLUTION = 0.1  # m, of the room maps (seg_map_resolution)
 TRAV_RESOLUTION = 0.1  # m, of the traversability maps (trav_map_resolution)
 TRAV_EROSION = 2  # cells (trav_map_erosion)
-MAX_SIDE = 20_000  # pixels: a home of 200 m
+MIN_SIDE = 10  # pixels
 MOST_ROOMS = 32_767  # instances: a cell of the room map is an int16
 
 
@@ -146,16 +146,14 @@ def _open_grey(file: pathlib.Path) -> np.ndarray:
 
 def _open(file: pathlib.Path) -> Image.Image:
     try:
-        with Image.open(io.BytesIO(inputs.content(file))) as image:
+        with open_image(inputs.content(file)) as image:
             if image.size[0] != image.size[1]:
                 raise InputError(file, f"is not square but {image.size[0]} x {image.size[1]} pixels")
-            if not 10 <= image.size[0] <= MAX_SIDE:
-                raise InputError(file, f"has {image.size[0]} pixels a side, not between 10 and {MAX_SIDE}")
+            if image.size[0] < MIN_SIDE:
+                raise InputError(file, f"has {image.size[0]} pixels a side, fewer than {MIN_SIDE}")
             image.load()
             return image.copy()
-    except InputError:
-        raise
-    except Exception as e:  # Pillow raises many kinds for broken images
+    except (ImageError, OSError) as e:
         raise InputError(file, f"is not an image that can be read: {e}") from e
 
 

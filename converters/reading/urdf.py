@@ -14,8 +14,9 @@ from ..base import inputs
 from ..base.description import Inertial, Joint, Link, Mimic, ObjectModel
 from ..base.file_access import FileGuard
 from ..base.transforms import read_origin
-from .urdf_geometry import GeometryReader, Rgba, read_colour
-from .urdf_tree import check_name, find_tree
+from .urdf_geometry import GeometryReader
+from .urdf_materials import UrdfMaterials
+from .urdf_tree import check_counts, check_name, find_tree
 from .xml_reader import Element, is_huge, number, numbers, read_xml, where
 
 JOINT_TYPES = ("fixed", "revolute", "prismatic", "continuous", "floating")
@@ -54,8 +55,8 @@ def read_urdf(
     warnings: list[str] = []
     robot = read_xml(path, "robot", warnings)
     guard = FileGuard(path, root, mesh_folder, allow_outside, mesh_root=mesh_root, package_path=package_path)
-    materials: dict[str, Rgba | None] = {m.get("name") or "": read_colour(m, path) for m in robot.iterfind("material")}
-    reader = GeometryReader(guard, materials, warnings)
+    reader = GeometryReader(guard, UrdfMaterials(robot, guard, warnings), warnings)
+    check_counts(robot, path)
     links: dict[str, Link] = {}
     for element in robot.iterfind("link"):
         link = _read_link(element, reader)
@@ -76,7 +77,7 @@ def read_urdf(
 def _read_link(element: Element, reader: GeometryReader) -> Link:
     file = reader.guard.file
     link = Link(check_name(element, file, reader.warnings))
-    link.collisions = [reader.collision(c) for c in element.iterfind("collision")]
+    link.collisions = [s for c in element.iterfind("collision") if (s := reader.collision(c)) is not None]
     link.visuals = [shape for v in element.iterfind("visual") for shape in reader.visual(v)]
     inertial = element.find("inertial")
     if inertial is not None:

@@ -14,11 +14,13 @@ from ..base import inputs
 from ..base.description import Mesh, Shape
 from ..base.file_access import FileGuard
 from ..base.transforms import read_origin
-from .mesh_files import MeshPart, encrypted_twin, is_encrypted, read_collision, read_visual
+from .geometry_parts import MeshPart
+from .looks import Look, TextureReader, encrypted_twin, is_encrypted
+from .mesh_files import read_collision, read_visual
 from .mesh_limits import MeshError
+from .urdf_materials import UrdfMaterials
 from .xml_reader import Element, local_name, number, numbers, shortened, where
 
-Rgba = tuple[float, float, float, float]
 CONVEX_ENOUGH = 0.9
 """A group of a plain URDF's OBJ counts as a convex piece if it fills this much of its hull."""
 
@@ -28,19 +30,25 @@ class GeometryReader:
     """Reads the shapes of one URDF, each mesh file once.
 
     Attributes:
-      materials: colours and textures of the robot's top-level `<material>`s.
+      materials: of the whole file.
       warnings: gets what was left out.
     """
 
     guard: FileGuard
-    materials: dict[str, Rgba | None]
+    materials: UrdfMaterials
     warnings: list[str]
     _collisions: dict[pathlib.Path, tuple[list[Mesh], bool]] = dataclasses.field(default_factory=dict)
     _visuals: dict[pathlib.Path, list[MeshPart]] = dataclasses.field(default_factory=dict)
 
-    def collision(self, element: Element) -> Shape:
-        """Raises InputError: whatever is wrong with it."""
+    def collision(self, element: Element) -> Shape | None:
+        """None (and a warning) for a shape of size zero, which Bullet leaves out, too.
+
+        Raises:
+          InputError: whatever else is wrong with it.
+        """
         shape, mesh = self._primitive(element)
+        if self._is_nothing(shape, mesh, element):
+            return None
         if mesh is None:
             return shape
         path, named = self._mesh_path(mesh)
@@ -48,7 +56,7 @@ class GeometryReader:
             raise MeshError(path, "is an encrypted collision mesh", element=where(element))
         try:
             if path not in self._collisions:
-                self._collisions[path] = read_collision(path, self.guard)
+                self._collisions[path] = read_collision(path, self.guard, self.warnings)
         except MeshError as e:
             raise _in_urdf(e, self.guard, mesh, named) from e
         meshes, grouped = self._collisions[path]
@@ -56,26 +64,28 @@ class GeometryReader:
         return dataclasses.replace(shape, meshes=list(meshes), grouped=grouped, scale=self._scale(mesh), file=path)
 
     def visual(self, element: Element) -> list[Shape]:
-        """One shape per material. A geometry that cannot be used is a warning and no shape.
+        """One shape per material. A geometry that cannot be used is a warning and no shape; so is a material.
 
         Raises:
           InputError: numbers or file names that no URDF may have.
         """
-        rgba = self._colour(element)
+        look = self.materials.look(element)
         try:
             shape, mesh = self._primitive(element)
         except MeshError as e:
             self.warnings.append(f"a visual is left out: {e}")
             return []
-        shape.rgba = rgba
+        if self._is_nothing(shape, mesh, element):
+            return []
+        textures = TextureReader(self.guard, where(element), self.guard.folder, self.warnings)
         if mesh is None:
-            return [shape]
+            return [dataclasses.replace(shape, rgba=textures.flat(look).rgba)]
         scale = self._scale(mesh)
         path, _ = self._mesh_path(mesh)
         if is_encrypted(path):
             if not inputs.is_file(path):
                 self.warnings.append(f"{where(element)}: the encrypted visual {path.name} does not exist")
-            return [dataclasses.replace(shape, scale=scale, file=path, encrypted=True)]
+            return [dataclasses.replace(shape, scale=scale, file=path, encrypted=True, rgba=look.rgba)]
         try:
             if path not in self._visuals:
                 self._visuals[path] = read_visual(path, self.guard, where(mesh), self.warnings)
@@ -88,12 +98,23 @@ class GeometryReader:
                 meshes=list(part.meshes),
                 scale=scale,
                 file=path,
-                rgba=part.rgba or rgba,
-                texture=part.texture,
-                uv=part.uv,
+                rgba=drawn.rgba,
+                texture=drawn.texture,
+                uv=part.uv if drawn.texture is not None else None,
             )
             for part in self._visuals[path]
+            for drawn in [_drawn(part, look, textures)]
         ]
+
+    def _is_nothing(self, shape: Shape, mesh: Element | None, element: Element) -> bool:
+        """A primitive or a mesh scaled to size zero, with a warning."""
+        text = "" if mesh is None else (mesh.get("scale") or "")
+        scale = () if mesh is None else numbers(mesh, "scale", len(text.split()) or 3, self.guard.file, (1.0,) * 3)
+        if all(shape.size) and np.all(np.asarray(scale) != 0):
+            return False
+        kind = f"its {shape.kind} has" if mesh is None else f"scale='{shortened(text, 40)}' gives its mesh"
+        self.warnings.append(f"{where(element)} is left out: {kind} no size")
+        return True
 
     def _primitive(self, element: Element) -> tuple[Shape, Element | None]:
         """The shape without meshes, and the <mesh> element where it is one."""
@@ -119,7 +140,7 @@ class GeometryReader:
                 element=where(element),
                 fix="use mesh, box, cylinder, sphere or capsule",
             )
-        if np.any(size <= 0):
+        if np.any(size < 0):
             raise MeshError(file, f"a size of the {shape.kind} is not positive", element=where(kind))
         shape.size = tuple(float(v) for v in size)
         return shape, None
@@ -135,29 +156,19 @@ class GeometryReader:
         text = mesh.get("scale")
         count = 1 if text is not None and len(text.split()) == 1 else 3
         s = numbers(mesh, "scale", count, self.guard.file, (1.0, 1.0, 1.0))
-        if np.any(s == 0):
-            raise InputError(self.guard.file, f"scale='{text}' makes the mesh flat", element=where(mesh))
         if np.any(s < 0):
             self.warnings.append(f"{where(mesh)}: scale='{text}' mirrors the mesh")
         x, y, z = np.broadcast_to(s, 3)
         return float(x), float(y), float(z)
 
-    def _colour(self, element: Element) -> Rgba | None:
-        material = element.find("material")
-        if material is None:
-            return None
-        colour = read_colour(material, self.guard.file)
-        return colour if colour is not None else self.materials.get(material.get("name") or "")
 
-
-def read_colour(material: Element, file: object) -> Rgba | None:
-    """<color rgba> of a <material>, clipped to 0..1; an alpha of 0 is drawn as 1."""
-    colour = material.find("color")
-    if colour is None:
-        return None
-    count = 3 if len((colour.get("rgba") or "").split()) == 3 else 4
-    r, g, b, a = (float(v) for v in np.append(np.clip(numbers(colour, "rgba", count, file), 0, 1), 1.0)[:4])
-    return r, g, b, a or 1.0
+def _drawn(part: MeshPart, look: Look, textures: TextureReader) -> Look:
+    """What a part of a mesh file is drawn in: its own look, else the URDF's."""
+    if part.rgba is not None or part.texture is not None:
+        return Look(part.rgba, part.texture)
+    if look.texture is not None and part.uv is None:
+        return textures.flat(look)
+    return look
 
 
 def _in_urdf(error: MeshError, guard: FileGuard, mesh: Element, named: str) -> InputError:

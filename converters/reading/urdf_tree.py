@@ -7,6 +7,7 @@ import pathlib
 from ig2mj.errors import InputError
 
 from ..base.description import Joint, Link
+from ..base.read_limits import check_limit
 from .xml_reader import Element, where
 
 MAX_NAME = 200
@@ -24,6 +25,16 @@ def check_name(element: Element, file: pathlib.Path, warnings: list[str]) -> str
     if any(c in "/\\ " or ord(c) > 126 for c in name):
         warnings.append(f"{where(element)}: blanks, slashes or non-ASCII letters in a name")
     return name
+
+
+def check_counts(robot: Element, file: pathlib.Path) -> None:
+    """Raises InputError for more links, moving joints or shapes than the limits allow, before any of them is read."""
+    check_limit("links", len(robot.findall("link")), file, "links")
+    moving = sum((joint.get("type") or "").strip() != "fixed" for joint in robot.iterfind("joint"))
+    check_limit("joints", moving, file, "moving joints")
+    for link in robot.iterfind("link"):
+        for tag in ("collision", "visual"):
+            check_limit("link_shapes", len(link.findall(tag)), file, f"{tag}s", element=where(link))
 
 
 def find_tree(
@@ -55,11 +66,14 @@ def find_tree(
         children[joint.parent].append(joint)
     _check_cycles(links, parent_joint, file)
     base = next(name for name in links if name not in parent_joint)
-    reached, queue = {base}, [base]
+    depth, queue = {base: 0}, [base]
     while queue:
-        for joint in children[queue.pop()]:
-            reached.add(joint.child)
+        parent = queue.pop()
+        for joint in children[parent]:
+            depth[joint.child] = depth[parent] + (joint.type not in ("fixed", "floating"))
             queue.append(joint.child)
+    check_limit("link_depth", max(depth.values()), file, "moving joints in a row")
+    reached = depth.keys()
     if lost := [name for name in links if name not in reached]:
         warnings.append(f"links that hang on nothing are left out: {', '.join(lost[:10])}")
     kept = {name: link for name, link in links.items() if name in reached}

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import io
+
 import numpy as np
 import pytest
 import trimesh
+from ig2mj_converters.base.description import PackedImage
 from ig2mj_converters.base.file_access import FileGuard
 from ig2mj_converters.bodies.solids import hull_volume, joined, signed_volume
 from ig2mj_converters.reading.mesh_files import read_collision, read_visual
@@ -120,8 +123,9 @@ def test_materials_split_a_visual_and_give_colour_texture_and_uv(folder):
     assert secret.rgba == (0, 0, 1, 1)
     assert secret.texture is None
     assert none.rgba is None
-    assert len(warnings) == 1
-    assert "no.png" in warnings[0]
+    assert len(warnings) == 2
+    assert "no MTL file defines: none" in warnings[0]
+    assert "no.png" in warnings[1]
 
 
 def test_materials_and_textures_outside_are_left_out_with_a_warning(folder, tmp_path, make):
@@ -261,7 +265,7 @@ def test_gltf_is_y_up_and_becomes_z_up(folder, kind):
     assert all(signed_volume(joined([m])) > 0 for m in meshes), "a mirroring node must not turn the mesh inside out"
 
 
-def test_a_texture_packed_into_a_glb_gives_its_mean_colour(folder):
+def test_a_texture_packed_into_a_glb_is_kept(folder):
     box = trimesh.creation.box()
     image = Image.new("RGB", (2, 2), (255, 0, 0))
     image.putpixel((0, 0), (0, 255, 0))
@@ -270,5 +274,7 @@ def test_a_texture_packed_into_a_glb_gives_its_mean_colour(folder):
         uv=np.zeros((8, 2)), material=trimesh.visual.material.PBRMaterial(baseColorTexture=image)
     )
     part = visual(folder.write("v.glb", trimesh.Scene(box).export(file_type="glb")))[0]
-    assert part.texture is None
-    assert part.rgba == pytest.approx((0.5, 0.5, 0, 1), abs=0.01)
+    assert isinstance(part.texture, PackedImage)
+    with Image.open(io.BytesIO(part.texture.content)) as kept:
+        assert kept.convert("RGB").tobytes() == image.tobytes()
+    assert len(part.uv[0]) == len(part.meshes[0].vertices)

@@ -1,0 +1,112 @@
+"""Triangles as the readers of DAE and glTF find them, and how instances of them become parts of a mesh file."""
+
+from __future__ import annotations
+
+import dataclasses
+import pathlib
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..base.description import Mesh, Rgba
+from .looks import Look, Texture, TextureReader, mean_vertex_colour
+from .mesh_limits import MeshError, check_faces, check_vertices
+
+
+@dataclasses.dataclass
+class MeshPart:
+    """Triangles with one look. uv: [n, 2] of the one mesh, origin at the image's lower left, as in OBJ."""
+
+    meshes: list[Mesh]
+    rgba: Rgba | None = None
+    texture: Texture | None = None
+    uv: list[np.ndarray] | None = None
+
+
+@dataclasses.dataclass(eq=False)
+class Geometry:
+    """Triangles of one primitive in its own frame, as the file has them.
+
+    Attributes:
+      vertices: [n, 3]. faces: [m, 3] of vertex indices. uv: [n, 2], origin at the lower left, or None.
+      colours: [n, 3] or [n, 4] of vertices, 0..1, or None.
+    """
+
+    vertices: np.ndarray
+    faces: np.ndarray
+    uv: np.ndarray | None = None
+    colours: np.ndarray | None = None
+
+
+@dataclasses.dataclass
+class Placed:
+    """An instance of a geometry. matrix: 4x4 into the file's frame. look: what its material says."""
+
+    geometry: Geometry
+    matrix: np.ndarray
+    look: Look = dataclasses.field(default_factory=Look)
+
+
+def parts_of(
+    placed: Sequence[Placed], turn: np.ndarray, file: pathlib.Path, textures: TextureReader | None
+) -> list[MeshPart]:
+    """One part per instance, vertices merged and moved by `turn` @ its matrix; instances without faces are left out.
+
+    Args:
+      turn: 4x4 from the file's frame to metres and Z up. textures: warns of what is lost of looks; None: no looks.
+
+    Raises:
+      MeshError: no faces at all, a face without vertex, vertices that are not finite, too many faces.
+    """
+    check_faces(sum(len(instance.geometry.faces) for instance in placed), file)
+    merged: dict[tuple[int, bool], tuple[Mesh, np.ndarray | None] | None] = {}
+    parts = []
+    for instance in placed:
+        look = _look(instance, textures, file)
+        key = (id(instance.geometry), look.texture is not None)
+        if key not in merged:
+            merged[key] = _merged(instance.geometry, look.texture is not None, file)
+        if (found := merged[key]) is None:
+            continue
+        mesh, uv = found
+        matrix = turn @ instance.matrix
+        check_vertices(matrix, file)
+        faces = mesh.faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else mesh.faces
+        moved = Mesh(mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3], faces)
+        parts.append(MeshPart([moved], look.rgba, look.texture, None if uv is None else [uv]))
+    if not parts:
+        raise MeshError(file, "is empty: it has no faces")
+    return parts
+
+
+def _look(instance: Placed, textures: TextureReader | None, file: pathlib.Path) -> Look:
+    if textures is None:
+        return Look()
+    geometry, look = instance.geometry, instance.look
+    if look.texture is not None and (geometry.uv is None or not np.all(np.isfinite(geometry.uv))):
+        look = textures.flat(look)
+    if look == Look() and geometry.colours is not None and len(geometry.colours):
+        rgba, vary = mean_vertex_colour(geometry.colours)
+        if vary:
+            textures.warn(f"{file.name} has colours per vertex: their mean is drawn")
+        look = Look(rgba)
+    return look
+
+
+def _merged(geometry: Geometry, with_uv: bool, file: pathlib.Path) -> tuple[Mesh, np.ndarray | None] | None:
+    """Equal vertices made one (files repeat them per face), degenerate triangles dropped; None where none is left."""
+    vertices = np.asarray(geometry.vertices, dtype=float)
+    faces = np.asarray(geometry.faces, dtype=np.int64)
+    if not len(faces):
+        return None
+    check_vertices(vertices, file)
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise MeshError(file, "a face names a vertex that does not exist")
+    rows = vertices if not with_uv or geometry.uv is None else np.column_stack([vertices, geometry.uv])
+    used, index = np.unique(rows, axis=0, return_inverse=True)
+    faces = index.reshape(-1)[faces]
+    a, b, c = faces.T
+    faces = faces[(a != b) & (b != c) & (c != a)]
+    if not len(faces):
+        return None
+    return Mesh(np.ascontiguousarray(used[:, :3]), faces), used[:, 3:] if used.shape[1] > 3 else None
