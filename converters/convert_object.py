@@ -16,7 +16,7 @@ from ig2mj.scene.manifest import FORMAT_VERSION, Manifest
 
 from .base import inputs
 from .base.description import Instance, ObjectModel
-from .base.options import ConvertOptions
+from .base.options import ConvertOptions, under_limits
 from .base.output import replaced_folder
 from .base.process_pool import TaskPool
 from .bodies.assembly import Assembly, extent
@@ -38,6 +38,7 @@ from .reading.urdf import read_urdf
 from .reading.xml_reader import shortened
 
 
+@under_limits
 def convert_object(
     urdf: str | os.PathLike,
     category: str,

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from .base.description import ObjectModel
-from .base.options import ConvertOptions
+from .base.options import ConvertOptions, under_limits
 from .base.outcome import Outcome
 from .bodies.kinematics import link_poses
 from .conversion import convert_object
@@ -26,6 +26,7 @@ FORMAT_VERSION = 1
 CATEGORY = "agent"
 
 
+@under_limits
 def convert_robot(
     urdf: str | os.PathLike, out: str | os.PathLike, *, name: str | None = None, options: ConvertOptions | None = None
 ) -> Outcome:
@@ -50,19 +51,18 @@ def convert_robot(
 def _described(source: ObjectModel) -> dict[str, Any]:
     """Joints that move with their motors' limits (N m or N, rad/s or m/s), and where links are that are fixed to
     others: position (m) and quaternion (w-x-y-z) in the link that moves them."""
-    poses, moving = link_poses(source), {source.base: source.base}
+    poses = link_poses(source)
     joints = {joint.child: joint for joint in source.joints.values()}
-
-    def mover(link: str) -> str:
-        if link not in moving:
-            joint = joints[link]
-            moving[link] = mover(joint.parent) if joint.type == "fixed" else link
-        return moving[link]
+    moving: dict[str, str] = {}
+    for link in poses:  # parents come before their children
+        joint = joints.get(link)
+        moving[link] = moving[joint.parent] if joint is not None and joint.type == "fixed" else link
 
     frames = {}
     for link in source.links:
-        pose = np.linalg.inv(poses[mover(link)]) @ poses[link]
-        frames[link] = {"on": mover(link), "pos": pose[:3, 3].round(9).tolist(), "axes": pose[:3, :3].round(9).tolist()}
+        pose = np.linalg.inv(poses[moving[link]]) @ poses[link]
+        place = {"pos": pose[:3, 3].round(9).tolist(), "axes": pose[:3, :3].round(9).tolist()}
+        frames[link] = {"on": moving[link], **place}
     return {
         "format_version": FORMAT_VERSION,
         "name": source.model,
@@ -71,7 +71,7 @@ def _described(source: ObjectModel) -> dict[str, Any]:
             {
                 "name": joint.name,
                 "type": joint.type,
-                "parent": mover(joint.parent),
+                "parent": moving[joint.parent],
                 "child": joint.child,
                 "effort": joint.effort or 0.0,
                 "velocity": joint.velocity or 0.0,

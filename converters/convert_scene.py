@@ -15,7 +15,7 @@ from ig2mj.scene.manifest import FORMAT_VERSION, Manifest, RoomsEntry
 
 from .base import inputs
 from .base.description import Instance, SceneDescription
-from .base.options import ConvertOptions
+from .base.options import ConvertOptions, under_limits
 from .base.output import replaced_folder
 from .base.process_pool import TaskPool
 from .base.transforms import quat_from_rotation
@@ -34,6 +34,7 @@ from .reading.scene_urdf import parse_object_scope
 ROOMS_FILE = "rooms.npz"
 
 
+@under_limits
 def convert_scene(
     dataset_root: str | os.PathLike,
     name: str,

@@ -16,6 +16,7 @@ from .base import inputs
 from .base.description import Instance, ObjectModel, SceneDescription
 from .base.options import Progress, no_progress
 from .base.process_pool import TaskPool
+from .base.read_limits import ReadLimits, limits, limits_of
 from .bodies.assembly import Assembly, assemble
 from .bodies.inertia import link_inertials
 from .bodies.kinematics import model_bounds
@@ -62,6 +63,7 @@ class ModelTask:
     instances: tuple[Instance, ...] = dataclasses.field(repr=False)
     hulls: HullOptions
     bullet_inertia: bool
+    limits: ReadLimits
 
     @property
     def label(self) -> str:
@@ -76,7 +78,7 @@ def model_tasks(
     hulls: Callable[[Instance], HullOptions],
     bullet_inertia: bool,
 ) -> tuple[list[ModelTask], list[list[list[str]]]]:
-    """The tasks that build the models of these instances.
+    """The tasks that build the models of these instances, under the limits in force.
 
     Returns:
       The tasks, and for each scale of each task the names of the instances that have it.
@@ -90,14 +92,14 @@ def model_tasks(
     tasks, names = [], []
     for scales in models.values():
         firsts = tuple(same[0] for same in scales.values())
-        tasks.append(ModelTask(str(dataset.root), bare, firsts, hulls(firsts[0]), bullet_inertia))
+        tasks.append(ModelTask(str(dataset.root), bare, firsts, hulls(firsts[0]), bullet_inertia, limits()))
         names.append([[instance.name for instance in same] for same in scales.values()])
     return tasks, names
 
 
 def run_task(task: ModelTask) -> list[BuiltModel]:
     """Does the work of a task, one result for each of its instances. Raises InputError as the readers do."""
-    with inputs.recording() as record:
+    with inputs.recording() as record, limits_of(task.limits):
         dataset = _dataset(task.root)
         first = task.instances[0]
         source = dataset.instance_model(task.scene, first)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import pathlib
 from collections.abc import Callable, Collection
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
+
+from .read_limits import ReadLimits, limits_of
 
 if TYPE_CHECKING:  # what these import takes seconds, which a conversion out of the cache need not spend
     from ..hulls.pieces import HullOptions
@@ -42,6 +45,7 @@ class ConvertOptions:
       strict: take warnings for errors, and leave no output.
       mesh_root, package_path: of an object: a folder below which its meshes may lie, although it is not above the URDF;
         folders in which packages (`package://`) are looked for first.
+      limits: how much the readers take from one input.
       renderer, view: what draws the report's pictures (see `report.write_report`).
     """
 
@@ -66,6 +70,7 @@ class ConvertOptions:
     strict: bool = False
     mesh_root: pathlib.Path | None = None
     package_path: tuple[pathlib.Path, ...] = ()
+    limits: ReadLimits = dataclasses.field(default_factory=ReadLimits)
     renderer: Renderer | None = None
     view: Callable[..., Any] | None = None
     progress: Progress = no_progress
@@ -102,3 +107,19 @@ class ConvertOptions:
             if value is not None:
                 record[name] = sorted(value)
         return record
+
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+
+
+def under_limits(conversion: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+    """A conversion whose readers keep to the limits of its keyword argument `options`."""
+
+    @functools.wraps(conversion)
+    def run(*args: Arguments.args, **kwargs: Arguments.kwargs) -> Result:
+        options = kwargs.get("options")
+        with limits_of(options.limits if isinstance(options, ConvertOptions) else ReadLimits()):
+            return conversion(*args, **kwargs)
+
+    return run

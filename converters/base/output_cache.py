@@ -10,6 +10,7 @@ here.
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import hashlib
 import importlib.metadata
 import importlib.util
@@ -57,6 +58,7 @@ def key_of(request: Mapping[str, Any], options: ConvertOptions) -> str:
         "strict": options.strict,
         "folders": [os.path.abspath(p) for p in (options.mesh_root or "", *options.package_path)],  # noqa: PTH100
         "assets": options.assets,
+        "limits": dataclasses.asdict(options.limits),
         "pictures": options.renderer is not None and os.environ.get("MUJOCO_GL", ""),
         "versions": [sys.version, *(_version(name) for name in PACKAGES)],
         "sources": [_source_hash(name) for name in SOURCES],

@@ -31,6 +31,7 @@ class Common:
       no_cache: convert even if nothing has changed, and write nothing to the cache.
       strict: treat warnings as errors: exit status 2, no output.
       no_report: skip the checks, report.json and report.html.
+      limit: raise or lower limits of the readers, e.g. mesh-faces=3000000 (see docs/untrusted_input.md).
       json: print what was done as JSON.
     """
 
@@ -43,6 +44,7 @@ class Common:
     no_cache: Flag = False
     strict: Flag = False
     no_report: Flag = False
+    limit: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=N")] = ()
     json: Flag = False
 
 
@@ -52,6 +54,7 @@ DEFAULTS = Common()
 def options_of(common: Common, **of_command: Any) -> ConvertOptions:
     """Conversion options from the command line, and the renderer for the report's pictures."""
     from ig2mj_converters.base.options import ConvertOptions
+    from ig2mj_converters.base.read_limits import ReadLimits
 
     from ig2mj.errors import InputError
 
@@ -69,6 +72,7 @@ def options_of(common: Common, **of_command: Any) -> ConvertOptions:
         cache=not common.no_cache,
         report=not common.no_report,
         strict=common.strict,
+        limits=ReadLimits.from_words(common.limit),
         renderer=None if common.no_report else _render,
         view=None if common.no_report else _free_view,
         **of_command,
