@@ -20,6 +20,7 @@ from jaxtyping import Float
 
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView
+from ig2mj.sampling.bystanders import Bystanders
 from ig2mj.sampling.columns import CELL, Window
 from ig2mj.sampling.drop import Rest, origin, rest_at
 from ig2mj.sampling.footprint import Footprint
@@ -34,9 +35,6 @@ PENETRATION = 0.001
 
 RESTING_PENETRATION = 0.002
 """Metres. No sampled state stands deeper in anything (at rest, by gravity)."""
-
-MOVED = 0.01
-"""Metres. Nothing else may move farther while the object settles."""
 
 SLIPPED = (0.05, 0.08)
 """Metres. An object that moves farther (sideways, downwards) while it settles has not been supported."""
@@ -154,6 +152,7 @@ class _Task:
     budget: Budget
     rejected: Rejections
     before: Snapshot
+    others: Bystanders
 
 
 class Placer:
@@ -181,7 +180,8 @@ class Placer:
           along: an object with whose sides every second orientation is aligned, so that a pillow finds its place in a
             cabinet that it all but fills; -1: all are turned by any angle.
         """
-        task = _Task(object_index, truth, rng, budget, rejected, self.query.save())
+        before = self.query.save()
+        task = _Task(object_index, truth, rng, budget, rejected, before, Bystanders(self.query, before))
         for draw in range(DRAWS):
             if budget.spent():
                 rejected["budget spent"] += 1
@@ -257,8 +257,8 @@ class Placer:
     def _let_go(self, task: _Task, pos: np.ndarray, quat: np.ndarray, area: Area, support: str) -> str:
         """Puts the object there and lets physics settle; the reason why that is no good, or ''."""
         query, placed = self.query, task.object_index
-        com = np.array(query.view.object_com[0])
-        on_top_of_it = np.array(query.view.touching[0, placed])  # what lies on it may fall when it is taken away
+        exempt = task.others.touching[placed].copy()  # what lies on it may fall when it is taken away
+        exempt[placed] = True
         query.place(placed, pos, quat)
         if area.push_towards >= 0:
             pos = self._pushed(placed, pos, quat, area.push_towards)
@@ -276,13 +276,10 @@ class Placer:
         start = np.array(query.view.object_com[0, placed])
 
         def moved(view: PhysicsView) -> str:
-            now = np.asarray(view.object_com[0])
-            way = now[placed] - start
+            way = np.asarray(view.object_com[0, placed]) - start
             if not loose and (np.linalg.norm(way[:2]) > SLIPPED[0] or way[2] < -SLIPPED[1]):
                 return "fell"
-            others = np.linalg.norm(now - com, axis=1) > MOVED
-            others[placed] = False
-            return "moves others" if (others & ~on_top_of_it).any() else ""
+            return "moves others" if (task.others.shoved() & ~exempt).any() else ""
 
         steps = 0
 
@@ -295,7 +292,7 @@ class Placer:
         task.budget.work -= steps // STEPS
         if reason := moved(query.view):
             return reason
-        if not asleep:
+        if not asleep and (np.asarray(query.view.awake[0, placed]) or task.others.restless().any()):
             return "not at rest"
         if query.penetration(placed) > RESTING_PENETRATION:
             return "stands in something"

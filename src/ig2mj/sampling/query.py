@@ -118,6 +118,12 @@ class SceneQuery:
         """How deep each object stands in anything that is no part of it, metres, whether it sleeps or not."""
         return self._overlaps.deepest(np.array(self._data.qpos))
 
+    def carried(
+        self, mask: Bool[np.ndarray, "nq"], target: Float[np.ndarray, "nq"]
+    ) -> tuple[Int[np.ndarray, "K"], Float[np.ndarray, "K 3"], Float[np.ndarray, "K 4"]]:
+        """What goes along when joints move; see `Overlaps.carried`."""
+        return self._overlaps.carried(np.array(self._data.qpos), mask, target)
+
     def penetration_at(
         self, object_index: int, pos: Float[np.ndarray, "N 3"], quat: Float[np.ndarray, "N 4"]
     ) -> Float[np.ndarray, "N"]:

@@ -18,7 +18,9 @@ from ig2mj.engine.base import Write
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.errors import StateError
 from ig2mj.predicates.literals import object_index, room_index
+from ig2mj.sampling.bystanders import Bystanders
 from ig2mj.sampling.conditions import Condition, order
+from ig2mj.sampling.joints import JointMover
 from ig2mj.sampling.placement import NOWHERE, RESTING_PENETRATION, Areas, Budget, Placer, Rejections
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.rules import PLACEMENTS, elsewhere, on_floor
@@ -75,6 +77,7 @@ class RowSampler:
         self._truth = self._truths_of(tuple(conditions))
         self.query.load(self._start)
         self._states = self._initial
+        self._others = Bystanders(self.query, self._start)
         placed = {name for name, wanted in plan.placements if wanted[0].value}
         self._joints = [c for c in plan.joints if c.arguments[0] in placed]
         for condition in plan.joints:
@@ -167,13 +170,16 @@ class RowSampler:
 
     def _open(self, condition: Condition, rng: np.random.Generator, rejected: Rejections) -> bool:
         """Moves an object's joints so that a condition about `open` holds when everything has come to rest."""
-        before = self.query.save()
+        name = condition.arguments[0]
+        mover = JointMover(self.query, object_index(self.model, name))
         for _ in range(OPENINGS):
-            self._set(condition, rng)
-            if self.query.settle() and self._holds((condition,)):
+            change = self._change(condition, rng)
+            assert change.joints is not None
+            problem = mover.problem(mover.plan(*change.joints))
+            if not problem and self._holds((condition,)):
                 return True
-            rejected[f"{condition.arguments[0]}: joints do not rest"] += 1
-            self.query.load(before)
+            rejected[f"{name}: {problem or 'joints do not rest'}"] += 1
+            self.query.load(mover.before)
         return False
 
     def _areas(self, index: int, rule: Condition) -> Areas:
@@ -186,29 +192,23 @@ class RowSampler:
     def _holds(self, conditions: Sequence[Condition]) -> bool:
         return self._truth.hold(conditions, self._states, self.query.view)
 
-    def _set(self, condition: Condition, rng: np.random.Generator) -> None:
+    def _change(self, condition: Condition, rng: np.random.Generator) -> Change:
         (name,) = condition.arguments
-        change = set_by_name(self.model, self._states, self.query.view, condition.predicate, name, condition.value, rng)
-        self._states = change.states
-        self._apply(change)
+        view = self.query.view
+        return set_by_name(self.model, self._states, view, condition.predicate, name, condition.value, rng)
 
-    def _apply(self, change: Change) -> None:
-        """What physics has to follow with: halves that take the whole's place, joints."""
-        query, tables = self.query, self.model.tables
+    def _set(self, condition: Condition, rng: np.random.Generator) -> None:
+        """Makes a condition of one object hold that needs neither place nor joints; halves take the whole's place."""
+        change = self._change(condition, rng)
+        self._states = change.states
         if change.swap is not None:
-            query.write(_teleports(self.model.swap_objects, change.swap, tables.num_objects))
-        if change.joints is not None:
-            positions, moves = change.joints
-            width = query.scene.model.nq
-            mask, qpos = np.zeros((1, width), bool), np.zeros((1, width))
-            mask[:, tables.openable_qposadr], qpos[:, tables.openable_qposadr] = moves, positions
-            query.write(Write(qpos_mask=mask, qpos=qpos))
+            self.query.write(_teleports(self.model.swap_objects, change.swap, self.model.tables.num_objects))
 
     def _problem(self, conditions: Sequence[Condition], placed: Sequence[str]) -> str:
         """Why the finished row is no good, or ''."""
         if not self._holds(conditions):
             return "predicate false at the end"
-        if np.asarray(self.query.view.awake).any() and not self.query.settle():
+        if np.asarray(self.query.view.awake).any() and not self.query.settle() and self._others.restless().any():
             return "not at rest at the end"
         if not self._holds(conditions):
             return "predicate false at the end"

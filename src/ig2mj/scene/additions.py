@@ -20,6 +20,7 @@ import msgspec
 from ig2mj.errors import Ig2mjError, InputError
 from ig2mj.scene.library import LibraryModel, find_model
 from ig2mj.scene.manifest import JointEntry, LinkEntry, Manifest, ObjectEntry, OpenableEntry
+from ig2mj.scene.resting import rest
 
 SLAB = "additions_slab"
 HEIGHT = -5.0
@@ -135,7 +136,8 @@ def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -
             )
     loose = [o for (_, model), at in zip(named, places, strict=True) if at is None for o in model.manifest.objects]
     cells = _add_slab(root, loose) if loose else []
-    start: list[float] = []
+    start: list[list[float]] = []
+    standing: list[tuple[ElementTree.Element, int]] = []
     place = iter(cells)
     for (name, model), at in zip(named, places, strict=True):
         added = _read(model.file)
@@ -151,7 +153,7 @@ def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -
         bodies = {body.get("name"): body for body in _child(added, "worldbody").findall("body")}
         if at is not None:
             _fix(bodies[name], at)
-            start += poses[name][1]
+            start.append(poses[name][1])
             world.append(bodies[name])
             continue
         for entry in model.manifest.objects:
@@ -161,14 +163,15 @@ def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -
             for body in roots:
                 values, inner = poses[str(body.get("name"))]
                 values = [values[0] - origin[0] + x, values[1] - origin[1] + y, values[2] + HEIGHT, *values[3:]]
-                body.set("pos", _numbers(values[:3]))
-                body.set("quat", _numbers(values[3:]))
-                start += [*values, *inner]
+                standing.append((body, len(start)))
+                start.append([*values, *inner])
                 world.append(body)
         for tag in ("contact", "equality"):
             for element in added.iter(tag):
                 _child(root, tag).extend(element)
-    _extend_key(root, start)
+    if standing:
+        _lay_down(root, standing, start)
+    _extend_key(root, [value for values in start for value in values])
     merged = copy.copy(manifest)
     merged.objects = list(manifest.objects)
     for (name, model), at in zip(named, places, strict=True):
@@ -257,6 +260,21 @@ def _add_slab(root: ElementTree.Element, entries: Sequence[ObjectEntry]) -> list
         (x - half + (i % columns + 0.5) * cell, centre[1] - half + (i // columns + 0.5) * cell)
         for i in range(len(entries))
     ]
+
+
+def _lay_down(
+    root: ElementTree.Element, standing: Sequence[tuple[ElementTree.Element, int]], start: list[list[float]]
+) -> None:
+    """Gives the bodies on the slab the poses in which they rest. `standing`: each, and its number in `start`."""
+    slab = next(body for body in _child(root, "worldbody") if body.get("name") == SLAB)
+    found = rest(root, slab, [body for body, _ in standing], [v for _, number in standing for v in start[number]])
+    first = 0
+    for body, number in standing:
+        values = [float(v) for v in found[first : first + len(start[number])]]
+        first += len(values)
+        start[number] = values
+        body.set("pos", _numbers(values[:3]))
+        body.set("quat", _numbers(values[3:7]))
 
 
 def _start_values(root: ElementTree.Element) -> dict[str, tuple[list[float], list[float]]]:

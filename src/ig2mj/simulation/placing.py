@@ -50,14 +50,6 @@ def write_of_joint(scene: Scene, name: str, q: float | int) -> Write:
     return Write(qpos_mask=mask, qpos=values)
 
 
-def write_of_openables(scene: Scene, positions: np.ndarray, moves: np.ndarray) -> Write:
-    """Puts openable joints, in the order of `SceneTables.openable_*`, at positions where they move: both [1, J]."""
-    address, width = scene.tables.openable_qposadr, scene.model.nq
-    mask, qpos = np.zeros((1, width), bool), np.zeros((1, width))
-    mask[:, address], qpos[:, address] = moves, positions
-    return Write(qpos_mask=mask, qpos=qpos)
-
-
 def joint_address(scene: Scene, name: str) -> int:
     """Where a hinge's or slide's position stands in qpos. Raises UnknownNameError; PoseError for other joints."""
     model = scene.model

@@ -5,13 +5,17 @@ from __future__ import annotations
 import collections
 import dataclasses
 
+import jax
 import numpy as np
 
-from ig2mj.engine.base import Snapshot
+from ig2mj.engine.base import Snapshot, Write
+from ig2mj.errors import StateError
 from ig2mj.sampling.conditions import Condition
+from ig2mj.sampling.joints import JointMover
 from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.query import SceneQuery
-from ig2mj.sampling.row import Row, RowSampler
+from ig2mj.sampling.row import OPENINGS, Row, RowSampler
+from ig2mj.sampling.setters import Change, set_by_name
 from ig2mj.scene.scene import Scene
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
@@ -42,10 +46,45 @@ class WorldSampler:
           StateError, AbilityError, UnknownNameError: it can never be made true.
         """
         self.rejected = collections.Counter()
-        if self._sampler is None:
-            self._sampler = RowSampler(SceneQuery(self._scene), self._model, states)
-        self._sampler.start_from(physics, states)
-        row = self._sampler.sample([condition], np.random.default_rng(seed), budget, self.rejected)
+        sampler = self._sampler_in(physics, states)
+        row = sampler.sample([condition], np.random.default_rng(seed), budget, self.rejected)
         if row is None:
             return None
         return Row(dataclasses.replace(row.physics, time=physics.time), row.states)
+
+    def write_of_joints(
+        self, change: Change, physics: Snapshot, states: ExtendedStates, object_name: str, value: bool, key: jax.Array
+    ) -> Write:
+        """Joint positions with which an object is open, or not, that shove nothing; what rests on links goes along.
+
+        The world need not be at rest then: a half-open lid may fall shut.
+
+        Args:
+          change: what `set_by_name` drew with this key for "open" of the object, and is taken if it will do.
+          physics, states: as for `sample`. value: open or not.
+
+        Raises:
+          StateError: whatever is drawn shoves something.
+        """
+        query = self._sampler_in(physics, states).query
+        query.load(physics)
+        mover = JointMover(query, self._scene.object_index(object_name))
+        shoved: list[str] = []
+        for draw in range(OPENINGS):
+            if draw:
+                again = jax.random.fold_in(key, draw)
+                change = set_by_name(self._model, states, query.view, "open", object_name, value, again)
+            assert change.joints is not None
+            move = mover.plan(*change.joints)
+            shoved = mover.shoved_by(move)
+            if not shoved:
+                return move.write
+            query.load(physics)
+        wanted = "opened" if value else "closed"
+        raise StateError(f"'{object_name}' cannot be {wanted} without moving {', '.join(shoved)} (move that first)")
+
+    def _sampler_in(self, physics: Snapshot, states: ExtendedStates) -> RowSampler:
+        if self._sampler is None:
+            self._sampler = RowSampler(SceneQuery(self._scene), self._model, states)
+        self._sampler.start_from(physics, states)
+        return self._sampler

@@ -35,7 +35,7 @@ from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.setters import lacks, set_by_name
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.simulation import pictures
-from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_openables, write_of_pose
+from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_pose
 from ig2mj.simulation.recording import Recorded
 from ig2mj.simulation.robots import RobotsOfWorld, remembered
 from ig2mj.simulation.sampling import WorldSampler
@@ -305,7 +305,7 @@ class Simulation(Recorded):
           object_name: its halves, where it has some, are set alike.
 
         Raises:
-          UnknownNameError, AbilityError: as for `state`. StateError: the state cannot be set, or not to this value.
+          UnknownNameError, AbilityError: as for `state`. StateError: it cannot be set, or a door would shove something.
         """
         self._key, key = jax.random.split(self._key)
         change = set_by_name(self.state_model, self.states, self.view, name, object_name, value, key)
@@ -313,7 +313,8 @@ class Simulation(Recorded):
         if change.swap is not None:
             self.physics, _ = self.core.teleport(self.physics, self.view, change.swap)
         if change.joints is not None:
-            self._write(write_of_openables(self.scene, *change.joints))
+            now = self.engine.export(self.physics, 0)
+            self._write(self._sampler.write_of_joints(change, now, self.states, object_name, bool(value), key))
 
     def set_predicate(self, name: str, *arguments: str, value: bool = True, seed: int = 0) -> bool:
         """Makes a predicate true or false by sampling, as table A.5 of the paper says, and lets the world come to rest.
