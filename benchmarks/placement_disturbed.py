@@ -9,9 +9,9 @@ of a loose object and something to place it at, of fitting size, drawn at random
 of a predicate has the same start, pair and seed in every run.
 
 A request is *possible* if it succeeds from any kind of start, or if, in the same start at rest, one of `--searches`
-further seeds finds a place with `SEARCH_WORK` units of work. It *has candidates* if any of these got as far as letting the object go. The first
-depends on the sampler, and the second on geometry alone: the share of requests with candidates that succeed is a lower
-bound of the share of possible ones.
+further seeds finds a place with `SEARCH_WORK` units of work. It *has candidates* if any of these got as far as letting
+the object go. The first depends on the sampler, and the second on geometry alone: the share of requests with candidates
+that succeed is a lower bound of the share of possible ones.
 
 What succeeded is woken, stepped for three seconds, and asked again. Times are processor time of one core. Every request
 is a line of benchmarks/results/placement_disturbed/requests.jsonl.
@@ -50,7 +50,7 @@ MOVING_STEPS = 6
 """Control steps between the second disturbance and the request."""
 
 SECONDS = 3.0
-SEARCH_WORK = 1000
+SEARCH_WORK = 500
 
 
 @dataclasses.dataclass

@@ -69,7 +69,7 @@ class WorldSampler:
         query = self._sampler_in(physics, states).query
         query.load(physics)
         mover = JointMover(query, self._scene.object_index(object_name))
-        shoved: list[str] = []
+        in_the_way: dict[str, None] = {}
         for draw in range(OPENINGS):
             if draw:
                 again = jax.random.fold_in(key, draw)
@@ -79,9 +79,10 @@ class WorldSampler:
             shoved = mover.shoved_by(move)
             if not shoved:
                 return move.write
+            in_the_way |= dict.fromkeys(shoved)
             query.load(physics)
         wanted = "opened" if value else "closed"
-        raise StateError(f"'{object_name}' cannot be {wanted} without moving {', '.join(shoved)} (move that first)")
+        raise StateError(f"'{object_name}' cannot be {wanted} without moving {', '.join(in_the_way)} (move that first)")
 
     def _sampler_in(self, physics: Snapshot, states: ExtendedStates) -> RowSampler:
         if self._sampler is None:

@@ -1,0 +1,145 @@
+"""What a placement or an opened door does not cause is no reason to refuse it; what it does cause is."""
+
+from __future__ import annotations
+
+import collections
+
+import numpy as np
+import pytest
+
+import ig2mj
+from ig2mj.errors import StateError
+from ig2mj.sampling.bystanders import MOVED, Bystanders
+from ig2mj.sampling.conditions import read_conditions
+from ig2mj.sampling.joints import JointMover
+from ig2mj.sampling.many import make_sampler
+from ig2mj.sampling.placement import Budget
+from ig2mj.sampling.query import SceneQuery
+
+BEFORE_THE_CABINET = (1.1, -0.15, 0.05)
+"""Of the box's middle: the door sweeps over it, and the drawer passes above."""
+
+
+@pytest.fixture(scope="module")
+def resting(tiny_home):
+    return make_sampler(tiny_home)
+
+
+@pytest.fixture
+def simulation(tiny_home):
+    made = ig2mj.Simulation(tiny_home)
+    made.step(count=60)
+    return made
+
+
+def test_motion_that_a_change_does_not_cause_is_told_apart_from_what_it_does(tiny_home):
+    query = SceneQuery(tiny_home)
+    query.settle()
+    ball, box = (tiny_home.object_index(name) for name in ("ball", "box"))
+    query.place(ball, np.array([-1.0, -1.0, 0.5]), np.array([1.0, 0, 0, 0]))
+    others = Bystanders(query, query.save())
+    query.place(box, np.array([0.1, 0.1, 0.55]), np.array([1.0, 0, 0, 0]))
+    for _ in range(6):
+        query.physics, view = query.engine.step(query.physics)
+    assert float(view.object_com[0, ball, 2]) < 0.45  # it falls
+    assert np.flatnonzero(others.shoved()).tolist() == [box]
+    assert not others.restless()[ball]
+
+
+def test_a_copy_of_a_resting_world_is_never_stepped(resting, monkeypatch):
+    """Rows that begin at rest are those of a comparison with where everything was at the start."""
+    monkeypatch.setattr(Bystanders, "_unchanged", lambda self: pytest.fail("the copy was asked"))
+    reasons = collections.Counter()
+    for text in ("(on_top can table)", "(open cabinet)", "(inside apple pan)"):
+        resting.sample(read_conditions([text]), np.random.default_rng(0), Budget(60), reasons)
+
+
+def test_an_object_that_still_falls_is_no_reason_to_refuse_a_placement(simulation):
+    simulation.set_object_pose("ball", (-1.0, -1.0, 0.6))
+    simulation.set_object_pose("rod", (-1.0, 1.0, 0.3), (0.9, 0.1, 0.4, 0.1))
+    assert simulation.set_predicate("on_top", "can", "box"), simulation.last_sampling
+    assert simulation.predicate("on_top", "can", "box")
+    simulation.step(count=90)
+    assert simulation.predicate("on_top", "can", "box")
+
+
+def test_what_a_change_pushes_away_is_shoved(resting):
+    query = resting.query
+    query.load(resting._start)
+    box, can = (query.scene.object_index(name) for name in ("box", "can"))
+    others = Bystanders(query, query.save())
+    query.place(box, np.array([0.25, 0.2, 0.55]), np.array([1.0, 0, 0, 0]))  # it stands in the can
+    query.settle()
+    assert others.shoved()[[box, can]].all()
+
+
+@pytest.mark.parametrize("value", [True, False])
+def test_opening_and_closing_shove_nothing(simulation, value):
+    """Joints are drawn so that what stands before a door stays where it is, and the answer is no where none will do."""
+    simulation.set_predicate("open", "cabinet", value=not value)
+    simulation.set_object_pose("box", BEFORE_THE_CABINET)
+    simulation.step(count=30)
+    opened = simulation.engine.export(simulation.physics, 0)
+    before = np.array(simulation.view.object_com[0])
+    cabinet, book = (simulation.scene.object_index(name) for name in ("cabinet", "book"))
+    done = []
+    for seed in range(12):
+        simulation.physics = simulation.engine.load(simulation.physics, opened)
+        done.append(simulation.set_predicate("open", "cabinet", value=value, seed=seed))
+        way = np.linalg.norm(np.array(simulation.view.object_com[0]) - before, axis=1)
+        way[[cabinet, book]] = 0.0  # the book is in the drawer
+        assert way.max() <= MOVED
+        assert simulation.predicate("open", "cabinet") == (value if done[-1] else not value)
+    assert any(done)
+
+
+def test_what_lies_in_a_drawer_goes_along(simulation):
+    drawer, book = "cabinet_drawer_slide", simulation.scene.object_index("book")
+    seen = set()
+    for seed in range(8):
+        simulation.reset()
+        simulation.step(count=30)
+        before, start = simulation.joint(drawer), np.array(simulation.view.object_com[0, book])
+        assert simulation.set_predicate("open", "cabinet", seed=seed), simulation.last_sampling
+        way = start - np.array(simulation.view.object_com[0, book])
+        pulled = simulation.joint(drawer) - before
+        assert way == pytest.approx([pulled, 0.0, 0.0], abs=MOVED)
+        assert simulation.predicate("inside", "book", "cabinet")
+        seen.add(pulled > 0.05)
+    assert seen == {True, False}
+
+
+def test_setting_the_state_of_a_door_shoves_nothing_and_says_what_is_in_the_way(simulation):
+    simulation.set_object_pose("box", BEFORE_THE_CABINET)
+    simulation.step(count=30)
+    before = np.array(simulation.view.object_com[0, simulation.scene.object_index("box")])
+    for _ in range(4):
+        simulation.set_state("open", "cabinet", True)
+        simulation.step(count=30)
+        assert simulation.predicate("open", "cabinet")
+        now = np.array(simulation.view.object_com[0, simulation.scene.object_index("box")])
+        assert np.linalg.norm(now - before) <= MOVED
+        simulation.set_state("open", "cabinet", False)
+        simulation.step(count=30)
+    simulation.set_object_pose("box", (1.17, -0.15, 0.05))  # before the door
+    simulation.set_object_pose("ball", (1.1, -0.15, 0.6))  # and before the drawer, for now
+    with pytest.raises(StateError, match=r"'cabinet' cannot be opened without moving .*ball.*move that first"):
+        for _ in range(8):
+            simulation.set_state("open", "cabinet", True)
+
+
+def test_a_door_that_shoves_another_object_s_drawer_or_stands_in_something_is_refused(resting):
+    query = resting.query
+    query.load(resting._start)
+    cabinet = query.scene.object_index("cabinet")
+    mover = JointMover(query, cabinet)
+    tables = query.scene.tables
+    positions = np.array(query.view.joint_pos, float)
+    moves = np.zeros(positions.shape, bool)
+    moves[0, 0] = True
+    assert tables.openable_object[0] == cabinet
+    positions[0, 0] = tables.openable_open[0]
+    assert mover.problem(mover.plan(positions, moves)) == ""
+    query.load(mover.before)
+    nobody = JointMover(query, query.scene.object_index("box"))  # as if the cabinet were another's
+    assert nobody.shoved_by(nobody.plan(positions, moves)) == ["cabinet"]
