@@ -11,8 +11,9 @@ import pytest
 from hand_world import HandWorld, Item
 from hypothesis import given
 from hypothesis import strategies as st
+from limits import run_limited
 
-from ig2mj.errors import AbilityError, UnknownNameError
+from ig2mj.errors import AbilityError, InputError, UnknownNameError
 from ig2mj.predicates import (
     AbilityWarning,
     ArityError,
@@ -301,3 +302,25 @@ def test_explain_is_about_the_world_asked_for():
     assert goal.explain(world.replace(states=states), 1).endswith("holds.")
     assert "does not hold" in goal.explain(world.replace(states=states), 0)
     assert goal(world.replace(states=states)).tolist() == [False, True]
+
+
+def _ground_nested(depth: int, size: int) -> logic.Expression:
+    body: logic.Expression = atom("toggled_on", "?x0")
+    for level in range(depth):
+        body = ForAll(f"?x{level}", "lamp", body)
+    return logic.ground(body, lambda group: [f"{group}_{k}" for k in range(size)])
+
+
+def test_nested_quantifiers_are_grounded_up_to_a_limit():
+    run_limited(_ground_nested, 4, 200).check(InputError, "stand for 16.* parts.*20000.*IG2MJ_LIMIT_GROUNDED_PARTS")
+    run_limited(_ground_nested, 90, 200).check(InputError, "IG2MJ_LIMIT_GROUNDED_PARTS")
+    assert logic.ground_size(_ground_nested(2, 3), lambda _: []) == 1 + 3 * (1 + 3)
+
+
+@given(st.integers(0, 3), st.integers(0, 3))
+def test_the_size_is_that_of_what_is_grounded(first: int, second: int):
+    groups = {"a": [f"a{k}" for k in range(first)], "b": [f"b{k}" for k in range(second)]}
+    pairs = logic.ForPairs(("?x", "a"), ("?y", "b"), atom("on_top", "?x", "?y") & ~atom("open", "?x"))
+    whole = pairs | ForAll("?z", "b", logic.Exists("?x", "a", atom("inside", "?x", "?z")))
+    grounded = logic.ground(whole, groups.__getitem__)
+    assert logic.ground_size(whole, groups.__getitem__) == logic.ground_size(grounded, groups.__getitem__)

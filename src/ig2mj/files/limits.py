@@ -7,6 +7,9 @@
 | IG2MJ_LIMIT_UNPACKED_RATIO | 100     | bytes of arrays for each byte of the file, beyond `IG2MJ_LIMIT_SMALL_BYTES` |
 | IG2MJ_LIMIT_UNPACKED_BYTES | 16 GiB  | all arrays that are read of one file                                       |
 | IG2MJ_LIMIT_ARRAYS         | 10000   | arrays in one file                                                         |
+| IG2MJ_LIMIT_MJCF_ELEMENTS  | 500000  | elements of a scene's MJCF, replicated ones counted                         |
+| IG2MJ_LIMIT_MJCF_CELLS     | 50 million | cells of its height fields and built-in textures, user data, one image  |
+| IG2MJ_LIMIT_GROUNDED_PARTS | 20000   | parts of an expression whose quantifiers are written out                    |
 """
 
 from __future__ import annotations
@@ -21,6 +24,9 @@ DEFAULTS = {
     "UNPACKED_RATIO": 100,
     "UNPACKED_BYTES": 16 * 2**30,
     "ARRAYS": 10_000,
+    "MJCF_ELEMENTS": 500_000,
+    "MJCF_CELLS": 50_000_000,
+    "GROUNDED_PARTS": 20_000,
 }
 """By name without `PREFIX`. Deflate packs at most 1032 bytes into one; pools and recordings that the project makes, and
 images of rooms, have 1 to 60."""

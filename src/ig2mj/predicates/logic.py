@@ -15,6 +15,8 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 
+from ig2mj.files.limits import refuse_more
+
 
 @dataclasses.dataclass(frozen=True)
 class Expression:
@@ -144,8 +146,29 @@ def ground(expression: Expression, groups: Callable[[str], Sequence[str]]) -> Ex
     Args:
       expression: may hold quantifiers. A "?name" that none of them binds is the object `name`, as in BDDL.
       groups: the objects of a named group.
+
+    Raises:
+      InputError: it would have more parts than the limit `GROUNDED_PARTS` (`ig2mj.files.limits`).
     """
+    count = ground_size(expression, groups)
+    refuse_more("GROUNDED_PARTS", count, "its quantifiers stand for", "expression", unit=" parts")
     return _ground(expression, groups, {})
+
+
+def ground_size(expression: Expression, groups: Callable[[str], Sequence[str]]) -> int:
+    """How many parts `ground` would make, without making them."""
+    match expression:
+        case And(parts) | Or(parts) | Exactly(_, parts):
+            return 1 + sum(ground_size(part, groups) for part in parts)
+        case Not(part):
+            return 1 + ground_size(part, groups)
+        case ForAll(_, group, body) | Exists(_, group, body) | ForN(_, _, group, body):
+            return 1 + len(groups(group)) * ground_size(body, groups)
+        case ForPairs(first, second, body) | ForNPairs(_, first, second, body):
+            return 1 + len(groups(first[1])) * len(groups(second[1])) * ground_size(body, groups)
+        case Pairing(_, rows):
+            return 1 + sum(ground_size(p, groups) for row in rows for p in row if p is not None)
+    return 1
 
 
 def _instances(

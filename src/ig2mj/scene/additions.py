@@ -20,6 +20,7 @@ import msgspec
 from ig2mj.errors import Ig2mjError, InputError
 from ig2mj.scene.library import LibraryModel, find_model
 from ig2mj.scene.manifest import JointEntry, LinkEntry, Manifest, ObjectEntry, OpenableEntry
+from ig2mj.scene.mjcf_limits import check_mjcf
 from ig2mj.scene.resting import rest
 
 SLAB = "additions_slab"
@@ -184,6 +185,7 @@ def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -
 
 
 def _read(file: pathlib.Path) -> ElementTree.Element:
+    check_mjcf(file)
     try:
         return ElementTree.parse(file).getroot()
     except (OSError, ElementTree.ParseError) as e:

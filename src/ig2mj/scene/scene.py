@@ -20,6 +20,7 @@ from ig2mj.scene.ceilings import add_ceiling
 from ig2mj.scene.floors import deepen_floors
 from ig2mj.scene.grasp_equalities import add_grasp_equalities
 from ig2mj.scene.manifest import AgentEntry, Manifest, ObjectEntry, load_manifest
+from ig2mj.scene.mjcf_limits import check_mjcf
 from ig2mj.scene.paths import MANIFEST_FILE, SHIPPED_HOMES, model_file
 from ig2mj.scene.rooms import Rooms, load_rooms
 from ig2mj.scene.tables import SceneTables
@@ -178,7 +179,8 @@ def digest_of(scene: str, objects: Sequence[str] = ()) -> str:
 
 
 def read_spec(file: pathlib.Path) -> mujoco.MjSpec:
-    """Parses a scene.xml. Raises InputError."""
+    """Parses a scene.xml. Raises InputError: it is no MJCF, or asks for more than a limit (`mjcf_limits`)."""
+    check_mjcf(file)
     try:
         return mujoco.MjSpec.from_file(str(file))
     except (ValueError, OSError) as e:
@@ -186,6 +188,7 @@ def read_spec(file: pathlib.Path) -> mujoco.MjSpec:
 
 
 def _spec_from_text(text: str, file: pathlib.Path) -> mujoco.MjSpec:
+    check_mjcf(file, text)
     try:
         return mujoco.MjSpec.from_string(text)
     except ValueError as e:
