@@ -60,16 +60,22 @@ def finish(
       timings: stage -> seconds so far; the checks' are added.
       warnings: about the whole scene.
     """
+    checks: list[CheckResult] = []
+    check_manifest(manifest)
+    if options.report or options.strict:
+        start = time.perf_counter()
+        checks = run_checks(model, manifest, overlaps_allowed, _source_boxes(built))
+        timings["checks"] = time.perf_counter() - start
     lines = [*warnings, *builder.textures.warnings, *builder.warnings.get("", [])]
     per_object = {name: _object_warnings(name, model_built, builder) for name, model_built in built.items()}
+    for name, text in _unsettled(checks):
+        per_object.get(name, lines).append(text)
     said = [*lines, *(f"{name}: {line}" for name, found in per_object.items() for line in found)]
     said.sort(key=lambda line: HOVERS in line)  # common, and harmless: after everything that was lost
     if options.strict and said:
         more = f" (and {len(said) - 1} more warnings)" if len(said) > 1 else ""
         raise InputError(manifest.name, f"{said[0]}{more}", fix="--strict takes warnings for errors")
-    check_manifest(manifest)
     save_manifest(manifest, folder / "manifest.json")
-    checks: list[CheckResult] = []
     provisional = [
         f"'{name}': the decomposition of link '{link}' was stopped"
         for name, model_built in built.items()
@@ -77,9 +83,6 @@ def finish(
         if found.stopped
     ]
     if options.report:
-        start = time.perf_counter()
-        checks = run_checks(model, manifest, overlaps_allowed, _source_boxes(built))
-        timings["checks"] = time.perf_counter() - start
         given = ReportInput(
             kind=kind,
             hulls={name: model_built.hulls for name, model_built in built.items()},
@@ -96,9 +99,26 @@ def finish(
             provisional.append(facts["pictures"])
     written = hashlib.sha256((folder / "manifest.json").read_bytes()).hexdigest()
     return Outcome(
-        len(manifest.objects), list(skipped), checks, len(said), timings, provisional, written, builder.files_outside(),
+        len(manifest.objects),
+        list(skipped),
+        checks if options.report else [],
+        len(said),
+        timings,
+        provisional,
+        written,
+        builder.files_outside(),
         first_warnings=list(dict.fromkeys(said))[:FIRST_WARNINGS],
-    )  # fmt: skip
+    )
+
+
+def _unsettled(checks: Sequence[CheckResult]) -> list[tuple[str, str]]:
+    """(object, warning) of loose objects that do not stay where they start; '' for the model as a whole."""
+    return [
+        (str(failure.get("object", "")), f"does not stay at rest in the first second: {failure['problem']}")
+        for check in checks
+        if check.name == "settle"
+        for failure in check.failures
+    ]
 
 
 def _source_boxes(built: Mapping[str, BuiltModel]) -> dict[str, SourceBox]:

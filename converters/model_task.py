@@ -20,13 +20,11 @@ from .base.read_limits import ReadLimits, limits, limits_of
 from .bodies.assembly import Assembly, assemble
 from .bodies.inertia import link_inertials
 from .bodies.kinematics import model_bounds
+from .checks.plausible import implausible
 from .hulls.link_hulls import LinkPieces, decompose_links, is_cached, scaled_pieces
 from .hulls.pieces import HullOptions, LinkHulls
 from .reading.dataset import Dataset
 from .reading.scaling import instance_scale, link_maps, scale_model
-
-SMALLEST, LARGEST = 1e-3, 50.0
-"""Metres across: what is smaller or larger is likely to be in another unit."""
 
 
 @dataclasses.dataclass
@@ -167,21 +165,10 @@ def build_model(
         if model.links[name].collisions and not link_hulls.pieces:
             assembly.warnings.append(f"link '{name}' has no usable collision geometry")
     box = model_bounds(scaled)
-    assembly.warnings += _odd_sizes(model, box)
+    assembly.warnings += implausible(scaled, assembly)
     encrypted = any(shape.encrypted for link in model.links.values() for shape in link.visuals)
     seconds = time.perf_counter() - start + sum(pieces.seconds for pieces in found.values())
     return BuiltModel(assembly, decomposed, encrypted, _file_hash(model), seconds, box)
-
-
-def _odd_sizes(model: ObjectModel, box: np.ndarray | None) -> list[str]:
-    """Warnings about an object without geometry, and about sizes that smell of a wrong unit."""
-    if box is None:
-        drawn = any(link.visuals for link in model.links.values())
-        return ["has no collision geometry: nothing touches it" if drawn else "has no geometry at all"]
-    across = float((box[1] - box[0]).max())
-    if SMALLEST <= across <= LARGEST:
-        return []
-    return [f"is {across:.3g} m across: are its meshes in another unit? (<mesh scale=...> in {model.file.name})"]
 
 
 def forget_datasets() -> None:

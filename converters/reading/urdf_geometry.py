@@ -110,7 +110,7 @@ class GeometryReader:
         """A primitive or a mesh scaled to size zero, with a warning."""
         text = "" if mesh is None else (mesh.get("scale") or "")
         scale = () if mesh is None else numbers(mesh, "scale", len(text.split()) or 3, self.guard.file, (1.0,) * 3)
-        if all(shape.size) and np.all(np.asarray(scale) != 0):
+        if all(shape.size) and (mesh is None or np.any(np.asarray(scale) != 0)):
             return False
         kind = f"its {shape.kind} has" if mesh is None else f"scale='{shortened(text, 40)}' gives its mesh"
         self.warnings.append(f"{where(element)} is left out: {kind} no size")
@@ -156,6 +156,8 @@ class GeometryReader:
         text = mesh.get("scale")
         count = 1 if text is not None and len(text.split()) == 1 else 3
         s = numbers(mesh, "scale", count, self.guard.file, (1.0, 1.0, 1.0))
+        if np.any(s == 0):
+            raise InputError(self.guard.file, f"scale='{text}' makes the mesh flat", element=where(mesh))
         if np.any(s < 0):
             self.warnings.append(f"{where(mesh)}: scale='{text}' mirrors the mesh")
         x, y, z = np.broadcast_to(s, 3)

@@ -86,6 +86,7 @@ URDFS = {
         "{link a <collision><origin xyz='0 0 NaN'/><geometry><box size='1 1 1'/></geometry></collision>}",
         "link 'a' collision origin.*NaN",
     ),
+    "mesh scale zero": ("{link a {mesh shape/c.obj 1 0 1}}", "link 'a'.*mesh.*flat"),
     "mesh scale of two numbers": ("{link a {mesh shape/c.obj 1 1}}", "link 'a'.*mesh.*2 numbers"),
     "mesh without filename": (
         "{link a <collision><geometry><mesh/></geometry></collision>}",
