@@ -11,7 +11,7 @@ from ig2mj.demos.reader import Recording
 from ig2mj.demos.writer import FLUSH, RunWriter
 from ig2mj.engine.native.recorded import Cut
 
-ABOUT = {name: "" for name in ("mujoco", "ig2mj", "scene", "scene_hash", "model_hash")}
+ABOUT = {name: "" for name in ("mujoco", "scene", "scene_hash", "model_hash")}
 OWN = {"vector": Cut(0, 0, 3), "matrix": Cut(0, 3, 7, (2, 2)), "nothing": Cut(0, 7, 7), "flag": Cut(1)}
 
 

@@ -299,7 +299,7 @@ import os, signal, sys
 import numpy as np
 from ig2mj.demos.writer import RunWriter
 
-about = {name: "" for name in ("mujoco", "ig2mj", "scene", "scene_hash", "model_hash")}
+about = {name: "" for name in ("mujoco", "scene", "scene_hash", "model_hash")}
 writer = RunWriter(sys.argv[1], about, {}, ["a", "late"], ["action"])
 writer.begin({0: {}}, [], [np.zeros((1, 3)), np.zeros((1, 2))])
 for k in range(1, 451):

@@ -150,12 +150,13 @@ def broken(pool: Pool, file, kind: str, scene: ig2mj.Scene) -> str:
     if kind == "scene":
         manifest = copy.copy(scene.manifest)
         manifest.name = "palace"
-        save_pool(pool, file, dataclasses.replace(scene, manifest=manifest))
+        tables = dataclasses.replace(scene.tables, object_names=(*scene.object_names[:-1], "vase"))
+        save_pool(pool, file, dataclasses.replace(scene, manifest=manifest, tables=tables))
         return "is a pool of scene 'palace', not of 'tiny_home'"
     if kind == "digest":
         tables = dataclasses.replace(scene.tables, object_names=(*scene.object_names[:-1], "vase"))
         save_pool(pool, file, dataclasses.replace(scene, tables=tables))
-        return "was made before 'tiny_home' was converted as it is now"
+        return "was made when the physics of 'tiny_home' differed from now"
     if kind == "lengths":
         short = jax.tree.map(lambda a: np.asarray(a)[:-1], pool.states)
         save_pool(dataclasses.replace(pool, states=short), file, scene)

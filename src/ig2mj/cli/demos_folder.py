@@ -15,14 +15,20 @@ def metrics(
     path: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="FILE|FOLDER")],
     jobs: int = 1,
     settle: int = 150,
+    success_only: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    include_incomplete: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
     """Compute iGibson's metrics of recordings: goal score, disarrangement, travel of base and hands, grasping, gaze.
+
+    Episodes that were cut off, by the end of a rollout or Ctrl-C, are left out.
 
     Args:
       path: a recording, or a folder of them.
       jobs: number of processes; each takes one recording at a time.
       settle: control steps to wait before start and end are compared; 0: compare them as recorded.
+      success_only: measure successful episodes only.
+      include_incomplete: measure episodes that were cut off, too.
       json: print one JSON object per run.
     """
     import json as form
@@ -33,15 +39,32 @@ def metrics(
 
     if jobs < 1 or settle < 0:
         raise Ig2mjError(f"--jobs {jobs}, --settle {settle}: at least one process, and no less than 0 steps")
-    failed = 0
-    for file, found in of_files(metrics_of, files_of(path), jobs, settle):
+    failed, chosen = 0, (success_only, include_incomplete)
+    for file, found in of_files(metrics_of, files_of(path), jobs, settle, None, *chosen):
         if isinstance(found, Ig2mjError):
             print(f"error: {found}", file=sys.stderr)
             failed += 1
             continue
         for run in found:
             print(form.dumps(run) if json else _line(file, run))
+        if others := _others(file, *chosen):
+            print(f"{file}: {others}", file=sys.stderr)
     return 2 if failed else 0
+
+
+def _others(file: pathlib.Path, success_only: bool, incomplete: bool) -> str:
+    """What was not measured, for people."""
+    from ig2mj.demos.reader import Recording
+    from ig2mj.demos.selection import INCOMPLETE, chosen_runs, left_out
+
+    with Recording(file) as recording:
+        runs = chosen_runs(recording, success_only, incomplete)
+        others = left_out(recording, runs)
+    if others and not runs:
+        return f"nothing to measure but {others}; {INCOMPLETE}"
+    if others:
+        return f"left out: {others}"
+    return "" if runs else "has no run with a step"
 
 
 def _line(file: pathlib.Path, run: dict[str, Any]) -> str:

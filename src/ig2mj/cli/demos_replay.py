@@ -103,17 +103,23 @@ def _replayed(
     with Recording(file) as recording:
         replayer = Replayer(recording, by, observations=names or VECTORS, **options)
         watchers: list[Any] = []
+        observing = None
         try:
             if video is not None:
                 watchers.append(_Filming(video, replayer.env))
             if names:
-                watchers.append(Observing.into(out or file.with_suffix(".sensors.h5"), names, recording))
+                observing = Observing.into(out or file.with_suffix(".sensors.h5"), names, recording)
+                watchers.append(observing)
 
             def watch(state: EnvState, runs: dict[int, Run], frame: int) -> None:
                 for watcher in watchers:
                     watcher.see(state, runs, frame)
 
             return replayer(check, watch if watchers else None)
+        except BaseException:
+            if observing is not None:
+                observing.discard()
+            raise
         finally:
             for watcher in watchers:
                 watcher.close()
@@ -125,30 +131,46 @@ def export(
     to: str = "robomimic",
     by: str = "action",
     obs: str = "",
+    success_only: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    include_incomplete: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
     """Export a recording to another project's format, with observations computed by a replay.
+
+    Episodes that were cut off, by the end of a rollout or Ctrl-C, are left out. The output is complete or not there.
 
     Args:
       file: the recording (`ig2mj rollout --record FILE`).
       out: output file; for lerobot and igibson a folder.
       to: robomimic (HDF5), lerobot (datasets v3.0: parquet and films) or igibson (HDF5).
       by: replay by action (compares every byte) or by state.
-      obs: observations, e.g. proprioception,rgb; default: proprioception,privileged_state. igibson has none.
+      obs: observations, e.g. proprioception,rgb; default: those of the recorded environment. igibson has none.
+      success_only: export successful episodes only.
+      include_incomplete: export episodes that were cut off, too.
     """
+    import sys
+
+    from ig2mj.cli.files import check_output
     from ig2mj.demos.exports import EXPORTS
     from ig2mj.demos.reader import Recording
-    from ig2mj.demos.replay import MODES, Replayer
+    from ig2mj.demos.replay import MODES, Replayer, recorded_observations
+    from ig2mj.demos.selection import left_out, some_runs
     from ig2mj.demos.shipped import find_recording
-    from ig2mj.envs.registry import VECTORS
     from ig2mj.errors import UnknownNameError
 
     for kind, name, known in (("format", to, tuple(EXPORTS)), ("way to replay", by, MODES)):
         if name not in known:
             raise UnknownNameError(kind, name, known)
     names = tuple(name.strip() for name in obs.split(",") if name.strip())
+    if to == "robomimic":
+        check_output(out)
     with Recording(find_recording(file)) as recording:
-        done = EXPORTS[to](Replayer(recording, by, observations=names or VECTORS), out)
+        runs = some_runs(recording, success_only, include_incomplete)
+        replayer = Replayer(recording, by, observations=names or recorded_observations(recording))
+        done = EXPORTS[to](replayer, out, success_only=success_only, incomplete=include_incomplete)
+        others = left_out(recording, runs)
     print(f"{out}: {done.runs} runs of {file}")
+    if others:
+        print(f"left out: {others}", file=sys.stderr)
     return 0
 
 

@@ -60,7 +60,7 @@ class RecordedEnvironment(Environment):
         self.writer: RunWriter | None = None
         self.devices: dict[str, np.ndarray] = dict(devices or {})
         self._device_names, self._past_success = list(self.devices), past_success
-        self._succeeded = np.zeros(env.num_worlds, bool)
+        self._succeeded, self._completed = np.zeros((2, env.num_worlds), bool)
 
     def step(self, state: EnvState, action: Array) -> EnvState:
         """As `Environment.step`."""
@@ -102,7 +102,8 @@ class RecordedEnvironment(Environment):
         if self.writer is not None:
             if self._past_success:
                 for world in self._worlds:
-                    self.writer.end(world, success=bool(self._succeeded[world]), terminated=False)
+                    how = {"success": bool(self._succeeded[world]), "complete": bool(self._completed[world])}
+                    self.writer.end(world, terminated=False, **how)
             self.writer.close()
         self._inner.close()
 
@@ -131,7 +132,7 @@ class RecordedEnvironment(Environment):
         if rows is None:
             rows = np.asarray(pick_rows(jnp.asarray(state.batch.world.key), self.core.starts.pool.size))
         episode = np.asarray(state.batch.episode)
-        self._succeeded[begun] = False
+        self._succeeded[begun] = self._completed[begun] = False
         runs = {w: {"episode": int(episode[w]), "row": int(rows[w]), **about} for w in begun}
         self.writer.begin(runs, *self._rows(state))
         return state
@@ -148,11 +149,13 @@ class RecordedEnvironment(Environment):
         terminated, truncated = np.asarray(state.terminated), np.asarray(state.truncated)
         if self._past_success:
             self._succeeded |= np.asarray(state.info["success"])
+            self._completed |= terminated | truncated
         elif terminated.any() or truncated.any():
             success = np.asarray(state.info["success"])
             for world in self._worlds:
                 if terminated[world] or truncated[world]:
-                    self.writer.end(world, success=bool(success[world]), terminated=bool(terminated[world]))
+                    how = {"terminated": bool(terminated[world]), "truncated": bool(truncated[world])}
+                    self.writer.end(world, success=bool(success[world]), complete=True, **how)
         self._last = state
 
 

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-PIXELS = "yuv420p"
+PIXELS, ODD_PIXELS = "yuv420p", "yuv444p"
+"""Formats of frames; the first halves the resolution of colours, and so is for even widths and heights only."""
 
 
 class EpisodeFilms:
@@ -34,7 +35,8 @@ class EpisodeFilms:
         Returns:
           Indices of its file, and the time in it at which it begins, s.
         """
-        if self._file is not None and self._file.stat().st_size > limit * 2**20:
+        # Codecs hold frames back, so that the file of a short episode may not be there yet.
+        if self._file is not None and self._file.exists() and self._file.stat().st_size > limit * 2**20:
             self.close()
             self._place = {**self._place, "file_index": self._place["file_index"] + 1}
             if self._place["file_index"] == 1000:
@@ -65,13 +67,14 @@ class EpisodeFilms:
         self._container = av.open(str(self._file), "w")
         # A key frame every other picture: readers take single pictures in any order.
         self._stream = self._container.add_stream(self._codec, rate=self._fps, options={"g": "2", "crf": "18"})
-        self._stream.width, self._stream.height, self._stream.pix_fmt = width, height, PIXELS
+        pixels = PIXELS if width % 2 == height % 2 == 0 else ODD_PIXELS
+        self._stream.width, self._stream.height, self._stream.pix_fmt = width, height, pixels
         self._stream.time_base = Fraction(1, self._fps)
         self.about = {
             "video.height": height,
             "video.width": width,
             "video.codec": self._codec,
-            "video.pix_fmt": PIXELS,
+            "video.pix_fmt": pixels,
             "video.is_depth_map": False,
             "video.fps": self._fps,
             "video.channels": 3,

@@ -20,15 +20,17 @@ import dataclasses
 import json
 import os
 import pathlib
+from collections.abc import Sequence
 from typing import Any
 
 import mujoco
 import numpy as np
 
-from ig2mj.agents.base import ACTION_PERIOD
-from ig2mj.demos.observing import exported_runs
+from ig2mj.demos.observing import check_observations, made_again
 from ig2mj.demos.reader import Run
 from ig2mj.demos.replay import Replayed, Replayer
+from ig2mj.demos.selection import some_runs
+from ig2mj.demos.whole_output import whole_output
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.errors import InputError
 from ig2mj.files.hdf5 import Hdf5File
@@ -71,19 +73,27 @@ class IGibsonLog:
         return min((len(rows) for rows in self.position.values()), default=0)
 
 
-def export_igibson(replayer: Replayer, folder: str | os.PathLike) -> Replayed:
-    """Writes all runs of a recording that have a step: `<run>.hdf5` in a folder.
+def export_igibson(
+    replayer: Replayer, folder: str | os.PathLike, success_only: bool = False, incomplete: bool = False
+) -> Replayed:
+    """Writes the complete runs of a recording: `<run>.hdf5` in a folder, which appears when all are written.
+
+    Args:
+      success_only, incomplete: see `ig2mj.demos.selection.chosen_runs`.
 
     Returns:
       What came of the replay.
 
     Raises:
-      InputError: the recording is broken, or does not come out the same by action, or the folder is there.
+      InputError: as of `observe`; or the folder is there.
     """
-    place = pathlib.Path(folder)
-    if place.exists():
-        raise InputError(place, "is there already", fix="choose another folder")
-    place.mkdir(parents=True)
+    runs = some_runs(replayer.recording, success_only, incomplete)
+    check_observations(replayer)
+    with whole_output(folder, folder=True) as place:
+        return _export(replayer, place, runs)
+
+
+def _export(replayer: Replayer, place: pathlib.Path, runs: Sequence[Run]) -> Replayed:
     bodies, seen = _Bodies(replayer.env.scene), dict[str, list[tuple[np.ndarray, ...]]]()
 
     def watch(state: EnvState, now: dict[int, Run], frame: int) -> None:
@@ -93,7 +103,7 @@ def export_igibson(replayer: Replayer, folder: str | os.PathLike) -> Replayed:
             if frame == run.frames - 1:
                 _write(place / f"{run.name}.hdf5", replayer, run, bodies, seen.pop(run.name), world)
 
-    done = replayer(check=True, watch=watch, runs=exported_runs(replayer))
+    done = replayer(check=True, watch=watch, runs=runs)
     if done.differences:
         fix = "export it by state (--by state)"
         raise InputError(replayer.recording.file, str(done.differences[0]), fix=fix)
@@ -155,7 +165,7 @@ def _metadata(env: Environment, replayer: Replayer, run: Run, bodies: _Bodies) -
     names = {str(k): name for k, name in enumerate(bodies.names)}
     return {
         "physics_timestep": float(env.core.engine.timestep),
-        "render_timestep": float(ACTION_PERIOD),
+        "render_timestep": float(env.period),
         "git_info": json.dumps({"ig2mj": {"version": replayer.recording.header.get("ig2mj")}}),
         "atus_activity": env.task.name,
         "activity_definition": 0,
@@ -163,6 +173,7 @@ def _metadata(env: Environment, replayer: Replayer, run: Run, bodies: _Bodies) -
         "scene_id": env.scene.name,
         "obj_body_id_to_name": json.dumps(names),  # YAML as well
         "urdf_file": "",
+        "ig2mj": json.dumps({"make": made_again(env), "horizon": env.task.horizon}),
         "run": run.name,
         "robot": env.robot,
     }

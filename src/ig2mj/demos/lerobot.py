@@ -1,11 +1,12 @@
 """Exporting recordings to LeRobot's dataset format, version 3.0, with observations made anew by a replay.
 
-    meta/info.json, stats.json, tasks.parquet, episodes/chunk-000/file-000.parquet
+    meta/info.json, stats.json, ig2mj.json, tasks.parquet, episodes/chunk-000/file-000.parquet
     data/chunk-000/file-000.parquet                      one row a step
     videos/<camera>/chunk-000/file-000.mp4               pictures of many episodes, one after the other
 
 An episode is a run; its row t has the observations before step t, the action, and reward and ends after it. Colours are
 films (`observation.images.rgb`), depths columns of whole millimetres, all other observations columns of floats.
+`meta/ig2mj.json` says how `ig2mj.make` makes an environment with these observations.
 Source of the layout: LeRobot's documentation of datasets v3.0 and the files of LeRobot 0.4.4.
 
 Axes: T steps of a run, N steps of all runs.
@@ -21,16 +22,16 @@ from typing import Any
 
 import numpy as np
 
-from ig2mj.agents.base import ACTION_PERIOD
-from ig2mj.demos.observing import observe
+from ig2mj.demos.observing import made_again, observe
 from ig2mj.demos.reader import Run
 from ig2mj.demos.replay import Replayed, Replayer
+from ig2mj.demos.selection import some_runs
+from ig2mj.demos.whole_output import whole_output
 from ig2mj.envs.environment import Environment
 from ig2mj.errors import InputError
 from ig2mj.install_hint import require_extras
 
 VERSION = "v3.0"
-FPS = round(1 / ACTION_PERIOD)
 CHUNK_FILES, DATA_MB, VIDEO_MB = 1000, 100, 200
 """Files of a folder, and how large they grow: LeRobot's defaults."""
 
@@ -43,30 +44,43 @@ NAMES = {"proprioception": "observation.state", "privileged_state": "observation
 
 QUANTILES = {"q01": 0.01, "q10": 0.1, "q50": 0.5, "q90": 0.9, "q99": 0.99}
 
+DEEPEST = 65.535
+"""m, the largest depth in whole millimetres of 16 bits."""
+
 PIXEL_STRIDE = 4
 """Of the pixels that statistics of pictures are made of, in each direction."""
 
 
-def export_lerobot(replayer: Replayer, folder: str | os.PathLike, codec: str = "h264") -> Replayed:
-    """Writes all runs of a recording that have a step.
+def export_lerobot(
+    replayer: Replayer,
+    folder: str | os.PathLike,
+    codec: str = "h264",
+    success_only: bool = False,
+    incomplete: bool = False,
+) -> Replayed:
+    """Writes the complete runs of a recording; the folder appears when all are written.
 
     Args:
       replayer: of the recording; its environment's observations are written. folder: must not be there yet.
-      codec: of the films, as PyAV names it.
+      codec: of the films, as PyAV names it. success_only, incomplete: see `ig2mj.demos.selection.chosen_runs`.
 
     Returns:
       What came of the replay.
 
     Raises:
-      MissingDependencyError: pyarrow or av is not installed. InputError: the recording is broken, or does not come out
-      the same by action, or the folder is there.
+      MissingDependencyError: pyarrow or av is not installed. InputError: as of `observe`; or the folder is there; or
+      the format cannot hold the period or the depths.
     """
     require_extras("lerobot")
-    writer = DatasetWriter(folder, replayer.env, codec)
-    try:
-        return observe(replayer, lambda number, run, seen: writer.add(run, seen))
-    finally:
-        writer.close()
+    runs = some_runs(replayer.recording, success_only, incomplete)
+    with whole_output(folder, folder=True) as unfinished:
+        writer = DatasetWriter(unfinished, replayer, codec)
+        try:
+            done = observe(replayer, lambda number, run, seen: writer.add(run, seen), runs=runs)
+            writer.finish()
+        finally:
+            writer.close()
+    return done
 
 
 @dataclasses.dataclass
@@ -93,19 +107,19 @@ class _Place:
 
 
 class DatasetWriter:
-    """Writes episodes, and what is known of all of them when it is closed."""
+    """Writes episodes, and what is known of all of them at the end."""
 
-    def __init__(self, folder: str | os.PathLike, env: Environment, codec: str):
-        """Makes the folder. Raises InputError: it is there."""
+    def __init__(self, folder: pathlib.Path, replayer: Replayer, codec: str):
+        """`folder`: an empty one. Raises InputError: the format cannot hold the recording."""
         from ig2mj.demos.films import EpisodeFilms
 
-        self.folder = pathlib.Path(folder)
-        if self.folder.exists():
-            raise InputError(self.folder, "is there already", fix="choose another folder")
+        env = replayer.env
+        self.folder, self._fps, self._made = folder, _whole_rate(replayer), made_again(env)
+        self._name, self._horizon = env.task.name, env.task.horizon
         self._robot, self._task = env.robot, getattr(env.task, "summary", env.task.name)
         self._features = _features(env)
         self._films = {
-            name: EpisodeFilms(lambda place, name=name: self._at(VIDEO_PATH, place, video_key=name), FPS, codec)
+            name: EpisodeFilms(lambda place, name=name: self._at(VIDEO_PATH, place, video_key=name), self._fps, codec)
             for name, feature in self._features.items()
             if feature["dtype"] == "video"
         }
@@ -133,7 +147,7 @@ class DatasetWriter:
         }
         for name, pictures in films.items():
             place, start = self._films[name].add(pictures, VIDEO_MB)
-            of_film = {**place, "from_timestamp": start, "to_timestamp": start + length / FPS}
+            of_film = {**place, "from_timestamp": start, "to_timestamp": start + length / self._fps}
             episode |= {f"videos/{name}/{k}": v for k, v in of_film.items()}
         for name, rows in (columns | films).items():
             statistics = _statistics(_for_statistics(rows, name in films))
@@ -143,11 +157,13 @@ class DatasetWriter:
         self._frames += length
 
     def close(self) -> None:
-        """Writes what is left, and the folder `meta`."""
+        """Closes the films; may be called twice."""
         for film in self._films.values():
             film.close()
-        if not self._episodes:
-            return
+
+    def finish(self) -> None:
+        """Writes what is left, and the folder `meta`, after at least one episode."""
+        self.close()
         self._write_data(self._data)
         import pyarrow as pa
         import pyarrow.parquet as pq
@@ -165,7 +181,7 @@ class DatasetWriter:
             "chunks_size": CHUNK_FILES,
             "data_files_size_in_mb": DATA_MB,
             "video_files_size_in_mb": VIDEO_MB,
-            "fps": FPS,
+            "fps": self._fps,
             "splits": {"train": f"0:{len(self._episodes)}"},
             "data_path": DATA_PATH,
             "video_path": VIDEO_PATH if self._films else None,
@@ -173,7 +189,8 @@ class DatasetWriter:
         }
         stats = {name: _statistics(np.concatenate(rows)) for name, rows in self._kept.items()}
         listed = {name: {k: v.tolist() for k, v in of.items()} for name, of in stats.items()}
-        for name, content in (("info", info), ("stats", listed)):
+        made = {"env": f"ig2mj/{self._name}-v0", "make": self._made, "horizon": self._horizon}
+        for name, content in (("info", info), ("stats", listed), ("ig2mj", made)):
             text = json.dumps(content, indent=4, ensure_ascii=False)
             (self.folder / "meta" / f"{name}.json").write_text(text, encoding="utf-8")
 
@@ -186,11 +203,11 @@ class DatasetWriter:
         films: dict[str, np.ndarray] = {}
         for name, rows in seen.items():
             known = _name(name)
-            (films if known in self._films else columns)[known] = _column(rows[:-1])
+            (films if known in self._films else columns)[known] = _column(name, rows[:-1])
         ends = run.all_rows("steps/terminated") | run.all_rows("steps/truncated")
         columns["next.reward"] = run.all_rows("steps/reward/total").astype(np.float32)
         columns["next.done"], columns["next.success"] = ends, run.all_rows("steps/success")
-        columns["timestamp"] = (np.arange(length) / FPS).astype(np.float32)
+        columns["timestamp"] = (np.arange(length) / self._fps).astype(np.float32)
         columns["frame_index"] = np.arange(length)
         columns["episode_index"] = np.full(length, number)
         columns["index"] = self._frames + np.arange(length)
@@ -213,6 +230,19 @@ class DatasetWriter:
         return file
 
 
+def _whole_rate(replayer: Replayer) -> int:
+    """Frames a second. Raises InputError: they are no whole number, or depths are too large."""
+    env, file = replayer.env, replayer.recording.file
+    rate = 1 / env.period
+    if abs(rate - round(rate)) > 1e-6:
+        problem = f"has {rate:.6g} steps a second, and LeRobot's datasets have a whole number"
+        raise InputError(file, problem, element="attribute period", fix="export it to robomimic")
+    if "depth" in env.observation_spaces and env.sensor_options.depth_high > DEEPEST:
+        problem = f"depth_high = {env.sensor_options.depth_high:g}: whole millimetres go up to {DEEPEST} m"
+        raise InputError(file, problem, element="attribute sensors", fix="export it to robomimic")
+    return round(rate)
+
+
 def _before(place: _Place) -> tuple[int, int]:
     """Chunk and file before these."""
     return (place.chunk, place.file - 1) if place.file else (place.chunk - 1, CHUNK_FILES - 1)
@@ -226,14 +256,14 @@ def _name(observation: str) -> str:
 
 def _features(env: Environment) -> dict[str, dict[str, Any]]:
     """Every column and film, as `info.json` lists it."""
-    names = {"privileged_state": list(env.privileged_names)}
+    names = {"privileged_state": list(env.privileged_names), "proprioception": list(env.proprioception_names)}
     features: dict[str, dict[str, Any]] = {"action": _feature(np.float32, env.action_space.shape, env.action_names)}
     for name, space in env.observation_spaces.items():
         if name == "rgb":
             listed = ["height", "width", "channels"]
             features[_name(name)] = {"dtype": "video", "shape": [*space.shape[:2], 3], "names": listed}
             continue
-        dtype = _column(np.zeros((1, *space.shape), space.dtype)).dtype
+        dtype = _column(name, np.zeros((1, *space.shape), space.dtype)).dtype
         listed = names.get(name, [])
         features[_name(name)] = _feature(dtype, space.shape, listed if len(listed) == space.shape[0] else None)
     scalars = {"next.reward": np.float32, "next.done": np.bool_, "next.success": np.bool_, "timestamp": np.float32}
@@ -246,10 +276,10 @@ def _feature(dtype: Any, shape: tuple[int, ...], names: Any) -> dict[str, Any]:
     return {"dtype": np.dtype(dtype).name, "shape": list(shape), "names": listed}
 
 
-def _column(rows: np.ndarray) -> np.ndarray:
+def _column(name: str, rows: np.ndarray) -> np.ndarray:
     """As it is written: depths in whole millimetres, other floats in single precision."""
-    if rows.dtype.kind == "f" and rows.ndim > 2:
-        return np.clip(np.nan_to_num(rows) * 1000, 0, 65535).round().astype(np.uint16)
+    if name == "depth":
+        return (rows * 1000.0).round().astype(np.uint16)
     return rows.astype(np.float32) if rows.dtype.kind == "f" else rows
 
 
@@ -269,8 +299,10 @@ def _for_statistics(rows: np.ndarray, pictures: bool) -> np.ndarray:
     """[n, k] values of which statistics are made: of pictures those of some pixels by channel, 0..1."""
     if pictures:
         return (rows[:, ::PIXEL_STRIDE, ::PIXEL_STRIDE].reshape(-1, 3) / 255.0).astype(np.float32)
+    if rows.ndim > 3:
+        return rows[:, ::PIXEL_STRIDE, ::PIXEL_STRIDE].reshape(-1, rows.shape[-1]).astype(np.float32)
     if rows.ndim > 2:
-        return rows[:, ::PIXEL_STRIDE, ::PIXEL_STRIDE].reshape(-1, 1).astype(np.float32)
+        return rows[:, ::PIXEL_STRIDE].reshape(-1, rows.shape[-1]).astype(np.float32)
     return rows.reshape(len(rows), -1).astype(np.float64 if rows.dtype.kind in "fi" else np.float32)
 
 

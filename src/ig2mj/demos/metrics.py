@@ -26,6 +26,7 @@ import numpy as np
 from ig2mj.demos.gaze import Rays, measured_rays, statistics
 from ig2mj.demos.reader import Recording, Run
 from ig2mj.demos.replay import Replayer
+from ig2mj.demos.selection import chosen_runs
 from ig2mj.demos.shipped import find_recording
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.predicates.questions import Questions
@@ -42,20 +43,29 @@ MOVED = 1e-3
 Fact = tuple[str, tuple[str, ...]]
 
 
-def metrics_of(file: str | os.PathLike, settle: int = SETTLE, env: Environment | None = None) -> list[dict[str, Any]]:
-    """Of every run of a recording that has a step, in their order; numbers and text only.
+def metrics_of(
+    file: str | os.PathLike,
+    settle: int = SETTLE,
+    env: Environment | None = None,
+    success_only: bool = False,
+    incomplete: bool = False,
+) -> list[dict[str, Any]]:
+    """Of the complete runs of a recording, in their order; numbers and text only.
 
     Args:
       settle: control steps before start and end are compared; 0: as they are.
       env: that the file was recorded in, where it is at hand or `ig2mj.make` cannot make it.
+      success_only, incomplete: see `ig2mj.demos.selection.chosen_runs`.
 
     Raises:
       InputError: the recording is broken, or of something that is not there.
     """
     with Recording(find_recording(file)) as recording:
+        runs = chosen_runs(recording, success_only, incomplete)
+        if not runs:
+            return []
         replayer = Replayer(recording, "state", env=env)
         measured = _Measuring(replayer.env, settle)
-        runs = [run for run in recording.runs if run.frames > 1]
         watched = {run.name: _Watched(measured_rays(run)) for run in runs}
 
         def watch(state: EnvState, now: dict[int, Run], frame: int) -> None:
@@ -67,14 +77,11 @@ def metrics_of(file: str | os.PathLike, settle: int = SETTLE, env: Environment |
         for now in replayer.rounds(runs):
             start, end = (measured.settled(replayer.all_at(now, place)) for place in ("first", "last"))
             for world, run in now.items():
-                about = {"file": str(file), "run": run.name, "frames": run.frames, "success": bool(_success(run))}
+                about = {"file": str(file), "run": run.name, "frames": run.frames, "success": run.success}
+                about["complete"] = run.complete
                 own = watched[run.name].result(measured)
                 found[run.name] = about | own | _disarrangement(measured, start, end, world)
         return [found[run.name] for run in runs]
-
-
-def _success(run: Run) -> bool:
-    return bool(run.all_rows("steps/success")[-1]) if "success" in run.step_names else False
 
 
 @dataclasses.dataclass

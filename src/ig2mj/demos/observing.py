@@ -5,36 +5,42 @@ Axis: T steps of a run.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import dataclasses
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
+from ig2mj.demos.origin import OBSERVED, WHOLE_HASHES, differences, is_plain
 from ig2mj.demos.reader import Run
 from ig2mj.demos.replay import Replayed, Replayer
-from ig2mj.envs.environment import EnvState
-from ig2mj.errors import InputError
+from ig2mj.demos.selection import some_runs
+from ig2mj.envs.environment import Environment, EnvState
+from ig2mj.errors import Ig2mjError, InputError
+from ig2mj.sensors.base import SensorOptions
+from ig2mj.sensors.registry import SENSORS
 
 Write = Callable[[int, Run, dict[str, np.ndarray]], None]
 """Called with a run's number among those that are exported, the run, and its observations [T + 1, ...] by name."""
 
 
-def exported_runs(replayer: Replayer) -> list[Run]:
-    """Runs with at least one step."""
-    return [run for run in replayer.recording.runs if run.frames > 1]
-
-
-def observe(replayer: Replayer, write: Write, exact: bool = True) -> Replayed:
-    """Replays all runs that have a step, and hands each one over when its last frame was seen.
+def observe(replayer: Replayer, write: Write, exact: bool = True, runs: Sequence[Run] | None = None) -> Replayed:
+    """Replays runs, and hands each one over when its last frame was seen.
 
     Runs of several worlds are replayed beside each other, so they do not come in their order.
 
     Args:
-      exact: compare every byte. Without it, what comes out on another processor is taken as it comes.
+      exact: compare every byte, and refuse observations that the recorded environment would not have made. Without it,
+        what comes out is taken as it comes.
+      runs: which; None: all complete ones (`ig2mj.demos.selection`).
 
     Raises:
-      InputError: the recording is broken, does not come out the same by action, or cannot be replayed by state.
+      InputError: the recording is broken, has no such run, does not come out the same by action, cannot be replayed by
+        state, or its observations would be others here.
     """
-    runs = exported_runs(replayer)
+    runs = some_runs(replayer.recording) if runs is None else runs
+    if exact:
+        check_observations(replayer)
     for run in runs if replayer.by == "state" else ():
         if not run.kept(1, 2).all():
             raise run.broken("frames", "has actions, first and last frame only: replay it by action")
@@ -55,3 +61,50 @@ def observe(replayer: Replayer, write: Write, exact: bool = True) -> Replayed:
         fix = "export it by state (--by state)"
         raise InputError(replayer.recording.file, str(done.differences[0]), fix=fix)
     return done
+
+
+def check_observations(replayer: Replayer) -> None:
+    """What is observed here must be what the recorded environment observed.
+
+    Of what cameras and rays see, that is checked of observations that the recorded environment made; the settings of
+    others are free.
+
+    Raises:
+      InputError: it names what is another here.
+    """
+    recording, env, here = replayer.recording, replayer.env, replayer.here
+    names = [name for name in OBSERVED if name != "task_hash" or recording.version != WHOLE_HASHES]
+    found = differences(recording.header, here, tuple(names))
+    if "observations" in recording.header:
+        recorded = recording.value("observations", list)
+        seen = [name for name in env.observation_spaces if name in recorded and name in SENSORS and SENSORS[name].looks]
+        if seen:
+            found += _other_settings(replayer)
+            if recording.header.get("appearance_hash") != here["appearance_hash"]:
+                found.append(f"the home looked otherwise in {', '.join(seen)}")
+    if found:
+        fix = "`ig2mj demos replay --by state --sensors NAMES` makes observations of what is here now"
+        raise InputError(recording.file, f"cannot be exported as it was recorded: {'; '.join(found)}", fix=fix)
+
+
+def _other_settings(replayer: Replayer) -> list[str]:
+    recording = replayer.recording
+    try:
+        recorded = SensorOptions.of(recording.value("sensors", dict))
+    except Ig2mjError as e:
+        raise InputError(recording.file, str(e), element="attribute sensors") from e
+    before, now = dataclasses.asdict(recorded), dataclasses.asdict(replayer.env.sensor_options)
+    return differences(before, now, tuple(now))
+
+
+def made_again(env: Environment) -> dict[str, Any]:
+    """Arguments of `ig2mj.make` that make an environment with the same observations again, as JSON has them."""
+    return {
+        **{name: value for name, value in env.made_with.items() if is_plain(value)},
+        "robot": env.robot,
+        "grasping": env.grasping,
+        "engine": env.core.engine.name,
+        "period": env.period,
+        "observations": list(env.observation_spaces),
+        "sensors": dataclasses.asdict(env.sensor_options),
+    }

@@ -1,9 +1,16 @@
-"""What a recording belongs to: versions, hashes of scene, pool and task, and the machine."""
+"""What a recording belongs to: hashes of physics, task and pool, what observations depend on, versions, the machine.
+
+A recording is bound to what determines physics (`model_hash`, `scene_hash`) and to the values that define the task
+(`task_hash`). Looks, names, and the package's version do not count; what a step of the package does is covered by the
+version of the format. Recordings of format 2 have hashes of every byte in their place, which are compared as such.
+"""
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
+import math
 import os
 import platform
 from collections.abc import Mapping
@@ -15,68 +22,70 @@ import jax
 import mujoco
 import numpy as np
 
+from ig2mj.demos.model_hash import appearance_hash, physics_hash, whole_hash
+from ig2mj.demos.task_hash import task_hash, whole_task_hash
+from ig2mj.demos.writer import FORMAT_VERSION
 from ig2mj.envs.environment import Environment
 from ig2mj.scene.scene import Scene
 from ig2mj.tasks.task import TaskLike
 from ig2mj.worlds.pool import Pool
 
-BINDING = ("mujoco", "ig2mj", "scene", "scene_hash", "model_hash", "task", "task_hash", "robot", "grasping", "engine")
+BINDING = (
+    *("mujoco", "scene_hash", "model_hash", "task_hash", "robot", "grasping", "engine"),
+    *("horizon", "period", "substeps", "timestep"),
+)
 """With another one of these nothing can be expected to come out the same."""
 
 LOOSE = ("jax", "architecture", "processor", "processor_features")
 """With another one of these it mostly does; mathematical functions choose their instructions by processor."""
 
+OBSERVED = ("scene_hash", "model_hash", "task_hash", "robot", "grasping", "horizon", "period")
+"""With another one of these an observation of the same state can be another."""
 
-def origin_of(env: Environment) -> dict[str, Any]:
-    """Of an environment, for the attributes of a file."""
+WHOLE_HASHES = 2
+"""Version of the format whose hashes are of every byte."""
+
+
+def origin_of(env: Environment, version: int = FORMAT_VERSION) -> dict[str, Any]:
+    """Of an environment, for the attributes of a file. `version`: of the format, which decides about the hashes."""
     engine, made = env.core.engine, env.made_with
     own = {
         "task": env.task.name,
-        "task_hash": task_hash(env.task),
+        "task_hash": whole_task_hash(env.task) if version == WHOLE_HASHES else task_hash(*_task_of(env)),
         "pool_hash": pool_hash(env.core.starts.pool),
         "robot": env.robot,
         "grasping": env.grasping,
         "engine": engine.name,
         "worlds": engine.num_worlds,
         "horizon": env.task.horizon,
+        "period": env.period,
+        "observations": json.dumps(list(env.observation_spaces)),
+        "sensors": json.dumps(dataclasses.asdict(env.sensor_options)),
         "action_names": json.dumps(list(env.action_names)),
-        "made_with": json.dumps({k: v for k, v in made.items() if _plain(v)}),
+        "made_with": json.dumps({k: v for k, v in made.items() if is_plain(v)}),
+        "not_made_with": json.dumps([k for k, v in made.items() if not is_plain(v)]),
         "substeps": engine.substeps,
         "timestep": engine.timestep,
     }
-    return own | origin_of_scene(env.scene) | origin_of_machine()
+    return own | origin_of_scene(env.scene, version) | origin_of_machine()
 
 
-def task_hash(task: TaskLike) -> str:
-    """Of all that a task says of itself, so that another number anywhere in it gives another hash."""
-    return _hash(repr(task).encode())
+def _task_of(env: Environment) -> tuple[TaskLike, str, tuple[str, ...]]:
+    return env.task, env.robot, env.scene.object_names
 
 
-def origin_of_scene(scene: Scene) -> dict[str, Any]:
-    """Of a household with its robots."""
+def origin_of_scene(scene: Scene, version: int = FORMAT_VERSION) -> dict[str, Any]:
+    """Of a household with its robots. `version`: see `origin_of`."""
+    whole = version == WHOLE_HASHES
     additions = [a.wanted for a in scene.additions]
     return {
         "scene": scene.name,
-        "scene_hash": scene.digest,
-        "model_hash": model_hash(scene.model),
+        "scene_hash": scene.files_digest if whole else scene.digest,
+        "model_hash": whole_hash(scene.model) if whole else physics_hash(scene.model),
+        "appearance_hash": appearance_hash(scene.model),
         "objects": json.dumps(list(scene.object_names)),
         "additions": json.dumps(additions),
     }
-
-
-def model_hash(model: mujoco.MjModel) -> str:
-    """Of all that a compiled model is but the places of its files, which are others in another folder."""
-    hashed = hashlib.blake2b(digest_size=16)
-    for part in (model, model.opt, model.stat):
-        for name in sorted(n for n in dir(part) if not n.startswith("_") and not n.endswith("_pathadr")):
-            value = getattr(part, name)
-            if isinstance(value, np.ndarray):
-                hashed.update(f"{name} {value.dtype} {value.shape}".encode())
-                hashed.update(np.ascontiguousarray(value).data)
-            elif part is not model and isinstance(value, int | float):
-                hashed.update(f"{name} {value!r}".encode())
-    hashed.update(model.names)
-    return hashed.hexdigest()
 
 
 def origin_of_machine() -> dict[str, Any]:
@@ -101,18 +110,25 @@ def pool_hash(pool: Pool) -> str:
 
 
 def differences(recorded: Mapping[str, Any], here: Mapping[str, Any], names: tuple[str, ...]) -> list[str]:
-    """What is another here, each with the exact pair, for people."""
+    """What is another here, each with the exact pair, for people. What the recording does not say is not compared."""
     return [
         f"{name} was {recorded.get(name)!s}, and is {here.get(name)!s} here"
         for name in names
-        if name in here and str(recorded.get(name)) != str(here.get(name))
+        if name in here and name in recorded and not _equal(recorded[name], here[name])
     ]
 
 
-def _plain(value: object) -> bool:
+def is_plain(value: object) -> bool:
+    """Whether JSON can hold it."""
     return isinstance(value, str | int | float | bool | None) or (
-        isinstance(value, list | tuple) and all(map(_plain, value))
+        isinstance(value, list | tuple) and all(map(is_plain, value))
     )
+
+
+def _equal(a: Any, b: Any) -> bool:
+    if isinstance(a, float | int) and isinstance(b, float | int):
+        return math.isclose(a, b, rel_tol=1e-9)
+    return str(a) == str(b)
 
 
 def _hash(content: Any) -> str:

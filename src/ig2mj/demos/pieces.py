@@ -14,6 +14,7 @@ import numpy as np
 from ig2mj.cluster.work import Piece, WholeRunError
 from ig2mj.demos.reader import Recording, Run
 from ig2mj.demos.replay import Replayer
+from ig2mj.demos.whole_output import whole_output
 from ig2mj.envs.environment import EnvState
 from ig2mj.envs.pieces import keep_pool
 from ig2mj.envs.registry import VECTORS
@@ -103,6 +104,13 @@ class Observing:
                     )
                 self._opened[path][frame] = row
 
+    def discard(self) -> None:
+        """Closes the file, and removes one of its own: the replay was broken off."""
+        self._opened.close()
+        if self._file is not None:
+            _beside(self._file, "frames").unlink(missing_ok=True)
+            self._file = None
+
     def close(self) -> None:
         """Closes the file. One of its own is copied run by run: how its frames came is not to be seen in it."""
         import h5py
@@ -110,13 +118,12 @@ class Observing:
         self._opened.close()
         if self._file is None:
             return
-        beside, frames = _beside(self._file, "part"), _beside(self._file, "frames")
-        with h5py.File(beside, "w") as whole, h5py.File(frames, "r") as opened:
+        frames = _beside(self._file, "frames")
+        with whole_output(self._file) as beside, h5py.File(beside, "w") as whole, h5py.File(frames, "r") as opened:
             whole.attrs["format"] = FORMAT
             for names in self._order:
                 _copy(opened, whole, set(names) & set(opened))
         frames.unlink()
-        beside.replace(self._file)
 
 
 def join_replays(parts: Iterable[bytes], out: pathlib.Path | None) -> dict[str, Any]:

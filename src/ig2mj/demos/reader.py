@@ -6,6 +6,7 @@ time than some hundred rows. No pickle, no links out of the file.
 
 from __future__ import annotations
 
+import functools
 import math
 import os
 import pathlib
@@ -13,14 +14,14 @@ from typing import Any
 
 import numpy as np
 
-from ig2mj.demos.writer import FLUSH, FORMAT, FORMAT_VERSION
+from ig2mj.demos.writer import FLUSH, FORMAT, READABLE_VERSIONS
 from ig2mj.errors import InputError
 from ig2mj.files.content import decode_json
 from ig2mj.files.hdf5 import Hdf5File
 
 FIX = "`ig2mj rollout --record FILE` and `ig2mj.demos.record` write such files"
 
-ATTRIBUTES = ("mujoco", "ig2mj", "scene", "scene_hash", "model_hash")
+ATTRIBUTES = ("mujoco", "scene", "scene_hash", "model_hash")
 """What every recording says of itself."""
 
 LARGEST_ROWS = 2**28
@@ -33,6 +34,8 @@ class Run:
     Attributes:
       name: "run_000000". attributes: of the run. world: of the batch. row: of the pool. frames: T + 1.
       names, step_names: of its arrays, without "frames/" and "steps/".
+      complete: the episode terminated or was truncated; else it was cut off, by a reset or by the end of the recording.
+      success: the goal held at its end (where it went on past success: at any time).
     """
 
     def __init__(self, recording: Recording, name: str, attributes: dict[str, Any]):
@@ -44,6 +47,20 @@ class Run:
         self.names = [name[7:] for name in recording.columns if name.startswith("frames/")]
         self.step_names = [name[6:] for name in recording.columns if name.startswith("steps/")]
         self._parts = self._read_parts(self.attributes.pop("parts", None))
+
+    @functools.cached_property
+    def complete(self) -> bool:
+        """See the class. Raises InputError."""
+        ends = [name for name in ("terminated", "truncated") if name in self.step_names]
+        return self.frames > 1 and any(bool(self.all_rows(f"steps/{name}").any()) for name in ends)
+
+    @functools.cached_property
+    def success(self) -> bool:
+        """See the class. Raises InputError."""
+        if self.frames < 2 or "success" not in self.step_names:
+            return False
+        last = self.rows("steps/success", self.frames - 2, self.frames - 1)
+        return self.attributes.get("success") is True or bool(last.all())
 
     def frame_rows(self, names: list[str], start: int, stop: int, like: list[Any] | None = None) -> list[np.ndarray]:
         """Rows of arrays of the world, [stop - start, ...] each.
@@ -131,7 +148,11 @@ class Run:
 
 
 class Recording:
-    """An open file; a context manager. Attributes: header: its attributes. runs: in the order of their beginning."""
+    """An open file; a context manager.
+
+    Attributes:
+      header: its attributes. version: of the format. runs: in the order of their beginning.
+    """
 
     def __init__(self, file: str | os.PathLike):
         """Opens it. Raises InputError: it is missing, broken, of another kind, or not what it claims to be."""
@@ -148,8 +169,14 @@ class Recording:
 
     def _read(self) -> None:
         self.header: dict[str, Any] = self._opened.attributes()
-        if self.header.get("format") != FORMAT or self.header.get("version") != FORMAT_VERSION:
-            raise InputError(self.file, f"is not {FORMAT}, version {FORMAT_VERSION}", element="format", fix=FIX)
+        if self.header.get("format") != FORMAT:
+            raise InputError(self.file, f"is not {FORMAT}", element="format", fix=FIX)
+        version: Any = self.header.get("version")
+        if version not in READABLE_VERSIONS:
+            known = " and ".join(map(str, READABLE_VERSIONS))
+            problem = f"is {version!r}, and versions {known} can be read"
+            raise InputError(self.file, problem, element="attribute version", fix="record it again")
+        self.version: int = version
         for name in ATTRIBUTES:
             if not isinstance(self.header.get(name), str):
                 raise InputError(self.file, "is missing", element=f"attribute {name}", fix=FIX)

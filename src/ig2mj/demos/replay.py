@@ -32,7 +32,7 @@ from ig2mj.demos.frames import (
     resumed,
     stacked,
 )
-from ig2mj.demos.origin import BINDING, LOOSE, differences, origin_of
+from ig2mj.demos.origin import BINDING, LOOSE, WHOLE_HASHES, differences, origin_of
 from ig2mj.demos.reader import Recording, Run
 from ig2mj.demos.shipped import find_recording
 from ig2mj.demos.writer import FLUSH
@@ -55,6 +55,8 @@ _NAMED_BY = {
 }
 """Attributes of a file that give names, by the kind of the name."""
 
+FIX_ENV = "make the environment yourself, and hand it over: `Replayer(recording, env=...)`"
+
 Watch = Callable[[EnvState, dict[int, Run], int], None]
 """Called with the environment's state, the run of each world that is replayed, and the number of the frame. The next
 frame uses the state up: what shall be kept is copied."""
@@ -76,7 +78,11 @@ class Replayed:
 
 
 class Replayer:
-    """Replays the runs of a file in one environment. Attributes: env: it. warnings: see `Replayed`."""
+    """Replays the runs of a file in one environment.
+
+    Attributes:
+      env: it. here: what a recording of it would say of itself (`ig2mj.demos.origin`). warnings: see `Replayed`.
+    """
 
     def __init__(
         self,
@@ -97,15 +103,19 @@ class Replayer:
         """
         self.recording, self.by = recording, by
         self.env = env if env is not None else _environment(recording, observations, options)
-        here = origin_of(self.env)
-        bound = differences(recording.header, here, BINDING)
+        here = origin_of(self.env, recording.version)
+        if recording.version == WHOLE_HASHES:  # a task's text has names of classes, which mean nothing
+            binding, loose = tuple(name for name in BINDING if name != "task_hash"), ("task_hash", *LOOSE)
+        else:
+            binding, loose = BINDING, LOOSE
+        bound = differences(recording.header, here, binding)
         if bound and by == "action":
             raise InputError(
                 recording.file,
                 f"cannot be replayed by action: {'; '.join(bound)}",
                 fix="replay it by state (--by state)",
             )
-        self.warnings = bound + differences(recording.header, here, LOOSE)
+        self.warnings, self.here = bound + differences(recording.header, here, loose), here
         if recording.header.get("engine") != "native" and by == "action":
             self.warnings.append(f"engine {recording.header.get('engine')} does not promise the same bytes")
         worlds = recording.value("worlds", int)
@@ -250,6 +260,13 @@ class Replayer:
             yield from rows
 
 
+def recorded_observations(recording: Recording) -> tuple[str, ...]:
+    """Names of the observations that the recorded environment made. Raises InputError."""
+    if "observations" not in recording.header:
+        return VECTORS
+    return tuple(map(str, recording.value("observations", list))) or VECTORS
+
+
 def replay(file: str | os.PathLike, by: str = "action", check: bool = True, **options: Any) -> Replayed:
     """Replays all runs of a file, or of demonstrations that ship. Arguments and errors as of `Replayer`."""
     with Recording(find_recording(file)) as recording:
@@ -263,6 +280,11 @@ def _environment(recording: Recording, observations: Sequence[str], options: dic
     hundreds of an activity's start states would take minutes.
     """
     made = recording.value("made_with", dict)
+    if recording.header.get("not_made_with", "[]") != "[]":
+        missing = ", ".join(map(str, recording.value("not_made_with", list)))
+        raise InputError(recording.file, f"does not have what its environment was made with: {missing}", fix=FIX_ENV)
+    if "sensors" in recording.header and "sensors" not in options:
+        options = {**options, "sensors": recording.value("sensors", dict)}
     robot, grasping = recording.value("robot", str), recording.value("grasping", str)
     worlds, engine = recording.value("worlds", int), recording.value("engine", str)
     if not 0 < worlds <= MOST_WORLDS:
@@ -271,7 +293,7 @@ def _environment(recording: Recording, observations: Sequence[str], options: dic
     try:
         task = find_task(recording.value("task", str))
         if isinstance(task, Task):
-            made["pool_size"] = 1
+            made = {**made, "pool_size": 1, "mixed": 0}
         env = make(task, robot, worlds, engine, grasping, observations=observations, **(made | options))
     except UnknownNameError as e:
         if e.kind not in _NAMED_BY:

@@ -9,14 +9,14 @@ from __future__ import annotations
 
 import json
 import os
-import pathlib
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ig2mj.demos.reader import Recording, Run
-from ig2mj.demos.writer import FLUSH, FORMAT, FORMAT_VERSION, PACKED
+from ig2mj.demos.whole_output import whole_output
+from ig2mj.demos.writer import FLUSH, FORMAT, PACKED
 
 
 def write_thin(recording: Recording, file: str | os.PathLike, runs: Sequence[Run], **attributes: Any) -> None:
@@ -26,7 +26,7 @@ def write_thin(recording: Recording, file: str | os.PathLike, runs: Sequence[Run
       attributes: added to the file's.
 
     Raises:
-      InputError: the recording is broken. OSError: the file cannot be written.
+      InputError: the recording is broken, or the file cannot be written.
     """
     import h5py
 
@@ -37,10 +37,8 @@ def write_thin(recording: Recording, file: str | os.PathLike, runs: Sequence[Run
         places[1:-1, of_world] = -1
         parts.append(places)
     index = np.concatenate(parts)
-    place = pathlib.Path(file)
-    unfinished = place.with_name(f".{place.name}.{os.getpid()}.part")
-    with h5py.File(unfinished, "w", libver=("v108", "v108")) as out:
-        about = {"format": FORMAT, "version": FORMAT_VERSION, "columns": json.dumps(names)}
+    with whole_output(file) as unfinished, h5py.File(unfinished, "w", libver=("v108", "v108")) as out:
+        about = {"format": FORMAT, "version": recording.version, "columns": json.dumps(names)}
         for name, value in (recording.header | about | attributes).items():
             out.attrs[name] = value
         for column, name in enumerate(names):
@@ -59,4 +57,3 @@ def write_thin(recording: Recording, file: str | os.PathLike, runs: Sequence[Run
                 group.attrs[name] = value
             group.attrs["parts"] = np.array([[first, run.frames]])
             first += run.frames
-    unfinished.replace(place)

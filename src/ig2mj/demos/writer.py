@@ -1,7 +1,8 @@
 """`RunWriter`: runs of worlds to HDF5, as they go on.
 
     /                    attributes: format, version, columns, and what the file is of (`ig2mj.demos.origin`)
-    /run_000000          one run of one world; attributes: world, seed, episode, row, frames, ended, success, parts
+    /run_000000          one run of one world; attributes: world, seed, episode, row, frames, ended, complete, success,
+                         terminated, truncated, parts
     /frames/<name>       [U, ...] rows of an array of the world (`ig2mj.demos.frames.Frame`)
     /steps/<name>        [U, ...] rows of the step that led to a frame: action, reward and its terms, ends
     /index               [N, C] of each frame of the file: its row of each of the C columns; -1: none
@@ -26,7 +27,11 @@ from ig2mj.demos.columns import Column, Rows, gathered, held
 from ig2mj.engine.native.recorded import Cut
 from ig2mj.errors import InputError
 
-FORMAT, FORMAT_VERSION = "ig2mj recording", 2
+FORMAT, FORMAT_VERSION = "ig2mj recording", 3
+"""Raise the version when frames, or what a step makes of them, change: recordings are bound to it and not to the
+package's version. 2: hashes were of every byte (`ig2mj.demos.origin`); sensors and period were not written."""
+
+READABLE_VERSIONS = (2, 3)
 
 FLUSH = 200
 """Frames of a world that are kept in memory at most (iGibson's figure)."""
@@ -112,7 +117,7 @@ class RunWriter:
         for world, attributes in worlds.items():
             self.end(world)
             group = self._opened.create_group(f"run_{self.runs:06d}")
-            about = {"world": world, "frames": 0, "ended": False, **attributes}
+            about = {"world": world, "frames": 0, "ended": False, "complete": False, **attributes}
             self._open[world].append(_Run(group, about, [], len(self._pending)))
             self.runs += 1
         self._put(_Frame(own, held(batched), None, set(worlds)))

@@ -58,7 +58,7 @@ class Environment:
     Attributes:
       task, robot, grasping: what is done by whom, and how hands hold (`ig2mj.agents.grasping.MODES`).
       scene, core: the household with its robot, and what steps it. objective: what is measured, rewarded and observed.
-      num_worlds: W. action_names: [n]. observation_spaces: of each observation, without the world axis.
+      num_worlds: W. action_names: [n]. observation_spaces: of each, without the world axis. sensor_options: settings.
       privileged_names, proprioception_names: what each number of these observations means.
       period: seconds of an agent step.
       made_with: what else `ig2mj.make` was given, by the names of its arguments, so that it can be made again.
@@ -93,6 +93,7 @@ class Environment:
         self.objective, self._goal, self._map, self._observer = objective, core.rules.goal, action_map, observer
         self._companions, self.made_with = companions, dict[str, Any]()
         self.action_names, self.observation_spaces = action_map.names, observer.spaces
+        self.sensor_options = observer.sensor_options
         self.privileged_names = objective.vectors["privileged_state"]
         self.proprioception_names = core.controllers[0].proprioception_names
         step = core.engine.substeps * core.engine.timestep

@@ -45,7 +45,7 @@ class Observer:
     """Makes the observations of a task.
 
     Attributes:
-      spaces: of each observation.
+      spaces: of each observation. sensor_options: settings of the sensors.
     """
 
     def __init__(self, names: Sequence[str], objective: Objective, sensors: SensorSuite):
@@ -56,7 +56,7 @@ class Observer:
         vectors = {name: len(numbers) for name, numbers in objective.vectors.items()}
         self._names, self._objective, self._sensors = tuple(names), objective, sensors
         every = {name: Space((count,), np.float32, -np.inf, np.inf) for name, count in vectors.items()} | sensors.spaces
-        self.spaces = {name: every[name] for name in names}
+        self.spaces, self.sensor_options = {name: every[name] for name in names}, sensors.options
         self._keys = jax.jit(step_keys)
 
     def serve(self, devices: Sequence[Any]) -> None:

@@ -10,7 +10,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
@@ -79,7 +79,7 @@ def make(
     pool_size: int | None = None,
     mixed: int = 0,
     image_size: int | None = None,
-    sensors: SensorOptions | None = None,
+    sensors: SensorOptions | Mapping[str, Any] | None = None,
     whole_actions: bool = False,
     period: float = ACTION_PERIOD,
     variant: int = 0,
@@ -104,7 +104,7 @@ def make(
         the number of rows; sampled on first use and kept (`ig2mj sample-task`). Navigation makes its own each time.
       mixed: so many start states instead, made of those (`ig2mj.tasks.mixing`); 0: they are as they are.
       image_size: pixels, height and width of pictures; None: those of `sensors`, by default 128.
-      sensors: settings of the sensors.
+      sensors: settings of the sensors, or a mapping of them.
       whole_actions: an action has every number of the robot's controller, 1 being its limit, not only the hands that
         the task moves: for people and their devices.
       period: seconds of an agent step, a whole number of control steps of 1/30 s.
@@ -159,7 +159,7 @@ def make(
     physics = make_engine(engine, scene, worlds, **options)
     hands = None if mode == "physical" else Grasping(scene, mode, setup.mittens)
     core = Core(physics, rules, starts, controllers, hands, hand_resets=whole_actions or None)
-    settings = sensors or SensorOptions()
+    settings = SensorOptions.of(sensors) if isinstance(sensors, Mapping) else sensors or SensorOptions()
     if image_size is not None:
         settings = dataclasses.replace(settings, width=image_size, height=image_size)
     perceived = SensorSuite(physics, scene, rules.model, controllers[0], chosen, settings)

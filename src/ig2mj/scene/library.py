@@ -16,6 +16,7 @@ from ig2mj.errors import UnknownNameError
 from ig2mj.scene import paths
 from ig2mj.scene.manifest import Manifest, ObjectEntry, load_manifest
 from ig2mj.scene.paths import MANIFEST_FILE
+from ig2mj.scene.physics_digest import physics_digest
 
 FOLDER = "objects"
 MODEL_FILE = "object.xml"
@@ -54,6 +55,11 @@ class LibraryModel:
         entries in the manifest. The version of the converter is not part of it."""
         entries = msgspec.json.encode(self.manifest.objects)
         return hashlib.sha256(self.file.read_bytes() + entries).hexdigest()
+
+    @functools.cached_property
+    def physics_digest(self) -> str:
+        """Of what determines physics alone (`ig2mj.scene.physics_digest`)."""
+        return physics_digest(self.file, self.manifest)
 
 
 @functools.cache

@@ -6,6 +6,7 @@ import copy
 import dataclasses
 import functools
 import hashlib
+import json
 import os
 import pathlib
 from collections.abc import Callable, Sequence
@@ -19,12 +20,17 @@ from ig2mj.scene.build_tables import build_tables
 from ig2mj.scene.ceilings import add_ceiling
 from ig2mj.scene.floors import deepen_floors
 from ig2mj.scene.grasp_equalities import add_grasp_equalities
+from ig2mj.scene.library import find_model
 from ig2mj.scene.manifest import AgentEntry, Manifest, ObjectEntry, load_manifest
 from ig2mj.scene.mjcf_limits import check_mjcf
 from ig2mj.scene.paths import MANIFEST_FILE, SHIPPED_HOMES, model_file
+from ig2mj.scene.physics_digest import physics_digest
 from ig2mj.scene.rooms import Rooms, load_rooms
 from ig2mj.scene.tables import SceneTables
 from ig2mj.scene.walls import deepen_walls
+
+KNOWN_DIGESTS = pathlib.Path(__file__).with_name("known_digests.json")
+"""Hash of a scene's physics -> the hash that is in the names and headers of its known pools."""
 
 
 @runtime_checkable
@@ -72,13 +78,31 @@ class Scene:
 
     @functools.cached_property
     def digest(self) -> str:
-        """Hash of what the scene is without its agents: its files, and the objects that were added to it."""
+        """Hash of what determines physics in the scene without its agents: its files as far as `physics_digest` goes,
+        and the objects that were added to it. Pools are bound to it. Scenes of `KNOWN_DIGESTS` keep the hash by which
+        their pools are known."""
+        hashed = hashlib.blake2b(digest_size=16)
+        hashed.update(physics_digest(model_file(self.folder), load_manifest(self.folder / MANIFEST_FILE)).encode())
+        hashed.update("\n".join(self.object_names).encode())
+        for addition in self.additions:
+            model = find_model(f"{addition.category}/{addition.model}")
+            hashed.update(f"\n{model.physics_digest} {addition.place}".encode())
+        return _known_digests().get(hashed.hexdigest(), hashed.hexdigest())
+
+    @functools.cached_property
+    def files_digest(self) -> str:
+        """Hash of every byte of its files and of the added models: what pools of format 2 made before `digest` was of
+        physics alone are bound to."""
         hashed = hashlib.blake2b(digest_size=16)
         for file in (model_file(self.folder), self.folder / MANIFEST_FILE):
             hashed.update(file.read_bytes())
         hashed.update("\n".join((*self.object_names, *(a.sha256 for a in self.additions))).encode())
         hashed.update("".join(a.wanted for a in self.additions if a.place is not None).encode())
         return hashed.hexdigest()
+
+    def owns(self, digest: str | None) -> bool:
+        """Whether what is bound to this digest, of either kind, belongs to the scene."""
+        return digest == self.digest or digest == self.files_digest
 
     @property
     def portable_name(self) -> str:
@@ -171,6 +195,11 @@ def _attach_all(agents: Sequence[Agent], spec: mujoco.MjSpec, manifest: Manifest
                     spec.add_exclude(bodyname1=body, bodyname2=name)
     add_grasp_equalities(spec, manifest, entries)
     return entries
+
+
+@functools.cache
+def _known_digests() -> dict[str, str]:
+    return json.loads(KNOWN_DIGESTS.read_text(encoding="utf-8"))
 
 
 def digest_of(scene: str, objects: Sequence[str] = ()) -> str:

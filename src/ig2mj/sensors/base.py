@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from jaxtyping import Float, UInt32
 
 from ig2mj.agents.base import Controller
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.errors import EngineError
+from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.scene.scene import Scene
 from ig2mj.sensors.images import Images, Pose, RayPattern
 from ig2mj.states.model import StateModel
@@ -72,6 +72,19 @@ class SensorOptions:
     particles: int = 64
     shadows: bool = False
     rows: tuple[int, int] | None = None
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> SensorOptions:
+        """From the settings by name, as JSON has them. Raises EngineError: no such setting, or one of another type."""
+        default = dataclasses.asdict(cls())
+        for name, value in values.items():
+            if name not in default:
+                raise UnknownNameError("setting of sensors", name, default)
+            kinds = {"rows": (list, tuple, type(None)), "shadows": bool}.get(name, (int, float))
+            if not isinstance(value, kinds) or (isinstance(value, bool) and kinds is not bool):
+                raise EngineError(f"{name} = {value!r}: no value of this setting of sensors")
+        rows = values.get("rows")
+        return cls(**{**values, "rows": rows if rows is None else tuple(rows)})
 
     def __post_init__(self) -> None:
         """Raises EngineError where a setting is out of range."""

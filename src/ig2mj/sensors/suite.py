@@ -36,7 +36,7 @@ class SensorSuite:
     """See the module's text.
 
     Attributes:
-      spaces: of each sensor, without the world axis.
+      spaces: of each sensor, without the world axis. options: of all of them.
     """
 
     def __init__(
@@ -61,7 +61,8 @@ class SensorSuite:
             pictures (only "native" and "warp" can).
         """
         self._sensors = [find_sensor(name) for name in names]
-        self._setup = Setup(scene, model, controller, options or SensorOptions(), agent)
+        self.options = options or SensorOptions()
+        self._setup = Setup(scene, model, controller, self.options, agent)
         self.spaces: dict[str, Space] = {s.name: s.space(self._setup) for s in self._sensors}
         self._felt = [s for s in self._sensors if not s.looks]
         self._seen = [s for s in self._sensors if s.looks]

@@ -21,7 +21,7 @@ from ig2mj.demos.frames import Labels, first_difference, names_of
 from ig2mj.demos.origin import LOOSE, differences, origin_of_machine, origin_of_scene
 from ig2mj.demos.reader import Recording, Run
 from ig2mj.demos.replay import Replayed
-from ig2mj.demos.writer import FLUSH, RunWriter
+from ig2mj.demos.writer import FLUSH, FORMAT_VERSION, RunWriter
 from ig2mj.engine.base import Physics
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import EngineError, InputError
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 KIND = "simulation"
 
-BINDING = ("mujoco", "ig2mj", "scene", "scene_hash", "model_hash", "engine", "substeps", "timestep", "grasping")
+BINDING = ("mujoco", "scene_hash", "model_hash", "engine", "substeps", "timestep", "grasping")
 
 
 class Recorded:
@@ -145,7 +145,7 @@ def _leaves(simulation: Simulation) -> list[np.ndarray]:
     ]
 
 
-def _origin(simulation: Simulation) -> dict[str, Any]:
+def _origin(simulation: Simulation, version: int = FORMAT_VERSION) -> dict[str, Any]:
     engine, grasping = simulation.engine, simulation._grasping
     own = {
         "kind": KIND,
@@ -154,7 +154,7 @@ def _origin(simulation: Simulation) -> dict[str, Any]:
         "timestep": engine.timestep,
         "grasping": "physical" if grasping is None else grasping.mode,
     }
-    return own | origin_of_scene(simulation.scene) | origin_of_machine()
+    return own | origin_of_scene(simulation.scene, version) | origin_of_machine()
 
 
 def _same(a: Any, b: Any) -> bool:
@@ -162,7 +162,7 @@ def _same(a: Any, b: Any) -> bool:
 
 
 def _replayed(simulation: Simulation, recording: Recording) -> Replayed:
-    here = _origin(simulation)
+    here = _origin(simulation, recording.version)
     if recording.header.get("kind") != KIND:
         fix = "`ig2mj demos replay FILE` replays it"
         raise InputError(recording.file, "is a recording of an environment, not of a simulation", fix=fix)

@@ -108,11 +108,25 @@ def pool_file(task: Task, scene: Scene, split: str = "train", count: int | None 
     if split not in SEEDS:
         raise UnknownNameError("split", split, SEEDS)
     near = [[n.object, *n.pos, n.least, n.most] for n in task.near]
-    made_of = json.dumps(
-        [VERSION, scene.digest, task.objects, task.start, near, task.flat, *([task.upright] if task.upright else [])]
-    )
-    mark = hashlib.blake2b(made_of.encode(), digest_size=6).hexdigest()
-    return cache_folder() / "pools" / f"{task.name}-{split}-{count or COUNT[split]}-{mark}.npz"
+    upright = [task.upright] if task.upright else []
+
+    def made_of(digest: str) -> list[object]:
+        return [VERSION, digest, task.objects, task.start, near, task.flat, *upright]
+
+    return cached_file(f"{task.name}-{split}-{count or COUNT[split]}", scene, made_of)
+
+
+def cached_file(name: str, scene: Scene, made_of: Callable[[str], list[object]]) -> pathlib.Path:
+    """The file of a pool in the cache; one that is bound to every byte of the scene's files is used where it is there.
+
+    Args:
+      made_of: what determines the pool, from a digest of the scene.
+    """
+    found = []
+    for digest in (scene.digest, scene.files_digest):
+        mark = hashlib.blake2b(json.dumps(made_of(digest), default=str).encode(), digest_size=6).hexdigest()
+        found.append(cache_folder() / "pools" / f"{name}-{mark}.npz")
+    return found[1] if found[1].exists() and not found[0].exists() else found[0]
 
 
 def pool_hash(file: pathlib.Path) -> str:

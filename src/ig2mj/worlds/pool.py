@@ -44,7 +44,7 @@ class Pool:
     """Rows of initial states: physics, and extended states. Every array begins with the row axis.
 
     Attributes:
-      digest: of the scene that it belongs to (`Scene.digest`), as far as that is known.
+      digest: of the scene that it belongs to (`Scene.owns` knows it), where that is known.
     """
 
     physics: Snapshot
@@ -87,18 +87,21 @@ def load_pool_scene(
       scene: the home, as of `load_scene`; None: the shipped one of the name that the pool says.
 
     Raises:
-      InputError: the file is not a pool, or is one of another home, or a model of the object library is not the one
-        that was added. UnknownNameError: the library has no such model.
+      InputError: the file is not a pool, or is one of another home, or a model of the object library differs in more
+        than its looks from the one that was added. UnknownNameError: the library has no such model.
     """
     header = _pool_header(file)
-    wanted = []
+    wanted, changed = [], []
     for entry in header["additions"]:
         model = find_model(f"{entry['category']}/{entry['model']}")
         if model.sha256 != entry["sha256"]:
-            raise InputError(file, f"was made with another '{model.category}/{model.model}' added", fix=_FIX)
+            changed.append(f"{model.category}/{model.model}")
         at = entry["place"]
         wanted.append(Addition(**{**entry, "place": None if at is None else tuple(at)}).wanted)
-    return load_scene(header["scene"] if scene is None else scene, agents, wanted)
+    found = load_scene(header["scene"] if scene is None else scene, agents, wanted)
+    if changed and not found.owns(header.get("digest")):
+        raise InputError(file, f"was made with another '{changed[0]}' added", fix=_FIX)
+    return found
 
 
 def scene_name(file: str | os.PathLike) -> str:
@@ -110,20 +113,20 @@ def load_pool(file: str | os.PathLike, scene: Scene | None = None) -> Pool:
     """Reads a pool.
 
     Args:
-      scene: what it is for, with whatever agents: it must be the very scene, converted once, that the pool was made in.
-        None: unchecked.
+      scene: what it is for, with whatever agents: in all that determines physics it must be the scene that the pool
+        was made in; looks and the home's name may differ. None: unchecked.
 
     Raises:
       InputError: the file is missing, broken, of another scene, or of another format.
     """
     header = _pool_header(file)
     fix = _FIX
-    if scene is not None and header.get("scene") != scene.name:
-        raise InputError(file, f"is a pool of scene '{header.get('scene')}', not of '{scene.name}'", fix=fix)
-    if scene is not None and [a["name"] for a in header["additions"]] != [a.name for a in scene.additions]:
-        raise InputError(file, "was made with other objects added", fix="load the scene with `load_pool_scene`")
-    if scene is not None and header.get("digest") != scene.digest:
-        raise InputError(file, f"was made before '{scene.name}' was converted as it is now", fix=fix)
+    if scene is not None and not scene.owns(header.get("digest")):
+        if header.get("scene") != scene.name:
+            raise InputError(file, f"is a pool of scene '{header.get('scene')}', not of '{scene.name}'", fix=fix)
+        if [a["name"] for a in header["additions"]] != [a.name for a in scene.additions]:
+            raise InputError(file, "was made with other objects added", fix="load the scene with `load_pool_scene`")
+        raise InputError(file, f"was made when the physics of '{scene.name}' differed from now", fix=fix)
     arrays = read_arrays(file, "")
     pool = build(Pool, arrays, file)
     lengths = {len(array) if array.ndim else 0 for array in arrays.values()}

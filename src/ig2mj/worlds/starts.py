@@ -30,7 +30,7 @@ class Starts:
 
         Raises EngineError: the pool is of another scene, of other added objects, or of the scene before it was changed.
         """
-        if pool is not None and pool.digest is not None and pool.digest != engine.scene.digest:
+        if pool is not None and pool.digest is not None and not engine.scene.owns(pool.digest):
             raise EngineError(
                 f"the pool is not of scene '{engine.scene.name}' with its objects as they are now (make one with "
                 "`ig2mj sample` or `ig2mj sample-task`)"

@@ -9,8 +9,6 @@ robot starts on free floor, as near as it can be to what the activity is about.
 from __future__ import annotations
 
 import dataclasses
-import hashlib
-import json
 import os
 import sys
 
@@ -18,7 +16,6 @@ import numpy as np
 
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.errors import EngineError, UnknownNameError
-from ig2mj.process.compilation import cache_folder
 from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.paths import scene_folder, shipped_homes
 from ig2mj.scene.scene import Scene, load_scene
@@ -26,7 +23,7 @@ from ig2mj.tasks.bddl.binding import Binding, BindingError
 from ig2mj.tasks.bddl.definitions import load_activity
 from ig2mj.tasks.bddl.start import fitting, load_bound, sample_start, start_conditions
 from ig2mj.tasks.navigation.starts import Places
-from ig2mj.tasks.pools import SEEDS, VERSION
+from ig2mj.tasks.pools import SEEDS, VERSION, cached_file
 from ig2mj.worlds.pool import Pool, load_pool, save_pool
 
 PREFIX = "activity/"
@@ -92,10 +89,9 @@ def activity_pool(task: BddlTask, split: str = "train", count: int | None = None
     if split not in SEEDS:
         raise UnknownNameError("split", split, SEEDS)
     wanted, bare = count or ROWS, load_bound(task.binding)
-    made_of = [VERSION, bare.digest, [c.expression for c in start_conditions(task.binding, bare)]]
-    mark = hashlib.blake2b(json.dumps(made_of, default=str).encode(), digest_size=6).hexdigest()
+    conditions = [c.expression for c in start_conditions(task.binding, bare)]
     short = task.name.removeprefix(PREFIX)
-    file = cache_folder() / "pools" / f"{short}-{split}-{wanted}-{mark}.npz"
+    file = cached_file(f"{short}-{split}-{wanted}", bare, lambda digest: [VERSION, digest, conditions])
     if file.exists():
         return load_pool(file, bare)
     print(f"sampling {wanted} start states of {task.name} in {task.home}, once", file=sys.stderr)
