@@ -13,9 +13,9 @@ from ig2mj.demos.model_hash import physics_hash
 from ig2mj.demos.origin import origin_of_machine
 from ig2mj.demos.shipped import folder
 from ig2mj.demos.task_hash import task_hash
-from ig2mj.envs.registry import find_task
 from ig2mj.errors import UnknownNameError
 from ig2mj.scene.scene import load_scene
+from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.experts.expert import PLANS
 from ig2mj.tasks.task import make_robot
 
@@ -42,7 +42,7 @@ def test_there_are_32_successes_of_each_activity_in_ten_megabytes():
 def test_they_are_of_the_activities_as_they_are_now():
     """Else they are refused by action: `make demonstrations` records them again."""
     for name in shipped():
-        task = find_task(name)
+        task = ACTIVITIES[name]
         scene = load_scene(task.home, agents=[make_robot(task, "humanoid")], objects=task.objects)
         with Recording(find_recording(name)) as recording:
             assert recording.header["task_hash"] == task_hash(task, "humanoid", scene.object_names)

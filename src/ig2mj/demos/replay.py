@@ -46,12 +46,16 @@ MODES = ("action", "state")
 MOST_WORLDS = 65536
 """Of a recording: more are taken for a file that was tampered with."""
 
+MOST_PIXELS = 16384
+"""Along an edge of an image, or rays of a sensor, for the same reason."""
+
 _NAMED_BY = {
     "environment": "task",
     "robot": "robot",
     "grasping mode": "grasping",
     "engine": "engine",
     "split": "made_with",
+    "setting of sensors": "sensors",
 }
 """Attributes of a file that give names, by the kind of the name."""
 
@@ -284,7 +288,12 @@ def _environment(recording: Recording, observations: Sequence[str], options: dic
         missing = ", ".join(map(str, recording.value("not_made_with", list)))
         raise InputError(recording.file, f"does not have what its environment was made with: {missing}", fix=FIX_ENV)
     if "sensors" in recording.header and "sensors" not in options:
-        options = {**options, "sensors": recording.value("sensors", dict)}
+        sensors = recording.value("sensors", dict)
+        large = [name for name, value in sensors.items() if isinstance(value, int) and value > MOST_PIXELS]
+        if large:
+            problem = f"{large[0]} = {sensors[large[0]]}, and {MOST_PIXELS} is the most"
+            raise InputError(recording.file, problem, element="attribute sensors")
+        options = {**options, "sensors": sensors}
     robot, grasping = recording.value("robot", str), recording.value("grasping", str)
     worlds, engine = recording.value("worlds", int), recording.value("engine", str)
     if not 0 < worlds <= MOST_WORLDS:

@@ -166,7 +166,9 @@ def make(
     observer = Observer(observations, setup.objective, perceived)
     name = robot if isinstance(robot, str) else robot.name
     env = Environment(task, name, scene, core, setup.actions, setup.objective, observer, mode, setup.companions, period)
-    env.made_with = {"paper_rl": paper_rl, "split": split, "pool_size": rows, **options}
+    # Of a BDDL activity fewer rows than asked for may be good, and its robot stands where the first row wants it.
+    size = pool_size if isinstance(task, BddlTask) else rows
+    env.made_with = {"paper_rl": paper_rl, "split": split, "pool_size": size, **options}
     if control != Control():
         env.made_with |= {"whole_actions": whole_actions, "period": period}
     if mixed:
