@@ -355,7 +355,7 @@ def test_foreign_and_tampered_logs_of_igibson_end_in_one_line(recorded, tmp_path
         opened["physics_data/0/position"] = h5py.ExternalLink("/etc/passwd", "/x")
 
     for spoil, named in (
-        (claimed, "physics_data/0/position: claims 1000000000 frames"),
+        (claimed, "physics_data/0/position: claims 1000000000 rows"),
         (short, "physics_data: have"),
         (outside, "physics_data/0/position: is not a table"),
     ):
