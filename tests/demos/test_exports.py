@@ -357,7 +357,7 @@ def test_foreign_and_tampered_logs_of_igibson_end_in_one_line(recorded, tmp_path
     for spoil, named in (
         (claimed, "physics_data/0/position: claims 1000000000 rows"),
         (short, "physics_data: have"),
-        (outside, "physics_data/0/position: is not a table"),
+        (outside, "physics_data/0/position: is missing"),
     ):
         copy.write_bytes(file.read_bytes())
         with h5py.File(copy, "a") as opened:
