@@ -13,8 +13,9 @@ further seeds finds a place with `SEARCH_WORK` units of work. It *has candidates
 the object go. The first depends on the sampler, and the second on geometry alone: the share of requests with candidates
 that succeed is a lower bound of the share of possible ones.
 
-What succeeded is woken, stepped for three seconds, and asked again. Times are processor time of one core. Every request
-is a line of benchmarks/results/placement_disturbed/requests.jsonl.
+What succeeded is woken, stepped for three seconds, and asked again. Times are processor time of one core. A request is
+one line of benchmarks/results/placement_disturbed/<home>.jsonl, written when the home is done; `--resume` keeps the
+homes of earlier runs, so that `--only` can spread them over several. The table is made of all lines that there are.
 """
 
 from __future__ import annotations
@@ -59,8 +60,8 @@ class Args:
 
     Attributes:
       homes: where requests are drawn, in turn; none: all that ship. rows: disturbed states of each. requests: per
-        predicate and start. predicates, starts: which ones. searches: further seeds of requests that fail. out: folder
-        for results.
+        predicate and start. predicates, starts: which ones. searches: further seeds of requests that fail. only: homes
+        to do now, out of all; none: all. resume: keep what is on file. out: folder for results.
     """
 
     homes: tuple[str, ...] = ()
@@ -69,6 +70,8 @@ class Args:
     predicates: tuple[str, ...] = ("on_top", "inside")
     starts: tuple[str, ...] = STARTS
     searches: int = 1
+    only: tuple[str, ...] = ()
+    resume: bool = False
     out: pathlib.Path = RESULTS
 
 
@@ -179,14 +182,18 @@ def main(args: Args) -> None:
     folder = args.out / "placement_disturbed"
     folder.mkdir(parents=True, exist_ok=True)
     homes = args.homes or tuple(shipped_homes())
-    lines: list[dict[str, Any]] = []
     for k, name in enumerate(homes):
-        home = Home(name, args.rows)
+        file = folder / f"{name}.jsonl"
+        if (args.only and name not in args.only) or (args.resume and file.is_file()):
+            continue
+        home, found = Home(name, args.rows), []
         for predicate in args.predicates:
             count = args.requests // len(homes) + (k < args.requests % len(homes))
-            lines += measure(home, name, predicate, args, count)
+            found += measure(home, name, predicate, args, count)
+        file.write_text("".join(json.dumps(line) + "\n" for line in found))
         print(f"{name}: {k + 1} of {len(homes)} homes", flush=True)
-        (folder / "requests.jsonl").write_text("".join(json.dumps(line) + "\n" for line in lines))
+    files = [folder / f"{name}.jsonl" for name in homes]
+    lines = [json.loads(line) for f in files if f.is_file() for line in f.read_text().splitlines()]
     rows = []
     for predicate in args.predicates:
         for start in args.starts:

@@ -14,12 +14,16 @@ from collections.abc import Sequence
 import jax
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from ig2mj.engine.base import Write
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.snapshot import Snapshot, fitted
 from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.sampling.bystanders import Bystanders
+from ig2mj.sampling.joints import JointMover
+from ig2mj.sampling.query import SceneQuery
+from ig2mj.sampling.row import OPENINGS
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.navigation.floor import FloorMap
@@ -105,7 +109,12 @@ def make_starts(
             other = _place(places, floor, cells, rng, robots)
             robots.append(other.pose)
         keep_off = np.array([pose[:2] for pose in robots])
-        household = households.draw(rng, floor, cells, keep_off)
+        for _ in range(TRIES):
+            household = households.draw(rng, floor, cells, keep_off)
+            if household is None or places.stand_in(_with_household(base, household), robots):
+                break
+        else:
+            raise EngineError(f"in {TRIES} households of '{scene.name}' what was opened or put down hits a robot")
         rows.append((household, robots))
     physics = _snapshots(base, rows, places, engine)
     one = jax.tree.map(np.asarray, states)
@@ -215,6 +224,16 @@ class Places:
         self._hide(number)
         return bool((self._ground[other] | (self._agent[other] == number)).all())
 
+    def stand_in(self, household: Snapshot, robots: Sequence[tuple[float, float, float]]) -> bool:
+        """Whether robots at these poses touch nothing but the ground in another household of the scene."""
+        still = np.array(self._data.qpos)
+        self._data.qpos[:] = np.asarray(household.whole("qpos"))
+        for number in range(len(self.address)):
+            self._hide(number)
+        found = all(self.stands(number, pose) for number, pose in enumerate(robots))
+        self._data.qpos[:] = still
+        return found
+
     def object_positions(self, names: Sequence[str]) -> Float[np.ndarray, "n 3"]:
         """Origins of objects in the settled household, world frame, m."""
         mujoco.mj_kinematics(self.scene.model, self._data)
@@ -237,26 +256,26 @@ class Places:
 
 
 class _Households:
-    """The household of a task, at rest with its doors open; `still`: with nothing put about or opened."""
+    """The household of a task, at rest with its doors open; `still`: with nothing put about or opened.
+
+    Furniture that is opened at random shoves nothing, and what lies in drawers goes along; what would is left closed.
+    """
 
     def __init__(self, task: NavigationTask, bare: Scene):
         self._task, self._scene = task, bare
-        self._engine = NativeEngine(bare, 1)
-        tables = bare.tables
-        categories = np.array(tables.object_categories)[tables.openable_object]
-        doors = np.flatnonzero(np.isin(categories, DOORS))
+        self._query = SceneQuery(bare, NativeEngine(bare, 1))
+        categories = np.array(bare.tables.object_categories)[bare.tables.openable_object]
         self._joints = np.flatnonzero(np.isin(categories, task.opened))
-        self.still = self._settled(doors, tables.openable_open[doors], {})
+        self.still = _settled_with_open_doors(self._query)
 
     def draw(
         self, rng: np.random.Generator, floor: FloorMap, cells: np.ndarray, keep_off: Float[np.ndarray, "n 2"]
     ) -> Snapshot | None:
         """The household of a row; None: the still one. `keep_off`: where the robots stand."""
-        task, tables = self._task, self._scene.tables
+        task = self._task
         if not len(self._joints) and not task.objects:
             return None
         opened = self._joints[rng.random(len(self._joints)) < OPEN_CHANCE]
-        closed, end = tables.openable_closed[opened], tables.openable_open[opened]
         spots: dict[str, np.ndarray] = {}
         taken = keep_off
         for addition in self._scene.additions:
@@ -268,32 +287,55 @@ class _Households:
                 raise EngineError(f"{task.name}: no free floor is left for '{addition.name}'")
             taken = np.concatenate([taken, xy[None]])
             spots[addition.name] = np.array([*xy, rng.uniform(-np.pi, np.pi)])
-        return self._settled(opened, closed + rng.random(len(opened)) * (end - closed), spots, self.still)
+        for _ in range(TRIES):
+            found = self._put_down(self._opened(opened, rng), spots)
+            if found is not None:
+                return found
+        raise EngineError(f"{task.name}: whatever is opened, what is put on the floor moves something")
 
-    def _settled(
-        self, joints: np.ndarray, values: np.ndarray, spots: dict[str, np.ndarray], start: Snapshot | None = None
-    ) -> Snapshot:
-        """The household after joints were opened and objects were put down, at rest."""
-        engine, tables = self._engine, self._scene.tables
-        physics = engine.reset() if start is None else engine.load(engine.reset(), start)
-        model = self._scene.model
-        mask, qpos = np.zeros((1, model.nq), bool), np.zeros((1, model.nq))
-        address = tables.openable_qposadr[joints]
-        mask[0, address], qpos[0, address] = True, values
+    def _opened(self, joints: Int[np.ndarray, "n"], rng: np.random.Generator) -> Snapshot:
+        """The still household with joints at random places of their range, one object after another, at rest."""
+        tables, query = self._scene.tables, self._query
+        closed, end = tables.openable_closed, tables.openable_open
+        query.load(self.still)
+        positions = np.array(query.view.joint_pos, float)
+        for owner in np.unique(tables.openable_object[joints]):
+            mine = joints[tables.openable_object[joints] == owner]
+            moves = np.isin(np.arange(len(closed)), mine)[None]
+            mover = JointMover(query, int(owner))
+            for _ in range(OPENINGS):
+                positions[0, mine] = closed[mine] + rng.random(len(mine)) * (end - closed)[mine]
+                if not mover.shoved_by(mover.plan(positions, moves)):
+                    break
+                query.load(mover.before)
+        return query.save()
+
+    def _put_down(self, household: Snapshot, spots: dict[str, np.ndarray]) -> Snapshot | None:
+        """The household with additions on the floor, at rest; None where they move something. Places: x, y, yaw."""
+        query, tables = self._query, self._scene.tables
+        query.load(household)
+        others, view = Bystanders(query, household), query.view
         moved = np.zeros((1, tables.num_objects), bool)
-        view = engine.view(physics)
         pos, quat = np.array(view.object_pos), np.array(view.object_quat)
         for name, (x, y, yaw) in spots.items():
             k = self._scene.object_index(name)
             lift = float(view.object_pos[0, k, 2] - view.aabb_low[0, k, 2])
             moved[0, k], pos[0, k], quat[0, k] = True, (x, y, lift + 0.005), _turned(yaw, quat[0, k])
-        write = Write(object_mask=moved, object_pos=pos, object_quat=quat, qpos_mask=mask, qpos=qpos)
-        physics = engine.write(physics, write)
-        for _ in range(round(SETTLE_SECONDS / (engine.substeps * engine.timestep))):
-            physics, view = engine.step(physics)
-            if not np.asarray(view.awake).any():
-                break
-        return engine.export(physics, 0)
+        query.write(Write(object_mask=moved, object_pos=pos, object_quat=quat))
+        query.settle(SETTLE_SECONDS)
+        return None if (others.shoved() & ~moved[0]).any() else query.save()
+
+
+def _settled_with_open_doors(query: SceneQuery) -> Snapshot:
+    """The scene at rest, all doors between rooms wide open."""
+    tables, model = query.scene.tables, query.scene.model
+    doors = np.isin(np.array(tables.object_categories)[tables.openable_object], DOORS)
+    mask, qpos = np.zeros((1, model.nq), bool), np.zeros((1, model.nq))
+    address = tables.openable_qposadr[doors]
+    mask[0, address], qpos[0, address] = True, tables.openable_open[doors]
+    query.write(Write(qpos_mask=mask, qpos=qpos))
+    query.settle(SETTLE_SECONDS)
+    return query.save()
 
 
 def _turned(yaw: float, quat: Float[np.ndarray, "4"]) -> Float[np.ndarray, "4"]:
