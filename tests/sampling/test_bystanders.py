@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import ig2mj
+from ig2mj.agents import Fetch
 from ig2mj.errors import StateError
 from ig2mj.sampling.bystanders import MOVED, Bystanders
 from ig2mj.sampling.conditions import read_conditions
@@ -143,3 +144,41 @@ def test_a_door_that_shoves_another_object_s_drawer_or_stands_in_something_is_re
     query.load(mover.before)
     nobody = JointMover(query, query.scene.object_index("box"))  # as if the cabinet were another's
     assert nobody.shoved_by(nobody.plan(positions, moves)) == ["cabinet"]
+
+
+def test_an_object_that_goes_on_rolling_forbids_nothing_and_goes_on(resting):
+    """Rest is asked of what is placed, and of what would rest without it."""
+    query, model = resting.query, resting.query.scene.model
+    ball = query.scene.object_index("ball")
+    query.load(resting._start)
+    query.place(ball, np.array([-1.0, -1.5, 0.1]), np.array([1.0, 0, 0, 0]))
+    rolling = query.save()
+    dof = int(model.body_dofadr[query.scene.tables.object_root[ball]])
+    qvel = np.array(rolling.qvel)
+    qvel[[dof, dof + 4]] = 0.25, 2.5
+    start, states = resting._start, resting._initial
+    try:
+        resting.start_from(rolling.with_whole(qvel=qvel), states)
+        reasons = collections.Counter()
+        conditions = read_conditions(["(on_top can box)", "(open cabinet)"])
+        row = resting.sample(conditions, np.random.default_rng(0), Budget(60), reasons)
+        assert row is not None, reasons
+        assert np.flatnonzero(query.view.awake[0]).tolist() == [ball]
+        assert float(query.view.object_com[0, ball, 0]) > -0.5
+        assert resting.holds(conditions, row.states)
+    finally:
+        resting.start_from(start, states)
+
+
+def test_a_door_is_not_opened_into_a_robot(tiny_home_folder):
+    scene = ig2mj.load_scene(tiny_home_folder, agents=[Fetch(pos=(0.95, -0.15, 0.0))])
+    simulation = ig2mj.Simulation(scene)
+    start = simulation.engine.export(simulation.physics, 0)
+    before = np.array(simulation.view.agent.base_pos[0, 0])
+    reasons = collections.Counter()
+    for seed in (0, 2, 3):
+        simulation.physics = simulation.engine.load(simulation.physics, start)
+        assert simulation.set_predicate("open", "cabinet", seed=seed)
+        reasons.update(simulation.last_sampling)
+        assert np.linalg.norm(np.array(simulation.view.agent.base_pos[0, 0]) - before) <= MOVED
+    assert reasons["cabinet: moves others"] > 0
