@@ -93,7 +93,7 @@ class Replayer:
         recording: Recording,
         by: str = "action",
         env: Environment | None = None,
-        observations: Sequence[str] = VECTORS,
+        observations: str | Sequence[str] = VECTORS,
         **options: Any,
     ):
         """Makes the environment that the file was recorded in.
@@ -277,7 +277,7 @@ def replay(file: str | os.PathLike, by: str = "action", check: bool = True, **op
         return Replayer(recording, by, **options)(check)
 
 
-def _environment(recording: Recording, observations: Sequence[str], options: dict[str, Any]) -> Environment:
+def _environment(recording: Recording, observations: str | Sequence[str], options: dict[str, Any]) -> Environment:
     """The environment that a file was recorded in.
 
     Runs begin at frames of their own. Of a pool only navigation's tasks need more, which is where to go; to sample

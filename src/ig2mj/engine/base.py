@@ -70,6 +70,11 @@ class Write:
     of. A fixed object cannot be moved: its row of `object_mask` is ignored. A write of nothing at all brings the view
     up to date with what someone changed in MuJoCo's own structures (`Engine.to_mujoco`).
 
+    A grasp ends when the write moves the held body or the hand, by teleport or by any coordinate of a joint between one
+    of them and the world: its constraint is switched off and its contacts are no longer ignored, before anything moves.
+    The native engine does the same with what someone moved in MuJoCo's own structures, at the write of nothing that
+    follows. A write that gives `eq_active` decides itself what stays held.
+
     Attributes:
       object_mask, object_pos, object_quat: teleports of objects: frame of the main body, world frame, w-x-y-z. Bodies
         that hang on the object by no joint (split-off floating links) go along rigidly.
@@ -106,6 +111,8 @@ class Engine(Protocol):
       num_worlds: W.
       scene, tables: what is simulated, and its constants.
       substeps, timestep: a control step is `substeps` physics steps of `timestep` seconds.
+      cannot_ignore: why this engine refuses `Write.ignored_contacts`, which all grasping but "physical" needs; ""
+        where it does not.
     """
 
     name: str
@@ -115,6 +122,9 @@ class Engine(Protocol):
     tables: SceneTables
     substeps: int
     timestep: float
+
+    @property
+    def cannot_ignore(self) -> str: ...
 
     def serve(self, devices: Sequence[Any]) -> None:
         """Makes ready for programs on other devices of this process, before they run: memory on each."""

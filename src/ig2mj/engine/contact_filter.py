@@ -14,6 +14,9 @@ from jaxtyping import Bool, Int
 from ig2mj.errors import EngineError
 from ig2mj.scene.tables import SceneTables
 
+MOST_BITS = 31
+"""Of an integer of MuJoCo's that stays positive."""
+
 
 def geom_hands(model: mujoco.MjModel, tables: SceneTables) -> Int[np.ndarray, "G"]:
     """Hand that each geom is part of, -1 none."""
@@ -33,6 +36,13 @@ class BitLayers:
         self._hand, self._object = geom_hands(model, tables), tables.geom_object
         self._width = int(np.bitwise_or.reduce(self._contype | self._conaffinity, initial=1)).bit_length()
 
+    @property
+    def full(self) -> str:
+        """Why not even one hand can ignore contacts; "" where one can."""
+        if self._width * 3 <= MOST_BITS:
+            return ""
+        return f"geoms of the scene use {self._width} bits of contype and conaffinity, which leaves none for layers"
+
     def masks(self, ignored: Bool[np.ndarray, "H O"]) -> tuple[np.ndarray, np.ndarray] | None:
         """`geom_contype` and `geom_conaffinity` [G]; None: the model's own.
 
@@ -42,10 +52,10 @@ class BitLayers:
         hands = np.flatnonzero(ignored.any(1))
         if not len(hands):
             return None
-        if self._width * (len(hands) + 2) > 31:
+        if self._width * (len(hands) + 2) > MOST_BITS:
             raise EngineError(
                 f"{len(hands)} hands cannot ignore contacts where geoms use {self._width} bits of contype and "
-                f"conaffinity: there is room for {31 // self._width - 2}"
+                f"conaffinity: there is room for {MOST_BITS // self._width - 2}"
             )
         layers = np.ones(len(self._hand), np.int64)  # bit k: the geom is in layer k
         together = 1 << (len(hands) + 1)

@@ -41,6 +41,8 @@ class ModelLayout:
       equality_tree: [E, 2] trees that an equality constraint joins, -1: the world or nothing.
       scene_sizes: how long the scene's part of each field of `ig2mj.engine.snapshot.AXIS` is; the agents' part follows.
       grasp_equality, grasp_hand, grasp_object: equality constraints between a hand's body and an object's.
+      grasp_body: the two bodies of each. grasp_coordinates: [grasps, D] addresses in qpos that move one of them, those
+        of all joints between a body and the world; -1: none.
     """
 
     object_qposadr: Int[np.ndarray, "O"]
@@ -67,6 +69,8 @@ class ModelLayout:
     grasp_equality: Int[np.ndarray, "grasps"]
     grasp_hand: Int[np.ndarray, "grasps"]
     grasp_object: Int[np.ndarray, "grasps"]
+    grasp_body: Int[np.ndarray, "grasps 2"]
+    grasp_coordinates: Int[np.ndarray, "grasps D"]
 
     @property
     def num_units(self) -> int:
@@ -151,6 +155,8 @@ def make_layout(model: mujoco.MjModel, tables: SceneTables) -> ModelLayout:
         grasp_equality=equality,
         grasp_hand=hand,
         grasp_object=grasped,
+        grasp_body=equality_body[equality],
+        grasp_coordinates=_moving_coordinates(model, equality_body[equality], width),
     )
 
 
@@ -203,6 +209,23 @@ def _equality_bodies(model: mujoco.MjModel) -> np.ndarray:
         elif kind == mujoco.mjtEq.mjEQ_JOINT:
             out[e] = np.where(ids >= 0, model.jnt_bodyid[ids], -1)
     return out
+
+
+def _moving_coordinates(model: mujoco.MjModel, bodies: np.ndarray, width: np.ndarray) -> np.ndarray:
+    """Addresses in qpos [n, D] of all joints between each row's bodies [n, 2] and the world, padded with -1.
+
+    Args:
+      width: [njnt] coordinates of each joint.
+    """
+    own: dict[int, list[int]] = {0: []}
+    for body in range(1, model.nbody):  # parents come first
+        first = int(model.body_jntadr[body])
+        joints = range(first, first + int(model.body_jntnum[body]))
+        address = [int(model.jnt_qposadr[j]) + k for j in joints for k in range(int(width[j]))]
+        own[body] = own[int(model.body_parentid[body])] + address
+    rows = [own[int(one)] + own[int(other)] for one, other in bodies]
+    most = max([1, *map(len, rows)])
+    return np.array([[*row, *[-1] * (most - len(row))] for row in rows], int).reshape(-1, most)
 
 
 def _grasps(tables: SceneTables, equality_body: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

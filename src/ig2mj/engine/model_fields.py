@@ -73,13 +73,13 @@ def given(fields: ModelFields | None) -> dict[str, Any]:
     return {name: array for name in NAMES if (array := getattr(fields, name)) is not None}
 
 
-def check_names(names: Iterable[str]) -> tuple[str, ...]:
-    """Fields besides `eq_data` that an engine is to have for each world, in the order of `NAMES`.
+def check_names(names: str | Iterable[str]) -> tuple[str, ...]:
+    """Fields besides `eq_data` that an engine is to have for each world, in the order of `NAMES`; a text is one name.
 
     Raises:
       UnknownNameError: there is no such field. EngineError: some fields of masses, and not all.
     """
-    chosen = set(names)
+    chosen = {names} if isinstance(names, str) else set(names)
     for name in sorted(chosen - set(NAMES)):
         raise UnknownNameError("field of ModelFields", name, NAMES)
     if 0 < len(chosen & set(MASSES)) < len(MASSES):

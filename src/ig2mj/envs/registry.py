@@ -10,6 +10,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -29,6 +30,7 @@ from ig2mj.sensors.base import SensorOptions
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.bddl.task import BddlTask, bddl_task
+from ig2mj.tasks.homes import AnyTask, in_home
 from ig2mj.tasks.mixing import mixed_pool
 from ig2mj.tasks.navigation.task import NAVIGATION, NavigationTask
 from ig2mj.tasks.task import Task
@@ -38,8 +40,6 @@ from ig2mj.worlds.pool import Pool
 
 VECTORS = ("proprioception", "privileged_state")
 """Observations that every engine and every task can make."""
-
-AnyTask = Task | NavigationTask | BddlTask
 
 TASKS: dict[str, Task | NavigationTask] = {**ACTIVITIES, **NAVIGATION}
 """By name, in the order of `list_envs`."""
@@ -72,7 +72,7 @@ def make(
     engine: str | None = None,
     grasping: str | None = None,
     *,
-    observations: Sequence[str] = VECTORS,
+    observations: str | Sequence[str] = VECTORS,
     paper_rl: bool = False,
     pool: Pool | None = None,
     split: str = "train",
@@ -83,6 +83,7 @@ def make(
     whole_actions: bool = False,
     period: float = ACTION_PERIOD,
     variant: int = 0,
+    home: str | os.PathLike | None = None,
     **options: Any,
 ) -> Environment:
     """Makes an environment.
@@ -97,8 +98,8 @@ def make(
       grasping: "mitten" (sticks to the task's first object at the first touch, as in the paper's experiments),
         "assisted", "sticky" or "physical"; with the last three an action of an activity closes hands, too. None:
         "mitten" for the paper's activities, "assisted" for others, "physical" for navigation.
-      observations: names of sensors and of the task's own vectors, see `ig2mj.envs.observations`; pictures and laser
-        scans need the native or the warp engine.
+      observations: names of sensors and of the task's own vectors, or a single one, see `ig2mj.envs.observations`;
+        images and laser scans need the native or the warp engine.
       paper_rl: the thresholds that the paper's runs had: any force cuts, and three quarters of the stains may stay.
       pool: start states of an activity; None: the task's own, of which `split` is "train" or "held_out" and `pool_size`
         the number of rows; sampled on first use and kept (`ig2mj sample-task`). Navigation makes its own each time.
@@ -110,13 +111,20 @@ def make(
       period: seconds of an agent step, a whole number of control steps of 1/30 s.
       variant: of an activity's objects: other models of the same categories (`ig2mj.tasks.variants`); 0: its own. Each
         has pools of start states of its own.
+      home: another home than the task's, by name or folder: any with a map of its floor for navigation, any that an
+        activity of BDDL can be bound in, and for the paper's activities one with the furniture that they name.
       options: go to the engine.
 
     Raises:
       UnknownNameError: no such environment, robot, mode, observation, engine or split.
-      EngineError: the engine cannot do what is asked.
+      EngineError: the engine cannot do what is asked, the home lacks what the task names, or the robot would start
+        outside of it. InputError: there is no such home. BindingError: the activity does not fit into it.
     """
     task = name if isinstance(name, AnyTask) else find_task(name)
+    if home is not None:
+        task = in_home(task, home)
+    if isinstance(observations, str):
+        observations = (observations,)
     mode = task.grasping if grasping is None else grasping
     if mode not in MODES:
         raise UnknownNameError("grasping mode", mode, MODES)
@@ -175,4 +183,6 @@ def make(
         env.made_with["mixed"] = mixed
     if variant:
         env.made_with["variant"] = variant
+    if home is not None:
+        env.made_with["home"] = os.fspath(home)
     return env

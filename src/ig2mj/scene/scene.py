@@ -152,14 +152,14 @@ def _make_solid(spec: mujoco.MjSpec, manifest: Manifest) -> None:
     deepen_walls(spec, manifest)
 
 
-def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: Sequence[str] = ()) -> Scene:
+def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: str | Sequence[str] = ()) -> Scene:
     """Loads a converted scene.
 
     Args:
       path: its folder, its scene.xml or its manifest.json, or the bare name of a home that ships with the project.
       agents: robots to compile into it, e.g. `FloatingHand(pos=(0, 0, 1))`.
-      objects: what to add from the object library, e.g. ["steak", "plate/plate_00"]. Additions are named
-        `<category>_<n>`, going on from the home's own, and stand outside the house until they are put somewhere.
+      objects: what to add from the object library, e.g. ["steak", "plate/plate_00"], or a single one. Additions are
+        named `<category>_<n>`, going on from the home's own, and stand outside the house until they are put somewhere.
         "shelf/shelf_14@1,2,0.9,-90" is fixed for good: its frame at x, y, z (m), turned by degrees about the vertical.
 
     Raises:
@@ -170,6 +170,7 @@ def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: S
     folder = file.parent
     manifest = load_manifest(folder / MANIFEST_FILE)
     additions: list[Addition] = []
+    objects = (objects,) if isinstance(objects, str) else objects
     if objects:
         text, manifest, additions = add_objects(file, manifest, objects)
         spec = _spec_from_text(text, file)

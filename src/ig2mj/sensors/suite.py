@@ -45,7 +45,7 @@ class SensorSuite:
         scene: Scene,
         model: StateModel,
         controller: Controller,
-        names: Sequence[str],
+        names: str | Sequence[str],
         options: SensorOptions | None = None,
         agent: int = 0,
     ):
@@ -54,13 +54,13 @@ class SensorSuite:
         Args:
           engine: whose worlds are perceived. scene: theirs. model: constants of the states.
           controller: of the agent, which is number `agent` of the scene.
-          names: of sensors (`ig2mj.sensors.registry.SENSORS`).
+          names: of sensors (`ig2mj.sensors.registry.SENSORS`), or a single one.
 
         Raises:
           UnknownNameError: no such sensor. EngineError: the robot lacks what a sensor needs, or the engine cannot make
             pictures (only "native" and "warp" can).
         """
-        self._sensors = [find_sensor(name) for name in names]
+        self._sensors = [find_sensor(name) for name in ((names,) if isinstance(names, str) else names)]
         self.options = options or SensorOptions()
         self._setup = Setup(scene, model, controller, self.options, agent)
         self.spaces: dict[str, Space] = {s.name: s.space(self._setup) for s in self._sensors}

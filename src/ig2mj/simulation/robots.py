@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD
-from ig2mj.engine.base import Physics
+from ig2mj.engine.base import Physics, Write
 from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import ActionError, EngineError
 from ig2mj.worlds.hands import Held
@@ -93,3 +93,18 @@ def remembered(simulation: Simulation) -> tuple[Any, ...]:
     if not simulation.scene.agents or not simulation.core.eyes.moving:
         return ()
     return simulation.core.controls.first() if simulation._robots is None else simulation._robots.controllers
+
+
+def after_write(simulation: Simulation, write: Write) -> PhysicsView:
+    """The view after a write to a simulation's physics, or a cut; hands let go of what it moved."""
+    robots, view = simulation._robots, simulation.view
+    if robots is not None:
+        robots.held = simulation.core.hands.after_write(simulation.physics, view, robots.held, write)
+    return view
+
+
+def after_load(simulation: Simulation) -> None:
+    """Hands hold what a loaded world brings along; controllers remember what they did."""
+    robots = simulation._robots
+    if robots is not None:
+        robots.held = simulation.core.hands.after_load(simulation.physics, robots.held)

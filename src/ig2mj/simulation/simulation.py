@@ -37,7 +37,7 @@ from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.simulation import pictures
 from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_pose
 from ig2mj.simulation.recording import Recorded
-from ig2mj.simulation.robots import RobotsOfWorld, remembered
+from ig2mj.simulation.robots import RobotsOfWorld, after_load, after_write, remembered
 from ig2mj.simulation.sampling import WorldSampler
 from ig2mj.simulation.saving import everything, load_world, put_world, save_world
 from ig2mj.states import registry
@@ -87,7 +87,7 @@ class Simulation(Recorded):
         self.physics = self.engine.reset()
         self._initial = self.engine.export(self.physics, 0)
         self.last_sampling: dict[str, int] = {}
-        self._grasping = grasping_of(self.scene, grasping)
+        self._grasping = grasping_of(self.engine, grasping)
         self._begin()
 
     def _begin(self) -> None:
@@ -240,7 +240,7 @@ class Simulation(Recorded):
 
     def _write(self, write: Write) -> PhysicsView:
         self.physics = self.engine.write(self.physics, write)
-        return self.view
+        return after_write(self, write)
 
     # Objects and joints.
 
@@ -312,6 +312,7 @@ class Simulation(Recorded):
         self._states = change.states
         if change.swap is not None:
             self.physics, _ = self.core.teleport(self.physics, self.view, change.swap)
+            after_write(self, Write())
         if change.joints is not None:
             now = self.engine.export(self.physics, 0)
             self._write(self._sampler.write_of_joints(change, now, self.states, object_name, bool(value), key))
@@ -337,7 +338,8 @@ class Simulation(Recorded):
         self.last_sampling = dict(self._sampler.rejected)
         if row is None:
             return False
-        self.physics, self._states, self._robots = self.engine.load(self.physics, row.physics), row.states, None
+        self.physics, self._states = self.engine.load(self.physics, row.physics), row.states
+        after_load(self)
         return True
 
     @functools.cached_property

@@ -336,7 +336,9 @@ class Core:
 
     def write_fn(self, batch: Batch, write: Write) -> Batch:
         """`write`, not compiled."""
-        return self._with(batch, self.engine.write(batch.world.physics, write), batch.world.states)
+        physics = self.engine.write(batch.world.physics, write)
+        batch = self._with(batch, physics, batch.world.states)
+        return dataclasses.replace(batch, grasps=self.hands.after_write(physics, batch.world.view, batch.grasps, write))
 
     def load(
         self,
@@ -367,15 +369,14 @@ class Core:
             states = world.states
         elif mask is not None:
             states = self._chosen(mask, states, world.states)
-        return self._with(batch, self.engine.load(world.physics, physics, mask), states)
+        loaded = self.engine.load(world.physics, physics, mask)
+        grasps = self.hands.after_load(loaded, batch.grasps, mask)
+        return dataclasses.replace(self._with(batch, loaded, states), grasps=grasps)
 
     def _with(self, batch: Batch, physics: Physics, states: ExtendedStates) -> Batch:
         view = self.eyes.seen(self.engine.view(physics), batch.controllers)
-        return dataclasses.replace(
-            batch,
-            world=dataclasses.replace(batch.world, physics=physics, view=view, states=states),
-            grasps=self.hands.read(physics),
-        )
+        world = dataclasses.replace(batch.world, physics=physics, view=view, states=states)
+        return dataclasses.replace(batch, world=world)
 
     # What went wrong.
 

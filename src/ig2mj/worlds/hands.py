@@ -18,22 +18,39 @@ from ig2mj.agents.base import Controller
 from ig2mj.agents.grasping import Grasping, GraspState
 from ig2mj.engine.base import Engine, Physics, Write
 from ig2mj.engine.view import OF_CONSTRAINTS, Array, PhysicsView, read_field, replace_fields
+from ig2mj.errors import EngineError
 from ig2mj.worlds.lazy.of_view import OfView
+from ig2mj.worlds.starts import chosen
 
 Held = GraspState | None
 """What hands hold; None where they hold by friction alone."""
+
+
+def check_grasping(engine: Engine, grasping: Grasping | None) -> None:
+    """Raises EngineError where hands hold by constraints and the engine cannot ignore contacts of what is held."""
+    if grasping is not None and grasping.active and engine.cannot_ignore:
+        raise EngineError(
+            f"grasping '{grasping.mode}' ignores contacts of what is held, which engine '{engine.name}' cannot: "
+            f"{engine.cannot_ignore} (take engine='native' or grasping='physical')"
+        )
 
 
 class Hands:
     """The hands of an engine's worlds. `act` and `read` may be part of a compiled program on a pure engine."""
 
     def __init__(self, engine: Engine, grasping: Grasping | None, controllers: Sequence[Controller]):
-        """Binds a rule of grasping to an engine and to the controllers that ask hands to close."""
+        """Binds a rule of grasping to an engine and to the controllers that ask hands to close.
+
+        Raises:
+          EngineError: the engine cannot hold by that rule; see `check_grasping`.
+        """
+        check_grasping(engine, grasping)
         self._engine, self._grasping, self._controllers = engine, grasping, tuple(controllers)
         self._holds = grasping is not None and grasping.active
         self._update = jax.jit(self._updated) if engine.pure else OfView(self._updated)
         if grasping is not None:
             self._constraints, self._read = jax.jit(grasping.write), jax.jit(grasping.read)
+            self._ended, self._loaded = jax.jit(grasping.ended), jax.jit(grasping.loaded)
 
     def act(
         self, physics: Physics, view: PhysicsView, held: Held, controllers: tuple[Any, ...]
@@ -63,13 +80,34 @@ class Hands:
         return dataclasses.replace(write, model_fields=dataclasses.replace(write.model_fields, eq_data=exact))
 
     def read(self, physics: Physics) -> Held:
-        """What hands hold in worlds that were loaded, or changed from outside: the constraints that are on."""
+        """What hands hold in worlds by themselves: the constraints that are on."""
         if self._grasping is None:
             return None
         if not self._holds:
             return self._grasping.initial(self._engine.num_worlds)
         now = self._engine.snapshot(physics)
-        return self._read(now.whole("eq_active"), now.whole("eq_data"))
+        return self._read(now.whole("eq_active"), now.whole("eq_data"), now.agents.ignored_contacts)
+
+    def after_write(self, physics: Physics, view: PhysicsView, held: Held, write: Write) -> Held:
+        """What hands hold after a write from outside: grasps that it ended are over.
+
+        Args:
+          physics, view: after the write. held: before it.
+        """
+        if not self._holds or held is None:
+            return held
+        return self._ended(held, view.held) if write.eq_active is None else self.after_load(physics, held)
+
+    def after_load(self, physics: Physics, held: Held, mask: Bool[Array, "W"] | None = None) -> Held:
+        """What hands hold after worlds were loaded: the grasps that these brought along.
+
+        Args:
+          held: before. mask: the worlds that were loaded; None: all.
+        """
+        if not self._holds or held is None:
+            return self.read(physics)
+        found = self._loaded(held, self.read(physics))
+        return found if mask is None else chosen(jnp.asarray(mask), found, held)
 
     def _updated(
         self, view: PhysicsView, held: GraspState, controllers: tuple[Any, ...]

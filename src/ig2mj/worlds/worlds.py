@@ -29,6 +29,7 @@ from ig2mj.states.model import DEFAULTS
 from ig2mj.states.options import StateOptions
 from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.core import Core
+from ig2mj.worlds.hands import check_grasping
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.rules import Rules
 
@@ -78,7 +79,7 @@ class Worlds:
             engine = make_engine(engine, self.scene, num_worlds, **options)
         rules = Rules.of_scene(self.scene, states).with_goal(goal)
         controllers = controllers_of(self.scene, engine.substeps * engine.timestep)
-        self.core = Core(engine, rules, pool, controllers, grasping_of(self.scene, grasping), True)
+        self.core = Core(engine, rules, pool, controllers, grasping_of(engine, grasping), True)
 
     @property
     def engine(self) -> Engine:
@@ -108,11 +109,12 @@ def controllers_of(scene: Scene, period: float) -> list[Controller]:
     return [robot.controller(scene.tables, k, period) for k, robot in robots]
 
 
-def grasping_of(scene: Scene, grasping: str | Grasping) -> Grasping | None:
-    """The rule of grasping of that name, or that was made; None: by friction alone.
+def grasping_of(engine: Engine, grasping: str | Grasping) -> Grasping | None:
+    """The rule of grasping of that name for the engine's scene, or that was made; None: by friction alone.
 
     Raises:
-      UnknownNameError: there is no such mode.
+      UnknownNameError: there is no such mode. EngineError: the engine cannot hold by that rule.
     """
-    made = Grasping(scene, grasping) if isinstance(grasping, str) else grasping
+    made = Grasping(engine.scene, grasping) if isinstance(grasping, str) else grasping
+    check_grasping(engine, made)
     return made if made.active else None

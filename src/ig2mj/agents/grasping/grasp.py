@@ -12,11 +12,17 @@ with the object are dropped while it is held. It lets go when it is asked to ope
 Modes (iGibson's manipulation_robot.py): "physical" never holds; "assisted" as above; "sticky" without the rays;
 "mitten" takes hold of the first of its targets that it touches, open or closed, and never lets go.
 
+A grasp also ends from outside, in every mode: what is held, or the hand, moves by other means than physics (a teleport,
+a cut, sampling), and the engine switches its constraint off (`ig2mj.engine.base.Write`). An assisted or sticky hand
+that is still asked to close takes hold again of what its fingers press on; a mitten waits until it touches none of its
+targets.
+
 Axes: W worlds, H hands, Y graspable bodies, O objects, E equality constraints.
 """
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 
 import jax
@@ -52,6 +58,9 @@ MITTEN_REACH = 0.1
 
 NOTHING = -1
 
+WAITS = -1
+"""`GraspState.window` of a mitten whose grasp was ended from outside, until it touches none of its targets."""
+
 
 @struct.dataclass
 class GraspState:
@@ -61,7 +70,8 @@ class GraspState:
       body: Y of what is held, or being let go of; -1 none. held: the constraint is on.
       local: its parameters (MuJoCo's eq_data without torque scale): anchor on the second body, or on the first for a
         connect; anchor on the other; relative orientation.
-      window: control steps for which contacts are still dropped after letting go. strain: steps behind the target.
+      window: control steps for which contacts are still dropped after letting go; `WAITS`: nothing is taken hold of.
+      strain: steps behind the target.
     """
 
     body: Int[Array, "W H"]
@@ -78,12 +88,12 @@ class Grasping:
       mode: one of `MODES`. active: something can be held at all.
     """
 
-    def __init__(self, scene: Scene, mode: str = "assisted", targets: Sequence[str] = ()):
+    def __init__(self, scene: Scene, mode: str = "assisted", targets: str | Sequence[str] = ()):
         """
         Args:
           scene: with its robots.
           mode: one of `MODES`.
-          targets: objects that mittens stick to.
+          targets: objects that mittens stick to, or a single one.
 
         Raises:
           UnknownNameError: there is no such mode or object. EngineError: a robot's hands have no rays, or mittens no
@@ -93,6 +103,7 @@ class Grasping:
             raise UnknownNameError("grasping mode", mode, MODES)
         if mode == "mitten" and not targets:
             raise EngineError("mittens stick to objects that are named: Grasping(scene, 'mitten', targets=[...])")
+        targets = (targets,) if isinstance(targets, str) else targets
         self.mode, self.scene = mode, scene
         tables, model = scene.tables, scene.model
         hands = [h for a in scene.agents if isinstance(a, Robot) for h in a.hand_rays()]
@@ -133,18 +144,22 @@ class Grasping:
         """
         if not self.active:
             return state
+        waited = state.window == WAITS
+        state = self.ended(state, view.held)
         held, strain = state.held, jnp.where(state.held & (lag > MAX_DISTANCE), state.strain + 1, 0)
         if self.mode == "mitten":
             lets_go = jnp.zeros_like(held)
         else:
             apart = self._distance(view, state) > MAX_DISTANCE
             lets_go = held & ((grip <= TRIGGER) | apart | (strain >= STRAIN_STEPS))
-        window = jnp.where(lets_go, 1, jnp.maximum(state.window - 1, 0))
+        touched = self._touched(view)
+        waits = (state.window == WAITS) & (~waited | touched.any(-1))  # contacts are known one step after the release
+        window = jnp.where(waits, WAITS, jnp.where(lets_go, 1, jnp.maximum(state.window - 1, 0)))
         body = jnp.where(held | (window > 0), state.body, NOTHING)
         free = body == NOTHING
 
         wants = free & (state.window == 0) & ((self.mode == "mitten") | (grip > TRIGGER))
-        allowed = self._touched(view) & wants[..., None]
+        allowed = touched & wants[..., None]
         found, takes = jax.lax.cond(  # most of the time no hand closes on anything
             allowed.any(),
             lambda: self._candidates.nearest(view, allowed, rays=self.mode == "assisted"),
@@ -154,10 +169,28 @@ class Grasping:
         local = jnp.where(takes[..., None], self._parameters(view, found), state.local)
         return GraspState(body, (held & ~lets_go) | takes, local, window, jnp.where(lets_go | takes, 0, strain))
 
+    def ended(self, state: GraspState, held: Bool[Array, "W H O"]) -> GraspState:
+        """The state without grasps whose constraints were switched off by something else than `update`.
+
+        Args:
+          held: of the view.
+        """
+        if not self.active:
+            return state
+        thing = jnp.asarray(self.scene.tables.graspable_object)[jnp.maximum(state.body, 0)]
+        over = state.held & ~jnp.take_along_axis(jnp.asarray(held), thing[..., None], axis=-1)[..., 0]
+        return GraspState(
+            body=jnp.where(over, NOTHING, state.body),
+            held=state.held & ~over,
+            local=state.local,
+            window=jnp.where(over, WAITS if self.mode == "mitten" else 0, state.window),
+            strain=jnp.where(over, 0, state.strain),
+        )
+
     def idle(self, view: PhysicsView, state: GraspState) -> bool:
-        """On the host: nothing is held and no hand touches anything, so that `update` would change nothing whatever the
-        hands are told. In most steps of a world it is so, and to look costs far less than a compiled program."""
-        if (np.asarray(state.body) != NOTHING).any():
+        """On the host: nothing is held, no hand waits and none touches anything, so that `update` would change nothing
+        whatever the hands are told. In most steps of a world it is so, and to look costs far less than a program."""
+        if (np.asarray(state.body) != NOTHING).any() or (np.asarray(state.window) == WAITS).any():
             return False
         pressed, touching = np.asarray(view.agent.finger_force), np.asarray(view.agent.touching)
         if self.mode != "mitten":
@@ -186,21 +219,35 @@ class Grasping:
             ignored = jnp.asarray(self._object).T[jnp.maximum(state.body, 0)] & (state.body >= 0)[..., None]
         return Write(eq_active=active, model_fields=ModelFields(eq_data=data), ignored_contacts=ignored)
 
-    def read(self, eq_active: Bool[Array, "W E"], eq_data: Float[Array, "W E 12"]) -> GraspState:
-        """What hands hold in a world that was loaded or changed by hand: the constraints that are on.
+    def read(
+        self, eq_active: Bool[Array, "W E"], eq_data: Float[Array, "W E 12"], ignored_contacts: Bool[Array, "W H O"]
+    ) -> GraspState:
+        """What hands hold in worlds that were loaded or changed by hand: the constraints that are on.
+
+        What a hand ignores without holding it is being let go of.
 
         Args:
-          eq_active, eq_data: of a `Snapshot` with the world axis.
+          eq_active, eq_data, ignored_contacts: of a `Snapshot` with the world axis.
         """
         state = self.initial(eq_active.shape[0])
         if not self.active:
             return state
-        on = jnp.asarray(eq_active)[:, self._equality]  # [W, H, Y]
+        on = jnp.asarray(eq_active, bool)[:, self._equality]  # [W, H, Y]
         held, body = on.any(-1), jnp.argmax(on, axis=-1).astype(jnp.int32)
+        leaving = jnp.asarray(ignored_contacts, bool)[..., self.scene.tables.graspable_object] & ~held[..., None]
+        leaves = leaving.any(-1)
+        body = jnp.where(leaves, jnp.argmax(leaving, axis=-1).astype(jnp.int32), body)
         equality = jnp.asarray(self._equality)[np.arange(body.shape[1])[None], body]
         local = jnp.take_along_axis(jnp.asarray(eq_data, jnp.float32)[..., :10], equality[..., None], axis=1)
-        body, local = jnp.where(held, body, NOTHING), jnp.where(held[..., None], local, 0.0)
-        return GraspState(body, held, local, state.window, state.strain)
+        body, local = jnp.where(held | leaves, body, NOTHING), jnp.where(held[..., None], local, 0.0)
+        return GraspState(body, held, local, jnp.where(leaves, 1, state.window), state.strain)
+
+    def loaded(self, before: GraspState, found: GraspState) -> GraspState:
+        """What hands hold in loaded worlds, which is what `read` found there; mittens wait where they held something
+        `before`."""
+        if self.mode != "mitten":
+            return found
+        return dataclasses.replace(found, window=jnp.where(before.held & ~found.held, WAITS, found.window))
 
     def _touched(self, view: PhysicsView) -> Bool[Array, "W H Y"]:
         """What each hand presses on; for a mitten, which of its targets it touches at all."""

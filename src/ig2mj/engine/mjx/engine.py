@@ -26,7 +26,7 @@ from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.mjx.contacts import Contacts, larger_forces, no_forces, touching_units, without_ignored
 from ig2mj.engine.mjx.physics import STATE_FIELDS, MjxPhysics, all_units, mujoco_of, uncommitted
 from ig2mj.engine.mjx.view import Moved, ViewPlan, make_view, plan_view
-from ig2mj.engine.mjx.writing import apply_write, reaches, trees_joined, with_islands
+from ig2mj.engine.mjx.writing import after_release, apply_write, reaches, trees_joined, with_islands
 from ig2mj.engine.model_fields import MOVING, ModelFields, check_names, check_written, given, merged, own_fields
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.native.sleep import FULLY_AWAKE
@@ -48,6 +48,7 @@ class MjxEngine(abc.ABC):
 
     name: str
     pure = True
+    cannot_ignore: str = ""
     unrolled = True
     """Substeps are written out one after the other: no copies at a loop's border, but as often compiled."""
 
@@ -202,7 +203,7 @@ class MjxEngine(abc.ABC):
         data, old = physics.data, given(physics.fields)
         asleep = jnp.asarray(self._tree_asleep(data))
         qpos, qvel, woken = apply_write(self.layout, self.host_model, data.qpos, data.qvel, write)
-        eq_active = data.eq_active if write.eq_active is None else jnp.asarray(write.eq_active, data.eq_active.dtype)
+        eq_active, ignored = after_release(self.layout, write, data.eq_active, physics.ignored)
         check_written(write.model_fields, self.model_fields, self.host_model, self.num_worlds)
         fields = jax.tree.map(lambda a: jnp.asarray(a, jnp.float32), merged(physics.fields, write.model_fields))
         eq_data, written = given(fields)["eq_data"], given(write.model_fields)
@@ -211,9 +212,12 @@ class MjxEngine(abc.ABC):
             if name in MOVING[1:]:
                 woken |= (getattr(fields, name) != old[name]).any(tuple(range(1, np.ndim(array))))[:, None]
         changed = woken.any(1) | (eq_active != data.eq_active).any(1) | (eq_data != old["eq_data"]).any((1, 2))
-        ignored, touching = physics.ignored, physics.touching
+        touching = physics.touching
         if write.ignored_contacts is not None:
-            ignored = self._checked_filter(jnp.asarray(write.ignored_contacts, bool))
+            if self.cannot_ignore:
+                raise EngineError(f"contacts cannot be ignored: {self.cannot_ignore}")
+            ignored = jnp.asarray(write.ignored_contacts, bool)
+        if ignored is not physics.ignored:
             woken |= reaches((ignored != physics.ignored).any(1), self.layout.object_trees)
             changed |= (ignored != physics.ignored).any((1, 2))
             touching = without_ignored(
@@ -241,9 +245,7 @@ class MjxEngine(abc.ABC):
             finger_force=jnp.where(changed[:, None, None], 0.0, physics.finger_force),
         )
         moves = write.object_mask is not None or write.qpos_mask is not None or not {*MOVING[1:]}.isdisjoint(written)
-        if not moves:
-            return physics
-        return jax.lax.cond(changed.any(), self._refresh, lambda p: p, physics)
+        return jax.lax.cond(changed.any(), self._refresh, lambda p: p, physics) if moves else physics
 
     def snapshot(self, physics: MjxPhysics) -> Snapshot:
         """All worlds as a snapshot with the world axis."""
@@ -369,10 +371,6 @@ class MjxEngine(abc.ABC):
             return self._act(act, own, d, fields.get("ignored"))
 
         return jax.vmap(one)(of_world, data)
-
-    def _checked_filter(self, ignored: Bool[Array, "W H O"]) -> Bool[Array, "W H O"]:
-        """What was asked to be ignored. Raises EngineError where this engine cannot."""
-        return ignored
 
     def _touching(
         self, data: mjx.Data, remembered: Bool[Array, "W U U"], tree_awake: Bool[Array, "W T"]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from ig2mj.engine.base import Write
+from ig2mj.engine.grasp_release import moved_grasps, without_moved
 from ig2mj.engine.layout import ModelLayout
 from ig2mj.geometry.poses import compose, quat_normalize, relative_pose
 
@@ -70,6 +73,15 @@ def apply_write(
         of_tree = layout.qpos_tree[:, None] == np.arange(model.ntree)
         moved_tree |= reaches(mask, of_tree)
     return qpos, qvel, moved_tree
+
+
+def after_release(layout: ModelLayout, write: Write, eq_active: Array, ignored: Any) -> tuple[Array, Any]:
+    """Active constraints [W, E] after a write, and ignored contacts [W, H, O], after the grasps of what it moved
+    ended (see `ig2mj.engine.grasp_release`)."""
+    if write.eq_active is not None:
+        return jnp.asarray(write.eq_active, eq_active.dtype), ignored
+    moved = moved_grasps(jnp, layout, write.object_mask, write.qpos_mask) if len(layout.grasp_equality) else None
+    return (eq_active, ignored) if moved is None else without_moved(jnp, layout, moved, eq_active, ignored)
 
 
 def trees_joined(

@@ -203,6 +203,11 @@ class NativeEngine:
         self._shares = np.array_split(np.arange(num_worlds), self.threads)
         self._pool = ThreadPoolExecutor(self.threads, "ig2mj-native") if self.threads > 1 else None
 
+    @property
+    def cannot_ignore(self) -> str:
+        """See `Engine.cannot_ignore`."""
+        return self._statics.layers.full
+
     def awaited(self) -> None:
         """See `Engine.awaited`."""
 

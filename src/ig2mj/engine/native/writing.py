@@ -4,19 +4,27 @@ from __future__ import annotations
 
 import mujoco
 import numpy as np
+from jaxtyping import Bool
 
+from ig2mj.engine.grasp_release import moved_grasps, without_moved
 from ig2mj.engine.model_fields import MOVING, NAMES
 from ig2mj.engine.native.one_world import World
 from ig2mj.engine.native.sleep import wake_trees
 from ig2mj.engine.native.view_rows import Changed
 
+SLACK = 1e-4
+"""Metres, and 1 - |cosine of half an angle|, within which one body's pose in another's frame is the same: views are in
+float32."""
+
 
 def apply_write(world: World, rows: dict[str, np.ndarray]) -> int:
     """Applies one world's rows of a `Write` (its fields, and those of the model, that are not None) and refreshes it.
 
-    Without any rows the world is refreshed from what stands in its MjData.
+    Without any rows the world is refreshed from what stands in its MjData. Grasps of what moves end, unless the rows
+    say which constraints are active.
     """
     layout, model, data = world.statics.layout, world.model, world.data
+    rows = _with_releases(world, rows)
     trees = np.zeros(model.ntree, bool)
     if "object_mask" in rows:
         moved = np.flatnonzero(rows["object_mask"] & (layout.object_qposadr >= 0))
@@ -57,7 +65,51 @@ def apply_write(world: World, rows: dict[str, np.ndarray]) -> int:
     world.disturbed()
     wake_trees(model, data, np.flatnonzero(trees))
     mujoco.mj_step1(model, data)
+    if not rows and (moved := _moved_by_hand(world)) is not None:
+        return apply_write(world, _released(world, moved))
     return world.clear_force() | world.refresh()
+
+
+def _with_releases(world: World, rows: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """The rows, and constraints and ignored contacts without the grasps of what they move."""
+    layout = world.statics.layout
+    if not len(layout.grasp_equality) or "eq_active" in rows:
+        return rows
+    masks = [rows[name][None] if name in rows else None for name in ("object_mask", "qpos_mask")]
+    moved = moved_grasps(np, layout, *masks)
+    return rows if moved is None or not moved.any() else _released(world, moved) | rows
+
+
+def _released(world: World, moved: Bool[np.ndarray, "1 grasps"]) -> dict[str, np.ndarray]:
+    """Rows without the grasps of what moved."""
+    active = world.data.eq_active[None].astype(bool)
+    after = without_moved(np, world.statics.layout, moved, active, world.ignored[None])
+    return {"eq_active": after[0][0], "ignored_contacts": after[1][0]}
+
+
+def _moved_by_hand(world: World) -> Bool[np.ndarray, "1 grasps"] | None:
+    """Grasps whose bodies no longer stand to each other as they did when the world was last looked at, since somebody
+    changed MuJoCo's own data. None: none."""
+    data, layout = world.data, world.statics.layout
+    active = np.flatnonzero(data.eq_active[layout.grasp_equality])
+    if not len(active):
+        return None
+    moved, pos, quat = np.zeros((1, len(layout.grasp_equality)), bool), world.rows["body_pos"], world.rows["body_quat"]
+    for k in active:
+        bodies = layout.grasp_body[k].tolist()
+        before = _relative([pos[b].astype(float) for b in bodies], [quat[b].astype(float) for b in bodies])
+        after = _relative([data.xpos[b] for b in bodies], [data.xquat[b] for b in bodies])
+        turned = 1.0 - abs(float(before[1] @ after[1]))
+        moved[0, k] = np.linalg.norm(after[0] - before[0]) > SLACK or turned > SLACK
+    return moved if moved.any() else None
+
+
+def _relative(pos: list[np.ndarray], quat: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Pose of the second body in the frame of the first."""
+    back, found = (np.zeros(3), np.zeros(4)), (np.zeros(3), np.zeros(4))
+    mujoco.mju_negPose(*back, pos[0], quat[0])
+    mujoco.mju_mulPose(*found, *back, pos[1], quat[1])
+    return found
 
 
 def _put(

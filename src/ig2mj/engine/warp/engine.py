@@ -35,7 +35,6 @@ from ig2mj.engine.warp.patches.flags import REPLACED
 from ig2mj.engine.warp.patches.ignored import DROP, encode
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile, fit, holds_everything, profile_of_scene
-from ig2mj.errors import EngineError
 from ig2mj.process import prepare_warp
 from ig2mj.process.collector import Traced
 from ig2mj.scene.scene import Scene
@@ -183,17 +182,20 @@ class WarpEngine(MjxEngine):
         return act(model, data)
 
     @property
-    def _filters(self) -> bool:
+    def cannot_ignore(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """See `Engine.cannot_ignore`."""
         model = self.host_model
-        return self.own_kernels and not model.npair and not np.any(model.geom_adhesion)
+        if not self.own_kernels:
+            wrong = patches.pins.mismatches()
+            why = wrong[0] if wrong else "the engine was made inside `upstream_kernels()`"
+            return f"that needs ig2mj's kernels for MuJoCo Warp, which do not run: {why}"
+        if model.npair or np.any(model.geom_adhesion):
+            return f"scene '{self.scene.name}' has <pair> elements or adhesion, whose fields the contact filter takes"
+        return ""
 
-    def _checked_filter(self, ignored: Bool[Array, "W H O"]) -> Bool[Array, "W H O"]:
-        if not self._filters:
-            raise EngineError(
-                f"contacts cannot be ignored in scene '{self.scene.name}': that needs our kernels for MuJoCo Warp, and "
-                "a scene without <pair> and without adhesion"
-            )
-        return ignored
+    @property
+    def _filters(self) -> bool:
+        return not self.cannot_ignore
 
     def _put_model(self, model: mujoco.MjModel) -> mjx.Model:
         with kernels.models_put() as self._models_put:
