@@ -131,10 +131,29 @@ def test_actions_are_checked(at_cabinet, tiny_home):
         robots.act(right_hand_x=np.nan)
     with pytest.raises(ActionError, match="right_hand_q"):
         robots.act(right_hand_q=1.0)
+    with pytest.raises(ActionError, match="real numbers"):
+        robots.act(["far"] * 28)
     with pytest.raises(EngineError, match="without robots"):
         ig2mj.Simulation(tiny_home).robots.act()
     with pytest.raises(EngineError, match="targets"):
         ig2mj.Worlds(at_cabinet.scene, grasping="mitten", engine="native")
+
+
+def test_actions_beyond_their_limits_are_clipped(at_cabinet):
+    """As in `Environment.step`, however large they are."""
+    simulation, ends = at_cabinet.simulation, []
+    high, low = simulation.robots.action_high, simulation.robots.action_low
+    assert high.shape == (28,) and (low < 0).all() and (high > 0).all()
+    assert high[simulation.robots.action_names.index("right_hand_x")] == pytest.approx(0.3)
+    for action in (high, 1000 * high, np.full(28, 1e300)):
+        simulation.reset()
+        ends.append(np.asarray(simulation.robots.act(action).body_pos))
+    for named in (low[20], -5.0, -1e300):
+        simulation.reset()
+        ends.append(np.asarray(simulation.robots.act(right_hand_x=float(named)).body_pos))
+    for k in (1, 2):
+        assert np.array_equal(ends[k], ends[0]) and np.array_equal(ends[3 + k], ends[3])
+    assert not np.array_equal(ends[0], ends[3])
 
 
 @pytest.mark.slow

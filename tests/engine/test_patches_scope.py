@@ -14,11 +14,14 @@ from mujoco import mjx
 from mujoco.mjx.third_party.mujoco_warp._src import collision_driver, forward, passive, solver
 
 import ig2mj
+from ig2mj.agents import Humanoid
+from ig2mj.agents.grasping import Grasping
 from ig2mj.engine.warp import patches
 from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.engine.warp.patches import pins
 from ig2mj.engine.warp.patches.replacements import KERNELS, original
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
+from ig2mj.errors import EngineError
 
 fits = pytest.mark.skipif(bool(pins.mismatches()), reason=f"our kernels do not fit: {pins.mismatches()}")
 
@@ -210,6 +213,23 @@ def test_with_another_version_engines_run_upstreams_functions_and_one_warning_sa
     assert not any(engine.own_kernels for engine in engines)
     with patches.awake_kernels():
         assert not KERNELS.active
+
+
+def test_with_another_version_grasping_by_constraints_is_refused_when_worlds_are_made(unfit, tiny_home_folder):
+    """Nothing is compiled, and no step is taken before the refusal; hands that hold by friction alone are fine."""
+    unfit.setattr(pins, "VERSION", "0.0.1")
+    unfit.setattr(patches, "_warned", True)
+    pins.mismatches.cache_clear()
+    scene = ig2mj.load_scene(tiny_home_folder, agents=[Humanoid(pos=(0.3, 0.6, 0.6))])
+    engine = WarpEngine(scene, 1, substeps=1)
+    reason = r"engine 'warp' cannot: .* mujoco-mjx [\d.]+ is not 0\.0\.1 \(take engine='native' or grasping="
+    for grasping in ("assisted", "sticky", Grasping(scene, "mitten", "can")):
+        with pytest.raises(EngineError, match=reason):
+            ig2mj.Worlds(scene, 1, engine, grasping=grasping)
+        with pytest.raises(EngineError, match=reason):
+            ig2mj.Simulation(scene, engine, grasping=grasping)
+    assert ig2mj.Worlds(scene, 1, engine).core.grasping is None
+    assert ig2mj.Worlds(scene, 1, "native", grasping="sticky").core.grasping is not None
 
 
 @fits

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import ig2mj
+from ig2mj.agents import Humanoid
+from ig2mj.agents.grasping import Grasping
+from ig2mj.engine.model_fields import check_names
 from ig2mj.envs import setups
 from ig2mj.errors import ActionError, EngineError, UnknownNameError
 from ig2mj.scene.scene import load_scene
@@ -104,6 +107,25 @@ def test_any_sensor_is_an_observation():
     after = np.asarray(state.obs["optical_flow"])
     assert np.abs(after[0]).max() < 1e-5
     assert np.array_equal(after[1], flow[1]) and np.array_equal(state.obs["rgb"][1], rgb[1])
+
+
+def test_a_text_is_the_name_of_one_observation():
+    env = ig2mj.make("CookingMeat", engine="native", pool_size=ROWS, observations="proprioception")
+    assert list(env.observation_spaces) == ["proprioception"]
+    with pytest.raises(UnknownNameError, match="near matches: rgb"):
+        ig2mj.make("CookingMeat", observations="rbg", pool_size=ROWS)
+
+
+def test_a_text_is_one_name_wherever_names_are_taken(tiny_home_folder):
+    home = load_scene(tiny_home_folder, agents=[Humanoid(pos=(0.3, 0.6, 0.6))], objects="apple")
+    assert [a.wanted for a in home.additions] == ["apple/apple_00"]
+    assert Grasping(home, "mitten", "can")._targets.sum() == 1
+    assert check_names("geom_friction") == ("geom_friction",)
+
+
+def test_numbers_of_an_action_that_only_double_precision_holds_are_clipped(env):
+    state = env.step(env.reset(0), np.full((env.num_worlds, len(env.action_names)), 1e300))
+    assert not np.asarray(state.info["bad_actions"]).any()
 
 
 def test_unknown_names_are_refused_with_near_matches_before_anything_is_sampled(monkeypatch):

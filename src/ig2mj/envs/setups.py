@@ -20,7 +20,7 @@ from ig2mj.tasks.activity_objective import ActivityObjective
 from ig2mj.tasks.bddl.goal import conditions
 from ig2mj.tasks.bddl.objective import BddlObjective
 from ig2mj.tasks.bddl.task import BddlTask, activity_pool, standing_place
-from ig2mj.tasks.homes import check_inside, check_objects
+from ig2mj.tasks.homes import check_inside
 from ig2mj.tasks.navigation.companions import wanderers
 from ig2mj.tasks.navigation.objective import NavigationObjective
 from ig2mj.tasks.navigation.starts import make_starts
@@ -96,7 +96,6 @@ def setup_activity(
     else:
         body = make_robot(task, robot, drives=control.whole)
     scene = load_scene(task.home, agents=[body], objects=task.objects)
-    check_objects(task, scene)
     check_inside(task.name, scene)
     rules = rules_of(task, scene, paper_rl)
     controller = control.controller(body, scene)

@@ -36,13 +36,24 @@ class RobotsOfWorld:
         """What each number of an action means, all robots one after the other."""
         return tuple(name for c in self._core.controllers for name in c.action_names)
 
+    @property
+    def action_low(self) -> np.ndarray:
+        """[n] least values of an action, in the controllers' units: m and rad of a move in 1/10 s, or shares."""
+        return self._core.controls.low
+
+    @property
+    def action_high(self) -> np.ndarray:
+        """[n] greatest values of an action."""
+        return self._core.controls.high
+
     def act(self, action: Any = None, count: int = 1, **named: float | int) -> PhysicsView:
         """Lets the robots act for 1/10 s, `count` times.
 
             simulation.robots.act(right_hand_z=0.05)
 
         Args:
-          action: [n] of all robots one after the other, clipped to the controllers' limits; None: zeros.
+          action: [n] of all robots one after the other, in the controllers' units; None: zeros. Numbers beyond
+            `action_low` and `action_high` are clipped, as in `Environment.step`.
           named: numbers of the action by name, put into it.
 
         Returns:
@@ -54,7 +65,10 @@ class RobotsOfWorld:
         names = self.action_names
         if not names:
             raise EngineError("the scene was loaded without robots: load_scene(..., agents=[...]) adds them")
-        row = np.zeros(len(names), np.float32) if action is None else np.array(action, np.float32)
+        try:
+            row = np.zeros(len(names)) if action is None else np.array(action, np.float64)
+        except (TypeError, ValueError):
+            raise ActionError(f"an action is of real numbers, not {action!r}") from None
         if row.shape != (len(names),):
             raise ActionError(f"an action of this scene's robots has shape {(len(names),)}, not {row.shape}")
         for name, number in named.items():
@@ -63,6 +77,7 @@ class RobotsOfWorld:
             row[names.index(name)] = number
         if not np.isfinite(row).all():
             raise ActionError("an action is of finite numbers")
+        row = np.clip(row, self.action_low, self.action_high).astype(np.float32)
         view = self._simulation.view
         for _ in range(count):
             simulation = self._simulation

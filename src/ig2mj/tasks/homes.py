@@ -1,4 +1,4 @@
-"""Tasks in other homes than their own, and whether a home has what a task names.
+"""Tasks in other homes than their own, and whether robots start in the house.
 
 env = ig2mj.make("PointNavigation", home="elm")
 env = ig2mj.make("activity/cleaning_windows", home="my_homes/loft")
@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import dataclasses
 import os
+import pathlib
 
 import numpy as np
 
 from ig2mj.errors import EngineError
 from ig2mj.sampling.conditions import read_conditions
 from ig2mj.scene.manifest import load_manifest
-from ig2mj.scene.paths import scene_folder
-from ig2mj.scene.scene import Scene
+from ig2mj.scene.paths import SHIPPED_HOMES, scene_folder
+from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.tasks.bddl.binding import bind
 from ig2mj.tasks.bddl.task import BddlTask
 from ig2mj.tasks.navigation.task import NavigationTask
@@ -24,6 +25,9 @@ from ig2mj.tasks.task import Task
 DOORWAY = 0.3
 """m around a robot in which there must be a room: between two rooms the map has none."""
 
+ELSEWHERE = 0.3
+"""m by which furniture may stand elsewhere than in an activity's own home: hands still reach it."""
+
 AnyTask = Task | NavigationTask | BddlTask
 
 
@@ -31,28 +35,42 @@ def in_home(task: AnyTask, home: str | os.PathLike) -> AnyTask:
     """The task in another home: a folder of a converted scene, or the name of a home that ships.
 
     Navigation goes into any home with a map of its floor. What BDDL defines is bound to the home's objects again. An
-    activity of the paper names furniture and positions of its own home, so that the other one must have them, too.
+    activity of the paper has robots and start states at positions of its own home, so that the furniture that it names
+    must stand there in the other one, too.
 
     Raises:
-      InputError: there is no such home. BindingError: it lacks what the activity needs.
+      InputError: there is no such home. BindingError: it lacks what the activity needs. EngineError: the activity's
+        furniture is not there, or elsewhere.
     """
     folder, name = scene_folder(home), os.fspath(home)
+    if folder.parent != SHIPPED_HOMES:
+        name = str(folder.resolve())
     if isinstance(task, BddlTask):
         binding = bind(task.binding.activity, load_manifest(folder))
         return dataclasses.replace(task, binding=dataclasses.replace(binding, home=name))
+    if isinstance(task, Task) and scene_folder(task.home) != folder:
+        _check_furniture(task, folder)
     return dataclasses.replace(task, home=name)
 
 
-def check_objects(task: Task, scene: Scene) -> None:
-    """Raises EngineError where a start condition is about an object or a room that the scene lacks."""
-    known = {*scene.object_names, *scene.tables.room_names, *scene.tables.room_types}
-    wanted = [a for condition in read_conditions(task.start) for a in condition.arguments]
-    missing = [name for name in dict.fromkeys([*wanted, *task.objects_of_interest]) if name not in known]
+def _check_furniture(task: Task, folder: pathlib.Path) -> None:
+    """Raises EngineError where what the task names of its home is not there, or elsewhere."""
+    own, other = load_scene(task.home), load_scene(folder)
+    arguments = [a for condition in read_conditions(task.start) for a in condition.arguments]
+    named = [name for name in dict.fromkeys([*arguments, *task.objects_of_interest]) if name in own.object_names]
+    missing = [name for name in named if name not in other.object_names]
+    hint = 'ig2mj.make("activity/...", home=...) goes into any home that has what it needs'
     if missing:
-        raise EngineError(
-            f"{task.name} cannot take place in '{task.home}': it has no {', '.join(missing)} (what BDDL defines goes "
-            'into any home that has what it needs: ig2mj.make("activity/...", home=...))'
-        )
+        raise EngineError(f"{task.name} cannot take place in '{other.name}': it has no {', '.join(missing)} ({hint})")
+    both = [(scene, scene.start_data()) for scene in (own, other)]
+    for name in named:
+        here, there = (data.xpos[scene.tables.object_root[scene.object_index(name)]] for scene, data in both)
+        apart = float(np.linalg.norm(here - there))
+        if apart > ELSEWHERE:
+            raise EngineError(
+                f"{task.name} cannot take place in '{other.name}': its {name} stands {apart:.1f} m from where it is in "
+                f"'{own.name}', for which the activity's positions are made ({hint})"
+            )
 
 
 def check_inside(task: str, scene: Scene) -> None:
@@ -66,8 +84,10 @@ def check_inside(task: str, scene: Scene) -> None:
     fixed = np.flatnonzero((tables.geom_object >= 0) & tables.object_fixed[tables.geom_object])
     if not len(fixed):
         return
-    reach = np.where(model.geom_type[fixed] == 0, 0.0, model.geom_rbound[fixed])[:, None]
-    low, high = (data.geom_xpos[fixed] - reach).min(0), (data.geom_xpos[fixed] + reach).max(0)
+    turn = data.geom_xmat[fixed].reshape(-1, 3, 3)
+    middle = data.geom_xpos[fixed] + np.einsum("gij,gj->gi", turn, model.geom_aabb[fixed, :3])
+    half = np.einsum("gij,gj->gi", np.abs(turn), model.geom_aabb[fixed, 3:])
+    low, high = (middle - half).min(0), (middle + half).max(0)
     for name, body in zip(tables.agent_names, tables.agent_body, strict=True):
         place = data.xpos[body]
         around = place[:2] + DOORWAY * np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1]), -1).reshape(-1, 2)
