@@ -10,6 +10,7 @@ from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.engine.base import Physics, Write
 from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import ActionError, EngineError
+from ig2mj.sampling.row import Row
 from ig2mj.worlds.hands import Held
 
 if TYPE_CHECKING:
@@ -118,8 +119,9 @@ def after_write(simulation: Simulation, write: Write) -> PhysicsView:
     return view
 
 
-def after_load(simulation: Simulation) -> None:
-    """Hands hold what a loaded world brings along; controllers remember what they did."""
+def put_row(simulation: Simulation, row: Row) -> None:
+    """The world becomes a sampled one: hands hold what it brings along; controllers remember what they did."""
+    simulation.physics, simulation._states = simulation.engine.load(simulation.physics, row.physics), row.states
     robots = simulation._robots
     if robots is not None:
         robots.held = simulation.core.hands.after_load(simulation.physics, robots.held)

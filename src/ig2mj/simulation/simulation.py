@@ -37,7 +37,7 @@ from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.simulation import pictures
 from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_pose
 from ig2mj.simulation.recording import Recorded
-from ig2mj.simulation.robots import RobotsOfWorld, after_load, after_write, remembered
+from ig2mj.simulation.robots import RobotsOfWorld, after_write, put_row, remembered
 from ig2mj.simulation.sampling import WorldSampler
 from ig2mj.simulation.saving import everything, load_world, put_world, save_world
 from ig2mj.states import registry
@@ -336,11 +336,9 @@ class Simulation(Recorded):
         now = self.engine.export(self.physics, 0)
         row = self._sampler.sample(condition, now, self.states, seed, Budget())
         self.last_sampling = dict(self._sampler.rejected)
-        if row is None:
-            return False
-        self.physics, self._states = self.engine.load(self.physics, row.physics), row.states
-        after_load(self)
-        return True
+        if row is not None:
+            put_row(self, row)
+        return row is not None
 
     @functools.cached_property
     def _sampler(self) -> WorldSampler:
