@@ -184,5 +184,5 @@ def make(
     if variant:
         env.made_with["variant"] = variant
     if home is not None:
-        env.made_with["home"] = os.fspath(home)
+        env.made_with["home"] = task.home
     return env
