@@ -382,9 +382,7 @@ class Environment:
             world, number = np.argwhere(~fine)[0]
             name = self.action_names[number]
             raise ActionError(f"{name} of the action of world {world} is not finite: {action[world, number]}")
-        if action.dtype == np.float64 and isinstance(action, np.ndarray):  # finite beyond single precision, too
-            action = action.clip(-1.0, 1.0)
-        return action.astype(np.float32)
+        return (action.clip(-1.0, 1.0) if isinstance(action, np.ndarray) else action).astype(np.float32)
 
     def metrics(self, state: EnvState) -> dict[str, int]:
         """Episodes begun, worlds flagged by `guards.Flag`, and numbers of actions that were not finite. On the host."""
