@@ -3,6 +3,7 @@
 | variable                   | default | what it bounds                                                             |
 |----------------------------|---------|----------------------------------------------------------------------------|
 | IG2MJ_LIMIT_TEXT_BYTES     | 64 MiB  | a file of text: JSON, TOML, BDDL, a journal                                |
+| IG2MJ_LIMIT_XML_BYTES      | 16 MiB  | an MJCF file; the largest home that ships has half a MiB                   |
 | IG2MJ_LIMIT_SMALL_BYTES    | 128 MiB | arrays of one file that are unpacked whatever its size                     |
 | IG2MJ_LIMIT_UNPACKED_RATIO | 100     | bytes of arrays for each byte of the file, beyond `IG2MJ_LIMIT_SMALL_BYTES` |
 | IG2MJ_LIMIT_UNPACKED_BYTES | 16 GiB  | all arrays that are read of one file                                       |
@@ -20,6 +21,7 @@ from ig2mj.errors import Ig2mjError, InputError
 
 DEFAULTS = {
     "TEXT_BYTES": 64 * 2**20,
+    "XML_BYTES": 16 * 2**20,
     "SMALL_BYTES": 128 * 2**20,
     "UNPACKED_RATIO": 100,
     "UNPACKED_BYTES": 16 * 2**30,

@@ -18,6 +18,7 @@ import pathlib
 import msgspec
 
 from ig2mj.errors import InputError
+from ig2mj.files.content import read_struct
 from ig2mj.knowledge.ability_table import ABILITIES
 
 Parameters = dict[str, float | bool]
@@ -41,12 +42,7 @@ def load_overrides(path: str | os.PathLike) -> Overrides:
         not exist or has the wrong type.
     """
     file = pathlib.Path(path)
-    try:
-        overrides = msgspec.json.decode(file.read_bytes(), type=Overrides)
-    except OSError as e:
-        raise InputError(file, f"cannot be read: {e.strerror or e}") from e
-    except msgspec.DecodeError as e:  # ValidationError is one
-        raise InputError(file, str(e), fix="see ig2mj.knowledge.overrides for the form") from e
+    overrides = read_struct(file, Overrides, fix="see ig2mj.knowledge.overrides for the form")
     tables = [overrides.categories, overrides.models, *overrides.compat.values()]
     for key, changes in ((k, c) for table in tables for k, c in table.items()):
         for ability, parameters in changes.items():

@@ -17,10 +17,10 @@ from collections.abc import Iterable, Sequence
 
 import msgspec
 
-from ig2mj.errors import Ig2mjError, InputError
+from ig2mj.errors import Ig2mjError
 from ig2mj.scene.library import LibraryModel, find_model
 from ig2mj.scene.manifest import JointEntry, LinkEntry, Manifest, ObjectEntry, OpenableEntry
-from ig2mj.scene.mjcf_limits import check_mjcf
+from ig2mj.scene.mjcf_files import read_mjcf
 from ig2mj.scene.resting import rest
 
 SLAB = "additions_slab"
@@ -124,7 +124,7 @@ def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -
       UnknownNameError: the library has no such model. InputError: a file is not MJCF. Ig2mjError: a fixed model has
       no place.
     """
-    root = _read(file)
+    root = read_mjcf(file)
     _make_absolute(root, file.parent)
     world, assets = _child(root, "worldbody"), _child(root, "asset")
     known = {(e.tag, e.get("name")) for e in assets}
@@ -141,7 +141,7 @@ def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -
     standing: list[tuple[ElementTree.Element, int]] = []
     place = iter(cells)
     for (name, model), at in zip(named, places, strict=True):
-        added = _read(model.file)
+        added = read_mjcf(model.file)
         _make_absolute(added, model.folder)
         _rename(added, model.entry.name, name)
         _take_defaults(root, added)
@@ -182,14 +182,6 @@ def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -
         merged.objects += entries
     additions = [Addition(name, m.category, m.model, m.sha256, at) for (name, m), at in zip(named, places, strict=True)]
     return ElementTree.tostring(root, encoding="unicode"), merged, additions
-
-
-def _read(file: pathlib.Path) -> ElementTree.Element:
-    check_mjcf(file)
-    try:
-        return ElementTree.parse(file).getroot()
-    except (OSError, ElementTree.ParseError) as e:
-        raise InputError(file, f"cannot be read: {e}", fix="convert it again") from e
 
 
 def _child(root: ElementTree.Element, tag: str) -> ElementTree.Element:

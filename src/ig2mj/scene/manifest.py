@@ -6,6 +6,7 @@ metres; masses kilograms; joint positions radians or metres.
 
 from __future__ import annotations
 
+import collections
 import os
 import pathlib
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import msgspec
 
 from ig2mj.errors import ManifestError
+from ig2mj.files.content import read_struct
 
 FORMAT_VERSION = 1
 
@@ -155,18 +157,9 @@ def load_manifest(path: str | os.PathLike) -> Manifest:
     file = pathlib.Path(path)
     if file.is_dir():
         file = file / "manifest.json"
-    try:
-        raw = file.read_bytes()
-    except FileNotFoundError as e:
-        raise ManifestError(file, "there is no such file", fix="give the folder that `ig2mj convert` wrote") from e
-    except OSError as e:
-        raise ManifestError(file, f"cannot be read: {e.strerror or e}") from e
-    try:
-        manifest = msgspec.json.decode(raw, type=Manifest)
-    except msgspec.ValidationError as e:
-        raise ManifestError(file, str(e), fix="convert the scene again") from e
-    except msgspec.DecodeError as e:
-        raise ManifestError(file, f"is not valid JSON: {e}", fix="convert the scene again") from e
+    if not file.exists():
+        raise ManifestError(file, "there is no such file", fix="give the folder that `ig2mj convert` wrote")
+    manifest = read_struct(file, Manifest, error=ManifestError, fix="convert the scene again")
     check_manifest(manifest, file)
     return manifest
 
@@ -188,7 +181,7 @@ def check_manifest(manifest: Manifest, file: object = "manifest.json") -> None:
         )
     names = [o.name for o in manifest.objects]
     if len(set(names)) != len(names):
-        twice = sorted({n for n in names if names.count(n) > 1})
+        twice = sorted(name for name, count in collections.Counter(names).items() if count > 1)[:10]
         raise ManifestError(file, f"object names occur twice: {', '.join(twice)}", element="objects")
     known = set(names)
     for o in manifest.objects:

@@ -15,6 +15,7 @@ from typing import Protocol, runtime_checkable
 import mujoco
 
 from ig2mj.errors import InputError, UnknownNameError, without_lines
+from ig2mj.files.inside import inside
 from ig2mj.scene.additions import Addition, add_objects
 from ig2mj.scene.build_tables import build_tables
 from ig2mj.scene.ceilings import add_ceiling
@@ -22,6 +23,7 @@ from ig2mj.scene.floors import deepen_floors
 from ig2mj.scene.grasp_equalities import add_grasp_equalities
 from ig2mj.scene.library import find_model
 from ig2mj.scene.manifest import AgentEntry, Manifest, ObjectEntry, load_manifest
+from ig2mj.scene.mjcf_files import read_mjcf
 from ig2mj.scene.mjcf_limits import check_mjcf
 from ig2mj.scene.paths import MANIFEST_FILE, SHIPPED_HOMES, model_file
 from ig2mj.scene.physics_digest import physics_digest
@@ -181,7 +183,9 @@ def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: s
         manifest = copy.copy(manifest)
         manifest.agents = [*manifest.agents, *_attach_all(agents, spec, manifest)]
     model = _compile(spec, file, generated=bool(objects))
-    rooms = load_rooms(folder / manifest.rooms.file) if manifest.rooms.file else None
+    rooms = None
+    if manifest.rooms.file:
+        rooms = load_rooms(inside(manifest.rooms.file, folder, folder / MANIFEST_FILE, "rooms.file"))
     tables = build_tables(model, manifest, rooms, folder / MANIFEST_FILE)
     return Scene(folder, manifest, model, tables, rooms, tuple(agents), tuple(additions))
 
@@ -209,8 +213,8 @@ def digest_of(scene: str, objects: Sequence[str] = ()) -> str:
 
 
 def read_spec(file: pathlib.Path) -> mujoco.MjSpec:
-    """Parses a scene.xml. Raises InputError: it is no MJCF, or asks for more than a limit (`mjcf_limits`)."""
-    check_mjcf(file)
+    """Parses a scene.xml whose paths lie where they may (`mjcf_files`). Raises InputError."""
+    read_mjcf(file)
     try:
         return mujoco.MjSpec.from_file(str(file))
     except (ValueError, OSError) as e:

@@ -26,6 +26,7 @@ from ig2mj.engine.view import Array
 from ig2mj.errors import InputError
 from ig2mj.scene.additions import Addition
 from ig2mj.scene.library import find_model
+from ig2mj.scene.paths import shipped_homes
 from ig2mj.scene.scene import Agent, Scene, load_scene
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
@@ -98,6 +99,8 @@ def load_pool_scene(
             changed.append(f"{model.category}/{model.model}")
         at = entry["place"]
         wanted.append(Addition(**{**entry, "place": None if at is None else tuple(at)}).wanted)
+    if scene is None and header["scene"] not in shipped_homes():
+        raise InputError(file, f"is of the home '{header['scene'][:60]}', which does not ship", fix="name its folder")
     found = load_scene(header["scene"] if scene is None else scene, agents, wanted)
     if changed and not found.owns(header.get("digest")):
         raise InputError(file, f"was made with another '{changed[0]}' added", fix=_FIX)

@@ -13,7 +13,7 @@ from ig2mj.agents.parts import Vector
 from ig2mj.agents.urdf.description import Description
 from ig2mj.agents.urdf.layout import Layout
 from ig2mj.errors import InputError
-from ig2mj.scene.mjcf_limits import check_mjcf
+from ig2mj.scene.mjcf_files import read_mjcf
 
 MODEL_FILE = "object.xml"
 
@@ -49,7 +49,7 @@ class RobotBody:
         self.height = float(self._model.body(self._own(description.base)).pos[2])
 
     def _spec(self) -> mujoco.MjSpec:
-        check_mjcf(self._file)
+        read_mjcf(self._file)
         spec = mujoco.MjSpec.from_file(str(self._file))
         meshes, textures = self._file.parent / spec.meshdir, self._file.parent / spec.texturedir
         for mesh in spec.meshes:

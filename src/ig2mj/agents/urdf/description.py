@@ -7,6 +7,7 @@ import pathlib
 import msgspec
 
 from ig2mj.errors import InputError
+from ig2mj.files.content import read_struct
 
 ROBOT_FILE = "robot.json"
 
@@ -63,12 +64,7 @@ class Description(msgspec.Struct, frozen=True):
         """Raises InputError: there is no such file, it is broken, or of another version."""
         file = folder / ROBOT_FILE
         again = f"convert the robot: ig2mj convert robot --urdf FILE --out {folder}"
-        try:
-            made = msgspec.json.decode(file.read_bytes(), type=cls)
-        except OSError as e:
-            raise InputError(file, "cannot be read", fix=again) from e
-        except (msgspec.DecodeError, msgspec.ValidationError) as e:
-            raise InputError(file, f"is not a description of a robot: {e}", fix=again) from e
+        made = read_struct(file, cls, fix=again)
         if made.format_version != FORMAT_VERSION:
             raise InputError(file, f"has format version {made.format_version}, not {FORMAT_VERSION}", fix=again)
         return made

@@ -20,7 +20,6 @@ What a file leaves out is found; `[]` and `""` say that there is none.
 from __future__ import annotations
 
 import dataclasses
-import json
 import os
 import pathlib
 import tomllib
@@ -29,6 +28,10 @@ from typing import Any
 
 from ig2mj.agents.urdf.description import Description, JointEntry
 from ig2mj.errors import InputError, UnknownNameError
+from ig2mj.files.content import decode_json, read_text
+
+MAX_POSITION = 1e6
+"""rad or m of a joint's start."""
 
 BASES = ("differential", "fixed")
 CLOSED = ("lower", "upper")
@@ -104,13 +107,14 @@ class Layout:
     def load(cls, robot: Description, file: str | os.PathLike) -> Layout:
         """From a TOML or a JSON file. Raises as `found`; InputError: it cannot be read."""
         path = pathlib.Path(file)
-        try:
-            text = path.read_text(encoding="utf-8")
-            given = json.loads(text) if path.suffix.lower() == ".json" else tomllib.loads(text)
-        except (OSError, UnicodeDecodeError) as e:
-            raise InputError(path, "cannot be read", fix="name a TOML or JSON file") from e
-        except ValueError as e:
-            raise InputError(path, f"is not {path.suffix.lstrip('.').upper() or 'TOML'}: {e}") from e
+        text = read_text(path, fix="name a TOML or JSON file")
+        if path.suffix.lower() == ".json":
+            given = decode_json(text, path, kind=dict)
+        else:
+            try:
+                given = tomllib.loads(text)
+            except (ValueError, RecursionError) as e:
+                raise InputError(path, f"is not TOML: {e}") from e
         return cls.found(robot, given, str(path))
 
 
@@ -126,7 +130,7 @@ def _check(robot: Description, given: dict[str, Any], where: str) -> None:
             _check_names("joint of the robot", value, [joint.name for joint in robot.joints])
         elif name == "start":
             if not isinstance(value, Mapping) or not all(_is_number(v) for v in value.values()):
-                raise InputError(where, "must be a table of numbers by joint", element=name)
+                raise InputError(where, "must be a table of finite numbers by joint", element=name)
             _check_names("joint of the robot", list(value), [joint.name for joint in robot.joints])
         elif not isinstance(value, str):
             raise InputError(where, "must be a text", element=name)
@@ -137,7 +141,7 @@ def _check(robot: Description, given: dict[str, Any], where: str) -> None:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= MAX_POSITION
 
 
 def _check_names(kind: str, names: Sequence[str], known: Sequence[str]) -> None:

@@ -21,12 +21,16 @@ import mujoco
 import numpy as np
 
 from ig2mj.errors import InputError
+from ig2mj.files.content import read_struct
 from ig2mj.scene.scene import Scene
 
 PROFILE_FILE = "engine_profile.json"
 
 ADDED_CONTACTS = 8
 """Contacts of an object that was added from the library. One that lies on a table or in a basket has four to six."""
+
+MOST = 10_000_000
+"""Of anything in a profile: more than any engine can allocate."""
 
 HAND = "floatinghand"
 """The robot whose sizes are the scene's."""
@@ -169,16 +173,13 @@ def load_profile(folder: str | os.PathLike, model: mujoco.MjModel, name: str = P
     if not file.exists():
         return default_profile(model)
     fix = "run `ig2mj calibrate` again, or delete the file"
-    try:
-        profile = msgspec.json.decode(file.read_bytes(), type=EngineProfile)
-    except msgspec.MsgspecError as e:
-        raise InputError(file, f"is not an engine profile: {e}", fix=fix) from e
+    profile = read_struct(file, EngineProfile, fix=fix)
     for name in ("awake_dofs", "constraints", "contacts", "convex_contacts"):
-        if getattr(profile, name) < 1:
-            raise InputError(file, "must be at least 1", element=name, fix=fix)
+        if not 1 <= getattr(profile, name) <= MOST:
+            raise InputError(file, f"must be between 1 and {MOST}", element=name, fix=fix)
     for name in ("spare_contacts", "spare_convex_contacts"):
-        if getattr(profile, name) < 0:
-            raise InputError(file, "must not be negative", element=name, fix=fix)
+        if not 0 <= getattr(profile, name) <= MOST:
+            raise InputError(file, f"must be between 0 and {MOST}", element=name, fix=fix)
     return fit(profile, model)
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import pathlib
 
-from ig2mj.errors import InputError, UnknownNameError
+from ig2mj.errors import UnknownNameError
+from ig2mj.files.content import read_text
 from ig2mj.knowledge import bddl_folder
 from ig2mj.tasks.bddl import behavior1k
 from ig2mj.tasks.bddl.problem import Problem, parse_problem
@@ -38,12 +39,9 @@ def read_problem(name: str | os.PathLike, behavior_1k: bool = False) -> Problem:
         file, tolerant = pathlib.Path(name), False
     else:
         file, tolerant = _folder(behavior_1k) / name / FILE, True
-        if not file.is_file():
+        if pathlib.PurePath(name).name != os.fspath(name) or "\0" in os.fspath(name) or not file.is_file():
             raise UnknownNameError("activity", os.fspath(name), activity_names(behavior_1k))
-    try:
-        text = file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as e:
-        raise InputError(file, f"cannot be read: {e}", fix="name a BDDL definition") from e
+    text = read_text(file, fix="name a BDDL definition")
     return parse_problem(text, str(file), tolerant=tolerant)
 
 
