@@ -5,12 +5,12 @@ from __future__ import annotations
 import contextlib
 import os
 import pathlib
-import re
 import shutil
 import tempfile
 from collections.abc import Iterator
 
 from ig2mj.errors import InputError
+from ig2mj.files.heartbeat import Heartbeat, is_alive
 
 #: A folder that holds this file is an earlier output and may be replaced.
 MARK = "manifest.json"
@@ -20,7 +20,9 @@ MARK = "manifest.json"
 def replaced_folder(out: str | os.PathLike) -> Iterator[pathlib.Path]:
     """A temporary folder beside `out` that takes its place when the block ends well, and vanishes when it does not.
 
-    A run that is killed leaves the old output or none, and at worst a hidden folder that the next run removes.
+    A run that is killed leaves the old output or none, and at worst a hidden folder that the next run removes: at once
+    where it can know that the run is dead, else when it has given no sign of life for two minutes
+    (`ig2mj.files.heartbeat`).
 
     Raises:
       InputError: `out` is a file, or a folder with something else in it; or the disk is full.
@@ -29,11 +31,12 @@ def replaced_folder(out: str | os.PathLike) -> Iterator[pathlib.Path]:
     _check(target)
     target.parent.mkdir(parents=True, exist_ok=True)
     _remove_leftovers(target)
-    folder = pathlib.Path(tempfile.mkdtemp(prefix=f"{_prefix(target)}{os.getpid()}-", dir=target.parent))
+    folder = pathlib.Path(tempfile.mkdtemp(prefix=_prefix(target), dir=target.parent))
     try:
         folder.chmod(0o755)
-        yield folder
-        _move_into_place(folder, target)
+        with Heartbeat(_sign(folder)):
+            yield folder
+            _move_into_place(folder, target)
     except OSError as e:
         if e.filename is not None:
             raise
@@ -64,20 +67,18 @@ def _move_into_place(folder: pathlib.Path, target: pathlib.Path) -> None:
         folder.rename(target)
 
 
+def _sign(folder: pathlib.Path) -> pathlib.Path:
+    """The sign of life of the run that has a temporary folder: next to it, since all that is in it is the output's."""
+    return folder.with_name(f"{folder.name.removesuffix('-old')}.alive")
+
+
 def _remove_leftovers(target: pathlib.Path) -> None:
-    """Removes temporary folders of runs that are no longer alive."""
-    pattern = re.compile(re.escape(_prefix(target)) + r"(\d+)-")
+    """Removes temporary folders of runs that are no longer alive, on this machine or another."""
     for entry in target.parent.iterdir():
-        match = pattern.match(entry.name)
-        if match and entry.is_dir() and not _alive(int(match.group(1))):
+        if not entry.name.startswith(_prefix(target)):
+            continue
+        if entry.is_dir() and not is_alive(_sign(entry), entry):
             shutil.rmtree(entry, ignore_errors=True)
-
-
-def _alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True
+            _sign(entry).unlink(missing_ok=True)
+        elif entry.suffix == ".alive" and not entry.with_suffix("").is_dir() and not is_alive(entry):
+            entry.unlink(missing_ok=True)

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import pathlib
 import pickle
 import shutil
+import time
 
 import mujoco
 import numpy as np
@@ -19,6 +21,7 @@ from tiny_house import SCENE, instance_xml, scene_xml
 
 from ig2mj.cli import call
 from ig2mj.errors import InputError
+from ig2mj.files.heartbeat import DEAD, identity
 from ig2mj.scene.manifest import load_manifest
 
 
@@ -258,11 +261,28 @@ def test_an_interrupted_run_leaves_nothing_behind(tmp_path):
 
 
 def test_the_leftovers_of_a_killed_run_are_removed_by_the_next(tmp_path):
-    dead = tmp_path / ".out.ig2mj-4194305-abc"  # beyond the largest process id of Linux
+    dead = tmp_path / ".out.ig2mj-abc"
     dead.mkdir()
+    own = json.loads(json.dumps(identity()))
+    dead.with_name(f"{dead.name}.alive").write_text(
+        json.dumps(own | {"process": 4194305})
+    )  # no process has this number
+    (tmp_path / ".out.ig2mj-old.alive").write_text(json.dumps(own | {"process": 4194305}))
     with replaced_folder(tmp_path / "out") as folder:
         (folder / "manifest.json").write_text("{}")
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
+
+
+def test_the_folder_of_a_run_on_another_machine_is_removed_only_when_it_is_silent(tmp_path):
+    other = tmp_path / ".out.ig2mj-abc"
+    other.mkdir()
+    sign = other.with_name(f"{other.name}.alive")
+    sign.write_text(json.dumps({"boot": "another", "namespace": "pid:[1]", "process": 1, "started": "5"}))
+    for seconds, left in ((DEAD - 10, ["out", sign.name[:-6], sign.name]), (DEAD + 5, ["out"])):
+        os.utime(sign, (time.time() - seconds,) * 2)
+        with replaced_folder(tmp_path / "out") as folder:
+            (folder / "manifest.json").write_text("{}")
+        assert sorted(p.name for p in tmp_path.iterdir()) == sorted(left)
 
 
 @pytest.mark.parametrize("kind", ["file", "folder"])

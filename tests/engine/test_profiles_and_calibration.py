@@ -66,12 +66,12 @@ def test_no_more_can_be_awake_than_there_is(tiny_home):
         ('{"awake_dofs": "x", "constraints": 1, "contacts": 1, "convex_contacts": 1}', "Expected `int`"),
         (
             '{"awake_dofs": 12, "constraints": 0, "contacts": 1, "convex_contacts": 1}',
-            "constraints: must be at least 1",
+            "constraints: must be between 1",
         ),
-        ('{"awake_dofs": 12, "constraints": 9, "contacts": -4, "convex_contacts": 1}', "contacts: must be at least 1"),
+        ('{"awake_dofs": 12, "constraints": 9, "contacts": -4, "convex_contacts": 1}', "contacts: must be between 1"),
         (
             '{"awake_dofs": 1, "constraints": 9, "contacts": 4, "convex_contacts": 1, "spare_contacts": -1}',
-            "spare_contacts: must not be negative",
+            "spare_contacts: must be between 0",
         ),
     ],
 )

@@ -192,7 +192,9 @@ def test_a_policy_file_acts_as_what_was_trained(done, tmp_path):
 
 def test_the_best_policy_of_a_run_is_kept_beside_the_last_one(tmp_path):
     def policy(success, mark, count=100):
-        card = {"format": 1, "depends": {}, "digest": "", "net": {}, SUCCESS: success, COUNTED: count}
+        names = {"task": "", "robot": "", "grasping": "", "actions": ["x"], "mode": "state", "vector": {"a": 1}}
+        depends, net = names | {"picture": None, "privileged": []}, {"net": "small", "sizes": [2]}
+        card = {"format": 1, "depends": depends, "digest": "", "net": net, SUCCESS: success, COUNTED: count}
         return Policy(card, {"mean/bias": np.full(2, mark, np.float32)}, np.zeros(1), np.ones(1))
 
     def kept():
@@ -219,7 +221,7 @@ def test_a_policy_for_something_else_is_refused_with_the_pair_that_differs(done,
     with pytest.raises(InputError, match='grasping = "sticky", and here it is ""'):
         policy.check(env, trained.perception)
     (tmp_path / "broken.npz").write_bytes(b"PK\x03\x04nothing")
-    with pytest.raises(InputError, match="is not a policy"):
+    with pytest.raises(InputError, match="is not an npz archive"):
         Policy.load(tmp_path / "broken.npz")
 
 

@@ -148,7 +148,7 @@ def test_the_command_writes_a_picture_and_a_video(can_draw, dump, bare, tmp_path
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (["--dump", "absent.npz", "--picture", "a.png"], "cannot be read"),
+        (["--dump", "absent.npz", "--picture", "a.png"], "there is no such file"),
         (["--video", "a.mp4"], "--video belongs to --dump"),
         (["--dump", "{dump}", "--video", "a.txt"], "is not a picture format"),
         (["--dump", "{dump}", "--video", "a.png"], "is not a video format"),

@@ -6,7 +6,6 @@ import dataclasses
 import hashlib
 import io
 import json as form
-import os
 import pathlib
 import shutil
 import sys
@@ -19,6 +18,7 @@ import tyro
 
 from ig2mj.cli.convert_common import DEFAULTS, Common, Flag, options_of
 from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures, where_of
+from ig2mj.files.unfinished import unfinished
 
 MARK = "manifest.json"
 """The file that every finished folder of the output has."""
@@ -158,8 +158,7 @@ def packed_folder(folder: pathlib.Path) -> bytes:
 def put_folder(target: pathlib.Path, packed: bytes) -> None:
     """Unpacks a folder beside its place, and puts it there when it is complete. Raises OSError."""
     target.parent.mkdir(parents=True, exist_ok=True)
-    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
-    shutil.rmtree(beside, ignore_errors=True)
+    beside = unfinished(target)
     try:
         with tarfile.open(fileobj=io.BytesIO(packed)) as archive:
             archive.extractall(beside, filter="data")

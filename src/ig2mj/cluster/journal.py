@@ -14,12 +14,20 @@ import hashlib
 import json
 import os
 import pathlib
+import re
 import shutil
 from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 from ig2mj.cluster.locks import hold
 from ig2mj.errors import InputError
+from ig2mj.files.content import read_bytes, read_json
+
+DONE = "done.jsonl"
+"""File of a journal with a line for each finished piece."""
+
+_HASH = re.compile(r"[0-9a-f]{64}")
+_OTHER = re.compile(r"[/\0]")
 
 Deliver = Callable[[str, bytes], None]
 """Puts the bytes of a finished piece, by its name, where they belong."""
@@ -81,22 +89,20 @@ class Journal:
 
     def _begin(self, resume: bool) -> None:
         file = self.folder / "request.json"
-        if (self.folder / "done.jsonl").exists():  # else there is nothing to go on with
+        if (self.folder / DONE).exists():  # else there is nothing to go on with
             if not resume:
                 fix = f"--resume continues it; to start over, remove {self.folder}"
                 raise InputError(self.out, "an earlier run of this was interrupted", fix=fix)
             self._compare(file)
             self._read()
+            self._mend()
             return
         beside = file.with_suffix(".part")
         beside.write_text(json.dumps(self._request), encoding="utf-8")
         beside.replace(file)
 
     def _compare(self, file: pathlib.Path) -> None:
-        try:
-            known = json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as e:
-            raise InputError(file, f"cannot be read: {e}", fix=f"remove {self.folder}") from e
+        known = read_json(file, kind=dict, fix=f"remove {self.folder}")
         known, wanted = _flat(known), _flat(self._request)
         for name in {**known, **wanted}:
             if known.get(name) != wanted.get(name):
@@ -106,23 +112,35 @@ class Journal:
                 raise InputError(self.out, problem, fix=fix)
 
     def _read(self) -> None:
-        with contextlib.suppress(FileNotFoundError):
-            for line in (self.folder / "done.jsonl").read_text(encoding="utf-8").splitlines():
-                with contextlib.suppress(ValueError, KeyError, TypeError):  # the last line, of a full disk or a kill
-                    entry = json.loads(line)
-                    self._done[str(entry["name"])] = str(entry["sha256"])
+        for line in self._lines():
+            with contextlib.suppress(ValueError, KeyError, TypeError, RecursionError):  # torn by a full disk or a kill
+                entry = json.loads(line)
+                if isinstance(entry["name"], str) and _HASH.fullmatch(entry["sha256"]):
+                    self._done[entry["name"]] = entry["sha256"]
         for name, known in list(self._done.items()):
             if not (self._there(name) if self._deliver else self._whole(name, known)):
                 del self._done[name]
 
+    def _lines(self) -> list[bytes]:
+        file = self.folder / DONE
+        return read_bytes(file, fix=f"remove {self.folder}").split(b"\n") if file.exists() else []
+
+    def _mend(self) -> None:
+        """Ends a last line that was torn, so that the next one is not lost with it."""
+        lines = self._lines()
+        if lines and lines[-1]:
+            with (self.folder / DONE).open("ab") as end:
+                end.write(b"\n")
+
     def _whole(self, name: str, known: str) -> bool:
         try:
             return hashlib.sha256(self._file(name).read_bytes()).hexdigest() == known
-        except OSError:
+        except (OSError, ValueError):  # of a name that no file can have
             return False
 
     def _file(self, name: str) -> pathlib.Path:
-        return self.folder / f"{name.replace('/', '+')}.bin"
+        """Of a finished piece; a name from a damaged line stays in the folder as well."""
+        return self.folder / f"{_OTHER.sub('+', name)[:200]}.bin"
 
     def names(self) -> Collection[str]:
         """Of the pieces that are finished."""
@@ -137,7 +155,7 @@ class Journal:
             beside.write_bytes(result)
             beside.replace(self._file(name))
         self._done[name] = hashlib.sha256(result).hexdigest()
-        with (self.folder / "done.jsonl").open("a", encoding="utf-8") as lines:
+        with (self.folder / DONE).open("a", encoding="utf-8") as lines:
             lines.write(json.dumps({"name": name, "sha256": self._done[name], "bytes": len(result)}) + "\n")
 
     def get(self, name: str) -> bytes:

@@ -1,34 +1,100 @@
-"""`hold`: one writer for each output; a second one is refused, with the name of the first."""
+"""`hold`: one writer for each output; a second one is refused, with the name of the first.
+
+Two things keep an output: a lock of the operating system, which ends with its process however that ends, and a sign of
+life in the same file (`ig2mj.files.heartbeat`). Processes of one machine, also in several containers, see each other's
+locks. Machines that share a network disk do where it has locks (NFS 4 has; others may say that they have and keep them
+to one machine), so that a lock alone is not believed there: a sign of life that is younger than two minutes holds the
+output, too. Who was killed on another machine therefore keeps an output for up to two minutes. On a disk without any
+locks two that begin in the same second can both begin.
+"""
 
 from __future__ import annotations
 
+import errno
 import fcntl
+import json
 import os
 import pathlib
-import socket
-from typing import IO
+from typing import IO, Any
 
 from ig2mj.errors import ClusterError
+from ig2mj.files.heartbeat import DEAD, age, identity, is_of_this_machine, keep_touching, lives, stop_touching
+
+_NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS}
+"""What systems say of a disk without locks."""
 
 
-def hold(file: pathlib.Path, out: object) -> IO[str]:
-    """Locks a file, which is made where it is not there, until it is closed or this process ends, however it ends.
+class Hold:
+    """An output that this process has, until it is closed."""
+
+    def __init__(self, file: pathlib.Path, opened: IO[str]):
+        """Writes the sign of life into an open file."""
+        self._file, self._opened = file, opened
+        opened.seek(0)
+        opened.truncate(0)
+        json.dump(identity(), opened)
+        opened.flush()
+        keep_touching(self)
+
+    def touch(self) -> None:
+        """One beat."""
+        if not self._opened.closed:
+            os.utime(self._opened.fileno())
+
+    def close(self) -> None:
+        """The next one can have it at once; may be called twice."""
+        stop_touching(self)
+        if not self._opened.closed:
+            self._opened.truncate(0)
+            self._opened.close()
+
+    def __enter__(self) -> Hold:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+
+def hold(file: pathlib.Path, out: object) -> Hold:
+    """Keeps an output for this process, until it is closed or this process ends, however it ends.
 
     Args:
-      file: the lock. out: the output that it stands for, for the message.
+      file: the lock, which is made where it is not there. out: the output that it stands for, for the message.
 
     Raises:
-      ClusterError: another process holds it.
+      ClusterError: another process has it, or one of another machine had it less than two minutes ago.
     """
-    opened = file.open("a+")
+    opened = file.open("a+", encoding="utf-8", errors="replace")
     try:
         fcntl.flock(opened, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        opened.seek(0)
-        who = opened.read().strip() or "another run"
-        opened.close()
-        raise ClusterError(f"{out}: {who} is writing there; wait for it, or choose another place") from None
-    opened.truncate(0)
-    opened.write(f"process {os.getpid()} on {socket.gethostname()}")
-    opened.flush()
-    return opened
+        locks = True
+    except OSError as e:
+        locks = False
+        if e.errno not in _NO_LOCKS:
+            who = _named(_holder(opened))
+            opened.close()
+            raise ClusterError(f"{out}: {who} is writing there; wait for it, or choose another place") from None
+    who = _holder(opened)
+    if who is not None and not (locks and is_of_this_machine(who)):
+        since = age(file)
+        if lives(who) or (lives(who) is None and since < DEAD):
+            opened.close()
+            raise ClusterError(
+                f"{out}: {_named(who)} was writing there {since:.0f} s ago; without a sign of life for {DEAD:.0f} s it "
+                "counts as dead, and the output can be had"
+            )
+    return Hold(file, opened)
+
+
+def _holder(opened: IO[str]) -> dict[str, Any] | None:
+    """Who wrote into a lock; None: nobody, who has let go of it, or an earlier version of this package."""
+    opened.seek(0)
+    try:
+        found = json.loads(opened.read(4096))
+    except (ValueError, RecursionError):
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def _named(who: dict[str, Any] | None) -> str:
+    return f"process {who.get('process')} on {who.get('host')}" if who else "another run"

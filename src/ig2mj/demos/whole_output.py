@@ -9,6 +9,7 @@ import shutil
 from collections.abc import Iterator
 
 from ig2mj.errors import InputError
+from ig2mj.files.unfinished import unfinished as hidden_name
 
 
 @contextlib.contextmanager
@@ -26,10 +27,9 @@ def whole_output(path: str | os.PathLike, folder: bool = False) -> Iterator[path
     place = pathlib.Path(path)
     if folder and (place.exists() or place.is_symlink()):
         raise InputError(place, "is there already", fix="choose another folder")
-    unfinished = place.with_name(f".{place.name}.{os.getpid()}.part")
+    unfinished = hidden_name(place)
     try:
         place.parent.mkdir(parents=True, exist_ok=True)
-        _remove(unfinished)
         if folder:
             unfinished.mkdir()
         yield unfinished

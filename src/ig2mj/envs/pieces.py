@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 
 from ig2mj.envs.registry import find_task
+from ig2mj.files.unfinished import unfinished
 from ig2mj.tasks.pools import bare_scene, pool_file, pool_of
 from ig2mj.tasks.task import Task
 
@@ -31,7 +31,7 @@ def keep_pool(shared: Mapping[str, bytes], task: str, split: str, count: int | N
     if file.exists():
         return
     file.parent.mkdir(parents=True, exist_ok=True)
-    beside = file.with_name(f".{os.getpid()}-{file.name}")
+    beside = unfinished(file)
     beside.write_bytes(shared[POOL])
     beside.replace(file)
 

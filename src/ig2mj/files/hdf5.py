@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 import os
 import pathlib
+import struct
 import zlib
 from typing import Any
 
@@ -27,6 +28,10 @@ LARGEST_CHUNK = 2**26
 LARGEST_ATTRIBUTE = 2**24
 """Bytes of one attribute."""
 
+LARGEST_HEAP = 2**28
+"""Bytes of a heap of texts."""
+
+_BLOCK = 2**24
 _DEFLATE, _SHUFFLE, _CHECKSUM, _LZF = 1, 2, 3, 32000
 """HDF5's numbers of filters."""
 _PIPELINES = [[*s, *p, *c] for s in ([], [_SHUFFLE]) for p in ([], [_DEFLATE], [_LZF]) for c in ([], [_CHECKSUM])]
@@ -47,6 +52,8 @@ class Hdf5File:
 
         self.file, self._fix, self._bytes_read = pathlib.Path(file), fix, 0
         self._size = regular_file(file, fix=fix)
+        if not _heaps_end(self.file):
+            raise InputError(file, "is a broken HDF5 file: a heap of texts has no end", fix=fix)
         try:
             self.root: Any = h5py.File(self.file, "r")
         except Exception as e:  # h5py names no types for what a broken file makes it raise
@@ -106,7 +113,7 @@ class Hdf5File:
         """Attributes of a group: numbers, texts and small arrays of numbers. Raises InputError: others, or none."""
         import h5py
 
-        group, found = self.group(path), {}
+        group, found, name = self.group(path), {}, ""
         try:
             for name in list(group.attrs):
                 name = _text(name)
@@ -125,6 +132,12 @@ class Hdf5File:
         except (OSError, RuntimeError, ValueError, TypeError, KeyError) as e:
             raise self.broken(f"{path or '/'}: attribute {name!a}", e) from e
         return found
+
+    def is_of(self, kind: str, version: int) -> bool:
+        """Whether its attributes `format` and `version` are these. Raises as `attributes`."""
+        header = self.attributes()
+        found = header.get("format"), header.get("version")
+        return isinstance(found[0], str) and isinstance(found[1], int) and found == (kind, version)
 
     def has(self, path: str) -> bool:
         """Whether there is something of this path in this very file."""
@@ -205,6 +218,42 @@ class Hdf5File:
         for chunk in chunks:
             if not _unpacks_to(array, chunk, filters, size):
                 raise self.broken(path, "has a chunk that unpacks to more than it should have")
+
+
+def _heaps_end(file: pathlib.Path) -> bool:
+    """Whether every heap of texts has objects of some size: HDF5 never ends at free space of size 0.
+
+    A heap is "GCOL", version 1, three zeros and its size; then objects: number, count of references, four zeros, size,
+    and content that fills up eight bytes. Number 0 is free space, whose size includes these sixteen bytes.
+    """
+    mark, before = b"GCOL\x01\0\0\0", b""
+    with file.open("rb") as stream:
+        at = 0
+        while block := stream.read(_BLOCK):
+            text, start, found = before + block, at - len(before), -1
+            while (found := text.find(mark, found + 1)) >= 0:
+                if not _heap_ends(file, start + found):
+                    return False
+            at += len(block)
+            before = text[-len(mark) + 1 :]
+    return True
+
+
+def _heap_ends(file: pathlib.Path, start: int) -> bool:
+    with file.open("rb") as stream:
+        stream.seek(start)
+        (size,) = struct.unpack("<8xQ", stream.read(16).ljust(16, b"\0"))
+        if size > LARGEST_HEAP:
+            return False
+        heap = stream.read(max(size - 16, 0))
+    at = 0
+    while len(heap) - at >= 16:
+        number, length = struct.unpack_from("<H6xQ", heap, at)
+        needed = 16 + (length + 7) // 8 * 8 if number else length
+        if needed < 16:
+            return False
+        at += needed
+    return True
 
 
 def _filters(array: Any) -> list[int]:

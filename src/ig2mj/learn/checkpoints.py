@@ -10,6 +10,7 @@ import contextlib
 import json
 import os
 import pathlib
+import re
 import shutil
 import sys
 from collections.abc import Iterator, Mapping
@@ -21,6 +22,14 @@ import numpy as np
 from ig2mj.cluster.locks import hold
 from ig2mj.cluster.team import Team
 from ig2mj.errors import InputError
+from ig2mj.files.content import read_json
+from ig2mj.files.heartbeat import Heartbeat, is_alive
+from ig2mj.files.unfinished import unfinished
+
+SIGN = ".alive"
+"""In a checkpoint that is being written: the writer's sign of life."""
+
+_NUMBER = re.compile(r"0|[1-9][0-9]{0,17}", re.ASCII)
 
 KEPT = 3
 """Checkpoints of a run that stay."""
@@ -57,7 +66,7 @@ class Checkpoints:
         """Iterations of which there is a checkpoint, oldest first."""
         if not self.folder.is_dir():
             return []
-        return sorted(int(f.name) for f in self.folder.iterdir() if f.name.isdigit())
+        return sorted(int(f.name) for f in self.folder.iterdir() if _NUMBER.fullmatch(f.name))
 
     def save(self, number: int, tree: Any, meta: Mapping[str, Any]) -> pathlib.Path:
         """Writes a checkpoint, and removes the oldest.
@@ -66,28 +75,30 @@ class Checkpoints:
           number: of the iteration. tree: arrays. meta: for JSON; counters, and what the run depends on.
         """
         self.folder.mkdir(parents=True, exist_ok=True)
-        target, beside = self.folder / str(number), self.folder / f".{os.getpid()}-{number}"
-        shutil.rmtree(beside, ignore_errors=True)
+        target = self.folder / str(number)
+        beside = unfinished(target)
         beside.mkdir()
-        with _checkpointer() as writer:
-            writer.save(beside / "arrays", _full(_leaves(tree)))
-        (beside / "meta.json").write_text(json.dumps(meta, indent=1), encoding="utf-8")
+        with Heartbeat(beside / SIGN):
+            with _checkpointer() as writer:
+                writer.save(beside / "arrays", _full(_leaves(tree)))
+            (beside / "meta.json").write_text(json.dumps(meta, indent=1), encoding="utf-8")
         if target.exists():
             shutil.rmtree(target)
         beside.replace(target)
         for old in self.numbers()[:-KEPT]:
             shutil.rmtree(self.folder / str(old), ignore_errors=True)
-        for left in self.folder.glob(".*-*"):  # of a process that was killed while it wrote
-            shutil.rmtree(left, ignore_errors=True)
+        for left in self.folder.glob(".*"):  # of a process that was killed while it wrote
+            if left.is_dir() and not is_alive(left / SIGN, left):
+                shutil.rmtree(left, ignore_errors=True)
         return target
 
     def meta(self, number: int) -> dict[str, Any]:
         """Of one checkpoint. Raises InputError."""
         file = self.folder / str(number) / "meta.json"
-        try:
-            return json.loads(file.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as e:
-            raise InputError(file, f"cannot be read: {e}") from e
+        found = read_json(file, kind=dict)
+        if not isinstance(found.get("depends"), dict):
+            raise InputError(file, "does not say what it is of", element="depends")
+        return found
 
     def newest(self, like: Any, depends: Mapping[str, Any]) -> tuple[Any, dict[str, Any]] | None:
         """The newest checkpoint that can be read; None where there is none.

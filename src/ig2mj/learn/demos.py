@@ -222,8 +222,7 @@ def load_demos(file: str | os.PathLike, perception: Perception, world: Mapping[s
 def _opened(file: str | os.PathLike) -> Iterator[Hdf5File]:
     """An open file of demonstrations. Raises InputError."""
     with Hdf5File(file, fix=_FIX) as found:
-        header = found.attributes()
-        if header.get("format") != FORMAT or header.get("version") != FORMAT_VERSION:
+        if not found.is_of(FORMAT, FORMAT_VERSION):
             raise InputError(found.file, f"is not a file of {FORMAT}, version {FORMAT_VERSION}", fix=_FIX)
         yield found
 

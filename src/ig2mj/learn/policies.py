@@ -27,6 +27,7 @@ from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError, InputError, PolicyMismatch
 from ig2mj.files.content import decode_json
 from ig2mj.files.npz import read_npz
+from ig2mj.files.unfinished import unfinished
 from ig2mj.learn.checkpoints import refuse_difference
 from ig2mj.learn.heads import drawn as drawn_from
 from ig2mj.learn.heads import likeliest
@@ -135,7 +136,7 @@ class Policy:
         """Writes it. Raises OSError."""
         half = {f"weights/{name}": np.asarray(w, np.float16) for name, w in self.weights.items()}
         path = pathlib.Path(file)
-        beside = path.with_name(f".{os.getpid()}-{path.name}")
+        beside = unfinished(path)
         with beside.open("wb") as f:
             card = np.frombuffer(json.dumps(self.card).encode(), np.uint8)
             scales = {"mean": self.mean, "deviation": self.deviation}

@@ -8,15 +8,14 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import importlib.metadata
-import os
 import pathlib
-import threading
 from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from ig2mj.errors import InputError
 from ig2mj.files.npz import read_npz
+from ig2mj.files.unfinished import unfinished
 from ig2mj.process.compilation import cache_folder
 
 Hull = tuple[np.ndarray, np.ndarray]
@@ -80,7 +79,7 @@ def _write(file: pathlib.Path, hulls: list[Hull]) -> None:
     }
     with contextlib.suppress(OSError):
         file.parent.mkdir(parents=True, exist_ok=True)
-        part = file.with_suffix(f".{os.getpid()}_{threading.get_ident()}.part")
+        part = unfinished(file)
         try:
             with part.open("wb") as opened:
                 np.savez(opened, allow_pickle=False, **arrays)

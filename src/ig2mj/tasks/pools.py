@@ -25,6 +25,7 @@ from jaxtyping import Bool
 
 from ig2mj.engine.registry import make_engine
 from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.files.unfinished import unfinished
 from ig2mj.process import use_processor_only
 from ig2mj.process.compilation import cache_folder
 from ig2mj.sampling.many import sample
@@ -97,7 +98,7 @@ def pool_of(
     )
     pool = make_pool(task, split, count, scene=scene, jobs=jobs, progress=progress, workers=workers)
     file.parent.mkdir(parents=True, exist_ok=True)
-    beside = file.with_name(f".{os.getpid()}-{file.name}")
+    beside = unfinished(file)
     save_pool(pool, beside, scene, {"task": task.name, "split": split, "conditions": list(task.start)})
     beside.replace(file)  # never half a file, even if two processes make it
     return pool

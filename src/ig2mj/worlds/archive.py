@@ -17,6 +17,7 @@ import numpy as np
 from ig2mj.errors import InputError
 from ig2mj.files.content import decode_struct
 from ig2mj.files.npz import read_npz, refuse_nonfinite
+from ig2mj.files.unfinished import unfinished
 
 HEADER = "header"
 
@@ -31,12 +32,12 @@ def save_tree(file: str | os.PathLike, tree: Any, header: dict[str, Any]) -> Non
     """
     path = pathlib.Path(file)
     packed = pack(tree, header)
-    unfinished = path.with_name(f".{path.name}.{os.getpid()}.part")
+    part = unfinished(path)
     try:
-        unfinished.write_bytes(packed)
-        unfinished.replace(path)
+        part.write_bytes(packed)
+        part.replace(path)
     except OSError as e:
-        unfinished.unlink(missing_ok=True)
+        part.unlink(missing_ok=True)
         raise InputError(path, f"cannot be written: {e.strerror or e}", fix="choose another place") from e
 
 

@@ -9,13 +9,13 @@ robot starts on free floor, as near as it can be to what the activity is about.
 from __future__ import annotations
 
 import dataclasses
-import os
 import sys
 
 import numpy as np
 
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.files.unfinished import unfinished
 from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.paths import scene_folder, shipped_homes
 from ig2mj.scene.scene import Scene, load_scene
@@ -104,7 +104,7 @@ def activity_pool(task: BddlTask, split: str = "train", count: int | None = None
         raise EngineError(f"{task.name} is done in all of its sampled start states")
     pool = pool.rows(keep)
     file.parent.mkdir(parents=True, exist_ok=True)
-    beside = file.with_name(f".{os.getpid()}-{file.name}")
+    beside = unfinished(file)
     save_pool(pool, beside, bare, {"task": task.name, "split": split})
     beside.replace(file)
     return pool

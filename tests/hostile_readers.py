@@ -1,0 +1,555 @@
+"""Readers of files that strangers make, each with a valid input and with mutations of it, for fuzz tests.
+
+A reader is a function from a folder to a `Reader`. What it raises must be an `Ig2mjError`; where a page talks to a
+server, a ValueError. Warnings are none of this file's business.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import io
+import json
+import pathlib
+import random
+import warnings
+import zipfile
+from collections.abc import Callable
+from typing import Any
+
+import h5py
+import numpy as np
+from fuzz import mutated_bytes, mutated_json
+
+from ig2mj.errors import Ig2mjError
+
+
+@dataclasses.dataclass
+class Reader:
+    """`read`: takes what `mutate` makes of a seed, and raises `typed` errors alone. `valid`: what is mutated. `whole`:
+    what is read without a mutation, where that is not `valid`."""
+
+    read: Callable[[Any], Any]
+    valid: Any
+    mutate: Callable[[Any, int], Any] = mutated_bytes
+    typed: tuple[type[BaseException], ...] = (Ig2mjError,)
+    whole: Any = None
+
+    def read_valid(self) -> None:
+        """Reads the valid input, `whole` where it is not what is mutated."""
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            self.read(self.valid if self.whole is None else self.whole)
+
+    def failures(self, seeds: range) -> dict[int, str]:
+        """Seed -> what was raised that is no typed error, or has no one-line message."""
+        found: dict[int, str] = {}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            for seed in seeds:
+                try:
+                    self.read(self.mutate(self.valid, seed))
+                except self.typed as e:
+                    if "\n" in str(e):
+                        found[seed] = f"several lines: {e}"
+                except Exception as e:
+                    at = e.__traceback__
+                    while at is not None and at.tb_next is not None:
+                        at = at.tb_next
+                    where = f"{at.tb_frame.f_code.co_filename}:{at.tb_lineno}" if at is not None else ""
+                    found[seed] = f"{type(e).__name__} at {where}: {str(e)[:300]}"
+        return found
+
+
+def json_or_bytes(raw: bytes, seed: int) -> bytes:
+    """A JSON text with odd values, or with changed bytes."""
+    if seed % 3 == 0:
+        return mutated_bytes(raw, seed)
+    return json.dumps(mutated_json(json.loads(raw), seed)).encode()
+
+
+def lines_or_bytes(raw: bytes, seed: int) -> bytes:
+    """Lines of JSON, one of them with odd values, or with changed bytes."""
+    if seed % 3 == 0:
+        return mutated_bytes(raw, seed)
+    lines = raw.splitlines()
+    at = random.Random(seed).randrange(len(lines))
+    lines[at] = json.dumps(mutated_json(json.loads(lines[at]), seed)).encode()
+    return b"\n".join(lines)
+
+
+def npz_or_bytes(raw: bytes, seed: int) -> bytes:
+    """An archive with odd arrays, or with changed bytes."""
+    if seed % 4 == 0:
+        return mutated_bytes(raw, seed)
+    random_ = random.Random(seed)
+    with zipfile.ZipFile(io.BytesIO(raw)) as archive:
+        entries = {name: archive.read(name) for name in archive.namelist()}
+    for name in random_.sample(sorted(entries), random_.randint(1, 2)):
+        what = random_.random()
+        if what < 0.15:
+            del entries[name]
+        elif what < 0.3:
+            entries[name] = mutated_bytes(entries[name], seed)
+        elif entries[name].lstrip(b"\x93NUMPY").find(b"|u1") >= 0 and b"{" in entries[name][100:]:
+            array = np.load(io.BytesIO(entries[name]))
+            text = json.dumps(mutated_json(json.loads(array.tobytes()), seed)).encode()
+            entries[name] = _npy(np.frombuffer(text, np.uint8))
+        else:
+            entries[name] = _npy(_odd(np.load(io.BytesIO(entries[name])), random_))
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w") as archive:
+        for name, content in entries.items():
+            archive.writestr(name, content)
+    return out.getvalue()
+
+
+def hdf5_or_bytes(raw: bytes, seed: int) -> bytes:
+    """An HDF5 file with odd arrays, attributes and links, or with changed bytes."""
+    if seed % 3 == 0:
+        return mutated_bytes(raw, seed)
+    random_, buffer = random.Random(seed), io.BytesIO(raw)
+    with h5py.File(buffer, "a") as file:
+        names: list[str] = []
+        file.visit(names.append)
+        for _ in range(random_.randint(1, 2)):
+            there = [name for name in names if name in file]
+            if not there:
+                break
+            name = random_.choice([*there, "/"])
+            if (random_.random() < 0.5 or name == "/") and len(file[name].attrs):
+                _change_attribute(file[name].attrs, random_)
+            elif name != "/":
+                _change_array(file, name, random_)
+    return buffer.getvalue()
+
+
+def _change_attribute(attributes: Any, random_: random.Random) -> None:
+    name = random_.choice(sorted(attributes))
+    value = attributes[name]
+    del attributes[name]
+    odd = [None, 7, -1, 2**40, 1.5, float("nan"), "", "[]", "{}", "null", "[[1]]", '{"a": [1]}', "../x", "\ud800x"]
+    odd += [np.zeros(3), np.zeros((2, 2), int), np.array([["a"]], h5py.string_dtype())]
+    if isinstance(value, str) and value[:1] in "[{" and random_.random() < 0.6:
+        attributes[name] = json.dumps(mutated_json(json.loads(value), random_.randrange(10**6)))
+    elif isinstance(value, np.ndarray) and random_.random() < 0.6:
+        attributes[name] = _odd(value, random_, for_text=False)
+    elif (new := random_.choice(odd)) is not None:
+        attributes[name] = new.encode("utf-8", "surrogatepass") if isinstance(new, str) and "\ud800" in new else new
+
+
+def _change_array(file: Any, name: str, random_: random.Random) -> None:
+    old = file[name]
+    values = old[()] if isinstance(old, h5py.Dataset) else None
+    del file[name]
+    links = [h5py.SoftLink("/"), h5py.ExternalLink("/etc/hostname", "/"), h5py.ExternalLink("none.h5", "/x")]
+    if (what := random_.random()) < 0.2:
+        return
+    if what < 0.3:
+        file[name] = random_.choice(links)
+    elif what < 0.4:
+        file.create_group(name)
+    elif values is not None:
+        file[name] = _odd(np.asarray(values), random_, for_text=False)
+    else:
+        file[name] = 1.0
+
+
+def _npy(array: np.ndarray) -> bytes:
+    out = io.BytesIO()
+    np.save(out, array)
+    return out.getvalue()
+
+
+def _odd(array: np.ndarray, random_: random.Random, for_text: bool = True) -> np.ndarray:
+    """An array of another type, shape or content."""
+    kinds = [np.float64, np.float16, np.int64, np.uint8, np.bool_, np.str_, np.complex64, ">f4", "S3"]
+    changes = [
+        lambda a: a.astype(random_.choice(kinds)),
+        lambda a: a[..., None],
+        lambda a: a[0] if a.ndim else a,
+        lambda a: a[:-1] if a.ndim else a,
+        lambda a: a[..., :-1] if a.ndim else a,
+        lambda a: np.concatenate([a, a]) if a.ndim else a,
+        lambda a: a[:0] if a.ndim else a,
+        lambda a: a.reshape(-1),
+        lambda a: a.T,
+        lambda a: np.zeros((0, 3), a.dtype),
+    ]
+    numbers: list[Any] = [0, -1, 1, 127, 2**31 - 1, -(2**31), 2**62]
+    if array.dtype.kind == "f":
+        numbers += [np.nan, np.inf, -np.inf, 1e30, 65000.0, 5e-324]
+    if not for_text:
+        kinds.remove(np.str_)
+    if array.dtype.kind in "iuf" and array.size and random_.random() < 0.6:
+        array = array.copy()
+        with np.errstate(all="ignore"):
+            array.reshape(-1)[random_.randrange(array.size)] = np.array(random_.choice(numbers)).astype(array.dtype)
+        return array
+    with np.errstate(all="ignore"):
+        try:
+            return np.asarray(random_.choice(changes)(array))
+        except (ValueError, IndexError):
+            return array.reshape(-1)
+
+
+# ------------------------------------------------------------------------------------------------------- the readers
+
+
+def file_reader(file: pathlib.Path, read: Callable[[pathlib.Path], Any]) -> Callable[[bytes], Any]:
+    """A reader of bytes, which are written into that file."""
+
+    def of_bytes(raw: bytes) -> Any:
+        file.write_bytes(raw)
+        return read(file)
+
+    return of_bytes
+
+
+def rooms(folder: pathlib.Path) -> Reader:
+    from ig2mj.scene.rooms import load_rooms
+
+    out = io.BytesIO()
+    np.savez_compressed(
+        out, format_version=np.array(1), names=np.array(["a_0", "b_0"]), types=np.array(["a", "b"]),
+        room_map=np.arange(9, dtype=np.int16).reshape(3, 3) % 3, resolution=np.array(0.1),
+        trav_resolution=np.array(0.1), traversable=np.ones((3, 3), bool), traversable_no_obj=np.ones((3, 3), bool),
+    )  # fmt: skip
+
+    def read(file: pathlib.Path) -> None:
+        found = load_rooms(file)
+        found.index_at(np.array([[0.0, 0.0], [np.nan, 1.0]]))
+        assert found.room_map.dtype == np.int16
+
+    return Reader(file_reader(folder / "rooms.npz", read), out.getvalue(), npz_or_bytes)
+
+
+def expressions(folder: pathlib.Path) -> Reader:
+    from tiny_home import write_tiny_home
+
+    from ig2mj.predicates import compile_expression, parse
+    from ig2mj.scene.scene import load_scene
+    from ig2mj.states.model import StateModel
+
+    scene = load_scene(write_tiny_home(folder / "home"))
+    model = StateModel.of_manifest(scene.tables, scene.manifest)
+    names = [o for o in scene.object_names]
+    valid = f"""(and (cooked {names[-1]}) (forall (?f - apple) (or (inside ?f {names[1]}) (not (frozen ?f))))
+     (exists (?t - table) (forn 1 (?p - "apple") (on_top ?p ?t)))  ; a comment
+     (imply (open {names[0]}) (fornpairs (2) (?c - apple) (?t - table) (next_to ?c ?t))))"""
+
+    def read(raw: bytes) -> None:
+        compile_expression(model, parse(raw.decode("utf-8", "surrogateescape")))
+
+    return Reader(read, valid.encode())
+
+
+def manifests(folder: pathlib.Path) -> Reader:
+    from tiny_home import write_tiny_home
+
+    from ig2mj.scene.scene import load_scene
+
+    home = write_tiny_home(folder / "home")
+    file = home / "manifest.json"
+    return Reader(file_reader(file, lambda _: load_scene(home)), file.read_bytes(), json_or_bytes)
+
+
+def models(folder: pathlib.Path) -> Reader:
+    from tiny_home import write_tiny_home
+
+    from ig2mj.scene.scene import load_scene
+
+    home = write_tiny_home(folder / "home")
+    file = home / "scene.xml"
+    return Reader(file_reader(file, lambda _: load_scene(home)), file.read_bytes())
+
+
+def pools(folder: pathlib.Path) -> Reader:
+    import jax
+    from tiny_home import write_tiny_home
+
+    from ig2mj.engine.registry import make_engine
+    from ig2mj.scene.scene import load_scene
+    from ig2mj.states.initial import initial_states
+    from ig2mj.states.model import StateModel
+    from ig2mj.worlds.pool import Pool, load_pool, load_pool_scene, save_pool
+
+    home = write_tiny_home(folder / "home")
+    scene = load_scene(home)
+    engine = make_engine("native", scene, 1)
+    states = initial_states(StateModel.of_manifest(scene.tables, scene.manifest), 1)
+    one = jax.tree.map(lambda a: np.asarray(a)[None], engine.export(engine.reset(), 0))
+    rows = Pool(one, jax.tree.map(np.asarray, states)).rows(np.zeros(2, int))
+    save_pool(rows, folder / "pool.npz", scene)
+
+    def read(file: pathlib.Path) -> None:
+        found = load_pool(file, scene)
+        assert all(np.isfinite(a).all() for a in jax.tree.leaves(found.physics))
+        load_pool(file)
+
+    def read_both(file: pathlib.Path) -> None:
+        read(file)
+        load_pool_scene(file, home)
+
+    return Reader(file_reader(folder / "pool.npz", read_both), (folder / "pool.npz").read_bytes(), npz_or_bytes)
+
+
+ROBOT = {
+    "format_version": 1,
+    "name": "rover",
+    "base": "base",
+    "joints": [
+        {"name": "left_wheel", "type": "continuous", "parent": "base", "child": "left"},
+        {"name": "right_wheel", "type": "continuous", "parent": "base", "child": "right"},
+        {"name": "shoulder", "type": "revolute", "parent": "base", "child": "arm", "effort": 3.0, "velocity": 1.0},
+        {"name": "finger", "type": "prismatic", "parent": "arm", "child": "tip"},
+        {"name": "thumb", "type": "prismatic", "parent": "arm", "child": "thumb", "mimics": "finger"},
+    ],
+    "frames": {
+        link: {"on": "base", "pos": [0.0, 0.0, 0.0], "axes": [[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]]}
+        for link in ("base", "left", "right", "arm", "tip", "thumb", "camera")
+    },
+}
+LAYOUT = """base = "differential"
+wheels = ["left_wheel", "right_wheel"]
+arm = ["shoulder"]
+gripper = ["finger"]
+closed = "lower"
+hand = "arm"
+camera = "camera"
+laser = ""
+[start]
+shoulder = 0.4
+"""
+
+
+def robots(folder: pathlib.Path) -> Reader:
+    from ig2mj.agents.urdf.description import ROBOT_FILE, Description
+    from ig2mj.agents.urdf.layout import Layout
+
+    def read(file: pathlib.Path) -> None:
+        Layout.found(Description.load(file.parent))
+
+    return Reader(file_reader(folder / ROBOT_FILE, read), json.dumps(ROBOT).encode(), json_or_bytes)
+
+
+def layouts(folder: pathlib.Path) -> Reader:
+    import tomllib
+
+    from ig2mj.agents.urdf.description import ROBOT_FILE, Description
+    from ig2mj.agents.urdf.layout import Layout
+
+    (folder / ROBOT_FILE).write_text(json.dumps(ROBOT))
+    robot = Description.load(folder)
+    toml, other = folder / "layout.toml", folder / "layout.json"
+
+    def mutate(valid: bytes, seed: int) -> tuple[pathlib.Path, bytes]:
+        if seed % 2:
+            return toml, mutated_bytes(valid, seed)
+        return other, json_or_bytes(json.dumps(tomllib.loads(valid.decode())).encode(), seed)
+
+    def read(given: tuple[pathlib.Path, bytes]) -> None:
+        given[0].write_bytes(given[1])
+        Layout.load(robot, given[0])
+
+    return Reader(read, LAYOUT.encode(), mutate, whole=(toml, LAYOUT.encode()))
+
+
+def journals(folder: pathlib.Path) -> Reader:
+    from ig2mj.cluster.journal import Journal
+
+    out, request = folder / "out.npz", {"command": "sample", "count": 3, "versions": {"numpy": "2"}}
+    with Journal(out, request) as journal:
+        for name in ("a/0", "a/1", "a/2"):
+            journal.put(name, name.encode())
+    pieces = folder / "out.npz.pieces"
+
+    def mutate(valid: dict[str, bytes], seed: int) -> dict[str, bytes]:
+        name = "done.jsonl" if seed % 3 else "request.json"
+        return valid | {name: lines_or_bytes(valid[name], seed)}
+
+    def read(files: dict[str, bytes]) -> None:
+        for name, raw in files.items():
+            (pieces / name).write_bytes(raw)
+        with Journal(out, request, resume=True) as journal:
+            for name in journal.names():
+                assert journal.get(name) == name.encode()
+            journal.put("a/0", b"a/0")
+
+    valid = {name: (pieces / name).read_bytes() for name in ("done.jsonl", "request.json")}
+    return Reader(read, valid, mutate)
+
+
+def activities(folder: pathlib.Path) -> Reader:
+    from ig2mj.knowledge import bddl_folder
+    from ig2mj.tasks.bddl.definitions import load_activity
+
+    valid = (bddl_folder() / "activity_definitions" / "packing_lunches" / "problem0.bddl").read_bytes()
+    return Reader(file_reader(folder / "own.bddl", load_activity), valid)
+
+
+def overrides(folder: pathlib.Path) -> Reader:
+    from ig2mj.knowledge.overrides import load_overrides
+
+    valid = {
+        "categories": {"apple": {"cookable": {"cook_temperature": 70.0}, "burnable": None}},
+        "also_accepts": {"a": ["b"]},
+    }
+    return Reader(file_reader(folder / "own.json", load_overrides), json.dumps(valid).encode(), json_or_bytes)
+
+
+def policies(folder: pathlib.Path) -> Reader:
+    import ig2mj.learn.policies as policies
+    from ig2mj.learn.shipped import shipped
+
+    def read(file: pathlib.Path) -> None:
+        policy = policies.Policy.load(file)
+        spaces = _spaces(policy.card["depends"])
+        policy.player(policies.perception_of(policy, spaces))
+
+    return Reader(file_reader(folder / "policy.npz", read), shipped()["PointNavigation"].read_bytes(), npz_or_bytes)
+
+
+def _spaces(depends: dict[str, Any]) -> dict[str, Any]:
+    """What an environment would observe that a card describes."""
+    from ig2mj.envs.observations import Space
+
+    high = depends["picture"][0] * 4 if depends["picture"] else 128
+    spaces = {name: Space((width,), np.float32, -1.0, 1.0) for name, width in depends["vector"].items()}
+    spaces["rgb"] = Space((high, high, 3), np.uint8, 0.0, 255.0)
+    spaces["depth"] = Space((high, high, 1), np.float32, 0.0, 5.0)
+    return spaces
+
+
+def demonstrations(folder: pathlib.Path) -> Reader:
+    from ig2mj.learn.demos import FORMAT, FORMAT_VERSION, about, load_demos
+    from ig2mj.learn.perception import Perception
+
+    file = folder / "demos.h5"
+    world = {"task": "reach", "robot": "", "grasping": "", "actions": ["x", "y"], "privileged": []}
+    with h5py.File(file, "w") as out:
+        out.attrs["format"], out.attrs["version"] = FORMAT, FORMAT_VERSION
+        out.attrs["world"] = json.dumps(world)
+        out.attrs["spaces"] = json.dumps({"proprioception": [[3], "float32"]})
+        for run in ("run_000000", "run_000001"):
+            for name in ("action", "label"):
+                out[f"{run}/{name}"] = np.zeros((4, 2), np.float32)
+            out[f"{run}/reward"] = np.zeros(4, np.float32)
+            out[f"{run}/terminated"], out[f"{run}/truncated"] = np.zeros(4, bool), np.zeros(4, bool)
+            out[f"{run}/obs/proprioception"] = np.zeros((5, 3), np.float32)
+            out[run].attrs["success"] = True
+
+    def read(file: pathlib.Path) -> None:
+        _, spaces = about(file)
+        load_demos(file, Perception(spaces), world)
+
+    return Reader(file_reader(folder / "read.h5", read), file.read_bytes(), hdf5_or_bytes)
+
+
+def recordings(folder: pathlib.Path) -> Reader:
+    from ig2mj.demos.reader import ATTRIBUTES, Recording
+    from ig2mj.demos.writer import FORMAT, FORMAT_VERSION
+
+    file, columns = folder / "runs.h5", ["frames/physics/qpos", "frames/goal", "steps/action"]
+    with h5py.File(file, "w") as out:
+        out.attrs["format"], out.attrs["version"] = FORMAT, FORMAT_VERSION
+        for name in ATTRIBUTES:
+            out.attrs[name] = "text"
+        out.attrs["columns"], out.attrs["worlds"] = json.dumps(columns), 1
+        out["index"] = np.array([[k, 0, max(k - 1, 0)] for k in range(6)], np.int32)
+        out["frames/physics/qpos"] = np.zeros((6, 7))
+        out["frames/goal"] = np.zeros((1, 2), bool)
+        out["steps/action"] = np.zeros((5, 2), np.float32)
+        run = out.create_group("run_000000")
+        run.attrs["frames"], run.attrs["world"], run.attrs["row"] = 6, 0, 0
+        run.attrs["parts"] = np.array([[0, 2], [2, 4]])
+
+    def read(file: pathlib.Path) -> None:
+        with Recording(file) as recording:
+            recording.value("worlds", int)
+            for run in recording.runs:
+                for name in recording.columns:
+                    run.all_rows(name)
+                run.kept(0, min(run.frames, 6))
+
+    return Reader(file_reader(folder / "read.h5", read), file.read_bytes(), hdf5_or_bytes)
+
+
+def igibson_logs(folder: pathlib.Path) -> Reader:
+    from ig2mj.demos.igibson import read_igibson
+
+    file = folder / "log.hdf5"
+    with h5py.File(file, "w") as out:
+        out["frame_data"] = np.zeros((3, 4))
+        for body in ("0", "1"):
+            out[f"physics_data/{body}/position"] = np.zeros((3, 3))
+            out[f"physics_data/{body}/orientation"] = np.ones((3, 4))
+            out[f"physics_data/{body}/joint_state"] = np.zeros((3, 1))
+        out["goal_status/satisfied"] = np.zeros((3, 2))
+        out["agent_actions/vr_robot"] = np.zeros((3, 28))
+        out.attrs["/metadata/obj_body_id_to_name"] = json.dumps({"0": "apple_0"})
+        out.attrs["/metadata/physics_timestep"] = 1 / 120
+
+    return Reader(file_reader(folder / "read.h5", read_igibson), file.read_bytes(), hdf5_or_bytes)
+
+
+def checkpoints(folder: pathlib.Path) -> Reader:
+    from ig2mj.learn.checkpoints import Checkpoints
+
+    tree, depends = {"weights": np.arange(6.0, dtype=np.float32).reshape(2, 3), "step": np.int32(3)}, {"task": "reach"}
+    kept = Checkpoints(folder)
+    kept.save(1, tree, {"depends": depends, "iteration": 1})
+    kept.save(2, tree, {"depends": depends, "iteration": 2})
+    meta = kept.folder / "2" / "meta.json"
+
+    def read(file: pathlib.Path) -> None:
+        found = kept.newest(tree, depends)
+        assert found is not None
+        assert found[1]["depends"] == depends
+
+    return Reader(file_reader(meta, read), meta.read_bytes(), json_or_bytes)
+
+
+def devices(folder: pathlib.Path) -> Reader:
+    from ig2mj.vr.messages import decode
+
+    hand = {
+        "pose": [0.1, 1.0, 0.2, 0.0, 0.0, 0.0, 1.0],
+        "trigger": 0.5,
+        "squeeze": 0.0,
+        "stick": [0.0, 1.0],
+        "buttons": 3,
+    }
+    valid = {"type": "devices", "time": 1.0, "head": pose, "hands": [hand, hand], "gaze": None}
+
+    def read(raw: bytes) -> None:
+        decode(raw.decode("utf-8", "surrogateescape"))
+
+    return Reader(read, json.dumps(valid).encode(), json_or_bytes, (ValueError,))
+
+
+def page_messages(folder: pathlib.Path) -> Reader:
+    import msgspec
+
+    from ig2mj.web.viser_server import check_message
+
+    valid = {"type": "GuiUpdateMessage", "uuid": "a", "updates": {"value": [1.0, 2, "x"]}}
+
+    def mutate(valid: dict, seed: int) -> bytes:
+        if seed % 2:
+            return mutated_bytes(msgspec.msgpack.encode(valid), seed)
+        try:
+            return msgspec.msgpack.encode(mutated_json(valid, seed))
+        except (OverflowError, UnicodeEncodeError):
+            return b"\xc1"
+
+    packed = msgspec.msgpack.encode(valid)
+    return Reader(lambda raw: check_message(raw, lambda uuid: (1.0, 2, "x")), valid, mutate, (ValueError,), packed)
+
+
+READERS: dict[str, Callable[[pathlib.Path], Reader]] = {
+    f.__name__: f
+    for f in (
+        rooms, expressions, manifests, models, pools, robots, layouts, journals, activities, overrides, policies,
+        demonstrations, recordings, igibson_logs, checkpoints, devices, page_messages,
+    )
+}  # fmt: skip
