@@ -512,8 +512,9 @@ def checkpoints(folder: pathlib.Path) -> Reader:
 def devices(folder: pathlib.Path) -> Reader:
     from ig2mj.vr.messages import decode
 
+    pose = [0.1, 1.0, 0.2, 0.0, 0.0, 0.0, 1.0]
     hand = {
-        "pose": [0.1, 1.0, 0.2, 0.0, 0.0, 0.0, 1.0],
+        "pose": pose,
         "trigger": 0.5,
         "squeeze": 0.0,
         "stick": [0.0, 1.0],

@@ -44,7 +44,7 @@ def save_tree(file: str | os.PathLike, tree: Any, header: dict[str, Any]) -> Non
 def pack(tree: Any, header: dict[str, Any]) -> bytes:
     """What `save_tree` would write, for `unpack`."""
     with io.BytesIO() as out:
-        arrays = {_name(keys): np.asarray(leaf) for keys, leaf in jax.tree_util.tree_flatten_with_path(tree)[0]}
+        arrays = {name_of(keys): np.asarray(leaf) for keys, leaf in jax.tree_util.tree_flatten_with_path(tree)[0]}
         arrays[HEADER] = np.frombuffer(msgspec.json.encode(header), np.uint8)
         np.savez_compressed(out, allow_pickle=False, **arrays)
         return out.getvalue()
@@ -71,7 +71,7 @@ def load_tree(file: str | os.PathLike, like: Tree) -> tuple[Tree, dict[str, Any]
     arrays, header = _read(file)
 
     def leaf(keys: Any, wanted: Any) -> np.ndarray:
-        name = _name(keys)
+        name = name_of(keys)
         if name not in arrays:
             raise InputError(file, "is missing", element=name, fix="make the file again with this version")
         check_array(arrays[name], wanted, file, name)
@@ -96,7 +96,7 @@ def check_array(array: np.ndarray, wanted: Any, file: str | os.PathLike, name: s
 def check_finite(tree: Any, file: str | os.PathLike) -> None:
     """Raises InputError, with the name of the array, where a leaf of a pytree holds NaN or an infinity."""
     for keys, leaf in jax.tree_util.tree_leaves_with_path(tree):
-        refuse_nonfinite(leaf, file, _name(keys))
+        refuse_nonfinite(leaf, file, name_of(keys))
 
 
 def read_arrays(file: str | os.PathLike, prefix: str) -> dict[str, np.ndarray]:
@@ -118,15 +118,19 @@ def build(kind: type[Tree], arrays: Mapping[str, np.ndarray], file: str | os.Pat
         if dataclasses.is_dataclass(hint):
             fields[field.name] = build(typing.cast(type, hint), arrays, file, f"{name}.")
         elif name in arrays:
-            if arrays[name].dtype.kind not in "biuf":
-                raise InputError(file, f"is of type {arrays[name].dtype}, not of numbers", element=name)
-            fields[field.name] = arrays[name]
+            array = arrays[name]
+            if array.dtype.kind not in "biuf":
+                raise InputError(file, f"is of type {array.dtype}, not of numbers", element=name)
+            if not any(isinstance(array, kind) for kind in typing.get_args(hint) or (hint,)):
+                raise InputError(file, f"has {array.ndim} axes of {array.dtype}, which do not fit", element=name)
+            fields[field.name] = array
         elif field.default is not None:  # one whose default is None may be left out
             raise InputError(file, "is missing", element=name, fix="make the file again with this version")
     return kind(**fields)
 
 
-def _name(keys: Any) -> str:
+def name_of(keys: Any) -> str:
+    """Of a leaf of a pytree in a file, by its path."""
     return jax.tree_util.keystr(keys, simple=True, separator=".")
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import jax
@@ -31,7 +31,7 @@ from ig2mj.scene.scene import Agent, Scene, load_scene
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
-from ig2mj.worlds.archive import build, check_array, check_finite, read_arrays, read_header, save_tree
+from ig2mj.worlds.archive import build, check_array, check_finite, name_of, read_arrays, read_header, save_tree
 
 FORMAT_VERSION = 2
 """1: scene and agents were not separate (`ig2mj.engine.snapshot`)."""
@@ -131,15 +131,15 @@ def load_pool(file: str | os.PathLike, scene: Scene | None = None) -> Pool:
             raise InputError(file, "was made with other objects added", fix="load the scene with `load_pool_scene`")
         raise InputError(file, f"was made when the physics of '{scene.name}' differed from now", fix=fix)
     arrays = read_arrays(file, "")
-    pool = build(Pool, arrays, file)
     lengths = {len(array) if array.ndim else 0 for array in arrays.values()}
     if len(lengths) != 1:
         raise InputError(file, f"has arrays of different lengths: {', '.join(map(str, sorted(lengths)))}", fix=fix)
+    if scene is not None:
+        _check_widths(arrays, scene, file)
+    pool = build(Pool, arrays, file)
     if not pool.size:
         raise InputError(file, "has no rows", fix=fix)
     _check_values(pool, file)
-    if scene is not None:
-        _check_widths(pool, scene, file)
     return dataclasses.replace(pool, digest=header.get("digest"))
 
 
@@ -147,30 +147,28 @@ def _check_values(pool: Pool, file: str | os.PathLike) -> None:
     """Refuses what is not finite, which a world would start with unnoticed; what has never been warm has no maximum."""
     check_finite({"physics": pool.physics}, file)
     warmest = np.asarray(pool.states.max_temperature)
-    known = np.where(np.isneginf(warmest), 0.0, warmest) if warmest.dtype.kind == "f" else warmest
+    known = np.where(np.isneginf(warmest), warmest.dtype.type(0), warmest)
     check_finite({"states": dataclasses.replace(pool.states, max_temperature=known)}, file)
 
 
-def _check_widths(pool: Pool, scene: Scene, file: str | os.PathLike) -> None:
+def _check_widths(arrays: Mapping[str, np.ndarray], scene: Scene, file: str | os.PathLike) -> None:
     """Refuses arrays of other kinds and widths than the scene's, and numbers of trees and bodies that it has not."""
     layout = make_layout(scene.model, scene.tables)
     units, sizes = layout.num_object_units, dict(layout.scene_sizes)
     inner = {"eq_data": (12,), "mocap_pos": (3,), "mocap_quat": (4,)}
     shapes = {name: (1, size, *inner.get(name, ())) for name, size in sizes.items()} | {"touching": (1, units, units)}
     kinds = {"eq_active": np.bool_, "tree_asleep": np.int32, "touching": np.bool_}
-    for name, shape in shapes.items():
-        wanted = np.empty(shape, kinds.get(name, np.float64))
-        check_array(getattr(pool.physics.scene, name), wanted, file, f"physics.scene.{name}")
+    wanted = {f"physics.scene.{n}": np.empty(shape, kinds.get(n, np.float64)) for n, shape in shapes.items()}
     states = initial_states(StateModel.of_manifest(scene.tables, scene.manifest), 1)
-
-    leaves = zip(jax.tree_util.tree_leaves_with_path(states), jax.tree.leaves(pool.states), strict=True)
-    for (keys, wanted), found in leaves:
-        check_array(found, wanted, file, f"states.{jax.tree_util.keystr(keys, simple=True, separator='.')}")
-    numbers = {"physics.scene.tree_asleep": (pool.physics.scene.tree_asleep, sizes["tree_asleep"])}
-    numbers |= {f"states.{n}.body": (getattr(pool.states, n).body, scene.model.nbody) for n in ("dust", "stain")}
-    for name, (array, count) in numbers.items():
-        if np.asarray(array).size and int(np.asarray(array).max()) >= count:
-            raise InputError(file, f"names number {int(np.asarray(array).max())} of {count}", element=name, fix=_FIX)
+    wanted |= {f"states.{name_of(keys)}": leaf for keys, leaf in jax.tree_util.tree_leaves_with_path(states)}
+    for name, like in wanted.items():
+        if name in arrays:
+            check_array(arrays[name], like, file, name)
+    counts = {"physics.scene.tree_asleep": sizes["tree_asleep"]}
+    counts |= {f"states.{name}.body": scene.model.nbody for name in ("dust", "stain")}
+    for name, count in counts.items():
+        if name in arrays and arrays[name].size and int(arrays[name].max()) >= count:
+            raise InputError(file, f"names number {int(arrays[name].max())} of {count}", element=name, fix=_FIX)
 
 
 def _pool_header(file: str | os.PathLike) -> dict[str, Any]:
