@@ -93,9 +93,9 @@ class _Counter:
         for kind, name in named:
             self._check_image(_place(path.parent, folders, kind, name), path)
         for name, here in included:
-            inner = path.parent / name
-            if inner.is_file():
-                self.read(inner, None, here)
+            for inner in {path.parent / name, self._file.parent / name}:  # MuJoCo looks in both
+                if inner.is_file():
+                    self.read(inner, None, here)
 
     def _add(self, elements: int, cells: int, path: pathlib.Path, tag: str) -> None:
         self._elements += elements
