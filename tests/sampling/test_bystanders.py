@@ -9,13 +9,16 @@ import pytest
 
 import ig2mj
 from ig2mj.agents import Fetch
+from ig2mj.envs.registry import find_task
 from ig2mj.errors import StateError
 from ig2mj.sampling.bystanders import MOVED, Bystanders
 from ig2mj.sampling.conditions import read_conditions
 from ig2mj.sampling.joints import JointMover
-from ig2mj.sampling.many import make_sampler
+from ig2mj.sampling.many import make_sampler, sample_row
 from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.query import SceneQuery
+from ig2mj.tasks.pools import bare_scene
+from ig2mj.tasks.task import Task
 
 BEFORE_THE_CABINET = (1.1, -0.15, 0.05)
 """Of the box's middle: the door sweeps over it, and the drawer passes above."""
@@ -182,3 +185,15 @@ def test_a_door_is_not_opened_into_a_robot(tiny_home_folder):
         reasons.update(simulation.last_sampling)
         assert np.linalg.norm(np.array(simulation.view.agent.base_pos[0, 0]) - before) <= MOVED
     assert reasons["cabinet: moves others"] > 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["SlicingFruit", "CookingMeat", "GraspingBook"])
+def test_start_states_of_activities_do_not_depend_on_the_copy(name, monkeypatch):
+    """Pools are sampled in homes at rest: the states of shipped policies' evaluations are what they were without it."""
+    monkeypatch.setattr(Bystanders, "_unchanged", lambda self: pytest.fail("the copy was asked"))
+    task = find_task(name)
+    assert isinstance(task, Task)
+    sampler = make_sampler(bare_scene(task))
+    made = [sample_row(sampler, read_conditions(task.start), 2_000_003, number)[0] for number in range(4)]
+    assert any(row is not None for row in made)

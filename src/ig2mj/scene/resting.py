@@ -41,7 +41,10 @@ def rest(
     Returns:
       Positions in the same order: those of an object that does not stir, or does not come to rest, unchanged.
     """
-    model = mujoco.MjModel.from_xml_string(ElementTree.tostring(_extract(root, slab, bodies), encoding="unicode"))
+    try:
+        model = mujoco.MjModel.from_xml_string(ElementTree.tostring(_extract(root, slab, bodies), encoding="unicode"))
+    except ValueError:  # what MuJoCo cannot read is reported when the whole scene is compiled
+        return np.array(start, float)
     model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_SLEEP
     data = mujoco.MjData(model)
     tree, joints = model.body_treeid, model.jnt_bodyid
@@ -75,7 +78,9 @@ def _extract(
     """MJCF of the slab and the bodies alone, without what is only seen."""
     small = ElementTree.Element("mujoco")
     for tag in ("compiler", "option", "default"):
-        small.extend(root.findall(tag))
+        small.extend(copy.deepcopy(e) for e in root.findall(tag))
+    for geom in small.iter("geom"):
+        geom.attrib.pop("material", None)
     world = ElementTree.Element("worldbody")
     world.append(slab)
     for body in bodies:
