@@ -1,7 +1,7 @@
 """`task_hash`: of the values that define a task, by their names.
 
-Names of classes do not count, nor do the task's own name and sentence, nor values that are a field's default. Names of
-objects count as places among the scene's objects, so that renaming an object changes nothing.
+Names of classes do not count, nor do names of task and home, the task's sentence, and values that are a field's
+default. Names of objects count as places among the scene's objects, so that renaming an object changes nothing.
 """
 
 from __future__ import annotations
@@ -40,9 +40,12 @@ KINDS: dict[type, str] = {
 }
 """What distinguishes classes with the same fields, whatever they are called."""
 
-NOT_HASHED = ("name", "summary", "horizon", "grasping", "physical")
-"""Fields of a task that do not define it, or that a recording names on its own (`horizon`, `grasping`). What differs
-with physical grasping is in the task that `variant` makes of it."""
+NAMES = ("name", "summary", "home")
+"""Fields that name or describe."""
+
+ELSEWHERE = ("objects", "horizon", "grasping", "physical")
+"""Fields of a task that a recording has elsewhere: added objects are part of the scene's hash, and what differs with
+physical grasping is in the task that `variant` makes of it."""
 
 
 def task_hash(task: TaskLike, robot: str = "", objects: Sequence[str] = ()) -> str:
@@ -53,7 +56,7 @@ def task_hash(task: TaskLike, robot: str = "", objects: Sequence[str] = ()) -> s
       objects: names of the scene's objects, in the order of the O axis.
     """
     places = {name: f"#{place}" for place, name in enumerate(objects)}
-    fields = [f for f in dataclasses.fields(task) if f.name not in NOT_HASHED and not _is_default(f, task)]
+    fields = [f for f in dataclasses.fields(task) if f.name not in ELSEWHERE and _counts(f, task)]
     values = {f.name: getattr(task, f.name) for f in fields}
     robots = values.pop("robots", None)
     if isinstance(robots, Mapping):
@@ -86,14 +89,16 @@ def _named(value: Any, places: Mapping[str, str]) -> Any:
     if isinstance(value, Sequence):
         return [_named(v, places) for v in value]
     if dataclasses.is_dataclass(value):
-        own = {f.name: getattr(value, f.name) for f in dataclasses.fields(value) if not _is_default(f, value)}
+        own = {f.name: getattr(value, f.name) for f in dataclasses.fields(value) if _counts(f, value)}
         return {"kind": KINDS.get(type(value), ""), **_named(own, places)}
     return getattr(value, "__qualname__", "")  # of a function
 
 
-def _is_default(field: dataclasses.Field, value: Any) -> bool:
+def _counts(field: dataclasses.Field, value: Any) -> bool:
+    """Whether a field of this value is no name, and differs from its default."""
     default = field.default
     if field.default_factory is not dataclasses.MISSING:
         default = field.default_factory()
     given = getattr(value, field.name)
-    return default is given or (type(default) is type(given) and not isinstance(given, np.ndarray) and default == given)
+    same = type(default) is type(given) and not isinstance(given, np.ndarray) and default == given
+    return field.name not in NAMES and default is not given and not same
