@@ -11,6 +11,7 @@ Images that the files name or hold are opened by `looks` alone, never by the lib
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import io
 import logging
 import pathlib
@@ -86,9 +87,13 @@ def _few(parts: list[MeshPart], file: pathlib.Path, warnings: list[str]) -> list
             joined.uv += part.uv
     if len(looks) <= most:
         return list(looks.values())
-    option = "--limit mesh-materials=N"
-    warnings.append(f"{file.name} has {len(looks)} materials, the limit is {most} ({option}): drawn in one colour")
+    warnings.append(_one_colour(file, len(looks)))
     return [MeshPart([mesh for part in parts for mesh in part.meshes], parts[0].rgba)]
+
+
+def _one_colour(file: pathlib.Path, count: int) -> str:
+    most = limits().mesh_materials
+    return f"{file.name} has {count} materials, the limit is {most} (--limit mesh-materials=N): drawn in one colour"
 
 
 def _suffix(file: pathlib.Path) -> str:
@@ -107,13 +112,18 @@ def _existing(file: pathlib.Path) -> pathlib.Path:
 
 
 def _obj_parts(obj: ObjFile, file: pathlib.Path, textures: TextureReader) -> list[MeshPart]:
+    if (count := len(np.unique(obj.material))) > limits().mesh_materials:
+        textures.warn(_one_colour(file, count))
+        obj = dataclasses.replace(obj, material=np.zeros_like(obj.material), materials=[""])
     materials: dict[str, Material] = {}
+    complete = True
     for library in obj.libraries[:MAX_LIBRARIES]:
         try:
             materials |= read_mtl(textures.guard.resolve(library, textures.element, base=file.parent))
         except InputError as e:
             textures.warn(f"materials of {file.name} are left out: {e}")
-    if unknown := [name for name in obj.materials[1:] if name not in materials]:
+            complete = False
+    if (unknown := [name for name in obj.materials[1:] if name not in materials]) and complete:
         textures.warn(f"{file.name} uses materials that no MTL file defines: {', '.join(unknown[:5])[:200]}")
     images: dict[str, pathlib.Path | None] = {}
     parts = []

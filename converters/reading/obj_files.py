@@ -160,7 +160,8 @@ class _Statements:
 
 def _lines(raw: bytes) -> Iterator[tuple[int, str]]:
     """(number, line) of text in UTF-8; a backslash at its end continues a line. A few MB are decoded at a time."""
-    number, at, waiting, first = 0, 0, "", 0
+    number, at, first = 0, 0, 0
+    waiting: list[str] = []
     while at < len(raw):
         end = raw.find(b"\n", at + 2**22)
         end = len(raw) if end < 0 else end
@@ -168,13 +169,14 @@ def _lines(raw: bytes) -> Iterator[tuple[int, str]]:
             number += 1
             text = line.removesuffix("\r")
             if text.endswith("\\"):
-                waiting, first = f"{waiting}{text[:-1]} ", first or number
+                waiting.append(text[:-1])
+                first = first or number
                 continue
-            yield first or number, waiting + line
-            waiting, first = "", 0
+            yield first or number, " ".join([*waiting, line]) if waiting else line
+            waiting, first = [], 0
         at = end + 1
     if waiting:
-        yield first, waiting
+        yield first, " ".join(waiting)
 
 
 def group_meshes(obj: ObjFile) -> list[Mesh]:
