@@ -86,6 +86,17 @@ class LostWorldError(EngineError):
     """A world's positions or velocities are not finite any more. It stays as it is until it is loaded or reset."""
 
 
+class StaleStateError(Ig2mjError):
+    """A state of worlds that a later step, reset, write or load used up: its worlds have gone on, or its arrays were
+    given back to the device."""
+
+    def __init__(self, what: str = "this state"):
+        super().__init__(
+            f"{what} was used up by a later step, reset, write or load: go on with the state that the last call "
+            "returned, or take a copy before that call with fork(state)"
+        )
+
+
 class ClusterError(Ig2mjError):
     """Processes or machines that are to work together cannot: out of reach, of other versions, or one has died."""
 

@@ -77,7 +77,8 @@ class FrameRows:
         physics, engine = state.batch.world.physics, self._engine
         besides = jax.tree.leaves(_besides_physics(state))
         if isinstance(engine, NativeEngine):
-            return [engine.pieces(physics.worlds[world]) for world in self._worlds], besides
+            worlds = engine.worlds(physics)
+            return [engine.pieces(worlds[world]) for world in self._worlds], besides
         return [], [np.array(leaf) for leaf in (*jax.tree.leaves(engine.snapshot(physics)), *besides)]
 
     def rows(self, state: EnvState) -> list[list[np.ndarray]]:

@@ -4,9 +4,10 @@ Nothing above this package asks which engine it has. Two things differ between e
 attributes:
 
 - `pure` engines (MJX) have a `Physics` that is a pytree; all methods but `export` may be called under `jax.jit`,
-  `lax.scan` and sharding, and return new pytrees. The native engine (C MuJoCo) has a stateful handle: `step`, `write`
-  and `load` change it in place and return the same handle. Code that always goes on with the returned physics, and
-  never uses the old one again, is right for both.
+  `lax.scan` and sharding, and return new pytrees. The native engine (C MuJoCo) changes its worlds in place: `step`,
+  `write` and `load` return a new handle on them, and every later use of an older handle raises StaleStateError. Code
+  that always goes on with the returned physics, and never uses the old one again, is right for both. `fork` gives an
+  independent copy on both.
 - `num_worlds` is fixed when the engine is made.
 
 Axes: W worlds, O objects, H hands, B bodies, U units (see `ig2mj.engine.layout`), E equality constraints, nq, nv, nu,
@@ -24,6 +25,7 @@ from jaxtyping import Bool, Float
 
 from ig2mj.engine.health import Health
 from ig2mj.engine.model_fields import ModelFields
+from ig2mj.engine.saved import SavedPhysics
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
@@ -201,6 +203,40 @@ class Engine(Protocol):
           snapshot: with the world axis: row w goes to world w. Without it: goes to every world. One of the bare scene
             leaves the agents at their start.
           mask: the worlds to replace; None: all.
+        """
+        ...
+
+    def check(self, physics: Physics) -> None:
+        """Raises StaleStateError: the physics was used up by a later step, reset, write or load, in place or since its
+        arrays were donated to a program. All methods that take physics raise it as well. Nothing while tracing."""
+        ...
+
+    def current(self, physics: Physics) -> Physics:
+        """Physics to go on with where a call did not return: on the native engine the worlds as that call left them,
+        whatever the handle stands for; on others the same physics."""
+        ...
+
+    def fork(self, physics: Physics) -> Physics:
+        """An independent copy, which goes on as the original would. The original stays valid. Not traced.
+
+        Raises:
+          StaleStateError: the physics was used up.
+        """
+        ...
+
+    def saved(self, physics: Physics) -> SavedPhysics:
+        """All worlds in NumPy arrays that share no memory with the engine; see `restored`. Not traced.
+
+        Raises:
+          StaleStateError: the physics was used up.
+        """
+        ...
+
+    def restored(self, saved: SavedPhysics) -> Physics:
+        """New worlds that go on from saved ones, of this engine or of another one. Not traced.
+
+        Raises:
+          EngineError: they are of another scene, of other agents or of another number of worlds.
         """
         ...
 

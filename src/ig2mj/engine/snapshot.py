@@ -22,7 +22,7 @@ from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.model_fields import ModelFields, given
-from ig2mj.engine.view import Array
+from ig2mj.engine.view import Array, counted, length
 from ig2mj.errors import EngineError
 
 FORMAT_VERSION = 2
@@ -110,6 +110,9 @@ class Snapshot:
     agents: AgentsPart
     time: Float[Array, "*W"]
     model_fields: ModelFields = ModelFields()
+
+    def __repr__(self) -> str:
+        return counted(self, worlds=length(self.time), coordinates=length(self.scene.qpos, -1))
 
     def whole(self, name: str) -> Array:
         """One of MuJoCo's arrays (`AXIS`), of scene and agents together. To change it: `with_whole`."""

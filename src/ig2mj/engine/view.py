@@ -46,6 +46,23 @@ class _MadeLater:
             array = self.__dict__[name] = later(name)
             return array
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copies and pickles have all fields; what makes fields later belongs to an engine."""
+        names = [field.name for field in dataclasses.fields(typing.cast(Any, self))]
+        return type(self), tuple(getattr(self, name) for name in names)
+
+
+def counted(thing: Any, **counts: int | None) -> str:
+    """A short `repr`: the class and how many of what it has, e.g. `Batch(3 worlds)`. None is left out."""
+    facts = (f"{n} {what if n != 1 else what.rstrip('s')}" for what, n in counts.items() if n is not None)
+    return f"{type(thing).__name__}({', '.join(facts)})"
+
+
+def length(array: Any, axis: int = 0) -> int | None:
+    """How long an axis is; None where it is no array with such an axis. Never reads the array."""
+    shape = getattr(array, "shape", ())
+    return int(shape[axis]) if len(shape) > axis else None
+
 
 @struct.dataclass
 class AgentView(_MadeLater):
@@ -73,6 +90,9 @@ class AgentView(_MadeLater):
         "any physics step of this control step"
     )
     touching: Bool[Array, "W A O"] = _field("any part of the agent touches the object; as `touching` of objects")
+
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}(agents, hands and fingers)"
 
 
 @struct.dataclass
@@ -109,6 +129,11 @@ class PhysicsView(_MadeLater):
     awake: Bool[Array, "W O"] = _field("some body of the object moves or may move now; never where it has no joints")
     held: Bool[Array, "W H O"] = _field("a grasp equality of the hand is active on the object")
     agent: AgentView = _field("agents, hands and fingers")
+
+    def __repr__(self) -> str:
+        pos = self.__dict__.get("object_pos")
+        bodies = length(self.__dict__.get("body_pos"), 1)
+        return counted(self, worlds=length(pos), objects=length(pos, 1), bodies=bodies)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -58,7 +58,7 @@ class NumpyEnv:
         if seed is not None or self.state is None:
             self.state = self.env.reset(0 if seed is None else seed)
         else:
-            self.state = self.env.reset(self.state, mask)
+            self.state = self.env.reset(self.env.current(self.state) if mask is None else self.state, mask)
         return self._tree(self.state.obs), self._tree(self.state.info)
 
     def step(self, action: Any) -> Step:

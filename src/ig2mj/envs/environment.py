@@ -7,7 +7,9 @@
 
 An agent step is 1/10 s unless `make` is given another period: three control steps of the core, the action held in
 all of them. What the core can compile is compiled, and so is this: on a pure engine `step_fn` and `reset_fn` may be
-part of a program of your own. A state that was passed to a method is used up; continue with the one that it returns.
+part of a program of your own. A state that was passed to `step` or `reset` is used up: continue with the one that is
+returned. Using it again raises StaleStateError, on every engine; `fork` copies a state first, to branch. Inside a
+compiled program of your own states are values, and may be used again; one that your program donates is gone.
 
 Success ends an episode, and so does what a task calls failure (`terminated`). The horizon truncates it, and so do
 guards, since results of a world with numbers that are not finite are meaningless (`ig2mj.worlds.guards`).
@@ -29,9 +31,11 @@ from jaxtyping import Bool, Float, Int, UInt
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.engine.base import Physics
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.envs.checks import checked_action
+from ig2mj.envs.copies import StateCopies
 from ig2mj.envs.observations import Observer, Space, chosen
 from ig2mj.envs.state import EnvState, Seen
-from ig2mj.errors import ActionError, EngineError
+from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.process.collector import REST, Compiled, compile_together
 from ig2mj.scene.scene import Scene
@@ -43,16 +47,15 @@ from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.lazy.of_view import OfView
 from ig2mj.worlds.pool import Pool
-from ig2mj.worlds.random_streams import pick_rows
+from ig2mj.worlds.random_streams import Seed, as_seed, pick_rows
 
-Seed = int | np.integer | Array
-"""A whole number, or a key of JAX."""
+__all__ = ["Companions", "EnvState", "Environment", "Seed", "as_seed"]
 
 Companions = Callable[[UInt[Array, "W 2"], Int[Array, "W"]], Float[Array, "W m"]]
 """Actions of the other robots, from the episode's key and the number of the agent step. Pure."""
 
 
-class Environment:
+class Environment(StateCopies):
     """See the module's text; `ig2mj.make` makes one.
 
     Attributes:
@@ -105,11 +108,12 @@ class Environment:
         compiled = jax.jit if core.engine.pure else OfView
         self._see, self._see_first = compiled(self._after_step), compiled(self._after_reset)
         if core.engine.pure:
-            self._step = Compiled(self.step_fn, donate_argnums=0)
-            self._reset = Compiled(self.reset_fn, donate_argnums=0)
-            self._autoreset = Compiled(self.step_autoreset_fn, donate_argnums=0)
+            self._step = Compiled(self.step_fn, self.check, donate_argnums=0)
+            self._reset = Compiled(self.reset_fn, self.check, donate_argnums=0)
+            self._autoreset = Compiled(self.step_autoreset_fn, self.check, donate_argnums=0)
             self._start: Any = Compiled(self._start_fn, donate_argnums=0)
-            self._load, self._resume = Compiled(self._load_fn, donate_argnums=0), Compiled(self._begun)
+            self._load = Compiled(self._load_fn, donate_argnums=0)
+            self._resume = Compiled(self._begun, self.core.check)
         else:
             self._step, self._reset, self._start = self.step_fn, self.reset_fn, self._start_fn
             self._autoreset, self._load, self._resume = self.step_autoreset_fn, self._load_fn, self._begun
@@ -152,7 +156,7 @@ class Environment:
         Raises:
           ActionError: the action has another shape, is not of numbers, or is NumPy's and has some that are not finite.
         """
-        return self._step(state, self._checked(action))
+        return self._step(state, checked_action(self, action))
 
     def step_fn(self, state: EnvState, action: Float[Array, "W n"]) -> EnvState:
         """`step`, neither checked nor compiled."""
@@ -179,7 +183,7 @@ class Environment:
         by name. Reward, `terminated`, `truncated` and the rest of `info` are of the episode that ended. Do not change
         between this and `step` in a compiled loop: here `info` has one key more.
         """
-        return self._autoreset(state, self._checked(action))
+        return self._autoreset(state, checked_action(self, action))
 
     def step_autoreset_fn(self, state: EnvState, action: Float[Array, "W n"]) -> EnvState:
         """`step_autoreset`, neither checked nor compiled."""
@@ -368,32 +372,9 @@ class Environment:
         total = jnp.stack([terms[name] for name in self.objective.terms]).sum(0)
         return Seen(obs, total, terminated, truncated, info, measures, status)
 
-    # Bad input.
-
-    def _checked(self, action: Array) -> Float[Array, "W n"]:
-        wanted = (self.num_worlds, self._map.size)
-        if np.shape(action) != wanted:
-            raise ActionError(f"an action of {self.task.name} has shape {wanted}, not {np.shape(action)}")
-        if not isinstance(action, jax.Array):
-            action = np.asarray(action)
-        if not (jnp.issubdtype(action.dtype, jnp.floating) or jnp.issubdtype(action.dtype, jnp.integer)):
-            raise ActionError(f"an action is of real numbers, not of {action.dtype}")
-        if isinstance(action, np.ndarray) and not (fine := np.isfinite(action)).all():
-            world, number = np.argwhere(~fine)[0]
-            name = self.action_names[number]
-            raise ActionError(f"{name} of the action of world {world} is not finite: {action[world, number]}")
-        return (action.clip(-1.0, 1.0) if isinstance(action, np.ndarray) else action).astype(np.float32)
-
     def metrics(self, state: EnvState) -> dict[str, int]:
         """Episodes begun, worlds flagged by `guards.Flag`, and numbers of actions that were not finite. On the host."""
         return {**self.core.metrics(state.batch), "bad_actions": int(np.asarray(state.bad_actions).sum())}
 
     def close(self) -> None:
         """Nothing is left open; may be called twice."""
-
-
-def as_seed(seed: Seed) -> int | Int[Array, ""]:
-    """A seed of 31 bits from a number or a key of JAX."""
-    if isinstance(seed, jax.Array) and (jnp.issubdtype(seed.dtype, jax.dtypes.prng_key) or seed.ndim == 1):
-        return (jax.random.bits(seed, (), jnp.uint32) >> 1).astype(jnp.int32)
-    return int(seed) % 2**31 if isinstance(seed, int | np.integer) else jnp.asarray(seed, jnp.int32)

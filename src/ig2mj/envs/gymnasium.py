@@ -65,7 +65,7 @@ class GymEnv(gymnasium.Env):
         if seed is not None or self.state is None:
             self.state = self.env.reset(int(self.np_random.integers(2**31)) if seed is None else seed)
         else:
-            self.state = self.env.reset(self.state)
+            self.state = self.env.reset(self.env.current(self.state))
         return self._obs(), self._info()
 
     def step(self, action: np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
@@ -129,7 +129,7 @@ class GymVectorEnv(gymnasium.vector.VectorEnv):
         elif seed is not None or self.state is None:
             self.state = self.env.reset(int(self.np_random.integers(2**31)) if seed is None else seed)
         else:
-            self.state = self.env.reset(self.state)
+            self.state = self.env.reset(self.env.current(self.state))
         return _host(self.state.obs), self._info(self.state.info)
 
     def step(

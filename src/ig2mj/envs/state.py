@@ -10,7 +10,7 @@ from typing import Any
 from flax import struct
 from jaxtyping import Bool, Float, Int
 
-from ig2mj.engine.view import Array
+from ig2mj.engine.view import Array, length
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.sensors.base import Memory
 from ig2mj.tasks.objective import Measures
@@ -49,6 +49,14 @@ class EnvState:
     def done(self) -> Bool[Array, "W"]:
         """The episode is over."""
         return self.terminated | self.truncated
+
+    def __repr__(self) -> str:
+        """Shapes only: nothing is read, so that it is quick and works for a state that was used up."""
+        physics = getattr(getattr(self.batch, "world", None), "physics", None)
+        stale = ", used up" if getattr(physics, "is_stale", bool)() else ""
+        obs = self.obs.items() if isinstance(self.obs, dict) else ()
+        shapes = (f"{name} {getattr(a, 'dtype', '?')}{list(getattr(a, 'shape', ()))}" for name, a in obs)
+        return f"EnvState({length(self.reward)} worlds{stale}; obs: {', '.join(shapes)})"
 
 
 @struct.dataclass

@@ -60,13 +60,20 @@ class Compiled:
     For programs that take a millisecond or more: a call takes half a microsecond longer.
     """
 
-    def __init__(self, function: Callable[..., Any], **options: Any):
-        """`options`: of `jax.jit`."""
+    def __init__(self, function: Callable[..., Any], check: Callable[[Any], None] | None = None, **options: Any):
+        """
+        Args:
+          check: called with the first argument before every call.
+          options: of `jax.jit`.
+        """
         import jax
 
         self._compiled: Any = jax.jit(function, **options)
+        self._check = check
 
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
+        if self._check is not None:
+            self._check(args[0])
         with REST:
             return self._compiled(*args, **kwargs)
 

@@ -61,8 +61,8 @@ class SceneQuery:
         return self.engine.export(self.physics, 0)
 
     def load(self, snapshot: Snapshot) -> None:
-        """Goes back to a state that `save` gave."""
-        self.physics = self.engine.load(self.physics, snapshot)
+        """Goes back to a state that `save` gave, also after a step in which the world was lost."""
+        self.physics = self.engine.load(self.engine.current(self.physics), snapshot)
 
     def level(self, window: Window, height: float, without: Collection[int] = ()) -> Level:
         """What a window of vertical columns looks like from a height; see `ColumnMap.level`."""

@@ -115,7 +115,7 @@ class Disturber:
         What a turn gives depends on its number, the seed, the share and the number of worlds, not on turns before it.
         """
         engine, first = self._engine, turn * self._width
-        physics = engine.load(self._physics, self._start)
+        physics = engine.load(engine.current(self._physics), self._start)  # a turn may have ended with an error
         world = jnp.arange(first, first + self._width)
         key = episode_keys(seed, world, jnp.zeros_like(world))
         write = jax.device_get(perturb(self._scene.tables, self._loose, engine.view(physics), key, share))

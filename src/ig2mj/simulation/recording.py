@@ -111,7 +111,7 @@ class SimulationRecorder:
         engine = self._engine
         besides = jax.tree.leaves(_besides(self._simulation, states, steps))
         if isinstance(engine, NativeEngine):
-            return [[engine.pieces(physics.worlds[0])], besides]
+            return [[engine.pieces(engine.worlds(physics)[0])], besides]
         return [[], [np.array(leaf) for leaf in (*jax.tree.leaves(engine.snapshot(physics)), *besides)]]
 
 

@@ -35,6 +35,7 @@ from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.setters import lacks, set_by_name
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.simulation import pictures
+from ig2mj.simulation.own_world import OwnWorld
 from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_pose
 from ig2mj.simulation.recording import Recorded
 from ig2mj.simulation.robots import RobotsOfWorld, after_write, put_row, remembered
@@ -49,7 +50,7 @@ from ig2mj.worlds.rules import Rules
 from ig2mj.worlds.worlds import controllers_of, grasping_of
 
 
-class Simulation(Recorded):
+class Simulation(OwnWorld, Recorded):
     """One world of a scene on any engine.
 
     Attributes:

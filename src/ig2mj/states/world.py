@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from flax import struct
 from jaxtyping import Float, Int, UInt
 
-from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.engine.view import Array, PhysicsView, counted, length
 from ig2mj.states.registry import SPECS
 from ig2mj.states.spec import Cut
 from ig2mj.states.swap import Swap
@@ -42,6 +42,10 @@ class ExtendedStates(_Fields):
                 taken.update(spec.inherit(self, cut))
         return dataclasses.replace(self, **taken)
 
+    def __repr__(self) -> str:
+        temperature = getattr(self, "temperature", None)
+        return counted(self, worlds=length(temperature), objects=length(temperature, 1))
+
 
 @struct.dataclass
 class WorldState:
@@ -58,6 +62,9 @@ class WorldState:
     key: UInt[Array, "W 2"]
     step: Int[Array, "W"]
     time: Float[Array, "W"]
+
+    def __repr__(self) -> str:
+        return counted(self, worlds=length(self.step))
 
 
 __all__ = ["ExtendedStates", "Swap", "WorldState"]

@@ -11,7 +11,7 @@ from flax import struct
 from jaxtyping import Int
 
 from ig2mj.agents.grasping import GraspState
-from ig2mj.engine.view import Array
+from ig2mj.engine.view import Array, counted, length
 from ig2mj.states.world import WorldState
 
 
@@ -36,3 +36,6 @@ class Batch:
     episode: Int[Array, "W"]
     flags: Int[Array, "W"]
     troubles: Int[Array, "W K"]
+
+    def __repr__(self) -> str:
+        return counted(self, worlds=length(self.number))

@@ -8,8 +8,9 @@
 A control step is, in this order: the robots' controllers, physics, the view of it, extended states and the goal, what
 slicing moves, what hands take hold of and let go of, guards, clocks. It is the same for every engine. On a pure engine
 (see `ig2mj.engine.base`) the methods are compiled; on the native one they work on the engine's worlds in place, and
-states are only computed where something can have changed (`ig2mj.worlds.lazy`). Either way a batch that was given to a
-method is used up: go on with the one that it returns.
+states are only computed where something can have changed (`ig2mj.worlds.lazy`). Either way a batch that was given to
+`step`, `reset`, `rollout`, `write` or `load` is used up: go on with the one that is returned. A batch that was used up
+raises StaleStateError; `fork` copies one first.
 
 `step_fn`, `reset_fn` and `start_fn` are the same functions, not compiled: call them inside your own `jax.jit` or
 `lax.scan` on a pure engine, or directly on any.
@@ -42,6 +43,7 @@ from ig2mj.process.collector import REST, Compiled, compile_together
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
 from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Batch
+from ig2mj.worlds.branches import call, cond_any, forked
 from ig2mj.worlds.controls import Controls
 from ig2mj.worlds.eyes import Eyes
 from ig2mj.worlds.hand_resets import HandResets
@@ -98,21 +100,21 @@ class Core:
         self._chosen = jax.jit(chosen)
         if engine.pure:
             self.advance, self.grasp = Compiled(self.advance_fn), jax.jit(self.hands.act)
-            self._step: Any = Compiled(self.step_fn, donate_argnums=0)
-            self._reset = Compiled(self.reset_fn, donate_argnums=0)
-            self._rollout = Compiled(self._scanned, static_argnums=(2, 3), donate_argnums=(0, 1))
+            self._step: Any = Compiled(self.step_fn, self.check, donate_argnums=0)
+            self._reset = Compiled(self.reset_fn, self.check, donate_argnums=0)
+            self._rollout = Compiled(self._scanned, self.check, static_argnums=(2, 3), donate_argnums=(0, 1))
             self._begin: Any = Compiled(self.start_fn, donate_argnums=0)
-            self._write = Compiled(self.write_fn, donate_argnums=0)
-            self._load = Compiled(self.load_fn, donate_argnums=0)
+            self._write = Compiled(self.write_fn, self.check, donate_argnums=0)
+            self._load = Compiled(self.load_fn, self.check, donate_argnums=0)
             self._react = rules.step if rules is not None else self._no_rules
-            self._if_any, self._index = _cond_any, jnp.asarray
+            self._if_any, self._index = cond_any, jnp.asarray
         else:
             self.advance, self.grasp = self.advance_fn, self.hands.act
             self._step, self._reset = self.step_fn, self.reset_fn
             self._rollout, self._begin = self._looped, self.start_fn
             self._write, self._load = self.write_fn, self.load_fn
             self._react = StateStepper.of(rules, engine.num_worlds).step if rules is not None else self._no_rules
-            self._if_any, self._index = _call, np.asarray
+            self._if_any, self._index = call, np.asarray
         self._no_status = GoalStatus.empty(engine.num_worlds)
 
     # A control step.
@@ -378,6 +380,15 @@ class Core:
         world = dataclasses.replace(batch.world, physics=physics, view=view, states=states)
         return dataclasses.replace(batch, world=world)
 
+    def check(self, batch: Batch) -> None:
+        """Raises StaleStateError: the batch was used up. Nothing while tracing."""
+        self.engine.check(batch.world.physics)
+
+    def fork(self, batch: Batch) -> Batch:
+        """An independent copy, which goes on as the batch does; not for compiled programs. Raises StaleStateError."""
+        self.check(batch)
+        return forked(self.engine, batch)
+
     # What went wrong.
 
     def metrics(self, batch: Batch) -> dict[str, int]:
@@ -387,12 +398,3 @@ class Core:
     def raise_flagged(self, batch: Batch) -> None:
         """Raises EngineError for the first flagged world, naming world, flag and the setting to raise. On the host."""
         guards.raise_first(batch.flags, self.engine.health(batch.world.physics).overflow)
-
-
-def _cond_any(mask: Bool[Array, "W"], act: Callable[..., Any], *operands: Any) -> Any:
-    return jax.lax.cond(mask.any(), act, lambda *same: same, *operands)
-
-
-def _call(mask: Bool[Array, "W"], act: Callable[..., Any], *operands: Any) -> Any:
-    """`_cond_any` beside the native engine, where nothing is asked for unless a world is chosen."""
-    return act(*operands)

@@ -22,7 +22,7 @@ from jaxtyping import Int
 
 from ig2mj.engine.layout import make_layout
 from ig2mj.engine.snapshot import Snapshot
-from ig2mj.engine.view import Array
+from ig2mj.engine.view import Array, counted, length
 from ig2mj.errors import InputError
 from ig2mj.scene.additions import Addition
 from ig2mj.scene.library import find_model
@@ -51,6 +51,9 @@ class Pool:
     physics: Snapshot
     states: ExtendedStates
     digest: str | None = struct.field(pytree_node=False, default=None)
+
+    def __repr__(self) -> str:
+        return counted(self, rows=length(self.physics.time))
 
     @property
     def size(self) -> int:

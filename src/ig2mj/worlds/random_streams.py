@@ -4,9 +4,20 @@ from __future__ import annotations
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Int, UInt
 
 from ig2mj.engine.view import Array
+
+Seed = int | np.integer | Array
+"""A whole number, or a key of JAX."""
+
+
+def as_seed(seed: Seed) -> int | Int[Array, ""]:
+    """A seed of 31 bits from a number or a key of JAX."""
+    if isinstance(seed, jax.Array) and (jnp.issubdtype(seed.dtype, jax.dtypes.prng_key) or seed.ndim == 1):
+        return (jax.random.bits(seed, (), jnp.uint32) >> 1).astype(jnp.int32)
+    return int(seed) % 2**31 if isinstance(seed, int | np.integer) else jnp.asarray(seed, jnp.int32)
 
 
 def episode_keys(seed: Int[Array, ""] | int, world: Int[Array, "W"], episode: Int[Array, "W"]) -> UInt[Array, "W 2"]:

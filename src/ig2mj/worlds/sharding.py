@@ -37,6 +37,9 @@ class Shards:
 
     parts: tuple[Batch, ...]
 
+    def __repr__(self) -> str:
+        return f"Shards({', '.join(map(repr, self.parts))})"
+
 
 class ShardedWorlds:
     """The functions of a core, over several devices. They use up the shards they are given."""
@@ -96,6 +99,10 @@ class ShardedWorlds:
         """New episodes in the masked worlds of this process."""
         local = self._split(mask)
         return Shards(tuple(self._each(lambda k: self.local.reset(shards.parts[k], local[k]))))
+
+    def fork(self, shards: Shards) -> Shards:
+        """An independent copy, each part on its device. Raises StaleStateError."""
+        return Shards(tuple(self._each(lambda k: self.local.fork(shards.parts[k]))))
 
     def gather(self, shards: Shards, read: Callable[[Batch], Any]) -> Any:
         """What `read` takes of every part, as arrays over this process's worlds, sharded over its devices.

@@ -98,6 +98,10 @@ class Worlds:
         """Starts a new episode in the masked worlds, from a random row of the pool. Uses up the batch."""
         return self.core.reset(batch, mask)
 
+    def fork(self, batch: Batch) -> Batch:
+        """An independent copy of a batch, for planners and branches; see `Core.fork`."""
+        return self.core.fork(batch)
+
     def metrics(self, batch: Batch) -> dict[str, int]:
         """Episodes begun, and how often worlds were flagged, by `guards.Flag`. On the host."""
         return self.core.metrics(batch)

@@ -24,7 +24,8 @@ from ig2mj.engine.controls import check_shape, clip
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.mjx.contacts import Contacts, larger_forces, no_forces, touching_units, without_ignored
-from ig2mj.engine.mjx.physics import STATE_FIELDS, MjxPhysics, all_units, mujoco_of, uncommitted
+from ig2mj.engine.mjx.copying import MjxCopies
+from ig2mj.engine.mjx.physics import STATE_FIELDS, MjxPhysics, all_units, fresh, mujoco_of, uncommitted
 from ig2mj.engine.mjx.view import Moved, ViewPlan, make_view, plan_view
 from ig2mj.engine.mjx.writing import after_release, apply_write, reaches, trees_joined, with_islands
 from ig2mj.engine.model_fields import MOVING, ModelFields, check_names, check_written, given, merged, own_fields
@@ -39,7 +40,7 @@ from ig2mj.process.collector import Compiled, Traced
 from ig2mj.scene.scene import Scene
 
 
-class MjxEngine(abc.ABC):
+class MjxEngine(MjxCopies, abc.ABC):
     """The `Engine` protocol on MJX; subclasses choose the implementation. See `ig2mj.engine.base`.
 
     Contacts of the view are those of the last physics step, that is of positions 1/120 s before the poses, as in
@@ -151,7 +152,7 @@ class MjxEngine(abc.ABC):
 
     def step(self, physics: MjxPhysics, ctrl: Float[Array, "W nu"] | None = None) -> tuple[MjxPhysics, PhysicsView]:
         """One control step of every world; see `Engine.step`."""
-        data = physics.data
+        data = fresh(physics).data
         wrong_controls = physics.wrong_controls
         if ctrl is not None:
             check_shape(ctrl, self.num_worlds, self.host_model.nu)
@@ -188,11 +189,11 @@ class MjxEngine(abc.ABC):
 
     def view(self, physics: MjxPhysics) -> PhysicsView:
         """The view of the present state."""
-        return self._view(physics)
+        return self._view(fresh(physics))
 
     def time(self, physics: MjxPhysics) -> Float[Array, "W"]:
         """Simulated seconds since each world's reset."""
-        return physics.data.time
+        return fresh(physics).data.time
 
     def write(self, physics: MjxPhysics, write: Write) -> MjxPhysics:
         """Applies a change; see `Engine.write`.
@@ -200,7 +201,7 @@ class MjxEngine(abc.ABC):
         Changes of constraints and of ignored contacts alone cost next to nothing, since no position depends on them.
         Everything else costs a forward pass of all worlds where any world is written to.
         """
-        data, old = physics.data, given(physics.fields)
+        data, old = fresh(physics).data, given(physics.fields)
         asleep = jnp.asarray(self._tree_asleep(data))
         qpos, qvel, woken = apply_write(self.layout, self.host_model, data.qpos, data.qvel, write)
         eq_active, ignored = after_release(self.layout, write, data.eq_active, physics.ignored)
@@ -249,7 +250,7 @@ class MjxEngine(abc.ABC):
 
     def snapshot(self, physics: MjxPhysics) -> Snapshot:
         """All worlds as a snapshot with the world axis."""
-        data, count = physics.data, self.layout.num_object_units
+        data, count = fresh(physics).data, self.layout.num_object_units
         fields = {name: getattr(data, name) for name in STATE_FIELDS}
         fields["eq_active"] = fields["eq_active"].astype(bool)
         return make_snapshot(
@@ -266,7 +267,7 @@ class MjxEngine(abc.ABC):
         """One world as a snapshot in numpy arrays of its own."""
         if not 0 <= world < self.num_worlds:
             raise EngineError(f"there is no world {world}: this engine has {self.num_worlds}")
-        return jax.tree.map(np.array, self._row(physics, world))
+        return jax.tree.map(np.array, self._row(fresh(physics), world))
 
     def load(self, physics: MjxPhysics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> MjxPhysics:
         """Replaces worlds by snapshots; see `Engine.load`. Raises EngineError where it is of another scene."""
@@ -279,7 +280,7 @@ class MjxEngine(abc.ABC):
             shape = (-1,) + (1,) * (old.ndim - 1)
             return jnp.where(chosen.reshape(shape), new if batched else new[None], old)
 
-        data = physics.data
+        data = fresh(physics).data
         fields = {name: put(snapshot.whole(name), getattr(data, name)) for name in STATE_FIELDS}
         data = data.replace(**fields, time=put(snapshot.time, data.time))
         asleep = put(snapshot.tree_asleep, self._tree_asleep(data))
@@ -298,7 +299,7 @@ class MjxEngine(abc.ABC):
 
     def health(self, physics: MjxPhysics) -> Health:
         """What went wrong in each world; see `ig2mj.engine.health`."""
-        data = physics.data
+        data = fresh(physics).data
         velocity = data.qvel[:, self.layout.object_linear_dofs]
         return Health(
             overflow=physics.overflow,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 from typing import Any
 
 import jax
@@ -11,12 +12,14 @@ import mujoco
 import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float, Int
+from mujoco import mjx
 
 from ig2mj.engine.contact_filter import BitLayers
 from ig2mj.engine.model_fields import ModelFields, given
 from ig2mj.engine.native.sleep import restore_sleep
 from ig2mj.engine.snapshot import AXIS, Snapshot
-from ig2mj.engine.view import Array
+from ig2mj.engine.view import Array, length
+from ig2mj.errors import EngineError, StaleStateError
 from ig2mj.scene.tables import SceneTables
 
 STATE_FIELDS = tuple(name for name in AXIS if name not in ("eq_data", "tree_asleep"))
@@ -44,6 +47,32 @@ class MjxPhysics:
     finger_force: Float[Array, "W F Y"]
     overflow: Int[Array, "W"]
     wrong_controls: Bool[Array, "W"]
+
+    def is_stale(self) -> bool:
+        """Its arrays were donated to a program; false while tracing."""
+        qpos = self.data.qpos
+        return isinstance(qpos, jax.Array) and not isinstance(qpos, jax.core.Tracer) and qpos.is_deleted()
+
+    def __repr__(self) -> str:
+        return f"MjxPhysics({length(self.wrong_controls)} worlds{', stale' * self.is_stale()})"
+
+    def __copy__(self) -> MjxPhysics:
+        return dataclasses.replace(self)
+
+    def __reduce_ex__(self, protocol: Any) -> Any:
+        if self.data.impl is mjx.Impl.WARP:
+            raise EngineError(
+                "a state of the warp engine can neither be pickled nor deep-copied: take a copy with env.fork(state), "
+                "or a file with env.save(state, file)"
+            )
+        return super().__reduce_ex__(protocol)
+
+
+def fresh(physics: MjxPhysics) -> MjxPhysics:
+    """The same physics. Raises StaleStateError where its arrays were donated to a program; nothing while tracing."""
+    if physics.is_stale():
+        raise StaleStateError
+    return physics
 
 
 def all_units(snapshot: Snapshot) -> Bool[Array, "*W U U"]:

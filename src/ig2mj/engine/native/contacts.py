@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import mujoco
@@ -67,6 +68,12 @@ class StepContacts(NamedTuple):
     force: np.ndarray
 
 
+class KnownForces(NamedTuple):
+    """In place of the contacts of a control step: the forces [F, Y] (N) that were computed from them."""
+
+    force: np.ndarray
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class ForcePlan:
     """Constants of a scene, by which contacts whose forces are of interest are found.
@@ -126,11 +133,14 @@ class ForcePlan:
         np.maximum.at(link_force, (self.layout.link_of_geom[own], self.geom_object[other]), normal)
         return len(own) > 0
 
-    def of_fingers(self, steps: list[StepContacts]) -> np.ndarray:
+    def of_fingers(self, steps: Sequence[StepContacts | KnownForces]) -> np.ndarray:
         """Forces [F, Y] (N) of a control step: of each physics step the sum over the contacts of a finger with a
         graspable body, of all of them the largest."""
         if not steps:
             return np.zeros(self.shape, np.float32)
+        if isinstance(steps[0], KnownForces):
+            return steps[0].force
+        steps = [step for step in steps if isinstance(step, StepContacts)]
         number = np.repeat(np.arange(len(steps)), [len(contacts.address) for contacts in steps])
         own, other, normal, row = self._normals(_joined(steps), FINGER)
         total = np.zeros((len(steps), *self.shape), np.float32)
@@ -173,7 +183,7 @@ def _joined(steps: list[StepContacts]) -> StepContacts:
 class FingerForces:
     """`AgentView.finger_force`, computed when somebody reads it first."""
 
-    def __init__(self, plan: ForcePlan, pressing: list[list[StepContacts]]):
+    def __init__(self, plan: ForcePlan, pressing: Sequence[Sequence[StepContacts | KnownForces]]):
         """`pressing`: of each world, contacts of the physics steps of a control step; nobody changes them any more."""
         self._plan, self._pressing = plan, pressing
         self._made: np.ndarray | None = None

@@ -30,101 +30,23 @@ from ig2mj.engine.controls import check_shape
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.model_fields import check_names, check_written, given
-from ig2mj.engine.native.contacts import FingerForces, ForcePlan
-from ig2mj.engine.native.later import RAW, Agents, LaterPlan, ObjectMotion
+from ig2mj.engine.native.contacts import ForcePlan
+from ig2mj.engine.native.later import RAW, LaterPlan
 from ig2mj.engine.native.model_slot import ModelSlot
 from ig2mj.engine.native.one_world import Statics, World
+from ig2mj.engine.native.physics import LiveWorlds, NativePhysics
 from ig2mj.engine.native.recorded import Pieces
 from ig2mj.engine.native.vicinity import Masks, VicinityTable
-from ig2mj.engine.native.view_rows import FIELDS, OF_AGENTS, Changed, PoseRows
+from ig2mj.engine.native.view_rows import FIELDS, Changed, PoseRows
 from ig2mj.engine.native.writing import apply_write
 from ig2mj.engine.object_boxes import make_box_table
+from ig2mj.engine.saved import SavedPhysics
 from ig2mj.engine.snapshot import Snapshot, fitted
 from ig2mj.engine.speed_limits import SpeedLimits
-from ig2mj.engine.view import SCHEMA, AgentView, Array, PhysicsView, axis_sizes
+from ig2mj.engine.view import SCHEMA, Array, PhysicsView, axis_sizes
 from ig2mj.errors import EngineError, LostWorldError
 from ig2mj.process import prepare_jax, prepare_mujoco
 from ig2mj.scene.scene import Scene
-
-
-class NativePhysics:
-    """The native engine's handle: all worlds, changed in place by `step`, `write` and `load`.
-
-    Attributes:
-      worlds: one `World` each. arrays: [W, ...] working arrays, by field of the view; never handed out.
-      view: the view last made; while nothing moves, the same object is handed out again.
-    """
-
-    def __init__(self, worlds: list[World], arrays: dict[str, np.ndarray], statics: Statics):
-        self.worlds, self.arrays, self.later, self.forces = worlds, arrays, statics.later, statics.forces
-        self.view: PhysicsView | None = None
-        self.of_agents: Agents  # what makes the fields of the view's agents
-        self.of_fingers: FingerForces
-
-    def update(self, changed: int) -> PhysicsView:
-        """The view of the present state: copies of what changed, the old arrays for the rest."""
-        if self.view is None:
-            self.view, changed = PhysicsView.__new__(PhysicsView), Changed.ALL
-            self.view.__dict__["agent"] = AgentView.__new__(AgentView)
-        elif changed:
-            self.view = _copied(self.view)
-        if changed:
-            arrays, fields = self.arrays, self.view.__dict__
-            for name in _fields_of(changed):
-                fields[name] = arrays[name].copy()
-            if changed & Changed.OBJECTS:
-                _make_later(
-                    self.view, _VELOCITIES, ObjectMotion(self.later, arrays["qvel"].copy(), fields["object_quat"])
-                )
-            if changed & ~OF_AGENTS:
-                fields["_but_agents"] = object()
-            if changed & OF_AGENTS:
-                fields["agent"] = self._agents(self.view.agent, fields, changed)
-        return self.view
-
-    def _agents(self, before: AgentView, fields: dict[str, Any], changed: int) -> AgentView:
-        known = before.__dict__
-        agent = object.__new__(AgentView)
-        kept = agent.__dict__
-        if changed & Changed.AGENT:
-            contacts = [world.agent_contacts for world in self.worlds]
-            raw = self.arrays[RAW].copy()
-            self.of_agents = Agents(self.later, fields["body_pos"], fields["body_quat"], raw, contacts)
-            if "finger_force" in known:
-                kept["finger_force"] = known["finger_force"]
-        else:
-            kept.update(known)
-        if changed & Changed.FINGERS:  # worlds change no list that stands here
-            self.of_fingers = FingerForces(self.forces, [world.pressing for world in self.worlds])
-            kept.pop("finger_force", None)
-        kept["_later"] = self._of_both()
-        return agent
-
-    def _of_both(self) -> Callable[[str], np.ndarray]:
-        agents, fingers = self.of_agents, self.of_fingers
-        return lambda name: fingers() if name == "finger_force" else agents(name)
-
-
-_VELOCITIES = ("object_linvel", "object_angvel")
-
-
-def _copied(view: PhysicsView) -> PhysicsView:
-    """A view of the same arrays; the constructor of a frozen dataclass costs more than to copy what changed."""
-    new = object.__new__(PhysicsView)
-    new.__dict__.update(view.__dict__)
-    return new
-
-
-def _make_later(view: PhysicsView, names: tuple[str, ...], later: Callable[[str], np.ndarray]) -> None:
-    fields = view.__dict__
-    for name in names:
-        fields.pop(name, None)
-    fields["_later"] = later
-
-
-@functools.cache
-def _fields_of(changed: int) -> tuple[str, ...]:
-    return tuple(name for name, group in FIELDS.items() if group & changed)
 
 
 class NativeEngine:
@@ -213,16 +135,18 @@ class NativeEngine:
 
     def reset(self) -> NativePhysics:
         """New worlds at the scene's initial state: its first keyframe, else the zero pose; everything awake."""
+        live = self._new_worlds()
+        live.update(self._run(live, World.start))
+        return live.current()
+
+    def _new_worlds(self) -> LiveWorlds:
         arrays = self._working_arrays(self.num_worlds)
         worlds = [
             World(self._statics, self._slots[share], self._masks[share], {n: a[w] for n, a in arrays.items()}, int(w))
             for share, numbers in enumerate(self._shares)
             for w in numbers
         ]
-        physics = NativePhysics(worlds, arrays, self._statics)
-
-        physics.update(self._run(physics, World.start))
-        return physics
+        return LiveWorlds(worlds, arrays, self._statics)
 
     def first_world(self, initial: Snapshot | None = None) -> tuple[Snapshot, PhysicsView]:
         """What `reset` makes of one world; see `Engine.first_world`.
@@ -251,36 +175,40 @@ class NativeEngine:
     ) -> tuple[NativePhysics, PhysicsView]:
         """One control step of every world; see `Engine.step`. Raises LostWorldError where a world is lost, after the
         others were stepped: who wants them goes on with the same physics and its view."""
+        live = physics._live
+        if live.generation != physics.generation:  # inline: a world at rest steps in under 2 us
+            live = self._live(physics)
         if ctrl is None:
             if self.num_worlds == 1:  # by far the most frequent case, in which a list would be a fifth of the time
-                if physics.view is not None and physics.worlds[0].only_time_passes():
-                    return physics, physics.view
+                if live.view is not None and live.worlds[0].only_time_passes():
+                    return live.changed(), live.view
                 moving = [True]
             else:
-                moving = [not world.only_time_passes() for world in physics.worlds]
-                if physics.view is not None and not any(moving):
-                    return physics, physics.view
-            changed = self._run(physics, lambda w: Changed.NOTHING if w.lost or not moving[w.number] else w.step(None))
+                moving = [not world.only_time_passes() for world in live.worlds]
+                if live.view is not None and not any(moving):
+                    return live.changed(), live.view
+            changed = self._run(live, lambda w: Changed.NOTHING if w.lost or not moving[w.number] else w.step(None))
         else:
             rows = np.asarray(ctrl, np.float64)
             check_shape(rows, self.num_worlds, self._slots[0].model.nu)
-            changed = self._run(physics, lambda w: Changed.NOTHING if w.lost else w.step(rows[w.number]))
-        view = physics.update(changed)
-        for world in physics.worlds:
+            changed = self._run(live, lambda w: Changed.NOTHING if w.lost else w.step(rows[w.number]))
+        view = live.update(changed)
+        for world in live.worlds:
             if world.lost:
                 raise LostWorldError(world.lost)
-        return physics, view
+        return live.changed(), view
 
     def view(self, physics: NativePhysics) -> PhysicsView:
         """The view of the present state; the same object as the last one when nothing changed."""
-        return physics.update(Changed.NOTHING)
+        return self._live(physics).update(Changed.NOTHING)
 
     def time(self, physics: NativePhysics) -> Float[np.ndarray, "W"]:
         """Simulated seconds since each world's reset."""
-        return np.array([world.data.time for world in physics.worlds])
+        return np.array([world.data.time for world in self._live(physics).worlds])
 
     def write(self, physics: NativePhysics, write: Write) -> NativePhysics:
         """Applies a change in place, but to worlds that are lost; see `Engine.write`."""
+        live = self._live(physics)
         check_written(write.model_fields, self._statics.own_fields, self._slots[0].model, self.num_worlds)
         values = {field.name: getattr(write, field.name) for field in dataclasses.fields(Write)}
         values |= {"model_fields": None} | given(write.model_fields)
@@ -291,19 +219,19 @@ class NativeEngine:
                 return Changed.NOTHING
             return apply_write(world, {name: value[world.number] for name, value in rows.items()})
 
-        physics.update(self._run(physics, apply))
-        return physics
+        live.update(self._run(live, apply))
+        return live.changed()
 
     def serve(self, devices: Sequence[Any]) -> None:
         """Nothing: worlds are on the processor."""
 
     def health(self, physics: NativePhysics) -> Health:
         """What went wrong in each world; see `ig2mj.engine.health`. C MuJoCo's buffers grow: nothing overflows."""
-        count = self.num_worlds
+        count, worlds = self.num_worlds, self._live(physics).worlds
         velocity = np.empty((count, *self._free_dofs.shape), np.float32)
         positions = np.empty((count, self._slots[0].model.nq))
         wrong, lost = np.zeros(count, bool), np.zeros(count, bool)
-        for row, world in enumerate(physics.worlds):
+        for row, world in enumerate(worlds):
             velocity[row], positions[row] = world.data.qvel[self._free_dofs], world.data.qpos
             wrong[row], lost[row] = world.wrong_controls, bool(world.lost)
         squares = np.einsum("wnk,wnk->wn", velocity, velocity)
@@ -316,19 +244,21 @@ class NativeEngine:
 
     def snapshot(self, physics: NativePhysics) -> Snapshot:
         """All worlds as a snapshot with the world axis."""
-        return jax.tree.map(lambda *rows: np.stack(rows), *(self.export(physics, w) for w in range(self.num_worlds)))
+        rows = [world.save() for world in self._live(physics).worlds]
+        return jax.tree.map(lambda *arrays: np.stack(arrays), *rows)
 
     def export(self, physics: NativePhysics, world: int) -> Snapshot:
         """One world as a snapshot in float64 numpy arrays of its own."""
-        return physics.worlds[world].save()
+        return self._live(physics).worlds[world].save()
 
     @functools.cached_property
     def pieces(self) -> Pieces:
-        """Takes worlds (`physics.worlds[w]`) as `export` does, in a fraction of its time, for recordings."""
+        """Takes worlds (`worlds(physics)[w]`) as `export` does, in a fraction of its time, for recordings."""
         return Pieces(self._slots[0].model, self.layout, self._statics.own_fields)
 
     def load(self, physics: NativePhysics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> NativePhysics:
         """Replaces worlds in place; see `Engine.load`. Raises EngineError where the snapshot is of another scene."""
+        live = self._live(physics)
         snapshot = jax.tree.map(np.asarray, fitted(snapshot, self._start, self.num_worlds, self.scene.name))
         batched = snapshot.time.ndim == 1
         chosen = np.ones(self.num_worlds, bool) if mask is None else np.asarray(mask, bool)
@@ -338,8 +268,44 @@ class NativeEngine:
                 return Changed.NOTHING
             return world.load(jax.tree.map(lambda a: np.asarray(a[world.number]), snapshot) if batched else snapshot)
 
-        physics.update(self._run(physics, replace))
-        return physics
+        live.update(self._run(live, replace))
+        return live.changed()
+
+    # Copies.
+
+    def check(self, physics: NativePhysics) -> None:
+        """Raises StaleStateError where the worlds have changed since this handle was returned."""
+        self._live(physics)
+
+    def worlds(self, physics: NativePhysics) -> list[World]:
+        """The worlds of a handle. Raises StaleStateError."""
+        return self._live(physics).worlds
+
+    def current(self, physics: NativePhysics) -> NativePhysics:
+        """See `Engine.current`."""
+        return physics.current()
+
+    def fork(self, physics: NativePhysics) -> NativePhysics:
+        """See `Engine.fork`: every `MjData` is copied, so that both go on bit for bit alike."""
+        return physics.fork()
+
+    def saved(self, physics: NativePhysics) -> SavedPhysics:
+        """See `Engine.saved`."""
+        return self._live(physics).saved()
+
+    def restored(self, saved: SavedPhysics) -> NativePhysics:
+        """See `Engine.restored`. It goes on bit for bit as the saved physics; of a world that is lost only the poses
+        are kept."""
+        return self._restored(saved).current()
+
+    def _restored(self, saved: SavedPhysics) -> LiveWorlds:
+        fitted(saved.snapshot, self._start, self.num_worlds, self.scene.name)
+        live = self._new_worlds()
+        live.restore(saved)
+        return live
+
+    def _live(self, physics: NativePhysics) -> LiveWorlds:
+        return physics.live(self._restored)
 
     def _working_arrays(self, num_worlds: int) -> dict[str, np.ndarray]:
         """By field of the view; and objects' velocities, and what agents' fields are made of."""
@@ -351,23 +317,23 @@ class NativeEngine:
 
     def to_mujoco(self, physics: NativePhysics, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """The live model and data of a world. Do not step them."""
-        one = physics.worlds[world]
+        one = self._live(physics).worlds[world]
         one.model_slot.put(one.fields)
         return one.model, one.data
 
-    def _run(self, physics: NativePhysics, act: Callable[[World], int]) -> int:
+    def _run(self, live: LiveWorlds, act: Callable[[World], int]) -> int:
         """Does something to every world, each share of the worlds on its own thread and with its own model."""
 
         failures: list[EngineError] = []
         if self._pool is None:
-            changed = _act_on(physics.worlds, act, failures)
+            changed = _act_on(live.worlds, act, failures)
         else:
-            shares = [[physics.worlds[w] for w in share] for share in self._shares]
+            shares = [[live.worlds[w] for w in share] for share in self._shares]
             changed = Changed.NOTHING
             for part in self._pool.map(lambda share: _act_on(share, act, failures), shares):
                 changed |= part
         if failures:
-            physics.update(changed)
+            live.update(changed)
             raise min(failures, key=str)
         return changed
 

@@ -12,7 +12,16 @@ from ig2mj.engine.contact_filter import BitLayers
 from ig2mj.engine.controls import LARGEST, clip
 from ig2mj.engine.layout import ModelLayout
 from ig2mj.engine.model_fields import ModelFields, given
-from ig2mj.engine.native.contacts import FINGER, LINK, NOTHING_MET, ForcePlan, Met, StepContacts, touching_units
+from ig2mj.engine.native.contacts import (
+    FINGER,
+    LINK,
+    NOTHING_MET,
+    ForcePlan,
+    KnownForces,
+    Met,
+    StepContacts,
+    touching_units,
+)
 from ig2mj.engine.native.later import RAW, AgentContacts, LaterPlan, agents_touching, of_owners
 from ig2mj.engine.native.lost import why_lost
 from ig2mj.engine.native.model_slot import ModelSlot
@@ -95,7 +104,7 @@ class World:
         self._none_awake = False
         self._steady_plan = self._plan(self._awake)
         self._has_force = False  # rows["link_force"] is not zero
-        self.pressing: list[StepContacts] = []
+        self.pressing: list[StepContacts | KnownForces] = []
         self._numbers = self.data.qpos, self.data.qvel
         self._timestep = float(model.opt.timestep)
         self._has_grasps = len(statics.layout.grasp_equality) > 0

@@ -1,0 +1,57 @@
+"""Copies of one world of the native engine: another world in memory, and a world from saved arrays."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+from ig2mj.engine.native.contacts import KnownForces
+from ig2mj.engine.native.lost import why_lost
+from ig2mj.engine.native.one_world import World
+from ig2mj.engine.native.view_rows import FIELDS
+from ig2mj.engine.snapshot import FULLY_AWAKE, Snapshot
+from ig2mj.engine.view import PhysicsView
+
+_OWN = frozenset({"data", "rows", "_near", "_copied", "_cvel", "_numbers", "_from_outside", "_plans"})
+"""Attributes of a world that refer to its own memory. All others are numbers, shared constants, and objects that
+worlds replace and never change."""
+
+
+def clone(world: World, rows: dict[str, np.ndarray]) -> World:
+    """Another world in exactly the same state.
+
+    Args:
+      rows: its rows of the working arrays, which hold copies of those of `world` already.
+    """
+    new = World(world.statics, world.model_slot, world.masks, rows, world.number)
+    mujoco.mj_copyData(new.data, world.model, world.data)
+    for name, value in vars(world).items():
+        if name not in _OWN:
+            setattr(new, name, value)
+    new.disturbed()
+    return new
+
+
+def restore(world: World, snapshot: Snapshot, view: PhysicsView) -> None:
+    """Puts a world where a saved one was.
+
+    Of a world that is not finite only the poses of the view are kept, and it stays lost until it is loaded.
+
+    Args:
+      snapshot, view: of one world, without the world axis.
+    """
+    model, data = world.model, world.data
+    position, velocity = np.asarray(snapshot.whole("qpos")), np.asarray(snapshot.whole("qvel"))
+    if np.abs(position).max(initial=0.0) < mujoco.mjMAXVAL and np.abs(velocity).max(initial=0.0) < mujoco.mjMAXVAL:
+        world.load(snapshot)
+        world.rows["link_force"][:] = view.link_force
+        world._has_force = bool(np.any(view.link_force))
+        world.pressing = [KnownForces(view.agent.finger_force)] if np.any(view.agent.finger_force) else []
+        return
+    calm = {name: np.zeros_like(snapshot.whole(name)) for name in ("qvel", "act", "ctrl", "qacc_warmstart")}
+    world.load(snapshot.with_whole(qpos=model.qpos0, tree_asleep=np.full(model.ntree, FULLY_AWAKE, np.int32), **calm))
+    data.qpos[:], data.qvel[:] = position, velocity
+    world.lost = why_lost(world.number, model, data)
+    world._none_awake = False  # no time passes
+    for name in FIELDS:
+        world.rows[name][:] = getattr(view, name)

@@ -1,0 +1,36 @@
+"""What is asked of actions, on the host."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from ig2mj.engine.view import Array
+from ig2mj.errors import ActionError
+
+if TYPE_CHECKING:
+    from ig2mj.envs.environment import Environment
+
+
+def checked_action(env: Environment, action: Array) -> Float[Array, "W n"]:
+    """The action in single precision.
+
+    Raises:
+      ActionError: it has another shape, is not of numbers, or is NumPy's and has some that are not finite.
+    """
+    wanted = (env.num_worlds, *env.action_space.shape)
+    if np.shape(action) != wanted:
+        raise ActionError(f"an action of {env.task.name} has shape {wanted}, not {np.shape(action)}")
+    if not isinstance(action, jax.Array):
+        action = np.asarray(action)
+    if not (jnp.issubdtype(action.dtype, jnp.floating) or jnp.issubdtype(action.dtype, jnp.integer)):
+        raise ActionError(f"an action is of real numbers, not of {action.dtype}")
+    if isinstance(action, np.ndarray) and not (fine := np.isfinite(action)).all():
+        world, number = np.argwhere(~fine)[0]
+        name = env.action_names[number]
+        raise ActionError(f"{name} of the action of world {world} is not finite: {action[world, number]}")
+    return (action.clip(-1.0, 1.0) if isinstance(action, np.ndarray) else action).astype(np.float32)

@@ -1,0 +1,63 @@
+"""What an environment does about copies of its states: forks, and files."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import typing
+from typing import Any
+
+import jax
+import numpy as np
+
+from ig2mj.engine.saved import copied
+from ig2mj.envs.state import EnvState
+from ig2mj.envs.state_files import load_state, save_state
+from ig2mj.worlds.core import Core
+
+
+class StateCopies:
+    """Part of `Environment`. Attributes: core: what steps its worlds."""
+
+    core: Core
+
+    def check(self, state: EnvState) -> None:
+        """Raises StaleStateError: the state was used up. Nothing while tracing."""
+        self.core.check(state.batch)
+
+    def fork(self, state: EnvState) -> EnvState:
+        """An independent copy of a state, for planners and branches: `state` stays valid, and both go on alike where
+        they are given the same actions. Not for compiled programs, in which states are values anyway.
+
+        Raises:
+          StaleStateError: the state was used up.
+        """
+        if self.core.engine.pure:
+            self.check(state)
+            return copied(state)
+        batch = self.core.fork(state.batch)
+        parts = {field.name: getattr(state, field.name) for field in dataclasses.fields(state) if field.name != "batch"}
+        return EnvState(batch=batch, **jax.tree.map(lambda a: np.copy(a) if isinstance(a, np.ndarray) else a, parts))
+
+    def save(self, state: EnvState, file: str | os.PathLike) -> None:
+        """Writes all worlds of a state to an `.npz` file (arrays only, no pickle), for `load`.
+
+        Raises:
+          StaleStateError: the state was used up. InputError: the file cannot be written.
+        """
+        save_state(typing.cast(Any, self), state, file)
+
+    def load(self, file: str | os.PathLike) -> EnvState:
+        """The state that `save` wrote, which goes on as it would have; to be loaded on any machine and engine.
+
+        Raises:
+          InputError: the file is missing or damaged, or of another scene, task, robot, way of grasping, observations or
+            number of worlds; it names the pair.
+        """
+        return load_state(typing.cast(Any, self), file)
+
+    def current(self, state: EnvState) -> EnvState:
+        """A state to reset after a step that did not return (Ctrl-C): on the native engine with the worlds as that step
+        left them. Its observations are older than its physics."""
+        world = dataclasses.replace(state.batch.world, physics=self.core.engine.current(state.batch.world.physics))
+        return dataclasses.replace(state, batch=dataclasses.replace(state.batch, world=world))
