@@ -39,7 +39,7 @@ class Bench:
         """All worlds at a snapshot of one world; None: at the scene's start."""
         if row is None:
             return self.engine.reset() if not self.engine.pure else self._blank
-        return self.load(self._blank, self.every(row))
+        return self.load(self._blank if self.engine.pure else self.engine.reset(), self.every(row))
 
     def every(self, row: Snapshot) -> Snapshot:
         """The snapshot in every world, so that `load` is compiled for one shape only."""

@@ -8,6 +8,8 @@ Use it on environments of your own, too. It takes an environment with at least t
 from __future__ import annotations
 
 import dataclasses
+import pathlib
+import tempfile
 from typing import Any
 
 import jax
@@ -15,7 +17,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.envs.environment import Environment, EnvState
-from ig2mj.errors import ActionError
+from ig2mj.errors import ActionError, StaleStateError
 from ig2mj.sensors.registry import SENSORS
 
 SOON = 3
@@ -45,6 +47,8 @@ def api_test(
     - `final_obs` is what was seen before the reset;
     - numbers of an action that are not finite are refused on the host, on a device counted and taken for 0; a wrong
       shape is refused;
+    - a state that was used up is refused by everything that takes a state; a fork of a state and a state from a file go
+      on as the state itself, whatever was done to the others in between;
     - nothing is compiled again at the second reset and the second step; closing twice is harmless.
 
     Args:
@@ -75,6 +79,7 @@ def api_test(
     _partial_reset(env, seed, actions, like)
     _ends(env, seed, actions[0], like)
     _bad_actions(env, seed, like)
+    _copies(env, seed, actions, like)
     env.close()
     env.close()
 
@@ -211,3 +216,40 @@ def _bad_actions(env: Environment, seed: int, like: Likeness) -> None:
         except ActionError:
             continue
         raise AssertionError(f"an action {what} was taken")
+
+
+def _copies(env: Environment, seed: int, actions: list[np.ndarray], like: Likeness) -> None:
+    """Used states are refused; copies go on alike, one after the other and in turn."""
+    used = env.reset(seed)
+    state = env.step(used, actions[0])
+    with tempfile.TemporaryDirectory() as folder:
+        file = pathlib.Path(folder) / "state.npz"
+        for name, take in {
+            "step": lambda: env.step(used, actions[0]),
+            "step_autoreset": lambda: env.step_autoreset(used, actions[0]),
+            "reset": lambda: env.reset(used),
+            "fork": lambda: env.fork(used),
+            "save": lambda: env.save(used, file),
+            "engine.view": lambda: env.core.engine.view(used.batch.world.physics),
+        }.items():
+            try:
+                take()
+            except StaleStateError:
+                continue
+            raise AssertionError(f"{name} took a state that was used up")
+        env.save(state, file)
+        copies = {"a fork": env.fork(state), "a state from a file": env.load(file)}
+    _same(_host(state), _host(copies["a state from a file"]), "a state from a file", Likeness())
+    going = {"the state": state, **copies}
+    for k, action in enumerate(actions):
+        going = {what: env.step(one, action if what == "the state" else -action) for what, one in going.items()}
+        if k == 0:
+            before = env.fork(going["a fork"])
+    alone = env.reset(seed)
+    for action in (actions[0], *(-action for action in actions)):
+        alone = env.step(alone, action)
+    for what in copies:
+        _same(_host(alone), _host(going[what]), f"{what}, in turn with others", like)
+    for action in actions[1:]:
+        before = env.step(before, -action)
+    _same(_host(alone), _host(before), "a fork of a fork", like)

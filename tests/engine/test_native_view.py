@@ -310,10 +310,10 @@ def test_views_say_whether_anything_but_agents_changed(tiny_home_folder):
     physics = engine.reset()
     for _ in range(60):
         physics, before = engine.step(physics)
-    pushed = engine.write(physics, teleport(scene, "box", (-1, 0, 0.8)))  # below the hand: it falls
+    physics = engine.write(physics, teleport(scene, "box", (-1, 0, 0.8)))  # below the hand: it falls
     said = {True: 0, False: 0}
     for k in range(150):
-        physics, view = engine.step(pushed, hand_ctrl((0.1 * np.sin(k / 20), 0, 0.05))[None].astype(np.float64))
+        physics, view = engine.step(physics, hand_ctrl((0.1 * np.sin(k / 20), 0, 0.05))[None].astype(np.float64))
         same = but_agents(view) is but_agents(before)
         said[same] += 1
         for name in SCHEMA if same else ():

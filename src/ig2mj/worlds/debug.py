@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import pathlib
+import weakref
 from typing import Any, Protocol, runtime_checkable
 
 import mujoco
@@ -11,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.engine.health import Usage
+from ig2mj.engine.saved import copied
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.engine.warp.profile import EngineProfile
@@ -34,12 +36,13 @@ class DebugWorlds:
         """Binds the worlds of a scene to a folder for dumps; `length`: control steps kept."""
         self.core, self.scene, self.folder, self.length = core, scene, pathlib.Path(folder), length
         self.batch: Batch | None = None
-        self._recording: Recording | None = None
+        # Of each branch its last batch and its recording; the one that was stepped last comes first.
+        self._branches: list[tuple[weakref.ref[Batch], Recording]] = []
 
     def start(self, seed: int = 0) -> Batch:
         """All worlds at the start of episode 0, and an empty recording."""
         batch = self.core.start(seed)
-        self._recording = start_recording(self.core.engine, batch, self.length)
+        self._branches = [(weakref.ref(batch), start_recording(self.core.engine, batch, self.length))]
         return batch
 
     def step(self, batch: Batch, action: Float[Array, "W n"] | None = None) -> tuple[Batch, GoalStatus]:
@@ -48,21 +51,38 @@ class DebugWorlds:
         Raises:
           EngineError: a world is flagged; names world, flag, values, the setting to raise, and the dump.
         """
-        assert self._recording is not None, "start first"
+        assert self._branches, "start first"
+        branch = self._branch_of(batch)
         batch, status = self.core.step(batch, action)
         self.batch = batch
-        self._recording = record(self.core.engine, self._recording, batch)
+        recording = record(self.core.engine, self._branches.pop(branch)[1], batch)
+        self._branches.insert(0, (weakref.ref(batch), recording))
         flagged = np.flatnonzero(np.asarray(batch.flags))
         if len(flagged):
-            raise EngineError(self._report(batch, int(flagged[0])))
+            raise EngineError(self._report(batch, int(flagged[0]), recording))
         return batch, status
 
     def reset(self, batch: Batch, mask: Array) -> Batch:
         """See `Core.reset`."""
-        return self.core.reset(batch, mask)
+        branch = self._branch_of(batch)
+        batch = self.core.reset(batch, mask)
+        self._branches[branch] = weakref.ref(batch), self._branches[branch][1]
+        return batch
 
-    def _report(self, batch: Batch, world: int) -> str:
-        assert self._recording is not None
+    def fork(self, batch: Batch) -> Batch:
+        """An independent copy, with a recording of its own; see `Core.fork`."""
+        copy = self.core.fork(batch)
+        recording = copied(self._branches[self._branch_of(batch)][1])
+        first, *others = self._branches
+        self._branches = [first, *(known for known in others if known[0]() is not None)]
+        self._branches.append((weakref.ref(copy), recording))
+        return copy
+
+    def _branch_of(self, batch: Batch) -> int:
+        """Number of a batch's branch. One that was changed by `core` itself counts as of the last one stepped."""
+        return next((k for k, (last, _) in enumerate(self._branches) if last() is batch), 0)
+
+    def _report(self, batch: Batch, world: int, recording: Recording) -> str:
         scene = self.scene
         overflow = int(np.asarray(self.core.engine.health(batch.world.physics).overflow)[world])
         flags = int(np.asarray(batch.flags)[world])
@@ -72,7 +92,7 @@ class DebugWorlds:
         values = "; ".join(self._values(batch, world, flags))
         text = f"{guards.explain(world, flags, overflow)}: {values}; step {step}"
         note = {"world": world, "step": step, "flags": flags, "overflow": overflow, "text": text}
-        save_dump(frames_of(self._recording, world), file, scene.name, note, scene.model)
+        save_dump(frames_of(recording, world), file, scene.name, note, scene.model)
         return f"{text}; the last {self.length} steps: ig2mj view {scene.folder} --dump {file}"
 
     def _values(self, batch: Batch, world: int, flags: int) -> list[str]:

@@ -38,15 +38,16 @@ def restore(world: World, snapshot: Snapshot, view: PhysicsView) -> None:
     Of a world that is not finite only the poses of the view are kept, and it stays lost until it is loaded.
 
     Args:
-      snapshot, view: of one world, without the world axis.
+      snapshot: of this world, without the world axis. view: of all worlds.
     """
     model, data = world.model, world.data
     position, velocity = np.asarray(snapshot.whole("qpos")), np.asarray(snapshot.whole("qvel"))
     if np.abs(position).max(initial=0.0) < mujoco.mjMAXVAL and np.abs(velocity).max(initial=0.0) < mujoco.mjMAXVAL:
         world.load(snapshot)
-        world.rows["link_force"][:] = view.link_force
-        world._has_force = bool(np.any(view.link_force))
-        world.pressing = [KnownForces(view.agent.finger_force)] if np.any(view.agent.finger_force) else []
+        force, fingers = np.asarray(view.link_force)[world.number], np.asarray(view.agent.finger_force)[world.number]
+        world.rows["link_force"][:] = force
+        world._has_force = bool(force.any())
+        world.pressing = [KnownForces(fingers)] if fingers.any() else []
         return
     calm = {name: np.zeros_like(snapshot.whole(name)) for name in ("qvel", "act", "ctrl", "qacc_warmstart")}
     world.load(snapshot.with_whole(qpos=model.qpos0, tree_asleep=np.full(model.ntree, FULLY_AWAKE, np.int32), **calm))
@@ -54,4 +55,4 @@ def restore(world: World, snapshot: Snapshot, view: PhysicsView) -> None:
     world.lost = why_lost(world.number, model, data)
     world._none_awake = False  # no time passes
     for name in FIELDS:
-        world.rows[name][:] = getattr(view, name)
+        world.rows[name][:] = np.asarray(getattr(view, name))[world.number]

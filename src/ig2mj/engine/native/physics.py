@@ -74,7 +74,8 @@ class LiveWorlds:
         """Becomes what was saved; the view is the saved one, forces included."""
         for w, world in enumerate(self.worlds):
             world.model_slot.put(world.fields)
-            restore(world, *jax.tree.map(lambda a, w=w: np.asarray(a[w]), (saved.snapshot, saved.view)))
+            row = jax.tree.map(lambda a, w=w: np.asarray(a[w]), saved.snapshot)
+            restore(world, row, saved.view)
             world.wrong_controls = bool(saved.wrong_controls[w])
         self.update(Changed.ALL)
 
@@ -160,9 +161,7 @@ class NativePhysics:
         live = self._live
         if isinstance(live, _Unpickled):
             if make is None:
-                raise EngineError(
-                    "physics of a pickle has no worlds yet: step it first"
-                )
+                raise EngineError("physics of a pickle has no worlds yet: step it first")
             live = self._live = make(live.saved)
         if live.generation != self.generation:
             raise StaleStateError
