@@ -137,10 +137,10 @@ def full_engine(
     count = 0
 
     def step() -> None:
-        nonlocal count
+        nonlocal count, physics
         if ctrl is not None and count % EPISODE_STEPS == 0:
-            engine.load(physics, start)
-        _, view = engine.step(physics, None if ctrl is None else ctrl(count % EPISODE_STEPS)[None])
+            physics = engine.load(physics, start)
+        physics, view = engine.step(physics, None if ctrl is None else ctrl(count % EPISODE_STEPS)[None])
         if count % 16 == 0:
             awake.append(int(view.awake.sum()))
         count += 1
@@ -194,7 +194,7 @@ def main(args: Args) -> None:
         rows.append(row(case, float(np.mean(awake)), bare, whole))
     engine, physics = settled(plain, args.worlds)
     with console.status("measuring: batch"):
-        batch = args.worlds * rates([lambda: engine.step(physics)], args.seconds)[0]
+        batch = args.worlds * rates([full_engine(engine, physics, None, [])], args.seconds)[0]
     rows.append(row(f"asleep, {args.worlds} worlds, {engine.threads} threads", 0.0, rows[0].physics_per_s, batch))
 
     names = f"{len(plain.object_names)} objects, {plain.model.nv} dofs, {plain.model.ngeom} geoms"

@@ -288,9 +288,21 @@ def test_every_promise_of_copies_is_kept_on_warp(tmp_path):
 
     from ig2mj.testing import Likeness, _copies
 
-    env = ig2mj.make(small("PointNavigation", target_dist=(1.0, 4.0)), worlds=2, engine="warp", pool_size=4)
+    task = small("PointNavigation", target_dist=(1.0, 4.0))
+    env = ig2mj.make(task, worlds=2, engine="warp", pool_size=4)
     rng = np.random.default_rng(0)
     actions = [rng.uniform(-1, 1, (2, *env.action_space.shape)).astype(np.float32) for _ in range(2)]
     _copies(env, 0, actions, Likeness())
     with pytest.raises(EngineError, match=r"env\.fork\(state\)"):
         copy.deepcopy(env.reset(0))
+    native = ig2mj.make(task, worlds=2, engine="native", pool_size=4)
+    state = native.step(native.reset(3), actions[0])
+    native.save(state, tmp_path / "native.npz")
+    loaded = env.load(tmp_path / "native.npz")
+    assert not differing(state.obs, loaded.obs)
+    ours, theirs = env.step(loaded, actions[1]), native.step(state, actions[1])
+    assert np.asarray(ours.info["steps"]).tolist() == [2, 2]
+    pos = [np.asarray(s.batch.world.view.agent.base_pos) for s in (ours, theirs)]
+    np.testing.assert_allclose(pos[0], pos[1], atol=5e-3)
+    env.save(ours, tmp_path / "warp.npz")
+    assert not differing(ours.obs, native.load(tmp_path / "warp.npz").obs)

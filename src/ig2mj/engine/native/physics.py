@@ -141,7 +141,8 @@ class NativePhysics:
     __slots__ = ("_live", "generation")
 
     def __init__(self, live: LiveWorlds | _Unpickled, generation: int):
-        self._live, self.generation = live, generation
+        self._live: Any = live  # looked at in every step
+        self.generation = generation
 
     @property
     def worlds(self) -> list[World]:
