@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 from flax import struct
+from jax.core import Tracer
 from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 
@@ -51,7 +52,7 @@ class MjxPhysics:
     def is_stale(self) -> bool:
         """Its arrays were donated to a program; false while tracing."""
         qpos = self.data.qpos
-        return isinstance(qpos, jax.Array) and not isinstance(qpos, jax.core.Tracer) and qpos.is_deleted()
+        return isinstance(qpos, jax.Array) and not isinstance(qpos, Tracer) and qpos.is_deleted()
 
     def __repr__(self) -> str:
         return f"MjxPhysics({length(self.wrong_controls)} worlds{', stale' * self.is_stale()})"
