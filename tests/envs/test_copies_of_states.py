@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-import io
 import json
 import pickle
 import random
@@ -152,7 +151,7 @@ def test_a_file_of_another_environment_names_the_pair_and_the_fix(env, file, tmp
         ("scene", "other_home", r"scene = 'other_home', here '.*make the environment in that home"),
         ("task", "SoakingTowel", r"task = 'SoakingTowel', here 'CookingMeat'"),
         ("robot", "fetch", r"robot = 'fetch', here 'humanoid' \(make it with robot="),
-        ("worlds", 4, r"worlds = 4, here 2 \(make it with worlds="),
+        ("worlds", 4, r"worlds = '4', here '2' \(make it with worlds="),
         ("layout", "other", "have changed since"),
         ("version", 0, "is not a state of an environment of format 1"),
         ("kind", "pool", "is not a state"),
@@ -176,8 +175,11 @@ def write(file, header, arrays):
     "damage, said",
     [
         (lambda a: a.pop("physics.snapshot.scene.qpos"), "qpos: is missing"),
-        (lambda a: a.update({"state.reward": np.zeros(3, np.float32)}), r"float32\[3\], and must be float32\[2\]"),
-        (lambda a: a.update({"state.reward": np.array(["a", "b"])}), "and must be float32"),
+        (
+            lambda a: a.update({"state.reward": np.zeros(3, np.float32)}),
+            r"has shape \(3,\), and \(2,\) is needed",
+        ),
+        (lambda a: a.update({"state.reward": np.array(["a", "b"])}), "is of type <U1, and float32 is needed"),
         (lambda a: a["physics.snapshot.scene.qpos"].__setitem__((0, 0), np.nan), "qpos: .*not finite"),
         (lambda a: a["physics.snapshot.scene.qpos"].__setitem__((0, 0), 1e30), "qpos: .*not finite"),
         (lambda a: a["physics.view.object_pos"].__setitem__((1, 0), np.inf), "object_pos: .*not finite"),
@@ -186,7 +188,7 @@ def write(file, header, arrays):
         (lambda a: a["batch.flags"].__setitem__(0, 1 << 20), "flags: .*out of range"),
         (lambda a: a["batch.episode"].__setitem__(0, -5), "episode: .*out of range"),
         (lambda a: a.update({"batch.step": np.array([0, 1 << 40])}), "step: .*out of range"),
-        (lambda a: a.update({"batch.step": np.array([None, None], object)}), "damaged|must be"),
+        (lambda a: a.update({"batch.step": np.array([None, None], object)}), "step: "),
     ],
 )
 def test_numbers_that_no_state_has_are_refused(env, file, tmp_path, damage, said):
@@ -197,28 +199,21 @@ def test_numbers_that_no_state_has_are_refused(env, file, tmp_path, damage, said
         env.load(tmp_path / "bad.npz")
 
 
-def test_declared_sizes_are_looked_at_before_anything_is_read(env, file, tmp_path):
-    """10 KB that unpack to 1 GiB, and an array that says that it has 2**40 numbers."""
+def test_declared_sizes_are_looked_at_before_anything_is_unpacked(env, file, tmp_path):
+    """An array of 64 MiB that says that it is of two numbers, and one that says that it has 2**40."""
     header, arrays = parts_of(file)
     arrays.pop("state.reward")
-    bomb = tmp_path / "bomb.npz"
-    write(bomb, header, arrays)
-    with zipfile.ZipFile(bomb, "a", zipfile.ZIP_DEFLATED) as archive, archive.open("state.reward.npy", "w") as entry:
-        np.lib.format.write_array_header_1_0(entry, {"descr": "<f4", "fortran_order": False, "shape": (2,)})
-        for _ in range(64):
-            entry.write(bytes(1 << 20))
-    with pytest.raises(InputError, match=r"state\.reward: has 67,.* bytes, too many"):
-        env.load(bomb)
-    claim = io.BytesIO()
-    np.lib.format.write_array_header_1_0(claim, {"descr": "<f4", "fortran_order": False, "shape": (1 << 40,)})
-    write(tmp_path / "claim.npz", header, arrays)
-    with zipfile.ZipFile(tmp_path / "claim.npz", "a") as archive:
-        archive.writestr("state.reward.npy", claim.getvalue())
-    with pytest.raises(InputError, match=r"float32\[1099511627776\], and must be"):
-        env.load(tmp_path / "claim.npz")
-    (tmp_path / "long.npz").write_bytes(bytes(64 << 20))
-    with pytest.raises(InputError, match=r"67,108,864 bytes, and what it should hold takes"):
-        env.load(tmp_path / "long.npz")
+    for count, body in ((2, bytes(64 << 20)), (1 << 40, b"")):
+        bomb = tmp_path / f"bomb{count}.npz"
+        write(bomb, header, arrays)
+        with (
+            zipfile.ZipFile(bomb, "a", zipfile.ZIP_DEFLATED) as archive,
+            archive.open("state.reward.npy", "w") as entry,
+        ):
+            np.lib.format.write_array_header_1_0(entry, {"descr": "<f4", "fortran_order": False, "shape": (count,)})
+            entry.write(body)
+        with pytest.raises(InputError, match=rf"state\.reward: claims the shape \({count},\)"):
+            env.load(bomb)
 
 
 def test_no_damage_raises_anything_but_an_input_error(env, file, tmp_path):
@@ -247,7 +242,7 @@ def test_no_damage_raises_anything_but_an_input_error(env, file, tmp_path):
 
 
 def test_what_is_no_file_is_refused(env, tmp_path):
-    for path, said in ((tmp_path / "none.npz", "does not exist"), (tmp_path, "is no file")):
+    for path, said in ((tmp_path / "none.npz", "no such file"), (tmp_path, "is a folder")):
         with pytest.raises(InputError, match=said):
             env.load(path)
     with pytest.raises(InputError, match="cannot be written"):

@@ -1,7 +1,7 @@
 """Files of an environment's state: all its worlds in one `.npz` (arrays only, no pickle).
 
-A file is read only where it fits the environment: what it is of is in its header, and every array must have the shape
-and the kind of number that the environment's own states have, so that a file can take no more memory than a state does.
+A file is read only where it fits the environment: what it is of is in its header, which is read first, and every array
+must have the shape and the kind of number that the environment's own states have.
 
 Axis: W worlds.
 """
@@ -25,9 +25,8 @@ from ig2mj.envs.state import EnvState
 from ig2mj.errors import InputError
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates, WorldState
-from ig2mj.worlds.archive import save_tree
+from ig2mj.worlds.archive import load_exactly, read_header, save_tree
 from ig2mj.worlds.batch import Batch
-from ig2mj.worlds.exact_archive import read_exactly
 from ig2mj.worlds.guards import Flag
 
 if TYPE_CHECKING:
@@ -76,7 +75,7 @@ def save_state(env: Environment, state: EnvState, file: str | os.PathLike) -> No
       StaleStateError: the state was used up. InputError: it cannot be written there.
     """
     env.check(state)
-    save_tree(file, jax.tree.map(_in_order, _saved(env, state)), {"kind": KIND, "version": FORMAT_VERSION, **_fit(env)})
+    save_tree(file, _saved(env, state), {"kind": KIND, "version": FORMAT_VERSION, **_fit(env)})
 
 
 def load_state(env: Environment, file: str | os.PathLike) -> EnvState:
@@ -85,28 +84,25 @@ def load_state(env: Environment, file: str | os.PathLike) -> EnvState:
     Raises:
       InputError: the file is missing or damaged, or does not fit the environment.
     """
-    fresh = env.reset(0)
-    like = _saved(env, fresh)
-    own = _fit(env)
-
-    def check(header: dict[str, Any]) -> None:
-        if header.get("kind") != KIND or header.get("version") != FORMAT_VERSION:
-            raise InputError(file, f"is not a state of an environment of format {FORMAT_VERSION}", fix="env.save")
-        for name, fix in _FIT.items():
-            if header.get(name) != own[name]:
-                said = "" if name == "layout" else f": {name} = {header.get(name)!r}, here {own[name]!r}"
-                raise InputError(file, f"is of another environment{said}", element=name, fix=fix)
-
+    _check_fit(file, read_header(file), _fit(env))
+    like = _saved(env, env.reset(0))
     more = {f"state.info.{FINAL}.{name}": array for name, array in like.state["obs"].items()}
-    saved, extra = read_exactly(file, like, check, more)
+    saved, extra = load_exactly(file, like, more)
     _check_numbers(file, env, saved)
     if extra:
         saved.state["info"][FINAL] = {name: extra[f"state.info.{FINAL}.{name}"] for name in like.state["obs"]}
     return _state_of(env, saved)
 
 
-def _in_order(leaf: Any) -> np.ndarray:
-    return np.asarray(leaf, order="C")
+def _check_fit(file: str | os.PathLike, header: dict[str, Any], own: dict[str, Any]) -> None:
+    if header.get("kind") != KIND or header.get("version") != FORMAT_VERSION:
+        raise InputError(
+            file, f"is not a state of an environment of format {FORMAT_VERSION}", fix="write it by env.save"
+        )
+    for name, fix in _FIT.items():
+        if header.get(name) != own[name]:
+            said = "" if name == "layout" else f": {name} = {str(header.get(name))[:200]!r}, here {str(own[name])!r}"
+            raise InputError(file, f"is of another environment{said}", fix=fix)
 
 
 def _saved(env: Environment, state: EnvState) -> _Saved:
@@ -167,11 +163,12 @@ def _check_numbers(file: str | os.PathLike, env: Environment, saved: _Saved) -> 
             continue
         rows = array[~lost] if array.ndim and len(array) == len(lost) else array
         if np.isnan(rows).any() or (name.startswith("physics.") and not (np.abs(rows) < mujoco.mjMAXVAL).all()):
-            raise InputError(file, "is damaged: it has numbers that are not finite", element=name)
+            raise InputError(file, "holds numbers that are not finite", element=name)
     asleep = np.asarray(saved.physics.snapshot.tree_asleep)
     known = {
         "physics.snapshot.tree_asleep": (asleep >= FULLY_AWAKE) & (asleep < max(env.scene.model.ntree, 1)),
         "batch.flags": (flags >= 0) & (flags < 2 * max(Flag)),
+        **{f"states.{n}.body": getattr(saved.states, n).body < env.scene.model.nbody for n in ("dust", "stain")},
         **{f"batch.{name}": np.asarray(saved.batch[name]) >= 0 for name in ("step", "number", "episode", "time")},
     }
     for name, space in env.observation_spaces.items():
@@ -179,4 +176,4 @@ def _check_numbers(file: str | os.PathLike, env: Environment, saved: _Saved) -> 
         known[f"state.obs.{name}"] = (seen >= space.low) & (seen <= space.high)
     for name, fine in known.items():
         if not np.all(fine):
-            raise InputError(file, "is damaged: it has numbers that are out of range", element=name)
+            raise InputError(file, "holds numbers that are out of range", element=name)

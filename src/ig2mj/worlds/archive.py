@@ -80,6 +80,39 @@ def load_tree(file: str | os.PathLike, like: Tree) -> tuple[Tree, dict[str, Any]
     return jax.tree_util.tree_map_with_path(leaf, like), header
 
 
+def load_exactly(
+    file: str | os.PathLike, like: Tree, optional: Mapping[str, Any] | None = None
+) -> tuple[Tree, dict[str, np.ndarray]]:
+    """Reads a pytree of exactly the structure, shapes and dtypes of `like`; nothing else in the file is unpacked.
+
+    Args:
+      optional: arrays by path, with examples of their shapes and dtypes, that may be missing, all or none.
+
+    Returns:
+      The pytree, and the optional arrays that are there.
+
+    Raises:
+      InputError: the file is missing, no such archive, damaged, or of other arrays.
+    """
+    leaves, structure = jax.tree_util.tree_flatten_with_path(like)
+    wanted, optional = {_name(keys): leaf for keys, leaf in leaves}, dict(optional or {})
+    arrays, _ = _read(file, lambda name: name in wanted or name in optional)
+    there = optional if any(name in arrays for name in optional) else {}
+    found = {}
+    for name, example in {**wanted, **there}.items():
+        if name not in arrays:
+            raise InputError(file, "is missing", element=name, fix="make the file again with this version")
+        array, shape = arrays[name], np.shape(example)
+        if array.shape != shape:
+            raise InputError(file, f"has shape {array.shape}, and {shape} is needed", element=name)
+        check_array(array, example, file, name)
+        with np.errstate(all="ignore"):
+            found[name] = array.astype(example.dtype)
+        if array.dtype.kind in "iu" and (found[name] != array).any():
+            raise InputError(file, "holds numbers that are out of range", element=name)
+    return jax.tree.unflatten(structure, [found[name] for name in wanted]), {name: found[name] for name in there}
+
+
 def check_array(array: np.ndarray, wanted: Any, file: str | os.PathLike, name: str) -> None:
     """Raises InputError where an array is not of the kind, the rank or the inner shape of `wanted`, another array."""
     if array.ndim != wanted.ndim or array.shape[1:] != wanted.shape[1:]:
