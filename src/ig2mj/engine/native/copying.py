@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import mujoco
 import numpy as np
 
@@ -47,7 +49,8 @@ def restore(world: World, snapshot: Snapshot, view: PhysicsView) -> None:
         force, fingers = np.asarray(view.link_force)[world.number], np.asarray(view.agent.finger_force)[world.number]
         world.rows["link_force"][:] = force
         world._has_force = bool(force.any())
-        world.pressing = [KnownForces(fingers)] if fingers.any() else []
+        pressing: Any = [KnownForces(fingers)] if fingers.any() else []
+        world.pressing = pressing
         return
     calm = {name: np.zeros_like(snapshot.whole(name)) for name in ("qvel", "act", "ctrl", "qacc_warmstart")}
     world.load(snapshot.with_whole(qpos=model.qpos0, tree_asleep=np.full(model.ntree, FULLY_AWAKE, np.int32), **calm))

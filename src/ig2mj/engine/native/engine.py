@@ -118,7 +118,7 @@ class NativeEngine:
             speed_limits=SpeedLimits(model, self.tables.body_agent),
             tolerance=touch_tolerance,
             own_fields=check_names(model_fields),
-            substeps=substeps,
+            substeps=range(substeps),
         )
         self._free_dofs = self.layout.object_linear_dofs
         self._masks = [Masks(self._statics.vicinity, slot.model) for slot in self._slots]
@@ -175,17 +175,18 @@ class NativeEngine:
     ) -> tuple[NativePhysics, PhysicsView]:
         """One control step of every world; see `Engine.step`. Raises LostWorldError where a world is lost, after the
         others were stepped: who wants them goes on with the same physics and its view."""
-        live = physics._live
+        live: Any = physics._live
         if live.generation != physics.generation:  # inline: a world at rest steps in under 2 us
             live = self._live(physics)
         if ctrl is None:
             if self.num_worlds == 1:  # by far the most frequent case, in which a list would be a fifth of the time
-                if live.view is not None and live.worlds[0].only_time_passes():
-                    return live.changed(), live.view
+                if live.worlds[0].only_time_passes():
+                    live.generation = generation = physics.generation + 1  # `live.changed()`
+                    return NativePhysics(live, generation), live.view
                 moving = [True]
             else:
                 moving = [not world.only_time_passes() for world in live.worlds]
-                if live.view is not None and not any(moving):
+                if not any(moving):
                     return live.changed(), live.view
             changed = self._run(live, lambda w: Changed.NOTHING if w.lost or not moving[w.number] else w.step(None))
         else:
