@@ -95,7 +95,7 @@ def load_exactly(
       InputError: the file is missing, no such archive, damaged, or of other arrays.
     """
     leaves, structure = jax.tree_util.tree_flatten_with_path(like)
-    wanted, optional = {_name(keys): leaf for keys, leaf in leaves}, dict(optional or {})
+    wanted, optional = {name_of(keys): leaf for keys, leaf in leaves}, dict(optional or {})
     arrays, _ = _read(file, lambda name: name in wanted or name in optional)
     there = optional if any(name in arrays for name in optional) else {}
     found = {}
