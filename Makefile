@@ -11,7 +11,7 @@ INTEROP ?= .interop
 INTEROP_ENVS ?= $(notdir $(patsubst %/requirements.txt,%,$(wildcard tests/interop/*/requirements.txt)))
 
 .DEFAULT_GOAL := help
-.PHONY: help setup web demo test test-slow test-gpu test-interop check docs homes-check demonstrations format bench clean distclean
+.PHONY: help setup web demo test test-slow test-gpu test-interop check docs homes-check pools demonstrations format bench clean distclean
 
 help:
 	@echo "make demo       convert the small home, run it, cook a fish in it; leaves pictures, a plot, films, a report"
@@ -23,6 +23,7 @@ help:
 	@echo "make web        fetch three.js for the page of \`ig2mj vr\` (needs npm)"
 	@echo "make docs       the documentation site, in out/site/"
 	@echo "make homes-check  build and convert all homes anew and compare them byte for byte with scenes_mjcf/"
+	@echo "make pools      sample the start states that ship anew (some minutes on many processors)"
 	@echo "make demonstrations  record the demonstrations that ship anew"
 	@echo "make format     let ruff put the code in order"
 	@echo "make bench      the benchmarks of the native engine; results in benchmarks/results/"
@@ -118,6 +119,13 @@ homes-check: setup
 	IG2MJ_CACHE_DIR=$$made/cache $(BIN)/ig2mj homes convert --dataset $$made/dataset --out $$made/homes; \
 	diff -rq -x "engine_profile*.json" $$made/homes scenes_mjcf; \
 	echo "scenes_mjcf/ is what this code builds and converts, byte for byte"
+
+# Needed when an activity, its home or the sampler changes. Success rates of policies are of these start states, and are
+# to be measured again then.
+pools: setup
+	@rm -rf out/pools && $(BIN)/ig2mj sample-task all --out out/pools; test $$? -le 1
+	@rm -f pools/*.npz && cp out/pools/*.npz pools/
+	@ls -l pools
 
 # Needed when the humanoid, a home or the engine changes: recordings belong to the compiled model.
 demonstrations: setup

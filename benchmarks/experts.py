@@ -90,7 +90,7 @@ def play_part(part: Part) -> dict[str, Any]:
     from ig2mj.envs.experts import expert_of
     from ig2mj.envs.rollout import play
     from ig2mj.tasks.activities import ACTIVITIES
-    from ig2mj.tasks.pools import bare_scene, pool_file
+    from ig2mj.tasks.pools import start_states
     from ig2mj.tasks.variants import variant
 
     began, pool = time.process_time(), min_pool(part.episodes)
@@ -111,7 +111,7 @@ def play_part(part: Part) -> dict[str, Any]:
         "mean_return": round(sum(done.total) / part.count, 3),
         "overflow": int(metrics["overflow"]),
         "non_finite": int(metrics["not_finite"]),
-        "pool": pool_file(task, bare_scene(task), "held_out", pool).stem.rsplit("-", 1)[1],
+        "pool": start_states(task, "held_out").cached.stem.rsplit("-", 1)[1],
         "processor_s": round(time.process_time() - began, 1),
         "date": time.strftime("%Y-%m-%d"),
     }
@@ -125,11 +125,11 @@ def min_pool(episodes: int) -> int:
 def make_pools(names: list[str], variants: list[int], modes: list[str], episodes: int, jobs: int) -> None:
     """Samples the pools that are not in the cache, side by side."""
     from ig2mj.tasks.activities import ACTIVITIES
-    from ig2mj.tasks.pools import bare_scene, pool_file, pool_of, sampling_processes
+    from ig2mj.tasks.pools import pool_of, sampling_processes, start_states
     from ig2mj.tasks.variants import variant
 
     every = [variant(ACTIVITIES[name], number, mode) for name in names for number in variants for mode in modes]
-    tasks = list({pool_file(task, bare_scene(task), "held_out").name: task for task in every}.values())
+    tasks = list({start_states(task, "held_out").cached.name: task for task in every}.values())
     with (
         sampling_processes(jobs) as workers,
         concurrent.futures.ThreadPoolExecutor(len(tasks)) as threads,

@@ -13,7 +13,7 @@ from ig2mj.scene.library import find_model
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.experts.expert import PLANS
 from ig2mj.tasks.points import At
-from ig2mj.tasks.pools import bare_scene, pool_file
+from ig2mj.tasks.pools import start_states
 from ig2mj.tasks.variants import variant, variants
 
 
@@ -69,7 +69,7 @@ def test_other_modes_and_other_activities_keep_their_objects(mode):
 
 def test_each_variant_has_its_own_pool():
     task = ACTIVITIES["CookingMeat"]
-    files = {pool_file(t, bare_scene(t)).name for t in (task, variant(task, 1), variant(task, 2))}
+    files = {start_states(t).cached.name for t in (task, variant(task, 1), variant(task, 2))}
     assert len(files) == 3
 
 

@@ -75,6 +75,7 @@ def sample(
     count: int,
     seed: int = 0,
     *,
+    first: int = 0,
     jobs: int = 1,
     seconds_per_row: float = math.inf,
     progress: Progress = lambda done, failed: None,
@@ -87,7 +88,7 @@ def sample(
     Args:
       scene: without agents: a pool describes the household alone.
       conditions: expressions or their text (see `ig2mj.sampling.conditions`); they hold together in every row.
-      count: rows. seed: the same seed gives the same rows.
+      count: rows. seed: the same seed gives the same rows. first: number of the first row.
       jobs: processes; 0: one per processor. where: more of that, such as a cluster; it takes the place of `jobs`.
       seconds_per_row: wall time after which an attempt at a row ends; it makes results depend on the machine's speed.
       journal: keeps finished rows, and takes rows that fail; without one they end everything.
@@ -104,7 +105,7 @@ def sample(
         progress(status.done, status.failed)
         report(status)
 
-    work = row_work(scene, wanted, range(count), seed, seconds_per_row)
+    work = row_work(scene, wanted, range(first, first + count), seed, seconds_per_row)
     try:
         with lent(scene):
             store, failed = run(work, where or Where(jobs), journal, tell)
@@ -113,7 +114,7 @@ def sample(
     if failed and journal is None:
         raise EngineError(next(iter(failed.values())))
     numbers, pools, rejected = [], [], collections.Counter()
-    for number, piece in enumerate(work.pieces):
+    for number, piece in enumerate(work.pieces, first):
         if piece.name in failed:
             continue
         arrays, header = unpack(store.get(piece.name))

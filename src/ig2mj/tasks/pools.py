@@ -1,8 +1,7 @@
-"""Pools of start states of tasks: sampled on first use from fixed seeds, and kept in the user's cache.
+"""Pools of start states of tasks: shipped with the package for the paper's activities, else sampled on first use.
 
 Training and held-out pools come from different seeds and have no row in common. A pool is of the household alone, so
-that it serves every robot. What it is made of is part of its file's name: a pool of another scene, object library,
-condition or version of the sampler's rules is another file.
+that it serves every robot. A pool of fewer rows is the first rows of a larger one (`ig2mj.tasks.pool_files`).
 """
 
 from __future__ import annotations
@@ -10,14 +9,12 @@ from __future__ import annotations
 import collections
 import concurrent.futures
 import contextlib
-import hashlib
-import json
 import multiprocessing
 import os
 import pathlib
 import sys
 import threading
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
 
 import jax
 import numpy as np
@@ -25,13 +22,12 @@ from jaxtyping import Bool
 
 from ig2mj.engine.registry import make_engine
 from ig2mj.errors import EngineError, UnknownNameError
-from ig2mj.files.unfinished import unfinished
 from ig2mj.process import use_processor_only
-from ig2mj.process.compilation import cache_folder
 from ig2mj.sampling.many import sample
 from ig2mj.scene.scene import Scene, load_scene
+from ig2mj.tasks.pool_files import StartStates
 from ig2mj.tasks.task import Task
-from ig2mj.worlds.pool import Pool, load_pool, save_pool, stack
+from ig2mj.worlds.pool import Pool
 
 VERSION = 3
 """Of the rules by which pools of tasks are made. Raise it when the sampler's results change."""
@@ -45,14 +41,14 @@ COUNT = {"train": 512, "held_out": 1000}
 CHUNK = 32
 """Rows that are sampled from one seed, at least."""
 
+HOPELESS = 8 * CHUNK
+"""Candidates of which none is good, after which no more are tried."""
+
 MAX_CHUNKS = 400
 """Seeds after which too many rows were turned down, of pools of the usual sizes; of larger ones `limit_of`."""
 
 FLAT = 0.98
 """Cosine of the angle between an object's z axis and the vertical from which it lies flat: 11 degrees."""
-
-HASHES = pathlib.Path(__file__).with_name("pool_hashes.json")
-"""Of the activities' pools of the usual sizes, by the names of their files. `ig2mj sample-task all` checks them."""
 
 Progress = Callable[[int, int], None]
 """Called with the number of rows made and wanted."""
@@ -87,57 +83,21 @@ def pool_of(
     Raises:
       UnknownNameError: no such split. EngineError: its start states cannot be sampled.
     """
-    scene = bare_scene(task)
-    file = pool_file(task, scene, split, count)
-    if file.exists():
-        return load_pool(file, scene)
-    print(
-        f"sampling {count or COUNT[split]} start states of {task.name}, once (on all processors: ig2mj sample-task "
-        f"{task.name})",
-        file=sys.stderr,
-    )
-    pool = make_pool(task, split, count, scene=scene, jobs=jobs, progress=progress, workers=workers)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    beside = unfinished(file)
-    save_pool(pool, beside, scene, {"task": task.name, "split": split, "conditions": list(task.start)})
-    beside.replace(file)  # never half a file, even if two processes make it
-    return pool
+    return _pool(start_states(task, split), task, split, count, jobs, progress, workers)
 
 
-def pool_file(task: Task, scene: Scene, split: str = "train", count: int | None = None) -> pathlib.Path:
-    """Where the pool is kept. Raises UnknownNameError."""
+def start_states(task: Task, split: str = "train", scene: Scene | None = None) -> StartStates:
+    """Where the pool's rows are kept, and what they are made of. Raises UnknownNameError: no such split."""
     if split not in SEEDS:
         raise UnknownNameError("split", split, SEEDS)
     near = [[n.object, *n.pos, n.least, n.most] for n in task.near]
     upright = [task.upright] if task.upright else []
-
-    def made_of(digest: str) -> list[object]:
-        return [VERSION, digest, task.objects, task.start, near, task.flat, *upright]
-
-    return cached_file(f"{task.name}-{split}-{count or COUNT[split]}", scene, made_of)
-
-
-def cached_file(name: str, scene: Scene, made_of: Callable[[str], list[object]]) -> pathlib.Path:
-    """The file of a pool in the cache; one that is bound to every byte of the scene's files is used where it is there.
-
-    Args:
-      made_of: what determines the pool, from a digest of the scene.
-    """
-    found = []
-    for digest in (scene.digest, scene.files_digest):
-        mark = hashlib.blake2b(json.dumps(made_of(digest), default=str).encode(), digest_size=6).hexdigest()
-        found.append(cache_folder() / "pools" / f"{name}-{mark}.npz")
-    return found[1] if found[1].exists() and not found[0].exists() else found[0]
-
-
-def pool_hash(file: pathlib.Path) -> str:
-    """sha256 of a pool's file."""
-    return hashlib.sha256(file.read_bytes()).hexdigest()
-
-
-def known_hash(file: pathlib.Path) -> str | None:
-    """sha256 of a pool of the usual size as it was first made, by the name of its file; None for any other."""
-    return json.loads(HASHES.read_text()).get(file.name)
+    return StartStates(
+        f"{task.name}-{split}",
+        bare_scene(task) if scene is None else scene,
+        lambda digest: [VERSION, digest, task.objects, task.start, near, task.flat, *upright],
+        {"task": task.name, "split": split, "conditions": list(task.start)},
+    )
 
 
 def make_pool(
@@ -145,31 +105,50 @@ def make_pool(
     split: str = "train",
     count: int | None = None,
     *,
-    scene: Scene | None = None,
+    file: pathlib.Path,
     jobs: int = 1,
     progress: Progress = lambda made, wanted: None,
     workers: concurrent.futures.Executor | None = None,
 ) -> Pool:
-    """Samples the pool anew: the same rows for any number of processes. Arguments and errors as `pool_of`."""
-    if split not in SEEDS:
-        raise UnknownNameError("split", split, SEEDS)
-    scene = bare_scene(task) if scene is None else scene
-    wanted, made, pools, tried = count or COUNT[split], 0, [], 0
-    processes = jobs or os.cpu_count() or 1
-    with contextlib.ExitStack() as stack_of:
-        if workers is None and processes > 1:
-            workers = stack_of.enter_context(sampling_processes(processes))
-        for drawn in stack_of.enter_context(contextlib.closing(_chunks(task, split, scene, workers, wanted))):
-            tried += 1
-            if drawn is not None:
-                pools.append(drawn)
-                made += drawn.size
-            progress(min(made, wanted), wanted)
-            if made >= wanted:
-                return stack(pools).rows(np.arange(wanted))
-            if tried == 8 and not made:
-                break
-    raise EngineError(f"{task.name}: of {tried * CHUNK} start states only {made} of {wanted} have all within reach")
+    """As `pool_of`, but in this file alone: what ships or is in the cache is not read."""
+    return _pool(start_states(task, split), task, split, count, jobs, progress, workers, file)
+
+
+def _pool(
+    states: StartStates,
+    task: Task,
+    split: str,
+    count: int | None,
+    jobs: int,
+    progress: Progress,
+    workers: concurrent.futures.Executor | None,
+    file: pathlib.Path | None = None,
+) -> Pool:
+    wanted, processes = count or COUNT[split], jobs or os.cpu_count() or 1
+
+    def sample_rows(tried: int, rows: int) -> Iterator[tuple[int, Pool | None]]:
+        print(
+            f"sampling {rows} start states of {task.name}, once (on all processors: ig2mj sample-task {task.name})",
+            file=sys.stderr,
+        )
+        made, first, limit = 0, tried, CHUNK * limit_of(wanted)
+        with contextlib.ExitStack() as stack_of:
+            shared = workers
+            if shared is None and processes > 1:
+                shared = stack_of.enter_context(sampling_processes(processes))
+            batches = _batches(task, split, states.scene, shared, tried, limit, lambda: rows - made)
+            for tried, drawn in stack_of.enter_context(contextlib.closing(batches)):
+                made += 0 if drawn is None else drawn.size
+                progress(wanted - rows + min(made, rows), wanted)
+                yield tried, drawn
+                if made >= rows or (tried - first >= HOPELESS and not made):
+                    break
+        if made < rows:
+            raise EngineError(
+                f"{task.name}: of {tried - first} start states only {made} of {rows} have all within reach"
+            )
+
+    return states.pool(wanted, sample_rows, file)
 
 
 def sampling_processes(jobs: int) -> concurrent.futures.Executor:
@@ -183,32 +162,46 @@ def limit_of(wanted: int) -> int:
     return max(MAX_CHUNKS, 8 * -(-wanted // CHUNK))
 
 
-def _chunks(
-    task: Task, split: str, scene: Scene, workers: concurrent.futures.Executor | None, wanted: int
-) -> Generator[Pool | None, None, None]:
-    """The good rows of one seed after the other, in order; None: there was none."""
-    limit = limit_of(wanted)
+def _batches(
+    task: Task,
+    split: str,
+    scene: Scene,
+    workers: concurrent.futures.Executor | None,
+    tried: int,
+    limit: int,
+    missing: Callable[[], int],
+) -> Generator[tuple[int, Pool | None], None, None]:
+    """Candidates after `tried` of them in order, up to `limit`: how many were tried by then, and the good ones.
+
+    Candidate n is row n % CHUNK of seed n // CHUNK, so that batches of any size hold the same rows.
+    """
     if workers is None:
-        for k in range(limit):
-            yield _chunk(task, scene, SEEDS[split] + k)
+        while tried < limit:
+            size = max(1, min(CHUNK - tried % CHUNK, missing()))
+            drawn = _batch(task, scene, SEEDS[split] + tried // CHUNK, tried % CHUNK, size)
+            tried += size
+            yield tried, drawn
         return
-    ahead = collections.deque[concurrent.futures.Future[Pool | None]]()
-    submitted, most = 0, 2 * -(-wanted // CHUNK)  # begun before they are known to be needed
+    ahead = collections.deque[tuple[int, concurrent.futures.Future[Pool | None]]]()
+    submitted, most = tried, 2 * -(-missing() // CHUNK)  # begun before they are known to be needed
     try:
         while submitted < limit or ahead:
             while submitted < limit and len(ahead) < most:
-                ahead.append(workers.submit(_chunk, task, None, SEEDS[split] + submitted))
-                submitted += 1
-            yield ahead.popleft().result()
+                size = CHUNK - submitted % CHUNK
+                where = SEEDS[split] + submitted // CHUNK, submitted % CHUNK
+                submitted += size
+                ahead.append((submitted, workers.submit(_batch, task, None, *where, size)))
+            tried, batch = ahead.popleft()
+            yield tried, batch.result()
     finally:
-        for future in ahead:
-            future.cancel()
+        for _, batch in ahead:
+            batch.cancel()
 
 
-def _chunk(task: Task, scene: Scene | None, seed: int) -> Pool | None:
-    """Of `CHUNK` rows of a seed those in which every object is where the task wants it."""
+def _batch(task: Task, scene: Scene | None, seed: int, first: int, count: int) -> Pool | None:
+    """Of these rows of a seed those in which every object is where the task wants it."""
     scene = bare_scene(task) if scene is None else scene
-    drawn = sample(scene, task.start, CHUNK, seed).pool
+    drawn = sample(scene, task.start, count, seed, first=first).pool
     if drawn is None:
         return None
     good = np.flatnonzero(_near(task, scene, drawn))

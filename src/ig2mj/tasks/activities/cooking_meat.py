@@ -15,6 +15,7 @@ COOKING_MEAT = Task(
     objects=("steak",),
     start=("(on_top steak_0 bottom_cabinet_1)", "(toggled_on stove_0)"),
     near=(Near("steak_0", (-2.1, -1.83, 0.85), most=1.0),),
+    flat=("steak_0",),
     goal="(cooked steak_0)",
     objects_of_interest=("steak_0", "stove_0"),
     distances=((Hand(0), At("steak_0")), (At("steak_0"), Heat("stove_0"))),

@@ -8,14 +8,15 @@ robot starts on free floor, as near as it can be to what the activity is about.
 
 from __future__ import annotations
 
+import collections
 import dataclasses
 import sys
+from collections.abc import Iterator
 
 import numpy as np
 
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.errors import EngineError, UnknownNameError
-from ig2mj.files.unfinished import unfinished
 from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.paths import scene_folder, shipped_homes
 from ig2mj.scene.scene import Scene, load_scene
@@ -23,8 +24,9 @@ from ig2mj.tasks.bddl.binding import Binding, BindingError
 from ig2mj.tasks.bddl.definitions import load_activity
 from ig2mj.tasks.bddl.start import fitting, load_bound, sample_start, start_conditions
 from ig2mj.tasks.navigation.starts import Places
-from ig2mj.tasks.pools import SEEDS, VERSION, cached_file
-from ig2mj.worlds.pool import Pool, load_pool, save_pool
+from ig2mj.tasks.pool_files import StartStates
+from ig2mj.tasks.pools import SEEDS, VERSION
+from ig2mj.worlds.pool import Pool
 
 PREFIX = "activity/"
 
@@ -33,6 +35,9 @@ HORIZON = 1000
 
 ROWS = 16
 """Start states unless another number is asked for."""
+
+TRIES = 2
+"""Candidates for each start state that is asked for, after which a pool has fewer."""
 
 CLEARANCE = 0.45
 """m around the robot that are free of furniture."""
@@ -81,33 +86,43 @@ def bddl_task(name: str) -> BddlTask:
 
 
 def activity_pool(task: BddlTask, split: str = "train", count: int | None = None) -> Pool:
-    """Start states of the bare household, read from the cache or sampled now.
+    """Start states of the bare household, read from the cache or sampled now; fewer where no more can be sampled.
 
     Raises:
       UnknownNameError: no such split. EngineError: none could be sampled.
     """
+    states, wanted = activity_states(task, split), count or ROWS
+
+    def sample_rows(tried: int, rows: int) -> Iterator[tuple[int, Pool | None]]:
+        print(f"sampling {rows} start states of {task.name} in {task.home}, once", file=sys.stderr)
+        made, last, reasons, reached = 0, tried + TRIES * wanted, collections.Counter[str](), False
+        while made < rows and tried < last:
+            count = min(rows - made, last - tried)
+            done = sample_start(task.binding, states.scene, count, SEEDS[split], first=tried)
+            tried += count
+            reasons += done.sampled.rejected
+            reached |= bool(done.reached)
+            good = [] if done.sampled.pool is None else np.setdiff1d(np.arange(done.sampled.pool.size), done.reached)
+            made += len(good)
+            yield tried, done.sampled.pool.rows(good) if done.sampled.pool is not None and len(good) else None
+        if not made and tried == last and rows == wanted:
+            if reached:
+                raise EngineError(f"{task.name} is done in all of its sampled start states")
+            raise EngineError(f"no start of {task.name} could be sampled: {dict(reasons.most_common(3))}")
+
+    return states.pool(wanted, sample_rows)
+
+
+def activity_states(task: BddlTask, split: str = "train") -> StartStates:
+    """Where the start states are kept, and what they are made of. Raises UnknownNameError: no such split."""
     if split not in SEEDS:
         raise UnknownNameError("split", split, SEEDS)
-    wanted, bare = count or ROWS, load_bound(task.binding)
+    bare = load_bound(task.binding)
     conditions = [c.expression for c in start_conditions(task.binding, bare)]
     short = task.name.removeprefix(PREFIX)
-    file = cached_file(f"{short}-{split}-{wanted}", bare, lambda digest: [VERSION, digest, conditions])
-    if file.exists():
-        return load_pool(file, bare)
-    print(f"sampling {wanted} start states of {task.name} in {task.home}, once", file=sys.stderr)
-    done = sample_start(task.binding, bare, wanted, SEEDS[split])
-    pool = done.sampled.pool
-    if pool is None:
-        raise EngineError(f"no start of {task.name} could be sampled: {dict(done.sampled.rejected.most_common(3))}")
-    keep = np.setdiff1d(np.arange(pool.size), done.reached)
-    if not len(keep):
-        raise EngineError(f"{task.name} is done in all of its sampled start states")
-    pool = pool.rows(keep)
-    file.parent.mkdir(parents=True, exist_ok=True)
-    beside = unfinished(file)
-    save_pool(pool, beside, bare, {"task": task.name, "split": split})
-    beside.replace(file)
-    return pool
+    return StartStates(
+        f"{short}-{split}", bare, lambda digest: [VERSION, digest, conditions], {"task": task.name, "split": split}
+    )
 
 
 def standing_place(task: BddlTask, pool: Pool) -> tuple[float, float]:
