@@ -13,7 +13,7 @@ from ig2mj.scene.library import find_model
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.experts.expert import PLANS
 from ig2mj.tasks.points import At
-from ig2mj.tasks.pools import start_states
+from ig2mj.tasks.pools import bare_scene, start_states
 from ig2mj.tasks.variants import variant, variants
 
 

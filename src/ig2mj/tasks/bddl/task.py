@@ -102,9 +102,10 @@ def activity_pool(task: BddlTask, split: str = "train", count: int | None = None
             tried += count
             reasons += done.sampled.rejected
             reached |= bool(done.reached)
-            good = [] if done.sampled.pool is None else np.setdiff1d(np.arange(done.sampled.pool.size), done.reached)
+            drawn = done.sampled.pool
+            good = np.setdiff1d(np.arange(0 if drawn is None else drawn.size), done.reached)
             made += len(good)
-            yield tried, done.sampled.pool.rows(good) if done.sampled.pool is not None and len(good) else None
+            yield tried, drawn.rows(good) if drawn is not None and len(good) else None
         if not made and tried == last and rows == wanted:
             if reached:
                 raise EngineError(f"{task.name} is done in all of its sampled start states")
