@@ -2,6 +2,7 @@
 
     python benchmarks/gpu_suite.py calibrate --out DIR [--minutes 3]     buffer sizes of all homes: DIR/profiles/<home>/
     python benchmarks/gpu_suite.py throughput --out DIR [--minutes 8]    rows: DIR/throughput.jsonl
+    python benchmarks/gpu_suite.py readme --out DIR [--minutes 8]        README.md's rows of one card: DIR/readme.jsonl
     python benchmarks/throughput_report.py DIR/throughput.jsonl          table and plots
 
 Every case is a process of its own with a time limit of its own, so that one that fails or hangs costs only itself; it
@@ -51,12 +52,12 @@ class Job:
 class Args:
     """What to run."""
 
-    plan: tyro.conf.Positional[Literal["calibrate", "throughput"]]
-    """calibrate: buffer sizes; throughput: control steps per second."""
+    plan: tyro.conf.Positional[Literal["calibrate", "throughput", "readme"]]
+    """calibrate: buffer sizes; throughput: control steps per second; readme: those of the README's table."""
     out: pathlib.Path = WORK / "gpu_suite"
     """Folder for rows, profiles and logs."""
     minutes: float = 0.0
-    """Time limit; 0: 3 for calibrate, 8 for throughput."""
+    """Time limit; 0: 3 for calibrate, 8 for the others."""
     jobs: int = 0
     """Processes at the same time; 0: one per two processors, and no more than 8."""
     only: tuple[str, ...] = ()
@@ -122,6 +123,32 @@ def throughputs(homes: dict[str, str], out: pathlib.Path, most: int) -> list[Job
         job("made_120", small, idle=True),
     ]
     return plan
+
+
+def readme_rows(homes: dict[str, str], out: pathlib.Path) -> list[Job]:
+    """The cases of README.md's table, one protocol for all; `readme_speed.py` makes the table of their rows."""
+    common = ("--rows", str(out / "readme.jsonl"), "--lock", str(out / "lock"))
+
+    def batch(home: str, worlds: int, *what: str, engine: str = "ig2mj") -> Job:
+        words = (str(HERE / "throughput.py"), homes[home], "--worlds", str(worlds), "--what", *what)
+        return Job("-".join([home, *what, engine]), (*words, "--engine", engine, *common))
+
+    def cooking(*observations: str) -> Job:
+        words = [str(HERE / "environments.py"), "CookingMeat", "--worlds", "4096"]
+        words += ["--observations", *observations] if observations else []
+        return Job("-".join(["cooking", *observations]), (*words, *common))
+
+    return [
+        batch("birch", 8192, "physics", "full"),
+        cooking("rgb", "depth"),
+        batch("birch", 8192, "camera"),
+        cooking(),
+        batch("birch", 8192, "physics", engine="mujoco_warp"),
+        batch("made_60", 16384, "full"),
+        batch("made_60", 8192, "camera"),
+        batch("made_120", 16384, "full"),
+        batch("made_20", 32768, "full"),
+    ]
 
 
 class Runner:
@@ -194,10 +221,12 @@ def main(args: Args) -> list[str]:
     args.out.mkdir(parents=True, exist_ok=True)
     homes = {f"made_{n}": str(write_home(WORK / f"made_{n}", n)) for n in SIZES}
     homes |= {file.parent.name: file.parent.name for file in (HERE.parent / "scenes_mjcf").glob("*/manifest.json")}
-    seconds = 60 * (args.minutes or {"calibrate": 3.0, "throughput": 8.0}[args.plan])
+    seconds = 60 * (args.minutes or {"calibrate": 3.0}.get(args.plan, 8.0))
     jobs = args.jobs or max(1, min(8, (os.cpu_count() or 2) // 2))
     if args.plan == "calibrate":
         queue = calibrations(homes, args.out, args.worlds)
+    elif args.plan == "readme":
+        queue = readme_rows(homes, args.out)
     else:
         queue = throughputs(homes, args.out, args.most_worlds)
     queue = [job for job in queue if not args.only or any(word in job.name for word in args.only)]

@@ -59,6 +59,15 @@ def machine(core: int) -> dict[str, Any]:
     }
 
 
+def provenance() -> dict[str, str]:
+    """Commit, command line and day of a row."""
+    return {
+        "commit": _commit(),
+        "command": command(),
+        "date": datetime.datetime.now(datetime.UTC).date().isoformat(),
+    }
+
+
 def save(
     name: str,
     core: int,
@@ -129,6 +138,9 @@ def _processor() -> str:
 
 
 def _commit() -> str:
+    """Of this checkout; `IG2MJ_COMMIT` names it where there is a copy of the files without git."""
+    if named := os.environ.get("IG2MJ_COMMIT"):
+        return named
     folder = pathlib.Path(__file__).resolve().parent
     try:
         done = subprocess.run(

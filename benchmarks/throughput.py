@@ -239,8 +239,9 @@ def _bits(overflow: np.ndarray) -> dict[str, int]:
 
 
 def device() -> dict[str, str]:
-    """What this ran on."""
+    """What this ran on, and what ran."""
     return {
+        **results.provenance(),
         "device": str(jax.devices()[0].device_kind),
         "jax": jax.__version__,
         "warp": wp.__version__,

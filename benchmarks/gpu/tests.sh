@@ -1,18 +1,18 @@
 #!/usr/bin/env bash
-# All tests that need a GPU, where there is no `make` and no package of ours: kernels in one process, the rest in another.
-# Each ends after LIMIT seconds (560), with what failed until then. One GPU; results: $OUT.
+# All tests that need a GPU, where there is no `make`: a process for each file, eight at a time. Each ends after LIMIT
+# seconds (560), with what failed until then. One GPU; results: $OUT, and a line for each file at the end.
 set -u
-out=${OUT:-out/gpu/tests}; mkdir -p "$out"
+out=${OUT:-out/gpu/tests}; mkdir -p "$out"; export out LIMIT="${LIMIT:-560}"
 unset XLA_PYTHON_CLIENT_MEM_FRACTION; export JAX_PLATFORMS=cuda,cpu XLA_PYTHON_CLIENT_PREALLOCATE=false
 
-tests() {  # NAME FILE ...
-  local name=$1; shift
-  timeout -s INT -k 20 "${LIMIT:-560}" python3 -m pytest -m gpu -v --tb=short --durations=15 \
-    -W default::DeprecationWarning "$@" >"$out/$name.txt" 2>&1
+test_file() {
+  timeout -s INT -k 20 "$LIMIT" python3 -m pytest -m gpu -v --tb=short --durations=5 -p no:cacheprovider \
+    -W default::DeprecationWarning "$1" >"$out/$(basename "$1" .py).txt" 2>&1
 }
+export -f test_file
 
-marked=$(grep -rl "mark.gpu" tests --include="test_*.py" --exclude-dir=engine)
-tests kernels tests/engine &
-tests rest $marked &
-wait
-tail -n 40 "$out"/kernels.txt "$out"/rest.txt
+began=$SECONDS
+{ grep -rlE "mark.gpu" tests --include="test_*.py"; grep -rl "kernel_device" tests --include="test_*.py"; } | sort -u |
+  xargs -P 8 -I{} bash -c 'test_file {}'
+for file in "$out"/test_*.txt; do echo "$(basename "$file" .txt): $(tail -n 1 "$file")"; grep -E "^(FAILED|ERROR)" "$file"; done
+echo "$((SECONDS - began)) s"

@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 import warp as wp
+from kernel_loading import load_kernels_of
 from mujoco.mjx.third_party import mujoco_warp
 from mujoco.mjx.third_party.mujoco_warp._src import collision_driver
 from tumbling_shapes import SCENE
@@ -59,9 +60,14 @@ def _contacts(model: mujoco.MjModel, start: mujoco.MjData, qpos: np.ndarray) -> 
     put.opt.warn_overflow = 0
     data = mujoco_warp.put_data(model, start, nworld=len(qpos), naconmax=2000, naccdmax=900, njmax=600, nvmax=model.nv)
     data.qpos.assign(qpos)
-    with awake_kernels():
+
+    def act() -> None:
         mujoco_warp.kinematics(put, data)
         mujoco_warp.collision(put, data)
+
+    with awake_kernels():
+        load_kernels_of(act)
+        act()
     assert not data.overflow.numpy().any()
     count = int(data.nacon.numpy()[0])
     contact = data.contact

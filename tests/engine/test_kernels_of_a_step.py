@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 import warp as wp
+from kernel_loading import load_kernels_of
 from mujoco.mjx.third_party import mujoco_warp
 from mujoco.mjx.third_party.mujoco_warp._src import island
 
@@ -83,6 +84,7 @@ def test_a_step_launches_no_other_kernels(kernel_device):
 
         watched = ScopedReplacement()
         watched.add({(wp, "launch"): launch, (wp, "launch_tiled"): launch_tiled})
+        load_kernels_of(lambda: mujoco_warp.step(put, data))
         with watched.entered():
             mujoco_warp.step(put, data)
     assert len(launched) > 40

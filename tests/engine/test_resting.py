@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 import pytest
 import warp as wp
+from kernel_loading import load_kernels_of
 from mujoco.mjx.third_party import mujoco_warp
 from mujoco.mjx.third_party.mujoco_warp._src import sleep
 
@@ -94,6 +95,9 @@ def test_a_step_that_passes_over_what_rests_is_the_same_to_the_bit(kernel_device
     flags = own.tree_awake.numpy()
     assert (flags == 0).any(1).all()
     own.tree_awake.assign(np.where(flags == 0, REPLACED, flags).astype(np.int32))
+    for kernels in (engine_kernels, awake_kernels):
+        with kernels():
+            load_kernels_of(lambda: mujoco_warp.step(put, own))
     ctrl, awake, fell = np.zeros((2, model.nu), np.float32), [], 0
     for step in range(160):
         ctrl[:, 0] = np.array([0.1, 0.4]) * (min(1.0, step / 50) if step < 60 else 0.0)

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 import warp as wp
+from kernel_loading import load_kernels_of
 from mujoco.mjx.third_party import mujoco_warp
 
 from ig2mj.engine.warp.patches import awake_kernels, pins
@@ -37,6 +38,7 @@ def _roll(model: mujoco.MjModel, start: mujoco.MjData) -> tuple[np.ndarray, np.n
     assert put.is_sparse
     put.opt.warn_overflow = 0
     data = mujoco_warp.put_data(model, start, nworld=2, naconmax=128, naccdmax=128, njmax=200, nvmax=AWAKE)
+    load_kernels_of(lambda: mujoco_warp.step(put, data))
     ctrl = np.zeros((2, model.nu), np.float32)
     seen, awake = [], []
     for step in range(STEPS):
