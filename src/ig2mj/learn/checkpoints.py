@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import os
 import pathlib
 import re
@@ -121,6 +122,7 @@ class Checkpoints:
             try:
                 expected = _leaves(like)
                 with _checkpointer() as reader:
+                    _check_shapes(reader.metadata(folder / "arrays"), _full(expected))
                     leaves = {**expected, **reader.restore(folder / "arrays", _full(expected))}
             except Exception as e:  # what orbax raises for half a file has no type of its own
                 why = " ".join(str(e).split())[:120]
@@ -140,6 +142,20 @@ def _checkpointer() -> Any:
         primary_host=own, active_processes={own}, barrier_sync_key_prefix=f"process{own}"
     )
     return ocp.StandardCheckpointer(multiprocessing_options=alone)
+
+
+def _check_shapes(metadata: Any, expected: Mapping[str, np.ndarray]) -> None:
+    """Raises ValueError where a checkpoint's arrays are others than expected: orbax unpacks whatever there is."""
+    found = dict(metadata.item_metadata.tree)
+    for name, wanted in expected.items():
+        if name not in found:
+            raise ValueError(f"{name} is missing")
+        shape, dtype = tuple(found[name].shape), np.dtype(found[name].dtype)
+        if shape != wanted.shape or not np.can_cast(dtype, wanted.dtype, "same_kind"):
+            raise ValueError(f"{name} is {dtype}{list(shape)}, and {wanted.dtype}{list(wanted.shape)} is expected")
+        chunk = getattr(found[name].storage, "chunk_shape", None) or shape
+        if math.prod(chunk) > max(wanted.size, 1):
+            raise ValueError(f"{name} has chunks of shape {chunk}")
 
 
 def newest(
