@@ -14,7 +14,7 @@ from typing import Protocol, runtime_checkable
 
 import mujoco
 
-from ig2mj.errors import InputError, UnknownNameError, without_lines
+from ig2mj.errors import InputError, ManifestError, UnknownNameError, without_lines
 from ig2mj.files.inside import inside
 from ig2mj.scene.additions import Addition, add_objects
 from ig2mj.scene.build_tables import build_tables
@@ -131,7 +131,7 @@ class Scene:
             spec = _spec_from_text(add_objects(file, own, [a.wanted for a in self.additions])[0], file)
         else:
             spec = read_spec(file)
-        _make_solid(spec, self.manifest)
+        _make_solid(spec, self.manifest, self.folder)
         _attach_all(self.agents, spec, self.manifest)
         return spec
 
@@ -147,8 +147,18 @@ class Scene:
         return f"Scene('{self.name}', {len(self.object_names)} objects, {self.folder})"
 
 
-def _make_solid(spec: mujoco.MjSpec, manifest: Manifest) -> None:
-    """What only physics knows of a building. The ceiling lies on walls as thin as they are drawn."""
+def _make_solid(spec: mujoco.MjSpec, manifest: Manifest, folder: pathlib.Path) -> None:
+    """Adds collision geometry of the building. The ceiling lies on walls as thin as they are drawn.
+
+    Raises ManifestError: the manifest names a body that the scene does not have.
+    """
+    there = {body.name for body in spec.bodies}
+    for entry in manifest.objects:
+        for name in entry.bodies:
+            if name not in there:
+                problem = f"names the body '{name}', which scene.xml does not have"
+                fix = "manifest.json and scene.xml must come from one conversion: convert the scene again"
+                raise ManifestError(folder / MANIFEST_FILE, problem, element=f"object '{entry.name}'", fix=fix)
     deepen_floors(spec, manifest)
     add_ceiling(spec, manifest)
     deepen_walls(spec, manifest)
@@ -178,7 +188,7 @@ def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: s
         spec = _spec_from_text(text, file)
     else:
         spec = read_spec(file)
-    _make_solid(spec, manifest)
+    _make_solid(spec, manifest, folder)
     if agents:
         manifest = copy.copy(manifest)
         manifest.agents = [*manifest.agents, *_attach_all(agents, spec, manifest)]
