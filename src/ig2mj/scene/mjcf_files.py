@@ -110,7 +110,7 @@ def _parse(file: pathlib.Path) -> ElementTree.Element:
     except UnicodeDecodeError as e:
         raise InputError(file, f"is not text in UTF-8: byte {e.start}", fix=_FIX) from e
     except (ElementTree.ParseError, ValueError) as e:
-        raise InputError(file, f"cannot be read: {e}", fix=_FIX) from e
+        raise InputError(file, f"MuJoCo cannot load it: it is no valid XML: {e}", fix=_FIX) from e
 
 
 class _Builder(ElementTree.TreeBuilder):
