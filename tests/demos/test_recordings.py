@@ -17,6 +17,7 @@ import ig2mj
 from ig2mj.cli import call
 from ig2mj.demos import Recording, Replayer, record
 from ig2mj.demos.metrics import metrics_of
+from ig2mj.demos.observing import observe
 from ig2mj.demos.origin import origin_of
 from ig2mj.demos.thin import write_thin
 from ig2mj.envs.experts import expert_of
@@ -201,6 +202,8 @@ def test_a_thin_recording_has_actions_and_first_and_last_frames_and_comes_out_th
     with Recording(thin) as recording:
         (found,) = Replayer(recording, env=env)(check=True).differences
     assert (found.run, found.frame) == ("run_000000", 12)
+    with Recording(thin) as recording, pytest.raises(InputError, match="record it on this machine"):
+        observe(Replayer(recording, env=env), lambda *run: None)
 
 
 def test_metrics_say_what_was_moved_reached_held_and_looked_at(env, recorded, tmp_path):

@@ -26,7 +26,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from ig2mj.demos.observing import check_observations, made_again
+from ig2mj.demos.observing import check_observations, made_again, refuse_differences
 from ig2mj.demos.reader import Run
 from ig2mj.demos.replay import Replayed, Replayer
 from ig2mj.demos.selection import some_runs
@@ -104,9 +104,7 @@ def _export(replayer: Replayer, place: pathlib.Path, runs: Sequence[Run]) -> Rep
                 _write(place / f"{run.name}.hdf5", replayer, run, bodies, seen.pop(run.name), world)
 
     done = replayer(check=True, watch=watch, runs=runs)
-    if done.differences:
-        fix = "export it by state (--by state)"
-        raise InputError(replayer.recording.file, str(done.differences[0]), fix=fix)
+    refuse_differences(replayer, done)
     return done
 
 
