@@ -159,15 +159,19 @@ def test_a_recording_of_format_2_is_bound_to_every_byte_and_replayed(env, record
 
 @pytest.mark.slow
 def test_a_recording_outlives_a_change_of_looks_and_names(env, recorded, tmp_path):
-    text = (SHIPPED_HOMES / "birch" / "scene.xml").read_text()
+    text, home = (SHIPPED_HOMES / "birch" / "scene.xml").read_text(), tmp_path / "painted"
+    home.mkdir()
     for folder in ("meshes", "textures"):
-        text = text.replace(f"../{folder}", str(SHIPPED_HOMES / folder))
+        (tmp_path / folder).mkdir()
+        for name in set(re.findall(r'file="([^"]*)"', text)):
+            if (SHIPPED_HOMES / folder / name).exists():
+                shutil.copy(SHIPPED_HOMES / folder / name, tmp_path / folder)
     text = re.sub(r'rgba="[^"]*"', 'rgba="0 1 0 1"', text).replace("<light ", '<camera name="new"/><light ')
     text = re.sub(r'material="[^"]*"', "", text)
     for file in ("manifest.json", "rooms.npz"):
-        shutil.copy(SHIPPED_HOMES / "birch" / file, tmp_path)
-    (tmp_path / "scene.xml").write_text(text)
-    task = dataclasses.replace(env.task, name="Frying", summary="Fry.", home=str(tmp_path))
+        shutil.copy(SHIPPED_HOMES / "birch" / file, home)
+    (home / "scene.xml").write_text(text)
+    task = dataclasses.replace(env.task, name="Frying", summary="Fry.", home=str(home))
     other = ig2mj.make(task, worlds=2, engine="native", pool=env.core.starts.pool)
     with Recording(recorded[0]) as recording:
         replayer = Replayer(recording, env=other.with_horizon(HORIZON))
