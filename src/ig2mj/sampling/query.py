@@ -179,7 +179,11 @@ class SceneQuery:
 
         `stop`: asked after every control step; True ends it at once, where going on is pointless.
         """
-        self.physics, asleep = settle_worlds(self.engine, self.physics, seconds, stop)
+
+        def keep(physics: NativePhysics) -> None:
+            self.physics = physics  # `stop` may ask this query, too
+
+        _, asleep = settle_worlds(self.engine, self.physics, seconds, stop, keep)
         return bool(asleep.all())
 
 
@@ -188,8 +192,13 @@ def settle_worlds(
     physics: NativePhysics,
     seconds: float = SETTLE_SECONDS,
     stop: Callable[[PhysicsView], bool] = lambda view: False,
+    keep: Callable[[NativePhysics], None] = lambda physics: None,
 ) -> tuple[NativePhysics, Bool[np.ndarray, "W"]]:
     """Steps all worlds of an engine until every object of each sleeps, or for some simulated time.
+
+    Args:
+      stop: asked after every control step; True ends it at once. keep: given physics after every control step, before
+        `stop` is asked.
 
     Returns:
       Physics, and in which worlds everything sleeps.
@@ -197,6 +206,7 @@ def settle_worlds(
     view = engine.view(physics)
     for _ in range(round(seconds / (engine.substeps * engine.timestep))):
         physics, view = engine.step(physics)
+        keep(physics)
         if not np.asarray(view.awake).any() or stop(view):
             break
     return physics, np.logical_not(np.asarray(view.awake).any(1))
