@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import bench_scene
 import engine_bench
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from ig2mj.engine.base import Write
+from ig2mj.engine.grasp_release import moved_grasps, without_moved
+from ig2mj.engine.layout import make_layout
 
 
 @pytest.fixture(params=["native", *(pytest.param(n, marks=pytest.mark.slow) for n in ("warp", "jax"))])
@@ -88,3 +91,23 @@ def test_who_writes_constraints_decides_what_stays_held(full, holding):
     )
     physics = full.write(holding, write)
     assert held(full, full.view(physics)) == [True, True] and ignored(full, physics) == [True, True]
+
+
+def test_numpy_and_jax_end_the_same_grasps(bench_folder):
+    """The rule is one function; random grasps and writes of many worlds."""
+    scene, rng, worlds = engine_bench.bench_home(bench_folder, False), np.random.default_rng(0), 64
+    model, objects, layout = scene.model, len(scene.object_names), make_layout(scene.model, scene.tables)
+    masks = rng.random((worlds, objects)) < 0.2, rng.random((worlds, model.nq)) < 0.05
+    active, before = rng.random((worlds, model.neq)) < 0.5, rng.random((worlds, 1, objects)) < 0.5
+    found = []
+    for xp in (np, jnp):
+        moved = moved_grasps(xp, layout, *masks)
+        found.append([np.asarray(a) for a in (moved, *without_moved(xp, layout, moved, active, before))])
+    for own, other in zip(*found, strict=True):
+        assert np.array_equal(own, other)
+    moved, kept, still = found[0]
+    assert 0 < moved.sum() < moved.size and (still <= before).all()
+    assert not kept[:, layout.grasp_equality][moved].any()
+    others = np.setdiff1d(np.arange(model.neq), layout.grasp_equality)
+    assert np.array_equal(kept[:, others], active[:, others]), "constraints between objects are nobody's grasp"
+    assert moved_grasps(np, layout, None, None) is None
