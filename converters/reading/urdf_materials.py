@@ -49,7 +49,7 @@ class UrdfMaterials:
         if name in self._named:
             return self._named[name]
         if name:
-            self._warn(f"{where(visual)}: material '{shortened(name)}' is not defined: drawn without it")
+            self._warn(f"material '{shortened(name)}' is not defined: drawn without it")
         return Look()
 
     def _own(self, material: Element) -> Look:
