@@ -128,12 +128,20 @@ def test_section_8_3_the_whole_tools_region_has_bullets_margin(height, left):
     assert _counts(states)[0] == left
 
 
-@pytest.mark.parametrize("tool", ["rag", "broom"])
-def test_section_4_2_a_regions_margin_turns_with_the_tool(tool):
+def test_section_4_2_the_box_of_an_annotated_area_has_no_margin():
+    """The area is a box shape in Bullet: 1 mm above the points it reaches none of them, and at their height all."""
+    reach = PLACES[0, 2] + 0.02
+    apart = step(ROOM.model(), _dirty(), _swept({"broom": (0.5, 0, reach + 0.001)}))
+    level = step(ROOM.model(), _dirty(), _swept({"broom": (0.5, 0, reach - 0.0001)}))
+    assert (_counts(apart)[0], _counts(level)[0]) == (20, 16)
+
+
+@pytest.mark.parametrize(("tool", "half", "margin"), [("rag", (0.1, 0.1, 0.01), 0.003), ("broom", (0.2, 0.1, 0.02), 0)])
+def test_section_4_2_a_region_turns_with_the_tool_and_so_does_its_margin(tool, half, margin):
     turn = (np.cos(0.4), np.sin(0.4), 0.0, 0.0)  # 0.8 rad about x
     low, high = cleaning.regions(ROOM.model(), ROOM.view({tool: (0, 0, 0)}, quat={tool: turn}))
     number = {"broom": 0, "rag": 1}[tool]
-    half = np.array({"rag": (0.1, 0.1, 0.01), "broom": (0.2, 0.1, 0.02)}[tool]) + 0.003
+    half = np.array(half) + margin
     c, s = np.cos(0.8), np.sin(0.8)
     reach = [half[0], c * half[1] + s * half[2], s * half[1] + c * half[2]]
     np.testing.assert_allclose([-np.asarray(low[0, number]), high[0, number]], [reach, reach], atol=1e-6)

@@ -1,8 +1,9 @@
 """Cleaning tools: what they touch they wipe off (iGibson's cleaning_tool.py).
 
 A tool removes, at once, every particle of an object it touches whose centre is in the world box of its annotated
-cleaning area, or of the whole tool where the model has none. The boxes are Bullet's: local boxes with their margin,
-turned together (`ig2mj.geometry.boxes.turned_boxes`). Where the area has geometry, only contacts through it count, so
+cleaning area, or of the whole tool where the model has none. The boxes are Bullet's: local boxes, those of hulls with
+their margin, turned together (`ig2mj.geometry.boxes.turned_boxes`). An annotated area is a box shape in Bullet, whose
+box has no margin. Where the area has geometry, only contacts through it count, so
 that the handle of a broom cleans nothing. Stains go only when the tool is soaked. No movement or minimum force is
 required. A tool with a switch cleans only while it is on (iGibson's vacuum cleaner works even when it is off).
 
@@ -20,7 +21,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.geometry.boxes import BULLET_MARGIN_SINGLE, link_boxes, piece_cores, turned_boxes
+from ig2mj.geometry.boxes import link_boxes, piece_cores, turned_boxes
 from ig2mj.geometry.poses import quat_to_matrix
 from ig2mj.states.model import StateModel
 from ig2mj.states.particles import Particles, world_positions
@@ -133,5 +134,5 @@ def _boxes_of_tools(model: StateModel) -> _Areas:
         body=body.astype(int),
         link=p.tool_link[with_area],
         center=np.concatenate([center, np.zeros((len(with_area), 3))]).astype(np.float32),
-        half=np.concatenate([half, area_half[with_area] + BULLET_MARGIN_SINGLE]).astype(np.float32),
+        half=np.concatenate([half, area_half[with_area]]).astype(np.float32),
     )
