@@ -15,14 +15,17 @@ from ig2mj.errors import InputError
 from ig2mj.scene.manifest import FORMAT_VERSION, Manifest
 
 from .base import inputs
-from .base.description import Instance, ObjectModel
+from .base.description import ROBOT_CATEGORY, Instance, ObjectModel
+from .base.naming import file_slug
 from .base.options import ConvertOptions, under_limits
 from .base.output import replaced_folder
 from .base.process_pool import TaskPool
 from .bodies.assembly import Assembly, extent
-from .bodies.joint_limits import clamp
+from .bodies.inertia import MassRule
+from .bodies.joint_limits import start_positions
 from .bodies.kinematics import model_bounds
 from .bodies.placements import Placement, make_halves
+from .bodies.robot_description import ROBOT_FILE, robot_json
 from .finish import Outcome, finish, version_record
 from .mjcf.appearance import add_ground, add_setting
 from .mjcf.manifest_entries import object_entry
@@ -52,11 +55,12 @@ def convert_object(
     """Converts one object: `object.xml`, `manifest.json`, `meshes/`, and the report.
 
     The object stands on a ground plane, free to move unless it is `fixed`; the halves of a sliceable one lie beside it.
-    Masses are the URDF's own; without any, the object weighs its bounding box times the category's density where the
+    Masses are the URDF's own. Without any, the object weighs its bounding box times a density: the category's where the
     URDF lies in a dataset, else a general one (`link_inertials`).
 
     Args:
-      category: what it is, in iGibson's names: decides its abilities. model: its name, default the URDF's.
+      category: what it is, in iGibson's names: decides its abilities. "agent" is a robot: `robot.json` is written, too.
+      model: its name, default the file's; a robot's is the one that its URDF gives.
       bounding_box: wanted size in base axes, m; default the size it has.
 
     Raises:
@@ -66,7 +70,7 @@ def convert_object(
     file = pathlib.Path(urdf)
     start = time.perf_counter()
     options.progress(f"reading {file.name}", 0, 2)
-    source, dataset = _read(file, category, model or file.stem, options)
+    source, dataset = _read(file, category, model, options)
     built = {source.model: _build(source, dataset, _scale(source, bounding_box), options)}
     built |= _halves(dataset, built[source.model], options)
     read_seconds = time.perf_counter() - start
@@ -88,19 +92,27 @@ def convert_object(
             kind="object",
             timings=timings,
         )
+        if source.category == ROBOT_CATEGORY:
+            (folder / ROBOT_FILE).write_text(robot_json(source), encoding="utf-8")
         options.progress(source.model, 2, 2)
     return outcome
 
 
-def _read(file: pathlib.Path, category: str, name: str, options: ConvertOptions) -> tuple[ObjectModel, Dataset | None]:
+def _read(
+    file: pathlib.Path, category: str, model: str | None, options: ConvertOptions
+) -> tuple[ObjectModel, Dataset | None]:
     """Reads the URDF, its metadata, and the dataset it lies in, if it does."""
     if not inputs.is_file(file):
         raise InputError(file, "is not a file", element="--urdf", fix="name an object's URDF")
+    name = model or file.stem
     if not name.strip() or not category.strip():
         raise InputError(file, "the object needs a category and a name", element="--category, --model")
     root = _dataset_root(file)
-    source = read_urdf(file, category, name, mesh_root=options.mesh_root, package_path=options.package_path)
-    if knowledge.synset(category) is None:
+    source = read_urdf(file, category, name, mesh_root=options.mesh_root, package_path=options.package_path,
+        progress=options.progress)  # fmt: skip
+    if category == ROBOT_CATEGORY:
+        source.model = model or file_slug(source.title or name)
+    elif knowledge.synset(category) is None:
         near = difflib.get_close_matches(category, knowledge.categories(), n=3, cutoff=0.6)
         hint = f"; near matches: {', '.join(near)}" if near else ""
         source.warnings.append(f"--category {shortened(category)} is not known, so the object can do nothing{hint}")
@@ -121,7 +133,11 @@ def _build(source: ObjectModel, dataset: Dataset | None, scale: np.ndarray, opti
     hulls = options.hull_options()
     with TaskPool(options.jobs) as pool:
         found = decompose_model(source, hulls, pool, options.progress)
-    return build_model(source, found, scale, density, hulls, options.bullet_inertia, igibson_visuals=False)
+    masses: MassRule = "robot" if source.category == ROBOT_CATEGORY else "object"
+    return build_model(
+        source, found, scale, density, hulls, options.bullet_inertia, igibson_visuals=False, masses=masses,
+        progress=options.progress,
+    )  # fmt: skip
 
 
 def _scale(source: ObjectModel, bounding_box: tuple[float, float, float] | None) -> np.ndarray:
@@ -192,7 +208,8 @@ def _write(
         roots = [places[placement.name] @ assembly.bodies[index].pose for index in assembly.roots]
         elements = add_object(builder, assembly, placement.name, roots, fixed=fixed)
         build.elements[placement.name] = elements
-        build.start_joints |= {elements.joints[j.name]: clamp(j, 0.0) for j in assembly.joints()}
+        start = start_positions(assembly.model.joints, {})
+        build.start_joints |= {name: start[joint] for joint, name in elements.joints.items()}
         build.entries.append(
             object_entry(
                 placement.name,

@@ -18,10 +18,10 @@ from .base.options import Progress, no_progress
 from .base.process_pool import TaskPool
 from .base.read_limits import ReadLimits, limits, limits_of
 from .bodies.assembly import Assembly, assemble
-from .bodies.inertia import link_inertials
+from .bodies.inertia import MassRule, link_inertials
 from .bodies.kinematics import model_bounds
 from .checks.plausible import implausible
-from .hulls.link_hulls import LinkPieces, decompose_links, is_cached, scaled_pieces
+from .hulls.link_hulls import LinkPieces, all_cached, decompose_links, scaled_pieces
 from .hulls.pieces import HullOptions, LinkHulls
 from .reading.dataset import Dataset
 from .reading.scaling import instance_scale, link_maps, scale_model
@@ -106,7 +106,7 @@ def run_task(task: ModelTask) -> list[BuiltModel]:
         built = [
             build_model(
                 source, found, instance_scale(instance, source), density, task.hulls, task.bullet_inertia,
-                igibson_visuals=True,
+                igibson_visuals=True, masses="object" if first.kind == "building" else "dataset",
             )
             for instance in task.instances
         ]  # fmt: skip
@@ -121,7 +121,7 @@ def is_quick(task: ModelTask) -> bool:
         source = scale_model(_dataset(task.root).instance_model(task.scene, task.instances[0]), 1.0)
     except Ig2mjError:
         return False
-    return all(is_cached(link.collisions, task.hulls) for link in source.links.values() if link.collisions)
+    return all_cached({name: link.collisions for name, link in source.links.items()}, task.hulls)
 
 
 def decompose_model(
@@ -144,20 +144,24 @@ def build_model(
     bullet_inertia: bool,
     *,
     igibson_visuals: bool,
+    masses: MassRule,
+    progress: Progress = no_progress,
 ) -> BuiltModel:
     """From a model as read to one ready to be written (see `scale_model`, `scaled_pieces`, `link_inertials`).
 
     Args:
       found: what `decompose_model` made of it.
       density: kg per m3 of the bounding box; None: the general one (see `link_inertials`).
+      masses: what the URDF's inertials count for.
     """
     start = time.perf_counter()
     scaled = scale_model(model, scale)
     maps = link_maps(model, scale)
-    decomposed = {
-        name: scaled_pieces(found[name], link.collisions, maps[name], hulls) for name, link in scaled.links.items()
-    }
-    inertials = link_inertials(scaled, density, bullet_inertia)
+    decomposed = {}
+    for name, link in scaled.links.items():
+        progress(f"link {name}: collision geoms", len(decomposed), len(scaled.links))
+        decomposed[name] = scaled_pieces(found[name], link.collisions, maps[name], hulls)
+    inertials = link_inertials(scaled, density, bullet_inertia, masses)
     pieces = {name: link_hulls.pieces for name, link_hulls in decomposed.items()}
     assembly = assemble(scaled, scale, pieces, inertials, igibson_visuals=igibson_visuals)
     for name, link_hulls in decomposed.items():

@@ -13,6 +13,9 @@ from typing import Any
 
 import numpy as np
 
+ROBOT_CATEGORY = "agent"
+"""iGibson's category of robots, which are no objects of the household: no synset has it."""
+
 Rgba = tuple[float, float, float, float]
 
 
@@ -140,7 +143,10 @@ class StableOrientation:
 
 @dataclasses.dataclass
 class Metadata:
-    """misc/metadata.json (iGibson's dataset format). bbox None: no scaling information."""
+    """misc/metadata.json (iGibson's dataset format). bbox None: no scaling information.
+
+    keep_inertials: an addition of ig2mj: the URDF's inertials are meant, also within a dataset.
+    """
 
     bbox_size: np.ndarray | None = None
     base_link_offset: np.ndarray | None = None
@@ -148,13 +154,17 @@ class Metadata:
     links: dict[str, MetaLink] = dataclasses.field(default_factory=dict)
     openable_joints: list[tuple[str, int]] = dataclasses.field(default_factory=list)  # (joint name, direction +-1)
     openable_both_sides: bool = False
+    keep_inertials: bool = False
     object_parts: list[ObjectPart] = dataclasses.field(default_factory=list)
     raw: dict[str, Any] = dataclasses.field(default_factory=dict)
 
 
 @dataclasses.dataclass
 class ObjectModel:
-    """An object's URDF, parsed and checked: a tree of links (a forest once floating joints are cut)."""
+    """An object's URDF, parsed and checked: a tree of links (a forest once floating joints are cut).
+
+    title: the name that the URDF gives itself, or ''.
+    """
 
     category: str
     model: str
@@ -164,6 +174,7 @@ class ObjectModel:
     base: str
     metadata: Metadata = dataclasses.field(default_factory=Metadata)
     warnings: list[str] = dataclasses.field(default_factory=list)
+    title: str = ""
 
 
 @dataclasses.dataclass

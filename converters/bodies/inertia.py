@@ -2,12 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
 import numpy as np
 import trimesh
 
 from ..base.description import Inertial, Link, ObjectModel
-from .kinematics import model_bounds, shape_bounds
+from .joint_limits import is_locked
+from .kinematics import link_poses, model_bounds, shape_bounds
 from .solids import Solid, combine, hull_volume, joined, shape_solids, signed_volume
+
+MassRule = Literal["dataset", "object", "robot"]
+"""What the inertials of a URDF count for.
+
+dataset: nothing, for an object of a dataset that has a bounding box, unless its metadata.json says `keep_inertials`
+  (iGibson overwrites them; building parts and objects without a box are excepted).
+object: they are kept; a body that none of them gives a mass gets its share by density.
+robot: they are kept; a body that none of them gives a mass has none.
+
+Where they come to no mass at all, the density rule holds for all three.
+"""
 
 DEFAULT_DENSITY = 67.0
 """kg per m^3 of the bounding box, of a category without a spec."""
@@ -21,41 +36,93 @@ TINY = 1e-3
 """A mesh's signed volume below this share of its hull's is taken for a double-sided or inside-out surface."""
 
 
-def link_inertials(model: ObjectModel, density: float | None, bullet: bool = False) -> dict[str, Inertial]:
+def link_inertials(
+    model: ObjectModel, density: float | None, bullet: bool = False, rule: MassRule = "object"
+) -> dict[str, Inertial]:
     """Inertials of all links of a model that `scaling.scale_model` returned.
 
-    One rule for scenes and single objects: the mass of the whole is density x scaled bounding box, split over the links
-    by the volume of their collision shapes, and the centre of mass is the volume's where the mesh is watertight, else
-    the surface's. A URDF that has inertials of its own keeps them; its links without one get their share of the above.
-    (iGibson throws them away, but its own objects have none.) Bodies left without mass get `MIN_MASS`.
+    By density: the mass of the whole is density x scaled bounding box, split over the links by the volume of their
+    collision shapes, and the centre of mass is the volume's where the mesh is watertight, else the surface's.
+    By the URDF: its inertials are kept. A link without one weighs nothing where another link of its rigid body (links
+    joined by fixed joints) has one. See `MassRule` for which of the two counts. Bodies without mass get `MIN_MASS`.
 
     Args:
       model: the scaled model. Warnings are appended to `model.warnings`.
       density: kg per m^3 of the bounding box, of the category; None: `DEFAULT_DENSITY`, with a warning.
       bullet: inertia by Bullet's formula on the axis-aligned box instead of the true one of the convex hulls.
+      rule: what the URDF's own inertials count for.
 
     Returns:
       link name -> Inertial (link frame), for every link. Fixed-joint children are separate: merging is the builder's.
     """
-    own = [link for link in model.links.values() if link.inertial is not None]
+    bodies = _rigid_bodies(model)
+    given = {name: link.inertial for name, link in model.links.items() if link.inertial is not None}
+    stated = sum(inertial.mass for inertial in given.values())
+    discarded = rule == "dataset" and model.metadata.bbox_size is not None and not model.metadata.keep_inertials
+    if discarded or stated <= 0:
+        light, given = list(model.links), {}
+    else:
+        empty = [] if rule == "robot" else [members for members in bodies.values() if not _mass_of(members, given)]
+        light = [name for members in empty for name in members]
     shares: dict[str, float] = {}
-    if len(own) < len(model.links) and (size := _size(model)) is not None:
+    if light and (size := _size(model)) is not None:
         total = (DEFAULT_DENSITY if density is None else density) * float(np.prod(size))
-        shares = _split_mass(model, total)
-        if density is None and not own:
-            text = f"has no inertials: {total:.3g} kg, {DEFAULT_DENSITY:g} kg/m3 of its box, split by volume"
-            model.warnings.append(text)
+        shares = {name: mass for name, mass in _split_mass(model, total).items() if name in set(light)}
+        _warn_of_density(model, total, stated, density, shares, discarded)
     result = {}
     for name, link in model.links.items():
-        if link.inertial is not None:
-            result[name] = _kept(link, link.inertial, model, bullet)
-            continue
-        share = shares.get(name, 0.0)
-        if own and share > 0:
-            model.warnings.append(f"link '{name}' has no inertial: {share:.3g} kg, its share of the object's size")
-        result[name] = _computed(link, share, bullet)
-    _give_least_mass(model, result)
+        if name in shares or name not in given:
+            result[name] = _computed(link, shares.get(name, 0.0), bullet)
+        else:
+            members = next(body for body in bodies.values() if name in body)
+            result[name] = _kept(link, given[name], members, model, bullet)
+    _give_least_mass(model, bodies, result)
     return result
+
+
+def _warn_of_density(
+    model: ObjectModel,
+    total: float,
+    stated: float,
+    density: float | None,
+    shares: dict[str, float],
+    discarded: bool,
+) -> None:
+    """Says where the density rule takes the place of what a URDF says, or of what it should say.
+
+    total: kg of the whole by the rule. stated: kg that the URDF's inertials come to.
+    """
+    own = any(link.inertial is not None for link in model.links.values())
+    if discarded:
+        if stated > 0:
+            model.warnings.append(
+                f"its inertials ({stated:.3g} kg) are not used, as in iGibson's datasets: {total:.3g} kg, the "
+                "category's density times the bounding box"
+            )
+    elif stated <= 0 and (own or density is None):
+        lacks = "its inertials have no mass" if own else "has no inertials"
+        used = DEFAULT_DENSITY if density is None else density
+        model.warnings.append(f"{lacks}: {total:.3g} kg, {used:g} kg/m3 of its box, split by volume")
+    elif stated > 0:
+        for name, mass in shares.items():
+            if mass > 0:
+                model.warnings.append(f"link '{name}' has no mass: {mass:.3g} kg, its share of the object's size")
+
+
+def _rigid_bodies(model: ObjectModel) -> dict[str, list[str]]:
+    """First link -> the links of each rigid body: those joined by fixed joints, or by joints without room to move."""
+    rigid = {j.child: j.parent for j in model.joints.values() if j.type == "fixed" or is_locked(j)}
+    root: dict[str, str] = {}
+    for name in link_poses(model):  # parents come before their children
+        root[name] = root[rigid[name]] if name in rigid else name
+    bodies: dict[str, list[str]] = {}
+    for name in model.links:
+        bodies.setdefault(root[name], []).append(name)
+    return bodies
+
+
+def _mass_of(members: Sequence[str], given: Mapping[str, Inertial]) -> float:
+    return sum(given[name].mass for name in members if name in given)
 
 
 def _size(model: ObjectModel) -> np.ndarray | None:
@@ -138,13 +205,16 @@ def _computed(link: Link, mass: float, bullet: bool) -> Inertial:
     return Inertial(mass, _tensor(link, mass, pose, bullet), pose)
 
 
-def _kept(link: Link, given: Inertial, model: ObjectModel, bullet: bool) -> Inertial:
-    """The URDF's inertial, or its mass with a computed tensor where no rigid body of this size has that tensor."""
+def _kept(link: Link, given: Inertial, members: Sequence[str], model: ObjectModel, bullet: bool) -> Inertial:
+    """The URDF's inertial, or its mass with a computed tensor where no rigid body of this size has that tensor.
+
+    members: the links of the rigid body that the link is a part of.
+    """
     if given.mass == 0:
         return Inertial(0.0, np.zeros((3, 3)), given.pose.copy())
     problem = "no rigid body has its inertia"
     if is_possible(given.inertia):
-        problem = _too_wide(link, given)
+        problem = _too_wide(link, given, members, model)
     if not bullet and not problem:
         return given
     if not bullet and np.any(given.inertia):
@@ -152,9 +222,18 @@ def _kept(link: Link, given: Inertial, model: ObjectModel, bullet: bool) -> Iner
     return Inertial(given.mass, _tensor(link, given.mass, given.pose, bullet), given.pose.copy())
 
 
-def _too_wide(link: Link, given: Inertial) -> str:
-    """What is wrong with an inertia whose mass would have to lie outside the link: a placeholder; else ''."""
-    boxes = [b for shape in link.collisions or link.visuals if (b := shape_bounds(shape)) is not None]
+def _too_wide(link: Link, given: Inertial, members: Sequence[str], model: ObjectModel) -> str:
+    """What is wrong with an inertia whose mass would have to lie outside the body: a placeholder; else ''.
+
+    The body counts, not the link: the inertial of a whole robot may be that of a frame without a shape of its size.
+    """
+    if not link.collisions and not link.visuals:
+        return ""  # what it is the inertia of has other frames
+    poses, boxes = link_poses(model), []
+    to_link = np.linalg.inv(poses[link.name])
+    for other in (model.links[name] for name in members):
+        frame = to_link @ poses[other.name]
+        boxes += [b for s in other.collisions or other.visuals if (b := shape_bounds(s, frame)) is not None]
     if not boxes:
         return ""
     size = np.max([b[1] for b in boxes], axis=0) - np.min([b[0] for b in boxes], axis=0)
@@ -202,17 +281,10 @@ def _ball() -> Solid:
     return Solid(4 / 3 * np.pi * MIN_RADIUS**3, np.zeros(3), np.eye(3) * MIN_RADIUS**2 / 5)
 
 
-def _give_least_mass(model: ObjectModel, inertials: dict[str, Inertial]) -> None:
-    """Gives `MIN_MASS` to the first link of every rigid body (links joined by fixed joints) that has no mass."""
-    fixed = {j.child: j.parent for j in model.joints.values() if j.type == "fixed"}
-    bodies: dict[str, list[str]] = {}
-    for name in model.links:
-        root = name
-        while root in fixed:
-            root = fixed[root]
-        bodies.setdefault(root, []).append(name)
+def _give_least_mass(model: ObjectModel, bodies: Mapping[str, Sequence[str]], inertials: dict[str, Inertial]) -> None:
+    """Gives `MIN_MASS` to the first link of every rigid body that has no mass."""
     for root, members in bodies.items():
-        if sum(inertials[name].mass for name in members) >= MIN_MASS * 1e-3:
+        if _mass_of(members, inertials) >= MIN_MASS * 1e-3:
             continue
         given = inertials[root]
         inertials[root] = Inertial(MIN_MASS, _tensor(model.links[root], MIN_MASS, given.pose, False), given.pose)

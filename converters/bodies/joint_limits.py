@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -32,6 +33,23 @@ def clamp(joint: Joint, position: float) -> float:
     """A joint position inside the limits (positions are clamped at export)."""
     limits = joint_range(joint)
     return position if limits is None else min(max(position, limits[0]), limits[1])
+
+
+def start_positions(joints: Mapping[str, Joint], given: Mapping[str, float]) -> dict[str, float]:
+    """Joint -> position at the start: as given, brought inside the limits; of a joint that follows another, where that
+    one puts it; else 0 brought inside the limits."""
+    found: dict[str, float] = {}
+
+    def at(name: str) -> float:
+        if name not in found:
+            joint = joints[name]
+            if name not in given and joint.mimic is not None and joint.mimic.joint in joints:
+                found[name] = joint.mimic.multiplier * at(joint.mimic.joint) + joint.mimic.offset
+            else:
+                found[name] = clamp(joint, given.get(name, 0.0))
+        return found[name]
+
+    return {name: at(name) for name in joints}
 
 
 def unit_axis(joint: Joint) -> np.ndarray:

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..base.description import ObjectModel, Shape
 from ..base.transforms import apply
+from .joint_limits import motion
 
 
-def link_poses(model: ObjectModel) -> dict[str, np.ndarray]:
-    """link -> 4x4 in the base link's frame with all joints at 0; floating joints at their origin."""
+def link_poses(model: ObjectModel, joints: Mapping[str, float] | None = None) -> dict[str, np.ndarray]:
+    """link -> 4x4 in the base link's frame; floating joints at their origin.
+
+    joints: positions of joints by name, rad or m; default 0.
+    """
+    given = joints or {}
     children: dict[str, list[tuple[str, np.ndarray]]] = {name: [] for name in model.links}
     for joint in model.joints.values():
-        children[joint.parent].append((joint.child, joint.origin))
+        position = given.get(joint.name, 0.0)
+        moved = joint.origin @ motion(joint, position) if position else joint.origin
+        children[joint.parent].append((joint.child, moved))
     poses = {model.base: np.eye(4)}
     queue = [model.base]
     while queue:

@@ -22,7 +22,7 @@ from ..base.process_pool import TaskPool
 from . import piece_cache as cache
 from .budget import drop_contained
 from .convex import Hull, distance_outside, hull_of, reduce_vertices, solid_hull, union_volume
-from .decompose import CutTask, cut_part, effort_for, recut_to_budget
+from .decompose import COARSE_FACES, COARSE_TOLERANCES, CutTask, cut_part, effort_for, recut_to_budget
 from .fitting import fit_primitive, primitive_hull
 from .pieces import HullOptions, LinkHulls, Piece, PieceSource
 from .shapes import Concave, Convex, ShapeParts, label_of, primitive_piece, take_apart
@@ -36,6 +36,38 @@ OUTSIDE_SHARE = 1e-3
 round convex body with too many vertices is replaced by one of the same volume and box (see `Piece.fit_error`)."""
 CUT = ("boxes", "sheet", "coacd", "merged", "recut")
 """Sources of pieces that are a part of something larger."""
+
+
+HEAVY_FACES = 2000
+"""Faces from which on a mesh may take long to cut up,"""
+FEW_HEAVY = 8
+"""and so many of them that a model may have before it counts as large."""
+LARGE_SECONDS = 600.0
+"""Processor time that a large model's meshes share, where they need so much: CoACD's limit, not what it takes."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ModelSize:
+    """How much there is to cut up in a model. It depends on what is read only, so that results can be kept.
+
+    heavy: meshes without groups of more than `HEAVY_FACES` faces.
+    """
+
+    heavy: int = 0
+
+    @classmethod
+    def of(cls, links: Mapping[str, Sequence[Shape]]) -> ModelSize:
+        shapes = [shape for own in links.values() for shape in own if shape.kind == "mesh" and not shape.grouped]
+        return cls(sum(sum(len(mesh.faces) for mesh in shape.meshes) > HEAVY_FACES for shape in shapes))
+
+    @property
+    def large(self) -> bool:
+        """Its meshes are cut with coarser settings, made coarser first, and share their time."""
+        return self.heavy > FEW_HEAVY
+
+    def seconds(self, options: HullOptions) -> float:
+        """Of processor time for the cuts of one link."""
+        return min(options.time_limit, LARGE_SECONDS / self.heavy) if self.large else options.time_limit
 
 
 @dataclasses.dataclass
@@ -82,8 +114,8 @@ def decompose_links(
       links: link -> its collision shapes.
       pool: does shapes and parts side by side; without one they are done here, one after the other.
     """
-    pool = pool or TaskPool(1)
-    keys = {name: _key(shapes, options) for name, shapes in links.items()}
+    pool, size = pool or TaskPool(1), ModelSize.of(links)
+    keys = {name: _key(shapes, options, size) for name, shapes in links.items()}
     done = {name: known for name, key in keys.items() if options.cache and (known := _load(key)) is not None}
     missing = [name for name in links if name not in done]
     shapes = [
@@ -97,11 +129,12 @@ def decompose_links(
         [(shape, label_of(shape, number), options) for _, number, shape in shapes],
         [f"link {name}: {label_of(shape, number)}" for name, number, shape in shapes],
         progress,
+        lambda task: sum(len(mesh.faces) for mesh in task[0].meshes) <= HEAVY_FACES,
     )
     apart: dict[str, list[ShapeParts]] = {name: [] for name in missing}
     for (name, _, _), parts in zip(shapes, taken, strict=True):
         apart[name].append(parts)
-    _cut_concave(apart, options, pool, progress)
+    _cut_concave(apart, options, size, pool, progress)
     results = pool.map(
         _keep_to_budget,
         [(apart[name], links[name], options) for name in missing],
@@ -116,9 +149,10 @@ def decompose_links(
     return {name: done[name] for name in links}
 
 
-def is_cached(shapes: Sequence[Shape], options: HullOptions) -> bool:
-    """Whether `decompose_links` would find its result in the cache, and so take no time worth a process of its own."""
-    return options.cache and cache.holds(_key(shapes, options))
+def all_cached(links: Mapping[str, Sequence[Shape]], options: HullOptions) -> bool:
+    """Whether `decompose_links` would find its results in the cache, and so take no time worth a process of its own."""
+    size = ModelSize.of(links)
+    return options.cache and all(cache.holds(_key(shapes, options, size)) for shapes in links.values() if shapes)
 
 
 def _take_apart(task: tuple[Shape, str, HullOptions]) -> ShapeParts:
@@ -126,7 +160,7 @@ def _take_apart(task: tuple[Shape, str, HullOptions]) -> ShapeParts:
 
 
 def _cut_concave(
-    apart: Mapping[str, list[ShapeParts]], options: HullOptions, pool: TaskPool, progress: Progress
+    apart: Mapping[str, list[ShapeParts]], options: HullOptions, size: ModelSize, pool: TaskPool, progress: Progress
 ) -> None:
     """Cuts up the concave parts of all links, side by side, and puts the pieces in their places."""
     tasks: list[CutTask] = []
@@ -136,10 +170,10 @@ def _cut_concave(
         if not concave:
             continue
         corners = np.concatenate([parts.corners for parts in shapes if len(parts.corners)])
-        size = float(np.linalg.norm(np.ptp(corners, axis=0)))
+        across = float(np.linalg.norm(np.ptp(corners, axis=0)))
         for number, item in enumerate(concave):
-            effort = effort_for(item.part.hull.diagonal / size)
-            tasks.append(CutTask(item.part, options, effort, options.time_limit / len(concave)))
+            effort = max(effort_for(item.part.hull.diagonal / across), int(size.large))
+            tasks.append(CutTask(item.part, options, effort, size.seconds(options) / len(concave), size.large))
             labels.append(f"link {name}: part {number + 1} of {len(concave)}")
     cuts = iter(pool.map(cut_part, tasks, labels, progress))
     for shapes in apart.values():
@@ -279,8 +313,10 @@ def _union_of(pieces: list[Piece]) -> float:
 _FACTS = ("before", "volume_before", "source_volume", "warnings", "seconds")
 
 
-def _key(shapes: Sequence[Shape], options: HullOptions) -> str:
+def _key(shapes: Sequence[Shape], options: HullOptions, size: ModelSize) -> str:
     rules = dataclasses.asdict(options)
+    if size.large:
+        rules |= {"coarse": [COARSE_FACES, COARSE_TOLERANCES], "time_limit": size.seconds(options)}
     for no_matter in ("threads", "cache", "max_hull_vertices", "primitives"):
         del rules[no_matter]
     given = [

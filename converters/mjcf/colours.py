@@ -5,10 +5,13 @@ from __future__ import annotations
 import colorsys
 import hashlib
 
+from ..base.description import ROBOT_CATEGORY
+
 Rgba = tuple[float, float, float, float]
 
 #: Word in a category's name -> colour; the first that matches wins. Plain household colours, chosen to be told apart.
 _BY_WORD: tuple[tuple[tuple[str, ...], Rgba], ...] = (
+    ((ROBOT_CATEGORY,), (0.70, 0.70, 0.70, 1.0)),
     (("walls",), (0.93, 0.91, 0.87, 1.0)),
     (("floors",), (0.72, 0.62, 0.50, 1.0)),
     (("ceilings",), (0.96, 0.96, 0.95, 1.0)),

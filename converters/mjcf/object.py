@@ -13,7 +13,7 @@ from ig2mj.scene.manifest import LinkEntry
 from ..base.description import MetaLink
 from ..base.transforms import pose_from, quat_from_rotation
 from ..bodies.assembly import Assembly, BodyPlan, VisualPart
-from ..bodies.joint_limits import joint_range, mujoco_type, unit_axis
+from ..bodies.joint_limits import clamp, is_locked, joint_range, mujoco_type, unit_axis
 from ..bodies.joint_rules import ARMATURE, DAMPING, friction, reach
 from ..hulls.pieces import Piece
 from .colours import Rgba, category_colour
@@ -209,18 +209,22 @@ class _ObjectWriter:
         _set_primitive(geom, "box", tuple(link.size), pose_from(link.xyz, link.rpy))
 
     def _add_mimics(self, joints: dict[str, str]) -> None:
+        """Follower = multiplier x leader + offset: both joints have their reference at position 0."""
         for joint in self._assembly.joints():
             if joint.mimic is None:
                 continue
-            leader = joints.get(joint.mimic.joint)
+            leader, source = joints.get(joint.mimic.joint), self._assembly.model.joints.get(joint.mimic.joint)
+            offset, multiplier = joint.mimic.offset, joint.mimic.multiplier
             if leader is None:
-                text = f"joint '{joint.name}' mimics '{joint.mimic.joint}', which does not move: left independent"
-                self._builder.warn(self._name, text)
-                continue
+                if source is None or not is_locked(source):
+                    text = f"joint '{joint.name}' mimics '{joint.mimic.joint}', which does not move: left independent"
+                    self._builder.warn(self._name, text)
+                    continue
+                offset, multiplier = offset + multiplier * clamp(source, 0.0), 0.0
             name = f"{joints[joint.name]}/mimic"
             equality = self._builder.spec.add_equality(name=name, type=mujoco.mjtEq.mjEQ_JOINT)
-            equality.name1, equality.name2 = joints[joint.name], leader
-            equality.data[:5] = [joint.mimic.offset, joint.mimic.multiplier, 0.0, 0.0, 0.0]
+            equality.name1, equality.name2 = joints[joint.name], leader or ""
+            equality.data[:5] = [offset, multiplier, 0.0, 0.0, 0.0]
 
     def _add_excludes(self, names: list[str]) -> None:
         """No contacts between bodies of one tree; split-off bodies do touch the rest."""

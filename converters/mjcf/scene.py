@@ -14,7 +14,7 @@ from ig2mj.scene.manifest import ObjectEntry
 from ..base.description import RoomMaps
 from ..base.transforms import rotation_from_wxyz
 from ..bodies.assembly import Assembly, extent
-from ..bodies.joint_limits import clamp
+from ..bodies.joint_limits import start_positions
 from ..bodies.placements import Placement
 from ..reading.cached_states import convert_states
 from .appearance import add_setting
@@ -143,11 +143,13 @@ def _with_extra_roots(assembly: Assembly, base: np.ndarray) -> list[np.ndarray]:
 def _start_joints(placement: Placement, assembly: Assembly, elements: ObjectElements) -> dict[str, float]:
     """MJCF joint -> start position. Saved names are `<object>_<joint>`; unknown ones are ignored."""
     saved = placement.instance.joint_states or {}
-    positions = {}
+    given = {}
     for joint in assembly.joints():
-        position, _ = saved.get(f"{placement.name}_{joint.name}", saved.get(joint.name, (0.0, 0.0)))
-        positions[elements.joints[joint.name]] = clamp(joint, float(position))
-    return positions
+        state = saved.get(f"{placement.name}_{joint.name}", saved.get(joint.name))
+        if state is not None:
+            given[joint.name] = float(state[0])
+    start = start_positions(assembly.model.joints, given)
+    return {name: start[joint] for joint, name in elements.joints.items()}
 
 
 def _scene_box(

@@ -62,6 +62,7 @@ def _parse(raw: dict[str, Any], file: pathlib.Path, warnings: list[str]) -> Meta
     for i, item in enumerate(_list(raw, "openable_joint_ids", file)):
         data.openable_joints.append(_openable(item, file, f"openable joint {i}"))
     data.openable_both_sides = bool(raw.get("openable_both_sides", False))
+    data.keep_inertials = bool(raw.get("keep_inertials", False))
     for i, item in enumerate(_list(raw, "object_parts", file)):
         data.object_parts.append(_part(item, file, f"object part {i}"))
     return data

@@ -13,6 +13,7 @@ from ig2mj.errors import InputError
 from ..base import inputs
 from ..base.description import Inertial, Joint, Link, Mimic, ObjectModel
 from ..base.file_access import FileGuard
+from ..base.options import Progress, no_progress
 from ..base.transforms import read_origin
 from .urdf_geometry import GeometryReader
 from .urdf_materials import UrdfMaterials
@@ -33,6 +34,7 @@ def read_urdf(
     allow_outside: bool = False,
     mesh_root: pathlib.Path | None = None,
     package_path: Sequence[pathlib.Path] = (),
+    progress: Progress = no_progress,
 ) -> ObjectModel:
     """Reads an object's URDF and its meshes (unscaled, link frames); metadata is left empty.
 
@@ -58,7 +60,9 @@ def read_urdf(
     reader = GeometryReader(guard, UrdfMaterials(robot, guard, warnings), warnings)
     check_counts(robot, path)
     links: dict[str, Link] = {}
-    for element in robot.iterfind("link"):
+    elements = robot.findall("link")
+    for done, element in enumerate(elements):
+        progress(f"reading link {element.get('name', '')}", done, len(elements))
         link = _read_link(element, reader)
         if link.name in links:
             raise InputError(path, "this name occurs twice", element=where(element))
@@ -71,7 +75,8 @@ def read_urdf(
         joints[joint.name] = joint
     base, links, joints = find_tree(links, joints, path, warnings)
     _drop_broken_mimics(joints, warnings)
-    return ObjectModel(category, model, path, links, joints, base, warnings=warnings)
+    title = (robot.get("name") or "").strip()
+    return ObjectModel(category, model, path, links, joints, base, warnings=warnings, title=title)
 
 
 def _read_link(element: Element, reader: GeometryReader) -> Link:

@@ -119,6 +119,8 @@ def metadata(model: HouseholdObject) -> dict:
         },
         "link_bounding_boxes": boxes,
     }
+    if model.mass is not None:
+        data["keep_inertials"] = True  # of the URDF; iGibson ignores them and this
     openable = [[k, joint.name, joint.openable] for k, joint in enumerate(model.joints) if joint.openable]
     if openable:
         data["openable_joint_ids"] = openable

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import os
 import pathlib
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any
@@ -94,7 +95,7 @@ def convert_object(
     """
     from ig2mj_converters.conversion import convert_object as convert
 
-    options = options_of(common, mesh_root=mesh_root, package_path=package_path)
+    options = options_of(common, default_jobs=os.cpu_count() or 1, mesh_root=mesh_root, package_path=package_path)
     with _progress(f"converting {urdf.name}") as options_with:
         outcome = convert(urdf, category, out, model=model, bounding_box=bbox, options=options_with(options))
     return _tell(outcome, out, "object.xml", common.json)
@@ -115,13 +116,13 @@ def convert_robot(
     Args:
       urdf: the robot's URDF.
       out: output folder; an earlier result there is replaced once the conversion succeeds.
-      name: name of the robot; default: the file's name.
+      name: name of the robot; default: the one in the URDF.
       mesh_root: additional folder from which meshes may be read (URDFs that use ../ or absolute paths).
       package_path: folders that hold the packages of `package://` names.
     """
     from ig2mj_converters.convert_robot import convert_robot as convert
 
-    options = options_of(common, mesh_root=mesh_root, package_path=package_path)
+    options = options_of(common, default_jobs=os.cpu_count() or 1, mesh_root=mesh_root, package_path=package_path)
     with _progress(f"converting {urdf.name}") as options_with:
         outcome = convert(urdf, out, name=name, options=options_with(options))
     return _tell(outcome, out, "object.xml", common.json)

@@ -20,7 +20,8 @@ class Common:
     """Options of every conversion.
 
     Attributes:
-      jobs: number of processes; they share the models of a scene, or the parts of a single object.
+      jobs: number of processes; they share the models of a scene, or the links of a single object. Default: one, and
+        for a single object or robot one per processor, used where links take long.
       seed: random seed of convex decomposition and of models that a scene names "random".
       max_hulls: largest number of convex pieces per link. Above 16, a link gets the fewest that keep the error of its
         volume under 15 % and its openings open.
@@ -35,7 +36,7 @@ class Common:
       json: print what was done as JSON.
     """
 
-    jobs: int = 1
+    jobs: int | None = None
     seed: int = 0
     max_hulls: int = 64
     max_hull_vertices: int = 32
@@ -51,19 +52,22 @@ class Common:
 DEFAULTS = Common()
 
 
-def options_of(common: Common, **of_command: Any) -> ConvertOptions:
-    """Conversion options from the command line, and the renderer for the report's pictures."""
+def options_of(common: Common, *, default_jobs: int = 1, **of_command: Any) -> ConvertOptions:
+    """Conversion options from the command line, and the renderer for the report's pictures.
+
+    default_jobs: processes where `--jobs` does not say how many.
+    """
     from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.base.read_limits import ReadLimits
 
     from ig2mj.errors import InputError
 
     for name, least in (("jobs", 1), ("max_hulls", 1), ("max_hull_vertices", 8)):
-        if (given := getattr(common, name)) < least:
+        if (given := getattr(common, name)) is not None and given < least:
             element = "--" + name.replace("_", "-")
             raise InputError("command line", f"is {given}, must be at least {least}", element=element)
     return ConvertOptions(
-        jobs=common.jobs,
+        jobs=common.jobs or default_jobs,
         seed=common.seed,
         max_hulls=common.max_hulls,
         max_hull_vertices=common.max_hull_vertices,

@@ -60,7 +60,7 @@ def convert_dataset(
         raise InputError(dataset, what, fix="give the root of a dataset, with scenes/ or objects/ in it")
     if out.exists() and not out.is_dir():
         raise InputError(out, "is a file", element="--out", fix="name a folder")
-    where = where_of(common.jobs, cluster, resume)
+    where = where_of(common.jobs or 1, cluster, resume)
     options_of(common)  # bad numbers are refused before any work
     out.mkdir(parents=True, exist_ok=True)
     chosen = {"skip_missing": skip_missing, "fixed_furniture": fixed_furniture}

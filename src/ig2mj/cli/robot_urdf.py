@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import pathlib
 from typing import TYPE_CHECKING
 
@@ -32,6 +33,7 @@ def own_robot(urdf: pathlib.Path, layout: pathlib.Path | None, robot: str | None
     from ig2mj_converters.convert_robot import convert_robot
 
     from ig2mj.agents.urdf import UrdfRobot
+    from ig2mj.cli.printing import add_bar, progress_bar
 
     if robot is not None:
         raise Ig2mjError("give either --robot or --robot-urdf")
@@ -40,5 +42,7 @@ def own_robot(urdf: pathlib.Path, layout: pathlib.Path | None, robot: str | None
     place = hashlib.blake2b(str(urdf.resolve()).encode(), digest_size=8).hexdigest()
     out = cache_folder("robots") / place / urdf.stem
     out.parent.mkdir(parents=True, exist_ok=True)
-    convert_robot(urdf, out, options=ConvertOptions(report=False))
+    with progress_bar() as bar:
+        report = add_bar(bar, f"converting {urdf.name}")
+        convert_robot(urdf, out, options=ConvertOptions(report=False, jobs=os.cpu_count() or 1, progress=report))
     return UrdfRobot.load(out, layout)

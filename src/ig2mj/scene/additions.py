@@ -21,6 +21,7 @@ from ig2mj.errors import Ig2mjError
 from ig2mj.scene.library import LibraryModel, find_model
 from ig2mj.scene.manifest import JointEntry, LinkEntry, Manifest, ObjectEntry, OpenableEntry
 from ig2mj.scene.mjcf_files import read_mjcf
+from ig2mj.scene.mjcf_text import make_absolute, rename
 from ig2mj.scene.resting import rest
 
 SLAB = "additions_slab"
@@ -30,23 +31,8 @@ DISTANCE = 40.0
 """From the house to the slab (m), on the side away from the home's own parking slab."""
 CLEARANCE = 0.15
 """Free space (m) between what stands there."""
-NAMED = (
-    "name",
-    "body",
-    "body1",
-    "body2",
-    "joint",
-    "joint1",
-    "joint2",
-    "geom",
-    "site",
-    "geom1",
-    "geom2",
-    "site1",
-    "site2",
-)
-"""MJCF attributes that may hold an object's name, or a name that begins with it."""
-
+CONSTRAINTS = ("contact", "equality", "tendon")
+"""Sections of an object's file by which its bodies and joints depend on each other."""
 
 Place = tuple[float, float, float, float]
 """x, y, z (m) of an object's frame, and degrees that it is turned about the vertical."""
@@ -125,7 +111,7 @@ def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -
       no place.
     """
     root = read_mjcf(file)
-    _make_absolute(root, file.parent)
+    make_absolute(root, file.parent)
     world, assets = _child(root, "worldbody"), _child(root, "asset")
     known = {(e.tag, e.get("name")) for e in assets}
     named = name_additions((o.name for o in manifest.objects), wanted)
@@ -142,7 +128,7 @@ def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -
     place = iter(cells)
     for (name, model), at in zip(named, places, strict=True):
         added = read_mjcf(model.file)
-        _make_absolute(added, model.folder)
+        make_absolute(added, model.folder)
         _rename(added, model.entry.name, name)
         _take_defaults(root, added)
         for asset in _child(added, "asset"):
@@ -152,6 +138,9 @@ def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -
                 assets.append(asset)
         poses = _start_values(added)
         bodies = {body.get("name"): body for body in _child(added, "worldbody").findall("body")}
+        for tag in CONSTRAINTS:
+            for element in added.iter(tag):
+                _child(root, tag).extend(element)
         if at is not None:
             _fix(bodies[name], at)
             start.append(poses[name][1])
@@ -167,9 +156,6 @@ def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -
                 standing.append((body, len(start)))
                 start.append([*values, *inner])
                 world.append(body)
-        for tag in ("contact", "equality"):
-            for element in added.iter(tag):
-                _child(root, tag).extend(element)
     if standing:
         _lay_down(root, standing, start)
     _extend_key(root, [value for values in start for value in values])
@@ -194,26 +180,16 @@ def _child(root: ElementTree.Element, tag: str) -> ElementTree.Element:
     return found
 
 
-def _make_absolute(root: ElementTree.Element, folder: pathlib.Path) -> None:
-    """Gives every mesh and texture its absolute path, so that files of several folders can stand in one MJCF."""
-    compiler = root.find("compiler")
-    known = {} if compiler is None else compiler.attrib
-    folders = {"mesh": known.get("meshdir", ""), "texture": known.get("texturedir", "")}
-    for kind, inner in folders.items():
-        for element in root.iter(kind):
-            if file := element.get("file"):
-                element.set("file", str((folder / inner / file).resolve()))
-
-
 def _rename(root: ElementTree.Element, old: str, new: str) -> None:
     """Replaces an object's name at the beginning of its elements' names and where they refer to each other."""
-    for section in root:
-        for element in section.iter() if section.tag not in ("asset", "default") else ():
-            for attribute in NAMED:
-                value = element.get(attribute)
-                if value is not None and value.startswith(old):
-                    first, mark, second = value.partition(f"--{old}")  # of an excluded pair of bodies
-                    element.set(attribute, f"{new}{first.removeprefix(old)}" + (f"--{new}{second}" if mark else ""))
+
+    def named(value: str) -> str:
+        if not value.startswith(old):
+            return value
+        first, mark, second = value.partition(f"--{old}")  # of an excluded pair of bodies
+        return f"{new}{first.removeprefix(old)}" + (f"--{new}{second}" if mark else "")
+
+    rename(root, named)
 
 
 def _take_defaults(root: ElementTree.Element, added: ElementTree.Element) -> None:

@@ -64,7 +64,7 @@ class RobotsOfWorld:
           EngineError: the scene has no robots. ActionError: another shape or name, or a number that is not finite.
         """
         names = self.action_names
-        if not names:
+        if not self._core.controllers:
             raise EngineError("the scene was loaded without robots: load_scene(..., agents=[...]) adds them")
         try:
             row = np.zeros(len(names)) if action is None else np.array(action, np.float64)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pathlib
 from typing import Any
 
@@ -9,9 +10,18 @@ import mujoco
 import numpy as np
 
 from ig2mj.agents.kinematics import Chain
-from ig2mj.agents.parts import Vector
+from ig2mj.agents.parts import Vector, multiply, rotate
 from ig2mj.agents.urdf.description import Description
-from ig2mj.agents.urdf.layout import Layout
+from ig2mj.agents.urdf.layout import Gripper, Layout
+from ig2mj.agents.urdf.references import (
+    BASE,
+    OBJECT,
+    couplings_of,
+    keep_relations,
+    name_base,
+    named_spec,
+    rebase_joint_equalities,
+)
 from ig2mj.errors import InputError
 from ig2mj.scene.mjcf_files import read_mjcf
 
@@ -25,14 +35,16 @@ class RobotBody:
 
     Attributes:
       height: m of the base's frame above the floor that it stands on. base: the root link.
+      couplings: joints that follow others (`<mimic>`), by name.
     """
 
     def __init__(self, folder: pathlib.Path, description: Description):
         """Raises InputError: its file is missing, is not MJCF, or is not the description's."""
         self.base = description.base
         self._file, self._description = folder / MODEL_FILE, description
+        read_mjcf(self._file)
         try:
-            self._model = self._spec().compile()
+            self._model = mujoco.MjModel.from_xml_path(str(self._file))
         except (ValueError, OSError) as e:
             raise InputError(self._file, f"MuJoCo cannot load it: {e}", fix="convert the robot again") from e
         self._data = mujoco.MjData(self._model)
@@ -46,19 +58,15 @@ class RobotBody:
                 raise InputError(self._file, f"has no '{name}' of robot.json", fix="convert the robot again")
         if any(joint.type == "floating" for joint in description.joints):
             raise InputError(self._file, "a floating joint cuts the robot in two", fix="fix it to the base")
+        self._scalar = [j for j in range(self._model.njnt) if int(self._model.jnt_type[j]) in map(int, SCALAR)]
+        prefix = f"{description.name}_"
+        self.couplings = {
+            coupling.follower.removeprefix(prefix): dataclasses.replace(
+                coupling, leader=coupling.leader and coupling.leader.removeprefix(prefix)
+            )
+            for coupling in couplings_of(self._model)
+        }
         self.height = float(self._model.body(self._own(description.base)).pos[2])
-
-    def _spec(self) -> mujoco.MjSpec:
-        read_mjcf(self._file)
-        spec = mujoco.MjSpec.from_file(str(self._file))
-        meshes, textures = self._file.parent / spec.meshdir, self._file.parent / spec.texturedir
-        for mesh in spec.meshes:
-            if mesh.file:
-                mesh.file = str((meshes / mesh.file).resolve())
-        for texture in spec.textures:
-            if texture.file:
-                texture.file = str((textures / texture.file).resolve())
-        return spec
 
     def _own(self, link: str) -> str:
         """The body of a link in the file."""
@@ -95,35 +103,50 @@ class RobotBody:
         return float(found.range[0]), float(found.range[1])
 
     def moved(self, joint: str) -> float:
-        """kg m2 or kg that a joint moves, at joint positions 0."""
-        dof = int(self._model.joint(f"{self._description.name}_{joint}").dofadr[0])
+        """kg m2 or kg that a joint moves, with the joints that follow it, at joint positions 0."""
+        rates = {joint: 1.0}
+        for name in self.couplings:
+            rates[name] = self._rate(name, joint)
         one, moments = np.zeros(self._model.nv), np.zeros(self._model.nv)
-        one[dof] = 1.0
+        for name, rate in rates.items():
+            one[int(self._model.joint(f"{self._description.name}_{name}").dofadr[0])] = rate
         mujoco.mj_mulM(self._model, self._data, moments, one)
-        return float(moments[dof] - self._model.dof_armature[dof])
+        return float(one @ moments - one**2 @ self._model.dof_armature)
+
+    def _rate(self, joint: str, leader: str) -> float:
+        """How fast a joint goes per speed of one that it follows, over others; 0 where it does not."""
+        rate = 1.0
+        while joint != leader:
+            coupling = self.couplings.get(joint)
+            if coupling is None or coupling.leader is None:
+                return 0.0
+            joint, rate = coupling.leader, rate * float(coupling.coefficients[1])
+        return rate
 
     def start_of(self, joint: str, layout: Layout) -> float:
-        """Position of a joint at the start, within its limits; a gripper is open."""
+        """Position of a joint at the start, within its limits; a gripper is open. A joint that follows another is where
+        that one puts it."""
+        coupling = self.couplings.get(joint)
+        if coupling is not None:
+            return coupling.position(0.0 if coupling.leader is None else self.start_of(coupling.leader, layout))
         low, high = self.limits(joint)
         if joint in layout.gripper and joint not in layout.start:
-            return high if layout.closed == "lower" else low
+            closed = next((g.closed for g in layout.grippers if joint in g.joints), layout.closed)
+            return high if closed == "lower" else low
         return float(np.clip(layout.start.get(joint, 0.0), low, high))
 
     def start(self, layout: Layout) -> list[float]:
         """Positions of all hinges and slides at the start, in the model's order."""
         prefix = f"{self._description.name}_"
-        return [
-            self.start_of(self._model.joint(j).name.removeprefix(prefix), layout)
-            for j in range(self._model.njnt)
-            if int(self._model.jnt_type[j]) in map(int, SCALAR)
-        ]
+        return [self.start_of(self._model.joint(j).name.removeprefix(prefix), layout) for j in self._scalar]
 
     def drive(self, layout: Layout) -> tuple[float, float, float]:
-        """Radius of the wheels and distance between them (m), and their largest speed (rad/s)."""
-        hubs = [self.pose(self._description.joint(name).child)[0] for name in layout.wheels]
-        radius = float(np.mean([hub[2] for hub in hubs])) + self.height
+        """Radius of the wheels and distance between both sides (m), and their largest speed (rad/s)."""
+        hubs = np.array([self.pose(self._description.joint(name).child)[0] for name in layout.wheels])
+        left, right = hubs.reshape(2, -1, 3).mean(1)
+        radius = float(np.mean(hubs[:, 2])) + self.height
         speed = min(self._description.joint(name).speed for name in layout.wheels)
-        return radius, float(np.linalg.norm(hubs[0] - hubs[1])), speed
+        return radius, float(np.linalg.norm(left - right)), speed
 
     def wheel_signs(self, layout: Layout) -> np.ndarray:
         """1 for a wheel whose joint turns about the robot's y axis, -1 for one that turns the other way."""
@@ -131,9 +154,22 @@ class RobotBody:
         left = self._data.body(self._own(self.base)).xmat.reshape(3, 3)[:, 1]
         return np.array([1.0 if self._data.joint(n).xaxis @ left >= 0 else -1.0 for n in names])
 
-    def fingers(self, layout: Layout) -> list[str]:
-        """Links that the gripper's joints move."""
-        return [self._description.joint(name).child for name in layout.gripper]
+    def fingers(self, gripper: Gripper) -> list[str]:
+        """Links that a gripper's joints move, and those of joints that follow them; in the order of the file's."""
+        robot = self._description
+        return [j.child for j in robot.joints if robot.leader(j.name) in gripper.joints]
+
+    def branch(self, link: str, gripper: Gripper) -> str:
+        """The first link of the finger that a finger's link belongs to."""
+        above, inner = {j.child: j.parent for j in self._description.joints}, set(self.fingers(gripper))
+        while above.get(link) in inner:
+            link = above[link]
+        return link
+
+    def has_shape(self, link: str) -> bool:
+        """It collides."""
+        body = self._model.body(self._own(link)).id
+        return bool(np.any((self._model.geom_bodyid == body) & (self._model.geom_contype > 0)))
 
     def frame(self, link: str) -> tuple[str, np.ndarray, np.ndarray]:
         """The link that moves a link, and where it is in that one's frame: m, w-x-y-z."""
@@ -163,11 +199,9 @@ class RobotBody:
         turn = self._data.body(self._own(base)).xmat.reshape(3, 3).T
         return turn @ (body.xpos - self._data.body(self._own(base)).xpos), turn @ body.xmat.reshape(3, 3)
 
-    def chain(self, layout: Layout) -> Chain | None:
-        """The arm's joints from the base to the hand, frames parallel at joint positions 0; None without a hand."""
-        if layout.hand is None:
-            return None
-        link, _, _ = self.frame(layout.hand)
+    def chain(self, layout: Layout, hand: str) -> Chain | None:
+        """The arm's joints from the base to a hand, frames parallel at joint positions 0; None where there are none."""
+        link, _, _ = self.frame(hand)
         body, path = self._model.body(self._own(link)).id, []
         named = {f"{self._description.name}_{name}": name for name in layout.arm}
         while body > 0:
@@ -193,9 +227,9 @@ class RobotBody:
             tip=self.pose(link)[0] - anchors[-1],
         )
 
-    def chain_joints(self, layout: Layout) -> list[int]:
-        """Which of the arm's joints are those of the chain, by their place in the layout."""
-        link, _, _ = self.frame(layout.hand or "")
+    def chain_joints(self, layout: Layout, hand: str) -> list[int]:
+        """Which of the arm's joints are those of a hand's chain, by their place in the layout."""
+        link, _, _ = self.frame(hand)
         above, found = {j.child: j for j in self._description.joints}, []
         while link in above:
             joint = above[link]
@@ -205,27 +239,61 @@ class RobotBody:
         return found
 
     def add_to(
-        self, spec: mujoco.MjSpec, name: str, pos: Vector, quat: Vector, fixed: bool
+        self, spec: mujoco.MjSpec, name: str, pos: Vector, quat: Vector, fixed: bool, layout: Layout
     ) -> dict[str, mujoco.MjsBody]:
-        """Adds the robot to a scene: bodies by link. `fixed`: bolted to the world."""
-        own = self._spec()
-        for element in (*own.excludes, *own.keys):
+        """Adds the robot to a scene, its joints at the layout's start: bodies by link. `fixed`: bolted to the world.
+
+        What of its file ties joints and bodies to each other comes along. Its keyframes, its motors and what measures
+        those do not: an agent has a start and servos of its own. Its excludes neither: no two bodies collide anyway.
+        """
+        own, prefix = named_spec(self._file, self._description.name, name), f"{self._description.name}_"
+        own_start = {
+            joint: self.start_of(joint.removeprefix(prefix), layout)
+            for joint in (self._model.joint(j).name for j in self._scalar)
+        }
+        keep_relations(own, self._model, own_start)
+        motors = (OBJECT.mjOBJ_ACTUATOR, OBJECT.mjOBJ_UNKNOWN)  # of unknown objects: clocks and user's data
+        measuring = [s for s in own.sensors if s.objtype in motors or s.reftype == OBJECT.mjOBJ_ACTUATOR]
+        for element in (*own.excludes, *own.keys, *measuring, *own.actuators):
             own.delete(element)
-        base = own.body(self._own(self._description.base))
+        base = own.body(BASE)
         base.pos, base.quat = [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]
         own.nkey = spec.nkey
         for mine, scenes in ((own.option, spec.option), (own.visual.map, spec.visual.map)):
             _agree(mine, scenes)
         frame = spec.worldbody.add_frame(pos=list(pos), quat=list(quat))
-        added = frame.attach_body(base, f"{name}:", "")
-        prefix = f"{name}:{self._description.name}"
-        for element in (added, *added.find_all("body"), *added.find_all("joint"), *added.find_all("geom")):
-            element.name = f"{name}{element.name.removeprefix(prefix)}"
+        added = frame.attach_body(base, name, "")
+        name_base(spec, added, name)
         for joint in added.joints:
             if joint.type == mujoco.mjtJoint.mjJNT_FREE and fixed:
                 spec.delete(joint)
+        for joint, value in own_start.items():
+            _bend(spec.joint(f"{name}_{joint.removeprefix(prefix)}"), value)
+        rebase_joint_equalities(
+            spec,
+            {
+                f"{name}_{follower}": dataclasses.replace(
+                    coupling, leader=None if coupling.leader is None else f"{name}_{coupling.leader}"
+                )
+                for follower, coupling in self.couplings.items()
+            },
+        )
         bodies = {f"{name}_{link}": link for link in self._links()} | {name: self._description.base}
-        return {bodies[body.name]: body for body in (added, *added.find_all("body"))}
+        return {bodies[body.name]: body for body in (added, *added.find_all("body")) if body.name in bodies}
+
+
+def _bend(joint: mujoco.MjsJoint, q: float) -> None:
+    """Poses the joint's body as at position `q`, which becomes the joint's reference.
+
+    Without it a scene whose keyframes have no positions would start with the robot at joint positions 0.
+    """
+    body, turned, by = joint.parent, np.array([1.0, 0.0, 0.0, 0.0]), q - joint.ref
+    if joint.type == mujoco.mjtJoint.mjJNT_SLIDE:
+        body.pos = body.pos + rotate(body.quat, np.asarray(joint.axis) * by)
+    else:
+        mujoco.mju_axisAngle2Quat(turned, np.asarray(joint.axis), by)
+        body.quat = multiply(body.quat, turned)
+    joint.ref = q
 
 
 def _agree(mine: Any, scenes: Any) -> None:

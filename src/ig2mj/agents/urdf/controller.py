@@ -4,14 +4,16 @@
 |---|---|
 | forward, turn_left (where it drives) | the drive's largest speeds |
 | one for each joint of the arm, by its name | the joint's largest speed |
-| gripper (where it has one) | open from 0 on, closed below |
+| gripper (where it has one; of several `<hand>_gripper`) | open from 0 on, closed below |
 
 Velocities of the arm become positions of servos, which go on from the last ones and not from where the arm sags to.
 
-Axes: W worlds, J joints of the arm, F of the gripper.
+Axes: W worlds, J joints of the arm, G grippers, F joints of all grippers.
 """
 
 from __future__ import annotations
+
+from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
@@ -42,8 +44,8 @@ class UrdfState:
 
     arm: Float[Array, "W J"]
     fingers: Float[Array, "W F"]
-    closed: Bool[Array, "W"]
-    held: Bool[Array, "W"]
+    closed: Bool[Array, "W G"]
+    held: Bool[Array, "W G"]
 
 
 class UrdfController:
@@ -59,8 +61,9 @@ class UrdfController:
         description: Description,
         layout: Layout,
         body: RobotBody,
+        hands: tuple[str, ...],
     ):
-        """Of a robot that is compiled into the scene of these tables."""
+        """Of a robot that is compiled into the scene of these tables. hands: links, as the scene numbers them."""
         self.agent, self._period = agent, period
         own = tables.agent_names[agent]
 
@@ -68,23 +71,32 @@ class UrdfController:
             return np.array([tables.agent_joint_names.index(f"{own}_{n}") for n in names], int)
 
         self._wheels, self._arm, self._fingers = places(layout.wheels), places(layout.arm), places(layout.gripper)
-        self._hand = np.flatnonzero(tables.hand_agent == agent)
+        self._hands = np.flatnonzero(tables.hand_agent == agent)
+        grippers = layout.grippers
+        self._gripper_of = np.array(
+            [next((g for g, one in enumerate(grippers) if n in one.joints), 0) for n in layout.gripper], int
+        )
+        of_hand = [[body.frame(one.hand)[0] == link for link in hands] for one in grippers]
+        self._holds = np.array(of_hand, bool).reshape(len(grippers), len(hands))
         self._arm_speed = np.array([description.joint(n).speed for n in layout.arm], np.float32)
         self._leash = (LEASH + 2 * period * self._arm_speed).astype(np.float32)
         limits = np.array([body.limits(n) for n in layout.arm], np.float32).reshape(-1, 2)
         self._low, self._high = limits[:, 0], limits[:, 1]
         ends = np.array([body.limits(n) for n in layout.gripper], np.float32).reshape(-1, 2)
-        self._open, self._closed = (ends[:, 1], ends[:, 0]) if layout.closed == "lower" else (ends[:, 0], ends[:, 1])
+        closes_low = np.array([grippers[g].closed == "lower" for g in self._gripper_of], bool)
+        self._open = np.where(closes_low, ends[:, 1], ends[:, 0])
+        self._closed = np.where(closes_low, ends[:, 0], ends[:, 1])
         self._start = np.array([body.start_of(n, layout) for n in (*layout.arm, *layout.gripper)], np.float32)
-        self._drive, self._signs = (body.drive(layout) if layout.wheels else None), body.wheel_signs(layout)
+        self._drive = body.drive(layout) if layout.wheels else None
+        self._signs, self._each_side = body.wheel_signs(layout), len(layout.wheels) // 2
         if self._drive is not None:
             self._speeds = drive_limits(*self._drive).astype(np.float32)
-        self._chain = body.chain(layout)
-        self._chain_joints = np.array(body.chain_joints(layout), int)
+        self._chains = [(body.chain(layout, link), np.array(body.chain_joints(layout, link), int)) for link in hands]
+        single = len(grippers) == 1
         self.action_names: tuple[str, ...] = (
             *(("forward", "turn_left") if self._drive else ()),
             *layout.arm,
-            *(("gripper",) if layout.gripper else ()),
+            *("gripper" if single else f"{one.hand}_gripper" for one in grippers),
         )
         self.action_high: np.ndarray = np.ones(len(self.action_names), np.float32)
         self.action_low: np.ndarray = -self.action_high
@@ -93,7 +105,7 @@ class UrdfController:
             *(("dd_base_lin_vel", "dd_base_ang_vel") if self._drive else ()),
             *(f"{name}_qpos" for name in moving),
             *(f"{name}_qvel" for name in moving),
-            *(("is_grasping",) if len(self._hand) else ()),
+            *("is_grasping" if len(hands) == 1 else f"{link}_is_grasping" for link in hands),
         )
 
     @property
@@ -102,7 +114,7 @@ class UrdfController:
 
     def initial(self, num_worlds: int) -> UrdfState:
         row = jnp.tile(jnp.asarray(self._start), (num_worlds, 1))
-        no = jnp.zeros(num_worlds, bool)
+        no = jnp.zeros((num_worlds, len(self._holds)), bool)
         return UrdfState(row[:, : len(self._arm)], row[:, len(self._arm) :], no, no)
 
     def control(
@@ -112,31 +124,38 @@ class UrdfController:
         q = jnp.asarray(view.agent.joint_pos)
         parts, first = [], 0
         if self._drive is not None:
-            parts.append(differential_drive(action[:, :2] * self._speeds, *self._drive) * self._signs)
+            sides = differential_drive(action[:, :2] * self._speeds, *self._drive)
+            parts.append(jnp.repeat(sides, self._each_side, axis=1) * self._signs)
             first = 2
-        velocity = action[:, first : first + len(self._arm)] * self._arm_speed
+        end = first + len(self._arm)
         now = q[:, self._arm]
-        arm = jnp.clip(state.arm + velocity * self._period, now - self._leash, now + self._leash)
+        arm = jnp.clip(
+            state.arm + action[:, first:end] * self._arm_speed * self._period, now - self._leash, now + self._leash
+        )
         arm = jnp.clip(arm, self._low, self._high)
-        held = jnp.asarray(view.held)[:, self._hand].any((1, 2))
-        fingers, closed = state.fingers, state.closed
+        in_hand = jnp.asarray(view.held)[:, self._hands].any(2)
+        held = (in_hand[:, None] & self._holds).any(2)
+        closed, fingers, of = action[:, end:] < 0, state.fingers, self._gripper_of
         if len(self._fingers):
-            closed = action[:, -1] < 0
-            asked = jnp.where(closed[:, None], self._closed, self._open)
-            frozen = jnp.where((held & ~state.held)[:, None], q[:, self._fingers], state.fingers)
-            fingers = jnp.where(held[:, None], frozen, asked)
+            asked = jnp.where(closed[:, of], self._closed, self._open)
+            frozen = jnp.where((held & ~state.held)[:, of], q[:, self._fingers], state.fingers)
+            fingers = jnp.where(held[:, of], frozen, asked)
         return jnp.concatenate([*parts, arm, fingers], axis=1), UrdfState(arm, fingers, closed, held)
 
     def grip(self, state: UrdfState) -> Float[Array, "W H"]:
-        return jnp.repeat(state.closed[:, None].astype(jnp.float32), len(self._hand), axis=1)
+        return (state.closed[:, :, None] & self._holds).any(1).astype(jnp.float32)
 
     def lag(self, view: PhysicsView, state: UrdfState) -> Float[Array, "W H"]:
-        """From where the arm is to where its servos pull it."""
-        if self._chain is None:
-            return jnp.zeros((state.closed.shape[0], len(self._hand)))
-        q = jnp.asarray(view.agent.joint_pos)[:, self._arm][:, self._chain_joints]
-        pulled = forward(self._chain, state.arm[:, self._chain_joints])[0]
-        return length(pulled - forward(self._chain, q)[0])[:, None]
+        """From where the arms are to where their servos pull them."""
+        behind: list[Any] = [jnp.zeros((state.arm.shape[0], 0))]
+        q = jnp.asarray(view.agent.joint_pos)[:, self._arm]
+        for chain, joints in self._chains:
+            if chain is None:
+                behind.append(jnp.zeros((state.arm.shape[0], 1)))
+            else:
+                apart = forward(chain, state.arm[:, joints])[0] - forward(chain, q[:, joints])[0]
+                behind.append(length(apart)[:, None])
+        return jnp.concatenate(behind, axis=1)
 
     def eye(self, view: PhysicsView, state: UrdfState) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
         return jnp.asarray(view.agent.eye_pos)[:, self.agent], jnp.asarray(view.agent.eye_quat)[:, self.agent]
@@ -146,12 +165,12 @@ class UrdfController:
         something in the hand, else -1."""
         agent, moving = view.agent, np.concatenate([self._arm, self._fingers])
         q, speed = jnp.asarray(agent.joint_pos), jnp.asarray(agent.joint_vel)
-        parts: list[Array] = []
+        parts: list[Any] = []
         if self._drive is not None:
             radius, axle, _ = self._drive
-            parts.append(wheel_odometry(speed[:, self._wheels] * self._signs, radius, axle))
+            turning = (speed[:, self._wheels] * self._signs).reshape(len(speed), 2, self._each_side)
+            parts.append(wheel_odometry(turning.mean(2), radius, axle))
         parts += [q[:, moving], speed[:, moving]]
-        if len(self._hand):
-            held = jnp.asarray(view.held)[:, self._hand].any((1, 2))
-            parts.append(jnp.where(held, 1.0, -1.0)[:, None])
+        holding = jnp.asarray(view.held)[:, self._hands].any(2)
+        parts.append(jnp.where(holding, jnp.ones(holding.shape), -1.0))
         return jnp.concatenate(parts, axis=1)

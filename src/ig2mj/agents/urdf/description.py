@@ -69,6 +69,13 @@ class Description(msgspec.Struct, frozen=True):
             raise InputError(file, f"has format version {made.format_version}, not {FORMAT_VERSION}", fix=again)
         return made
 
+    def leader(self, name: str) -> str:
+        """The joint that a joint follows, over others that do; itself where it follows none."""
+        by_name = {joint.name: joint for joint in self.joints}
+        while name in by_name and (above := by_name[name].mimics) is not None:
+            name = above
+        return name
+
     def joint(self, name: str) -> JointEntry:
         """The joint of this name."""
         return next(joint for joint in self.joints if joint.name == name)

@@ -6,23 +6,22 @@ import numpy as np
 
 from ig2mj.agents.hand_rays import HandRays
 from ig2mj.agents.urdf.body import RobotBody
-from ig2mj.agents.urdf.layout import Layout
+from ig2mj.agents.urdf.layout import Gripper
 
 INSIDE = 0.8
 """Share of a finger's half size at which rays begin and end."""
 
 
-def gripper_rays(name: str, body: RobotBody, layout: Layout) -> tuple[HandRays, ...]:
+def gripper_rays(name: str, body: RobotBody, gripper: Gripper) -> HandRays | None:
     """Sixteen rays, as iGibson's of Fetch: four corners of each finger's inner face; none with fewer than two fingers.
 
-    Args:
-      name: of the agent.
+    name: of the agent.
     """
-    links = body.fingers(layout)
-    if len(links) < 2 or layout.hand is None:
-        return ()
-    one, other = links[:2]
-    hand = body.frame(layout.hand)[0]
+    pair = _facing(body, gripper)
+    if pair is None:
+        return None
+    one, other = pair
+    hand = body.frame(gripper.hand)[0]
     ends = {link: (body.pose(link), body.box(link)) for link in (one, other)}
     middle = {link: pose[0] + pose[1] @ box[0] for link, (pose, box) in ends.items()}
     corners = {}
@@ -41,16 +40,27 @@ def gripper_rays(name: str, body: RobotBody, layout: Layout) -> tuple[HandRays, 
         corners[link] = np.array(spots)
     palm_pos, palm_turn = body.pose(hand)
     between = palm_turn.T @ ((middle[one] + middle[other]) / 2 - palm_pos)
-    return (
-        HandRays(
-            palm=_named(name, body, hand),
-            grasp_point=between,
-            start_bodies=(_named(name, body, one),) * 4,
-            starts=corners[one],
-            end_bodies=(_named(name, body, other),) * 4,
-            ends=corners[other],
-        ),
+    return HandRays(
+        palm=_named(name, body, hand),
+        grasp_point=between,
+        start_bodies=(_named(name, body, one),) * 4,
+        starts=corners[one],
+        end_bodies=(_named(name, body, other),) * 4,
+        ends=corners[other],
     )
+
+
+def _facing(body: RobotBody, gripper: Gripper) -> tuple[str, str] | None:
+    """Two fingers between which something is held: the last links with a shape of the first two that hang on the hand.
+
+    Of a finger of several links the last one is its tip.
+    """
+    tips: dict[str, str] = {}
+    for link in body.fingers(gripper):  # the first of each finger, then what hangs on it
+        if body.has_shape(link):
+            tips[body.branch(link, gripper)] = link
+    pair = list(tips.values())[:2]
+    return (pair[0], pair[1]) if len(pair) == 2 else None
 
 
 def _named(name: str, body: RobotBody, link: str) -> str:

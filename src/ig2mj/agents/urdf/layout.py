@@ -3,7 +3,7 @@
 Found from names and kinds of joints, and where that is not right, written in a TOML (or JSON) file:
 
     base = "differential"                   # or "fixed": bolted to the floor
-    wheels = ["left_wheel_joint", "right_wheel_joint"]
+    wheels = ["left_wheel_joint", "right_wheel_joint"]   # of more than two: all on the left, then all on the right
     arm = ["shoulder_pan", "shoulder_lift", "wrist"]
     gripper = ["left_finger_joint", "right_finger_joint"]
     closed = "lower"                        # the limit of the gripper's joints at which it is closed, or "upper"
@@ -14,6 +14,15 @@ Found from names and kinds of joints, and where that is not right, written in a 
     [start]                                 # rad or m, at the beginning of an episode; others at 0
     shoulder_lift = 0.4
 
+A robot with several grippers has, in place of `gripper`, `closed` and `hand`, one table for each:
+
+    [[grippers]]
+    joints = ["left_finger_joint"]
+    hand = "left_hand"
+    closed = "upper"
+
+Joints that follow others (`<mimic>`) are not named: they go along.
+
 What a file leaves out is found; `[]` and `""` say that there is none.
 """
 
@@ -23,7 +32,7 @@ import dataclasses
 import os
 import pathlib
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from ig2mj.agents.urdf.description import Description, JointEntry
@@ -43,13 +52,23 @@ LASERS = ("laser", "scan", "lidar")
 
 
 @dataclasses.dataclass(frozen=True)
+class Gripper:
+    """Joints that close together, the link that holds, and the limit at which they are closed, one of `CLOSED`."""
+
+    joints: tuple[str, ...]
+    hand: str
+    closed: str = "lower"
+
+
+@dataclasses.dataclass(frozen=True)
 class Layout:
     """See the module's text.
 
     Attributes:
-      base: one of `BASES`. wheels: left and right joint; none where the base is fixed.
-      arm: joints in the order of the action. gripper: joints that close together. closed: one of `CLOSED`.
+      base: one of `BASES`. wheels: joints on the left, then as many on the right; none where the base is fixed.
+      arm: joints in the order of the action. gripper: joints that close, of all grippers. closed: one of `CLOSED`.
       hand, camera, laser: links; None: there is none. start: positions of joints, rad or m.
+      several: the grippers of a robot with more than one, whose first one's hand is `hand`; else empty.
     """
 
     base: str
@@ -61,6 +80,20 @@ class Layout:
     camera: str | None = None
     laser: str | None = None
     start: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    several: tuple[Gripper, ...] = ()
+
+    @property
+    def grippers(self) -> tuple[Gripper, ...]:
+        """All grippers, in the order of the action. One without a hand to hang on is none."""
+        if self.several or not self.gripper or self.hand is None:
+            return self.several
+        return (Gripper(self.gripper, self.hand, self.closed),)
+
+    @property
+    def hands(self) -> tuple[str, ...]:
+        """Links that hold something, each once."""
+        own = () if self.hand is None else (self.hand,)
+        return tuple(dict.fromkeys(gripper.hand for gripper in self.grippers)) or own
 
     @classmethod
     def found(cls, robot: Description, given: Mapping[str, Any] | None = None, where: str = "layout") -> Layout:
@@ -77,15 +110,20 @@ class Layout:
         _check(robot, given, where)
         joints = [joint for joint in robot.joints if joint.mimics is None]
         wheels = tuple(given["wheels"] if "wheels" in given else _wheels(joints))
-        base = given.get("base", "differential" if len(wheels) == 2 else "fixed")
-        if base == "differential" and len(wheels) != 2:
+        even = len(wheels) > 0 and len(wheels) % 2 == 0
+        base = given.get("base", "differential" if even else "fixed")
+        if base == "differential" and not even:
             raise InputError(
-                where, f"a differential drive has two wheels, not {len(wheels)}", element="wheels",
+                where, f"a differential drive has two wheels, or two, three ... on each side, not {len(wheels)}",
+                element="wheels",
                 fix='name them, left and right: wheels = ["left_wheel_joint", "right_wheel_joint"], or base = "fixed"',
             )  # fmt: skip
         wheels = wheels if base == "differential" else ()
         free = [joint for joint in joints if joint.name not in wheels and not _named(joint.name, PASSIVE)]
-        gripper = given.get("gripper", [j.name for j in free if _named(j.name, GRIPS) or _named(j.child, GRIPS)])
+        several = _several(robot, free, given, where)
+        gripper = [name for one in several for name in one.joints]
+        if not several:
+            gripper = given.get("gripper", [j.name for j in free if _grips(j)])
         rolling = {j.name for j in free if j.type == "continuous" and _named(j.name, ("wheel",))}
         arm = given.get("arm", [j.name for j in free if j.name not in gripper and j.name not in rolling])
         both = sorted(set(arm) & set(gripper))
@@ -97,10 +135,11 @@ class Layout:
             arm=tuple(arm),
             gripper=tuple(gripper),
             closed=given.get("closed", "lower"),
-            hand=_link(given, "hand", _hand(robot, arm, gripper)),
+            hand=several[0].hand if several else _link(given, "hand", _hand(robot, arm, gripper)),
             camera=_link(given, "camera", _first(robot, CAMERAS)),
             laser=_link(given, "laser", _first(robot, LASERS)),
             start=dict(given.get("start", {})),
+            several=several,
         )
 
     @classmethod
@@ -120,11 +159,13 @@ class Layout:
 
 def _check(robot: Description, given: dict[str, Any], where: str) -> None:
     """Whether entries are known, of the right kind, and name what there is."""
-    known = [field.name for field in dataclasses.fields(Layout)]
+    known = [field.name for field in dataclasses.fields(Layout) if field.name != "several"] + ["grippers"]
     for name, value in given.items():
         if name not in known:
             raise UnknownNameError(f"entry of {where}", name, known)
-        if name in ("wheels", "arm", "gripper"):
+        if name == "grippers":
+            _check_grippers(robot, given, where)
+        elif name in ("wheels", "arm", "gripper"):
             if not isinstance(value, list | tuple) or not all(isinstance(entry, str) for entry in value):
                 raise InputError(where, "must be a list of names of joints", element=name)
             _check_names("joint of the robot", value, [joint.name for joint in robot.joints])
@@ -138,6 +179,25 @@ def _check(robot: Description, given: dict[str, Any], where: str) -> None:
             _check_names("link of the robot", [value], list(robot.frames))
         elif name in ("base", "closed") and value not in (choices := BASES if name == "base" else CLOSED):
             raise InputError(where, f"is '{value}'", element=name, fix=f"use {' or '.join(choices)}")
+
+
+def _check_grippers(robot: Description, given: Mapping[str, Any], where: str) -> None:
+    also = sorted({"gripper", "hand", "closed"} & set(given))
+    if also:
+        raise InputError(where, f"has both 'grippers' and '{also[0]}'", element="grippers", fix="keep one of them")
+    if not isinstance(given["grippers"], list | tuple) or not all(isinstance(g, Mapping) for g in given["grippers"]):
+        raise InputError(where, "must be a list of tables with joints and a hand", element="grippers")
+    for one in given["grippers"]:
+        for name in ("joints", "hand"):
+            if name not in one:
+                raise InputError(where, f"a gripper has no '{name}'", element="grippers")
+        for name in one:
+            if name not in ("joints", "hand", "closed"):
+                raise UnknownNameError(f"entry of grippers of {where}", name, ["joints", "hand", "closed"])
+        entries = {"gripper": one["joints"]} | {name: one[name] for name in ("hand", "closed") if name in one}
+        _check(robot, entries, where)
+        if not one["joints"] or not one["hand"]:
+            raise InputError(where, "a gripper has joints and a hand", element="grippers")
 
 
 def _is_number(value: Any) -> bool:
@@ -154,18 +214,54 @@ def _named(name: str, parts: Sequence[str]) -> bool:
     return any(part in name.lower() for part in parts)
 
 
+def _grips(joint: JointEntry) -> bool:
+    """It opens and closes a gripper, and does not turn without end."""
+    return joint.type != "continuous" and (_named(joint.name, GRIPS) or _named(joint.child, GRIPS))
+
+
+def _several(
+    robot: Description, free: Sequence[JointEntry], given: Mapping[str, Any], where: str
+) -> tuple[Gripper, ...]:
+    """Grippers given as such, or found on different hands; none where there is just one, or joints are given."""
+    if "grippers" in given:
+        made = tuple(Gripper(tuple(g["joints"]), g["hand"], g.get("closed", "lower")) for g in given["grippers"])
+        names = [name for one in made for name in one.joints]
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise InputError(where, f"joint '{twice[0]}' is of two grippers", element="grippers")
+        return made
+    if {"gripper", "hand"} & set(given):
+        return ()
+    chosen, taken = [j for j in free if _grips(j)], set(given.get("arm", ()))
+    on_hand: dict[str, list[str]] = {}
+    for joint in chosen:
+        if joint.name not in taken:
+            on_hand.setdefault(hand_of(robot, joint.name, {j.name for j in chosen}), []).append(joint.name)
+    closed = given.get("closed", "lower")
+    return tuple(Gripper(tuple(names), hand, closed) for hand, names in on_hand.items()) if len(on_hand) > 1 else ()
+
+
+def hand_of(robot: Description, joint: str, gripper: Collection[str]) -> str:
+    """The link on which a joint of a gripper hangs, over all other joints of grippers and those that follow them."""
+    above = {entry.child: entry for entry in robot.joints}
+    link = robot.joint(joint).parent
+    while link in above and (above[link].name in gripper or robot.leader(above[link].name) in gripper):
+        link = above[link].parent
+    return link
+
+
 def _wheels(joints: Sequence[JointEntry]) -> list[str]:
-    """The left and the right driven wheel, where there is one of each."""
+    """The driven wheels on the left, then those on the right, where there are as many."""
     rolling = [j.name for j in joints if j.type == "continuous" and "wheel" in j.name.lower()]
     rolling = [name for name in rolling if not _named(name, PASSIVE)]
     left, right = ([name for name in rolling if _named(name, side)] for side in (LEFT, RIGHT))
-    return [left[0], right[0]] if len(left) == len(right) == 1 else []
+    apart = len(left) == len(right) and not set(left) & set(right)
+    return [*left, *right] if apart else []
 
 
 def _hand(robot: Description, arm: Sequence[str], gripper: Sequence[str]) -> str | None:
     """The link that the gripper hangs on, else the last one of the arm."""
     if gripper:
-        return robot.joint(gripper[0]).parent
+        return hand_of(robot, gripper[0], set(gripper))
     return robot.joint(arm[-1]).child if arm else None
 
 

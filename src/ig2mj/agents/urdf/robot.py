@@ -24,7 +24,7 @@ import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.hand_rays import HandRays
-from ig2mj.agents.parts import Vector, exclude_all, extend_keyframes, multiply, normalized, rotate, servo
+from ig2mj.agents.parts import Vector, exclude_all, extend_keyframes, multiply, normalized, servo
 from ig2mj.agents.urdf.body import RobotBody
 from ig2mj.agents.urdf.controller import UrdfController
 from ig2mj.agents.urdf.description import Description
@@ -119,10 +119,11 @@ class UrdfRobot:
         pos = np.array(self.pos if pos is None else pos, np.float64)
         pos[2] += self.body.height
         quat, layout = normalized(self.quat if quat is None else quat), self.layout
-        bodies = self.body.add_to(spec, self.name, pos, quat, fixed=not self.drives)
+        bodies = self.body.add_to(spec, self.name, pos, quat, fixed=not self.drives, layout=layout)
+        fingers = [link for gripper in layout.grippers for link in self.body.fingers(gripper)]
         for link, body in bodies.items():
             body.gravcomp = 0.0 if link == self.description.base or link in self._rolling else 1.0
-            if link in self._rolling or link in self.body.fingers(layout):
+            if link in self._rolling or link in fingers:
                 for geom in body.geoms:
                     geom.friction[0] = FRICTION
         exclude_all(spec, [body.name for body in bodies.values()])
@@ -142,16 +143,22 @@ class UrdfRobot:
         laser = None
         if layout.laser is not None and frames[layout.laser].on == self.description.base:
             laser = frames[layout.laser].pos
-        hand = None if layout.hand is None else bodies[frames[layout.hand].on].name
         return AgentEntry(
             name=self.name,
             body=self.name,
             camera=camera,
-            fingers=[bodies[link].name for link in self.body.fingers(layout)],
-            hands=[hand] if hand is not None else [],
+            fingers=[bodies[link].name for link in fingers],
+            hands=[bodies[link].name for link in self.holding],
             assisted=len(self.hand_rays()) > 0,
             laser=laser,
         )
+
+    @property
+    def holding(self) -> tuple[str, ...]:
+        """Links that hold something, as the scene numbers them: those of grippers with two fingers, else all hands."""
+        frames = self.description.frames
+        gripping = [g.hand for g in self.layout.grippers if gripper_rays(self.name, self.body, g) is not None]
+        return tuple(dict.fromkeys(frames[link].on for link in gripping or self.layout.hands))
 
     @property
     def _rolling(self) -> list[str]:
@@ -160,8 +167,7 @@ class UrdfRobot:
         return [j.child for j in joints if j.type == "continuous" and j.name not in self.layout.arm]
 
     def _tune(self, joint: mujoco.MjsJoint, name: str) -> None:
-        """Friction, rotor and reference of a joint: the converter's are those of doors and drawers at 0."""
-        _bend(joint, self.body.start_of(name, self.layout))
+        """Friction and rotor of a joint: the converter's are those of doors and drawers."""
         joint.frictionloss, joint.damping[:] = 0.0, 0.0
         if name in self.layout.arm:
             joint.armature = ROTOR_SHARE * self.body.moved(name)
@@ -191,21 +197,9 @@ class UrdfRobot:
         return moved * SERVO_RATE**2, 2 * moved * SERVO_RATE
 
     def hand_rays(self) -> tuple[HandRays, ...]:
-        """From corners of the first finger to corners of the second; none with fewer than two fingers."""
-        if self.layout.hand is None:
-            return ()
-        return gripper_rays(self.name, self.body, self.layout)
+        """Of each gripper from corners of one finger to corners of another; none of one with fewer than two fingers."""
+        rays = [gripper_rays(self.name, self.body, gripper) for gripper in self.layout.grippers]
+        return tuple({hand.palm: hand for hand in rays if hand is not None}.values())
 
     def controller(self, tables: SceneTables, agent: int, period: float = ACTION_PERIOD) -> UrdfController:
-        return UrdfController(tables, agent, period, self.description, self.layout, self.body)
-
-
-def _bend(joint: mujoco.MjsJoint, q: float) -> None:
-    """Poses the joint's body as at position `q`, which becomes the joint's reference."""
-    body, turned = joint.parent, np.array([1.0, 0.0, 0.0, 0.0])
-    if joint.type == mujoco.mjtJoint.mjJNT_SLIDE:
-        body.pos = body.pos + rotate(body.quat, np.asarray(joint.axis) * q)
-    else:
-        mujoco.mju_axisAngle2Quat(turned, np.asarray(joint.axis), q)
-        body.quat = multiply(body.quat, turned)
-    joint.ref = q
+        return UrdfController(tables, agent, period, self.description, self.layout, self.body, self.holding)

@@ -1,0 +1,50 @@
+"""What MJCF does not keep of a robot: its motors' limits, and where its fixed links are (`robot.json`)."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+
+from ..base.description import ObjectModel
+from .joint_limits import clamp, is_locked
+from .kinematics import link_poses
+
+ROBOT_FILE = "robot.json"
+
+FORMAT_VERSION = 1
+
+
+def robot_json(source: ObjectModel) -> str:
+    """The text of `robot.json`: joints that move, with their motors' limits (N m or N, rad/s or m/s), and for every
+    link the one that moves it, with its position (m) and its axes (rotation matrix) in that one's frame."""
+    joints = {joint.child: joint for joint in source.joints.values()}
+    moves = {name for name, joint in joints.items() if joint.type != "fixed" and not is_locked(joint)}
+    poses = link_poses(source, {j.name: clamp(j, 0.0) for j in joints.values() if is_locked(j)})
+    mover: dict[str, str] = {}
+    for link in poses:  # parents come before their children
+        mover[link] = link if link in moves or link not in joints else mover[joints[link].parent]
+    frames = {}
+    for link, above in ((name, mover[name]) for name in source.links):
+        pose = np.linalg.inv(poses[above]) @ poses[link]
+        frames[link] = {"on": above, "pos": pose[:3, 3].round(9).tolist(), "axes": pose[:3, :3].round(9).tolist()}
+    described = {
+        "format_version": FORMAT_VERSION,
+        "name": source.model,
+        "base": source.base,
+        "joints": [
+            {
+                "name": joint.name,
+                "type": joint.type,
+                "parent": mover[joint.parent],
+                "child": joint.child,
+                "effort": joint.effort or 0.0,
+                "velocity": joint.velocity or 0.0,
+                "mimics": None if joint.mimic is None else joint.mimic.joint,
+            }
+            for joint in source.joints.values()
+            if joint.child in moves
+        ],
+        "frames": frames,
+    }
+    return json.dumps(described, indent=1)

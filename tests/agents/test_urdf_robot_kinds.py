@@ -1,0 +1,316 @@
+"""Robots of one's own of all kinds: with joints that follow others, without an arm, with several grippers or wheels."""
+
+from __future__ import annotations
+
+import pathlib
+
+import mujoco
+import numpy as np
+import pytest
+from ig2mj_converters.base.options import ConvertOptions
+from ig2mj_converters.convert_robot import convert_robot
+from robot_world import GraspingWorld
+from tiny_home import write_tiny_home
+
+import ig2mj
+from ig2mj.agents.urdf import Layout, UrdfRobot
+from ig2mj.agents.urdf.references import Coupling
+from ig2mj.errors import InputError, UnknownNameError
+
+INERTIA = '<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/>'
+
+
+def link(name: str, size: str = "0.05 0.05 0.05", mass: float = 0.5) -> str:
+    shape = f'<geometry><box size="{size}"/></geometry>'
+    inertial = f'<inertial><mass value="{mass}"/>{INERTIA}</inertial>'
+    return f'<link name="{name}">{inertial}<visual>{shape}</visual><collision>{shape}</collision></link>'
+
+
+def joint(name: str, kind: str, parent: str, child: str, xyz: str, axis: str, inside: str = "") -> str:
+    limit = "" if kind == "continuous" else '<limit lower="0" upper="0.04" effort="20" velocity="0.2"/>'
+    return (
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><origin xyz="{xyz}"/>'
+        f'<axis xyz="{axis}"/>{inside or limit}</joint>'
+    )
+
+
+def follows(leader: str, multiplier: float = 1.0, offset: float = 0.0, lower: float = -1, upper: float = 1) -> str:
+    limit = f'<limit lower="{lower}" upper="{upper}" effort="20" velocity="0.2"/>'
+    return f'{limit}<mimic joint="{leader}" multiplier="{multiplier}" offset="{offset}"/>'
+
+
+def gripper(side: str, parent: str, at: str) -> list[str]:
+    """A hand on a lift, with a finger and one that follows it."""
+    hand, one, two = f"{side}hand", f"{side}left_finger", f"{side}right_finger"
+    return [
+        link(hand, "0.06 0.2 0.04"),
+        link(one, "0.02 0.01 0.06", 0.05),
+        link(two, "0.02 0.01 0.06", 0.05),
+        joint(f"{side}lift", "prismatic", parent, hand, at, "0 0 1",
+              '<limit lower="0" upper="0.3" effort="200" velocity="0.5"/>'),
+        joint(f"{side}finger_1", "prismatic", hand, one, "0 0.005 0.05", "0 1 0"),
+        joint(f"{side}finger_2", "prismatic", hand, two, "0 -0.005 0.05", "0 -1 0",
+              follows(f"{side}finger_1", lower=0, upper=0.04)),
+    ]  # fmt: skip
+
+
+def converted(folder: pathlib.Path, *parts: str, name: str = "arm") -> pathlib.Path:
+    """A robot of these parts on a base, converted."""
+    file = folder / "robot.urdf"
+    file.write_text(f'<robot name="{name}">{link("base", "0.2 0.2 0.2", 5)}{"".join(parts)}</robot>', encoding="utf-8")
+    convert_robot(file, folder / "out", options=ConvertOptions(report=False))
+    return folder / "out"
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory) -> pathlib.Path:
+    return write_tiny_home(tmp_path_factory.mktemp("homes") / "home")
+
+
+class Stepped:
+    """A scene with a robot, in MuJoCo alone."""
+
+    def __init__(self, home: pathlib.Path, robot: UrdfRobot):
+        self.scene = ig2mj.load_scene(home, agents=[robot])
+        self.model, self.data = self.scene.model, mujoco.MjData(self.scene.model)
+        mujoco.mj_resetDataKeyframe(self.model, self.data, 0)
+
+    def run(self, seconds: float, **controls: float) -> None:
+        for name, value in controls.items():
+            self.data.actuator(name).ctrl[0] = value
+        mujoco.mj_step(self.model, self.data, round(seconds / self.model.opt.timestep))
+
+    def at(self, joint: str) -> float:
+        return float(self.data.joint(joint).qpos[0])
+
+
+def test_a_finger_that_follows_another_is_where_that_one_puts_it_open_and_closed(tmp_path, home):
+    robot = UrdfRobot.load(converted(tmp_path, *gripper("", "base", "0 0 0.4")))
+    assert robot.layout.gripper == ("finger_1",) and robot.layout.hand == "hand"
+    world = Stepped(home, robot.at(-1.0, 0.5, 0.0))
+    assert (world.at("arm_finger_1"), world.at("arm_finger_2")) == pytest.approx((0.04, 0.04)), "open at the start"
+    world.run(0.5, arm_finger_1=0.04)
+    assert world.at("arm_finger_2") == pytest.approx(0.04, abs=1e-3)
+    world.run(0.5, arm_finger_1=0.0)
+    assert (world.at("arm_finger_1"), world.at("arm_finger_2")) == pytest.approx((0.0, 0.0), abs=1e-3)
+    assert len(robot.hand_rays()) == 1, "both fingers hold, although one motor moves them"
+
+
+@pytest.mark.parametrize("start", [0.0, 0.3, -0.2])
+@pytest.mark.parametrize(("multiplier", "offset"), [(1.0, 0.0), (-0.5, 0.1), (2.0, -0.25)])
+def test_a_follower_is_multiplier_x_leader_plus_offset_after_any_start(tmp_path, home, start, multiplier, offset):
+    limit = '<limit lower="-1" upper="1" effort="50" velocity="2"/>'
+    folder = converted(
+        tmp_path,
+        link("one"), link("two"), link("three"),
+        joint("lead", "revolute", "base", "one", "0 0 0.2", "0 0 1", limit),
+        joint("follow", "revolute", "base", "two", "0 0.2 0.2", "0 0 1", follows("lead", multiplier, offset, -3, 3)),
+        joint("last", "revolute", "base", "three", "0 -0.2 0.2", "0 0 1", follows("follow", 2.0, 0.1, -9, 9)),
+    )  # fmt: skip
+    world = Stepped(home, UrdfRobot.load(folder, {"start": {"lead": start}}).at(-1.0, 0.5, 0.3))
+
+    def errors() -> tuple[float, float]:
+        lead, follow, last = (world.at(f"arm_{name}") for name in ("lead", "follow", "last"))
+        return follow - (multiplier * lead + offset), last - (2.0 * follow + 0.1)
+
+    assert world.at("arm_lead") == pytest.approx(start)
+    assert errors() == pytest.approx((0, 0), abs=1e-9), "at the start"
+    for target in (start, 0.4, -0.4):
+        world.run(1.0, arm_lead=target)
+        assert world.at("arm_lead") == pytest.approx(target, abs=0.02)
+        assert errors() == pytest.approx((0, 0), abs=0.01)
+
+
+def test_a_relation_between_joints_holds_for_other_references():
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        coupling = Coupling("a", "b", rng.normal(size=5), *rng.normal(size=2))
+        follower_ref, leader_ref = rng.normal(size=2)
+        moved = Coupling("a", "b", coupling.about(follower_ref, leader_ref), follower_ref, leader_ref)
+        for leader in rng.normal(size=5):
+            assert moved.position(leader) == pytest.approx(coupling.position(leader), abs=1e-9)
+
+
+def test_what_follows_a_joint_without_room_to_move_stays_where_that_one_puts_it(tmp_path, home):
+    stuck = '<limit lower="0.2" upper="0.2" effort="1" velocity="1"/>'
+    folder = converted(
+        tmp_path,
+        link("one"), link("two"), link("three"),
+        joint("lead", "prismatic", "base", "one", "0 0 0.2", "0 0 1", stuck),
+        joint("follow", "prismatic", "base", "two", "0 0.2 0.2", "0 0 1", follows("lead", 2.0, 0.1)),
+        joint("turn", "continuous", "one", "three", "0 0 0.1", "0 0 1"),
+    )  # fmt: skip
+    robot = UrdfRobot.load(folder)
+    assert robot.layout.arm == ("turn",)
+    world = Stepped(home, robot.at(-1.0, 0.5, 0.0))
+    world.run(0.5)
+    assert world.at("arm_follow") == pytest.approx(0.5, abs=1e-3)
+    base = world.data.body("arm").xpos
+    assert world.data.body("arm_three").xpos[2] - base[2] == pytest.approx(0.5, abs=1e-3), "0.2 + 0.2 + 0.1"
+
+
+TIES = """
+  <tendon><fixed name="rope"><joint joint="arm_lift" coef="1"/><joint joint="arm_finger_1" coef="2"/></fixed></tendon>
+  <equality><tendon name="tie" tendon1="rope" polycoef="0.1 0 0 0 0" active="false"/>
+    <connect name="pin" body1="arm_left_finger" body2="arm_hand" anchor="0 0 0.01" active="false"/>
+    <weld name="glue" body1="arm_right_finger" body2="arm" active="false"/></equality>
+  <actuator><position name="motor" joint="arm_lift"/></actuator>
+  <sensor><jointpos name="felt" joint="arm_lift"/><framepos name="seen" objtype="body" objname="arm_hand"/>
+    <framepos name="base" objtype="body" objname="arm"/><actuatorfrc name="pulled" actuator="motor"/></sensor>
+"""
+
+
+@pytest.mark.parametrize("name", ["arm", "other", "x"])
+def test_tendons_equalities_and_sensors_of_its_file_come_along(tmp_path, home, name):
+    """What they measure at the joints' references is what they measured there in the robot's own file."""
+    folder = converted(tmp_path, *gripper("", "base", "0 0 0.4"))
+    file = folder / "object.xml"
+    text = file.read_text(encoding="utf-8")
+    file.write_text(text.replace("<keyframe>", f"{TIES}<keyframe>"), encoding="utf-8")
+    alone = mujoco.MjModel.from_xml_path(str(file))
+    robot = UrdfRobot.load(folder, {"start": {"lift": 0.2}}, name=name).at(-1.0, 0.5, 0.7)
+    model = ig2mj.load_scene(home, agents=[robot]).model
+
+    def names(count: int, of) -> set[str]:
+        return {of(k).name.removeprefix(name).removeprefix(":") for k in range(count)}
+
+    assert names(model.ntendon, model.tendon) == {"rope"}
+    assert names(model.nsensor, model.sensor) == {"felt", "seen", "base"}
+    assert {"tie", "pin", "glue", "_finger_2/mimic"} <= names(model.neq, model.equality)
+    assert names(model.nu, model.actuator) == {"_lift", "_finger_1"}, "its motors are the agent's own servos"
+    tie = model.equality(f"{name}:tie").id
+    assert model.tendon_length0[0] == pytest.approx(0.2 + 2 * 0.04)
+    assert model.tendon_length0[0] + model.eq_data[tie, 0] == pytest.approx(alone.tendon_length0[0] + 0.1)
+    assert model.tendon_lengthspring[0] == pytest.approx(alone.tendon_lengthspring[0])
+    glue, own = model.equality(f"{name}:glue").id, alone.equality("glue").id
+    np.testing.assert_allclose(model.eq_data[glue, :11], alone.eq_data[own, :11], atol=1e-9)
+    pin = model.equality(f"{name}:pin")
+    data = mujoco.MjData(model)
+    for joint_name in ("lift", "finger_1", "finger_2"):
+        data.joint(f"{name}_{joint_name}").qpos[0] = 0.0
+    mujoco.mj_kinematics(model, data)
+    one, two = (data.site_xpos[int(site[0])] for site in (pin.obj1id, pin.obj2id) for site in [np.atleast_1d(site)])
+    np.testing.assert_allclose(one, two, atol=1e-6), "at joint positions 0 the two ends of the pin meet"
+
+
+def test_two_robots_of_one_file_keep_their_own_relations(tmp_path, home):
+    folder = converted(tmp_path, *gripper("", "base", "0 0 0.4"))
+    one = UrdfRobot.load(folder).at(-1.0, 0.5, 0.0)
+    other = UrdfRobot.load(folder, {"start": {"finger_1": 0.01}}, name="other").at(-1.0, -1.0, 0.0)
+    model = ig2mj.load_scene(home, agents=[one, other]).model
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    assert data.joint("arm_finger_2").qpos[0] == pytest.approx(0.04)
+    assert data.joint("other_finger_2").qpos[0] == pytest.approx(0.01)
+    mujoco.mj_step(model, data, 60)
+    assert data.joint("other_finger_2").qpos[0] == pytest.approx(data.joint("other_finger_1").qpos[0], abs=1e-3)
+
+
+def wheel(name: str, xyz: str) -> list[str]:
+    turned = '<origin rpy="1.5708 0 0"/><geometry><cylinder radius="0.06" length="0.02"/></geometry>'
+    body = f'<link name="{name}"><inertial><mass value="0.2"/><inertia ixx="0.001" iyy="0.001" izz="0.001"/></inertial>'
+    body += f"<visual>{turned}</visual><collision>{turned}</collision></link>"
+    return [body, joint(f"{name}_joint", "continuous", "base", name, xyz, "0 1 0")]
+
+
+def test_a_base_without_arm_hand_or_camera_drives(tmp_path, home):
+    parts = [*wheel("left_wheel", "0 0.12 -0.06"), *wheel("right_wheel", "0 -0.12 -0.06")]
+    parts += ['<link name="caster"><collision><geometry><sphere radius="0.02"/></geometry></collision></link>']
+    at = '<parent link="base"/><child link="caster"/><origin xyz="-0.1 0 -0.1"/>'
+    parts += [f'<joint name="c" type="fixed">{at}</joint>']
+    robot = UrdfRobot.load(converted(tmp_path, *parts, name="cart"))
+    assert robot.layout == Layout("differential", wheels=("left_wheel_joint", "right_wheel_joint"))
+    world = GraspingWorld(home, robot.at(-1.0, 0.5, -np.pi / 2))
+    assert world.controller.action_names == ("forward", "turn_left")
+    assert world.controller.proprioception_names == ("dd_base_lin_vel", "dd_base_ang_vel")
+    start = world.body("cart").copy()
+    world.act(times=5, forward=0.5)
+    assert world.body("cart")[1] - start[1] < -0.1
+
+
+def test_four_wheels_drive_as_two_sides(tmp_path, home):
+    sides = {"left": 0.12, "right": -0.12}
+    parts = []
+    for end, x in (("front", 0.08), ("rear", -0.08)):
+        for side, y in sides.items():
+            parts += wheel(f"{end}_{side}_wheel", f"{x} {y} -0.06")
+    robot = UrdfRobot.load(converted(tmp_path, *parts, name="husky"))
+    assert robot.layout.wheels == tuple(f"{end}_{side}_wheel_joint" for side in sides for end in ("front", "rear"))
+    assert robot.body.drive(robot.layout)[1] == pytest.approx(0.24)
+    world = Stepped(home, robot.at(-1.0, 0.5, 0.0))
+    start = world.data.body("husky").xpos.copy()
+    world.run(1.0, **{f"husky_{name}": 3.0 for name in robot.layout.wheels})
+    moved = world.data.body("husky").xpos - start
+    assert moved[0] == pytest.approx(0.18, abs=0.05) and abs(moved[1]) < 0.01
+
+
+def test_nothing_that_moves_is_a_robot_too(tmp_path, home):
+    robot = UrdfRobot.load(converted(tmp_path, name="post"))
+    assert robot.layout == Layout("fixed")
+    world = GraspingWorld(home, robot.at(-1.0, 0.5, 0.0))
+    assert world.controller.action_names == ()
+    world.act(times=1)
+
+
+@pytest.fixture(scope="module")
+def two_hands(tmp_path_factory) -> pathlib.Path:
+    made = tmp_path_factory.mktemp("two")
+    return converted(made, *gripper("l_", "base", "0 0.3 0.4"), *gripper("r_", "base", "0 -0.3 0.4"), name="twin")
+
+
+def test_each_gripper_of_several_has_a_hand_and_a_number_of_its_own(two_hands, home):
+    robot = UrdfRobot.load(two_hands)
+    assert [(g.joints, g.hand) for g in robot.layout.grippers] == [
+        (("l_finger_1",), "l_hand"),
+        (("r_finger_1",), "r_hand"),
+    ]
+    assert [hand.palm for hand in robot.hand_rays()] == ["twin_l_hand", "twin_r_hand"]
+    world = GraspingWorld(home, robot.at(-1.0, 0.5, 0.0))
+    assert world.controller.action_names == ("l_lift", "r_lift", "l_hand_gripper", "r_hand_gripper")
+    assert world.held == [None, None]
+    world.act(times=5, l_hand_gripper=-1.0, r_hand_gripper=1.0)
+    felt = world.proprioception()
+    assert felt["l_finger_1_qpos"] == pytest.approx(0.0, abs=2e-3)
+    assert felt["r_finger_1_qpos"] == pytest.approx(0.04, abs=2e-3)
+    between = world.body("twin_r_hand") + np.array([0.0, 0.0, 0.06])
+    world.simulation.set_object_pose("can", between, (1, 0, 0, 0))
+    world.act(times=3, l_hand_gripper=-1.0, r_hand_gripper=-1.0)
+    assert world.held == [None, "can"]
+
+
+def test_grippers_are_named_in_a_layout(two_hands):
+    given = [
+        {"joints": ["r_finger_1"], "hand": "r_hand", "closed": "upper"},
+        {"joints": ["l_finger_1"], "hand": "l_hand"},
+    ]
+    robot = UrdfRobot.load(two_hands, {"grippers": given})
+    assert robot.layout.hands == ("r_hand", "l_hand") and robot.layout.gripper == ("r_finger_1", "l_finger_1")
+    assert [robot.body.start_of(name, robot.layout) for name in robot.layout.gripper] == [0.0, 0.04]
+    single = UrdfRobot.load(two_hands, {"gripper": ["l_finger_1"], "arm": ["l_lift", "r_lift"]})
+    assert single.layout.grippers[0].hand == "l_hand" and not single.layout.several
+
+
+@pytest.mark.parametrize(
+    ("entry", "error", "said"),
+    [
+        ({"grippers": [{"joints": ["l_finger_1"]}]}, InputError, "no 'hand'"),
+        ({"grippers": [{"joints": ["l_finger"], "hand": "l_hand"}]}, UnknownNameError, "l_finger_1"),
+        ({"grippers": [{"joints": [], "hand": "l_hand"}]}, InputError, "joints and a hand"),
+        ({"grippers": "l_hand"}, InputError, "list of tables"),
+        ({"grippers": [{"joints": ["l_finger_1"], "hand": "l_hand", "close": "upper"}]}, UnknownNameError, "closed"),
+        ({"grippers": [{"joints": ["l_finger_1"], "hand": "l_hand"}] * 2}, InputError, "of two grippers"),
+        ({"grippers": [], "hand": "l_hand"}, InputError, "both 'grippers' and 'hand'"),
+    ],
+)
+def test_grippers_that_do_not_fit_are_refused(two_hands, entry, error, said):
+    with pytest.raises(error, match=said):
+        UrdfRobot.load(two_hands, entry)
+
+
+def test_its_name_is_the_urdfs_and_its_colour_grey(tmp_path):
+    folder = converted(tmp_path, name="my robot")
+    robot = UrdfRobot.load(folder)
+    assert robot.name == "my_robot"
+    model = mujoco.MjModel.from_xml_path(str(folder / "object.xml"))
+    r, g, b, a = model.geom_rgba[model.geom("my_robot/visual_0").id]
+    assert r == g == b and a == 1.0
