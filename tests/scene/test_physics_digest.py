@@ -12,7 +12,7 @@ from ig2mj.errors import InputError
 from ig2mj.sampling.settled import make_pool
 from ig2mj.scene.scene import KNOWN_DIGESTS, load_scene
 from ig2mj.tasks.activities import ACTIVITIES
-from ig2mj.tasks.pools import bare_scene, cached_file
+from ig2mj.tasks.pools import bare_scene
 from ig2mj.worlds import Rules
 from ig2mj.worlds.pool import load_pool, save_pool
 from tests.tiny_home import write_tiny_home
@@ -116,21 +116,6 @@ def test_a_pool_outlives_a_change_of_looks_and_of_the_homes_name_and_not_one_of_
     manifest.write_text(manifest.read_text().replace('"renamed_home"', '"tiny_home"', 1))
     with pytest.raises(InputError, match="when the physics of 'tiny_home' differed"):
         load_pool(file, load_scene(home))
-
-
-def test_a_pool_that_is_bound_to_every_byte_is_still_found_and_read(home, tmp_path, monkeypatch):
-    monkeypatch.setenv("IG2MJ_CACHE_DIR", str(tmp_path))
-    scene = load_scene(home)
-    (tmp_path / "pools").mkdir()
-    new = cached_file("tiny", scene, lambda digest: [digest])
-    monkeypatch.setitem(scene.__dict__, "digest", scene.files_digest)
-    old = cached_file("tiny", scene, lambda digest: [digest])
-    scene.__dict__.pop("digest")
-    assert old != new
-    old.touch()
-    assert cached_file("tiny", scene, lambda digest: [digest]) == old
-    new.touch()
-    assert cached_file("tiny", scene, lambda digest: [digest]) == new
 
 
 def test_known_digests_are_of_the_homes_of_the_activities():
