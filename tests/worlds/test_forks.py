@@ -116,3 +116,15 @@ def test_forks_and_used_shards_of_several_devices(scene, engine):
         with pytest.raises(StaleStateError):
             use(shards)
     assert repr(ours) == "Shards(Batch(2 worlds))"
+
+
+def test_a_goal_asked_of_donated_states_names_the_remedy(worlds, scene):
+    """As after a step on a GPU; on the native engine views and states of a used batch stay readable."""
+    goal = worlds.core.rules.compiled("(on_top box table)", False)
+    world = worlds.start(seed=0).world
+    assert goal(world).tolist() == [True, True]
+    arrays = jax.tree.map(jax.numpy.array, world.states)
+    jax.jit(lambda states: jax.tree.map(lambda a: ~a if a.dtype == bool else a + 1, states), donate_argnums=0)(arrays)
+    for ask in (goal, goal.fraction, goal.literals_of, goal.explain):
+        with pytest.raises(StaleStateError):
+            ask(world.replace(states=arrays))

@@ -24,7 +24,7 @@ from jax.core import Tracer
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.errors import UnknownNameError
+from ig2mj.errors import StaleStateError, UnknownNameError
 from ig2mj.knowledge import categories_of
 from ig2mj.predicates import logic
 from ig2mj.predicates.base import Context
@@ -107,7 +107,7 @@ class CompiledExpression:
         return GoalStatus(holds=holds(self.ground, truth), fraction=fraction(self.ground, truth), literals=values)
 
     def __call__(self, world: WorldState) -> Bool[Array, "W"]:
-        """Whether the expression holds, in every world."""
+        """Whether the expression holds, in every world. Raises StaleStateError: the worlds' arrays were donated."""
         return self._status_now(world).holds
 
     def fraction(self, world: WorldState) -> Float[Array, "W"]:
@@ -119,7 +119,7 @@ class CompiledExpression:
         return self._status_now(world).literals
 
     def _status_now(self, world: WorldState) -> GoalStatus:
-        states, view = world.states, world.view
+        states, view = _kept(world.states), world.view
         if self.questions is None or len(states.sliced) != 1 or isinstance(states.sliced, Tracer):
             return self._jitted(states, view)
         return self.status_of(self.questions.facts(self.literals, states, view), states)
@@ -128,11 +128,19 @@ class CompiledExpression:
         """What is still missing in one world, as text to read."""
         from ig2mj.predicates.explain import explain
 
-        return explain(self, world.states, world.view, index)
+        return explain(self, _kept(world.states), world.view, index)
 
     @functools.cached_property
     def _jitted(self):
         return jax.jit(lambda states, view: self.status(states, view))
+
+
+def _kept(states: ExtendedStates) -> ExtendedStates:
+    """The same states. Raises StaleStateError where their arrays were donated to a program."""
+    sliced = states.sliced
+    if isinstance(sliced, jax.Array) and not isinstance(sliced, Tracer) and sliced.is_deleted():
+        raise StaleStateError
+    return states
 
 
 def compile_expression(
