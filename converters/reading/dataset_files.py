@@ -11,6 +11,7 @@ from ig2mj.errors import InputError
 
 from ..base import inputs
 from .json_reader import read_json, scalar, vector
+from .text import decoded
 from .xml_reader import read_bytes
 
 OLDEST, BEYOND = (2, 0, 6), (2, 2, 3)
@@ -34,7 +35,7 @@ def read_version(root: pathlib.Path, warnings: list[str]) -> str | None:
     if not inputs.is_file(file):
         warnings.append("the dataset has no VERSION file")
         return None
-    text = read_bytes(file, 4096).decode("utf-8", errors="replace").strip()
+    text = decoded(read_bytes(file, 4096)).strip()
     match = re.match(r"v?(\d+)\.(\d+)(?:\.(\d+))?", text)
     version = None if match is None else tuple(int(n or 0) for n in match.groups())
     if version is None or not OLDEST <= version < BEYOND:
@@ -51,7 +52,7 @@ def read_lines(root: pathlib.Path, name: str, warnings: list[str]) -> list[str]:
     if not inputs.is_file(file):
         warnings.append(f"metadata/{name} is missing")
         return []
-    lines = [line.strip() for line in read_bytes(file, 2**22).decode("utf-8-sig", errors="replace").splitlines()]
+    lines = [line.strip() for line in decoded(read_bytes(file, 2**22)).splitlines()]
     while lines and not lines[-1]:
         lines.pop()
     if name == "non_sampleable_categories.txt":

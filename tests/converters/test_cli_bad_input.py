@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import json
 import pathlib
+import pickle
 import re
 
 import numpy as np
 import pytest
+from ig2mj_converters.base.read_limits import ReadLimits, limits_of
+from ig2mj_converters.hulls.pieces import HullOptions
+from ig2mj_converters.model_task import model_tasks, run_task
+from ig2mj_converters.reading.dataset import Dataset
 from PIL import Image
 from tiny_geometry import box, groups, write_obj
 
 from ig2mj.cli import call
+from ig2mj.errors import InputError
 
 MODEL = "objects/cup/m"
 URDF, MESH, META = f"{MODEL}/m.urdf", f"{MODEL}/c.obj", f"{MODEL}/misc/metadata.json"
@@ -228,3 +234,21 @@ def test_damage_of_any_kind_never_fails_otherwise(name, root, capsys):
         if status == 2:
             assert complaint(capsys)
         capsys.readouterr()
+
+
+def test_limits_of_the_readers_are_options(root, capsys):
+    assert convert(root, "--no-report", "--no-cache", "--limit", "mesh-faces=5", "links=9") == 2
+    assert "c.obj: has 12 or more faces, the limit is 5" in (said := capsys.readouterr().err)
+    assert "--limit mesh-faces=N" in said
+    assert convert(root, "--no-report", "--no-cache", "--limit", "mesh-faces=500") == 0
+    assert convert(root, "--limit", "mesh-faced=5") == 2
+    assert "there is no limit 'mesh-faced'" in capsys.readouterr().err
+
+
+def test_limits_go_along_into_worker_processes(root):
+    dataset = Dataset(root)
+    scene = dataset.scene("s_int")
+    with limits_of(ReadLimits(mesh_faces=5)):
+        (task,), _ = model_tasks(dataset, scene, scene.instances, lambda _: HullOptions(), False)
+    with pytest.raises(InputError, match="the limit is 5"):
+        run_task(pickle.loads(pickle.dumps(task)))
