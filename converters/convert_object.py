@@ -225,9 +225,9 @@ def _write(
     add_setting(builder.spec, low, high, None, distance=2.0)
     add_ground(builder.spec, builder.collision_class)
     add_start_key(builder.spec, build.start_joints)
-    compiled = write_model(builder.spec, folder / "object.xml")
+    compiled = write_model(builder.spec, folder / "object.xml", exact=source.category == ROBOT_CATEGORY)
     if rest_start(build, compiled):
-        compiled = write_model(builder.spec, folder / "object.xml")
+        compiled = write_model(builder.spec, folder / "object.xml", exact=source.category == ROBOT_CATEGORY)
     models = {f"{b.assembly.model.category}/{b.assembly.model.model}": b.file_hash for b in built.values()}
     manifest = Manifest(
         format_version=FORMAT_VERSION,

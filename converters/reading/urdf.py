@@ -167,8 +167,9 @@ def _limit(element: Element, attribute: str, file: pathlib.Path) -> float | None
 
 
 def _positive_or_none(element: Element, attribute: str, file: pathlib.Path) -> float | None:
-    """Real files write effort="inf" or "0" for "no limit"."""
-    if (element.get(attribute) or "").strip().lower().lstrip("+") in ("inf", "infinity"):
+    """Real files write effort="inf", "1e+30" or "0" for "no limit"."""
+    word = (element.get(attribute) or "").strip()
+    if word.lower().lstrip("+") in ("inf", "infinity") or is_huge(word):
         return None
     value = number(element, attribute, file, 0.0)
     return value if value > 0 else None

@@ -190,7 +190,7 @@ def test_tendons_equalities_and_sensors_of_its_file_come_along(tmp_path, home, n
         data.joint(f"{name}_{joint_name}").qpos[0] = 0.0
     mujoco.mj_kinematics(model, data)
     one, two = (data.site_xpos[int(site[0])] for site in (pin.obj1id, pin.obj2id) for site in [np.atleast_1d(site)])
-    np.testing.assert_allclose(one, two, atol=1e-6), "at joint positions 0 the two ends of the pin meet"
+    np.testing.assert_allclose(one, two, atol=1e-6)  # at joint positions 0 the two ends of the pin meet
 
 
 def test_two_robots_of_one_file_keep_their_own_relations(tmp_path, home):

@@ -43,9 +43,9 @@ def model_of(*links, joints=(), bbox=(1, 1, 1), category="cup") -> ObjectModel:
     )
 
 
-def inertials(model, density=100.0, s=1.0, bullet=False):
+def inertials(model, density=100.0, s=1.0, bullet=False, rule="object"):
     scaled = scale_model(model, s)
-    return link_inertials(scaled, density, bullet), scaled.warnings
+    return link_inertials(scaled, density, bullet, rule), scaled.warnings
 
 
 def test_mass_is_density_times_scaled_bounding_box():
@@ -174,9 +174,75 @@ def test_category_lamp_has_a_base_ten_times_as_heavy():
 
 def test_building_parts_and_objects_without_box_keep_the_urdfs_inertial():
     given = Inertial(10000.0, np.eye(3))
-    link = Link("a", [boxes(((1, 1, 1), (0, 0, 0)))], inertial=given)
+    link = Link("a", [boxes(((1, 1, 1), (0, 0, 0)))], inertial=massless)
     assert inertials(model_of(link), density=None)[0]["a"].mass == 10000
     assert inertials(model_of(link, bbox=None), density=100.0)[0]["a"].mass == 10000
+
+
+def test_an_objects_inertial_is_thrown_away_within_a_dataset_section_6():
+    """A basket in four sizes that weighs 1.056 kg by its URDF weighs density x box in each."""
+    link = Link("a", [boxes(((1, 1, 1), (0, 0, 0)))], inertial=Inertial(1.056, np.eye(3)))
+    for s in (0.5, 1.0, 1.5, 2.0):
+        found, warnings = inertials(model_of(link), s=s, rule="dataset")
+        assert found["a"].mass == pytest.approx(100 * s**3)
+        assert any("1.06 kg) are not used" in w for w in warnings)
+        assert inertials(model_of(link), s=s)[0]["a"].mass == 1.056, "a single object keeps it"
+    assert inertials(model_of(link, bbox=None), rule="dataset")[0]["a"].mass == 1.056, "without a box it counts"
+    meant = model_of(link)
+    meant.metadata.keep_inertials = True
+    assert inertials(meant, rule="dataset")[0]["a"].mass == 1.056
+
+
+def test_a_link_without_inertial_weighs_nothing_where_its_body_has_one():
+    """The inertia of a base on a fixed child, since KDL takes none on a root."""
+    base = Link("a", [boxes(((0.6, 0.4, 0.3), (0, 0, 0)))])
+    dummy = Link("i", inertial=Inertial(16.0, np.diag([0.3, 0.6, 0.7])))
+    for rule in ("object", "robot"):
+        found, warnings = inertials(model_of(base, dummy, joints=[fixed_or("fixed", "a", "i")], bbox=None), rule=rule)
+        assert (found["a"].mass, found["i"].mass) == (0, 16)
+        assert found["i"].inertia == pytest.approx(np.diag([0.3, 0.6, 0.7]))
+        assert not warnings
+
+
+def test_a_body_without_mass_has_none_in_a_robot_and_its_share_in_an_object():
+    base = Link("a", [boxes(((1, 1, 1), (0, 0, 0)))], inertial=Inertial(5.0, np.eye(3) * 0.5))
+    for massless in (None, Inertial(0.0, np.zeros((3, 3)))):
+        door = Link("b", [boxes(((1, 1, 1), (0, 0, 0)))], inertial=massless)
+        model = model_of(base, door, joints=[fixed_or("revolute", "a", "b")])
+        robot, warnings = inertials(model, rule="robot")
+        assert (robot["a"].mass, robot["b"].mass) == (5, MIN_MASS)
+        assert any("'b' has no mass: it is given" in w for w in warnings)
+        found, warnings = inertials(model)
+        assert (found["a"].mass, found["b"].mass) == (5, pytest.approx(50))
+        assert any("'b' has no mass: 50 kg" in w for w in warnings)
+
+
+@pytest.mark.parametrize("rule", ["object", "robot"])
+def test_a_mass_of_zero_is_no_mass(rule):
+    """A table of mass 0 gets the density rule, with a warning, and not a gram."""
+    table = Link("a", [boxes(((1, 1, 1), (0, 0, 0)))], inertial=Inertial(0.0, np.zeros((3, 3))))
+    found, warnings = inertials(model_of(table, bbox=None), density=None, rule=rule)
+    assert found["a"].mass == pytest.approx(67)
+    assert any("its inertials have no mass: 67 kg" in w for w in warnings)
+
+
+@pytest.mark.parametrize("scale", [(0.001, 0.001, 0.001), (-0.001, 0.001, 0.001)])
+def test_a_placeholder_inertia_is_found_with_a_mesh_scale(scale):
+    shape = boxes(((100, 200, 300), (0, 0, 0)))
+    shape.scale = scale
+    found, warnings = inertials(model_of(Link("a", [shape], inertial=Inertial(1.0, np.eye(3))), bbox=None))
+    assert found["a"].inertia == pytest.approx(np.diag([0.13, 0.10, 0.05]) / 12)
+    assert any("mass 1 m away" in w for w in warnings)
+
+
+def test_an_inertia_of_a_whole_robot_on_a_small_link_is_kept():
+    whole = Inertial(20.0, np.diag([2.0, 2.0, 2.0]))
+    small, large = (
+        Link("a", [boxes(((0.02,) * 3, (0, 0, 0)))], inertial=whole),
+        Link("b", [boxes(((1,) * 3, (0, 0, 0)))]),
+    )
+    found, warnings = inertials(model_of(small, large, joints=[fixed_or("fixed", "a", "b")], bbox=None), rule="robot")
+    assert found["a"].inertia == pytest.approx(whole.inertia) and not warnings
 
 
 def test_a_missing_inertial_is_computed_and_an_impossible_one_mended():
