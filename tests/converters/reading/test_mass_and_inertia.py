@@ -174,7 +174,7 @@ def test_category_lamp_has_a_base_ten_times_as_heavy():
 
 def test_building_parts_and_objects_without_box_keep_the_urdfs_inertial():
     given = Inertial(10000.0, np.eye(3))
-    link = Link("a", [boxes(((1, 1, 1), (0, 0, 0)))], inertial=massless)
+    link = Link("a", [boxes(((1, 1, 1), (0, 0, 0)))], inertial=given)
     assert inertials(model_of(link), density=None)[0]["a"].mass == 10000
     assert inertials(model_of(link, bbox=None), density=100.0)[0]["a"].mass == 10000
 
