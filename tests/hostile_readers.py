@@ -112,7 +112,7 @@ def hdf5_or_bytes(raw: bytes, seed: int) -> bytes:
         names: list[str] = []
         file.visit(names.append)
         for _ in range(random_.randint(1, 2)):
-            there = [name for name in names if name in file]
+            there = [name for name in names if _is_own(file, name)]
             if not there:
                 break
             name = random_.choice([*there, "/"])
@@ -121,6 +121,13 @@ def hdf5_or_bytes(raw: bytes, seed: int) -> bytes:
             elif name != "/":
                 _change_array(file, name, random_)
     return buffer.getvalue()
+
+
+def _is_own(file: Any, name: str) -> bool:
+    """Whether it is still there, and no link that an earlier change made."""
+    parts = name.split("/")
+    paths = ["/".join(parts[: k + 1]) for k in range(len(parts))]
+    return all(p in file and isinstance(file.get(p, getlink=True), h5py.HardLink) for p in paths)
 
 
 def _change_attribute(attributes: Any, random_: random.Random) -> None:

@@ -60,8 +60,8 @@ def test_no_more_can_be_awake_than_there_is(tiny_home):
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("awake", "is not an engine profile"),
-        ("[]", "is not an engine profile"),
+        ("awake", "is not valid JSON"),
+        ("[]", "Expected `object`, got `array`"),
         ('{"awake_dofs": 12}', "missing required field `constraints`"),
         ('{"awake_dofs": "x", "constraints": 1, "contacts": 1, "convex_contacts": 1}', "Expected `int`"),
         (

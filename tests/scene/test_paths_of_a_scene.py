@@ -95,7 +95,7 @@ def test_meshes_that_homes_share_lie_in_a_folder_of_that_name(home, folder):
     "text, match",
     [
         ('<!DOCTYPE a [<!ENTITY b "c">]><mujoco/>', "document type"),
-        ("<mujoco>" + "<body>" * 300 + "</body>" * 300 + "</mujoco>", "nested deeper than 200"),
+        ("<mujoco>" + "<body>" * 600 + "</body>" * 600 + "</mujoco>", "nested deeper than 490"),
         ("<mujoco>", "no valid XML: no element found"),
         ("", "no valid XML"),
         ("<mujoco model='\ud800'/>", "UTF-8"),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import re
 
 import jax
 import jax.numpy as jnp
@@ -208,3 +209,29 @@ def test_the_command_makes_a_pool(tiny_home_folder, tiny_home, pool, tmp_path, c
 def test_the_command_refuses_senseless_numbers(tiny_home_folder, capsys, options, says):
     assert cli.call(["sample", str(tiny_home_folder), "--disturb", *options]) == 2
     assert says in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "says"),
+    [
+        ("physics.scene.qpos", lambda a: np.full_like(a, np.nan), "holds numbers that are not finite"),
+        ("physics.time", lambda a: np.full_like(a, np.inf), "holds numbers that are not finite"),
+        ("states.temperature", lambda a: np.full_like(a, np.nan), "holds numbers that are not finite"),
+        ("states.max_temperature", lambda a: np.full_like(a, np.inf), "holds numbers that are not finite"),
+        ("physics.scene.qpos", lambda a: a.astype(str), "is of type <U"),
+        ("physics.scene.qpos", lambda a: a[:, :-1], "has shape"),
+        ("physics.scene.touching", lambda a: a[:, :-1], "has shape"),
+        ("states.temperature", lambda a: a[:, :-1], "has shape"),
+        ("states.dust.body", lambda a: np.full_like(a, 10**6), "names number 1000000 of"),
+        ("physics.scene.tree_asleep", lambda a: np.full_like(a, 10**6), "names number 1000000 of"),
+        ("states.toggled_on", lambda a: a.astype(np.float64), "is of type float64"),
+    ],
+)
+def test_arrays_that_no_world_can_start_with_are_refused(pool, tiny_home, tmp_path, name, change, says):
+    file = tmp_path / "pool.npz"
+    save_pool(pool, file, tiny_home)
+    with np.load(file) as archive:
+        arrays = dict(archive)
+    np.savez(file, **(arrays | {name: change(arrays[name])}))
+    with pytest.raises(InputError, match=f"{re.escape(name)}: {says}"):
+        load_pool(file, tiny_home)

@@ -14,6 +14,7 @@ import os
 import pathlib
 import struct
 import zlib
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -168,6 +169,10 @@ class Hdf5File:
         except (OSError, RuntimeError, ValueError, TypeError, zlib.error) as e:
             raise self.broken(path, f"cannot be read: {e}") from e
         return array
+
+    def claim(self, paths: Iterable[str]) -> None:
+        """Refuses a file of which these arrays, all together, claim more than one reads (`ig2mj.files.limits`)."""
+        refuse_bomb(sum(int(getattr(self._find(path), "nbytes", 0)) for path in paths), self._size, self.file)
 
     def read(self, path: str, *, kinds: str = "biuf", ndim: int | None = None) -> np.ndarray:
         """All of an array; what is read of a file counts together (`ig2mj.files.limits`). Raises as `array`."""

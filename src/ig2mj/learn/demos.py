@@ -40,6 +40,9 @@ FORMAT, FORMAT_VERSION = "ig2mj demonstrations", 1
 LONGEST = 100_000
 """Steps of a run that is believed: more than any horizon, and little enough to read."""
 
+STEPS = ("action", "label", "reward", "terminated", "truncated")
+"""Arrays of a run, next to its observations."""
+
 HOPELESS = 50
 """Failures after which too few successes end a collection."""
 
@@ -208,6 +211,8 @@ def load_demos(file: str | os.PathLike, perception: Perception, world: Mapping[s
             fix = "`ig2mj demos collect --obs rgbd` records pictures; `ig2mj train --algo sac --expert` needs no file"
             raise InputError(found.file, f"holds no {' and no '.join(missing)}", fix=fix)
         actions = len(own["actions"]) if isinstance(own.get("actions"), list) else None
+        fields = (*STEPS, *(f"obs/{name}" for name in perception.names))
+        found.claim(f"{run}/{name}" for run in found.names() for name in fields)
         parts = [_read(found, name, perception, spaces, actions) for name in found.names()]
         if not parts:
             raise InputError(found.file, "holds no run", fix=_FIX)

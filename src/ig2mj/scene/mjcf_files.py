@@ -19,10 +19,7 @@ from typing import Any
 from ig2mj.errors import InputError
 from ig2mj.files.content import read_bytes
 from ig2mj.files.inside import inside
-from ig2mj.scene.mjcf_limits import check_mjcf
-
-DEEPEST = 200
-"""Nesting of elements. A robot's chain of links is the deepest that homes have."""
+from ig2mj.scene.mjcf_limits import MAX_DEPTH, check_mjcf
 
 MOST_FILES = 100
 """MJCF files that one includes, directly or not."""
@@ -122,8 +119,8 @@ class _Builder(ElementTree.TreeBuilder):
 
     def start(self, tag: Any, attrs: Any, /) -> Any:
         self._depth += 1
-        if self._depth > DEEPEST:
-            raise InputError(self._file, f"is nested deeper than {DEEPEST} elements", element=str(tag)[:60])
+        if self._depth > MAX_DEPTH:
+            raise InputError(self._file, f"is nested deeper than {MAX_DEPTH} levels", element=f"<{str(tag)[:60]}>")
         return super().start(tag, attrs)
 
     def end(self, tag: Any, /) -> Any:

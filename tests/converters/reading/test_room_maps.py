@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from ig2mj_converters.reading.room_maps import read_room_maps, room_at, traversable, write_rooms
+from ig2mj_converters.reading.room_maps import name_rooms, read_room_maps, room_at, traversable, write_rooms
 
 from ig2mj.errors import InputError
 from ig2mj.scene.rooms import load_rooms
@@ -168,8 +168,17 @@ def test_a_broken_rooms_npz_is_an_input_error(tmp_path, content):
         ({"format_version": 2}, "format version 2"),
         ({"names": None}, "lacks an array.*names"),
         ({"room_map": np.full((3, 3), 9)}, "room_map.*do not exist"),
-        ({"room_map": np.zeros((3, 4))}, "do not fit together"),
-        ({"resolution": 0.0}, "not positive"),
+        ({"room_map": np.zeros((3, 4), np.int16)}, "room_map: has shape .3, 4., and a map is square"),
+        ({"room_map": np.zeros((3, 3))}, "room_map: is 2-dimensional float64"),
+        ({"room_map": np.zeros((0, 0), np.int16)}, "room_map: has shape"),
+        ({"names": np.array(["a", "a"]), "types": np.array(["a", "a"])}, "names and types do not fit together"),
+        (
+            {"names": np.arange(40_000).astype(str), "types": np.full(40_000, "a")},
+            "40000 rooms, and the limit is 32767",
+        ),
+        ({"resolution": 0.0}, r"resolution: is 0 m, and must be in"),
+        ({"trav_resolution": np.nan}, r"trav_resolution: is nan m, and must be in"),
+        ({"traversable": np.array([["x"]])}, "traversable: is 2-dimensional <U1"),
     ],
 )
 def test_a_rooms_npz_that_does_not_fit_is_an_input_error(tmp_path, change, message):
@@ -184,3 +193,13 @@ def test_a_rooms_npz_that_does_not_fit_is_an_input_error(tmp_path, change, messa
     np.savez(tmp_path / "rooms.npz", **{k: v for k, v in arrays.items() if v is not None})
     with pytest.raises(InputError, match=message):
         load_rooms(tmp_path)
+
+
+def test_more_rooms_than_a_map_can_number_are_refused(tmp_path):
+    """Of an image with an id for each pixel."""
+    ids = np.arange(1, 200 * 200 + 1).reshape(200, 200)
+    with pytest.raises(InputError, match="has 40000 rooms, and the limit is 32767"):
+        name_rooms(np.ones_like(ids), ids, ["kitchen"], "floor_insseg_0.png")
+    few = np.minimum(ids, 30_000)
+    room_map, names, types = name_rooms(np.ones_like(few), few, ["kitchen"], "floor_insseg_0.png")
+    assert len(names) == len(types) == room_map.max() == 30_000 and names[-1] == "kitchen_29999"

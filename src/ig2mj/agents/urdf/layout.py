@@ -171,7 +171,7 @@ def _check(robot: Description, given: dict[str, Any], where: str) -> None:
             _check_names("joint of the robot", value, [joint.name for joint in robot.joints])
         elif name == "start":
             if not isinstance(value, Mapping) or not all(_is_number(v) for v in value.values()):
-                raise InputError(where, "must be a table of finite numbers by joint", element=name)
+                raise InputError(where, "must be a table of numbers by joint", element=name)
             _check_names("joint of the robot", list(value), [joint.name for joint in robot.joints])
         elif not isinstance(value, str):
             raise InputError(where, "must be a text", element=name)

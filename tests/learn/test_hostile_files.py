@@ -1,0 +1,118 @@
+"""Policies and demonstrations of strangers: what cannot be learned from or played is refused when it is read."""
+
+from __future__ import annotations
+
+import json
+import pathlib
+import re
+
+import h5py
+import numpy as np
+import pytest
+from hostile_readers import demonstrations, policies
+from limits import run_limited
+
+from ig2mj.errors import InputError
+from ig2mj.learn.demos import about, load_demos
+from ig2mj.learn.perception import Perception
+from ig2mj.learn.policies import Policy
+
+
+@pytest.fixture
+def demos(tmp_path):
+    """A small file of demonstrations."""
+    demonstrations(tmp_path)
+    return tmp_path / "demos.h5"
+
+
+def read_demos(file: pathlib.Path) -> None:
+    load_demos(file, Perception(about(file)[1]))
+
+
+def replaced(file: pathlib.Path, name: str, value) -> None:
+    with h5py.File(file, "a") as opened:
+        del opened[name]
+        opened[name] = value
+
+
+def test_rewards_out_of_another_file_are_not_read(demos, tmp_path):
+    with h5py.File(tmp_path / "secret.h5", "w") as secret:
+        secret["reward"] = np.ones(4, np.float32)
+    raw = tmp_path / "secret.raw"
+    raw.write_bytes(np.ones(4, np.float32).tobytes())
+    replaced(demos, "run_000000/reward", h5py.ExternalLink(str(tmp_path / "secret.h5"), "/reward"))
+    with pytest.raises(InputError, match="run_000000/reward: is missing, or no array of this file"):
+        read_demos(demos)
+    with h5py.File(demos, "a") as opened:
+        del opened["run_000000/reward"]
+        opened.create_dataset("run_000000/reward", (4,), "f4", external=[(str(raw), 0, 16)])
+    with pytest.raises(InputError, match="run_000000/reward: lies in another file"):
+        read_demos(demos)
+
+
+def test_a_few_bytes_that_claim_gigabytes_are_refused(demos):
+    with h5py.File(demos, "a") as opened:
+        opened.attrs["spaces"] = json.dumps({"proprioception": [[2**20], "float32"]})
+        for run in ("run_000000", "run_000001"):
+            del opened[f"{run}/obs/proprioception"]
+            opened.create_dataset(
+                f"{run}/obs/proprioception",
+                data=np.zeros((5, 2**20), np.float32),
+                compression="gzip",
+                chunks=(1, 2**20),
+            )
+        for k in range(2, 60):
+            opened[f"run_{k:06d}"] = opened["run_000000"]
+    assert demos.stat().st_size < 2**20
+    run_limited(read_demos, demos).check(InputError, "claims arrays of .* bytes .*UNPACKED_RATIO")
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [
+        ("action", np.full((4, 2), np.nan, np.float32), "holds numbers that are not finite"),
+        ("reward", np.full(4, np.inf, np.float32), "holds numbers that are not finite"),
+        ("obs/proprioception", np.full((5, 3), np.nan, np.float32), "holds numbers that are not finite"),
+        ("action", np.zeros((4, 3), np.float32), r"has shape \(4, 3\), and must have \(any, 2\)"),
+        ("label", np.zeros((4, 3), np.float32), "has shape"),
+        ("obs/proprioception", np.zeros((5, 4), np.float32), "has shape"),
+        ("terminated", np.zeros(4), "is of type float64"),
+        ("action", np.array([[b"a", b"b"]] * 4), "is of type"),
+    ],
+)
+def test_numbers_that_cannot_be_learned_from_are_refused(demos, name, value, says):
+    replaced(demos, f"run_000001/{name}", value)
+    with pytest.raises(InputError, match=f"run_000001/{name}: {says}"):
+        read_demos(demos)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "says"),
+    [
+        ("weights/mean/bias", lambda a: np.full_like(a, np.nan), "holds numbers that are not finite"),
+        ("mean", lambda a: np.full_like(a, np.inf), "holds numbers that are not finite"),
+        ("deviation", lambda a: 0 * a, "must be as long as its mean, and positive"),
+        ("deviation", lambda a: a[:-1], "must be as long as its mean, and positive"),
+        ("weights/mean/bias", lambda a: a.astype(str), "is of type <U"),
+    ],
+)
+def test_policies_with_numbers_that_cannot_be_played_are_refused(tmp_path, name, change, says):
+    file = changed_policy(tmp_path, name, change)
+    with pytest.raises(InputError, match=f"{re.escape(name)}: {says}"):
+        Policy.load(file)
+
+
+def test_weights_that_do_not_fit_the_card_are_named(tmp_path):
+    reader = policies(tmp_path)
+    file = changed_policy(tmp_path, "weights/mean/kernel", lambda a: a[:-1])
+    with pytest.raises(InputError, match="its arrays do not fit its card"):
+        reader.read(file.read_bytes())
+
+
+def changed_policy(folder: pathlib.Path, name: str, change) -> pathlib.Path:
+    file = folder / "changed.npz"
+    file.write_bytes(policies(folder).valid)
+    with np.load(file) as archive:
+        arrays = dict(archive)
+    np.savez(file, **(arrays | {name: change(arrays[name])}))
+    return file
