@@ -42,6 +42,9 @@ SLIPPED = (0.05, 0.08)
 SETTLED_TRIES = 8
 """Candidates of one orientation and level that are let go, before another one is drawn."""
 
+AT_ONCE = 4
+"""Candidates that count as one unit of work where the predicate is false before anything is let go."""
+
 LIFTS = 3
 """Times that an object that stands in something is lifted by as much as it stands in it."""
 
@@ -153,6 +156,7 @@ class _Task:
     rejected: Rejections
     before: Snapshot
     others: Bystanders
+    at_once: Iterator[int] = dataclasses.field(default_factory=lambda: itertools.count(1))
 
 
 class Placer:
@@ -272,6 +276,7 @@ class Placer:
             return "collides"
         loose = support == "loose" and area.loose
         if area.holds_at_once and not loose and not task.truth():
+            task.budget.work += next(task.at_once) % AT_ONCE > 0
             return "predicate false"
         start = np.array(query.view.object_com[0, placed])
 
