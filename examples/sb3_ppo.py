@@ -6,11 +6,14 @@
 from __future__ import annotations
 
 import argparse
+import sys
+import time
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from stable_baselines3 import PPO
+from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecEnv, VecMonitor, VecNormalize
 
 import ig2mj
@@ -69,11 +72,35 @@ class Worlds(VecEnv):
         return [False] * len(list(self._get_indices(indices)))
 
 
+class Progress(BaseCallback):
+    """A line on stderr every few seconds: how many steps are done, the last episodes, how long it may take."""
+
+    EVERY = 3.0
+
+    def __init__(self, steps: int):
+        super().__init__()
+        self._steps = steps
+
+    def _on_training_start(self) -> None:
+        self._began = self._told = time.monotonic()
+
+    def _on_step(self) -> bool:
+        now = time.monotonic()
+        if now - self._told >= self.EVERY:
+            self._told, seconds, done = now, now - self._began, self.num_timesteps
+            ended = list(self.model.ep_info_buffer or [])
+            words = f"mean return {np.mean([e['r'] for e in ended]):.3f}" if ended else "no episode has ended yet"
+            left = seconds * max(self._steps - done, 0) / done
+            line = f"{done:,} of {self._steps:,} steps, {words}, {done / seconds:,.0f} steps/s, about {left:.0f} s left"
+            print(line, file=sys.stderr, flush=True)
+        return True
+
+
 def trained(task: str, worlds: int, steps: int, **options: Any) -> PPO:
     """PPO after so many agent steps of all worlds together. `options`: of `ig2mj.make`."""
     env = VecNormalize(VecMonitor(Worlds(ig2mj.make(task, worlds=worlds, **options))))
     model = PPO("MlpPolicy", env, n_steps=64, batch_size=256, gamma=0.98, learning_rate=1e-3, device="cpu")
-    return model.learn(steps)
+    return model.learn(steps, callback=Progress(steps))
 
 
 if __name__ == "__main__":

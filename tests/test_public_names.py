@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib
+import importlib.metadata
+import os
 import subprocess
 import sys
 
@@ -37,6 +39,28 @@ def test_the_top_has_what_the_readme_uses():
     assert all(getattr(ig2mj, name) is not None for name in ig2mj.__all__)
     with pytest.raises(AttributeError, match="no attribute 'Simulaton'"):
         _ = ig2mj.Simulaton
+
+
+@pytest.mark.parametrize("name", ["__version__", "agents.UrdfRobot", "envs.list_envs", "demos.igibson.read_igibson"])
+def test_names_resolve_in_an_interpreter_that_imported_nothing_else(name):
+    code = f"import ig2mj; assert ig2mj.{name}"
+    assert subprocess.run([sys.executable, "-W", "ignore", "-c", code]).returncode == 0
+
+
+def test_the_version_is_that_of_the_installed_package():
+    assert ig2mj.__version__ == importlib.metadata.version("ig2mj")
+
+
+def test_what_is_listed_is_public():
+    assert [name for name in dir(ig2mj) if not name.startswith("__")] == sorted(ig2mj.__all__)
+
+
+def test_a_variable_that_mujoco_refuses_is_a_user_s_error():
+    code = "import ig2mj; ig2mj.load_scene"
+    environment = {**os.environ, "MUJOCO_GL": "nonsense"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=environment)
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith("ig2mj.errors.EngineError: the environment variable MUJOCO_GL is 'nonsense': "), last
 
 
 def test_importing_ig2mj_loads_neither_jax_nor_mujoco():

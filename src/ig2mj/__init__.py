@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
-import importlib
-import sys
 from typing import TYPE_CHECKING, Any
 
+from ig2mj.envs.gymnasium_hook import register_now_or_later
+
 if TYPE_CHECKING:
+    from ig2mj.envs.environment import Environment
     from ig2mj.envs.registry import list_envs, make
+    from ig2mj.envs.state import EnvState
     from ig2mj.scene.scene import Scene, load_scene
     from ig2mj.simulation import Simulation
     from ig2mj.worlds import Worlds
 
-__all__ = ["Scene", "Simulation", "Worlds", "list_envs", "load_scene", "make"]
+    __version__: str
+
+__all__ = ["EnvState", "Environment", "Scene", "Simulation", "Worlds", "list_envs", "load_scene", "make"]
 
 _HOME = {
+    "EnvState": "ig2mj.envs.state",
+    "Environment": "ig2mj.envs.environment",
     "Scene": "ig2mj.scene.scene",
     "list_envs": "ig2mj.envs.registry",
     "load_scene": "ig2mj.scene.scene",
@@ -25,20 +31,18 @@ _HOME = {
 
 
 def __getattr__(name: str) -> Any:
-    """Imports the public names when they are first used, so that `import ig2mj` loads neither MuJoCo nor JAX."""
-    if name not in _HOME:
-        raise AttributeError(f"module 'ig2mj' has no attribute '{name}'")
-    from ig2mj.process.collector import REST
+    """Imports public names and packages when they are first used: `import ig2mj` loads neither MuJoCo nor JAX."""
+    if name == "__version__":
+        from importlib.metadata import version
 
-    with REST:
-        return getattr(importlib.import_module(_HOME[name]), name)
+        return version("ig2mj")
+    from ig2mj.process.public_names import public_name
+
+    return public_name("ig2mj", name, _HOME)
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *_HOME})
+    return sorted({*__all__, "__version__", *(name for name in globals() if name.startswith("__"))})
 
 
-if "gymnasium" in sys.modules:
-    from ig2mj.envs import names
-
-    names.register(sys.modules["gymnasium"])
+register_now_or_later()

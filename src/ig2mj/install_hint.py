@@ -44,6 +44,16 @@ def require_extras(*extras: str) -> None:
         )
 
 
+def require_module(module: str) -> None:
+    """Checks that a module can be imported, before a command does half of its work.
+
+    Raises:
+      MissingDependencyError: it cannot; the message has the command that installs the extra of ig2mj that asks for it.
+    """
+    if not _is_importable(module):
+        raise MissingDependencyError(f"the Python package '{module}' is not installed ({pip_install_module(module)})")
+
+
 def pip_install_extra(extra: str) -> str:
     """The command that installs an extra of ig2mj (or several: "convert,demo") from where ig2mj itself came from.
 

@@ -18,6 +18,7 @@ from jaxtyping import Float
 
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.errors import ActionError, StaleStateError
+from ig2mj.process import entry_point
 from ig2mj.sensors.registry import SENSORS
 
 SOON = 3
@@ -30,6 +31,7 @@ JUMPS = 0.01
 """Share of a world's rays that may jump where steps do not come out the same to the bit (`api_test`'s `within`)."""
 
 
+@entry_point
 def api_test(
     env: Environment,
     seed: int = 0,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import io
 import pathlib
 import subprocess
@@ -9,10 +10,12 @@ import sys
 import time
 
 import jax
+import jax.monitoring
 import pytest
 
+import ig2mj
 from ig2mj.process import cache_folder, prepare_jax, waiting
-from ig2mj.process.compilation import kernels_text, xla_text
+from ig2mj.process.compilation import PROGRAMS, XLA_EVENT, kernels_text, xla_text
 from ig2mj.process.waiting import Waiting
 
 
@@ -155,10 +158,36 @@ def test_jax_is_given_a_folder_below_ig2mjs(tmp_path):
 
 
 def test_programs_are_named_by_what_they_do():
-    assert xla_text("jit(whole)").startswith("compiling the rules of states and goal, once per machine")
-    assert xla_text("jit(_rules)").startswith("compiling the rules of states, goal and guards,")
+    assert xla_text("jit(events_step)").startswith("compiling the rules of states and events, once per machine")
+    assert xla_text("jit(_start_all)").startswith("compiling the start of physics in all worlds,")
+    assert xla_text("jit(step_fn)").startswith("compiling a step of all worlds,")
     assert xla_text("jit(some_step)").startswith("compiling a program (some_step),")
     assert xla_text("jit(<lambda>)").startswith("compiling a program, ")
+
+
+def test_every_program_that_is_named_is_a_function_of_ours():
+    package = pathlib.Path(ig2mj.__file__).parent
+    trees = (ast.parse(file.read_text(encoding="utf-8")) for file in package.rglob("*.py"))
+    functions = {n.name.strip("_") for tree in trees for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)}
+    assert set(PROGRAMS) <= functions, sorted(set(PROGRAMS) - functions)
+
+
+def test_what_a_user_waits_for_is_named(tiny_home):
+    """The program that takes longest to compile in a world's first steps says what it is for."""
+    took: dict[str, float] = {}
+
+    def heard(event, seconds, **about):
+        if event == XLA_EVENT:
+            name = str(about.get("fun_name", ""))
+            took[name] = max(seconds, took.get(name, 0.0))
+
+    jax.monitoring.register_event_duration_secs_listener(heard)
+    world = ig2mj.Simulation(tiny_home)
+    world.set_state("temperature", "apple", 80.0)
+    world.step(count=2)
+    world.predicate("cooked", "apple")
+    long = max(took, key=lambda name: took[name])
+    assert xla_text(long).partition(",")[0].removeprefix("compiling ") in PROGRAMS.values(), took
 
 
 def test_a_line_is_cut_to_one_row_of_the_terminal_so_that_it_can_be_overwritten(monkeypatch):

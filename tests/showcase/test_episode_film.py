@@ -8,8 +8,8 @@ import pytest
 
 import ig2mj
 from ig2mj.envs.rollout import play
-from ig2mj.showcase import episode_film
 from ig2mj.showcase.episode_film import BETWEEN, LAST, EpisodeFilm
+from ig2mj.viewer import episode_view
 from ig2mj.viewer.film import ffmpeg_program
 from ig2mj.viewer.offscreen import default_backend
 
@@ -45,7 +45,7 @@ def test_where_a_robot_drives_the_camera_goes_along_and_the_goal_is_marked(tmp_p
         seen.append((camera.lookat, [np.array(scene.geoms[k].pos) for k in range(scene.ngeom)]))
         return np.zeros((height, width, 3), np.uint8)
 
-    monkeypatch.setattr(episode_film, "render", render)
+    monkeypatch.setattr(episode_view, "render", render)
     film, bases = EpisodeFilm(tmp_path / "way.png", env), []
 
     def see(state):

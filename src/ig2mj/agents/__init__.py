@@ -6,5 +6,8 @@ from ig2mj.agents.floating_hand import FloatingHand
 from ig2mj.agents.humanoid import Humanoid
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.agents.urdf import UrdfRobot
+from ig2mj.process.public_names import offer_modules
 
 __all__ = ["Controller", "Fetch", "FloatingHand", "Humanoid", "Robot", "TurtleBot", "UrdfRobot"]
+
+offer_modules(__name__)

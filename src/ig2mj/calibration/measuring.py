@@ -29,6 +29,7 @@ from ig2mj.engine.warp.candidate_pairs import CandidatePairs
 from ig2mj.engine.warp.engine import WarpEngine
 from ig2mj.engine.warp.profile import EngineProfile, default_profile
 from ig2mj.errors import EngineError
+from ig2mj.process import entry_point
 from ig2mj.sampling.perturbation import loose_objects, perturb
 from ig2mj.scene.scene import Scene
 from ig2mj.worlds.random_streams import episode_keys
@@ -54,6 +55,7 @@ BINS = 1 << 14
 Progress = Callable[[int, int], None]
 
 
+@entry_point
 def calibrate(
     scene: Scene,
     reach: Reach | None = None,

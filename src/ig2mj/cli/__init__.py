@@ -47,6 +47,7 @@ from typing import Any
 
 from ig2mj.errors import Ig2mjError
 from ig2mj.install_hint import pip_install_module
+from ig2mj.process.variables import error_of_variable
 
 #: Sub-command -> what it does, in the order of `ig2mj --help`. The module is `ig2mj.cli.<sub-command>`, a
 #: hyphen in it an underscore.
@@ -132,6 +133,8 @@ def describe_error(error: Exception) -> tuple[str, int]:
         name = error.filename or _written(error)
         where = f"{name}: " if name else ""
         return f"{where}{error.strerror or error}", 2
+    if (known := error_of_variable(error)) is not None:
+        return str(known), 2
     text = " ".join(str(error).split())
     return f"ig2mj failed with {type(error).__name__}: {text} (run it again with --debug for the traceback)", 1
 

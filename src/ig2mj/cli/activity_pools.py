@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
+import shlex
 from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
@@ -75,11 +76,14 @@ def sample(
         if not done.sampled.failed:
             journal.finish()
     tell_failures(done.sampled.failed, count)
-    _tell(done, binding, file, json)
+    show = ["ig2mj activity show", shlex.quote(name), "--pool", shlex.quote(str(file))]
+    show += [*(["--behavior1k"] if behavior1k else []), *(["--scene", shlex.quote(scene)] if scene else [])]
+    _tell(done, binding, file, json, " ".join(show))
     return 0 if done.sampled.complete else 1
 
 
-def _tell(done: SampledStart, binding: Binding, file: pathlib.Path, as_json: bool) -> None:
+def _tell(done: SampledStart, binding: Binding, file: pathlib.Path, as_json: bool, show: str) -> None:
+    """`show`: the command that shows the pool's rows."""
     import sys
 
     from ig2mj.cli.printing import make_table, print_json, stdout_console
@@ -104,7 +108,7 @@ def _tell(done: SampledStart, binding: Binding, file: pathlib.Path, as_json: boo
         print(
             f"{file}: {len(sampled.rows)} of {sampled.requested} starts of {binding.activity.name} in {binding.home}, "
             f"{len(binding.additions)} objects added, {sampled.seconds:.1f} s\n"
-            f"look: ig2mj activity show {binding.activity.name} --pool {file} --row 0 --picture row.png"
+            f"look: {show} --row 0 --picture row.png"
         )
     if done.reached:
         print(f"the goal holds already in rows {', '.join(map(str, done.reached))}", file=sys.stderr)

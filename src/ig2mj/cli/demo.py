@@ -171,7 +171,7 @@ def _watch_expert(console: Console, step: Step, file: pathlib.Path) -> int:
     def watch(state: Any) -> None:
         if film is not None:
             film.see(state)
-        seconds = int(state.info["steps"][0]) / 10
+        seconds = int(state.info["steps"][0]) * env.period
         report(f"{seconds:.1f} s", int(state.info["steps"][0]), None)
 
     try:
@@ -181,6 +181,6 @@ def _watch_expert(console: Console, step: Step, file: pathlib.Path) -> int:
             film.close()
     cooked = played.success[0]
     ending = "cooks the steak" if cooked else "does not cook the steak"
-    console.print(f"[bold]expert[/]     the humanoid {ending} in {played.steps / 10:.1f} s")
+    console.print(f"[bold]expert[/]     the humanoid {ending} in {played.steps * env.period:.1f} s")
     console.print(f"[bold]film[/]       {file if filming else f'none: it needs OpenGL ({GL_INSTALL_HINT})'}")
     return 0 if cooked else 1

@@ -57,6 +57,7 @@ def collect(
     from ig2mj.envs.pieces import shared_pool
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.errors import Ig2mjError, UnknownNameError
+    from ig2mj.install_hint import require_module
     from ig2mj.learn.demo_pieces import collection_pieces, join_demos
     from ig2mj.learn.perception import MODES
 
@@ -68,6 +69,7 @@ def collect(
         raise Ig2mjError(f"--noise {noise}, --disturbed {disturbed}: 0 or more, and between 0 and 1")
     if jobs < 0:
         raise Ig2mjError(f"--jobs {jobs}: 0 takes one process per processor, else at least one is needed")
+    require_module("h5py")
     check_output(out)
     where = where_of(jobs, cluster, resume)
     names = VECTORS if obs == "state" else (*VECTORS, "rgb", "depth")

@@ -45,6 +45,8 @@ def metrics(
             print(f"error: {found}", file=sys.stderr)
             failed += 1
             continue
+        if not found:
+            print(f"{file}: holds no episodes to measure", file=sys.stderr)
         for run in found:
             print(form.dumps(run) if json else _line(file, run))
         if others := _others(file, *chosen):

@@ -22,7 +22,7 @@ Resume = Annotated[bool, tyro.conf.FlagCreatePairsOff]
 """Option: go on with a run that was broken off."""
 
 EVERY = 30.0
-"""Seconds between two lines where there is no terminal, on a cluster."""
+"""Seconds between two lines where there is no terminal."""
 
 LISTED = 20
 """Failed pieces that are listed by name."""
@@ -51,19 +51,34 @@ def opened(
 
 @contextlib.contextmanager
 def follow(title: str, where: Where) -> Iterator[Report]:
-    """A bar on the terminal, or lines now and then where a cluster works and there is no terminal."""
+    """A bar on the terminal, or lines now and then where there is none. What a piece that is done in this process says
+    of itself (`ig2mj.process.progress`) stands next to the bar."""
     from ig2mj.cli.printing import add_bar, progress_bar
+    from ig2mj.process.progress import shown_by
 
-    last = [time.monotonic()]
-    with progress_bar() as bar:
+    last, told, words = [time.monotonic()], list[Status](), [""]
+    with progress_bar() as bar, contextlib.ExitStack() as stack:
         move = add_bar(bar, title)
 
+        def show() -> None:
+            status = told[-1] if told else None
+            texts = [*([str(status)] if status else []), *([words[0]] if words[0] else [])]
+            move("; ".join(texts), status.done + status.failed if status else 0, status.total if status else None)
+
         def report(status: Status) -> None:
-            move(str(status), status.done + status.failed, status.total)
-            if bar.disable and where.cluster is not None and time.monotonic() - last[0] > EVERY:
+            told.append(status)
+            words[0] = ""
+            show()
+            if bar.disable and time.monotonic() - last[0] > EVERY:
                 last[0] = time.monotonic()
                 print(f"{title}: {status.done} of {status.total} done, {status}", file=sys.stderr, flush=True)
 
+        def say(text: str) -> None:
+            words[0] = text
+            show()
+
+        if not bar.disable:
+            stack.enter_context(shown_by(say))
         yield report
 
 

@@ -74,6 +74,8 @@ def run(
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.envs.rollout import play
     from ig2mj.errors import Ig2mjError, UnknownNameError
+    from ig2mj.install_hint import require_module
+    from ig2mj.process.progress import progress
 
     if format not in FORMATS:
         raise UnknownNameError("format", format, FORMATS)
@@ -89,6 +91,7 @@ def run(
         check_film(video, ENDINGS)
         engine = engine or "native"
     if record is not None:
+        require_module("h5py")
         check_output(record)
     split = "held_out" if held_out else split
     played = make(
@@ -113,14 +116,10 @@ def run(
 
         film = EpisodeFilm(video, played)
     try:
-        outcome = play(
-            played,
-            who_acts(agent, policy, played, seed),
-            episodes,
-            seed,
-            held_out,
-            film.see if film is not None else None,
-        )
+        act = who_acts(agent, policy, played, seed)
+        with progress(f"playing {played.task.name}") as report:
+            watch = film.see if film is not None else None
+            outcome = play(played, act, episodes, seed, held_out, watch, report=report)
     finally:
         played.close()
         if film is not None:

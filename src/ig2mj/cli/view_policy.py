@@ -30,7 +30,7 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
     from ig2mj.learn.shipped import find_policy
     from ig2mj.showcase.film_strip import ENDINGS
     from ig2mj.tasks.pools import COUNT
-    from ig2mj.viewer.acting import STEP_TIME, ActingWorld
+    from ig2mj.viewer.acting import BETWEEN, ActingWorld
     from ig2mj.viewer.interactive import check_display, launch
 
     if not 0 <= row < COUNT["held_out"]:
@@ -68,5 +68,5 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
         print(f"wrote {video} ({'success' if bool(np.asarray(state.info['success'])[0]) else 'no success'})")
         return
     world = ActingWorld(env, act, row)
-    launch(world, step_time=STEP_TIME, paused=paused)
+    launch(world, step_time=env.period / BETWEEN, paused=paused)
     print(f"{world.successes} of {world.episodes} episodes succeeded", file=sys.stderr)

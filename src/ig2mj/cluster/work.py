@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ig2mj.errors import Ig2mjError
+from ig2mj.process import entry_point
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,6 +71,7 @@ def found(name: str) -> Callable[..., Any]:
     return getattr(importlib.import_module(module), function)
 
 
+@entry_point
 def do(function: str, piece: Piece, shared: Mapping[str, bytes]) -> Answer:
     """Does one piece; errors are part of the answer, since their classes need not exist where it is read."""
     options = {"shared": shared} if shared else {}

@@ -18,7 +18,6 @@ import dataclasses
 import os
 import weakref
 from collections.abc import Collection, Mapping
-from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -29,11 +28,13 @@ from ig2mj.demos.frames import FrameRows
 from ig2mj.demos.origin import origin_of
 from ig2mj.demos.writer import RunWriter
 from ig2mj.engine.view import Array
-from ig2mj.envs.environment import Environment, EnvState, Seed, as_seed
+from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.errors import EngineError
-from ig2mj.worlds.random_streams import pick_rows
+from ig2mj.process import entry_point
+from ig2mj.worlds.random_streams import Seed, as_seed, pick_rows
 
 
+@entry_point
 class RecordedEnvironment(Environment):
     """An environment with a file.
 
@@ -86,7 +87,7 @@ class RecordedEnvironment(Environment):
     def reset(self, seed: Seed | EnvState = 0, mask: Bool[Array, "W"] | None = None) -> EnvState:
         """As `Environment.reset`."""
         if not isinstance(seed, EnvState):
-            return self._begin(self._inner.reset(seed), np.ones(self.num_worlds, bool), {"seed": _number(seed)})
+            return self._begin(self._inner.reset(seed), np.ones(self.num_worlds, bool), self._seeds(seed))
         chosen = np.ones(self.num_worlds, bool) if mask is None else np.asarray(mask, bool)
         if seed is not self._last:
             chosen = np.ones_like(chosen)
@@ -95,7 +96,7 @@ class RecordedEnvironment(Environment):
     def start_from(self, rows: Int[np.ndarray, "W"], seed: Seed = 0) -> EnvState:
         """As `Environment.start_from`."""
         state = self._inner.start_from(rows, seed)
-        return self._begin(state, np.ones(self.num_worlds, bool), {"seed": _number(seed)}, np.asarray(rows))
+        return self._begin(state, np.ones(self.num_worlds, bool), self._seeds(seed), np.asarray(rows))
 
     def close(self) -> None:
         """Ends all runs, and closes the file; may be called twice."""
@@ -114,7 +115,7 @@ class RecordedEnvironment(Environment):
         self.close()
 
     def _begin(
-        self, state: EnvState, mask: np.ndarray, about: dict[str, Any], rows: np.ndarray | None = None
+        self, state: EnvState, mask: np.ndarray, about: dict[str, np.ndarray], rows: np.ndarray | None = None
     ) -> EnvState:
         """New runs in the masked worlds."""
         if self.writer is None:
@@ -133,9 +134,13 @@ class RecordedEnvironment(Environment):
             rows = np.asarray(pick_rows(jnp.asarray(state.batch.world.key), self.core.starts.pool.size))
         episode = np.asarray(state.batch.episode)
         self._succeeded[begun] = self._completed[begun] = False
-        runs = {w: {"episode": int(episode[w]), "row": int(rows[w]), **about} for w in begun}
+        about = {"episode": episode, "row": rows, **about}
+        runs = {w: {name: int(of_worlds[w]) for name, of_worlds in about.items()} for w in begun}
         self.writer.begin(runs, *self._rows(state))
         return state
+
+    def _seeds(self, seed: Seed) -> dict[str, np.ndarray]:
+        return {"seed": np.broadcast_to(np.asarray(as_seed(seed, self.num_worlds)), (self.num_worlds,))}
 
     def _note(self, action: np.ndarray, state: EnvState) -> None:
         """A frame of all worlds, and the ends of runs."""
@@ -159,6 +164,7 @@ class RecordedEnvironment(Environment):
         self._last = state
 
 
+@entry_point
 def record(
     env: Environment,
     file: str | os.PathLike,
@@ -179,7 +185,3 @@ def record(
       EngineError: there are no such worlds. InputError, at the first reset: the file cannot be written.
     """
     return RecordedEnvironment(env, file, worlds, devices, past_success)
-
-
-def _number(seed: Seed) -> int:
-    return int(np.asarray(as_seed(seed)))

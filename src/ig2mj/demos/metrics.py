@@ -31,6 +31,7 @@ from ig2mj.demos.shipped import find_recording
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.predicates.questions import Questions
 from ig2mj.predicates.registry import PREDICATES, find
+from ig2mj.process import entry_point
 from ig2mj.scene.scene import Scene
 from ig2mj.states.model import StateModel
 
@@ -43,6 +44,7 @@ MOVED = 1e-3
 Fact = tuple[str, tuple[str, ...]]
 
 
+@entry_point
 def metrics_of(
     file: str | os.PathLike,
     settle: int = SETTLE,

@@ -39,6 +39,7 @@ from ig2mj.demos.writer import FLUSH
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.registry import VECTORS, find_task, make
 from ig2mj.errors import EngineError, InputError, UnknownNameError
+from ig2mj.process import entry_point
 from ig2mj.tasks.task import Task
 
 MODES = ("action", "state")
@@ -81,6 +82,7 @@ class Replayed:
     warnings: list[str]
 
 
+@entry_point
 class Replayer:
     """Replays the runs of a file in one environment.
 
@@ -305,6 +307,8 @@ def _environment(recording: Recording, observations: str | Sequence[str], option
             made = {**made, "pool_size": 1, "mixed": 0}
         env = make(task, robot, worlds, engine, grasping, observations=observations, **(made | options))
     except UnknownNameError as e:
+        if e.kind.startswith("option of "):
+            raise InputError(recording.file, f"makes no environment: {e}", element="attribute made_with") from e
         if e.kind not in _NAMED_BY:
             raise
         raise InputError(recording.file, str(e), element=f"attribute {_NAMED_BY[e.kind]}") from e

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import importlib
+import inspect
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 from ig2mj.engine.base import Engine
 from ig2mj.errors import UnknownNameError
+from ig2mj.process import entry_point
 from ig2mj.process.collector import REST
 from ig2mj.process.imports import find_devices, import_mjx
 from ig2mj.scene.scene import Scene
@@ -19,6 +22,7 @@ ENGINES = {
 """Name: module and class."""
 
 
+@entry_point
 @REST
 def make_engine(name: str, scene: Scene, num_worlds: int = 1, **options: Any) -> Engine:
     """Makes an engine for a scene.
@@ -28,12 +32,48 @@ def make_engine(name: str, scene: Scene, num_worlds: int = 1, **options: Any) ->
       options: keyword arguments of the engine's class, e.g. `boxes="igibson"`.
 
     Raises:
-      UnknownNameError: no such engine. EngineError: the engine cannot run this scene.
+      UnknownNameError: no such engine or option. EngineError: the engine cannot run this scene.
     """
-    if name not in ENGINES:
-        raise UnknownNameError("engine", name, ENGINES)
+    check_options(f"the {name} engine", options, name)
     if name != "native":
         find_devices()
+    return _kind_of(name)(scene, num_worlds, **options)
+
+
+def check_options(
+    what: str, options: Mapping[str, Any], engine: str | Engine, own: Callable[..., Any] | None = None
+) -> None:
+    """Checks names of options before anything is made.
+
+    Args:
+      what: takes the options, for the message. engine: they go to; an engine that is made already takes none.
+      own: what else takes arguments by name: a function or class, whose names are among the near matches.
+
+    Raises:
+      UnknownNameError: no such engine, or an option that neither has, with near matches.
+    """
+    if isinstance(engine, str) and engine not in ENGINES:
+        raise UnknownNameError("engine", engine, ENGINES)
+    if not options:
+        return
+    taken = set(_arguments(_kind_of(engine))) - {"scene", "num_worlds"} if isinstance(engine, str) else set[str]()
+    for name in options:
+        if name not in taken:
+            raise UnknownNameError(f"option of {what}", name, [*(_arguments(own) if own else ()), *sorted(taken)])
+
+
+def _kind_of(name: str) -> type:
+    """The engine's class."""
+    if name != "native":
         import_mjx()
     module, kind = ENGINES[name].split(":")
-    return getattr(importlib.import_module(module), kind)(scene, num_worlds, **options)
+    return getattr(importlib.import_module(module), kind)
+
+
+def _arguments(taker: Callable[..., Any]) -> Iterable[str]:
+    """Names of the arguments of a function, or of a class and those above it to which it hands others on."""
+    for function in [t.__init__ for t in taker.__mro__[:-1]] if inspect.isclass(taker) else [taker]:
+        found = inspect.signature(function).parameters.values()
+        yield from (p.name for p in found if p.kind in (p.POSITIONAL_OR_KEYWORD, p.KEYWORD_ONLY) and p.name != "self")
+        if not any(p.kind is p.VAR_KEYWORD for p in found):
+            return

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -11,11 +10,16 @@ if TYPE_CHECKING:
 
 __all__ = ["EnvState", "Environment", "list_envs", "make"]
 
-_HOME = {"EnvState": "environment", "Environment": "environment", "list_envs": "registry", "make": "registry"}
+_HOME = {
+    "EnvState": "ig2mj.envs.state",
+    "Environment": "ig2mj.envs.environment",
+    "list_envs": "ig2mj.envs.registry",
+    "make": "ig2mj.envs.registry",
+}
 
 
 def __getattr__(name: str) -> Any:
     """Imports the public names when they are first used: names of environments are known without MuJoCo and JAX."""
-    if name not in _HOME:
-        raise AttributeError(f"module 'ig2mj.envs' has no attribute '{name}'")
-    return getattr(importlib.import_module(f"ig2mj.envs.{_HOME[name]}"), name)
+    from ig2mj.process.public_names import public_name
+
+    return public_name("ig2mj.envs", name, _HOME)

@@ -21,6 +21,7 @@ from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.state import EnvState
 from ig2mj.errors import ActionError
+from ig2mj.process import entry_point
 from ig2mj.process.collector import Compiled
 
 STEPS = 20
@@ -97,6 +98,7 @@ def lifted_by_all(by_all: Array, off: Array, info: Mapping[str, Array], going: A
     return (leaves & info["held_by_all"]) | (~leaves & by_all)
 
 
+@entry_point
 class Actor:
     """Who acts in an environment by a pure function of observations and a key: an `ig2mj.envs.rollout.Act`."""
 

@@ -21,13 +21,16 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from ig2mj.envs.environment import Environment, EnvState, Seed
+from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.errors import ActionError, EngineError
+from ig2mj.process import entry_point
+from ig2mj.worlds.random_streams import Seed
 
 Step = tuple[dict[str, Any], Any, Any, Any, dict[str, Any]]
 """Observations by name, reward [W], terminated [W], truncated [W], info; arrays of the face's kind."""
 
 
+@entry_point
 class NumpyEnv:
     """See the module's text. Attributes: env: the environment underneath. state: its state, None before the reset."""
 
@@ -96,6 +99,7 @@ class NumpyEnv:
         return np.array(array)
 
 
+@entry_point
 class TorchEnv(NumpyEnv):
     """The same with PyTorch's tensors."""
 

@@ -25,10 +25,10 @@ import numpy as np
 from flax import struct
 from jaxtyping import Float
 
-from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.engine.view import Array
-from ig2mj.envs.environment import as_seed
 from ig2mj.errors import EngineError
+from ig2mj.process import entry_point
+from ig2mj.worlds.random_streams import as_seed
 
 PRIVILEGED = "privileged_state"
 
@@ -56,6 +56,7 @@ class PureEnv(Protocol):
     """What is asked of an environment; `ig2mj.envs.Environment` has it."""
 
     num_worlds: int
+    period: float
 
     @property
     def pure(self) -> bool: ...
@@ -71,6 +72,7 @@ class PureEnv(Protocol):
     def step_autoreset_fn(self, state: Any, action: Any) -> Any: ...
 
 
+@entry_point
 class BraxEnv:
     """See the module's text. Attributes: env: the environment underneath."""
 
@@ -109,7 +111,7 @@ class BraxEnv:
     @property
     def dt(self) -> float:
         """Seconds of an agent step."""
-        return ACTION_PERIOD
+        return self.env.period
 
     @property
     def num_envs(self) -> int:

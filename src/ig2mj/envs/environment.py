@@ -37,6 +37,7 @@ from ig2mj.envs.observations import Observer, Space, chosen
 from ig2mj.envs.state import EnvState, Seen
 from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import GoalStatus
+from ig2mj.process import entry_point
 from ig2mj.process.collector import REST, Compiled, compile_together
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
@@ -47,7 +48,7 @@ from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.lazy.of_view import OfView
 from ig2mj.worlds.pool import Pool
-from ig2mj.worlds.random_streams import Seed, as_seed, pick_rows
+from ig2mj.worlds.random_streams import Seed, Seeds, as_seed, pick_rows
 
 __all__ = ["Companions", "EnvState", "Environment", "Seed", "as_seed"]
 
@@ -55,6 +56,7 @@ Companions = Callable[[UInt[Array, "W 2"], Int[Array, "W"]], Float[Array, "W m"]
 """Actions of the other robots, from the episode's key and the number of the agent step. Pure."""
 
 
+@entry_point
 class Environment(StateCopies):
     """See the module's text; `ig2mj.make` makes one.
 
@@ -204,18 +206,19 @@ class Environment(StateCopies):
         """All worlds at the start of their first episode; or a new episode in some worlds.
 
         Args:
-          seed: of everything random, a number or a key of JAX; or a state, of which the masked worlds are reset.
+          seed: of everything random (see `seeds.Seed`); or a state, of which the masked worlds are reset.
           mask: with a state: which worlds; None: all. Each new episode begins with a random row of the pool, which
             belongs to seed, world and episode.
         """
         if isinstance(seed, EnvState):
             return self._reset(seed, np.ones(self.num_worlds, bool) if mask is None else mask)
+        number = as_seed(seed, self.num_worlds)
         if (physics := self.core.engine.awaited()) is not None:
-            compile_together([self._start.traced(physics.returned, as_seed(seed)), physics])
+            compile_together([self._start.traced(physics.returned, number), physics])
         with REST:
-            return self._start(self.core.engine.reset(), as_seed(seed))
+            return self._start(self.core.engine.reset(), number)
 
-    def _start_fn(self, physics: Physics, seed: int | Int[Array, ""]) -> EnvState:
+    def _start_fn(self, physics: Physics, seed: Seeds) -> EnvState:
         batch = self.core.start_fn(physics, seed)
         return self._begun(batch, jnp.ones(self.num_worlds, bool), None)
 
@@ -231,9 +234,9 @@ class Environment(StateCopies):
             raise EngineError(f"start_from takes {self.num_worlds} rows, each from 0 to {size - 1}")
         starts = self.core.starts.pool.rows(rows)
         with REST:
-            return self._load(self.core.engine.reset(), as_seed(seed), starts, rows.astype(np.int32))
+            return self._load(self.core.engine.reset(), as_seed(seed, self.num_worlds), starts, rows.astype(np.int32))
 
-    def _load_fn(self, physics: Physics, seed: int | Int[Array, ""], starts: Pool, rows: Int[Array, "W"]) -> EnvState:
+    def _load_fn(self, physics: Physics, seed: Seeds, starts: Pool, rows: Int[Array, "W"]) -> EnvState:
         batch = self.core.load_fn(self.core.start_fn(physics, seed), starts.physics, starts.states)
         return self._begun(batch, jnp.ones(self.num_worlds, bool), None, rows)
 

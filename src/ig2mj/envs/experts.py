@@ -16,6 +16,7 @@ from jaxtyping import Float
 from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment
 from ig2mj.errors import UnknownNameError
+from ig2mj.process import entry_point
 from ig2mj.tasks.experts import Expert
 from ig2mj.tasks.experts.expert import PLANS
 from ig2mj.tasks.task import Task
@@ -30,6 +31,7 @@ def make_expert(env: Environment) -> Expert:
     return Expert(env.task, env.robot, env.scene, rules.model, env.grasping)
 
 
+@entry_point
 def expert_of(env: Environment) -> Callable[..., Float[Array, "W n"]]:
     """What acts in all worlds of an environment, compiled: from a state, and where it takes objects to be, as
     `ig2mj.tasks.experts.Expert` does, to actions.

@@ -1,20 +1,27 @@
 """Gymnasium's face: `gymnasium.make("ig2mj/CookingMeat-v0")` and `gymnasium.make_vec(...)`.
 
-`import gymnasium, ig2mj` makes the environments known to Gymnasium, in that order, and `import ig2mj.envs.gymnasium` in
-any. Without an import: `gymnasium.make("ig2mj.envs.gymnasium:ig2mj/CookingMeat-v0")`. Keyword arguments go to
-`ig2mj.make`: `robot=`, `grasping=`, `engine=`, `observations=`, ...
+Environments are known to Gymnasium once ig2mj is imported, before Gymnasium or after. Gymnasium imports it for a name
+with a module before it: `gymnasium.make("ig2mj:ig2mj/CookingMeat-v0")`. Keyword arguments go to `ig2mj.make`: `robot=`,
+`grasping=`, `engine=`, `observations=`, ...
 
-The vector environment has the three autoreset modes: `autoreset_mode="same_step"` (what was seen last is
+With `render_mode="rgb_array"`, `render()` gives an image of the world from next to the robot (of each world, for a
+vector environment), [480, 640, 3], as `gymnasium.wrappers.RecordVideo` takes it.
+
+The vector environment has the three autoreset modes: `autoreset_mode="same_step"` (the last observation is
 `info["final_obs"]`), "next_step" (the default), and "disabled" (`reset(options={"reset_mask": mask})`).
 
-All arrays are fresh in every step, never buffers that are used again.
+Gymnasium's `vectorization_mode="async"` needs `vector_kwargs={"context": "spawn"}`: JAX does not run in processes that
+were forked. The vector environment is faster, since its worlds are one batch.
+
+All arrays are new in every step, never buffers that are used again.
 """
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from typing import Any, ClassVar
+import pkgutil
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import gymnasium
 import jax
@@ -23,14 +30,19 @@ from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space
 
+from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.envs import names
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.observations import Space
 from ig2mj.envs.registry import make
-from ig2mj.errors import ActionError
+from ig2mj.errors import ActionError, EngineError, UnknownNameError
+from ig2mj.process.entry import refuse_fork
+from ig2mj.worlds.random_streams import as_seed
 
-STEPS_PER_SECOND = 10
-"""Agent steps of a simulated second, for films."""
+RENDER_MODES = ("rgb_array",)
+
+IMAGES = "ig2mj.viewer.episode_view:EpisodeView"
+"""What makes images of a world. By name, since drawing is built on environments and not they on it."""
 
 
 def gym_space(space: Space) -> spaces.Box:
@@ -45,22 +57,69 @@ def _spaces(env: Environment) -> tuple[gymnasium.Space, gymnasium.Space]:
     return spaces.Dict(observations), gym_space(env.action_space)
 
 
+def _metadata(period: float) -> dict[str, Any]:
+    return {"render_modes": list(RENDER_MODES), "render_fps": round(1 / period, 3)}
+
+
+def _checked(render_mode: str | None) -> str | None:
+    if render_mode is not None and render_mode not in RENDER_MODES:
+        raise UnknownNameError("render mode", render_mode, RENDER_MODES)
+    return render_mode
+
+
+class _Images:
+    """Images of worlds of an environment, as they are asked for."""
+
+    def __init__(self, env: Environment):
+        self._env, self._views = env, dict[int, Callable[[EnvState], np.ndarray]]()
+
+    def __call__(self, state: EnvState | None, world: int) -> np.ndarray:
+        if state is None:
+            raise gymnasium.error.ResetNeeded("reset the environment before its first image")
+        if world not in self._views:
+            self._views[world] = pkgutil.resolve_name(IMAGES)(self._env, world)
+        return self._views[world](state)
+
+
+class _NoSpace(spaces.Dict):
+    """The space of an environment that cannot run in this process: comparing it raises the reason.
+
+    Gymnasium's asynchronous workers hand errors to the calling process from their first comparison of spaces on, and
+    not from where they make environments.
+    """
+
+    def __eq__(self, other: object) -> bool:
+        refuse_fork()
+        return False
+
+    __hash__ = None  # pyright: ignore[reportAssignmentType]
+
+
 class GymEnv(gymnasium.Env):
     """One world. Attributes: env: the environment underneath. state: its state, None before the first reset."""
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": [], "render_fps": STEPS_PER_SECOND}
+    metadata: dict[str, Any] = _metadata(ACTION_PERIOD)
 
     def __init__(self, task: str, render_mode: str | None = None, **options: Any):
-        """Arguments as `ig2mj.make`, without `worlds`."""
-        self.env = make(task, worlds=1, **options)
+        """Arguments as `ig2mj.make`, without `worlds`. render_mode: "rgb_array", or None."""
         self.state: EnvState | None = None
-        self.render_mode = render_mode
+        self.render_mode = _checked(render_mode)
+        self.env: Environment
+        try:
+            refuse_fork()
+        except EngineError:
+            self.observation_space = self.action_space = _NoSpace()
+            return
+        self.env = make(task, worlds=1, **options)
+        self.metadata = _metadata(self.env.period)
+        self._image = _Images(self.env)
         self.observation_space, self.action_space = _spaces(self.env)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
         """A new episode. With a seed the first of that seed; else the next one of the seed before."""
+        refuse_fork()
         super().reset(seed=seed)
         if seed is not None or self.state is None:
             self.state = self.env.reset(int(self.np_random.integers(2**31)) if seed is None else seed)
@@ -69,7 +128,7 @@ class GymEnv(gymnasium.Env):
         return self._obs(), self._info()
 
     def step(self, action: np.ndarray) -> tuple[dict[str, np.ndarray], float, bool, bool, dict[str, Any]]:
-        """One agent step of 1/10 s. Raises ActionError: a wrong shape."""
+        """One agent step of `env.period` seconds. Raises ActionError: a wrong shape."""
         if self.state is None:
             raise gymnasium.error.ResetNeeded("reset the environment before its first step")
         action = np.asarray(action)
@@ -81,9 +140,14 @@ class GymEnv(gymnasium.Env):
         )
         return self._obs(), float(reward), bool(terminated), bool(truncated), self._info()
 
+    def render(self) -> np.ndarray | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """An image [480, 640, 3] of the world as it is now; None without a render mode."""
+        return None if self.render_mode is None else self._image(self.state, 0)
+
     def close(self) -> None:
         """May be called twice."""
-        self.env.close()
+        if hasattr(self, "env"):
+            self.env.close()
 
     def _obs(self) -> dict[str, np.ndarray]:
         assert self.state is not None
@@ -105,27 +169,40 @@ class GymVectorEnv(gymnasium.vector.VectorEnv):
         render_mode: str | None = None,
         **options: Any,
     ):
-        """Arguments as `ig2mj.make`; autoreset_mode: see the module's text."""
+        """Arguments as `ig2mj.make`; autoreset_mode: see the module's text. render_mode: "rgb_array", or None."""
+        self.render_mode = _checked(render_mode)
         self.env = make(task, worlds=num_envs, **options)
         self.state: EnvState | None = None
-        self.num_envs, self.render_mode = num_envs, render_mode
+        self.num_envs = num_envs
         self.autoreset_mode = _mode(autoreset_mode)
-        self.metadata = {"render_modes": [], "render_fps": STEPS_PER_SECOND, "autoreset_mode": self.autoreset_mode}
+        self.metadata = {**_metadata(self.env.period), "autoreset_mode": self.autoreset_mode}
+        self._image = _Images(self.env)
         self.single_observation_space, self.single_action_space = _spaces(self.env)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    def reset(  # pyright: ignore[reportIncompatibleMethodOverride]
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
-        """New episodes: of all worlds, or of those of `options={"reset_mask": mask}`. One seed serves all worlds."""
-        super().reset(seed=seed)
+        """New episodes: of all worlds, or of those of `options={"reset_mask": mask}`.
+
+        Args:
+          seed: of all worlds; or one for each, of which each world then begins as an environment of one world does with
+            its seed (None: any). None: the next episodes of the seeds before.
+
+        Raises:
+          ActionError: a mask of another shape. EngineError: not a seed for each world.
+        """
+        super().reset(seed=seed if seed is None or isinstance(seed, int | np.integer) else None)  # pyright: ignore
+        if seed is not None and not isinstance(seed, int | np.integer):
+            seed = [int(self.np_random.integers(2**31)) if s is None else s for s in seed]
         mask = (options or {}).get("reset_mask")
         if mask is not None and self.state is not None:
             mask = np.asarray(mask, bool)
             if mask.shape != (self.num_envs,):
                 raise ActionError(f"reset_mask has shape {(self.num_envs,)}, not {mask.shape}")
-            self.state = self.env.reset(self.state, mask)
+            state = self.state if seed is None else _reseeded(self.state, as_seed(seed, self.num_envs), mask)
+            self.state = self.env.reset(state, mask)
         elif seed is not None or self.state is None:
             self.state = self.env.reset(int(self.np_random.integers(2**31)) if seed is None else seed)
         else:
@@ -155,12 +232,16 @@ class GymVectorEnv(gymnasium.vector.VectorEnv):
         flags = np.array(state.terminated), np.array(state.truncated)
         return _host(state.obs), np.array(state.reward, np.float64), *flags, found
 
+    def render(self) -> tuple[np.ndarray, ...] | None:
+        """An image [480, 640, 3] of each world as it is now; None without a render mode."""
+        return None if self.render_mode is None else tuple(self._image(self.state, w) for w in range(self.num_envs))
+
     def close(self, **kwargs: Any) -> None:
         """May be called twice."""
         self.env.close()
 
     def _info(self, info: Mapping[str, Any]) -> dict[str, Any]:
-        """Gymnasium's form: beside every array the mask of the worlds that it is of."""
+        """Gymnasium's form: with every array the mask of the worlds that it is of."""
         found: dict[str, Any] = {}
         for name, array in info.items():
             found[name] = np.array(array)
@@ -172,6 +253,15 @@ class GymVectorEnv(gymnasium.vector.VectorEnv):
             return
         found["final_obs"], found["_final_obs"] = _host(final), done
         found["final_info"], found["_final_info"] = {name: np.array(a) for name, a in info.items()}, done.copy()
+
+
+def _reseeded(state: EnvState, seed: Any, mask: np.ndarray) -> EnvState:
+    """A state of which the next episodes of the masked worlds are the first of other seeds."""
+    batch, worlds = state.batch, np.arange(len(mask), dtype=np.int32)
+    seeds = np.where(mask, np.asarray(seed), np.asarray(batch.seed)).astype(np.int32)
+    number = np.where(mask, worlds if np.ndim(seed) == 0 else 0, np.asarray(batch.number)).astype(np.int32)
+    episode = np.where(mask, -1, np.asarray(batch.episode)).astype(np.int32)
+    return dataclasses.replace(state, batch=dataclasses.replace(batch, seed=seeds, number=number, episode=episode))
 
 
 def _restarted(state: EnvState, over: np.ndarray) -> EnvState:

@@ -19,13 +19,13 @@ import jax
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import MODES, Grasping
 from ig2mj.agents.urdf import UrdfRobot
-from ig2mj.engine.registry import ENGINES, make_engine
+from ig2mj.engine.registry import check_options, make_engine
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.names import NAMES, NAMESPACE, activity_name, short_name
 from ig2mj.envs.observations import Observer, check_names
 from ig2mj.envs.setups import Control, setup_activity, setup_bddl, setup_navigation
 from ig2mj.errors import EngineError, UnknownNameError
-from ig2mj.process import run_programs_inline
+from ig2mj.process import entry_point, run_programs_inline
 from ig2mj.sensors.base import SensorOptions
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.tasks.activities import ACTIVITIES
@@ -65,6 +65,7 @@ def find_task(name: str) -> AnyTask:
     return TASKS[short]
 
 
+@entry_point
 def make(
     name: str | AnyTask,
     robot: str | UrdfRobot | None = None,
@@ -108,7 +109,8 @@ def make(
       sensors: settings of the sensors, or a mapping of them.
       whole_actions: an action has every number of the robot's controller, 1 being its limit, not only the hands that
         the task moves: for people and their devices.
-      period: seconds of an agent step, a whole number of control steps of 1/30 s.
+      period: seconds of an agent step, a whole number of control steps of 1/30 s. An episode is as long in seconds as
+        with the usual 1/10 s.
       variant: of an activity's objects: other models of the same categories (`ig2mj.tasks.variants`); 0: its own. Each
         has pools of start states of its own.
       home: another home than the task's, by name or folder: any with a map of its floor for navigation, any that an
@@ -116,7 +118,7 @@ def make(
       options: go to the engine.
 
     Raises:
-      UnknownNameError: no such environment, robot, mode, observation, engine or split.
+      UnknownNameError: no such environment, robot, mode, observation, engine, option or split.
       EngineError: the engine cannot do what is asked, the home lacks what the task names, or the robot would start
         outside of it. InputError: there is no such home. BindingError: the activity does not fit into it.
     """
@@ -145,10 +147,15 @@ def make(
         raise EngineError(f"mixed = {mixed}: a number of start states, or 0")
     if mixed and not isinstance(task, Task):
         raise EngineError(f"mixed = {mixed} for {task.name}: only start states of the paper's activities are mixed")
-    if engine is not None and engine not in ENGINES:
-        raise UnknownNameError("engine", engine, ENGINES)
     if engine in (None, "native"):
         run_programs_inline()
+    if engine is None:
+        engine = "warp" if jax.default_backend() == "gpu" else "native"
+    check_options(f"make with the {engine} engine", options, engine, make)
+    if not 0 < period < float("inf"):
+        raise EngineError(f"period = {period}: seconds of an agent step, a whole number of control steps of 1/30 s")
+    if period != ACTION_PERIOD:
+        task = dataclasses.replace(task, horizon=max(1, round(task.horizon * ACTION_PERIOD / period)))
     control = Control(whole_actions, period)
     if isinstance(task, NavigationTask):
         setup = setup_navigation(task, robot, split, pool_size, control)
@@ -156,8 +163,6 @@ def make(
         setup = setup_bddl(task, robot, pool, split, pool_size, control)
     else:
         setup = setup_activity(task, robot, mode, pool, split, pool_size, paper_rl, control)
-    if engine is None:
-        engine = "warp" if jax.default_backend() == "gpu" else "native"
     scene, rules, controllers = setup.scene, setup.rules, setup.controllers
     chosen = check_names(observations, setup.objective)
     starts = setup.pool()  # may take minutes: everything that has a name is known by now

@@ -17,6 +17,8 @@ import numpy as np
 from ig2mj.engine.view import Array
 from ig2mj.envs.actor import STEPS, Actor, Tally, ending, lifted_by_all, resting
 from ig2mj.envs.environment import Environment, EnvState
+from ig2mj.process import entry_point
+from ig2mj.process.progress import Report
 
 Act = Callable[[EnvState], Array]
 """Actions [W, n] from the state of all worlds."""
@@ -47,6 +49,7 @@ class Played:
     state: EnvState
 
 
+@entry_point
 def play(
     env: Environment,
     act: Act,
@@ -55,6 +58,7 @@ def play(
     in_order: bool = False,
     watch: Watch | None = None,
     first: int = 0,
+    report: Report = lambda share, words: None,
 ) -> Played:
     """Plays episodes.
 
@@ -63,22 +67,27 @@ def play(
       in_order: begin with the rows of the environment's pool, each once; again from the first where there are fewer.
         Where an episode is over actions are zero until all are.
       first: of these rows.
+      report: takes after every step the share that is done, and how far it is in words.
     """
-    return _in_order(env, act, episodes, seed, watch, first) if in_order else _drawn(env, act, episodes, seed, watch)
+    if in_order:
+        return _in_order(env, act, episodes, seed, watch, first, report)
+    return _drawn(env, act, episodes, seed, watch, report)
 
 
-def _drawn(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None) -> Played:
+def _drawn(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None, report: Report) -> Played:
     state = env.reset(seed)
-    _look(watch, state)
+    pace = Pace(watch)
+    pace.look(state)
     success, in_hand, lifted, total = [], [], [], []
     lifts = Lifts(state.info, env.num_worlds)
-    running, steps, pace = np.zeros(env.num_worlds), 0, Pace()
+    running, steps = np.zeros(env.num_worlds), 0
+    most = env.task.horizon * max(1, math.ceil(episodes / env.num_worlds))
     while len(total) < episodes:
         state = env.step_autoreset(state, act(state))
-        _look(watch, state)
         running += np.asarray(state.reward)
         steps += env.num_worlds
         pace.stepped(env.num_worlds)
+        pace.look(state)
         done, won = np.asarray(state.done), np.asarray(state.info["success"])
         lifts.see(state.info, done, np.ones_like(done))
         for world in np.flatnonzero(done)[: episodes - len(total)]:
@@ -87,16 +96,21 @@ def _drawn(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | 
             in_hand.append(bool(np.asarray(state.info.get("success_in_hand", won))[world]))
             lifted.append(bool(won[world] & lifts.by_all[world]))
         running[done] = 0.0
+        step = int(np.asarray(state.info["steps"]).max())
+        words = f"{len(total)} of {episodes} episodes, step {step} of at most {env.task.horizon}"
+        report(max(len(total) / episodes, min(steps / env.num_worlds / most, 1.0)), words)
     both = lifted if lifts.told else None
     return Played(success, in_hand, both, total, steps, pace.steps_per_second(), env.metrics(state), state)
 
 
-def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None, start: int = 0) -> Played:
+def _in_order(
+    env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None, start: int, report: Report
+) -> Played:
     size, worlds = env.core.starts.pool.size, env.num_worlds
-    tallies, pace, state, metrics = list[Tally](), Pace(), None, collections.Counter[str]()
+    tallies, pace, state, metrics = list[Tally](), Pace(watch), None, collections.Counter[str]()
     for first in range(0, episodes, worlds):
         state = env.start_from((start + first + np.arange(worlds)) % size, seed)
-        _look(watch, state)
+        pace.look(state)
         tally = Tally.begun(state)
         while tally.going.any():
             before = int(tally.steps)
@@ -104,9 +118,14 @@ def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch
                 state, tally = act.several(state, tally, STEPS if pace.begun else 1)
             else:
                 state = env.step(state, resting(act(state), tally.going))
-                _look(watch, state)
                 tally = tally.after(jax.device_get(ending(state)))
             pace.stepped(worlds * (int(tally.steps) - before))
+            pace.look(state)
+            over = min(first + worlds - int(np.asarray(tally.going).sum()), episodes)
+            step = int(tally.steps)
+            share = min((first + min(step / env.task.horizon, 1.0) * worlds) / episodes, 1.0)
+            words = f"{over} of {episodes} episodes, step {step} of at most {env.task.horizon}"
+            report(max(share, over / episodes), words)
         tallies.append(jax.device_get(tally))
         metrics.update(env.metrics(state))
 
@@ -123,10 +142,21 @@ def _in_order(env: Environment, act: Act, episodes: int, seed: int, watch: Watch
 
 
 class Pace:
-    """How fast agent steps are taken, without the first, which compiles for seconds."""
+    """How fast agent steps are taken, without the first, which compiles for seconds, and without what who watches does
+    (images take longer than steps)."""
 
-    def __init__(self) -> None:
-        self._steps, self._began = 0, math.nan
+    def __init__(self, watch: Watch | None = None) -> None:
+        self._steps, self._began, self._watch = 0, math.nan, watch
+        self._watched = 0.0
+
+    def look(self, state: EnvState) -> None:
+        """Shows a state to who watches; the time that takes does not count."""
+        if self._watch is None:
+            return
+        began = time.monotonic()
+        self._watch(state)
+        if self.begun:
+            self._watched += time.monotonic() - began
 
     @property
     def begun(self) -> bool:
@@ -142,7 +172,7 @@ class Pace:
 
     def steps_per_second(self) -> float:
         """0 where there was one step at most."""
-        return self._steps / (time.monotonic() - self._began) if self._steps else 0.0
+        return self._steps / (time.monotonic() - self._began - self._watched) if self._steps else 0.0
 
 
 class Lifts:
@@ -170,8 +200,3 @@ class Lifts:
         now = {name: np.array(info[name]) for name in ("off_floor", "held_by_all")}
         self.by_all = lifted_by_all(self.by_all, self._off, now, going)
         self._off = now["off_floor"] & ~done  # a new episode begins on the floor
-
-
-def _look(watch: Watch | None, state: EnvState) -> None:
-    if watch is not None:
-        watch(state)

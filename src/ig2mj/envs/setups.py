@@ -107,7 +107,12 @@ def setup_activity(
         ActivityObjective(task, robot, scene, rules.model),
         control.actions(
             controller,
-            lambda: hand_actions(controller.action_names, task.acts(robot).hands, closing=grasping != "mitten"),
+            lambda: hand_actions(
+                controller.action_names,
+                task.acts(robot).hands,
+                closing=grasping != "mitten",
+                period=control.period,
+            ),
         ),
         task.objects_of_interest[:1],
     )

@@ -18,3 +18,7 @@
 | `policies`, `shipped`, `evaluate` | policy files, those that ship with the project, and how good they are |
 | `memory` | how many worlds fit into a device |
 """
+
+from ig2mj.process.public_names import offer_modules
+
+offer_modules(__name__)

@@ -29,6 +29,7 @@ from ig2mj.learn.log import Log
 from ig2mj.learn.moments import Moments
 from ig2mj.learn.perception import Perception, Seen
 from ig2mj.learn.train import Run
+from ig2mj.process import entry_point
 
 APART = 10
 """One in so many steps, in stretches of `STRETCH`, is kept apart."""
@@ -72,6 +73,7 @@ class BCLearner:
     updates: Int[Array, ""]
 
 
+@entry_point
 class BC:
     """See the module's text."""
 
@@ -119,6 +121,7 @@ class BC:
         return found["actor_loss"]
 
 
+@entry_point
 def clone(algorithm: BC, demos: Demos, run: Run, depends: Mapping[str, Any] | None = None) -> tuple[Any, dict]:
     """Trains on demonstrations until the configured number of updates, or the run's minutes, are over.
 
@@ -136,7 +139,10 @@ def _clone(algorithm: BC, demos: Demos, run: Run, depends: Mapping[str, Any]) ->
     depends = {**depends, "algorithm": "bc", "settings": dataclasses.asdict(algorithm.config)}
     key = jax.random.PRNGKey(run.seed)
     learner = algorithm.init(key, demos)
-    checkpoints, log = (Checkpoints(run.out) if run.out is not None else None), Log(run.out, quiet=run.quiet)
+    checkpoints, log = (
+        (Checkpoints(run.out) if run.out is not None else None),
+        Log(run.out, quiet=run.quiet, minutes=run.minutes),
+    )
     if run.resume and checkpoints is not None:
         found = checkpoints.newest({"learner": learner}, depends)
         learner = found[0]["learner"] if found is not None else learner
@@ -159,7 +165,7 @@ def _clone(algorithm: BC, demos: Demos, run: Run, depends: Mapping[str, Any]) ->
             kept_apart = float(algorithm.judge(learner, demos, testing, now))
             seconds = clock - began
             row = {"seconds": seconds, "iteration": updates // CALL, "env_steps": updates, "success": None}
-            row |= {"steps_per_second": 0.0, "updates_per_second": updates / seconds, **losses}
+            row |= {"steps_per_second": None, "updates_per_second": updates / seconds, **losses}
             row["loss_apart"] = kept_apart
             log.row(row)
             logged = clock
@@ -172,6 +178,7 @@ def _clone(algorithm: BC, demos: Demos, run: Run, depends: Mapping[str, Any]) ->
             return learner, row
 
 
+@entry_point
 def begin_as_clone(algorithm: Any, demos: Demos, seed: int, steps: int = 2000) -> Any:
     """What another algorithm learns from, where its actor begins as a clone of demonstrations (SAC's `cloned`)."""
     c = algorithm.config

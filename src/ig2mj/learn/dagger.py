@@ -34,6 +34,7 @@ from ig2mj.learn.labels import Imitation, Labels
 from ig2mj.learn.moments import Moments, share_of
 from ig2mj.learn.perception import Perception, Seen
 from ig2mj.learn.recall import Recall
+from ig2mj.process import entry_point
 from ig2mj.tasks.experts.sight import Belief
 from ig2mj.tasks.task import HORIZON
 
@@ -125,6 +126,7 @@ class Turns:
     at_first: Float[Array, "W K"] | None = None
 
 
+@entry_point
 class Dagger:
     """See the module's text. All methods are pure."""
 

@@ -17,6 +17,7 @@ from ig2mj.envs.pieces import keep_pool
 from ig2mj.envs.registry import make
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.demos import DemoWriter, collect_demos
+from ig2mj.process.progress import progress
 
 PIECE = 32
 """Episodes of a piece."""
@@ -63,10 +64,9 @@ def collect_piece(
         raise WholeRunError(e) from e
     with tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:
         file = pathlib.Path(folder) / "demos.h5"
-        with DemoWriter(file, played) as writer:
-            found = collect_demos(
-                played, expert_of(played), writer, episodes, seed=seed, noise=noise, disturbed=disturbed
-            )
+        with DemoWriter(file, played) as writer, progress(f"the expert plays {env}") as report:
+            options: dict[str, Any] = {"seed": seed, "noise": noise, "disturbed": disturbed, "progress": report}
+            found = collect_demos(played, expert_of(played), writer, episodes, **options)
             writer.note(FAILED, found[FAILED])
         return file.read_bytes()
 

@@ -34,6 +34,8 @@ from ig2mj.learn.checkpoints import refuse_difference
 from ig2mj.learn.collect import FINAL, TrainingEnv
 from ig2mj.learn.perception import Perception, Seen, blank
 from ig2mj.learn.policies import world_of
+from ig2mj.process import entry_point
+from ig2mj.process.progress import Report
 
 FORMAT, FORMAT_VERSION = "ig2mj demonstrations", 1
 
@@ -102,6 +104,7 @@ class DemoWriter:
         self._file.close()
 
 
+@entry_point
 def collect_demos(
     env: TrainingEnv,
     expert: Callable[[Any], Array],
@@ -111,13 +114,14 @@ def collect_demos(
     seed: int = 0,
     noise: float = 0.0,
     disturbed: float = 0.0,
-    progress: Callable[[int, int], None] = lambda kept, of: None,
+    progress: Report = lambda share, words: None,
 ) -> dict[str, int]:
     """Plays the expert until so many of its episodes have succeeded, and writes those.
 
     Args:
       noise: deviation of what is added to its actions. disturbed: share of the steps that begin a disturbance: five
-        steps of one random action, from which the expert finds its way back. progress: called after each success.
+        steps of one random action, from which the expert finds its way back.
+      progress: takes after every step the share that is done, and how far it is in words.
 
     Returns:
       Numbers of episodes: "kept", and "failed", which are left out.
@@ -146,12 +150,14 @@ def collect_demos(
             if success[w] and writer.runs < episodes:
                 last = {name: np.asarray(a)[w] for name, a in state.info[FINAL].items()}
                 writer.add(*run.closed(last), success=True)
-                progress(writer.runs, episodes)
             failed += not success[w]
             if failed >= HOPELESS and writer.runs * 10 < failed:
                 raise Ig2mjError(f"the expert failed in {failed} of {failed + writer.runs} episodes")
             open_runs[w] = _Run()
             left[w] = 0
+        step = max(len(run) for run in open_runs)
+        words = f"{writer.runs} of {episodes} successful episodes, {failed} failed, step {step} of the present ones"
+        progress(writer.runs / episodes, words)
     return {"kept": writer.runs, "failed": failed}
 
 
@@ -161,6 +167,9 @@ class _Run:
     def __init__(self) -> None:
         self._steps: list[dict[str, np.ndarray]] = []
         self._obs: list[dict[str, np.ndarray]] = []
+
+    def __len__(self) -> int:
+        return len(self._steps)
 
     def add(self, step: dict[str, np.ndarray], obs: dict[str, np.ndarray]) -> None:
         self._steps.append(step)
@@ -193,6 +202,7 @@ def _about(found: Hdf5File) -> tuple[dict[str, Any], dict[str, Space]]:
         raise found.broken(element, e) from e
 
 
+@entry_point
 def load_demos(file: str | os.PathLike, perception: Perception, world: Mapping[str, Any] | None = None) -> Demos:
     """All runs of a file as networks see them.
 

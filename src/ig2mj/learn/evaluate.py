@@ -24,6 +24,8 @@ from ig2mj.envs.registry import make
 from ig2mj.envs.rollout import play
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.policies import Policy, perception_of
+from ig2mj.process import entry_point
+from ig2mj.process.progress import progress
 
 
 def acting(policy: Policy, env: Environment, file: object, *, drawn: bool | None = None, seed: int = 0) -> Actor:
@@ -86,6 +88,7 @@ def evaluation_pieces(settings: Mapping[str, Any], episodes: int) -> list[Piece]
     ]
 
 
+@entry_point
 def evaluate_piece(
     file: str,
     task: str,
@@ -117,7 +120,8 @@ def evaluate_piece(
         env, actor = _player(shared["policy"], file, drawn, *made)
     except Ig2mjError as e:
         raise WholeRunError(e) from e
-    played = play(env, actor.seeded(first // worlds), episodes, in_order=True, first=first)
+    with progress(f"playing {task} from start state {first}") as report:
+        played = play(env, actor.seeded(first // worlds), episodes, in_order=True, first=first, report=report)
     found = {"success": played.success, "success_in_hand": played.success_in_hand, "total": played.total}
     if played.lifted_by_all is not None:
         found["lifted_by_all"] = played.lifted_by_all

@@ -9,18 +9,28 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
+LOSSES = 3
+"""So many losses stand in a line of the terminal, before an episode has ended."""
+
 
 class Log:
     """Writes rows of numbers to a run's folder."""
 
-    def __init__(self, run: str | os.PathLike | None, *, tensorboard: bool = True, quiet: bool = False):
+    def __init__(
+        self,
+        run: str | os.PathLike | None,
+        *,
+        tensorboard: bool = True,
+        quiet: bool = False,
+        minutes: float | None = None,
+    ):
         """
         Args:
           run: the folder; None: only the terminal. tensorboard: also for TensorBoard, where tensorboardX is installed.
-          quiet: nothing on the terminal.
+          quiet: nothing on the terminal. minutes: of the run, to be told with how long it has taken.
         """
         self._folder = None if run is None else pathlib.Path(run)
-        self._quiet, self._board = quiet, None
+        self._quiet, self._board, self._minutes = quiet, None, minutes
         if self._folder is not None:
             self._folder.mkdir(parents=True, exist_ok=True)
             if tensorboard:
@@ -51,7 +61,7 @@ class Log:
                 if value is not None and name != "env_steps":
                     self._board.add_scalar(name, value, int(values["env_steps"] or 0))
         if not self._quiet:
-            print(_line(values), file=sys.stderr, flush=True)
+            print(_line(values, self._minutes), file=sys.stderr, flush=True)
 
     def close(self) -> None:
         """Ends TensorBoard's file."""
@@ -81,13 +91,26 @@ def _number(value: float | int | None) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-def _line(v: Mapping[str, Any]) -> str:
+def _line(v: Mapping[str, Any], minutes: float | None = None) -> str:
+    """Before an episode has ended, losses stand in place of return and success."""
+
     def told(name: str, form: str) -> str:
         return "-" if v.get(name) is None else format(v[name], form)
 
-    return (
-        f"{v['seconds']:7.1f} s  {v['env_steps'] / 1e6:7.3f} M steps  return {told('return', '.3f')}  "
-        f"success {told('success', '.1%')}  {v['steps_per_second']:,.0f} steps/s  "
-        f"{v['updates_per_second']:,.0f} updates/s  learner {told('learner_share', '.0%')}  "
-        f"simulator {told('simulator_share', '.0%')}"
-    )
+    whole = "" if minutes is None else f" of {60 * minutes:.0f}"
+    parts = [f"{v['seconds']:7.1f}{whole} s"]
+    if v["steps_per_second"] is not None:
+        parts.append(f"{v['env_steps'] / 1e6:7.3f} M steps")
+    else:  # no environment is stepped
+        parts.append(f"{v['env_steps']:,} updates")
+    if v.get("success") is not None:
+        parts.append(f"return {told('return', '.3f')}  success {told('success', '.1%')}")
+    else:
+        losses = [name for name, value in v.items() if "loss" in name and value is not None][:LOSSES]
+        parts += [f"{name} {v[name]:.4g}" for name in losses] or ["no episode has ended yet"]
+    if v["steps_per_second"] is not None:
+        parts.append(f"{v['steps_per_second']:,.0f} steps/s")
+    parts.append(f"{v['updates_per_second']:,.0f} updates/s")
+    if v.get("learner_share") is not None:
+        parts.append(f"learner {told('learner_share', '.0%')}  simulator {told('simulator_share', '.0%')}")
+    return "  ".join(parts)

@@ -36,6 +36,7 @@ from ig2mj.learn.networks import Actor
 from ig2mj.learn.perception import SIZE, Perception
 from ig2mj.learn.policy_checks import check_arrays, check_card, check_play, check_scales
 from ig2mj.learn.recall import Recall, looked
+from ig2mj.process import entry_point
 
 FORMAT_VERSION = 1
 
@@ -88,6 +89,7 @@ def digest(depends: Mapping[str, Any]) -> str:
     return hashlib.blake2b(json.dumps(depends, sort_keys=True).encode(), digest_size=6).hexdigest()
 
 
+@entry_point
 @dataclasses.dataclass(frozen=True)
 class Policy:
     """A trained actor.

@@ -26,6 +26,7 @@ from ig2mj.learn.collect import Advice, Transition, if_ready
 from ig2mj.learn.moments import Moments, RewardScale, average
 from ig2mj.learn.networks import Actor, Value, shifted
 from ig2mj.learn.perception import Perception, Seen, blank
+from ig2mj.process import entry_point
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,6 +87,7 @@ class Minibatch:
     wanted: Float[Array, "*b"]
 
 
+@entry_point
 class PPO:
     """See the module's text. All methods are pure."""
 

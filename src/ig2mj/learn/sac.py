@@ -8,10 +8,8 @@ deviation of 0.15, exploration noise that is held for a random number of steps.
 
 With an expert episodes begin under it, and its labels draw the actor, ever less, until the policy is left alone
 (`ig2mj.learn.guidance`).
-
 With demonstrations the actor begins as their clone, the critics learn alone for a while, and up to half of a batch is
 of demonstrations: a share that falls to nothing along the run.
-
 An iteration is `length` steps of all worlds, then `updates` updates for each of them. Time limits do not end the value:
 where an episode was cut off, what was seen last is evaluated; where it succeeded, nothing comes after.
 
@@ -40,6 +38,7 @@ from ig2mj.learn.moments import Moments, RewardScale, share_of
 from ig2mj.learn.networks import SHAKEN, Actor, projected, shifted, twins
 from ig2mj.learn.perception import Perception, Seen, blank
 from ig2mj.learn.replay import Replay, Sample
+from ig2mj.process import entry_point
 
 
 @dataclasses.dataclass(frozen=True)
@@ -138,6 +137,7 @@ class Noise:
     helpless: Int[Array, "W"]
 
 
+@entry_point
 class SAC:
     """See the module's text. All methods are pure."""
 

@@ -29,6 +29,7 @@ from ig2mj.learn.collect import TrainingEnv
 from ig2mj.learn.iteration import Algorithm, ManyDevices, OneDevice
 from ig2mj.learn.log import Log
 from ig2mj.learn.progress import EPISODES, Window
+from ig2mj.process import entry_point
 
 
 @dataclasses.dataclass(frozen=True)
@@ -68,6 +69,7 @@ class Result:
     stopped: str
 
 
+@entry_point
 def train(
     env: TrainingEnv,
     algorithm: Algorithm,
@@ -122,7 +124,7 @@ class _Training:
         )
         self.memory = self.step.memory()
         self.checkpoints = Checkpoints(run.out) if run.out is not None else None
-        self.log = Log(run.out if team.first else None, quiet=run.quiet or not team.first)
+        self.log = Log(run.out if team.first else None, quiet=run.quiet or not team.first, minutes=run.minutes)
         self.clock, self.iteration, self.env_steps = 0.0, 0, 0
         resumed = self._resume() if run.resume else self._begin()
         self.waiting = 2 if resumed and run.save_buffer else algorithm.warm_up(resumed)

@@ -23,6 +23,7 @@ from ig2mj.predicates.logic import (
 )
 from ig2mj.predicates.parse import ExpressionError, parse
 from ig2mj.predicates.registry import PREDICATES, find
+from ig2mj.process.public_names import offer_modules
 
 __all__ = [
     "PREDICATES",
@@ -51,3 +52,5 @@ __all__ = [
     "parse",
     "resolve",
 ]
+
+offer_modules(__name__)

@@ -33,6 +33,7 @@ from ig2mj.predicates.literals import Literals
 from ig2mj.predicates.logic import Atom, Expression
 from ig2mj.predicates.parse import parse
 from ig2mj.predicates.questions import Questions
+from ig2mj.process import entry_point
 from ig2mj.process.collector import REST
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Query, RelationPlan, Relations
@@ -60,6 +61,7 @@ class GoalStatus:
         return cls(np.zeros(num_worlds, bool), np.zeros(num_worlds, np.float32), np.zeros((num_worlds, 0), bool))
 
 
+@entry_point
 @dataclasses.dataclass(frozen=True, eq=False)
 class CompiledExpression:
     """An expression of a scene; made by `compile_expression`.
@@ -143,6 +145,7 @@ def _kept(states: ExtendedStates) -> ExtendedStates:
     return states
 
 
+@entry_point
 def compile_expression(
     model: StateModel,
     expression: Expression | str,

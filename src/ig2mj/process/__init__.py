@@ -30,6 +30,9 @@ Where engines are imported and made, their kernels loaded, worlds started and pr
 graph:
   - Python's cyclic garbage collector is off, and on again afterwards if it was (`ig2mj.process.collector`).
 
+While an entry point of ig2mj runs (`ig2mj.process.entry`):
+  - JAX's option `jax_enable_x64` is off in this thread, and afterwards what it was.
+
 While MJX is imported by an engine (`ig2mj.process.imports`):
   - Something stands in for trimesh and SciPy's spatial algorithms, and Warp does not note what MJX's kernels depend on.
 
@@ -44,6 +47,7 @@ MUJOCO_GL (the backend tried first), and those named above. MuJoCo Warp's functi
 from __future__ import annotations
 
 from ig2mj.process.compilation import CACHE_VARIABLE, cache_folder
+from ig2mj.process.entry import entry_point
 from ig2mj.process.settings import (
     keep_scratch_in_place,
     prepare_jax,
@@ -59,6 +63,7 @@ from ig2mj.process.settings import (
 __all__ = [
     "CACHE_VARIABLE",
     "cache_folder",
+    "entry_point",
     "keep_scratch_in_place",
     "prepare_jax",
     "prepare_mujoco",

@@ -60,14 +60,34 @@ def report_xla_compilation() -> None:
 
 
 PROGRAMS = {
-    "whole": "the rules of states and goal",
-    "heat_step": "the rules of temperatures",
-    "rules": "the rules of states, goal and guards",
-    "step": "a step of all worlds",
-    "episode_0": "the start of all worlds",
-    "reset": "the reset of worlds",
+    "events_step": "the rules of states and events",
+    "facts_step": "the predicates of the goal",
+    "rest_step": "the rules of states where nothing moves",
+    "heat_steps": "the rules of temperatures",
+    "after_step": "rewards and observations",
+    "after_reset": "observations after a reset",
+    "run": "a predicate's question",
+    "status": "a goal",
+    "start_all": "the start of physics in all worlds",
+    "start_fn": "the start of all worlds",
+    "load_fn": "the start of all worlds from saved states",
+    "step_fn": "a step of all worlds",
+    "step_autoreset_fn": "a step of all worlds, with the next episodes",
+    "advance_fn": "a step of all worlds",
+    "reset_fn": "the reset of worlds",
+    "several_fn": "several steps of all worlds under a policy",
+    "scanned": "a rollout of all worlds",
+    "choose": "a policy",
+    "whole": "an iteration of training",
+    "collect": "a rollout of training",
+    "learn": "what an iteration of training learns",
+    "learn_fn": "what a step of training learns",
+    "looked": "the first training of an encoder",
+    "read_fn": "the sensors",
+    "look_fn": "the looks of states for cameras",
+    "one_round": "a measurement of buffers",
 }
-"""What our programs do, by the names of the functions that JAX compiles."""
+"""What our programs do, by the names of the functions that JAX compiles, without underscores before them."""
 
 
 def xla_text(program: str) -> str:

@@ -15,7 +15,9 @@ PATIENCE = 2.0
 """Seconds of silence before the first line."""
 
 EVERY = 5.0
-"""Seconds between two lines where there is no terminal."""
+"""Seconds between two lines where there is no terminal; more the longer it takes, `SELDOM` of what has passed."""
+
+SELDOM = 0.2
 
 REDRAW = 0.5
 """Seconds between two drawings of the line in a terminal."""
@@ -90,7 +92,7 @@ class Waiting:
                 in_terminal, now = sys.stderr.isatty(), time.monotonic()
                 rows = [[w for w in self._works if w.in_row is in_row] for in_row in (True, False)]
                 works = [row[-1] for row in rows if row]
-                due = max(min(w.began for w in works) + PATIENCE, self._told + (REDRAW if in_terminal else EVERY))
+                due = self._due(min(w.began for w in works), in_terminal)
                 if now < due:
                     self._changed.wait(due - now)
                     continue
@@ -98,6 +100,11 @@ class Waiting:
                 _write(f"\r{_cut(line)}\x1b[K" if in_terminal else f"{line}\n")
                 self._drawn, self._told = in_terminal, now
             self._thread = None
+
+    def _due(self, began: float, in_terminal: bool) -> float:
+        """When the next line is due, of work since `began`."""
+        pause = REDRAW if in_terminal else max(EVERY, SELDOM * (self._told - began))
+        return max(began + PATIENCE, self._told + pause)
 
 
 def _cut(line: str) -> str:

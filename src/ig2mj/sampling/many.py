@@ -22,6 +22,7 @@ from ig2mj.cluster.pieces import Report, Status, Where, run
 from ig2mj.cluster.work import Piece, WholeRunError, Work
 from ig2mj.errors import EngineError
 from ig2mj.predicates.logic import Expression
+from ig2mj.process import entry_point
 from ig2mj.sampling.conditions import Condition, bind, read_conditions
 from ig2mj.sampling.offered import check_of, lent, named, scene_named
 from ig2mj.sampling.placement import Budget, Rejections
@@ -69,6 +70,7 @@ class Sampled:
         return len(self.rows) == self.requested
 
 
+@entry_point
 def sample(
     scene: Scene,
     conditions: Sequence[str | Expression],
@@ -150,6 +152,7 @@ def row_work(
     )
 
 
+@entry_point
 def row_piece(
     scene: str, objects: Sequence[str], conditions: Sequence[Sequence], seed: int, seconds: float | None, number: int
 ) -> bytes:

@@ -19,6 +19,7 @@ from ig2mj.engine.base import Write
 from ig2mj.engine.native.engine import NativeEngine, NativePhysics
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView
+from ig2mj.process import entry_point
 from ig2mj.sampling.columns import ColumnMap, Level, Window
 from ig2mj.sampling.footprint import Footprint, footprint
 from ig2mj.sampling.overlap import Overlaps
@@ -29,6 +30,7 @@ SETTLE_SECONDS = 3.0
 """Simulated seconds within which what was placed must come to rest."""
 
 
+@entry_point
 class SceneQuery:
     """One world of a scene on the native engine, for samplers.
 

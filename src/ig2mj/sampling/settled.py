@@ -16,6 +16,7 @@ from jaxtyping import Float
 from ig2mj.engine.base import Write
 from ig2mj.engine.native.engine import NativeEngine, NativePhysics
 from ig2mj.errors import EngineError
+from ig2mj.process import entry_point
 from ig2mj.sampling.overlap import Overlaps
 from ig2mj.sampling.perturbation import loose_objects, perturb
 from ig2mj.sampling.query import settle_worlds
@@ -42,6 +43,7 @@ TAKEN_BACK = 3
 Progress = Callable[[int], None]
 
 
+@entry_point
 def make_pool(
     scene: Scene,
     model: StateModel,

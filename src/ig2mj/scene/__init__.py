@@ -1,5 +1,6 @@
 """One household: what stands on disk, compiled and as tables."""
 
+from ig2mj.process.public_names import offer_modules
 from ig2mj.scene.manifest import Manifest, ObjectEntry, load_manifest, save_manifest
 from ig2mj.scene.rooms import Rooms
 from ig2mj.scene.scene import Scene, load_scene
@@ -17,3 +18,5 @@ __all__ = [
     "load_scene",
     "save_manifest",
 ]
+
+offer_modules(__name__)

@@ -1,1 +1,5 @@
 """What agents perceive."""
+
+from ig2mj.process.public_names import offer_modules
+
+offer_modules(__name__)

@@ -22,6 +22,7 @@ from ig2mj.agents.base import Controller
 from ig2mj.engine.base import Engine, Physics
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
+from ig2mj.process import entry_point
 from ig2mj.scene.scene import Scene
 from ig2mj.sensors.base import Memory, Percept, SensorOptions, Setup, Space
 from ig2mj.sensors.images import Camera, Images, Pose
@@ -32,6 +33,7 @@ from ig2mj.states.world import ExtendedStates
 Readings = dict[str, Array]
 
 
+@entry_point
 class SensorSuite:
     """See the module's text.
 

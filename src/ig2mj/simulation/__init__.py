@@ -1,5 +1,8 @@
 """One world, for people: `Simulation`."""
 
+from ig2mj.process.public_names import offer_modules
 from ig2mj.simulation.simulation import Simulation
 
 __all__ = ["Simulation"]
+
+offer_modules(__name__)

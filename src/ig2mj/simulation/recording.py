@@ -25,6 +25,7 @@ from ig2mj.demos.writer import FLUSH, FORMAT_VERSION, RunWriter
 from ig2mj.engine.base import Physics
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import EngineError, InputError
+from ig2mj.process import entry_point
 from ig2mj.simulation.saving import SavedWorld, put_world
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ KIND = "simulation"
 BINDING = ("mujoco", "scene_hash", "model_hash", "engine", "substeps", "timestep", "grasping")
 
 
+@entry_point
 class Recorded:
     """What a `Simulation` does about recordings of itself."""
 

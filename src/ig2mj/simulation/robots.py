@@ -10,6 +10,7 @@ from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.engine.base import Physics, Write
 from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import ActionError, EngineError
+from ig2mj.process import entry_point
 from ig2mj.sampling.row import Row
 from ig2mj.worlds.hands import Held
 
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
     from ig2mj.simulation.simulation import Simulation
 
 
+@entry_point
 class RobotsOfWorld:
     """Robots of one world.
 

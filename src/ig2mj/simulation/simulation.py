@@ -21,7 +21,7 @@ import numpy as np
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import Grasping
 from ig2mj.engine.base import Engine, Write
-from ig2mj.engine.registry import make_engine
+from ig2mj.engine.registry import check_options, make_engine
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import AbilityError, EngineError, StateError
@@ -29,7 +29,7 @@ from ig2mj.predicates.compile import CompiledExpression
 from ig2mj.predicates.literals import object_index
 from ig2mj.predicates.logic import Atom, Expression
 from ig2mj.predicates.registry import find
-from ig2mj.process import run_programs_inline
+from ig2mj.process import entry_point, run_programs_inline
 from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.setters import lacks, set_by_name
@@ -50,6 +50,7 @@ from ig2mj.worlds.rules import Rules
 from ig2mj.worlds.worlds import controllers_of, grasping_of
 
 
+@entry_point
 class Simulation(OwnWorld, Recorded):
     """One world of a scene on any engine.
 
@@ -74,12 +75,12 @@ class Simulation(OwnWorld, Recorded):
         Args:
           scene: a loaded scene, or what `load_scene` takes.
           engine: an engine's name, or an engine made for this scene with one world.
-          states: how extended states behave; None: physics only.
-          seed: of what `set_state` draws at random.
+          states: how extended states behave; None: physics only. seed: of what `set_state` samples at random.
           grasping: how the robots' hands hold (see `ig2mj.Worlds`).
           options: go to the engine, where it is given by name, e.g. `boxes="igibson"`.
         """
         run_programs_inline()
+        check_options("Simulation", options, engine, Simulation)
         self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
         self.engine: Engine = make_engine(engine, self.scene, 1, **options) if isinstance(engine, str) else engine
         if self.engine.num_worlds != 1:

@@ -3,6 +3,7 @@
 A state is one file; `update.update` calls them in their one order; `world.ExtendedStates` holds what they keep.
 """
 
+from ig2mj.process.public_names import offer_modules
 from ig2mj.states.initial import initial_states, states_of_manifest
 from ig2mj.states.model import StateModel
 from ig2mj.states.options import StateOptions
@@ -24,3 +25,5 @@ __all__ = [
     "states_of_manifest",
     "update",
 ]
+
+offer_modules(__name__)

@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.process import entry_point
 from ig2mj.states.definitions import (
     dust,
     heat_source,
@@ -59,6 +60,7 @@ def queries(model: StateModel) -> list[Query]:
     return heat_source.queries(model)
 
 
+@entry_point
 def update(
     model: StateModel, states: ExtendedStates, view: PhysicsView, relations: Relations | None = None
 ) -> tuple[ExtendedStates, Swap]:
@@ -79,6 +81,7 @@ def update(
     return heat(model, states, acts, view.touching), swap
 
 
+@entry_point
 def events(
     model: StateModel, states: ExtendedStates, view: PhysicsView, relations: Relations
 ) -> tuple[ExtendedStates, Swap, Bool[Array, "W O S"]]:
@@ -96,6 +99,7 @@ def events(
     return step.states, step.swap, _as_wholes(model, step.cut_now, acts)
 
 
+@entry_point
 def heat(
     model: StateModel, states: ExtendedStates, acts: Bool[Array, "W O S"], touching: Bool[Array, "W O O"]
 ) -> ExtendedStates:

@@ -1,1 +1,5 @@
 """Tasks: what is to be done in a home, and whether it is."""
+
+from ig2mj.process.public_names import offer_modules
+
+offer_modules(__name__)

@@ -57,19 +57,21 @@ class ActionMap:
         return rest.at[:, self.places].set(jnp.clip(action, -1.0, 1.0) * self.scale)
 
 
-def hand_actions(names: Sequence[str], hands: tuple[int, ...], closing: bool) -> ActionMap:
+def hand_actions(
+    names: Sequence[str], hands: tuple[int, ...], closing: bool, period: float = ACTION_PERIOD
+) -> ActionMap:
     """The action that moves these hands of a robot.
 
     Args:
       names: of the robot's action (`Controller.action_names`). hands: numbers among the robot's hands.
-      closing: with a number for each hand that closes it.
+      closing: with a number for each hand that closes it. period: seconds of an action.
 
     Raises:
       EngineError: the robot has no such hands to move.
     """
     names = tuple(names)
     rest = np.zeros(len(names), np.float32)
-    step = SPEED * ACTION_PERIOD, TURN_SPEED * ACTION_PERIOD
+    step = SPEED * period, TURN_SPEED * period
     if "right_hand_x" in names:
         sides = [("left_hand", "right_hand")[h] for h in hands]
         wanted = [[f"{s}_{n}" for n in (*_POSE, *(["trigger"] if closing else []))] for s in sides]

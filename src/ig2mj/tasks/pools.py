@@ -22,7 +22,7 @@ from jaxtyping import Bool
 
 from ig2mj.engine.registry import make_engine
 from ig2mj.errors import EngineError, UnknownNameError
-from ig2mj.process import use_processor_only
+from ig2mj.process import entry_point, use_processor_only
 from ig2mj.sampling.many import sample
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.tasks.pool_files import StartStates
@@ -64,6 +64,7 @@ def bare_scene(task: Task) -> Scene:
         return load_scene(task.home, objects=task.objects)
 
 
+@entry_point
 def pool_of(
     task: Task,
     split: str = "train",
@@ -86,6 +87,34 @@ def pool_of(
     return _pool(start_states(task, split), task, split, count, jobs, progress, workers)
 
 
+def _hint(task: Task, split: str, count: int | None) -> str:
+    """The command that samples the same pool on all processors; '' where there is none, as of a task of the user's."""
+    from ig2mj.tasks.activities import ACTIVITIES
+    from ig2mj.tasks.variants import variant, variants
+
+    if task.name not in ACTIVITIES:
+        return ""
+    usual = ACTIVITIES[task.name]
+    for number in range(variants(usual)):
+        for mode in ("mitten", "physical"):
+            if _made_of(variant(usual, number, mode)) == _made_of(task):
+                options = [
+                    *(["--split", split] if split != "train" else []),
+                    *(["--count", str(count)] if count else []),
+                    *(["--variant", str(number)] if number else []),
+                    *(["--grasping", mode] if mode != "mitten" else []),
+                ]
+                return f" (on all processors: {' '.join(['ig2mj sample-task', task.name, *options])})"
+    return ""
+
+
+def _made_of(task: Task) -> list[object]:
+    """What of a task a pool depends on."""
+    near = [[n.object, *n.pos, n.least, n.most] for n in task.near]
+    upright = [task.upright] if task.upright else []
+    return [task.home, task.objects, task.start, near, task.flat, *upright]
+
+
 def start_states(task: Task, split: str = "train", scene: Scene | None = None) -> StartStates:
     """Where the pool's rows are kept, and what they are made of. Raises UnknownNameError: no such split."""
     if split not in SEEDS:
@@ -100,6 +129,7 @@ def start_states(task: Task, split: str = "train", scene: Scene | None = None) -
     )
 
 
+@entry_point
 def make_pool(
     task: Task,
     split: str = "train",
@@ -127,18 +157,18 @@ def _pool(
     wanted, processes = count or COUNT[split], jobs or os.cpu_count() or 1
 
     def sample_rows(tried: int, rows: int) -> Iterator[tuple[int, Pool | None]]:
-        print(
-            f"sampling {rows} start states of {task.name}, once (on all processors: ig2mj sample-task {task.name})",
-            file=sys.stderr,
-        )
+        print(f"sampling {rows} start states of {task.name}, once{_hint(task, split, count)}", file=sys.stderr)
         made, first, limit = 0, tried, CHUNK * limit_of(wanted)
         with contextlib.ExitStack() as stack_of:
             shared = workers
             if shared is None and processes > 1:
                 shared = stack_of.enter_context(sampling_processes(processes))
             batches = _batches(task, split, states.scene, shared, tried, limit, lambda: rows - made)
+            report = stack_of.enter_context(shown(f"sampling start states of {task.name}"))
+            report(0.0, f"0 of {rows}")
             for tried, drawn in stack_of.enter_context(contextlib.closing(batches)):
                 made += 0 if drawn is None else drawn.size
+                report(min(made, rows) / rows, f"{min(made, rows)} of {rows}")
                 progress(wanted - rows + min(made, rows), wanted)
                 yield tried, drawn
                 if made >= rows or (tried - first >= HOPELESS and not made):

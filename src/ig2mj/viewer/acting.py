@@ -9,16 +9,13 @@ from __future__ import annotations
 import mujoco
 import numpy as np
 
-from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.rollout import Act
 from ig2mj.errors import EngineError
+from ig2mj.process import entry_point
 
 BETWEEN = 3
 """Pictures of an agent step."""
-
-STEP_TIME = ACTION_PERIOD / BETWEEN
-"""s of one of the viewer's steps."""
 
 PAUSE = 10
 """The viewer's steps for which the end of an episode is shown."""
@@ -27,6 +24,7 @@ JUMP = 0.3
 """m or rad of an agent step beyond which nothing is interpolated: what slicing moves."""
 
 
+@entry_point
 class ActingWorld:
     """See the module's text.
 

@@ -25,6 +25,7 @@ from ig2mj.envs.registry import AnyTask, find_task, make
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.predicates import logic
 from ig2mj.predicates.logic import And, Atom, Exactly, Not, Or, Pairing
+from ig2mj.process import entry_point
 from ig2mj.vr.frames import to_arrays
 from ig2mj.vr.haptics import Touch
 from ig2mj.vr.looks import Looks, looks_of
@@ -69,6 +70,7 @@ def person_environment(task: str | AnyTask, grasping: str = "assisted", **option
     return env.with_horizon(HOURS * 3600 * 30)
 
 
+@entry_point
 class Session:
     """See the module's text.
 

@@ -145,7 +145,7 @@ class Acting:
         self.scene, self.env, self._act, self.model, self.goal = env.scene, env, act, rules.model, rules.goal
         self.num_worlds = env.num_worlds
         size = env.core.starts.pool.size
-        self.rows, self.period = size if size > 1 else 0, 0.1
+        self.rows, self.period = size if size > 1 else 0, env.period
         self._state = env.reset(seed)
         self._began = np.zeros(self.num_worlds, bool)
         self._rewards = np.zeros(self.num_worlds)

@@ -1,5 +1,6 @@
 """How worlds start, step and reset: one core, and its faces for batches, for debugging and for several devices."""
 
+from ig2mj.process.public_names import offer_modules
 from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.debug import DebugWorlds
@@ -24,3 +25,5 @@ __all__ = [
     "load_pool_scene",
     "save_pool",
 ]
+
+offer_modules(__name__)

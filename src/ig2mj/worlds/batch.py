@@ -24,7 +24,7 @@ class Batch:
       controllers: the state of each robot's controller; empty where there are none.
       grasps: what hands hold; None where hands hold by friction alone.
       number: global number of each world; with several devices a batch is a part of all worlds.
-      seed: of all random streams. episode: how often each world was reset.
+      seed: of all random streams, or [W], of those of each world. episode: how often each world was reset.
       flags: `guards.Flag` of each world since its reset. troubles: how often each world was flagged, per flag.
     """
 
@@ -32,7 +32,7 @@ class Batch:
     controllers: tuple[Any, ...]
     grasps: GraspState | None
     number: Int[Array, "W"]
-    seed: Int[Array, ""]
+    seed: Int[Array, "*seeds"]
     episode: Int[Array, "W"]
     flags: Int[Array, "W"]
     troubles: Int[Array, "W K"]

@@ -39,6 +39,7 @@ from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import LostWorldError
 from ig2mj.predicates.compile import GoalStatus
+from ig2mj.process import entry_point
 from ig2mj.process.collector import REST, Compiled, compile_together
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
 from ig2mj.worlds import guards
@@ -50,6 +51,7 @@ from ig2mj.worlds.hand_resets import HandResets
 from ig2mj.worlds.hands import Hands
 from ig2mj.worlds.lazy.stepper import StateStepper
 from ig2mj.worlds.pool import Pool
+from ig2mj.worlds.random_streams import Seeds
 from ig2mj.worlds.rules import Outcome, Rules, States
 from ig2mj.worlds.starts import Starts, chosen
 
@@ -57,6 +59,7 @@ Policy = Callable[[Batch, Any], tuple[Float[Array, "W n"] | None, Any]]
 """The next step's action (or controls) from the batch and a carry, and the new carry. Pure."""
 
 
+@entry_point
 class Core:
     """Start, step and reset of the worlds of one engine.
 
@@ -264,11 +267,12 @@ class Core:
     # Episodes.
 
     @REST
-    def start(self, seed: int | Int[Array, ""] = 0, first: int | Int[Array, ""] = 0) -> Batch:
+    def start(self, seed: Seeds = 0, first: int | Int[Array, ""] = 0) -> Batch:
         """All worlds at the start of their first episode.
 
         Args:
-          seed: of everything random. first: global number of the first world, where a batch is a part of all worlds.
+          seed: of everything random; [W]: each world starts as world 0 with its seed. first: global number of the first
+            world, where a batch is a part of all worlds.
 
         Raises:
           EngineError: kernels of the engine could not be compiled.
@@ -280,14 +284,13 @@ class Core:
             compile_together([self._step.traced(begin.returned, action), begin, reset])
         return self._begin(self.engine.reset(), seed, first)
 
-    def start_fn(self, physics: Physics, seed: int | Int[Array, ""] = 0, first: int | Int[Array, ""] = 0) -> Batch:
+    def start_fn(self, physics: Physics, seed: Seeds = 0, first: int | Int[Array, ""] = 0) -> Batch:
         """`start`, not compiled.
 
         Args:
-          physics: `engine.reset()`, handed in since it would be thousands of constants in a compiled program.
-          seed, first: as for `start`.
+          physics: `engine.reset()`; in a compiled program it would be thousands of constants. Others: of `start`.
         """
-        count = self.engine.num_worlds
+        count, seed = self.engine.num_worlds, jnp.asarray(seed, jnp.int32)
         nothing = jnp.zeros(count, jnp.int32)
         world = WorldState(
             physics=physics,
@@ -301,8 +304,8 @@ class Core:
             world=world,
             controllers=self.controls.first(),
             grasps=self.hands.read(physics),
-            number=first + jnp.arange(count, dtype=jnp.int32),
-            seed=jnp.asarray(seed, jnp.int32),
+            number=nothing if seed.ndim else first + jnp.arange(count, dtype=jnp.int32),
+            seed=seed,
             episode=nothing - 1,
             flags=nothing,
             troubles=jnp.zeros((count, len(guards.Flag)), jnp.int32),
@@ -353,8 +356,7 @@ class Core:
 
         Args:
           physics: of every world (`engine.snapshot`), or of one without the world axis.
-          states: of every world; None: they stay, too.
-          mask: the worlds to replace; None: all.
+          states: of every world; None: they stay, too. mask: the worlds to replace; None: all.
         """
         return self._load(batch, physics, states, mask)
 

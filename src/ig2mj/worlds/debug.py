@@ -18,6 +18,7 @@ from ig2mj.engine.view import Array
 from ig2mj.engine.warp.profile import EngineProfile
 from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import GoalStatus
+from ig2mj.process import entry_point
 from ig2mj.scene.scene import Scene
 from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Batch
@@ -25,6 +26,7 @@ from ig2mj.worlds.core import Core
 from ig2mj.worlds.recorder import LENGTH, Recording, frames_of, record, save_dump, start_recording
 
 
+@entry_point
 class DebugWorlds:
     """A core stepped under watch. Slower: it waits for the device in every step, and copies every world's state.
 

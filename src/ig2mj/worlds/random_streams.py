@@ -2,28 +2,57 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Int, UInt
 
 from ig2mj.engine.view import Array
+from ig2mj.errors import EngineError
+from ig2mj.process import entry_point
 
-Seed = int | np.integer | Array
-"""A whole number, or a key of JAX."""
+Seeds = int | Int[Array, "*seeds"]
+"""A seed of all worlds, or [W] of each."""
+
+LARGEST = 2**31
+"""Seeds are taken modulo this number."""
+
+Seed = int | np.integer | Array | Sequence[int]
+"""A whole number, a key of JAX, or a list (tuple, array of NumPy) of W numbers, one for each world."""
 
 
-def as_seed(seed: Seed) -> int | Int[Array, ""]:
-    """A seed of 31 bits from a number or a key of JAX."""
+@entry_point
+def as_seed(seed: Seed, num_worlds: int | None = None) -> int | Int[Array, ""] | Int[np.ndarray, "W"]:
+    """A seed of 31 bits, or one for each world, of which each then starts as world 0 of a batch with its seed does.
+
+    Args:
+      num_worlds: W; None: a list is refused.
+
+    Raises:
+      EngineError: not a whole number for each world.
+    """
     if isinstance(seed, jax.Array) and (jnp.issubdtype(seed.dtype, jax.dtypes.prng_key) or seed.ndim == 1):
         return (jax.random.bits(seed, (), jnp.uint32) >> 1).astype(jnp.int32)
-    return int(seed) % 2**31 if isinstance(seed, int | np.integer) else jnp.asarray(seed, jnp.int32)
+    if isinstance(seed, int | np.integer):
+        return int(seed) % LARGEST
+    if isinstance(seed, Sequence | np.ndarray) and np.ndim(seed):  # pyright: ignore[reportArgumentType]
+        seeds = np.asarray(seed)
+        if num_worlds is None or seeds.shape != (num_worlds,) or not np.issubdtype(seeds.dtype, np.integer):
+            wanted = "one whole number" if num_worlds is None else f"{num_worlds} whole numbers, one for each world"
+            raise EngineError(f"seeds have shape {seeds.shape} and are of {seeds.dtype}: {wanted} or a single one")
+        return np.array([int(s) % LARGEST for s in seeds], np.int32)
+    return jnp.asarray(seed, jnp.int32)
 
 
-def episode_keys(seed: Int[Array, ""] | int, world: Int[Array, "W"], episode: Int[Array, "W"]) -> UInt[Array, "W 2"]:
+def episode_keys(seed: Seeds, world: Int[Array, "W"], episode: Int[Array, "W"]) -> UInt[Array, "W 2"]:
     """The key of each world's episode, as raw key data."""
-    root = jax.random.PRNGKey(seed)
-    return jax.vmap(lambda w, e: jax.random.fold_in(jax.random.fold_in(root, w), e))(world, episode)
+
+    def key(seed: Array | int, world: Array, episode: Array) -> Array:
+        return jax.random.fold_in(jax.random.fold_in(jax.random.PRNGKey(seed), world), episode)
+
+    return jax.vmap(key, (0 if np.ndim(seed) else None, 0, 0))(seed, world, episode)
 
 
 def step_keys(key: UInt[Array, "W 2"], step: Int[Array, "W"]) -> UInt[Array, "W 2"]:

@@ -22,6 +22,7 @@ from ig2mj.engine.base import Engine
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.errors import InputError
+from ig2mj.process import entry_point
 from ig2mj.states.world import ExtendedStates
 from ig2mj.worlds.archive import build, load_tree, read_arrays, read_header, save_tree
 from ig2mj.worlds.batch import Batch
@@ -57,12 +58,14 @@ class Recording:
         return self.rings[0].shape[0]
 
 
+@entry_point
 def start_recording(engine: Engine, batch: Batch, length: int = LENGTH) -> Recording:
     """A recording whose first step is the present state."""
     leaves, kind = jax.tree.flatten(_now(engine, batch))
     return record(engine, Recording(_empty(leaves, length), jnp.zeros((), jnp.int32), kind), batch)
 
 
+@entry_point
 def record(engine: Engine, recording: Recording, batch: Batch) -> Recording:
     """Adds the present state, over the oldest one when full. Pure, and uses up the recording it is given."""
     rings = _put(recording.rings, recording.written % recording.length, jax.tree.leaves(_now(engine, batch)))

@@ -25,6 +25,7 @@ from jaxtyping import Bool, Float
 from ig2mj.engine.view import Array
 from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import GoalStatus
+from ig2mj.process import entry_point
 from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.core import Core, Policy
 
@@ -41,6 +42,7 @@ class Shards:
         return f"Shards({', '.join(map(repr, self.parts))})"
 
 
+@entry_point
 class ShardedWorlds:
     """The functions of a core, over several devices. They use up the shards they are given."""
 

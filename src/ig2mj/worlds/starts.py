@@ -19,7 +19,7 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
 from ig2mj.worlds import guards
 from ig2mj.worlds.pool import Pool
-from ig2mj.worlds.random_streams import episode_keys, pick_rows
+from ig2mj.worlds.random_streams import Seeds, episode_keys, pick_rows
 
 
 class Starts:
@@ -60,7 +60,7 @@ class Starts:
         return self._engine.first_world()
 
     def draw(
-        self, seed: Int[Array, ""], number: Int[Array, "W"], episode: Int[Array, "W"], mask: Bool[Array, "W"]
+        self, seed: Seeds, number: Int[Array, "W"], episode: Int[Array, "W"], mask: Bool[Array, "W"]
     ) -> tuple[Int[Array, "W"], UInt[Array, "W 2"], Int[Array, "W"]]:
         """Episodes after a reset of the masked worlds, their keys, and the row of the pool that each begins with."""
         return self._draw(seed, number, episode, mask, self.pool.size)
@@ -76,7 +76,7 @@ def chosen(mask: Bool[Array, "W"], these: Any, others: Any) -> Any:
 
 
 def _draw(
-    seed: Int[Array, ""], number: Int[Array, "W"], episode: Int[Array, "W"], mask: Bool[Array, "W"], rows: int
+    seed: Seeds, number: Int[Array, "W"], episode: Int[Array, "W"], mask: Bool[Array, "W"], rows: int
 ) -> tuple[Int[Array, "W"], UInt[Array, "W 2"], Int[Array, "W"]]:
     episode = jnp.where(mask, episode + 1, episode)
     key = episode_keys(seed, number, episode)

@@ -14,16 +14,16 @@ import os
 from typing import Any
 
 import jax
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from ig2mj.agents.base import Controller, Robot
 from ig2mj.agents.grasping import Grasping
 from ig2mj.engine.base import Engine
-from ig2mj.engine.registry import make_engine
+from ig2mj.engine.registry import check_options, make_engine
 from ig2mj.engine.view import Array
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus
 from ig2mj.predicates.logic import Expression
-from ig2mj.process import run_programs_inline
+from ig2mj.process import entry_point, run_programs_inline
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.states.model import DEFAULTS
 from ig2mj.states.options import StateOptions
@@ -31,9 +31,11 @@ from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.hands import check_grasping
 from ig2mj.worlds.pool import Pool
+from ig2mj.worlds.random_streams import Seeds
 from ig2mj.worlds.rules import Rules
 
 
+@entry_point
 class Worlds:
     """Many worlds of a home; a core with a scene.
 
@@ -67,7 +69,8 @@ class Worlds:
           options: go to the engine, where it is given by name.
 
         Raises:
-          EngineError: the engine cannot run this scene. UnknownNameError: no such mode of grasping. Others: as
+          EngineError: the engine cannot run this scene. UnknownNameError: no such mode of grasping, or option.
+          Others: as
           `load_scene` and `compile_expression`.
         """
         if engine in (None, "native"):
@@ -75,6 +78,7 @@ class Worlds:
         self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
         if engine is None:
             engine = "warp" if jax.default_backend() == "gpu" else "native"
+        check_options("Worlds", options, engine, Worlds)
         if isinstance(engine, str):
             engine = make_engine(engine, self.scene, num_worlds, **options)
         rules = Rules.of_scene(self.scene, states).with_goal(goal)
@@ -86,8 +90,8 @@ class Worlds:
         """What steps physics."""
         return self.core.engine
 
-    def start(self, seed: int | Int[Array, ""] = 0) -> Batch:
-        """All worlds at the start of their first episode; `seed` of everything random."""
+    def start(self, seed: Seeds = 0) -> Batch:
+        """All worlds at the start of their first episode; `seed` of everything random, or [W] of each world."""
         return self.core.start(seed)
 
     def step(self, batch: Batch, action: Float[Array, "W n"] | None = None) -> tuple[Batch, GoalStatus]:

@@ -35,16 +35,16 @@ from ig2mj.engine.snapshot import Snapshot, fitted, make_snapshot
 from ig2mj.engine.speed_limits import SpeedLimits
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
-from ig2mj.process import prepare_jax
+from ig2mj.process import entry_point, prepare_jax
 from ig2mj.process.collector import Compiled, Traced
 from ig2mj.scene.scene import Scene
 
 
+@entry_point
 class MjxEngine(MjxCopies, abc.ABC):
     """The `Engine` protocol on MJX; subclasses choose the implementation. See `ig2mj.engine.base`.
 
-    Contacts of the view are those of the last physics step, that is of positions 1/120 s before the poses, as in
-    Bullet and iGibson.
+    Contacts of the view are those of the last physics step, of positions 1/120 s before the poses, as in iGibson.
     """
 
     name: str
@@ -392,8 +392,8 @@ class MjxEngine(MjxCopies, abc.ABC):
         return own
 
     def _host_data(self) -> mujoco.MjData:
-        data = mujoco.MjData(self.host_model)
-        if self.host_model.nkey:
-            mujoco.mj_resetDataKeyframe(self.host_model, data, 0)
-        mujoco.mj_forward(self.host_model, data)
+        model, data = self.host_model, mujoco.MjData(self.host_model)
+        if model.nkey:
+            mujoco.mj_resetDataKeyframe(model, data, 0)
+        mujoco.mj_forward(model, data)
         return data

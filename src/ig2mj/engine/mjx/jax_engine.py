@@ -24,11 +24,13 @@ from ig2mj.engine.mjx.physics import own_device
 from ig2mj.engine.native.sleep import FULLY_AWAKE
 from ig2mj.engine.view import Array
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
+from ig2mj.process import entry_point
 
 FAR = 1000.0
 """Metres: the distance written into a dropped contact, so that it gives neither force nor touch."""
 
 
+@entry_point
 class JaxEngine(MjxEngine):
     """MJX-JAX behind the `Engine` protocol. Sleep states of snapshots are ignored: everything is awake."""
 

@@ -7,6 +7,9 @@ has come to.
 
 from __future__ import annotations
 
+from ig2mj.process.public_names import offer_modules
 from ig2mj.tasks.experts.expert import Expert
 
 __all__ = ["Expert"]
+
+offer_modules(__name__)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Float
 
 from ig2mj.engine.view import Array
@@ -20,7 +21,7 @@ ON_IT, ABOVE = 0.06, 0.06
 SPEED = 0.03
 """m in an action."""
 
-FLAT = jnp.array([1.0, 1.0, 0.0])
+FLAT = np.array([1.0, 1.0, 0.0], np.float32)
 
 
 def draw(see: Sight, name: str, goal: Float[Array, "W 3"], behind: float = 0.0, hand: int = 0) -> Wish:
