@@ -73,8 +73,7 @@ class Simulation(OwnWorld, Recorded):
         """Starts at the scene's initial state.
 
         Args:
-          scene: a loaded scene, or what `load_scene` takes.
-          engine: an engine's name, or an engine made for this scene with one world.
+          scene: a loaded scene, or what `load_scene` takes. engine: a name, or one made for this scene with one world.
           states: how extended states behave; None: physics only. seed: of what `set_state` samples at random.
           grasping: how the robots' hands hold (see `ig2mj.Worlds`).
           options: go to the engine, where it is given by name, e.g. `boxes="igibson"`.

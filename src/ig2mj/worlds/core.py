@@ -271,8 +271,7 @@ class Core:
         """All worlds at the start of their first episode.
 
         Args:
-          seed: of everything random; [W]: each world starts as world 0 with its seed. first: global number of the first
-            world, where a batch is a part of all worlds.
+          seed: of everything random; [W]: each world starts as world 0 with its seed. first: number of the first world.
 
         Raises:
           EngineError: kernels of the engine could not be compiled.
@@ -355,8 +354,7 @@ class Core:
         """Replaces worlds by saved ones; clocks, keys and flags stay.
 
         Args:
-          physics: of every world (`engine.snapshot`), or of one without the world axis.
-          states: of every world; None: they stay, too. mask: the worlds to replace; None: all.
+          physics, states: of every world, physics also of one without the world axis; None: states stay. mask: all if None.
         """
         return self._load(batch, physics, states, mask)
 
