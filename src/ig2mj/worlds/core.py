@@ -354,7 +354,7 @@ class Core:
         """Replaces worlds by saved ones; clocks, keys and flags stay.
 
         Args:
-          physics, states: of every world, physics also of one without the world axis; None: states stay. mask: all if None.
+          physics, states: of every world, physics also of one without the world axis; None: they stay. mask: None: all.
         """
         return self._load(batch, physics, states, mask)
 
