@@ -23,6 +23,7 @@ from jaxtyping import Bool
 from ig2mj.engine.registry import make_engine
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process import entry_point, use_processor_only
+from ig2mj.process.progress import progress as shown
 from ig2mj.sampling.many import sample
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.tasks.pool_files import StartStates
