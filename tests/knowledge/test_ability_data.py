@@ -302,5 +302,5 @@ def test_a_broken_overrides_file_is_one_clear_line(tmp_path, content, says):
 
 
 def test_a_missing_overrides_file_is_an_input_error(tmp_path):
-    with pytest.raises(InputError, match="cannot be read"):
+    with pytest.raises(InputError, match="there is no such file"):
         knowledge.load_overrides(tmp_path / "none.json")
