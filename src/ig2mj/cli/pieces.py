@@ -56,7 +56,8 @@ def follow(title: str, where: Where) -> Iterator[Report]:
     from ig2mj.cli.printing import add_bar, progress_bar
     from ig2mj.process.progress import shown_by
 
-    last, told, words = [time.monotonic()], list[Status](), [""]
+    last, words = [time.monotonic()], [""]
+    told: list[Status] = []
     with progress_bar() as bar, contextlib.ExitStack() as stack:
         move = add_bar(bar, title)
 
