@@ -41,6 +41,8 @@ def run(
       record: HDF5 file to record all runs to, for `ig2mj demos replay`; it lacks what the mouse does to objects.
       keys: print the keys and exit.
     """
+    import numpy as np
+
     from ig2mj.viewer.play.keys import BINDINGS
 
     if keys:
@@ -74,6 +76,7 @@ def run(
         whole_actions=True,
         period=1 / STEPS_PER_SECOND,
     ).with_horizon(FOREVER)
+    made.step(made.reset(seed), np.zeros((1, *made.action_space.shape), np.float32))  # compiles before the window opens
     if record is not None:
         from ig2mj.demos import record as recorded
 

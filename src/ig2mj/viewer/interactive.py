@@ -19,7 +19,7 @@ import numpy as np
 
 from ig2mj.errors import EngineError, MissingDependencyError
 from ig2mj.scene.scene import Scene
-from ig2mj.viewer.label_space import Sight, uncovered
+from ig2mj.viewer.label_space import Sight, off_texts, uncovered
 from ig2mj.viewer.mouse import Mouse
 from ig2mj.viewer.offscreen import FreeView
 from ig2mj.viewer.overlays import Drawing, Label, Overlay, default_overlays
@@ -35,6 +35,13 @@ PREPARING = ("preparing", "states are compiled; once per machine and scene")
 """What the window says before the first step."""
 
 _NO_DISPLAY = "a window needs a display: set DISPLAY, or write a picture with `ig2mj view SCENE --picture out.png`"
+
+
+@runtime_checkable
+class Looking(Protocol):
+    """An overlay whose labels depend on what the camera sees; called before `labels`."""
+
+    def look(self, data: mujoco.MjData, sight: Sight) -> None: ...
 
 
 class ViewerState:
@@ -75,7 +82,7 @@ class ViewerState:
         return not self.paused
 
     def key_help(self) -> list[tuple[str, str]]:
-        """Key and what it does, for the window and for the shell."""
+        """The viewer's own keys and what they do."""
         rows = [
             ("Space", "pause, go on"),
             ("Right arrow", "one step, while paused"),
@@ -83,10 +90,10 @@ class ViewerState:
             ("Double-click", "pick an object"),
             ("Ctrl, right button", "drag what is picked"),
             ("P", "push what is picked"),
-            *self._more_keys,
         ]
         rows += [(k, f"{o.title} on, off") for k, o in zip(OVERLAY_KEYS, self.overlays, strict=False)]
-        return [*rows, ("Enter or ?", "this list"), ("F1", "MuJoCo's keys"), ("Esc", "free camera")]
+        rows += [("Enter or ?", "this list"), ("Tab", "MuJoCo's panel"), ("F1", "MuJoCo's keys")]
+        return [*rows, ("Esc", "free camera")]
 
     def texts(self, data: mujoco.MjData) -> list[Any]:
         """The corner texts as `Handle.set_texts` takes them."""
@@ -94,11 +101,13 @@ class ViewerState:
         if self.paused:
             rows.append(("paused", "Space goes on"))
         font, corner = mujoco.mjtFontScale.mjFONTSCALE_150, mujoco.mjtGridPos
-        help_rows = self.key_help() if self.help else [("Enter or ?", "keys")]
-        return [
-            (font, corner.mjGRID_TOPRIGHT, *_columns(rows)),
-            (font, corner.mjGRID_BOTTOMLEFT, *_columns(help_rows)),
-        ]
+        texts = [(font, corner.mjGRID_TOPRIGHT, *_columns(rows))]
+        if not self.help:
+            return [*texts, (font, corner.mjGRID_BOTTOMLEFT, *_columns([("Enter or ?", "keys")]))]
+        if not self._more_keys:
+            return [*texts, (font, corner.mjGRID_BOTTOMLEFT, *_columns(self.key_help()))]
+        texts.append((font, corner.mjGRID_BOTTOMLEFT, *_columns(self._more_keys)))  # two lists: one would be too high
+        return [*texts, (font, corner.mjGRID_BOTTOMRIGHT, *_columns(self.key_help()))]
 
     def draw_labels(self, data: mujoco.MjData, scene: mujoco.MjvScene, sight: Sight | None = None) -> None:
         """Replaces the user geoms of `scene` by the marks and labels of the overlays that are on.
@@ -111,8 +120,12 @@ class ViewerState:
         for overlay, on in zip(self.overlays, self.shown, strict=True):
             if isinstance(overlay, Drawing):
                 draw_marks(scene, overlay.marks(data)) if on else overlay.hide()
+            if on and sight is not None and isinstance(overlay, Looking):
+                overlay.look(data, sight)
             labels += overlay.labels(data) if on else ()
-        for label in labels if sight is None else uncovered(labels, sight):
+        if sight is not None:
+            labels = uncovered(off_texts(labels, sight, self.texts(data)), sight)
+        for label in labels:
             if scene.ngeom >= scene.maxgeom:
                 return
             geom = scene.geoms[scene.ngeom]
@@ -180,6 +193,7 @@ def open_viewer(
     more_keys: Sequence[tuple[str, str]] = (),
     camera: Callable[[], FreeView | None] | None = None,
     own_letters: bool = False,
+    panels: bool = True,
 ) -> None:
     """Opens the window and runs the simulation until it is closed.
 
@@ -193,7 +207,8 @@ def open_viewer(
       key_callback: called with every key (GLFW code) that is pressed, in this thread.
       prepare: does what takes long, such as compiling; must not change `data`, which is drawn meanwhile.
       more_keys: what `key_callback` does, key and text, for the list of keys.
-      camera: where each picture is taken from; None where it gives none: where the mouse has put the camera.
+      camera: where each image is taken from; None where it gives none: where the mouse has put the camera.
+      panels: MuJoCo's panel on the left is open at first; Tab opens and closes it.
       own_letters: letters are `key_callback`'s: the marks that MuJoCo's viewer shows for some of them stay off or on.
 
     Raises:
@@ -201,8 +216,9 @@ def open_viewer(
     """
     state, mouse = ViewerState(default_overlays(scene) if overlays is None else overlays, paused, more_keys), Mouse()
     keys: queue.SimpleQueue[int] = queue.SimpleQueue()
-    with _launch(scene.model, data, keys.put) as handle:
-        _look(handle.cam, home_overview(scene, data))
+    with _launch(scene.model, data, keys.put, panels) as handle:
+        first = camera() if camera is not None else None
+        _look(handle.cam, home_overview(scene, data) if first is None else first)
         handle.set_texts([(mujoco.mjtFontScale.mjFONTSCALE_150, mujoco.mjtGridPos.mjGRID_TOPLEFT, *PREPARING)])
         handle.sync()
         if prepare is not None:
@@ -242,7 +258,7 @@ def check_display() -> None:
         raise MissingDependencyError(_NO_DISPLAY)
 
 
-def _launch(model: mujoco.MjModel, data: mujoco.MjData, key_callback: Callable[[int], None]):
+def _launch(model: mujoco.MjModel, data: mujoco.MjData, key_callback: Callable[[int], None], panels: bool):
     """MuJoCo's passive viewer, with one-line errors where there can be no window."""
     check_display()
     with warnings.catch_warnings():
@@ -253,7 +269,9 @@ def _launch(model: mujoco.MjModel, data: mujoco.MjData, key_callback: Callable[[
         if not glfw.init():
             raise MissingDependencyError(_NO_DISPLAY)
     try:
-        return mujoco.viewer.launch_passive(model, data, key_callback=key_callback, show_right_ui=False)
+        return mujoco.viewer.launch_passive(
+            model, data, key_callback=key_callback, show_left_ui=panels, show_right_ui=False
+        )
     except RuntimeError as e:
         if "mjpython" in str(e):
             raise MissingDependencyError("on macOS the viewer runs under mjpython: mjpython -m ig2mj view ...") from e

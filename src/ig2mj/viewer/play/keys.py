@@ -10,6 +10,7 @@ those letters for marks of its own, which the session switches off again.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Collection
 
 HOLD = 0.25
 """Seconds."""
@@ -66,6 +67,55 @@ BINDINGS: tuple[Binding, ...] = (
 )
 
 BY_KEY: dict[int, Binding] = {key: binding for binding in BINDINGS for key in binding.keys}
+
+
+_NEEDS = {
+    "rise": "body_z",
+    "look up": ("eye_pitch", "head_tilt"),
+    "hand": ("eef_x", "right_hand_x"),
+    "close or open": ("gripper", "right_hand_trigger"),
+    "other hand": "left_hand_x",
+}
+"""Numbers of an action without which a key does nothing, by the beginning of its command."""
+
+
+def key_rows(names: Collection[str]) -> list[tuple[str, str]]:
+    """Keys and what they do for a robot, for the window: what moves one way and the other shares a row.
+
+    Args:
+      names: the controller's `action_names`.
+    """
+    rows: list[tuple[str, str]] = []
+    waiting: Binding | None = None
+    for binding in BINDINGS:
+        if not binding.moves:
+            if _usable(binding.command, names):
+                rows.append((binding.shown, binding.command))
+        elif waiting is None:
+            waiting = binding
+        else:
+            if _usable(waiting.command, names):
+                rows.append((_together(waiting.shown, binding.shown), _together(waiting.command, binding.command)))
+            waiting = None
+    return rows
+
+
+def _usable(command: str, names: Collection[str]) -> bool:
+    for start, needed in _NEEDS.items():
+        if command.startswith(start):
+            return any(name in names for name in ((needed,) if isinstance(needed, str) else needed))
+    return True
+
+
+def _together(first: str, second: str) -> str:
+    """Two texts in one; words that both begin with are written once."""
+    if ", " in first:  # keys of both sets
+        pairs = zip(first.split(", "), second.split(", "), strict=True)
+        return ", ".join(_together(one, other).replace(", ", " ") for one, other in pairs)
+    ours, theirs, same = first.split(), second.split(), 0
+    while same < min(len(ours), len(theirs)) - 1 and ours[same] == theirs[same]:
+        same += 1
+    return f"{first}, {' '.join(theirs[same:])}"
 
 
 class Held:

@@ -20,15 +20,17 @@ from ig2mj.envs.environment import Environment
 from ig2mj.scene.scene import Scene
 from ig2mj.viewer.interactive import open_viewer
 from ig2mj.viewer.offscreen import FreeView
-from ig2mj.viewer.overlays import Label, default_overlays
+from ig2mj.viewer.overlays import Clock, Label, Overlay
 from ig2mj.viewer.play.actions import Wish, action_of
-from ig2mj.viewer.play.keys import BINDINGS, Held
+from ig2mj.viewer.play.first_view import first_view
+from ig2mj.viewer.play.goal import Goal
+from ig2mj.viewer.play.keys import Held, key_rows
+from ig2mj.viewer.play.names import VisibleObjectNames, VisibleRoomNames
+from ig2mj.viewer.sight_lines import SightLines
+from ig2mj.viewer.state_marks import Mark
 
 NEAR = 0.05
 """m before the robot's eye at which the window's camera turns, where it looks with that eye."""
-
-BEHIND = (2.2, 25.0)
-"""m and degrees: where the window's camera begins, behind and above the robot."""
 
 
 class PlaySession:
@@ -37,6 +39,7 @@ class PlaySession:
     Attributes:
       env, state: the environment and where it is. closed, hand: of the robot's hands, and which one is moved.
       with_eye: the window looks with the robot's eye. successes: how often the goal was reached.
+      sight_lines, goal: what is seen of the scene, and what is shown of the goal.
     """
 
     def __init__(self, env: Environment, seed: int = 0, clock: Callable[[], float] = time.monotonic):
@@ -45,11 +48,14 @@ class PlaySession:
         self._controller = env.core.controllers[0]
         self._hands = int(np.sum(env.scene.tables.hand_agent == 0))
         self._keys, self.with_eye, self.successes = Held(), False, 0
+        self.sight_lines = SightLines(env.scene.model)
+        self.goal = Goal(env, self.sight_lines)
         self._begin()
 
     def _begin(self) -> None:
         self.hand = self._hands - 1 if self._hands else 0
         self.closed, self._resets, self._reached = [False] * max(self._hands, 1), set[int](), False
+        self._choose_view = True
 
     @property
     def scene(self) -> Scene:
@@ -72,6 +78,7 @@ class PlaySession:
             self._resets.add(self.hand)
         elif command == "see with the robot's eye":
             self.with_eye = not self.with_eye
+            self._choose_view = not self.with_eye
 
     def step(self) -> None:
         """One step of the environment with what the keys say now."""
@@ -96,9 +103,14 @@ class PlaySession:
         return [tables.object_names[int(np.argmax(row))] if row.any() else None for row in held]
 
     def view(self) -> FreeView | None:
-        """Where the window looks from; None: where the mouse has put its camera."""
+        """Where the window looks from; None: where the mouse has put its camera.
+
+        The view is chosen when an episode begins, and when the window no longer looks with the robot's eye.
+        """
         if not self.with_eye:
-            return None
+            chosen = self.first_view() if self._choose_view else None
+            self._choose_view = False
+            return chosen
         agent = self.state.batch.world.view.agent
         pos, turn = np.asarray(agent.eye_pos, float)[0, 0], np.zeros(9)
         mujoco.mju_quat2Mat(turn, np.asarray(agent.eye_quat, float)[0, 0])
@@ -111,25 +123,47 @@ class PlaySession:
             elevation=math.degrees(math.asin(np.clip(ahead[2], -1.0, 1.0))),
         )
 
-    def behind(self) -> FreeView:
-        """Behind and above the robot."""
-        agent = self.state.batch.world.view.agent
-        pos, (w, _, _, z) = np.asarray(agent.base_pos, float)[0, 0], np.asarray(agent.base_quat, float)[0, 0]
-        distance, above = BEHIND
-        return FreeView((pos[0], pos[1], max(pos[2], 0.6)), distance, math.degrees(2 * math.atan2(z, w)), -above)
+    def first_view(self) -> FreeView:
+        """The robot, its goal and the room, from behind the robot where that is possible."""
+        model, tables, data = self.scene.model, self.scene.tables, self.data
+        w, _, _, z = np.asarray(self.state.batch.world.view.agent.base_quat, float)[0, 0]
+        robot = np.flatnonzero(self.sight_lines.opaque & (tables.body_agent[model.geom_bodyid] == 0))
+        point = self.goal.point(self.state)
+        points = np.zeros((0, 3)) if point is None else point[None]
+        heading = math.degrees(2 * math.atan2(z, w))
+        return first_view(self.sight_lines, model, data, robot, heading, points, self.goal.geoms)
+
+    def overlays(self) -> list[Overlay]:
+        """Names of what is seen, the clock, and the session itself."""
+        names = VisibleObjectNames(self.scene, self.sight_lines, self.goal.objects)
+        return [names, VisibleRoomNames(self.scene, self.sight_lines), Clock(self.scene), self]
+
+    def key_rows(self) -> list[tuple[str, str]]:
+        """The robot's keys and what they do, in pairs."""
+        return key_rows(self._controller.action_names)
 
     # What the corner of the window says (an overlay of the viewer).
 
     title = "robot"
 
     def labels(self, data: mujoco.MjData) -> Sequence[Label]:
-        """None."""
-        return ()
+        """The way to the goal, where it is a point."""
+        return self.goal.labels(self.state)
+
+    def marks(self, data: mujoco.MjData) -> Sequence[Mark]:
+        """Where the goal is."""
+        return self.goal.marks(data, self.state)
+
+    def hide(self) -> None:
+        """Nothing is left to hide: marks are of one image."""
 
     def lines(self, data: mujoco.MjData) -> Sequence[tuple[str, str]]:
-        """The goal, and what hands do."""
+        """The task, how much of the goal is reached, and what hands do."""
         progress = float(np.asarray(self.state.info["goal_progress"])[0])
-        rows = [("goal", "reached" if self._reached else f"{progress:.0%}")]
+        rows = [("" if number else "task", line) for number, line in enumerate(self.goal.text)]
+        rows.append(("goal", "reached" if self._reached else f"{progress:.0%}"))
+        if (far := self.goal.distance(self.state)) is not None:
+            rows.append(("distance", f"{far:.1f} m"))
         names = ("left hand", "right hand") if self._hands == 2 else ("hand",)
         for number, (name, held) in enumerate(zip(names, self.holding, strict=False)):
             doing = held or ("closed" if self.closed[number] else "open")
@@ -139,20 +173,16 @@ class PlaySession:
 
 def launch(session: PlaySession) -> None:
     """Opens the window and plays until it is closed. Raises as `open_viewer`."""
-    first = [session.behind()]
-
-    def camera() -> FreeView | None:
-        return first.pop() if first else session.view()
-
     open_viewer(
         session.scene,
         session.data,
         session.step,
         reset=session.reset,
-        overlays=[*default_overlays(session.scene), session],
+        overlays=session.overlays(),
         step_time=session.env.period,
         key_callback=session.press,
-        more_keys=[(binding.shown, binding.command) for binding in BINDINGS],
-        camera=camera,
+        more_keys=session.key_rows(),
+        camera=session.view,
         own_letters=True,
+        panels=False,
     )

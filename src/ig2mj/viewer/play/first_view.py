@@ -1,0 +1,147 @@
+"""Where the window of `ig2mj play` looks from at the start: the robot, its goal and the room are in sight.
+
+Cameras around the robot are tried, the one behind it first. Each is judged by rays (`ig2mj.viewer.sight_lines`): how
+much of the robot and of the goal it sees within the frame, and how far it sees into the room.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import mujoco
+import numpy as np
+from jaxtyping import Float, Int
+
+from ig2mj.viewer.label_space import Sight
+from ig2mj.viewer.offscreen import FreeView
+from ig2mj.viewer.sight_lines import SightLines, surface_points
+
+ASPECT = (800, 600)
+"""The narrowest window, pixels, whose frame must hold the robot."""
+
+MARGIN = 0.06
+"""Share of the frame along each edge that does not count as in sight."""
+
+SIDES = (0.0, 25.0, -25.0, 50.0, -50.0, 80.0, -80.0, 110.0, -110.0, 145.0, -145.0, 180.0)
+"""Degrees from the robot's heading to the direction of view; 0: from behind."""
+
+ELEVATIONS = (-25.0, -15.0, -38.0, -55.0)
+"""Degrees."""
+
+DISTANCES = (2.2, 2.8, 1.7, 3.5, 1.3)
+"""m from the point that is looked at."""
+
+FORWARD = 0.6
+"""m towards the goal by which the camera looks past the robot, at most."""
+
+_ROOM = 2.5
+"""m to which a free ray counts."""
+
+_CLEAR = 0.25
+"""m before the camera within which nothing may be."""
+
+_WEIGHTS = {"robot": 6.0, "goal": 2.0, "room": 1.5, "turned": 0.8, "steep": 0.3, "off": 0.3}
+"""Of the shares of the robot, of the goal and of the room that are seen, and of what differs from the first camera:
+the side by half a turn, the elevation by a right angle, the distance by a metre."""
+
+_GRID = np.stack(np.meshgrid(np.linspace(-0.9, 0.9, 9), np.linspace(-0.9, 0.9, 7)), axis=-1).reshape(-1, 2)
+"""Where rays go through the frame, -1..1."""
+
+
+def first_view(
+    lines: SightLines,
+    model: mujoco.MjModel,
+    data: mujoco.MjData,
+    robot: Int[np.ndarray, "K"],
+    heading: float,
+    goal: Float[np.ndarray, "N 3"],
+    goal_geoms: Int[np.ndarray, "M"],
+) -> FreeView:
+    """The best view of a robot at the start.
+
+    Args:
+      lines: of the model. data: with up-to-date positions.
+      robot: visible geoms of the robot. heading: degrees about +z in which it looks.
+      goal: points in the air or on the floor that matter, world frame, m; may be empty.
+      goal_geoms: visible geoms of the objects that matter; may be empty.
+    """
+    body = surface_points(model, data, robot).reshape(-1, 3)
+    low, high = body.min(axis=0), body.max(axis=0)
+    middle = (low + high) / 2
+    objects = surface_points(model, data, goal_geoms)
+    matters = np.concatenate([np.asarray(goal, float).reshape(-1, 3), objects[:, 0]])
+    ahead = _ahead(middle, matters)
+    tall = float(np.linalg.norm(high - low))
+
+    def worth(view: FreeView, side: float) -> float:
+        sight = Sight.of_view(view, float(model.vis.global_.fovy), ASPECT)
+        room = _room(lines, data, sight)
+        if room is None:
+            return -np.inf
+        seen = {"robot": _share(lines, data, sight, body, robot), "room": room}
+        seen["goal"] = _goal_share(lines, data, sight, goal, objects, goal_geoms)
+        seen["turned"] = -abs(side) / 180
+        seen["steep"] = -abs(view.elevation - ELEVATIONS[0]) / 90
+        seen["off"] = -abs(view.distance - max(DISTANCES[0], tall))
+        return sum(_WEIGHTS[name] * value for name, value in seen.items())
+
+    best, found = -np.inf, FreeView(tuple(middle.tolist()), DISTANCES[-1], heading, -89.0)
+    for side, elevation, distance, past in itertools.product(SIDES, ELEVATIONS, DISTANCES, (1.0, 0.0)):
+        lookat = tuple((middle + past * ahead).tolist())
+        view = FreeView(lookat, distance, heading + side, elevation)
+        value = worth(view, side)
+        if value > best:
+            best, found = value, view
+    return found
+
+
+def _ahead(middle: Float[np.ndarray, "3"], matters: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "3"]:
+    """From the robot towards the nearest of what matters, at most `FORWARD`, along the floor."""
+    if not len(matters):
+        return np.zeros(3)
+    offsets = (matters - middle) * (1.0, 1.0, 0.0)
+    lengths = np.linalg.norm(offsets, axis=1)
+    nearest = int(np.argmin(lengths))
+    return offsets[nearest] * min(0.5, FORWARD / max(float(lengths[nearest]), 1e-6))
+
+
+def _share(
+    lines: SightLines,
+    data: mujoco.MjData,
+    sight: Sight,
+    points: Float[np.ndarray, "N 3"],
+    own: Int[np.ndarray, "K"],
+) -> float:
+    """Share of points that lie within the frame and whose rays meet one of their own geoms first."""
+    met, _ = lines.towards(data, sight.eye, points)
+    return float(np.mean(np.isin(met, own) & sight.frames(points, MARGIN)))
+
+
+def _goal_share(
+    lines: SightLines,
+    data: mujoco.MjData,
+    sight: Sight,
+    goal: Float[np.ndarray, "N 3"],
+    objects: Float[np.ndarray, "M 7 3"],
+    geoms: Int[np.ndarray, "M"],
+) -> float:
+    """Share of the goal's points and geoms of which something is seen."""
+    seen: list[bool] = []
+    if len(goal):
+        _, far = lines.towards(data, sight.eye, goal)
+        open_ = far > np.linalg.norm(goal - sight.eye, axis=1) - 0.1
+        seen += (open_ & sight.frames(goal, MARGIN)).tolist()
+    if len(geoms):
+        met, _ = lines.towards(data, sight.eye, objects.reshape(-1, 3))
+        own = met.reshape(len(geoms), -1) == geoms[:, None]
+        framed = sight.frames(objects.reshape(-1, 3), MARGIN).reshape(len(geoms), -1)
+        seen += (own & framed).any(axis=1).tolist()
+    return float(np.mean(seen)) if seen else 0.0
+
+
+def _room(lines: SightLines, data: mujoco.MjData, sight: Sight) -> float | None:
+    """How far rays through the frame go, 0..1; None where something is right before the camera."""
+    geoms, far = lines.cast(data, sight.eye, sight.directions(_GRID))
+    if far.min() < _CLEAR:
+        return None
+    return float(np.mean(np.where(geoms >= 0, np.minimum(far / _ROOM, 1.0), 0.5)))
