@@ -181,7 +181,8 @@ def test_the_window_shows_every_step_also_of_a_world_that_hands_out_copies(tiny_
     handle = FakeHandle(tiny_home.model, pictures=3)
     shown, pressed = [], []
 
-    def launch_window(model, data, key_callback):
+    def launch_window(model, data, key_callback, panels):
+        assert panels
         shown.append(data)
         key_callback(ord("6"))
         return handle

@@ -16,8 +16,8 @@ from ig2mj.viewer.overlays import Label
 CHARACTER = (9.0, 18.0)
 """Pixels. Width and height of a character of MuJoCo's labels, about; letters differ in width."""
 
-TEXT, TEXT_EDGE = (9.5, 23.0), 30.0
-"""Pixels. Width and height of a character of the texts in the window's corners, at most, and what lies around them."""
+TEXT, TEXT_EDGE = (7.2, 23.0), (20.0, 10.0)
+"""Pixels. Width and height of a character of the texts in the window's corners, about, and what lies around them."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -92,23 +92,32 @@ class Sight:
 
 
 def off_texts(labels: Sequence[Label], sight: Sight, texts: Sequence[Sequence[Any]]) -> list[Label]:
-    """The labels that do not lie under the window's texts.
+    """The labels that do not begin under the window's texts; those that would reach under one are shifted to its left.
 
     Args:
       texts: font, corner and both columns of each, as `Handle.set_texts` takes them.
     """
     if not labels:
         return []
-    low, _ = sight.pixels(np.array([label.pos for label in labels], float))
-    high = low + [(CHARACTER[0] * len(label.text), CHARACTER[1]) for label in labels]
-    free = np.ones(len(labels), bool)
+    low, depth = sight.pixels(np.array([label.pos for label in labels], float))
+    width = np.array([CHARACTER[0] * len(label.text) for label in labels])
+    free, shift = np.ones(len(labels), bool), np.zeros(len(labels))
     for _, corner, *columns in texts:
         size = np.array(text_size(*columns))
         right = corner in (mujoco.mjtGridPos.mjGRID_TOPRIGHT, mujoco.mjtGridPos.mjGRID_BOTTOMRIGHT)
         top = corner in (mujoco.mjtGridPos.mjGRID_TOPLEFT, mujoco.mjtGridPos.mjGRID_TOPRIGHT)
         start = np.where([right, top], np.array(sight.size) - size, 0.0)
-        free &= ((high <= start) | (low >= start + size)).any(axis=1)
-    return [label for label, good in zip(labels, free, strict=True) if good]
+        level = (low[:, 1] + CHARACTER[1] > start[1]) & (low[:, 1] < start[1] + size[1])
+        free &= ~(level & (low[:, 0] >= start[0]) & (low[:, 0] < start[0] + size[0]))
+        over = low[:, 0] + width - start[0]
+        shift = np.where(level & (low[:, 0] < start[0]), np.maximum(shift, over), shift)
+    metres = shift * depth * 2 * np.tan(sight.fovy / 2) / sight.size[1]
+    moved = [label.pos - step * sight.axes[0] for label, step in zip(labels, metres, strict=True)]
+    return [
+        dataclasses.replace(label, pos=(float(pos[0]), float(pos[1]), float(pos[2])))
+        for label, pos, good in zip(labels, moved, free, strict=True)
+        if good
+    ]
 
 
 def text_size(left: str, right: str) -> tuple[float, float]:
@@ -116,7 +125,7 @@ def text_size(left: str, right: str) -> tuple[float, float]:
     if not (left or right):
         return 0.0, 0.0
     widths = [max(map(len, column.split("\n"))) for column in (left, right)]
-    return TEXT[0] * sum(widths) + TEXT_EDGE, TEXT[1] * len(left.split("\n")) + TEXT_EDGE
+    return TEXT[0] * sum(widths) + TEXT_EDGE[0], TEXT[1] * len(left.split("\n")) + TEXT_EDGE[1]
 
 
 def uncovered(labels: Sequence[Label], sight: Sight) -> list[Label]:

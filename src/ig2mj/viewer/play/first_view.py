@@ -34,15 +34,21 @@ DISTANCES = (2.2, 2.8, 1.7, 3.5, 1.3)
 FORWARD = 0.6
 """m towards the goal by which the camera looks past the robot, at most."""
 
-_ROOM = 2.5
+_REACH = 2.5
 """m to which a free ray counts."""
+
+_SKY = 0.7
+"""What a ray counts that meets nothing."""
 
 _CLEAR = 0.25
 """m before the camera within which nothing may be."""
 
-_WEIGHTS = {"robot": 6.0, "goal": 2.0, "room": 1.5, "turned": 0.8, "steep": 0.3, "off": 0.3}
-"""Of the shares of the robot, of the goal and of the room that are seen, and of what differs from the first camera:
-the side by half a turn, the elevation by a right angle, the distance by a metre."""
+_ROBOT, _GOAL, _ROOM = 6.0, 2.0, 1.5
+"""Weights of the shares of the robot, of the goal and of the room that are seen."""
+
+_TURNED, _STEEP, _OFF = 3.0, 0.5, 0.3
+"""Weights of what differs from the first camera: the side by half a turn, the elevation by a right angle, and the
+distance by a metre. A robot that faces the camera is hard to drive, so that a goal does not outweigh it."""
 
 _GRID = np.stack(np.meshgrid(np.linspace(-0.9, 0.9, 9), np.linspace(-0.9, 0.9, 7)), axis=-1).reshape(-1, 2)
 """Where rays go through the frame, -1..1."""
@@ -73,24 +79,22 @@ def first_view(
     ahead = _ahead(middle, matters)
     tall = float(np.linalg.norm(high - low))
 
-    def worth(view: FreeView, side: float) -> float:
+    def worth(view: FreeView, side: float, least: float) -> float:
+        """How good a view is; no more than `least` where it is not better than that."""
+        turned, steep = -abs(side) / 180, -abs(view.elevation - ELEVATIONS[0]) / 90
+        value = _TURNED * turned + _STEEP * steep - _OFF * abs(view.distance - max(DISTANCES[0], tall))
+        if value + _ROBOT + _GOAL + _ROOM <= least:
+            return least
         sight = Sight.of_view(view, float(model.vis.global_.fovy), ASPECT)
-        room = _room(lines, data, sight)
-        if room is None:
-            return -np.inf
-        seen = {"robot": _share(lines, data, sight, body, robot), "room": room}
-        seen["goal"] = _goal_share(lines, data, sight, goal, objects, goal_geoms)
-        seen["turned"] = -abs(side) / 180
-        seen["steep"] = -abs(view.elevation - ELEVATIONS[0]) / 90
-        seen["off"] = -abs(view.distance - max(DISTANCES[0], tall))
-        return sum(_WEIGHTS[name] * value for name, value in seen.items())
+        value += _ROBOT * _share(lines, data, sight, body, robot)
+        if value + _GOAL + _ROOM <= least or (room := _room(lines, data, sight)) is None:
+            return least
+        return value + _ROOM * room + _GOAL * _goal_share(lines, data, sight, goal, objects, goal_geoms)
 
     best, found = -np.inf, FreeView(tuple(middle.tolist()), DISTANCES[-1], heading, -89.0)
     for side, elevation, distance, past in itertools.product(SIDES, ELEVATIONS, DISTANCES, (1.0, 0.0)):
-        lookat = tuple((middle + past * ahead).tolist())
-        view = FreeView(lookat, distance, heading + side, elevation)
-        value = worth(view, side)
-        if value > best:
+        view = FreeView(tuple((middle + past * ahead).tolist()), distance, heading + side, elevation)
+        if (value := worth(view, side, best)) > best:
             best, found = value, view
     return found
 
@@ -144,4 +148,4 @@ def _room(lines: SightLines, data: mujoco.MjData, sight: Sight) -> float | None:
     geoms, far = lines.cast(data, sight.eye, sight.directions(_GRID))
     if far.min() < _CLEAR:
         return None
-    return float(np.mean(np.where(geoms >= 0, np.minimum(far / _ROOM, 1.0), 0.5)))
+    return float(np.mean(np.where(geoms >= 0, np.minimum(far / _REACH, 1.0), _SKY)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Collection
 
 import mujoco
 import numpy as np
@@ -28,7 +29,7 @@ ARROW = (0.02, 0.2, 0.06)
 COLUMNS = 28
 """Characters of a line of the task's text."""
 
-LINES = 4
+LINES = 3
 """Lines of the task's text, at most."""
 
 _DOWN = np.diag([1.0, -1.0, -1.0])
@@ -75,6 +76,26 @@ class Goal:
             return float(np.linalg.norm(np.asarray(agent.hand_pos, float)[0, 0] - point))
         return float(np.linalg.norm((np.asarray(agent.base_pos, float)[0, 0] - point)[:2]))
 
+    def way(self, data: mujoco.MjData, state: EnvState, heading: float, held: Collection[str | None]) -> str | None:
+        """Where the goal's point or its nearest object is, such as "1.5 m left"; None where there is neither.
+
+        Args:
+          heading: degrees about +z in which the robot looks. held: objects in its hands, which are left out.
+        """
+        base = np.asarray(state.batch.world.view.agent.base_pos, float)[0, 0]
+        point, far = self.point(state), self.distance(state)
+        if point is not None and far is not None:
+            return f"{far:.1f} m {_direction(point - base, heading)}"
+        centres = [
+            (surface_points(self._model, data, geoms)[:, 0].mean(axis=0) - base, name)
+            for name, geoms in zip(self.objects, self._geoms, strict=True)
+            if len(geoms) and name not in held
+        ]
+        if not centres:
+            return None
+        offset, name = min(centres, key=lambda centre: float(np.linalg.norm(centre[0][:2])))
+        return f"{name}, {np.linalg.norm(offset[:2]):.1f} m {_direction(offset, heading)}"
+
     def marks(self, data: mujoco.MjData, state: EnvState) -> list[Mark]:
         """A disc on the floor or a ball in the air within which the goal is reached; an arrow above each object."""
         found: list[Mark] = []
@@ -102,3 +123,9 @@ class Goal:
     @property
     def _in_air(self) -> bool:
         return isinstance(self._task, NavigationTask) and self._task.goal == "reach"
+
+
+def _direction(offset: Float[np.ndarray, "3"], heading: float) -> str:
+    """Of the four sides of a robot that looks in a direction (degrees), the one on which an offset lies."""
+    angle = np.degrees(np.arctan2(offset[1], offset[0])) - heading
+    return ("ahead", "left", "behind", "right")[round(angle / 90) % 4]

@@ -96,6 +96,12 @@ class PlaySession:
         self._begin()
 
     @property
+    def heading(self) -> float:
+        """Degrees about +z in which the robot looks."""
+        w, _, _, z = np.asarray(self.state.batch.world.view.agent.base_quat, float)[0, 0]
+        return math.degrees(2 * math.atan2(z, w))
+
+    @property
     def holding(self) -> list[str | None]:
         """Object in each hand."""
         tables = self.scene.tables
@@ -126,12 +132,10 @@ class PlaySession:
     def first_view(self) -> FreeView:
         """The robot, its goal and the room, from behind the robot where that is possible."""
         model, tables, data = self.scene.model, self.scene.tables, self.data
-        w, _, _, z = np.asarray(self.state.batch.world.view.agent.base_quat, float)[0, 0]
         robot = np.flatnonzero(self.sight_lines.opaque & (tables.body_agent[model.geom_bodyid] == 0))
         point = self.goal.point(self.state)
         points = np.zeros((0, 3)) if point is None else point[None]
-        heading = math.degrees(2 * math.atan2(z, w))
-        return first_view(self.sight_lines, model, data, robot, heading, points, self.goal.geoms)
+        return first_view(self.sight_lines, model, data, robot, self.heading, points, self.goal.geoms)
 
     def overlays(self) -> list[Overlay]:
         """Names of what is seen, the clock, and the session itself."""
@@ -162,8 +166,9 @@ class PlaySession:
         progress = float(np.asarray(self.state.info["goal_progress"])[0])
         rows = [("" if number else "task", line) for number, line in enumerate(self.goal.text)]
         rows.append(("goal", "reached" if self._reached else f"{progress:.0%}"))
-        if (far := self.goal.distance(self.state)) is not None:
-            rows.append(("distance", f"{far:.1f} m"))
+        way = None if self._reached else self.goal.way(data, self.state, self.heading, self.holding)
+        if way is not None:
+            rows.append(("next", way))
         names = ("left hand", "right hand") if self._hands == 2 else ("hand",)
         for number, (name, held) in enumerate(zip(names, self.holding, strict=False)):
             doing = held or ("closed" if self.closed[number] else "open")
