@@ -7,6 +7,7 @@ much of the robot and of the goal it sees within the frame, and how far it sees 
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 
 import mujoco
 import numpy as np
@@ -43,12 +44,12 @@ _SKY = 0.7
 _CLEAR = 0.25
 """m before the camera within which nothing may be."""
 
-_ROBOT, _GOAL, _ROOM = 6.0, 2.0, 1.5
+_ROBOT, _GOAL, _ROOM = 6.0, 2.5, 1.5
 """Weights of the shares of the robot, of the goal and of the room that are seen."""
 
-_TURNED, _STEEP, _OFF = 3.0, 0.5, 0.3
-"""Weights of what differs from the first camera: the side by half a turn, the elevation by a right angle, and the
-distance by a metre. A robot that faces the camera is hard to drive, so that a goal does not outweigh it."""
+_TURNED, _STEEP, _OFF = 4.0, 0.5, 0.3
+"""Weights of what differs from the first camera: the square of the side in half turns, the elevation in right angles,
+and the distance in metres. A robot that faces the camera is hard to drive, so that a goal does not outweigh it."""
 
 _GRID = np.stack(np.meshgrid(np.linspace(-0.9, 0.9, 9), np.linspace(-0.9, 0.9, 7)), axis=-1).reshape(-1, 2)
 """Where rays go through the frame, -1..1."""
@@ -61,7 +62,7 @@ def first_view(
     robot: Int[np.ndarray, "K"],
     heading: float,
     goal: Float[np.ndarray, "N 3"],
-    goal_geoms: Int[np.ndarray, "M"],
+    goal_objects: Sequence[Int[np.ndarray, "_"]] = (),
 ) -> FreeView:
     """The best view of a robot at the start.
 
@@ -69,19 +70,19 @@ def first_view(
       lines: of the model. data: with up-to-date positions.
       robot: visible geoms of the robot. heading: degrees about +z in which it looks.
       goal: points in the air or on the floor that matter, world frame, m; may be empty.
-      goal_geoms: visible geoms of the objects that matter; may be empty.
+      goal_objects: visible geoms of each object that matters.
     """
     body = surface_points(model, data, robot).reshape(-1, 3)
     low, high = body.min(axis=0), body.max(axis=0)
     middle = (low + high) / 2
-    objects = surface_points(model, data, goal_geoms)
-    matters = np.concatenate([np.asarray(goal, float).reshape(-1, 3), objects[:, 0]])
+    objects = [(geoms, surface_points(model, data, geoms)) for geoms in goal_objects if len(geoms)]
+    matters = np.concatenate([np.asarray(goal, float).reshape(-1, 3), *(points[:, 0] for _, points in objects)])
     ahead = _ahead(middle, matters)
     tall = float(np.linalg.norm(high - low))
 
     def worth(view: FreeView, side: float, least: float) -> float:
         """How good a view is; no more than `least` where it is not better than that."""
-        turned, steep = -abs(side) / 180, -abs(view.elevation - ELEVATIONS[0]) / 90
+        turned, steep = -((side / 180) ** 2), -abs(view.elevation - ELEVATIONS[0]) / 90
         value = _TURNED * turned + _STEEP * steep - _OFF * abs(view.distance - max(DISTANCES[0], tall))
         if value + _ROBOT + _GOAL + _ROOM <= least:
             return least
@@ -89,7 +90,7 @@ def first_view(
         value += _ROBOT * _share(lines, data, sight, body, robot)
         if value + _GOAL + _ROOM <= least or (room := _room(lines, data, sight)) is None:
             return least
-        return value + _ROOM * room + _GOAL * _goal_share(lines, data, sight, goal, objects, goal_geoms)
+        return value + _ROOM * room + _GOAL * _goal_share(lines, data, sight, goal, objects)
 
     best, found = -np.inf, FreeView(tuple(middle.tolist()), DISTANCES[-1], heading, -89.0)
     for side, elevation, distance, past in itertools.product(SIDES, ELEVATIONS, DISTANCES, (1.0, 0.0)):
@@ -126,20 +127,20 @@ def _goal_share(
     data: mujoco.MjData,
     sight: Sight,
     goal: Float[np.ndarray, "N 3"],
-    objects: Float[np.ndarray, "M 7 3"],
-    geoms: Int[np.ndarray, "M"],
+    objects: Sequence[tuple[Int[np.ndarray, "_"], Float[np.ndarray, "_ 7 3"]]],
 ) -> float:
-    """Share of the goal's points and geoms of which something is seen."""
-    seen: list[bool] = []
+    """Mean over the goal's points and objects of whether a point is seen, or of the share of an object's geoms of which
+    something is seen."""
+    seen: list[float] = []
     if len(goal):
         _, far = lines.towards(data, sight.eye, goal)
         open_ = far > np.linalg.norm(goal - sight.eye, axis=1) - 0.1
         seen += (open_ & sight.frames(goal, MARGIN)).tolist()
-    if len(geoms):
-        met, _ = lines.towards(data, sight.eye, objects.reshape(-1, 3))
+    for geoms, points in objects:
+        met, _ = lines.towards(data, sight.eye, points.reshape(-1, 3))
         own = met.reshape(len(geoms), -1) == geoms[:, None]
-        framed = sight.frames(objects.reshape(-1, 3), MARGIN).reshape(len(geoms), -1)
-        seen += (own & framed).any(axis=1).tolist()
+        framed = sight.frames(points.reshape(-1, 3), MARGIN).reshape(len(geoms), -1)
+        seen.append(float(np.mean((own & framed).any(axis=1))))
     return float(np.mean(seen)) if seen else 0.0
 
 

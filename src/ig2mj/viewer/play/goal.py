@@ -40,6 +40,7 @@ class Goal:
 
     Attributes:
       objects: names of the objects that the task or its goal names, in that order, without parts of the building.
+      geoms: visible geoms of each of these objects.
       text: the task in a sentence, in lines that fit the corner of the window.
     """
 
@@ -55,9 +56,7 @@ class Goal:
         self.text = textwrap.wrap(env.task.summary, COLUMNS, max_lines=LINES, placeholder=" ...")
         owner = np.asarray(env.scene.tables.geom_object)
         indices = [env.scene.object_index(name) for name in self.objects]
-        self._geoms = [np.flatnonzero(lines.opaque & (owner == index)) for index in indices]
-        self.geoms = np.concatenate([np.zeros(0, int), *self._geoms])
-        """Visible geoms of the objects."""
+        self.geoms = [np.flatnonzero(lines.opaque & (owner == index)) for index in indices]
 
     def point(self, state: EnvState) -> Float[np.ndarray, "3"] | None:
         """Where the robot or its hand is to go, world frame, m; None where the goal is no point."""
@@ -88,7 +87,7 @@ class Goal:
             return f"{far:.1f} m {_direction(point - base, heading)}"
         centres = [
             (surface_points(self._model, data, geoms)[:, 0].mean(axis=0) - base, name)
-            for name, geoms in zip(self.objects, self._geoms, strict=True)
+            for name, geoms in zip(self.objects, self.geoms, strict=True)
             if len(geoms) and name not in held
         ]
         if not centres:
@@ -105,7 +104,7 @@ class Goal:
             size = (self._task.tolerance,) * 3 if self._in_air else (self._task.tolerance, THICK, 0.0)
             found.append(Mark(kind, size, point, np.eye(3), COLOUR))
         radius, length, gap = ARROW
-        for geoms in self._geoms:
+        for geoms in self.geoms:
             if len(geoms):
                 points = surface_points(self._model, data, geoms).reshape(-1, 3)
                 x, y = (points[:, :2].min(axis=0) + points[:, :2].max(axis=0)) / 2
