@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import textwrap
 
 import mujoco
@@ -12,6 +13,7 @@ import ig2mj
 from ig2mj.agents.fetch.controller import FetchController
 from ig2mj.agents.humanoid.controller import HumanoidController
 from ig2mj.envs.registry import find_task, list_envs
+from ig2mj.scene.rooms import Rooms
 from ig2mj.viewer.interactive import ViewerState
 from ig2mj.viewer.label_space import CHARACTER, Sight, off_texts, text_size
 from ig2mj.viewer.offscreen import FreeView
@@ -19,7 +21,7 @@ from ig2mj.viewer.overlays import Label
 from ig2mj.viewer.play.first_view import ASPECT, first_view
 from ig2mj.viewer.play.goal import COLUMNS, LINES
 from ig2mj.viewer.play.keys import BINDINGS, key_rows
-from ig2mj.viewer.play.names import VisibleObjectNames
+from ig2mj.viewer.play.names import VisibleObjectNames, VisibleRoomNames
 from ig2mj.viewer.play.session import PlaySession
 from ig2mj.viewer.sight_lines import SightLines, surface_points
 
@@ -85,6 +87,21 @@ def test_glass_hides_nothing():
     assert robot_in_sight(model, data, lines, view, robot) == 1.0
 
 
+def test_a_robot_of_glass_is_not_hidden_either():
+    text = ROOM.format(wall=WALL.format(rgba="1 1 1 1")).replace(
+        'name="robot" type', 'name="robot" rgba="1 1 1 0.4" type'
+    )
+    model = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    lines, robot = SightLines(model), np.array([model.geom("robot").id])
+    assert not lines.opaque[robot].any()
+    view = first_view(lines, model, data, robot, 0.0, NO_POINTS)
+    eye = Sight.of_view(view, FOVY, ASPECT).eye
+    _, far = lines.towards(data, eye, np.array([[0.0, 0.0, 0.5]]))
+    assert far[0] > np.linalg.norm(eye - (0.0, 0.0, 0.5))
+
+
 def test_the_camera_shows_the_goals_object_along_with_the_robot():
     model, data, lines = room('<geom name="shelf" type="box" size="0.05 0.5 0.35" pos="0.9 0 0.35"/>')
     robot, apple = np.array([model.geom("robot").id]), np.array([model.geom("apple").id])
@@ -129,6 +146,19 @@ def test_names_are_of_objects_in_sight_and_not_of_those_behind_others_or_outside
     assert "pan" in after and "box" not in after, "the box is behind the camera"
     put(tiny_home, data, "pan", (0.0, 0.5, -1.0))
     assert "pan" not in named(tiny_home, data, sight), "below the floor"
+
+
+def test_a_room_is_named_where_its_floor_is_seen_at_that_point(tiny_home, data):
+    room_map = np.zeros((40, 40), dtype=np.int16)
+    room_map[18:22, 18:22], room_map[0:5, 0:5] = 1, 2
+    rooms = Rooms(("under_the_table_0", "corner_0"), ("den", "corner"), room_map, 0.1)
+    home = dataclasses.replace(tiny_home, rooms=rooms)
+    names = VisibleRoomNames(home, SightLines(home.model))
+    assert names.labels(data) == [], "nothing is seen yet"
+    names.look(data, Sight.of_view(FreeView((0.0, 0.0, 0.0), 4.0, 90.0, -89.0), FOVY, (800, 800)))
+    assert [label.text for label in names.labels(data)] == [], "one is below the table, one outside the window"
+    names.look(data, Sight.of_view(FreeView((0.0, 0.0, 0.0), 8.0, 90.0, -89.0), FOVY, (800, 800)))
+    assert [label.text for label in names.labels(data)] == ["corner_0"]
 
 
 def test_every_name_stands_where_its_object_or_free_space_is_seen(tiny_home, data):

@@ -68,7 +68,7 @@ def first_view(
 
     Args:
       lines: of the model. data: with up-to-date positions.
-      robot: visible geoms of the robot. heading: degrees about +z in which it looks.
+      robot: geoms of the robot, those that are opaque where there are any. heading: degrees about +z in which it looks.
       goal: points in the air or on the floor that matter, world frame, m; may be empty.
       goal_objects: visible geoms of each object that matters.
     """
@@ -117,9 +117,10 @@ def _share(
     points: Float[np.ndarray, "N 3"],
     own: Int[np.ndarray, "K"],
 ) -> float:
-    """Share of points that lie within the frame and whose rays meet one of their own geoms first."""
-    met, _ = lines.towards(data, sight.eye, points)
-    return float(np.mean(np.isin(met, own) & sight.frames(points, MARGIN)))
+    """Share of points that lie within the frame and before which rays meet nothing but one of their own geoms."""
+    met, far = lines.towards(data, sight.eye, points)
+    free = np.isin(met, own) | (far >= np.linalg.norm(points - sight.eye, axis=1))
+    return float(np.mean(free & sight.frames(points, MARGIN)))
 
 
 def _goal_share(

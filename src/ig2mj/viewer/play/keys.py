@@ -70,11 +70,13 @@ BY_KEY: dict[int, Binding] = {key: binding for binding in BINDINGS for key in bi
 
 
 _NEEDS = {
-    "rise": "body_z",
+    "forward": ("body_x", "forward"),
+    "turn": ("body_yaw", "turn_left"),
+    "rise": ("body_z",),
     "look up": ("eye_pitch", "head_tilt"),
     "hand": ("eef_x", "right_hand_x"),
     "close or open": ("gripper", "right_hand_trigger"),
-    "other hand": "left_hand_x",
+    "other hand": ("left_hand_x",),
 }
 """Numbers of an action without which a key does nothing, by the beginning of its command."""
 
@@ -101,10 +103,9 @@ def key_rows(names: Collection[str]) -> list[tuple[str, str]]:
 
 
 def _usable(command: str, names: Collection[str]) -> bool:
-    for start, needed in _NEEDS.items():
-        if command.startswith(start):
-            return any(name in names for name in ((needed,) if isinstance(needed, str) else needed))
-    return True
+    return next(
+        (any(n in names for n in needed) for start, needed in _NEEDS.items() if command.startswith(start)), True
+    )
 
 
 def _together(first: str, second: str) -> str:

@@ -132,7 +132,9 @@ class PlaySession:
     def first_view(self) -> FreeView:
         """The robot, its goal and the room, from behind the robot where that is possible."""
         model, tables, data = self.scene.model, self.scene.tables, self.data
-        robot = np.flatnonzero(self.sight_lines.opaque & (tables.body_agent[model.geom_bodyid] == 0))
+        own = tables.body_agent[model.geom_bodyid] == 0
+        opaque = own & self.sight_lines.opaque
+        robot = np.flatnonzero(opaque if opaque.any() else own)
         point = self.goal.point(self.state)
         points = np.zeros((0, 3)) if point is None else point[None]
         return first_view(self.sight_lines, model, data, robot, self.heading, points, self.goal.geoms)
