@@ -59,7 +59,7 @@ def run(
     from ig2mj.cli.files import check_output
     from ig2mj.cluster.pieces import run
     from ig2mj.cluster.work import Work
-    from ig2mj.envs.pieces import shared_pool
+    from ig2mj.envs.pieces import shared_pool, shipped_states
     from ig2mj.errors import Ig2mjError
     from ig2mj.learn.evaluate import evaluation_pieces, summary
     from ig2mj.learn.policies import Policy
@@ -131,6 +131,7 @@ def run(
             "drawn": drawn,
             "engine": engine,
             "worlds": count,
+            "start_states": shipped_states(depends["task"], settings["grasping"], split),
             **found,
         }
         if out is not None:

@@ -8,6 +8,7 @@ from ig2mj.envs.registry import find_task
 from ig2mj.tasks import pools
 from ig2mj.tasks.pool_files import file_of_bytes
 from ig2mj.tasks.task import Task
+from ig2mj.tasks.variants import variant
 
 POOL = "pool"
 """Name of the start states among the bytes that pieces share."""
@@ -36,3 +37,12 @@ def start_states(task: str, split: str, count: int | None) -> str:
     """What start states another machine would take: the same text where its homes and objects are the same."""
     found = find_task(task)
     return f"{pools.start_states(found, split).cached.name} {count}" if isinstance(found, Task) else task
+
+
+def shipped_states(task: str, grasping: str, split: str) -> str | None:
+    """Name of the file of start states that ships with the package; None: they are made on each machine."""
+    found = find_task(task)
+    if not isinstance(found, Task):
+        return None
+    file = pools.start_states(variant(found, 0, grasping), split).shipped
+    return None if file is None else file.name

@@ -138,7 +138,7 @@ def _read_evaluation(file: pathlib.Path, policy: Policy) -> dict[str, Any]:
         raise InputError(file, "is the evaluation of another policy", element="weights", fix=fix)
     if found["split"] != "held_out":
         raise InputError(file, f"is of the split {found['split']}, not of held-out states", element="split", fix=fix)
-    return {name: found[name] for name in EVALUATED}
+    return {name: found[name] for name in (*EVALUATED, "start_states") if name in found}
 
 
 def _without_paths(command: str) -> str:
@@ -173,6 +173,7 @@ def model_card(name: str, policy: Policy) -> str:
         "acts by": ", ".join(depends["actions"]),
         "success": rate,
         "thresholds": thresholds,
+        "start states": found.get("start_states"),
         "mean return": f"{found['mean_return']:.3f}",
         "evaluated on": f"the {found['engine']} engine, {'drawn actions' if found['drawn'] else 'mean actions'}",
         "command": f"`{card.get('command', '')}`",
