@@ -53,7 +53,7 @@ def test_a_file_of_ones_own(tmp_path, capsys):
     [
         (["show", "cleaning_window"], "near matches: cleaning_windows"),
         (["show", "cleaning_windows", "--scene", "birhc"], "near matches: birch"),
-        (["show", "nowhere.bddl"], "nowhere.bddl: cannot be read"),
+        (["show", "nowhere.bddl"], "nowhere.bddl: there is no such file"),
         (["list", "--behavior1k"], "run `ig2mj activity fetch`"),
     ],
 )

@@ -68,6 +68,8 @@ def test_torch_gets_tensors_that_the_next_step_leaves_alone(short):
 class Counted(PointMass):
     """A pure environment that says how far its episodes are."""
 
+    period = 0.1
+
     def _start_fn(self, key):
         return self._told(super()._start_fn(key), jnp.zeros(self.num_worlds, jnp.int32))
 

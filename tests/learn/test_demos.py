@@ -94,7 +94,7 @@ def test_broken_and_foreign_files_are_refused_with_run_and_field(recorded, tmp_p
     with h5py.File(copy, "a") as opened:
         del opened["run_000000/action"]
         opened.create_dataset("run_000000/action", (10**9, 2), np.float32)  # claimed, and not there
-    with pytest.raises(InputError, match="run_000000/action: claims 1000000000 rows that are not there"):
+    with pytest.raises(InputError, match=r"cut.h5: has \d+ bytes and claims arrays of 8\d{9} bytes"):
         load_demos(copy, perception)
 
 

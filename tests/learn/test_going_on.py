@@ -13,7 +13,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 from small_envs import SeenPointMass
-from test_recall import made
+from test_recall import depends, made
 
 from ig2mj.errors import InputError
 from ig2mj.learn.going_on import further
@@ -30,7 +30,7 @@ def policy(tmp_path_factory):
     learner = jax.jit(algorithm.init)(jax.random.PRNGKey(7))
     learner = dataclasses.replace(learner, moments=Moments.initial(9).update(jnp.asarray(samples)))
     file = tmp_path_factory.mktemp("policy") / "policy.npz"
-    Policy.of(algorithm, learner, {"actions": ["x", "y"], "picture": [16, 16, 4]}, {}).save(file)
+    Policy.of(algorithm, learner, depends(algorithm), {}).save(file)
     return algorithm, learner, Policy.load(file)
 
 
@@ -68,7 +68,7 @@ def test_other_networks_and_files_without_scales_are_refused(policy):
 def test_who_guesses_nothing_needs_no_scales_of_what_is_hidden(tmp_path):
     algorithm = made(net="small", guess=0.0, recall=0)
     learner = jax.jit(algorithm.init)(jax.random.PRNGKey(7))
-    Policy.of(algorithm, learner, {"actions": ["x", "y"], "picture": [16, 16, 4]}, {}).save(tmp_path / "policy.npz")
+    Policy.of(algorithm, learner, depends(algorithm), {}).save(tmp_path / "policy.npz")
     loaded = Policy.load(tmp_path / "policy.npz")
     assert loaded.hidden is None
     begun = further(algorithm, loaded, 0)

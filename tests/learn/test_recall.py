@@ -20,13 +20,19 @@ from ig2mj.errors import Ig2mjError
 from ig2mj.learn.dagger import Dagger, DaggerConfig
 from ig2mj.learn.heads import likeliest
 from ig2mj.learn.perception import Perception, Seen
-from ig2mj.learn.policies import Policy
+from ig2mj.learn.policies import Policy, depends_of
 from ig2mj.learn.projection import Lens
 from ig2mj.learn.recall import Recall, grips_of, hands_of
 
 NAMES = [*(f"goal_pos_{c}" for c in "xyz"), *(f"goal_quat_{c}" for c in "wxyz")]
 
 FELT = ("left_hand_x", "left_hand_is_grasping")
+
+
+def depends(algorithm) -> dict:
+    """What a policy of `made` depends on."""
+    world = {"task": "PointMass", "robot": "point", "grasping": "physical", "actions": ["x", "y"], "privileged": []}
+    return depends_of(world, algorithm.perception)
 
 
 def made(**settings) -> Any:
@@ -159,7 +165,7 @@ def test_a_policy_file_remembers_as_what_was_trained(tmp_path):
     algorithm, env = made(), SeenPointMass(4)
     assert algorithm.recall is not None
     learner = jax.jit(algorithm.init)(jax.random.PRNGKey(0))
-    Policy.of(algorithm, learner, {"actions": ["x", "y"], "picture": [16, 16, 4]}, {}).save(tmp_path / "policy.npz")
+    Policy.of(algorithm, learner, depends(algorithm), {}).save(tmp_path / "policy.npz")
     policy = Policy.load(tmp_path / "policy.npz")
     assert policy.recall is not None and policy.recall.card() == algorithm.recall.card()
     play, choose = jax.jit(policy.player(algorithm.perception)), jax.jit(algorithm._imitation.choose)

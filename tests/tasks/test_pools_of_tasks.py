@@ -72,7 +72,7 @@ def test_the_steak_lies_flat_in_every_start_state():
 def test_a_pool_that_ships_is_neither_sampled_nor_copied(cache):
     assert pool_of(TASK).size == COUNT["train"] and pool_of(TASK, "held_out").size == COUNT["held_out"]
     assert equal(pool_of(TASK, count=3), pool_of(TASK).rows(np.arange(3)))
-    assert not list(cache.rglob("*.npz"))
+    assert not list((cache / "pools").rglob("*"))
 
 
 # Files, without a sampler.
