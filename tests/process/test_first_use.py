@@ -194,12 +194,10 @@ print(xla_text(max(took, key=lambda name: took[name])))
 
 @pytest.mark.slow
 def test_what_a_user_waits_for_is_named(tiny_home_folder, tmp_path):
-    """The program that takes longest to compile in a world's first steps, with nothing compiled, says what it is for."""
-    command = [sys.executable, "-c", FIRST_STEPS]
+    """With nothing compiled: the program that takes longest to compile in a world's first steps says what it is for."""
+    command = [sys.executable, "-c", FIRST_STEPS, str(tiny_home_folder)]
     environment = {**os.environ, "IG2MJ_CACHE_DIR": str(tmp_path), "JAX_PLATFORMS": "cpu"}
-    done = subprocess.run(
-        [*command, str(tiny_home_folder)], capture_output=True, text=True, env=environment, check=True
-    )
+    done = subprocess.run(command, capture_output=True, text=True, env=environment, check=True)
     said = done.stdout.strip().partition(",")[0].removeprefix("compiling ")
     assert said in PROGRAMS.values(), done.stdout + done.stderr
 
