@@ -98,7 +98,8 @@ def _hint(task: Task, split: str, count: int | None) -> str:
     usual = ACTIVITIES[task.name]
     for number in range(variants(usual)):
         for mode in ("mitten", "physical"):
-            if _made_of(variant(usual, number, mode)) == _made_of(task):
+            other = variant(usual, number, mode)
+            if other.home == task.home and _made_of(other) == _made_of(task):
                 options = [
                     *(["--split", split] if split != "train" else []),
                     *(["--count", str(count)] if count else []),
@@ -113,19 +114,17 @@ def _made_of(task: Task) -> list[object]:
     """What of a task a pool depends on."""
     near = [[n.object, *n.pos, n.least, n.most] for n in task.near]
     upright = [task.upright] if task.upright else []
-    return [task.home, task.objects, task.start, near, task.flat, *upright]
+    return [task.objects, task.start, near, task.flat, *upright]
 
 
 def start_states(task: Task, split: str = "train", scene: Scene | None = None) -> StartStates:
     """Where the pool's rows are kept, and what they are made of. Raises UnknownNameError: no such split."""
     if split not in SEEDS:
         raise UnknownNameError("split", split, SEEDS)
-    near = [[n.object, *n.pos, n.least, n.most] for n in task.near]
-    upright = [task.upright] if task.upright else []
     return StartStates(
         f"{task.name}-{split}",
         bare_scene(task) if scene is None else scene,
-        lambda digest: [VERSION, digest, task.objects, task.start, near, task.flat, *upright],
+        lambda digest: [VERSION, digest, *_made_of(task)],
         {"task": task.name, "split": split, "conditions": list(task.start)},
     )
 

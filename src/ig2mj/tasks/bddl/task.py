@@ -17,6 +17,7 @@ import numpy as np
 
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.process.progress import progress
 from ig2mj.scene.manifest import load_manifest
 from ig2mj.scene.paths import scene_folder, shipped_homes
 from ig2mj.scene.scene import Scene, load_scene
@@ -98,7 +99,15 @@ def activity_pool(task: BddlTask, split: str = "train", count: int | None = None
         made, last, reasons, reached = 0, tried + TRIES * wanted, collections.Counter[str](), False
         while made < rows and tried < last:
             count = min(rows - made, last - tried)
-            done = sample_start(task.binding, states.scene, count, SEEDS[split], first=tried)
+            with progress(f"sampling start states of {task.name}") as report:
+                done = sample_start(
+                    task.binding,
+                    states.scene,
+                    count,
+                    SEEDS[split],
+                    first=tried,
+                    progress=lambda done, failed, made=made: report((made + done) / rows, f"{made + done} of {rows}"),
+                )
             tried += count
             reasons += done.sampled.rejected
             reached |= bool(done.reached)
