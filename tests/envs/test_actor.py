@@ -10,6 +10,7 @@ from ig2mj.envs.actor import Actor
 from ig2mj.envs.rollout import play
 
 
+@pytest.mark.slow
 def test_what_is_remembered_ends_with_the_episode_also_where_the_next_begins_by_itself():
     """The number that is remembered counts steps; nobody acts, so that an episode lasts for all of its 200 steps."""
     env = ig2mj.make("GraspingBook", worlds=2, engine="native", pool_size=4)

@@ -38,6 +38,7 @@ def dagger(env: Any, **settings) -> Any:
     return Dagger(perception, 2, expert, config, starts=starts)
 
 
+@pytest.mark.slow
 def test_who_looks_at_start_states_knows_where_things_are_before_the_first_step():
     env: Any = SeenPointMass(16, pure=False)
     algorithm = dagger(env, starts=200, look=100)
@@ -86,6 +87,7 @@ def test_openings_without_start_states_and_start_states_on_several_devices_are_r
         Dagger(perception, 2, expert, DaggerConfig(starts=4), "devices", starts)
 
 
+@pytest.mark.slow
 def test_an_actor_that_is_told_what_is_hidden_learns_labels_without_pictures():
     spaces = {**SeenPointMass.observation_spaces, "privileged_state": Space((7,), np.float32, -np.inf, np.inf)}
     ahead = Lens((0.0, 0.0, 0.0), ((0.0, 0.0, -1.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), (1.0, 1.0), 16, (0, 16))

@@ -131,6 +131,7 @@ def test_how_a_thing_lies_by_now_is_reckoned_from_how_it_lay_and_where_the_hand_
         np.testing.assert_array_equal(np.delete(more, np.s_[18:50], axis=1), shown)
 
 
+@pytest.mark.slow
 def test_labels_that_only_the_first_picture_tells_are_learnt():
     """The label is what was guessed in the first step; the picture of every later step is blank."""
     algorithm = made(choices=0)

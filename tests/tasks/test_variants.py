@@ -73,6 +73,7 @@ def test_each_variant_has_its_own_pool():
     assert len(files) == 3
 
 
+@pytest.mark.slow
 def test_without_mittens_fetch_looks_at_the_towel_that_it_is_to_take():
     """The towel's middle is within the half of its picture, which spans 45 degrees to each side."""
     env = ig2mj.make("SoakingTowel", robot="fetch", grasping="physical", worlds=4, pool_size=4)
