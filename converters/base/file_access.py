@@ -19,6 +19,8 @@ from . import inputs
 
 PACKAGE_SEARCH_DEPTH = 8  # how many folders above an URDF are looked at for its ROS package
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+)://")
+_FIND = re.compile(r"(?:file://)?\$\(\s*find\s+([^()]+?)\s*\)/*")
+"""A package's folder as xacro and roslaunch write it."""
 
 
 class OutsideError(InputError):
@@ -70,7 +72,8 @@ class FileGuard:
     def resolve(self, filename: str, element: str, base: pathlib.Path | None = None) -> pathlib.Path:
         """Path of a file that is named in the URDF, or in a file in the folder `base`.
 
-        A name with percent signs that is no file is read as the percent-encoding of one, as URIs have it.
+        A name with percent signs that is no file is read as the percent-encoding of one, as URIs have it; so is the
+        name of a package. `$(find package)/`, which xacro leaves in a file that it has not expanded, is `package://`.
         The path need not exist. Raises OutsideError where it may not be read, InputError for names that are none.
         """
         path = self._resolve(filename, element, base)
@@ -81,7 +84,7 @@ class FileGuard:
         return path
 
     def _resolve(self, filename: str, element: str, base: pathlib.Path | None) -> pathlib.Path:
-        name = filename.strip().replace("\\", "/")
+        name = _FIND.sub(r"package://\1/", filename.strip().replace("\\", "/"), count=1)
         said = shortened(name)
         if not name or any(ord(c) < 32 for c in name):
             raise InputError(self.file, f"{shortened(filename)!r} is not a file name", element=element)
@@ -119,7 +122,9 @@ class FileGuard:
         if package in ("", ".", ".."):
             fix = "name the package's folder by --package-path" if not package else ""
             raise InputError(self.file, f"'package://{shortened(rest)}' names no package", element=element, fix=fix)
-        root = self._on_path(package) or find_package(self.file.parent, package)
+        names = dict.fromkeys((package, urllib.parse.unquote(package, errors="replace")))
+        names = [n for n in names if n not in ("", ".", "..") and "/" not in n and "\\" not in n and n.isprintable()]
+        root = next((r for n in names if (r := self._on_path(n) or find_package(self.file.parent, n))), None)
         if root is None:
             raise InputError(
                 self.file,
@@ -127,8 +132,8 @@ class FileGuard:
                 element=element,
                 fix="put the URDF into the package's folder, with a package.xml, or name it by --package-path",
             )
-        beside = self.file.parent.resolve() / package
-        if self.roots is not None and root not in self.roots and not (beside.is_symlink() or beside == root):
+        beside = [self.file.parent.resolve() / n for n in names]
+        if self.roots is not None and root not in self.roots and not any(b.is_symlink() or b == root for b in beside):
             self.roots.append(root)
         return root / inside
 

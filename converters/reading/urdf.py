@@ -16,6 +16,7 @@ from ..base.file_access import FileGuard
 from ..base.options import Progress, no_progress
 from ..base.transforms import read_origin
 from .urdf_geometry import GeometryReader
+from .urdf_leftovers import read_leftovers
 from .urdf_materials import UrdfMaterials
 from .urdf_tree import check_counts, check_name, find_tree
 from .xml_reader import Element, is_huge, number, numbers, read_xml, where
@@ -56,6 +57,7 @@ def read_urdf(
         path = simplified
     warnings: list[str] = []
     robot = read_xml(path, "robot", warnings)
+    read_leftovers(robot, warnings)
     guard = FileGuard(path, root, mesh_folder, allow_outside, mesh_root=mesh_root, package_path=package_path)
     reader = GeometryReader(guard, UrdfMaterials(robot, guard, warnings), warnings)
     check_counts(robot, path)

@@ -107,10 +107,11 @@ class GeometryReader:
         ]
 
     def _is_nothing(self, shape: Shape, mesh: Element | None, element: Element) -> bool:
-        """A primitive or a mesh scaled to size zero, with a warning."""
+        """A primitive or a mesh scaled to size zero, with a warning; a visual also where it is flat."""
         text = "" if mesh is None else (mesh.get("scale") or "")
         scale = () if mesh is None else numbers(mesh, "scale", len(text.split()) or 3, self.guard.file, (1.0,) * 3)
-        if all(shape.size) and (mesh is None or np.any(np.asarray(scale) != 0)):
+        enough = np.all if local_name(element) == "visual" else np.any
+        if all(shape.size) and (mesh is None or enough(np.asarray(scale) != 0)):
             return False
         kind = f"its {shape.kind} has" if mesh is None else f"scale='{shortened(text, 40)}' gives its mesh"
         self.warnings.append(f"{where(element)} is left out: {kind} no size")

@@ -245,17 +245,19 @@ def numbers(
             raise InputError(file, f"attribute '{attribute}' is missing", element=where(element))
         return np.array(default, dtype=float)
     words = [word.removesuffix(",") for word in text.split()]  # "0.1, 0, 0" is common, and harmless
+    fix = "expand the file with xacro" if "${" in text or "$(" in text else ""
     if len(words) != count:
         raise InputError(
             file,
             f"{attribute}='{shortened(text, 40)}' has {len(words)} numbers instead of {count}",
             element=where(element),
+            fix=fix,
         )
     values = [parse_number(w) for w in words]
     for word, value in zip(words, values, strict=True):
         if value is None:
             raise InputError(
-                file, f"{attribute}: '{shortened(word, 40)}' is not a finite number", element=where(element)
+                file, f"{attribute}: '{shortened(word, 40)}' is not a finite number", element=where(element), fix=fix
             )
     return np.array(values, dtype=float)
 

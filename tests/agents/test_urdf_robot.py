@@ -136,7 +136,11 @@ def test_a_fixed_base_stays(folder, home):
         ({"arm": ["sholder_pan"]}, UnknownNameError, "near matches: shoulder_pan"),
         ({"camera": "camra_link"}, UnknownNameError, "camera_link"),
         ({"whels": []}, UnknownNameError, "wheels"),
-        ({"wheels": ["left_wheel_joint"], "base": "differential"}, InputError, "a differential drive has two wheels, .* not 1"),
+        (
+            {"wheels": ["left_wheel_joint"], "base": "differential"},
+            InputError,
+            "drive has two wheels, .* not 1",
+        ),
         ({"base": "hovering"}, InputError, "use differential or fixed"),
         ({"arm": ["wrist", "left_finger_joint"]}, InputError, "of the arm and of the gripper"),
         ({"gripper": ["left_wheel_joint"], "base": "fixed", "arm": []}, InputError, "no two ends"),

@@ -314,3 +314,61 @@ def test_its_name_is_the_urdfs_and_its_colour_grey(tmp_path):
     model = mujoco.MjModel.from_xml_path(str(folder / "object.xml"))
     r, g, b, a = model.geom_rgba[model.geom("my_robot/visual_0").id]
     assert r == g == b and a == 1.0
+
+
+def two_fingers(left: str, right: str) -> list[str]:
+    """Two fingers that are not tied to each other, 6 cm on the left and on the right of a hand; as URDF of joints."""
+    return [
+        link("hand", "0.06 0.2 0.04"),
+        joint("lift", "prismatic", "base", "hand", "0 0 0.4", "0 0 1"),
+        *(link(f"{side}_finger", "0.02 0.01 0.06", 0.05) for side in ("left", "right")),
+        joint("left_finger_joint", "prismatic", "hand", "left_finger", "0 0.06 0.05", "0 1 0", left),
+        joint("right_finger_joint", "prismatic", "hand", "right_finger", "0 -0.06 0.05", "0 1 0", right),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "closed"),
+    [
+        ((0, 0.04), (-0.04, 0), (0, 0)),
+        ((-0.04, 0), (0, 0.04), (-0.04, 0.04)),
+        ((-0.05, -0.01), (0.01, 0.05), (-0.05, 0.05)),
+    ],
+)
+def test_each_finger_is_closed_at_the_limit_at_which_it_is_nearer_to_the_other(tmp_path, home, left, right, closed):
+    limits = [f'<limit lower="{low}" upper="{high}" effort="20" velocity="0.2"/>' for low, high in (left, right)]
+    robot = UrdfRobot.load(converted(tmp_path, *two_fingers(*limits)))
+    world = GraspingWorld(home, robot)
+    opened = [sum(pair) - end for pair, end in zip((left, right), closed, strict=True)]
+    np.testing.assert_allclose([robot.body.start_of(n, robot.layout) for n in robot.layout.gripper], opened)
+    names = [f"{robot.name}_{name}" for name in robot.layout.gripper]
+    world.act(times=10, gripper=-1.0)
+    np.testing.assert_allclose([world.simulation.joint(name) for name in names], closed, atol=2e-3)
+    world.act(times=10, gripper=1.0)
+    np.testing.assert_allclose([world.simulation.joint(name) for name in names], opened, atol=2e-3)
+
+
+def test_a_leader_is_closed_at_its_upper_limit_where_that_brings_its_follower_nearer(tmp_path):
+    leader = '<limit lower="-0.04" upper="0" effort="20" velocity="0.2"/>'
+    robot = UrdfRobot.load(converted(tmp_path, *two_fingers(leader, follows("left_finger_joint", -1.0))))
+    assert robot.layout.gripper == ("left_finger_joint",) and robot.layout.closed == "lower"
+    turned = '<limit lower="0" upper="0.04" effort="20" velocity="0.2"/>'
+    parts = "".join(two_fingers(turned, follows("left_finger_joint", -1.0)))
+    robot = UrdfRobot.load(converted(tmp_path, parts.replace('axis xyz="0 1 0"', 'axis xyz="0 -1 0"')))
+    assert robot.layout.closed == "upper"
+    assert UrdfRobot.load(tmp_path / "out", {"closed": "lower"}).layout.closed == "lower"
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("wheel_fl", "wheel_rl", "wheel_fr", "wheel_rr"),
+        ("leftFront_wheel", "left_rear_wheel", "r_front_wheel", "right_rear_wheel"),
+    ],
+)
+def test_wheels_named_by_their_corners_drive_as_two_sides(tmp_path, names):
+    parts = []
+    for name, xyz in zip(names, ("0.1 0.12", "-0.1 0.12", "0.1 -0.12", "-0.1 -0.12"), strict=True):
+        parts += wheel(name, f"{xyz} -0.06")
+    robot = UrdfRobot.load(converted(tmp_path, *parts))
+    assert robot.layout.wheels == tuple(f"{name}_joint" for name in names)

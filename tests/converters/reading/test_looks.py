@@ -8,6 +8,8 @@ from ig2mj_converters.reading.mesh_files import read_visual
 from ig2mj_converters.reading.urdf import read_urdf
 from PIL import Image
 
+from ig2mj.errors import InputError
+
 RED, BLUE = (1, 0, 0, 1), (0, 0, 1, 1)
 BOX = '<geometry><box size="1 1 1"/></geometry>'
 CUBE = [(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)]
@@ -149,7 +151,10 @@ def test_a_byte_order_mark_is_no_part_of_a_file(folder, make, encoding):
         assert (look(model), model.warnings) == ((RED, None), [])
 
 
-@pytest.mark.parametrize("name", ["my%20mesh.obj", "package://pack/my%20mesh.obj", "file://{root}/my%20mesh.obj"])
+@pytest.mark.parametrize("name", [
+    "my%20mesh.obj", "package://pack/my%20mesh.obj", "file://{root}/my%20mesh.obj", "package://p%61ck/my%20mesh.obj",
+    "$(find pack)/my mesh.obj", "file://$(find pack)/my%20mesh.obj",
+])  # fmt: skip
 def test_percent_encoded_names_are_decoded(folder, make, name):
     folder.write("pack/package.xml", "<package><name>pack</name></package>")
     folder.write("pack/my mesh.obj", make.box_obj())
@@ -167,6 +172,49 @@ def test_a_file_whose_name_holds_a_percent_sign_is_found_first(folder, make):
     guard = FileGuard(folder.root / "r.urdf")
     assert guard.resolve("a%20b.obj", "x").name == "a%20b.obj"
     assert guard.resolve("a%2520b.obj", "x").name == "a%20b.obj"
+
+
+@pytest.mark.parametrize("name", ["package://..%2F..%2Fetc/x.obj", "package://%2E%2E/x.obj", "$(find ..)/x.obj"])
+def test_an_encoded_package_name_leads_no_further_than_a_plain_one(folder, name):
+    with pytest.raises(InputError, match="package"):
+        FileGuard(folder.root / "r.urdf").resolve(name, "x")
+
+
+# ---- numbers that are too many, and what xacro leaves
+
+
+@pytest.mark.parametrize(
+    ("origin", "xyz", "warning"),
+    [
+        ('xyz="1 2 3 4"', (1, 2, 3), "xyz='1 2 3 4' has 4 numbers: the first 3 are read, as Bullet does"),
+        ('xyz="1 2 3" rpy="0 0 0 0"', (1, 2, 3), "rpy='0 0 0 0' has 4 numbers"),
+        ('xyz="$(optenv PLACE 1 2 3)"', (1, 2, 3), "$(optenv PLACE 1 2 3) is read as its default"),
+    ],
+)
+def test_numbers_that_are_too_many_and_defaults_of_xacro_are_read_with_a_warning(folder, origin, xyz, warning):
+    model = read(folder, f'<link name="a"><collision><origin {origin}/>{BOX}</collision></link>')
+    assert tuple(model.links["a"].collisions[0].pose[:3, 3]) == xyz
+    assert len(model.warnings) == 1 and warning in model.warnings[0]
+
+
+def test_a_visual_mesh_scaled_flat_costs_no_geometry(folder, make):
+    folder.write("c.obj", make.box_obj())
+    flat = '<visual><geometry><mesh filename="c.obj" scale="1 1 0"/></geometry></visual>'
+    model = read(folder, f'<link name="a">{flat}<collision>{BOX}</collision></link>')
+    assert (len(model.links["a"].visuals), len(model.links["a"].collisions)) == (0, 1)
+    assert len(model.warnings) == 1 and "gives its mesh no size" in model.warnings[0]
+
+
+def test_a_mesh_with_four_scales_has_the_first_three(folder, make):
+    folder.write("c.obj", make.box_obj())
+    model = read(folder, visual("", geometry='<geometry><mesh filename="c.obj" scale="1 2 3 4"/></geometry>'))
+    assert model.links["a"].visuals[0].scale == (1, 2, 3)
+
+
+@pytest.mark.parametrize("word", ["${width}", "$(arg width)"])
+def test_what_only_xacro_can_expand_is_refused_with_the_remedy(folder, word):
+    with pytest.raises(InputError, match="expand the file with xacro"):
+        read(folder, f'<link name="a"><collision><geometry><sphere radius="{word}"/></geometry></collision></link>')
 
 
 # ---- OBJ

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import pathlib
+from collections.abc import Mapping
 from typing import Any
 
 import mujoco
@@ -131,9 +132,16 @@ class RobotBody:
             return coupling.position(0.0 if coupling.leader is None else self.start_of(coupling.leader, layout))
         low, high = self.limits(joint)
         if joint in layout.gripper and joint not in layout.start:
-            closed = next((g.closed for g in layout.grippers if joint in g.joints), layout.closed)
-            return high if closed == "lower" else low
+            opens_high = next((g.closes_low(joint) for g in layout.grippers if joint in g.joints), True)
+            return high if opens_high else low
         return float(np.clip(layout.start.get(joint, 0.0), low, high))
+
+    def _position(self, joint: str, positions: Mapping[str, float]) -> float:
+        """Of a joint where those that lead are at these positions, others at 0."""
+        coupling = self.couplings.get(joint)
+        if coupling is None:
+            return positions.get(joint, 0.0)
+        return coupling.position(0.0 if coupling.leader is None else self._position(coupling.leader, positions))
 
     def start(self, layout: Layout) -> list[float]:
         """Positions of all hinges and slides at the start, in the model's order."""
@@ -198,6 +206,19 @@ class RobotBody:
         base, body = self._description.base, self._data.body(self._own(link))
         turn = self._data.body(self._own(base)).xmat.reshape(3, 3).T
         return turn @ (body.xpos - self._data.body(self._own(base)).xpos), turn @ body.xmat.reshape(3, 3)
+
+    def distance(self, one: str, other: str, positions: Mapping[str, float]) -> float:
+        """m between the centres of two links' collision geometry, joints at these positions, others at 0."""
+        data, prefix = mujoco.MjData(self._model), f"{self._description.name}_"
+        data.qpos[:] = self._model.qpos0
+        for name in (self._model.joint(j).name.removeprefix(prefix) for j in self._scalar):
+            data.qpos[self._model.joint(prefix + name).qposadr[0]] = self._position(name, positions)
+        mujoco.mj_kinematics(self._model, data)
+        centres = []
+        for link in (one, other):
+            body = data.body(self._own(link))
+            centres.append(body.xpos + body.xmat.reshape(3, 3) @ self.box(link)[0])
+        return float(np.linalg.norm(centres[0] - centres[1]))
 
     def chain(self, layout: Layout, hand: str) -> Chain | None:
         """The arm's joints from the base to a hand, frames parallel at joint positions 0; None where there are none."""

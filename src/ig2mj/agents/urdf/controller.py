@@ -83,7 +83,9 @@ class UrdfController:
         limits = np.array([body.limits(n) for n in layout.arm], np.float32).reshape(-1, 2)
         self._low, self._high = limits[:, 0], limits[:, 1]
         ends = np.array([body.limits(n) for n in layout.gripper], np.float32).reshape(-1, 2)
-        closes_low = np.array([grippers[g].closed == "lower" for g in self._gripper_of], bool)
+        closes_low = np.array(
+            [grippers[g].closes_low(n) for g, n in zip(self._gripper_of, layout.gripper, strict=True)], bool
+        )
         self._open = np.where(closes_low, ends[:, 1], ends[:, 0])
         self._closed = np.where(closes_low, ends[:, 0], ends[:, 1])
         self._start = np.array([body.start_of(n, layout) for n in (*layout.arm, *layout.gripper)], np.float32)

@@ -1,15 +1,53 @@
-"""Where a URDF robot's gripper looks for what is in it: rays between the inner faces of two fingers."""
+"""A URDF robot's grippers: rays between the inner faces of two fingers, and at which limits they are closed."""
 
 from __future__ import annotations
+
+import dataclasses
 
 import numpy as np
 
 from ig2mj.agents.hand_rays import HandRays
 from ig2mj.agents.urdf.body import RobotBody
-from ig2mj.agents.urdf.layout import Gripper
+from ig2mj.agents.urdf.layout import Gripper, Layout
 
 INSIDE = 0.8
 """Share of a finger's half size at which rays begin and end."""
+
+
+NEARER = 1e-3
+"""m by which two fingers are nearer to each other at one limit of a joint, so that it counts as the closed one."""
+
+
+def with_closed_limits(body: RobotBody, layout: Layout) -> Layout:
+    """The layout with the limit at which each gripper is closed, where it does not say so.
+
+    That of two fingers which are nearer to each other there; the lower one where there are no two, or where it makes no
+    difference.
+    """
+    if layout.several:
+        return dataclasses.replace(layout, several=tuple(_with_closed_limit(body, one) for one in layout.several))
+    found = [_with_closed_limit(body, one) for one in layout.grippers]
+    if not found:
+        return dataclasses.replace(layout, closed=layout.closed or "lower")
+    return dataclasses.replace(layout, closed=found[0].closed, reversed=found[0].reversed)
+
+
+def _with_closed_limit(body: RobotBody, gripper: Gripper) -> Gripper:
+    if gripper.closed:
+        return gripper
+    fingers = {body.branch(link, gripper) for link in body.fingers(gripper) if body.has_shape(link)}
+    pair = _facing(body, gripper) if len(fingers) == 2 else None
+    high = [] if pair is None else [name for name in gripper.joints if _closes_high(body, gripper, name, pair)]
+    if len(high) == len(gripper.joints):
+        return dataclasses.replace(gripper, closed="upper")
+    return dataclasses.replace(gripper, closed="lower", reversed=tuple(high))
+
+
+def _closes_high(body: RobotBody, gripper: Gripper, joint: str, pair: tuple[str, str]) -> bool:
+    """Two fingers are nearer to each other at a joint's upper limit, the other joints half way."""
+    half = {name: sum(body.limits(name)) / 2 for name in gripper.joints}
+    at_lower, at_upper = (body.distance(*pair, half | {joint: limit}) for limit in body.limits(joint))
+    return at_upper < at_lower - NEARER
 
 
 def gripper_rays(name: str, body: RobotBody, gripper: Gripper) -> HandRays | None:

@@ -6,7 +6,8 @@ Found from names and kinds of joints, and where that is not right, written in a 
     wheels = ["left_wheel_joint", "right_wheel_joint"]   # of more than two: all on the left, then all on the right
     arm = ["shoulder_pan", "shoulder_lift", "wrist"]
     gripper = ["left_finger_joint", "right_finger_joint"]
-    closed = "lower"                        # the limit of the gripper's joints at which it is closed, or "upper"
+    closed = "lower"                        # the limit of the gripper's joints at which it is closed, or "upper"; left
+                                            # out: of two fingers, the limit at which they are nearer to each other
     hand = "hand"                           # the link that holds; default: the one that the gripper's joints hang on
     camera = "camera_link"                  # x forward, z up
     laser = "laser_link"
@@ -31,6 +32,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import pathlib
+import re
 import tomllib
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
@@ -44,7 +46,9 @@ MAX_POSITION = 1e6
 
 BASES = ("differential", "fixed")
 CLOSED = ("lower", "upper")
-LEFT, RIGHT = ("left", "_l_", "l_wheel"), ("right", "_r_", "r_wheel")
+LEFT = frozenset(("left", "l", "fl", "rl", "bl", "ml", "lf", "lr", "lb", "lm"))
+RIGHT = frozenset(("right", "r", "fr", "rr", "br", "mr", "rf", "rb", "rm"))
+"""Words of a wheel's name that say on which side it is, as in `wheel_fl` and `rl_wheel_joint`."""
 GRIPS = ("finger", "gripper", "jaw", "thumb")
 PASSIVE = ("caster", "castor", "swivel")
 CAMERAS = ("camera", "eyes", "cam_", "head_tilt", "head")
@@ -53,11 +57,21 @@ LASERS = ("laser", "scan", "lidar")
 
 @dataclasses.dataclass(frozen=True)
 class Gripper:
-    """Joints that close together, the link that holds, and the limit at which they are closed, one of `CLOSED`."""
+    """Joints that close together, the link that holds, and the limit at which they are closed.
+
+    Attributes:
+      closed: one of `CLOSED`; "": not said (`grip.with_closed_limits` finds it).
+      reversed: joints that are closed at the other limit.
+    """
 
     joints: tuple[str, ...]
     hand: str
     closed: str = "lower"
+    reversed: tuple[str, ...] = ()
+
+    def closes_low(self, joint: str) -> bool:
+        """One of its joints is closed at its lower limit."""
+        return (self.closed != "upper") != (joint in self.reversed)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -66,8 +80,9 @@ class Layout:
 
     Attributes:
       base: one of `BASES`. wheels: joints on the left, then as many on the right; none where the base is fixed.
-      arm: joints in the order of the action. gripper: joints that close, of all grippers. closed: one of `CLOSED`.
-      hand, camera, laser: links; None: there is none. start: positions of joints, rad or m.
+      arm: joints in the order of the action. gripper: joints that close, of all grippers.
+      closed, reversed: see `Gripper`. hand, camera, laser: links; None: there is none.
+      start: positions of joints, rad or m.
       several: the grippers of a robot with more than one, whose first one's hand is `hand`; else empty.
     """
 
@@ -81,13 +96,14 @@ class Layout:
     laser: str | None = None
     start: Mapping[str, float] = dataclasses.field(default_factory=dict)
     several: tuple[Gripper, ...] = ()
+    reversed: tuple[str, ...] = ()
 
     @property
     def grippers(self) -> tuple[Gripper, ...]:
         """All grippers, in the order of the action. One without a hand to hang on is none."""
         if self.several or not self.gripper or self.hand is None:
             return self.several
-        return (Gripper(self.gripper, self.hand, self.closed),)
+        return (Gripper(self.gripper, self.hand, self.closed, self.reversed),)
 
     @property
     def hands(self) -> tuple[str, ...]:
@@ -134,7 +150,7 @@ class Layout:
             wheels=wheels,
             arm=tuple(arm),
             gripper=tuple(gripper),
-            closed=given.get("closed", "lower"),
+            closed=given.get("closed", "" if gripper and not several else "lower"),
             hand=several[0].hand if several else _link(given, "hand", _hand(robot, arm, gripper)),
             camera=_link(given, "camera", _first(robot, CAMERAS)),
             laser=_link(given, "laser", _first(robot, LASERS)),
@@ -159,7 +175,9 @@ class Layout:
 
 def _check(robot: Description, given: dict[str, Any], where: str) -> None:
     """Whether entries are known, of the right kind, and name what there is."""
-    known = [field.name for field in dataclasses.fields(Layout) if field.name != "several"] + ["grippers"]
+    known = [field.name for field in dataclasses.fields(Layout) if field.name not in ("several", "reversed")] + [
+        "grippers"
+    ]
     for name, value in given.items():
         if name not in known:
             raise UnknownNameError(f"entry of {where}", name, known)
@@ -214,6 +232,11 @@ def _named(name: str, parts: Sequence[str]) -> bool:
     return any(part in name.lower() for part in parts)
 
 
+def _words(name: str) -> set[str]:
+    """The words of a name: "wheelFL_joint" has wheel, fl and joint."""
+    return {word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)}
+
+
 def _grips(joint: JointEntry) -> bool:
     """It opens and closes a gripper, and does not turn without end."""
     return joint.type != "continuous" and (_named(joint.name, GRIPS) or _named(joint.child, GRIPS))
@@ -224,7 +247,7 @@ def _several(
 ) -> tuple[Gripper, ...]:
     """Grippers given as such, or found on different hands; none where there is just one, or joints are given."""
     if "grippers" in given:
-        made = tuple(Gripper(tuple(g["joints"]), g["hand"], g.get("closed", "lower")) for g in given["grippers"])
+        made = tuple(Gripper(tuple(g["joints"]), g["hand"], g.get("closed", "")) for g in given["grippers"])
         names = [name for one in made for name in one.joints]
         if twice := sorted({name for name in names if names.count(name) > 1}):
             raise InputError(where, f"joint '{twice[0]}' is of two grippers", element="grippers")
@@ -236,7 +259,7 @@ def _several(
     for joint in chosen:
         if joint.name not in taken:
             on_hand.setdefault(hand_of(robot, joint.name, {j.name for j in chosen}), []).append(joint.name)
-    closed = given.get("closed", "lower")
+    closed = given.get("closed", "")
     return tuple(Gripper(tuple(names), hand, closed) for hand, names in on_hand.items()) if len(on_hand) > 1 else ()
 
 
@@ -253,7 +276,7 @@ def _wheels(joints: Sequence[JointEntry]) -> list[str]:
     """The driven wheels on the left, then those on the right, where there are as many."""
     rolling = [j.name for j in joints if j.type == "continuous" and "wheel" in j.name.lower()]
     rolling = [name for name in rolling if not _named(name, PASSIVE)]
-    left, right = ([name for name in rolling if _named(name, side)] for side in (LEFT, RIGHT))
+    left, right = ([name for name in rolling if side & _words(name)] for side in (LEFT, RIGHT))
     apart = len(left) == len(right) and not set(left) & set(right)
     return [*left, *right] if apart else []
 

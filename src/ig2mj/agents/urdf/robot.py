@@ -28,7 +28,7 @@ from ig2mj.agents.parts import Vector, exclude_all, extend_keyframes, multiply, 
 from ig2mj.agents.urdf.body import RobotBody
 from ig2mj.agents.urdf.controller import UrdfController
 from ig2mj.agents.urdf.description import Description
-from ig2mj.agents.urdf.grip import gripper_rays
+from ig2mj.agents.urdf.grip import gripper_rays, with_closed_limits
 from ig2mj.agents.urdf.layout import Layout
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.tables import SceneTables
@@ -98,7 +98,10 @@ class UrdfRobot:
         else:
             found = Layout.load(description, layout)
         robot = cls(path, name or description.name, description, found)
-        robot.body.check(found)
+        body = robot.body
+        body.check(found)
+        robot = dataclasses.replace(robot, layout=with_closed_limits(body, found))
+        vars(robot)["body"] = body  # compiled once
         return robot
 
     @functools.cached_property
