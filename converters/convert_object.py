@@ -25,7 +25,7 @@ from .bodies.inertia import MassRule
 from .bodies.joint_limits import start_positions
 from .bodies.kinematics import model_bounds
 from .bodies.placements import Placement, make_halves
-from .bodies.robot_description import ROBOT_FILE, robot_json
+from .bodies.robot_description import ROBOT_FILE, put_on_floating_base, robot_json
 from .finish import Outcome, finish, version_record
 from .mjcf.appearance import add_ground, add_setting
 from .mjcf.manifest_entries import object_entry
@@ -112,6 +112,7 @@ def _read(
         progress=options.progress)  # fmt: skip
     if category == ROBOT_CATEGORY:
         source.model = model or file_slug(source.title or name)
+        put_on_floating_base(source)
     elif knowledge.synset(category) is None:
         near = difflib.get_close_matches(category, knowledge.categories(), n=3, cutoff=0.6)
         hint = f"; near matches: {', '.join(near)}" if near else ""

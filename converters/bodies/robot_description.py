@@ -6,6 +6,8 @@ import json
 
 import numpy as np
 
+from ig2mj.errors import InputError
+
 from ..base.description import ObjectModel
 from .joint_limits import clamp, is_locked
 from .kinematics import link_poses
@@ -13,6 +15,23 @@ from .kinematics import link_poses
 ROBOT_FILE = "robot.json"
 
 FORMAT_VERSION = 1
+
+
+def put_on_floating_base(source: ObjectModel) -> None:
+    """Makes the child of a floating joint the base where nothing but that joint hangs on the base, an empty link.
+
+    So URDFs say that a robot is free to move in the world, which every robot's base is that drives. Raises InputError
+    for a floating joint between parts of a robot.
+    """
+    floating = [joint for joint in source.joints.values() if joint.type == "floating"]
+    below = [joint for joint in source.joints.values() if joint.parent == source.base]
+    root = source.links[source.base]
+    if len(below) == 1 and below == floating and not (root.visuals or root.collisions or root.inertial):
+        source.base = floating[0].child
+        del source.joints[floating[0].name], source.links[root.name]
+    elif floating:
+        element = f"joint '{floating[0].name}'"
+        raise InputError(source.file, "a floating joint cuts the robot in two", element=element, fix="make it fixed")
 
 
 def robot_json(source: ObjectModel) -> str:

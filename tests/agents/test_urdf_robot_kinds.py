@@ -372,3 +372,29 @@ def test_wheels_named_by_their_corners_drive_as_two_sides(tmp_path, names):
         parts += wheel(name, f"{xyz} -0.06")
     robot = UrdfRobot.load(converted(tmp_path, *parts))
     assert robot.layout.wheels == tuple(f"{name}_joint" for name in names)
+
+
+FLOATING = '<joint name="free" type="floating"><parent link="{}"/><child link="{}"/><origin xyz="0 0 0.5"/></joint>'
+
+
+def test_a_robot_that_floats_in_an_empty_root_has_the_floating_link_as_its_base(tmp_path, home):
+    parts = [*wheel("left_wheel", "0 0.12 -0.06"), *wheel("right_wheel", "0 -0.12 -0.06")]
+    plain = UrdfRobot.load(converted(tmp_path, *parts))
+    robot = UrdfRobot.load(converted(tmp_path, *parts, '<link name="world"/>', FLOATING.format("world", "base")))
+    assert (robot.description.base, robot.layout) == (plain.description.base, plain.layout) == ("base", plain.layout)
+    assert robot.body.height == pytest.approx(plain.body.height)
+    assert ig2mj.load_scene(home, agents=[robot]).model.body("arm").mass > 0
+
+
+def test_a_floating_joint_between_parts_of_a_robot_is_refused(tmp_path):
+    with pytest.raises(InputError, match="joint 'free': a floating joint cuts the robot in two"):
+        converted(tmp_path, link("part"), FLOATING.format("base", "part"))
+
+
+def test_a_gripper_without_a_hand_is_none_or_refused(tmp_path, home):
+    folder = converted(tmp_path, *gripper("", "base", "0 0 0.4"))
+    robot = UrdfRobot.load(folder, {"hand": ""})
+    assert (robot.layout.gripper, robot.layout.grippers, robot.layout.hand) == ((), (), None)
+    assert "finger_1" in GraspingWorld(home, robot).controller.action_names
+    with pytest.raises(InputError, match="a gripper has no hand"):
+        UrdfRobot.load(folder, {"hand": "", "gripper": ["finger_1"]})

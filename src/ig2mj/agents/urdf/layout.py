@@ -139,7 +139,10 @@ class Layout:
         several = _several(robot, free, given, where)
         gripper = [name for one in several for name in one.joints]
         if not several:
-            gripper = given.get("gripper", [j.name for j in free if _grips(j)])
+            without_hand = given.get("hand") == ""
+            gripper = given.get("gripper", [] if without_hand else [j.name for j in free if _grips(j)])
+            if gripper and without_hand:
+                raise InputError(where, "a gripper has no hand", element="hand", fix="name its link, or gripper = []")
         rolling = {j.name for j in free if j.type == "continuous" and _named(j.name, ("wheel",))}
         arm = given.get("arm", [j.name for j in free if j.name not in gripper and j.name not in rolling])
         both = sorted(set(arm) & set(gripper))
