@@ -6,6 +6,7 @@ server, a ValueError. Warnings are none of this file's business.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import io
 import json
@@ -77,14 +78,14 @@ def lines_or_bytes(raw: bytes, seed: int) -> bytes:
     return b"\n".join(lines)
 
 
-def npz_or_bytes(raw: bytes, seed: int) -> bytes:
-    """An archive with odd arrays, or with changed bytes."""
+def npz_or_bytes(raw: bytes, seed: int, kept: tuple[str, ...] = ()) -> bytes:
+    """An archive with odd arrays, or with changed bytes. `kept`: entries that stay as they are."""
     if seed % 4 == 0:
         return mutated_bytes(raw, seed)
     random_ = random.Random(seed)
     with zipfile.ZipFile(io.BytesIO(raw)) as archive:
         entries = {name: archive.read(name) for name in archive.namelist()}
-    for name in random_.sample(sorted(entries), random_.randint(1, 2)):
+    for name in random_.sample(sorted(entries.keys() - {*kept}), random_.randint(1, 2)):
         what = random_.random()
         if what < 0.15:
             del entries[name]
@@ -554,10 +555,100 @@ def page_messages(folder: pathlib.Path) -> Reader:
     return Reader(lambda raw: check_message(raw, lambda uuid: (1.0, 2, "x")), valid, mutate, (ValueError,), packed)
 
 
+def engine_profiles(folder: pathlib.Path) -> Reader:
+    from tiny_home import write_tiny_home
+
+    from ig2mj.engine.warp.profile import PROFILE_FILE, default_profile, load_profile, profile_of_scene, save_profile
+    from ig2mj.scene.scene import load_scene
+
+    scene = load_scene(write_tiny_home(folder / "home"))
+    file = save_profile(default_profile(scene.model), folder)
+
+    def read(file: pathlib.Path) -> None:
+        found = load_profile(folder, scene.model)
+        assert found.for_worlds(3).contacts >= 1
+        profile_of_scene(scene)
+
+    assert file.name == PROFILE_FILE
+    return Reader(file_reader(file, read), file.read_bytes(), json_or_bytes)
+
+
+def saved_worlds(folder: pathlib.Path) -> Reader:
+    from tiny_home import write_tiny_home
+
+    from ig2mj.simulation import Simulation
+
+    world = Simulation(write_tiny_home(folder / "home"))
+    world.save(folder / "saved.npz")
+    valid = (folder / "saved.npz").read_bytes()
+
+    return Reader(file_reader(folder / "read.npz", lambda file: world.restore(file)), valid, npz_or_bytes)
+
+
+def dumps(folder: pathlib.Path) -> Reader:
+    """Mutations leave the compiled model alone: it is MuJoCo's to read."""
+    import jax
+    from tiny_home import write_tiny_home
+
+    from ig2mj.engine.registry import make_engine
+    from ig2mj.scene.scene import load_scene
+    from ig2mj.states.initial import initial_states
+    from ig2mj.states.model import StateModel
+    from ig2mj.viewer.replay import Replay
+    from ig2mj.worlds.recorder import MODEL, Frames, load_dump, save_dump
+
+    scene = load_scene(write_tiny_home(folder / "home"))
+    engine = make_engine("native", scene, 1)
+    states = initial_states(StateModel.of_manifest(scene.tables, scene.manifest), 1)
+    frames = Frames(engine.snapshot(engine.reset()), jax.tree.map(np.asarray, states))
+    frames = jax.tree.map(lambda a: np.concatenate([a, a]), frames)
+    file = folder / "dump.npz"
+    save_dump(frames, file, scene.name, {"world": 0, "flags": 0}, scene.model)
+
+    def mutate(valid: bytes, seed: int) -> bytes:
+        return npz_or_bytes(valid, seed, kept=(f"{MODEL}.npy",))
+
+    def read(file: pathlib.Path) -> None:
+        load_dump(file, frames, scene.name)
+        shown = Replay(scene, file)
+        shown.step()
+
+    return Reader(file_reader(folder / "read.npz", read), file.read_bytes(), mutate)
+
+
+def checkpoint_arrays(folder: pathlib.Path) -> Reader:
+    """One of the files that Orbax writes is changed; a checkpoint that cannot be read is skipped."""
+    import shutil
+
+    from ig2mj.learn.checkpoints import Checkpoints
+
+    tree, depends = {"weights": np.arange(6.0, dtype=np.float32).reshape(2, 3), "step": np.int32(3)}, {"task": "reach"}
+    kept = Checkpoints(folder)
+    kept.save(1, tree, {"depends": depends, "iteration": 1})
+    whole = folder / "whole"
+    shutil.copytree(kept.folder / "1", whole)
+    names = sorted(f.relative_to(whole).as_posix() for f in (whole / "arrays").rglob("*") if f.is_file())
+    valid = {name: (whole / name).read_bytes() for name in names}
+
+    def mutate(valid: dict[str, bytes], seed: int) -> dict[str, bytes]:
+        name = names[seed % len(names)]
+        return {name: mutated_bytes(valid[name], seed)}
+
+    def read(changed: dict[str, bytes]) -> None:
+        for name in names:
+            (kept.folder / "1" / name).write_bytes(changed.get(name, valid[name]))
+        with contextlib.redirect_stderr(io.StringIO()):
+            found = kept.newest(tree, depends)
+        assert found is None or found[0]["weights"].shape == (2, 3)
+
+    return Reader(read, valid, mutate)
+
+
 READERS: dict[str, Callable[[pathlib.Path], Reader]] = {
     f.__name__: f
     for f in (
         rooms, expressions, manifests, models, pools, robots, layouts, journals, activities, overrides, policies,
-        demonstrations, recordings, igibson_logs, checkpoints, devices, page_messages,
+        demonstrations, recordings, igibson_logs, checkpoints, devices, page_messages, engine_profiles, saved_worlds,
+        dumps, checkpoint_arrays,
     )
 }  # fmt: skip

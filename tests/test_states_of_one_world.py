@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import jax
 import numpy as np
 import pytest
@@ -183,6 +185,29 @@ def test_a_file_of_another_scene_is_refused(world, tmp_path):
         world.restore(tmp_path / "no.npz")
     with pytest.raises(InputError):
         world.restore(tmp_path / "absent.npz")
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "says"),
+    [
+        ("physics.scene.qpos", lambda a: np.full_like(a, np.nan), "holds numbers that are not finite"),
+        ("physics.scene.tree_asleep", lambda a: np.full_like(a, 10**6), "names number 1000000 of"),
+        ("states.temperature", lambda a: np.full_like(a, np.inf), "holds numbers that are not finite"),
+        ("states.temperature", lambda a: np.concatenate([a, a]), "has shape"),
+        ("states.dust.body", lambda a: np.full_like(a, 10**6), "names number 1000000 of"),
+        ("key", lambda a: a[:1], "has shape"),
+        ("step", lambda a: a[:0], "has shape"),
+        ("step", lambda a: a - 9, "a clock begins at 0"),
+    ],
+)
+def test_a_file_with_numbers_that_no_world_has_is_refused(world, tmp_path, name, change, says):
+    file = tmp_path / "world.npz"
+    world.save(file)
+    with np.load(file) as archive:
+        arrays = dict(archive)
+    np.savez(file, **(arrays | {name: change(arrays[name])}))
+    with pytest.raises(InputError, match=f"{re.escape(name)}: .*{says}"):
+        world.restore(file)
 
 
 def test_physics_alone_has_no_states(tiny_home):

@@ -10,7 +10,7 @@ import pytest
 
 import ig2mj
 from ig2mj.engine.native.engine import NativeEngine
-from ig2mj.engine.snapshot import AXIS
+from ig2mj.engine.snapshot import AXIS, FULLY_AWAKE, closed_circles
 from ig2mj.errors import EngineError
 
 
@@ -86,3 +86,18 @@ def test_the_first_world_is_where_reset_puts_one(full):
     seen = jax.tree.map(lambda a: np.asarray(a[:1]), full.view(full.fresh()))
     for name in ("object_pos", "object_quat", "aabb_low", "aabb_high", "object_com"):
         np.testing.assert_allclose(getattr(view, name), getattr(seen, name), atol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("given", "closed"),
+    [
+        ([0, 2, 1, -3], [0, 2, 1, -3]),
+        ([1, -5, 2, 3], [FULLY_AWAKE, -5, 2, 3]),
+        ([1, 2, 1, 3], [FULLY_AWAKE, FULLY_AWAKE, FULLY_AWAKE, 3]),
+        ([2**31 - 1, 1, -(2**31), 0], [FULLY_AWAKE, 1, FULLY_AWAKE, FULLY_AWAKE]),
+    ],
+)
+def test_trees_of_open_circles_of_sleep_are_awake(given, closed):
+    both = np.array([given, [0, 1, 2, 3]], np.int32)
+    assert closed_circles(both).tolist() == [closed, [0, 1, 2, 3]]
+    assert closed_circles(np.zeros((2, 0), np.int32)).shape == (2, 0)

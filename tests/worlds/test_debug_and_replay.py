@@ -172,5 +172,22 @@ def test_dumps_of_other_scenes_are_refused(dump, tiny_home, bare, bench_folder, 
     with pytest.raises(InputError, match="model: is missing"):
         Replay(bare, file)
     save_dump(Frames(frames, initial_states(_model(bare), 4)), file, "bench", {}, small.model)
-    with pytest.raises(InputError, match="has shape"):
+    with pytest.raises(InputError, match=r"qpos: has shapes .* which do not make"):
         Replay(bare, file)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "says"),
+    [
+        ("frames.physics.scene.qvel", lambda a: a[:-1], "has arrays of different lengths"),
+        ("frames.physics.agents.mocap_pos", lambda a: a[..., :-1], "has shapes"),
+        ("frames.physics.scene.eq_data", lambda a: a[..., :-1], "has shapes"),
+        ("model", lambda a: a.astype(float), "is of type float64, and not of bytes"),
+    ],
+)
+def test_a_dump_whose_arrays_do_not_fit_together_is_refused(dump, bare, tmp_path, name, change, says):
+    with np.load(dump) as archive:
+        arrays = dict(archive)
+    np.savez(tmp_path / "odd.npz", **(arrays | {name: change(arrays[name])}))
+    with pytest.raises(InputError, match=says):
+        Replay(bare, tmp_path / "odd.npz")

@@ -196,6 +196,27 @@ class Snapshot:
         return self.whole("tree_asleep")
 
 
+def closed_circles(tree_asleep: Array) -> np.ndarray:
+    """`tree_asleep` [..., T] (see `ScenePart`) in which every tree of an open circle is awake.
+
+    Trees that sleep name each other in circles, one for each island. MuJoCo walks along a circle to wake the island; of
+    an open one it finds no end, or an awake tree. Engines leave circles open between a write and the next step, and so
+    may files.
+    """
+    found = np.asarray(tree_asleep)
+    count = found.shape[-1]
+    order = -1 - np.arange(count)
+    while True:
+        asleep, target = found >= 0, np.clip(found, 0, max(count - 1, 0))
+        whole = ~asleep | ((found < count) & (np.take_along_axis(found, target, -1) >= 0)) if count else ~asleep
+        named = np.sort(np.where(asleep, found, order), axis=-1)
+        if whole.all() and (found >= FULLY_AWAKE).all() and (np.diff(named, axis=-1) > 0).all():
+            return found
+        times = (target[..., :, None] == target[..., None, :]) & asleep[..., None, :]
+        lost = ~whole | (asleep & (times.sum(-1) > 1)) | (found < FULLY_AWAKE)
+        found = np.where(lost, np.asarray(FULLY_AWAKE, found.dtype), found)
+
+
 def make_snapshot(
     fields: Mapping[str, Any],
     sizes: Mapping[str, int],

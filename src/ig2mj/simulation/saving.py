@@ -15,8 +15,9 @@ from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import InputError
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
-from ig2mj.worlds.archive import check_finite, load_tree, save_tree
+from ig2mj.worlds.archive import load_exactly, read_header, save_tree
 from ig2mj.worlds.hands import Held
+from ig2mj.worlds.pool import check_numbers, check_values
 
 if TYPE_CHECKING:
     from ig2mj.simulation.simulation import Simulation
@@ -70,14 +71,22 @@ def load_world(file: str | os.PathLike, like: SavedWorld, scene: Scene) -> Saved
     """Reads a world of the scene; `like`: any world of it, for the shapes.
 
     Raises:
-      InputError: the file is missing, broken, of another scene, or of another version.
+      InputError: the file is missing, broken, of another scene, or of another version; or it holds numbers that no
+        world can have.
     """
-    found, header = load_tree(file, jax.tree.map(np.asarray, like))
+    header = read_header(file)
     if header.get("version") != VERSION:
         raise InputError(file, f"has version {header.get('version')}, this ig2mj reads {VERSION}")
     if header.get("objects") != list(scene.object_names):
         raise InputError(file, f"is of scene '{header.get('scene')}'", fix="restore it in that scene")
-    check_finite(found.physics, file)
+    found, _ = load_exactly(file, jax.tree.map(np.asarray, like))
+    check_values(found.physics, found.states, file)
+    trees = {f"physics.{part}.tree_asleep": getattr(found.physics, part).tree_asleep for part in ("scene", "agents")}
+    bodies = {f"states.{name}.body": getattr(found.states, name).body for name in ("dust", "stain")}
+    counts = {name: int(scene.model.ntree) for name in trees} | {name: int(scene.model.nbody) for name in bodies}
+    check_numbers({name: np.asarray(array) for name, array in (trees | bodies).items()}, counts, file)
+    if found.step[0] < 0:
+        raise InputError(file, f"is {found.step[0]}, and a clock begins at 0", element="step")
     return found
 
 

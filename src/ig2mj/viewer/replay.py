@@ -16,7 +16,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Int
 
-from ig2mj.engine.snapshot import Snapshot
+from ig2mj.engine.snapshot import Snapshot, closed_circles
 from ig2mj.errors import EngineError, InputError
 from ig2mj.scene.scene import Scene
 from ig2mj.viewer.overlays import Label, default_overlays
@@ -58,7 +58,7 @@ class Replay:
         mujoco.mj_kinematics(self.scene.model, data)
         mujoco.mj_comPos(self.scene.model, data)
         mujoco.mj_camlight(self.scene.model, data)
-        data.tree_asleep[:] = np.asarray(frames.tree_asleep)[self.at]
+        data.tree_asleep[:] = closed_circles(np.asarray(frames.tree_asleep)[self.at])
 
     def step(self) -> None:
         """Goes on to the next recorded step; stays at the last one."""

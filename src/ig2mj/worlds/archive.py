@@ -60,15 +60,17 @@ def read_header(file: str | os.PathLike) -> dict[str, Any]:
     return _read(file, lambda name: False)[1]
 
 
-def load_tree(file: str | os.PathLike, like: Tree) -> tuple[Tree, dict[str, Any]]:
+def load_tree(file: str | os.PathLike, like: Tree, rows: str = "") -> tuple[Tree, dict[str, Any]]:
     """Reads a pytree of the structure, leaf ranks and dtypes of `like`, and the header.
 
-    The leading axis may differ from that of `like`.
+    The leading axis may differ from that of `like`, and is the same in all arrays whose paths begin with `rows`.
 
     Raises:
       InputError: the file is missing, no such archive, or of another structure.
     """
     arrays, header = _read(file)
+    wanted_names = [name_of(keys) for keys, _ in jax.tree_util.tree_leaves_with_path(like)]
+    check_lengths({n: arrays[n] for n in wanted_names if n.startswith(rows) and n in arrays}, file)
 
     def leaf(keys: Any, wanted: Any) -> np.ndarray:
         name = name_of(keys)
@@ -124,6 +126,15 @@ def check_array(array: np.ndarray, wanted: Any, file: str | os.PathLike, name: s
         )
     if not np.can_cast(array.dtype, wanted.dtype, "same_kind"):
         raise InputError(file, f"is of type {array.dtype}, and {wanted.dtype} is needed", element=name)
+
+
+def check_lengths(arrays: Mapping[str, np.ndarray], file: str | os.PathLike) -> None:
+    """Raises InputError where arrays do not all have the same number of rows, at least one."""
+    lengths = {len(array) if array.ndim else 0 for array in arrays.values()}
+    if len(lengths) != 1:
+        raise InputError(file, f"has arrays of different lengths: {', '.join(map(str, sorted(lengths)))}")
+    if not max(lengths):
+        raise InputError(file, "has no rows")
 
 
 def check_finite(tree: Any, file: str | os.PathLike) -> None:

@@ -142,16 +142,27 @@ def load_pool(file: str | os.PathLike, scene: Scene | None = None) -> Pool:
     pool = build(Pool, arrays, file)
     if not pool.size:
         raise InputError(file, "has no rows", fix=fix)
-    _check_values(pool, file)
+    check_values(pool.physics, pool.states, file)
     return dataclasses.replace(pool, digest=header.get("digest"))
 
 
-def _check_values(pool: Pool, file: str | os.PathLike) -> None:
-    """Refuses what is not finite, which a world would start with unnoticed; what has never been warm has no maximum."""
-    check_finite({"physics": pool.physics}, file)
-    warmest = np.asarray(pool.states.max_temperature)
+def check_values(physics: Snapshot, states: ExtendedStates, file: str | os.PathLike) -> None:
+    """Refuses what is not finite, which a world would start with unnoticed; what has never been warm has no maximum.
+
+    Raises:
+      InputError: it names the array.
+    """
+    check_finite({"physics": physics}, file)
+    warmest = np.asarray(states.max_temperature)
     known = np.where(np.isneginf(warmest), warmest.dtype.type(0), warmest)
-    check_finite({"states": dataclasses.replace(pool.states, max_temperature=known)}, file)
+    check_finite({"states": dataclasses.replace(states, max_temperature=known)}, file)
+
+
+def check_numbers(arrays: Mapping[str, np.ndarray], counts: Mapping[str, int], file: str | os.PathLike) -> None:
+    """Raises InputError where an array names one of more things than there are (`counts`, by the array's name)."""
+    for name, count in counts.items():
+        if name in arrays and arrays[name].size and int(arrays[name].max()) >= count:
+            raise InputError(file, f"names number {int(arrays[name].max())} of {count}", element=name, fix=_FIX)
 
 
 def _check_widths(arrays: Mapping[str, np.ndarray], scene: Scene, file: str | os.PathLike) -> None:
@@ -169,9 +180,7 @@ def _check_widths(arrays: Mapping[str, np.ndarray], scene: Scene, file: str | os
             check_array(arrays[name], like, file, name)
     counts = {"physics.scene.tree_asleep": sizes["tree_asleep"]}
     counts |= {f"states.{name}.body": scene.model.nbody for name in ("dust", "stain")}
-    for name, count in counts.items():
-        if name in arrays and arrays[name].size and int(arrays[name].max()) >= count:
-            raise InputError(file, f"names number {int(arrays[name].max())} of {count}", element=name, fix=_FIX)
+    check_numbers(arrays, counts, file)
 
 
 def _pool_header(file: str | os.PathLike) -> dict[str, Any]:

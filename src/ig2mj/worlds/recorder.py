@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import functools
 import os
+from collections.abc import Mapping
 from typing import Any
 
 import jax
@@ -24,7 +25,7 @@ from ig2mj.engine.view import Array
 from ig2mj.errors import InputError
 from ig2mj.process import entry_point
 from ig2mj.states.world import ExtendedStates
-from ig2mj.worlds.archive import build, load_tree, read_arrays, read_header, save_tree
+from ig2mj.worlds.archive import build, check_lengths, load_tree, read_arrays, read_header, save_tree
 from ig2mj.worlds.batch import Batch
 
 LENGTH = 50
@@ -111,7 +112,7 @@ def save_dump(
 def load_dump(file: str | os.PathLike, like: Frames, scene: str) -> tuple[Frames, dict[str, Any]]:
     """Reads a dump of the scene, of the shapes of `like`, to go on from it. Raises InputError."""
     check_dump(file, scene)
-    tree, header = load_tree(file, {"frames": like, MODEL: np.zeros(0, np.uint8)})
+    tree, header = load_tree(file, {"frames": like, MODEL: np.zeros(0, np.uint8)}, "frames.")
     return tree["frames"], header
 
 
@@ -122,14 +123,34 @@ def read_dump(file: str | os.PathLike, scene: str) -> tuple[Snapshot, mujoco.MjM
     binary = read_arrays(file, MODEL).get("", np.zeros(0, np.uint8))
     if not len(binary):
         raise InputError(file, "is missing", element=MODEL, fix="record it again")
-    physics = build(Snapshot, arrays, file)
+    if binary.dtype != np.uint8:
+        raise InputError(file, f"is of type {binary.dtype}, and not of bytes", element=MODEL, fix="record it again")
     try:
         model = mujoco.MjModel.from_binary_path("dump.mjb", assets={"dump.mjb": binary.tobytes()})
     except ValueError as e:
         raise InputError(file, f"MuJoCo cannot read it: {e}", element=MODEL, fix="use the MuJoCo of the run") from e
-    if physics.qpos.shape[1:] != (model.nq,) or not len(physics.qpos):
-        raise InputError(file, f"has shape {physics.qpos.shape}", element="frames.physics.qpos")
-    return physics, model, header
+    check_lengths(arrays, file)
+    _check_parts(arrays, model, file)
+    return build(Snapshot, arrays, file), model, header
+
+
+def _check_parts(arrays: Mapping[str, np.ndarray], model: mujoco.MjModel, file: str | os.PathLike) -> None:
+    """Refuses arrays of scene and agents that, put together, are not the model's. Raises InputError."""
+    widths = {"qpos": model.nq, "qvel": model.nv, "act": model.na, "ctrl": model.nu, "qacc_warmstart": model.nv}
+    widths |= {"eq_active": model.neq, "tree_asleep": model.ntree}
+    shapes = {name: (width,) for name, width in widths.items()}
+    shapes |= {"eq_data": (model.neq, 12), "mocap_pos": (model.nmocap, 3), "mocap_quat": (model.nmocap, 4)}
+    first = {"qacc_warmstart": "qvel", "eq_data": "eq_active", "mocap_quat": "mocap_pos"}
+    for name, shape in shapes.items():
+        scene, agents = (arrays.get(f"{part}.{name}") for part in ("scene", "agents"))
+        twin = arrays.get(f"scene.{first.get(name, name)}")
+        if scene is None or agents is None or twin is None:
+            raise InputError(file, "is missing", element=f"frames.physics.scene.{name}", fix="record it again")
+        fits = scene.ndim == agents.ndim == len(shape) + 1 and scene.shape[:2] == twin.shape[:2]
+        fits = fits and (scene.shape[1] + agents.shape[1], *scene.shape[2:]) == shape == (*shape[:1], *agents.shape[2:])
+        if not fits:
+            problem = f"has shapes {scene.shape} and {agents.shape}, which do not make {('steps', *shape)}"
+            raise InputError(file, problem, element=f"frames.physics.scene.{name}", fix="record it again")
 
 
 def check_dump(file: str | os.PathLike, scene: str) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from ig2mj.engine.native.model_slot import ModelSlot
 from ig2mj.engine.native.sleep import restore_sleep, wake_trees
 from ig2mj.engine.native.vicinity import Masks, Vicinity, VicinityTable
 from ig2mj.engine.native.view_rows import Changed, PosePlan, PoseRows
-from ig2mj.engine.snapshot import AXIS, Snapshot, make_snapshot
+from ig2mj.engine.snapshot import AXIS, Snapshot, closed_circles, make_snapshot
 from ig2mj.engine.speed_limits import SpeedLimits
 from ig2mj.engine.view import Array
 from ig2mj.errors import LostWorldError
@@ -270,7 +270,7 @@ class World:
         wake_trees(model, data, np.arange(model.ntree))
         mujoco.mj_step1(model, data)  # kinematics of everything, while everything is awake
         self._set_state(state, float(snapshot.time))
-        restore_sleep(model, data, np.asarray(snapshot.tree_asleep))
+        restore_sleep(model, data, closed_circles(snapshot.tree_asleep))
         mujoco.mj_step1(model, data)
         self.units = np.array(snapshot.scene.touching, bool)
         known = np.array(snapshot.agents.touching, bool)
