@@ -33,6 +33,9 @@ from .output import MARK, replaced_folder
 LIMIT = 2 * 2**30
 """Bytes of all entries together."""
 
+UNPACKED = 16 * 2**30
+"""Bytes that an entry may unpack to; a larger one is taken as damaged."""
+
 PACKAGES = (
     "ig2mj", "mujoco", "coacd", "trimesh", "manifold3d", "fast-simplification", "numpy", "scipy", "shapely",
     "pillow", "lxml", "pycollada", "jinja2", "bddl",
@@ -41,6 +44,12 @@ PACKAGES = (
 
 SOURCES = ("ig2mj_converters", "ig2mj.knowledge", "ig2mj.scene", "ig2mj.sensors", "ig2mj.viewer")
 """Packages of this project whose files decide what comes out (sensors and viewer draw the report's pictures)."""
+
+_DAMAGED = (
+    OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, RecursionError, NotImplementedError,
+    RuntimeError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+"""What reading an entry raises that was changed: `zipfile` raises the last ones at methods and passwords."""
 
 _FACTS = "ig2mj-cache.json"
 _SHARED = "ig2mj-shared/"
@@ -78,6 +87,8 @@ def fetch(key: str, out: str | os.PathLike) -> Outcome | None:
     path = _path(key)
     try:
         with zipfile.ZipFile(path) as archive:
+            if sum(entry.file_size for entry in archive.infolist()) > UNPACKED:
+                return None
             facts = json.loads(archive.read(_FACTS))
             if facts["key"] != key or not Record(facts["inputs"]).holds_still():
                 return None
@@ -91,7 +102,7 @@ def fetch(key: str, out: str | os.PathLike) -> Outcome | None:
                 for name, raw in shared.items():
                     _put(folder / name, raw)
         os.utime(path)
-    except (OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, zipfile.BadZipFile, zlib.error):
+    except _DAMAGED:
         return None
     outcome.cached = True
     return outcome

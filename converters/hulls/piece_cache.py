@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import io
 import json
 import pathlib
 import tempfile
-import zipfile
-import zlib
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+
+from ig2mj.errors import InputError
+from ig2mj.files.content import decode_json
+from ig2mj.files.npz import read_npz
 
 from ..base.cache_folder import cache_folder, prune
 
@@ -63,13 +64,11 @@ def _feed(digest: Any, part: Any) -> None:
 def load(key: str) -> tuple[dict[str, Any], dict[str, np.ndarray]] | None:
     """The entry's facts and arrays, or None if there is none that reads."""
     try:
-        content = io.BytesIO(_path(key).read_bytes())
-        with np.load(content, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
-        facts = json.loads(arrays.pop("facts").tobytes().decode())
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+        arrays = read_npz(_path(key))
+        facts = decode_json(arrays.pop("facts", np.zeros(0)).tobytes(), _path(key), kind=dict)
+    except InputError:
         return None
-    return (facts, arrays) if isinstance(facts, dict) and facts.get("key") == key else None
+    return (facts, arrays) if facts.get("key") == key else None
 
 
 def holds(key: str) -> bool:

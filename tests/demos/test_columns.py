@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import json
+
 import h5py
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from hostile_readers import recordings
 
+from ig2mj.demos.pieces import TOLD, join_replays
 from ig2mj.demos.reader import Recording
 from ig2mj.demos.writer import FLUSH, RunWriter
 from ig2mj.engine.native.recorded import Cut
+from ig2mj.errors import InputError
 
 ABOUT = {name: "" for name in ("mujoco", "scene", "scene_hash", "model_hash")}
 OWN = {"vector": Cut(0, 0, 3), "matrix": Cut(0, 3, 7, (2, 2)), "nothing": Cut(0, 7, 7), "flag": Cut(1)}
@@ -91,3 +96,32 @@ def test_short_episodes_take_little_room(tmp_path):
                 writer.add([[row]], [], [np.zeros((1, 1))])
     size = (tmp_path / "x.h5").stat().st_size
     assert size / 3100 < 1.5 * 20 * 8 + 150
+
+
+def test_pieces_of_a_replay_are_joined_only_from_their_own_content(tmp_path):
+    def piece(run, **told):
+        with h5py.File(tmp_path / "piece.h5", "w") as out:
+            out[f"{run}/vector"] = np.zeros((4, 3), np.float32)
+            out.attrs[TOLD] = json.dumps({"runs": 1, "frames": 4, "differences": ["d"], "warnings": [], **told})
+        return (tmp_path / "piece.h5").read_bytes()
+
+    first, second = piece("run_000000"), piece("run_000001")
+    found = join_replays([first, second], tmp_path / "whole.h5")
+    assert found == {"runs": 2, "frames": 8, "differences": ["d", "d"], "warnings": []}
+    with h5py.File(tmp_path / "whole.h5") as whole:
+        assert list(whole) == ["run_000000", "run_000001"]
+    with pytest.raises(InputError, match="Expected `int`, got `str`"):
+        join_replays([piece("run_000000", frames="many")], None)
+    piece("run_000000")
+    with h5py.File(tmp_path / "piece.h5", "a") as out:
+        out["run_000000/more"] = h5py.ExternalLink("secret.h5", "/a")
+    with pytest.raises(InputError, match="run_000000/more: is missing, or no array of this file"):
+        join_replays([(tmp_path / "piece.h5").read_bytes()], tmp_path / "whole.h5")
+
+
+def test_a_recording_does_not_name_a_file_as_its_task(tmp_path):
+    recordings(tmp_path)
+    with h5py.File(tmp_path / "runs.h5", "a") as out:
+        out.attrs["task"] = "activity/own.bddl"
+    with pytest.raises(InputError, match=r"attribute task: 'activity/own\.bddl' is the path of a file"):
+        Recording(tmp_path / "runs.h5")

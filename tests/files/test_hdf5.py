@@ -146,3 +146,32 @@ def test_what_is_no_hdf5_file_is_named(tmp_path):
         Hdf5File(tmp_path / "a.h5")
     with pytest.raises(InputError, match="there is no such file"):
         Hdf5File(tmp_path / "b.h5")
+
+
+def test_an_array_of_a_type_that_numpy_does_not_know_is_named(tmp_path):
+    kind = h5py.h5t.IEEE_F32LE.copy()
+    kind.set_fields(31, 23, 8, 0, 23)
+    kind.set_ebias(2**20)
+    with h5py.File(tmp_path / "a.h5", "w") as out:
+        h5py.h5d.create(out.id, b"a", kind, h5py.h5s.create_simple((3,)))
+    with Hdf5File(tmp_path / "a.h5") as file:
+        for use in (lambda: file.claim(["a"]), lambda: file.read("a")):
+            with pytest.raises(InputError, match=r"a: .*Insufficient precision"):
+                use()
+
+
+@pytest.mark.parametrize("link", [h5py.SoftLink("/other"), h5py.ExternalLink("secret.h5", "/a")])
+def test_groups_are_copied_only_with_what_is_in_their_own_file(tmp_path, link):
+    with h5py.File(tmp_path / "a.h5", "w") as out:
+        out["good/x/y"], out["good"].attrs["n"] = np.arange(5), 3
+        out["bad/x"] = np.arange(5)
+        out["bad/link"] = link
+        out["deep/1/2/3/4/5/6"] = np.arange(2)
+    with Hdf5File(tmp_path / "a.h5") as file, h5py.File(tmp_path / "b.h5", "w") as into:
+        file.copy("good", into, "run")
+        assert into["run/x/y"][:].tolist() == [0, 1, 2, 3, 4] and into["run"].attrs["n"] == 3
+        with pytest.raises(InputError, match="bad/link: is missing, or no array of this file"):
+            file.copy("bad", into)
+        with pytest.raises(InputError, match="deep/1/2/3/4/5: is a group in too many others"):
+            file.copy("deep", into)
+        assert list(into) == ["run"]

@@ -13,6 +13,7 @@ from hostile_readers import demonstrations, policies
 from limits import run_limited
 
 from ig2mj.errors import InputError
+from ig2mj.learn.demo_pieces import FAILED, join_demos
 from ig2mj.learn.demos import about, load_demos
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy
@@ -107,6 +108,31 @@ def test_weights_that_do_not_fit_the_card_are_named(tmp_path):
     file = changed_policy(tmp_path, "weights/mean/kernel", lambda a: a[:-1])
     with pytest.raises(InputError, match="its arrays do not fit its card"):
         reader.read(file.read_bytes())
+
+
+@pytest.mark.parametrize("task", ["activity/own.bddl", "ig2mj/activity/own.bddl-v0", "../own.bddl"])
+def test_a_policy_does_not_name_a_file_as_its_task(tmp_path, task):
+    def renamed(card):
+        text = json.loads(card.tobytes())
+        text["depends"]["task"] = task
+        return np.frombuffer(json.dumps(text).encode(), np.uint8)
+
+    with pytest.raises(InputError, match=r"card\.json: depends\.task: .* is the path of a file"):
+        Policy.load(changed_policy(tmp_path, "card.json", renamed))
+
+
+def test_parts_of_demonstrations_are_joined_only_from_their_own_content(demos, tmp_path):
+    with h5py.File(demos, "a") as opened:
+        opened.attrs[FAILED] = 2
+    good = demos.read_bytes()
+    assert join_demos([good, good], tmp_path / "whole.h5") == (4, 4)
+    load_demos(tmp_path / "whole.h5", Perception(about(tmp_path / "whole.h5")[1]))
+    with h5py.File(demos, "a") as opened:
+        opened["run_000000/obs/more"] = h5py.ExternalLink("secret.h5", "/a")
+    with pytest.raises(InputError, match="run_000000/obs/more: is missing, or no array of this file"):
+        join_demos([demos.read_bytes()], tmp_path / "whole.h5")
+    with pytest.raises(InputError, match="is not an HDF5 file"):
+        join_demos([good[:500]], tmp_path / "whole.h5")
 
 
 def changed_policy(folder: pathlib.Path, name: str, change) -> pathlib.Path:

@@ -9,6 +9,7 @@ import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from ig2mj.cluster.work import Piece, WholeRunError
@@ -19,6 +20,8 @@ from ig2mj.envs.environment import EnvState
 from ig2mj.envs.pieces import keep_pool
 from ig2mj.envs.registry import VECTORS
 from ig2mj.errors import Ig2mjError
+from ig2mj.files.content import decode_struct
+from ig2mj.files.hdf5 import Hdf5File
 
 TOLD = "told"
 """Attribute of a piece's file: what came of the replay, as JSON."""
@@ -28,6 +31,15 @@ FORMAT = "ig2mj observations"
 
 RECORDING = "recording"
 """Name of the recording among the bytes that pieces share, where they are done on other machines."""
+
+
+class _Told(msgspec.Struct):
+    """What a piece's `TOLD` holds."""
+
+    runs: int
+    frames: int
+    differences: list[str]
+    warnings: list[str]
 
 
 def replay_pieces(recording: Recording, settings: Mapping[str, Any]) -> list[Piece]:
@@ -127,7 +139,8 @@ class Observing:
 
 
 def join_replays(parts: Iterable[bytes], out: pathlib.Path | None) -> dict[str, Any]:
-    """What came of all pieces; with `out` their observations in one file. Raises OSError."""
+    """What came of all pieces; with `out` their observations in one file. Raises OSError, and InputError:
+    a part is broken, or takes anything from another file."""
     import h5py
 
     found: dict[str, Any] = {"runs": 0, "frames": 0, "differences": [], "warnings": []}
@@ -139,14 +152,15 @@ def join_replays(parts: Iterable[bytes], out: pathlib.Path | None) -> dict[str, 
         for packed in parts:
             part = pathlib.Path(folder) / "part.h5"
             part.write_bytes(packed)
-            with h5py.File(part, "r") as opened:
-                told = json.loads(str(opened.attrs[TOLD]))
-                found = {
-                    **{k: found[k] + told[k] for k in ("runs", "frames", "differences")},
-                    "warnings": told["warnings"],
-                }
-                if whole is not None:
-                    _copy(opened, whole, set(opened))
+            with Hdf5File(part) as opened:
+                text = str(opened.attributes().get(TOLD, ""))
+                told = decode_struct(text.encode(), _Told, part)
+                found["runs"] += told.runs
+                found["frames"] += told.frames
+                found["differences"] += told.differences
+                found["warnings"] = told.warnings
+                for name in opened.names() if whole is not None else ():
+                    opened.copy(name, whole)
     if whole is not None and beside is not None and out is not None:
         whole.close()
         beside.replace(out)

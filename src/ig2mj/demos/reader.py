@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ig2mj.demos.writer import FLUSH, FORMAT, READABLE_VERSIONS
+from ig2mj.envs.names import refuse_path
 from ig2mj.errors import InputError
 from ig2mj.files.content import decode_json
 from ig2mj.files.hdf5 import Hdf5File
@@ -180,6 +181,7 @@ class Recording:
         for name in ATTRIBUTES:
             if not isinstance(self.header.get(name), str):
                 raise InputError(self.file, "is missing", element=f"attribute {name}", fix=FIX)
+        refuse_path(str(self.header.get("task", "")), self.file, "attribute task")
         columns = self.value("columns", list)
         if not all(isinstance(name, str) and name.startswith(("frames/", "steps/")) for name in columns):
             raise InputError(self.file, "must be names of arrays", element="attribute columns", fix=FIX)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from typing import Any
 
+from ig2mj.errors import InputError
+
 NAMESPACE, VERSION = "ig2mj", 0
 """Of the names that Gymnasium knows: ig2mj/CookingMeat-v0."""
 
@@ -39,6 +41,12 @@ def activity_name(name: str) -> str | None:
     """cleaning_windows of activity/cleaning_windows and ig2mj/activity/cleaning_windows-v0; None of other names."""
     match = _ACTIVITY.fullmatch(name)
     return None if match is None or int(match["version"] or VERSION) != VERSION else match["name"]
+
+
+def refuse_path(name: str, file: object, element: str) -> None:
+    """Raises InputError where a file names its task by the path of a BDDL definition, which is of another file."""
+    if (activity_name(name) or name).endswith(".bddl"):
+        raise InputError(file, f"{name[:80]!r} is the path of a file, not the name of a task", element=element)
 
 
 def register(gymnasium: Any) -> None:

@@ -83,11 +83,11 @@ class Hdf5File:
         except (OSError, RuntimeError, ValueError) as e:
             raise self.broken(path or "/", f"cannot be read: {e}") from e
 
-    def arrays_below(self, path: str, depth: int = 4) -> list[str]:
+    def arrays_below(self, path: str, depth: int = 4, whole: bool = False) -> list[str]:
         """Paths of the arrays below a group, sorted, at most so many groups down: hard links can make circles.
 
         Raises:
-          InputError: there is no such group, or it holds too many arrays.
+          InputError: there is no such group, or it holds too many arrays, or, for `whole`, groups further down.
         """
         import h5py
 
@@ -97,7 +97,9 @@ class Hdf5File:
             if not isinstance(self._find(inner), h5py.Group):
                 found.append(inner)
             elif depth:
-                found += self.arrays_below(inner, depth - 1)
+                found += self.arrays_below(inner, depth - 1, whole)
+            elif whole:
+                raise self.broken(inner, "is a group in too many others")
             refuse_more("ARRAYS", len(found), "holds", self.file, path, unit=" arrays")
         return found
 
@@ -172,7 +174,30 @@ class Hdf5File:
 
     def claim(self, paths: Iterable[str]) -> None:
         """Refuses a file of which these arrays, all together, claim more than one reads (`ig2mj.files.limits`)."""
-        refuse_bomb(sum(int(getattr(self._find(path), "nbytes", 0)) for path in paths), self._size, self.file)
+        refuse_bomb(sum(self._claimed(path) for path in paths), self._size, self.file)
+
+    def _claimed(self, path: str) -> int:
+        try:
+            return int(getattr(self._find(path), "nbytes", 0))
+        except (OSError, RuntimeError, ValueError, TypeError) as e:  # of a type that NumPy does not know
+            raise self.broken(path, f"cannot be read: {e}") from e
+
+    def copy(self, name: str, into: Any, under: str = "") -> None:
+        """Copies a group of the root into another HDF5 file, as it is packed.
+
+        Args:
+          into: h5py's file or group. under: its name there; "": the same.
+
+        Raises:
+          InputError: below it is something else than groups and arrays of this very file (`array`, `arrays_below`).
+        """
+        self.attributes(name)
+        for path in self.arrays_below(name, whole=True):
+            self.array(path)
+        try:
+            self.root.copy(self.group(name), into, under or name)
+        except (OSError, RuntimeError, ValueError) as e:
+            raise self.broken(name, f"cannot be copied: {e}") from e
 
     def read(self, path: str, *, kinds: str = "biuf", ndim: int | None = None) -> np.ndarray:
         """All of an array; what is read of a file counts together (`ig2mj.files.limits`). Raises as `array`."""

@@ -16,6 +16,7 @@ from ig2mj.envs.experts import expert_of
 from ig2mj.envs.pieces import keep_pool
 from ig2mj.envs.registry import make
 from ig2mj.errors import Ig2mjError
+from ig2mj.files.hdf5 import Hdf5File
 from ig2mj.learn.demos import DemoWriter, collect_demos
 from ig2mj.process.progress import progress
 
@@ -72,7 +73,8 @@ def collect_piece(
 
 
 def join_demos(parts: Iterable[bytes], file: pathlib.Path) -> tuple[int, int]:
-    """Writes the runs of all parts to one file; how many there are, and how many episodes failed. Raises OSError."""
+    """Writes the runs of all parts to one file; how many there are, and how many episodes failed. Raises OSError, and
+    InputError: a part is broken, or takes anything from another file."""
     import h5py
 
     runs = failed = 0
@@ -81,13 +83,17 @@ def join_demos(parts: Iterable[bytes], file: pathlib.Path) -> tuple[int, int]:
         for packed in parts:
             part = pathlib.Path(folder) / "part.h5"
             part.write_bytes(packed)
-            with h5py.File(part, "r") as opened:
-                failed += int(str(opened.attrs[FAILED]))
+            with Hdf5File(part) as opened:
+                header = opened.attributes()
+                try:
+                    failed += int(str(header[FAILED]))
+                except (KeyError, ValueError) as e:
+                    raise opened.broken(f"attribute {FAILED}", "is no number") from e
                 if not whole.attrs:
-                    for name, value in opened.attrs.items():
+                    for name, value in header.items():
                         whole.attrs[name] = value
-                for name in sorted(opened):
-                    opened.copy(opened[name], whole, f"run_{runs:06d}")
+                for name in opened.names():
+                    opened.copy(name, whole, f"run_{runs:06d}")
                     runs += 1
         if runs:
             whole.attrs[FAILED] = failed

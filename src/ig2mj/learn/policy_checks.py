@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import msgspec
 import numpy as np
 
+from ig2mj.envs.names import refuse_path
 from ig2mj.errors import Ig2mjError, InputError
 from ig2mj.files.npz import refuse_nonfinite
 from ig2mj.learn.recall import POSE
@@ -62,6 +63,7 @@ def check_card(card: Mapping[str, Any], file: object) -> None:
         known = msgspec.convert(card, _Card)
     except (msgspec.ValidationError, RecursionError) as e:
         raise InputError(file, str(e), element="card.json", fix=_FIX) from e
+    refuse_path(known.depends.task, file, "card.json: depends.task")
     recall = known.net.recall
     if recall is None:
         return

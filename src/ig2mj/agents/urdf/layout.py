@@ -157,7 +157,7 @@ class Layout:
             hand=several[0].hand if several else _link(given, "hand", _hand(robot, arm, gripper)),
             camera=_link(given, "camera", _first(robot, CAMERAS)),
             laser=_link(given, "laser", _first(robot, LASERS)),
-            start=dict(given.get("start", {})),
+            start={joint: float(at) for joint, at in given.get("start", {}).items()},
             several=several,
         )
 
