@@ -6,7 +6,6 @@ server, a ValueError. Warnings are none of this file's business.
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import io
 import json
@@ -616,39 +615,11 @@ def dumps(folder: pathlib.Path) -> Reader:
     return Reader(file_reader(folder / "read.npz", read), file.read_bytes(), mutate)
 
 
-def checkpoint_arrays(folder: pathlib.Path) -> Reader:
-    """One of the files that Orbax writes is changed; a checkpoint that cannot be read is skipped."""
-    import shutil
-
-    from ig2mj.learn.checkpoints import Checkpoints
-
-    tree, depends = {"weights": np.arange(6.0, dtype=np.float32).reshape(2, 3), "step": np.int32(3)}, {"task": "reach"}
-    kept = Checkpoints(folder)
-    kept.save(1, tree, {"depends": depends, "iteration": 1})
-    whole = folder / "whole"
-    shutil.copytree(kept.folder / "1", whole)
-    names = sorted(f.relative_to(whole).as_posix() for f in (whole / "arrays").rglob("*") if f.is_file())
-    valid = {name: (whole / name).read_bytes() for name in names}
-
-    def mutate(valid: dict[str, bytes], seed: int) -> dict[str, bytes]:
-        name = names[seed % len(names)]
-        return {name: mutated_bytes(valid[name], seed)}
-
-    def read(changed: dict[str, bytes]) -> None:
-        for name in names:
-            (kept.folder / "1" / name).write_bytes(changed.get(name, valid[name]))
-        with contextlib.redirect_stderr(io.StringIO()):
-            found = kept.newest(tree, depends)
-        assert found is None or found[0]["weights"].shape == (2, 3)
-
-    return Reader(read, valid, mutate)
-
-
 READERS: dict[str, Callable[[pathlib.Path], Reader]] = {
     f.__name__: f
     for f in (
         rooms, expressions, manifests, models, pools, robots, layouts, journals, activities, overrides, policies,
         demonstrations, recordings, igibson_logs, checkpoints, devices, page_messages, engine_profiles, saved_worlds,
-        dumps, checkpoint_arrays,
+        dumps,
     )
 }  # fmt: skip

@@ -13,7 +13,7 @@ from limits import run_limited
 
 def bomb() -> bytes:
     """An archive of 1 MB whose array has 1 GiB, all zeros."""
-    out, block, deflated = io.BytesIO(), bytes(2**24), zipfile.ZIP_DEFLATED
+    out, block = io.BytesIO(), bytes(2**24)
     with (
         zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive,
         archive.open("points.npy", "w", force_zip64=True) as f,

@@ -8,7 +8,7 @@ from hostile_readers import READERS
 QUICK, MANY = 20, 2000
 """Mutations of each reader: in every run of the tests, and in the slow ones."""
 
-NEEDS = {"page_messages": "viser", "checkpoints": "orbax.checkpoint", "checkpoint_arrays": "orbax.checkpoint"}
+NEEDS = {"page_messages": "viser", "checkpoints": "orbax.checkpoint"}
 
 
 def reader(name: str, folder):
