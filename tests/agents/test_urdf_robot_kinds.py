@@ -398,3 +398,24 @@ def test_a_gripper_without_a_hand_is_none_or_refused(tmp_path, home):
     assert "finger_1" in GraspingWorld(home, robot).controller.action_names
     with pytest.raises(InputError, match="a gripper has no hand"):
         UrdfRobot.load(folder, {"hand": "", "gripper": ["finger_1"]})
+
+
+def test_fingers_of_a_linkage_are_its_longest_branches_and_close_at_the_upper_limit(tmp_path):
+    parts = [link("hand"), joint("lift", "prismatic", "base", "hand", "0 0 0.4", "0 0 1")]
+    for side, y, axis in (("left", 0.03, "1 0 0"), ("right", -0.03, "-1 0 0")):
+        leads = side == "left"
+        turns = '<limit lower="0" upper="0.8" effort="20" velocity="1"/>'
+        outer = turns if leads else follows("finger_joint")
+        parts += [
+            *(link(f"{side}_{part}", "0.02 0.01 0.04", 0.05) for part in ("inner_knuckle", "outer_knuckle", "tip")),
+            joint(f"{side}_inner_joint", "revolute", "hand", f"{side}_inner_knuckle", f"0 {y / 2} 0.03", axis,
+                  follows("finger_joint")),
+            joint("finger_joint" if leads else "right_outer_joint", "revolute", "hand", f"{side}_outer_knuckle",
+                  f"0 {y} 0.03", axis, outer),
+            joint(f"{side}_tip_joint", "revolute", f"{side}_outer_knuckle", f"{side}_tip", "0 0 0.05", axis,
+                  follows("finger_joint", -1.0)),
+        ]  # fmt: skip
+    robot = UrdfRobot.load(converted(tmp_path, *parts))
+    assert (robot.layout.gripper, robot.layout.closed) == (("finger_joint",), "upper")
+    (rays,) = robot.hand_rays()
+    assert {*rays.start_bodies, *rays.end_bodies} == {"arm_left_tip", "arm_right_tip"}

@@ -35,8 +35,7 @@ def with_closed_limits(body: RobotBody, layout: Layout) -> Layout:
 def _with_closed_limit(body: RobotBody, gripper: Gripper) -> Gripper:
     if gripper.closed:
         return gripper
-    fingers = {body.branch(link, gripper) for link in body.fingers(gripper) if body.has_shape(link)}
-    pair = _facing(body, gripper) if len(fingers) == 2 else None
+    pair = _facing(body, gripper) if len(_tips(body, gripper)) == 2 else None
     high = [] if pair is None else [name for name in gripper.joints if _closes_high(body, gripper, name, pair)]
     if len(high) == len(gripper.joints):
         return dataclasses.replace(gripper, closed="upper")
@@ -89,16 +88,28 @@ def gripper_rays(name: str, body: RobotBody, gripper: Gripper) -> HandRays | Non
 
 
 def _facing(body: RobotBody, gripper: Gripper) -> tuple[str, str] | None:
-    """Two fingers between which something is held: the last links with a shape of the first two that hang on the hand.
+    """Two fingers between which something is held: the tips of the first two that hang on the hand."""
+    pair = _tips(body, gripper)[:2]
+    return (pair[0], pair[1]) if len(pair) == 2 else None
 
-    Of a finger of several links the last one is its tip.
+
+def _tips(body: RobotBody, gripper: Gripper) -> list[str]:
+    """The last link with a shape of each finger, in the order of the file's.
+
+    Where branches of a hand have different numbers of links, fingers are those with the most: the others guide them, as
+    the inner knuckles of a four-bar linkage do.
     """
     tips: dict[str, str] = {}
+    links: dict[str, int] = {}
     for link in body.fingers(gripper):  # the first of each finger, then what hangs on it
+        branch = body.branch(link, gripper)
+        links[branch] = links.get(branch, 0) + 1
         if body.has_shape(link):
-            tips[body.branch(link, gripper)] = link
-    pair = list(tips.values())[:2]
-    return (pair[0], pair[1]) if len(pair) == 2 else None
+            tips[branch] = link
+    if len(tips) > 2:
+        most = sorted((links[branch] for branch in tips), reverse=True)[1]
+        tips = {branch: link for branch, link in tips.items() if links[branch] >= most}
+    return list(tips.values())
 
 
 def _named(name: str, body: RobotBody, link: str) -> str:
