@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 
 import jax
+import jaxtyping
 import numpy as np
 import pytest
 
 import ig2mj
 from ig2mj.engine.native.engine import NativeEngine
-from ig2mj.errors import AbilityError, InputError, StateError, UnknownNameError
+from ig2mj.errors import AbilityError, EngineError, InputError, StateError, UnknownNameError
 from ig2mj.predicates import AbilityWarning
 from ig2mj.states import StateOptions
 
@@ -221,3 +222,30 @@ def test_igibsons_rules_on_request(tiny_home):
     world = ig2mj.Simulation(tiny_home, states=StateOptions(compat="igibson"))
     world.set_state("burnt", "apple", True)
     assert world.predicate("cooked", "apple")  # burnt implies cooked, there
+
+
+def test_what_is_no_number_is_refused_as_a_state(world, monkeypatch):
+    monkeypatch.setattr(jaxtyping.config, "jaxtyping_disable", True)
+    for value in ("hot", None, [3.0], 1j):
+        with pytest.raises(StateError, match="is set to a number, not to"):
+            world.set_state("temperature", "apple", value)
+    assert world.state("temperature", "apple") == 23.0
+
+
+def test_a_predicate_that_is_asked_as_a_state_names_what_to_ask(world):
+    with pytest.raises(StateError, match=r"is a predicate, not a state: ask predicate\('cooked'"):
+        world.state("cooked", "apple")
+
+
+def test_seeds_of_samplings_are_whole_numbers(world, monkeypatch):
+    monkeypatch.setattr(jaxtyping.config, "jaxtyping_disable", True)
+    with pytest.raises(EngineError, match="a seed is a whole number"):
+        world.set_predicate("on_top", "apple", "table", seed="x")
+
+
+def test_sizes_of_images_are_whole_numbers(world, monkeypatch):
+    monkeypatch.setattr(jaxtyping.config, "jaxtyping_disable", True)
+    for size in ({"width": 0}, {"height": -1}, {"width": 1.5}, {"width": "x"}):
+        with pytest.raises(EngineError, match="a whole number of at least 1"):
+            world.render(**size)
+    assert world.render(width=33, height=7).shape == (7, 33, 3)

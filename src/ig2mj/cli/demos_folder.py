@@ -57,13 +57,14 @@ def metrics(
 def _others(file: pathlib.Path, success_only: bool, incomplete: bool) -> str:
     """What was not measured, for people."""
     from ig2mj.demos.reader import Recording
-    from ig2mj.demos.selection import INCOMPLETE, chosen_runs, left_out
+    from ig2mj.demos.selection import advice, chosen_runs, left_out
 
     with Recording(file) as recording:
         runs = chosen_runs(recording, success_only, incomplete)
         others = left_out(recording, runs)
+        hint = advice(recording, success_only, incomplete)
     if others and not runs:
-        return f"nothing to measure but {others}; {INCOMPLETE}"
+        return f"nothing to measure but {others}" + (f"; {hint}" if hint else "")
     if others:
         return f"left out: {others}"
     return "" if runs else "has no run with a step"

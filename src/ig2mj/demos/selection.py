@@ -33,11 +33,16 @@ def left_out(recording: Recording, chosen: Sequence[Run]) -> str:
     return f"{words} run{'s' if len(others) > 1 else ''}" if words else ""
 
 
+def advice(recording: Recording, success_only: bool, incomplete: bool) -> str:
+    """The option with which a recording of which nothing was chosen has runs, or ""."""
+    return INCOMPLETE if not incomplete and chosen_runs(recording, success_only, True) else ""
+
+
 def some_runs(recording: Recording, success_only: bool = False, incomplete: bool = False) -> list[Run]:
     """The same for what must have a run. Raises InputError: there is none."""
     runs = chosen_runs(recording, success_only, incomplete)
     if not runs:
         others = left_out(recording, runs)
         problem = f"has nothing to export but {others}" if others else "has no run with a step"
-        raise InputError(recording.file, problem, fix=INCOMPLETE if others and not incomplete else "")
+        raise InputError(recording.file, problem, fix=advice(recording, success_only, incomplete))
     return runs

@@ -20,6 +20,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import mujoco
+import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float
 
@@ -50,14 +51,21 @@ world and enclosed, plus Bullet's margin (iGibson's aabb.py).
 """
 
 
+def whole_number(name: str, value: Any, least: int = 1) -> int:
+    """The value of an argument as an int. Raises EngineError: it is not a whole number, or less than `least`."""
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise EngineError(f"{name} = {value!r}: a whole number of at least {least} is needed")
+    return int(value)
+
+
 def check_arguments(boxes: str, num_worlds: int, substeps: int, timestep: float) -> None:
     """What every engine asks of its arguments. Raises EngineError."""
     if boxes not in BOX_RULES:
         raise EngineError(f"there is no box rule '{boxes}' (rules: {', '.join(BOX_RULES)})")
-    if num_worlds < 1 or substeps < 1 or not timestep > 0:
-        raise EngineError(
-            f"num_worlds = {num_worlds}, substeps = {substeps}, timestep = {timestep}: all must be positive"
-        )
+    whole_number("num_worlds", num_worlds)
+    whole_number("substeps", substeps)
+    if isinstance(timestep, bool) or not isinstance(timestep, float | int | np.number) or not timestep > 0:
+        raise EngineError(f"timestep = {timestep!r}: seconds, more than 0")
 
 
 Physics = Any

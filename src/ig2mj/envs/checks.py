@@ -1,4 +1,4 @@
-"""What is asked of actions, on the host."""
+"""What is asked of states and actions, on the host."""
 
 from __future__ import annotations
 
@@ -7,21 +7,34 @@ from typing import TYPE_CHECKING
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax.core import Tracer
 from jaxtyping import Float
 
 from ig2mj.engine.view import Array
+from ig2mj.envs.state import EnvState
 from ig2mj.errors import ActionError
 
 if TYPE_CHECKING:
     from ig2mj.envs.environment import Environment
 
 
+def checked_state(state: EnvState) -> EnvState:
+    """The state. Raises ActionError: it is something else."""
+    if not isinstance(state, EnvState):
+        given = type(state).__name__
+        raise ActionError(f"a step takes the state that reset or the last step returned, and an action; not {given}")
+    return state
+
+
 def checked_action(env: Environment, action: Array) -> Float[Array, "W n"]:
     """The action in single precision.
 
     Raises:
-      ActionError: it has another shape, is not of numbers, or is NumPy's and has some that are not finite.
+      ActionError: it is traced on the native engine, has another shape, is not of numbers, or is NumPy's and has some
+        that are not finite.
     """
+    if not env.pure and isinstance(action, Tracer):
+        raise ActionError("the native engine steps outside of compiled programs: call step without jit, vmap or scan")
     wanted = (env.num_worlds, *env.action_space.shape)
     if np.shape(action) != wanted:
         raise ActionError(f"an action of {env.task.name} has shape {wanted}, not {np.shape(action)}")

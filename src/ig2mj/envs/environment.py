@@ -31,7 +31,7 @@ from jaxtyping import Bool, Float, Int, UInt
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.engine.base import Physics
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.envs.checks import checked_action
+from ig2mj.envs.checks import checked_action, checked_state
 from ig2mj.envs.copies import StateCopies
 from ig2mj.envs.observations import Observer, Space, chosen
 from ig2mj.envs.state import EnvState, Seen
@@ -49,6 +49,7 @@ from ig2mj.worlds.core import Core
 from ig2mj.worlds.lazy.of_view import OfView
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import Seed, Seeds, as_seed, pick_rows
+from ig2mj.worlds.starts import checked_mask
 
 __all__ = ["Companions", "EnvState", "Environment", "Seed", "as_seed"]
 
@@ -158,7 +159,7 @@ class Environment(StateCopies):
         Raises:
           ActionError: the action has another shape, is not of numbers, or is NumPy's and has some that are not finite.
         """
-        return self._step(state, checked_action(self, action))
+        return self._step(checked_state(state), checked_action(self, action))
 
     def step_fn(self, state: EnvState, action: Float[Array, "W n"]) -> EnvState:
         """`step`, neither checked nor compiled."""
@@ -185,7 +186,7 @@ class Environment(StateCopies):
         by name. Reward, `terminated`, `truncated` and the rest of `info` are of the episode that ended. Do not change
         between this and `step` in a compiled loop: here `info` has one key more.
         """
-        return self._autoreset(state, checked_action(self, action))
+        return self._autoreset(checked_state(state), checked_action(self, action))
 
     def step_autoreset_fn(self, state: EnvState, action: Float[Array, "W n"]) -> EnvState:
         """`step_autoreset`, neither checked nor compiled."""
@@ -209,9 +210,15 @@ class Environment(StateCopies):
           seed: of everything random (see `seeds.Seed`); or a state, of which the masked worlds are reset.
           mask: with a state: which worlds; None: all. Each new episode begins with a random row of the pool, which
             belongs to seed, world and episode.
+
+        Raises:
+          EngineError: not a seed, or a mask without a state. ActionError: not a truth value for each world.
         """
         if isinstance(seed, EnvState):
-            return self._reset(seed, np.ones(self.num_worlds, bool) if mask is None else mask)
+            mask = np.ones(self.num_worlds, bool) if mask is None else mask
+            return self._reset(seed, checked_mask(mask, self.num_worlds))
+        if mask is not None:
+            raise EngineError("a mask resets worlds of a state: reset(state, mask); a seed starts all of them")
         number = as_seed(seed, self.num_worlds)
         if (physics := self.core.engine.awaited()) is not None:
             compile_together([self._start.traced(physics.returned, number), physics])

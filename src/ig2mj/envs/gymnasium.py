@@ -38,6 +38,7 @@ from ig2mj.envs.registry import make
 from ig2mj.errors import ActionError, EngineError, UnknownNameError
 from ig2mj.process.entry import refuse_fork
 from ig2mj.worlds.random_streams import as_seed
+from ig2mj.worlds.starts import checked_mask
 
 RENDER_MODES = ("rgb_array",)
 
@@ -194,17 +195,16 @@ class GymVectorEnv(gymnasium.vector.VectorEnv):
           ActionError: a mask of another shape. EngineError: not a seed for each world.
         """
         super().reset(seed=seed if seed is None or isinstance(seed, int | np.integer) else None)  # pyright: ignore
-        if seed is not None and not isinstance(seed, int | np.integer):
-            seed = [int(self.np_random.integers(2**31)) if s is None else s for s in seed]
+        given: Any = seed
+        if isinstance(seed, Sequence | np.ndarray) and np.ndim(given):
+            given = [int(self.np_random.integers(2**31)) if s is None else s for s in seed]
         mask = (options or {}).get("reset_mask")
         if mask is not None and self.state is not None:
-            mask = np.asarray(mask, bool)
-            if mask.shape != (self.num_envs,):
-                raise ActionError(f"reset_mask has shape {(self.num_envs,)}, not {mask.shape}")
-            state = self.state if seed is None else _reseeded(self.state, as_seed(seed, self.num_envs), mask)
+            mask = np.asarray(checked_mask(mask, self.num_envs))
+            state = self.state if seed is None else _reseeded(self.state, as_seed(given, self.num_envs), mask)
             self.state = self.env.reset(state, mask)
         elif seed is not None or self.state is None:
-            self.state = self.env.reset(int(self.np_random.integers(2**31)) if seed is None else seed)
+            self.state = self.env.reset(int(self.np_random.integers(2**31)) if seed is None else given)
         else:
             self.state = self.env.reset(self.env.current(self.state))
         return _host(self.state.obs), self._info(self.state.info)

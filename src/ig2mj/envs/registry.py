@@ -19,6 +19,7 @@ import jax
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import MODES, Grasping
 from ig2mj.agents.urdf import UrdfRobot
+from ig2mj.engine.base import whole_number
 from ig2mj.engine.registry import check_options, make_engine
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.names import NAMES, NAMESPACE, activity_name, short_name
@@ -139,12 +140,11 @@ def make(
     if isinstance(task, NavigationTask) and pool is not None:
         raise EngineError(f"a pool for {task.name}: navigation draws its own start states")
     robot = next(iter(task.robots)) if robot is None else robot
-    if worlds < 1:
-        raise EngineError(f"worlds = {worlds}: an environment has at least one")
-    if pool_size is not None and pool_size < 1:
-        raise EngineError(f"pool_size = {pool_size}: an environment has at least one start state")
-    if mixed < 0:
-        raise EngineError(f"mixed = {mixed}: a number of start states, or 0")
+    whole_number("worlds", worlds)
+    for argument, given in (("pool_size", pool_size), ("image_size", image_size)):
+        if given is not None:
+            whole_number(argument, given)
+    whole_number("mixed", mixed, least=0)
     if mixed and not isinstance(task, Task):
         raise EngineError(f"mixed = {mixed} for {task.name}: only start states of the paper's activities are mixed")
     if engine in (None, "native"):
@@ -152,8 +152,8 @@ def make(
     if engine is None:
         engine = "warp" if jax.default_backend() == "gpu" else "native"
     check_options(f"make with the {engine} engine", options, engine, make)
-    if not 0 < period < float("inf"):
-        raise EngineError(f"period = {period}: seconds of an agent step, a whole number of control steps of 1/30 s")
+    if isinstance(period, str) or not 0 < period < float("inf"):
+        raise EngineError(f"period = {period!r}: seconds of an agent step, a whole number of control steps of 1/30 s")
     if period != ACTION_PERIOD:
         task = dataclasses.replace(task, horizon=max(1, round(task.horizon * ACTION_PERIOD / period)))
     control = Control(whole_actions, period)
@@ -172,7 +172,9 @@ def make(
     physics = make_engine(engine, scene, worlds, **options)
     hands = None if mode == "physical" else Grasping(scene, mode, setup.mittens)
     core = Core(physics, rules, starts, controllers, hands, hand_resets=whole_actions or None)
-    settings = SensorOptions.of(sensors) if isinstance(sensors, Mapping) else sensors or SensorOptions()
+    settings = SensorOptions.of(sensors or {}) if isinstance(sensors, Mapping | None) else sensors
+    if not isinstance(settings, SensorOptions):
+        raise EngineError(f"sensors = {sensors!r}: a mapping of settings, or SensorOptions")
     if image_size is not None:
         settings = dataclasses.replace(settings, width=image_size, height=image_size)
     perceived = SensorSuite(physics, scene, rules.model, controllers[0], chosen, settings)

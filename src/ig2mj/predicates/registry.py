@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ig2mj.errors import UnknownNameError
+from ig2mj.errors import StateError, UnknownNameError
 from ig2mj.predicates.base import Predicate
 from ig2mj.predicates.definitions.burnt import BURNT
 from ig2mj.predicates.definitions.cooked import COOKED
@@ -23,6 +23,8 @@ from ig2mj.predicates.definitions.soaked import SOAKED
 from ig2mj.predicates.definitions.stained import STAINED
 from ig2mj.predicates.definitions.toggled_on import TOGGLED_ON
 from ig2mj.predicates.definitions.under import UNDER
+from ig2mj.states import registry
+from ig2mj.states.spec import StateSpec
 
 PREDICATES: dict[str, Predicate] = {
     p.name: p
@@ -51,6 +53,16 @@ PREDICATES: dict[str, Predicate] = {
 """The 19 predicates of the paper's table A.1, under their snake_case names."""
 
 _ALIASES = {alias: p for p in PREDICATES.values() for alias in p.aliases}
+
+
+def find_state(name: str) -> StateSpec:
+    """The state of that name or alias. Raises UnknownNameError; StateError: it is the name of a predicate."""
+    try:
+        return registry.find(name)
+    except UnknownNameError:
+        if name.lower() in PREDICATES or name.lower() in _ALIASES:
+            raise StateError(f"'{name}' is a predicate, not a state: ask predicate('{name}', ...)") from None
+        raise
 
 
 def find(name: str) -> Predicate:

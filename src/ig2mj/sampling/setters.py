@@ -95,8 +95,9 @@ def set_by_name(
     if kind.set is None:
         raise StateError(f"state '{kind.name}' cannot be set (settable: {', '.join(settable())})")
     kept = np.asarray(getattr(states, kind.name)).dtype if kind.name in kind.fields else np.dtype(bool)
-    if isinstance(value, bool | np.bool_) and kept.kind != "b":
-        raise StateError(f"state '{kind.name}' is set to a number, not to {value}")
+    kinds = "b" if kept.kind == "b" else ""  # a truth is no number, though Python counts with it
+    if np.ndim(value) or np.asarray(value).dtype.kind not in kinds + "iuf":
+        raise StateError(f"state '{kind.name}' is set to a number, not to {value!r}")
     with np.errstate(over="ignore"):
         finite = np.isfinite(np.float32(value))  # as states are kept
     if not finite:

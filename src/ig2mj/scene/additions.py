@@ -61,7 +61,9 @@ class Addition:
 
 
 def place_of(wanted: str) -> tuple[str, Place | None]:
-    """The model's name, and where it is fixed: "shelf/shelf_14@1,2,0.9,-90". Raises Ig2mjError: not four numbers."""
+    """The model's name, and where it is fixed: "shelf/shelf_14@1,2,0.9,-90". Raises Ig2mjError: it is neither."""
+    if not isinstance(wanted, str):
+        raise Ig2mjError(f"objects: {wanted!r} is not a name of the object library, such as 'plate'")
     name, mark, place = wanted.partition("@")
     if not mark:
         return name, None

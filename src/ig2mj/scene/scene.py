@@ -9,12 +9,12 @@ import hashlib
 import json
 import os
 import pathlib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol, runtime_checkable
 
 import mujoco
 
-from ig2mj.errors import InputError, ManifestError, UnknownNameError, without_lines
+from ig2mj.errors import Ig2mjError, InputError, ManifestError, UnknownNameError, without_lines
 from ig2mj.files.inside import inside
 from ig2mj.scene.additions import Addition, add_objects
 from ig2mj.scene.build_tables import build_tables
@@ -183,6 +183,8 @@ def load_scene(path: str | os.PathLike, agents: Sequence[Agent] = (), objects: s
     manifest = load_manifest(folder / MANIFEST_FILE)
     additions: list[Addition] = []
     objects = (objects,) if isinstance(objects, str) else objects
+    if isinstance(objects, Mapping):
+        raise Ig2mjError(f"objects = {objects!r}: a list of names, one for each object to add")
     if objects:
         text, manifest, additions = add_objects(file, manifest, objects)
         spec = _spec_from_text(text, file)

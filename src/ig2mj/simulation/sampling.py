@@ -19,6 +19,7 @@ from ig2mj.sampling.setters import Change, set_by_name
 from ig2mj.scene.scene import Scene
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
+from ig2mj.worlds.random_streams import as_seed
 
 
 class WorldSampler:
@@ -47,7 +48,7 @@ class WorldSampler:
         """
         self.rejected = collections.Counter()
         sampler = self._sampler_in(physics, states)
-        row = sampler.sample([condition], np.random.default_rng(seed), budget, self.rejected)
+        row = sampler.sample([condition], np.random.default_rng(int(as_seed(seed))), budget, self.rejected)
         if row is None:
             return None
         return Row(dataclasses.replace(row.physics, time=physics.time), row.states)

@@ -28,7 +28,7 @@ from ig2mj.errors import AbilityError, EngineError, StateError
 from ig2mj.predicates.compile import CompiledExpression
 from ig2mj.predicates.literals import object_index
 from ig2mj.predicates.logic import Atom, Expression
-from ig2mj.predicates.registry import find
+from ig2mj.predicates.registry import find, find_state
 from ig2mj.process import entry_point, run_programs_inline
 from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.placement import Budget
@@ -41,7 +41,6 @@ from ig2mj.simulation.recording import Recorded
 from ig2mj.simulation.robots import RobotsOfWorld, after_write, put_row, remembered
 from ig2mj.simulation.sampling import WorldSampler
 from ig2mj.simulation.saving import everything, load_world, put_world, save_world
-from ig2mj.states import registry
 from ig2mj.states.model import DEFAULTS, StateModel
 from ig2mj.states.options import StateOptions
 from ig2mj.states.world import ExtendedStates, WorldState
@@ -285,9 +284,9 @@ class Simulation(OwnWorld, Recorded):
           object_name: halves of a sliced object are objects of their own.
 
         Raises:
-          UnknownNameError: no such state or object. AbilityError: the object does not have this state.
+          UnknownNameError: no such state or object; StateError: a predicate. AbilityError: the object does not have it.
         """
-        kind, model, view = registry.find(name), self.state_model, self.view
+        kind, model, view = find_state(name), self.state_model, self.view
         if object_name is not None:
             index = object_index(model, object_name)
             if not kind.belongs_to(model, index):

@@ -21,7 +21,8 @@ from collections.abc import Callable, Sequence
 import mujoco
 import numpy as np
 
-from ig2mj.errors import MissingDependencyError, UnknownNameError
+from ig2mj.engine.base import whole_number
+from ig2mj.errors import EngineError, MissingDependencyError, UnknownNameError
 from ig2mj.process.opengl import GL_BACKENDS, PROBE_XML, fault_of_probe, probe_gl, run_probe
 from ig2mj.process.settings import GL_INSTALL_HINT, use_gl, used_gl
 from ig2mj.scene.geom_groups import VISIBLE_GROUPS
@@ -83,8 +84,10 @@ def render(
       uint8 [height, width, 3], row 0 on top; with `segmentation` int32 [height, width] of geom ids, -1 for none.
 
     Raises:
-      UnknownNameError: no camera has that name. MissingDependencyError: nothing here can draw.
+      UnknownNameError: no camera has that name. MissingDependencyError: nothing here can draw. EngineError: an image of
+      this size cannot be drawn.
     """
+    width, height = whole_number("width", width), whole_number("height", height)
     view = _resolve_camera(model, camera)
     name = backend or default_backend()
     if name == "warp":
@@ -198,6 +201,8 @@ def _renderer_for(model: mujoco.MjModel, width: int, height: int) -> mujoco.Rend
     size.offwidth, size.offheight = max(width, keep[0]), max(height, keep[1])
     try:
         renderer = mujoco.Renderer(model, height, width, max_geom=2 * model.ngeom + model.nsite + 1000)
+    except mujoco.FatalError as e:
+        raise EngineError(f"OpenGL cannot draw an image of {width}x{height} pixels: {e}") from None
     finally:
         size.offwidth, size.offheight = keep
     _renderers[key] = renderer

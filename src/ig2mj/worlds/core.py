@@ -53,7 +53,7 @@ from ig2mj.worlds.lazy.stepper import StateStepper
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import Seeds
 from ig2mj.worlds.rules import Outcome, Rules, States
-from ig2mj.worlds.starts import Starts, chosen
+from ig2mj.worlds.starts import Starts, checked_mask, chosen
 
 Policy = Callable[[Batch, Any], tuple[Float[Array, "W n"] | None, Any]]
 """The next step's action (or controls) from the batch and a carry, and the new carry. Pure."""
@@ -312,8 +312,8 @@ class Core:
         return self.reset_fn(batch, jnp.ones(count, bool))
 
     def reset(self, batch: Batch, mask: Bool[Array, "W"]) -> Batch:
-        """Starts a new episode in the masked worlds, from a random row of the pool."""
-        return self._reset(batch, mask)
+        """Starts a new episode in the masked worlds, each from a random row of the pool. Raises ActionError."""
+        return self._reset(batch, checked_mask(mask, self.engine.num_worlds))
 
     def reset_fn(self, batch: Batch, mask: Bool[Array, "W"]) -> Batch:
         """`reset`, not compiled."""
@@ -356,7 +356,7 @@ class Core:
         Args:
           physics, states: of every world, physics also of one without the world axis; None: they stay. mask: None: all.
         """
-        return self._load(batch, physics, states, mask)
+        return self._load(batch, physics, states, None if mask is None else checked_mask(mask, self.engine.num_worlds))
 
     def load_fn(
         self,

@@ -43,6 +43,8 @@ def as_seed(seed: Seed, num_worlds: int | None = None) -> int | Int[Array, ""] |
             wanted = "one whole number" if num_worlds is None else f"{num_worlds} whole numbers, one for each world"
             raise EngineError(f"seeds have shape {seeds.shape} and are of {seeds.dtype}: {wanted} or a single one")
         return np.array([int(s) % LARGEST for s in seeds], np.int32)
+    if not isinstance(seed, jax.Array | np.ndarray) or not jnp.issubdtype(seed.dtype, jnp.integer):
+        raise EngineError(f"a seed is a whole number or a key of JAX, not {seed!r}")
     return jnp.asarray(seed, jnp.int32)
 
 

@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Int, UInt
 from ig2mj.engine.base import Engine
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.errors import EngineError
+from ig2mj.errors import ActionError, EngineError
 from ig2mj.worlds import guards
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import Seeds, episode_keys, pick_rows
@@ -30,6 +30,8 @@ class Starts:
 
         Raises EngineError: the pool is of another scene, of other added objects, or of the scene before it was changed.
         """
+        if pool is not None and not isinstance(pool, Pool):
+            raise EngineError(f"a pool is what load_pool(file) of ig2mj.worlds.pool returns, not {pool!r}")
         if pool is not None and pool.digest is not None and not engine.scene.owns(pool.digest):
             raise EngineError(
                 f"the pool is not of scene '{engine.scene.name}' with its objects as they are now (make one with "
@@ -64,6 +66,24 @@ class Starts:
     ) -> tuple[Int[Array, "W"], UInt[Array, "W 2"], Int[Array, "W"]]:
         """Episodes after a reset of the masked worlds, their keys, and the row of the pool that each begins with."""
         return self._draw(seed, number, episode, mask, self.pool.size)
+
+
+def checked_mask(mask: Any, num_worlds: int) -> Bool[Array, "W"]:
+    """A mask of worlds: an array of JAX, traced or not, stays one; lists and other arrays become arrays of NumPy.
+
+    Raises:
+      ActionError: it is not one truth value (or 0 or 1) for each world.
+    """
+    if not isinstance(mask, jax.Array):
+        mask = np.asarray(mask)
+    if mask.shape != (num_worlds,):
+        raise ActionError(f"a mask of worlds has shape {(num_worlds,)}, not {mask.shape}")
+    if mask.dtype != bool:
+        whole = jnp.issubdtype(mask.dtype, jnp.integer)
+        if not whole or not isinstance(mask, np.ndarray) or not np.isin(mask, (0, 1)).all():
+            raise ActionError(f"a mask of worlds is true or false for each, not of {mask.dtype}: {mask}")
+        mask = mask.astype(bool)
+    return mask
 
 
 def chosen(mask: Bool[Array, "W"], these: Any, others: Any) -> Any:

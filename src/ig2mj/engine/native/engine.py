@@ -24,7 +24,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Write, check_arguments
+from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Write, check_arguments, whole_number
 from ig2mj.engine.contact_filter import BitLayers
 from ig2mj.engine.controls import check_shape
 from ig2mj.engine.health import Health
@@ -88,8 +88,8 @@ class NativeEngine:
         check_arguments(boxes, num_worlds, substeps, timestep)
         prepare_jax()
         prepare_mujoco()
-        if threads is not None and threads < 1:
-            raise EngineError(f"threads = {threads}: at least one is needed")
+        if threads is not None:
+            whole_number("threads", threads)
         self.scene, self.tables, self.num_worlds = scene, scene.tables, num_worlds
         self.substeps, self.timestep, self.boxes = substeps, timestep, boxes
         self.threads = min(threads or os.cpu_count() or 1, num_worlds)
@@ -176,7 +176,7 @@ class NativeEngine:
         """One control step of every world; see `Engine.step`. Raises LostWorldError where a world is lost, after the
         others were stepped: who wants them goes on with the same physics and its view."""
         live: Any = physics._live
-        if live.generation != physics.generation:  # inline: a world at rest steps in under 2 us
+        if live.generation != physics.generation or live.statics is not self._statics:  # inline: rest takes under 2 us
             live = self._live(physics)
         if ctrl is None:
             if self.num_worlds == 1:  # by far the most frequent case, in which a list would be a fifth of the time
@@ -306,7 +306,12 @@ class NativeEngine:
         return live
 
     def _live(self, physics: NativePhysics) -> LiveWorlds:
-        return physics.live(self._restored)
+        live = physics.live(self._restored)
+        if live.statics is not self._statics:
+            raise EngineError(
+                "this state is of another environment or engine: step it there; env.save and env.load take one across"
+            )
+        return live
 
     def _working_arrays(self, num_worlds: int) -> dict[str, np.ndarray]:
         """By field of the view; and objects' velocities, and what agents' fields are made of."""

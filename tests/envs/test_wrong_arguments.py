@@ -1,0 +1,115 @@
+"""Wrong arguments of environments are errors of the user's, in one line, and leave the state that was given usable."""
+
+import jax
+import jaxtyping
+import numpy as np
+import pytest
+
+import ig2mj
+from ig2mj.errors import ActionError, EngineError, Ig2mjError, UnknownNameError
+
+TASK = "PointNavigation"
+
+
+@pytest.fixture(autouse=True)
+def as_users_call(monkeypatch):
+    """Without the checks of annotations, which only tests have."""
+    monkeypatch.setattr(jaxtyping.config, "jaxtyping_disable", True)
+
+
+@pytest.fixture(scope="module")
+def env():
+    return ig2mj.make(TASK, worlds=2, pool_size=4, engine="native")
+
+
+@pytest.fixture
+def action(env):
+    return np.full((2, *env.action_space.shape), 0.5, np.float32)
+
+
+@pytest.mark.parametrize("mask", [np.ones(3, bool), np.ones((2, 1), bool), [0.5, 1.0], [2, 0], "x", True])
+def test_a_wrong_mask_is_refused_and_uses_up_nothing(env, mask):
+    state = env.reset(0)
+    with pytest.raises(ActionError, match="a mask of worlds"):
+        env.reset(state, mask)
+    with pytest.raises(ActionError, match="a mask of worlds"):
+        env.core.reset(state.batch, mask)
+    env.check(state)
+
+
+@pytest.mark.parametrize("mask", [[True, False], (1, 0), np.array([1, 0])])
+def test_a_mask_may_be_a_list_or_whole_numbers(env, mask):
+    state = env.reset(env.reset(0), mask)
+    assert np.asarray(state.batch.episode).tolist() == [1, 0]
+
+
+def test_a_mask_needs_a_state(env):
+    with pytest.raises(EngineError, match=r"reset\(state, mask\)"):
+        env.reset(0, [True, False])
+
+
+@pytest.mark.parametrize("seed", ["a", None, 1.5, np.float32(1)])
+def test_a_seed_is_a_whole_number(env, seed):
+    with pytest.raises(EngineError, match="a seed is a whole number"):
+        env.reset(seed)
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_a_batch_of_other_worlds_is_refused_and_not_used_up(tiny_home, count):
+    worlds = ig2mj.Worlds(tiny_home, 2, engine="native")
+    batch, other = worlds.start(), ig2mj.Worlds(tiny_home, count, engine="native")
+    for act in (other.step, lambda b: other.reset(b, np.ones(count, bool))):
+        with pytest.raises(EngineError, match="of another environment"):
+            act(batch)
+    worlds.core.check(batch)
+
+
+def test_what_is_no_state_is_refused(env, action):
+    with pytest.raises(ActionError, match="takes the state that reset"):
+        env.step(None, action)
+    with pytest.raises(ActionError, match="not dict"):
+        env.step_autoreset(env.reset(0).obs, action)
+
+
+def test_a_traced_action_is_refused_on_the_native_engine(env, action):
+    state = env.reset(0)
+    with pytest.raises(ActionError, match="without jit, vmap or scan"):
+        jax.vmap(lambda a: env.step(state, a).reward)(np.stack([action, action]))
+    env.check(state)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("worlds", "2"),
+        ("worlds", 1.5),
+        ("worlds", True),
+        ("pool_size", "4"),
+        ("pool_size", 2.5),
+        ("image_size", 17.5),
+        ("image_size", 0),
+        ("mixed", -1),
+        ("period", "x"),
+        ("sensors", 3),
+        ("threads", "a"),
+    ],
+)
+def test_make_names_an_argument_that_is_no_number(name, value):
+    with pytest.raises(EngineError, match=f"{name} = "):
+        ig2mj.make(TASK, **{"pool_size": 4, "engine": "native", name: value})
+
+
+def test_worlds_take_whole_numbers_and_pools(tiny_home):
+    for count in ("2", 1.5, True, 0):
+        with pytest.raises(EngineError, match="num_worlds = "):
+            ig2mj.Worlds(tiny_home, count, engine="native")
+    with pytest.raises(EngineError, match="load_pool"):
+        ig2mj.Worlds(tiny_home, 2, engine="native", pool="pool.npz")
+
+
+def test_objects_are_names():
+    for objects in ([3], [None], [("apple", "plate")], {"apple": 2}):
+        with pytest.raises(Ig2mjError, match="objects"):
+            ig2mj.load_scene("small_home", objects=objects)
+    with pytest.raises(UnknownNameError, match="near matches: apple"):
+        ig2mj.load_scene("small_home", objects=["aple"])
