@@ -11,6 +11,7 @@
 | IG2MJ_LIMIT_MJCF_ELEMENTS  | 500000  | elements of a scene's MJCF, replicated ones counted                         |
 | IG2MJ_LIMIT_MJCF_CELLS     | 50 million | cells of its height fields and built-in textures, user data, one image  |
 | IG2MJ_LIMIT_GROUNDED_PARTS | 20000   | parts of an expression whose quantifiers are written out                    |
+| IG2MJ_LIMIT_BDDL_OBJECTS   | 1000    | objects of an activity; BEHAVIOR-100 has up to 35                           |
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ DEFAULTS = {
     "MJCF_ELEMENTS": 500_000,
     "MJCF_CELLS": 50_000_000,
     "GROUNDED_PARTS": 20_000,
+    "BDDL_OBJECTS": 1_000,
 }
 """By name without `PREFIX`. Deflate packs at most 1032 bytes into one; pools and recordings that the project makes, and
 images of rooms, have 1 to 60."""

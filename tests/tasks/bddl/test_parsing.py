@@ -5,8 +5,9 @@ import sys
 import pytest
 from bddl_package import compare, package_says
 
+from ig2mj.errors import InputError
 from ig2mj.predicates import logic
-from ig2mj.tasks.bddl.definitions import activity_names
+from ig2mj.tasks.bddl.definitions import activity_names, read_problem
 from ig2mj.tasks.bddl.problem import parse_problem
 from ig2mj.tasks.bddl.syntax import BddlError
 
@@ -111,3 +112,14 @@ def test_text_that_is_no_definition(text):
 def test_deep_nesting_is_refused_instead_of_overflowing_the_stack():
     with pytest.raises(BddlError, match="nested deeper"):
         parse_problem("(" * 5000 + ")" * 5000)
+
+
+def test_more_objects_than_any_activity_has_are_refused_before_they_are_bound(tmp_path):
+    file = tmp_path / "many.bddl"
+    names = " ".join(f"apple.n.01_{n}" for n in range(1, 2001))
+    file.write_text(
+        f"(define (problem many_0) (:domain igibson) (:objects {names} - apple.n.01)\n"
+        "(:init (cooked apple.n.01_1)) (:goal (and (cooked ?apple.n.01_1))))"
+    )
+    with pytest.raises(InputError, match=r"many.bddl: :objects: names 2000 objects, .*IG2MJ_LIMIT_BDDL_OBJECTS"):
+        read_problem(file)

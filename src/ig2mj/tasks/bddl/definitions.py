@@ -7,6 +7,7 @@ import pathlib
 
 from ig2mj.errors import UnknownNameError
 from ig2mj.files.content import read_text
+from ig2mj.files.limits import refuse_more
 from ig2mj.knowledge import bddl_folder
 from ig2mj.tasks.bddl import behavior1k
 from ig2mj.tasks.bddl.problem import Problem, parse_problem
@@ -33,7 +34,7 @@ def read_problem(name: str | os.PathLike, behavior_1k: bool = False) -> Problem:
 
     Raises:
       UnknownNameError: no such activity. BddlError: the file is not a definition, naming line and word. InputError: it
-        cannot be read.
+        cannot be read, or names more objects than `ig2mj.files.limits` allows.
     """
     if os.fspath(name).endswith(".bddl"):
         file, tolerant = pathlib.Path(name), False
@@ -42,7 +43,9 @@ def read_problem(name: str | os.PathLike, behavior_1k: bool = False) -> Problem:
         if pathlib.PurePath(name).name != os.fspath(name) or "\0" in os.fspath(name) or not file.is_file():
             raise UnknownNameError("activity", os.fspath(name), activity_names(behavior_1k))
     text = read_text(file, fix="name a BDDL definition")
-    return parse_problem(text, str(file), tolerant=tolerant)
+    problem = parse_problem(text, str(file), tolerant=tolerant)
+    refuse_more("BDDL_OBJECTS", sum(map(len, problem.objects.values())), "names", file, ":objects", " objects")
+    return problem
 
 
 def load_activity(name: str | os.PathLike, behavior_1k: bool = False) -> Activity:
