@@ -1,4 +1,4 @@
-"""One core, before and after robots moved in: measures it, and writes the table of docs/benchmarks.md from the rows.
+"""One core, before and after robots moved in: measures it, and writes the table of docs/notes/benchmarks.md from the rows.
 
     python benchmarks/before_after.py measure [--tree FOLDER --which before]   some 80 s of two quiet cores
     python benchmarks/before_after.py write                                    the table, from the newest rows
@@ -23,7 +23,7 @@ import tyro
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 ROWS = ROOT / "benchmarks" / "results" / "before_after" / "rows.jsonl"
-PAGE = ROOT / "docs" / "benchmarks.md"
+PAGE = ROOT / "docs" / "notes" / "benchmarks.md"
 BEGIN, END = "<!-- begin: python benchmarks/before_after.py write -->\n", "<!-- end of before and after -->"
 
 LINES = (
@@ -136,7 +136,7 @@ def shown(value: float | None) -> str:
 
 
 def write() -> None:
-    """The table between its marks in docs/benchmarks.md."""
+    """The table between its marks in docs/notes/benchmarks.md."""
     rows = [json.loads(line) for line in ROWS.read_text(encoding="utf-8").splitlines()]
     before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
     made = before + BEGIN + "\n" + table(rows) + "\n" + END + rest.split(END)[1]

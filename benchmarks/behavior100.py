@@ -1,6 +1,6 @@
 """In which homes BEHAVIOR's activities can be done: each is bound and compiled in all homes that ship.
 
-    python benchmarks/behavior100.py                       all 100, home by home; writes docs/behavior100.md anew
+    python benchmarks/behavior100.py                       all 100, home by home; writes docs/notes/behavior100.md anew
     python benchmarks/behavior100.py --suite behavior1k    those of BEHAVIOR-1K that need only our predicates
     python benchmarks/behavior100.py --resume              only the homes that an earlier run did not get to
     python benchmarks/behavior100.py --homes birch         just this home, in place of what is known of it
@@ -37,7 +37,7 @@ from ig2mj.tasks.bddl.vocabulary import Activity, VocabularyError
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results" / "behavior100"
-PAGE = ROOT / "docs" / "behavior100.md"
+PAGE = ROOT / "docs" / "notes" / "behavior100.md"
 
 
 def main() -> None:

@@ -1,4 +1,4 @@
-"""`docs/behavior100.md`, written from the files of `behavior100.py`."""
+"""`docs/notes/behavior100.md`, written from the files of `behavior100.py`."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The starts of BEHAVIOR-100's activities, sampled: how many seeds succeed in the home that fits best.
 
-    python benchmarks/behavior100_starts.py --seeds 10             every activity; then writes docs/behavior100.md anew
+    python benchmarks/behavior100_starts.py --seeds 10             every activity; then writes docs/notes/behavior100.md anew
     python benchmarks/behavior100_starts.py --seeds 10 --resume    only the seeds that no earlier run got to
     python benchmarks/behavior100_starts.py --activities cleaning_toilet --part 0 2    every second of these activities
     python benchmarks/behavior100_starts.py --suite behavior1k --seeds 3 --resume    those of BEHAVIOR-1K that fit
@@ -36,7 +36,7 @@ from ig2mj.tasks.bddl.start import HOMES, GoalCheck, fitting, load_bound, start_
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "benchmarks" / "results" / "behavior100"
-PAGE = ROOT / "docs" / "behavior100.md"
+PAGE = ROOT / "docs" / "notes" / "behavior100.md"
 SECONDS = 60.0
 """Wall time that a seed may take, if nothing else is said."""
 HOPELESS = 3

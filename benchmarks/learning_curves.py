@@ -4,7 +4,7 @@
 
 Reads `progress.csv` files of `ig2mj train` in benchmarks/results/learning, named
 ENVIRONMENT-ROBOT-GRASPING-ALGORITHM-OBSERVATION-SEED.csv, and writes a plot for each environment and robot and a table
-(curves.md) there, and with --write the tables of docs/learning.md. A row's success is that of the episodes that ended
+(curves.md) there, and with --write the tables of docs/guide/learning.md. A row's success is that of the episodes that ended
 since the row before, exploration noise included; in the first seconds only those that succeeded have ended, so a run
 counts as there once every later row is, too.
 """
@@ -22,7 +22,7 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-PAGE = pathlib.Path(__file__).parents[1] / "docs" / "learning.md"
+PAGE = pathlib.Path(__file__).parents[1] / "docs" / "guide" / "learning.md"
 
 BEGIN, END = "<!-- tables: benchmarks/learning_curves.py -->", "<!-- end of tables -->"
 
@@ -118,7 +118,7 @@ def reached(curve: list[tuple[float, float, float]], least: float = GOOD) -> flo
 
 
 def tables(files: list[pathlib.Path]) -> str:
-    """The tables of docs/learning.md: a row for each activity, robot and grasping.
+    """The tables of docs/guide/learning.md: a row for each activity, robot and grasping.
 
     It is of the run from pictures, with SAC or DAgger, that was best on held-out states (SAC's, where both were), or
     with most training success where none was evaluated; further seeds with the same settings stand in the same row.
@@ -169,7 +169,7 @@ def tables(files: list[pathlib.Path]) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser()
-    parser.add_argument("--write", action="store_true", help="put the tables into docs/learning.md")
+    parser.add_argument("--write", action="store_true", help="put the tables into docs/guide/learning.md")
     args = parser.parse_args()
     groups: dict[tuple[str, str], list[tuple[str, list, str]]] = collections.defaultdict(list)
     for file in sorted(FOLDER.glob("*.csv")):

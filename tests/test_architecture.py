@@ -1,4 +1,4 @@
-"""The house's rules: who may import whom, and what is packed (docs/architecture.md)."""
+"""The house's rules: who may import whom, and what is packed (docs/design/architecture.md)."""
 
 from __future__ import annotations
 
@@ -120,12 +120,14 @@ def sources(*folders: pathlib.Path) -> list[pathlib.Path]:
 
 def test_every_room_of_the_package_has_its_place_in_the_order():
     rooms = {room_of(f) for f in sources(SRC)} - {"__init__"}
-    assert rooms <= set(LAYERS), f"give {sorted(rooms - set(LAYERS))} a place in LAYERS and in docs/architecture.md"
+    assert rooms <= set(LAYERS), (
+        f"give {sorted(rooms - set(LAYERS))} a place in LAYERS and in docs/design/architecture.md"
+    )
 
 
 def test_the_order_is_that_of_the_document():
-    """docs/architecture.md lists the rooms that there are, in the order of LAYERS."""
-    text = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
+    """docs/design/architecture.md lists the rooms that there are, in the order of LAYERS."""
+    text = (ROOT / "docs" / "design" / "architecture.md").read_text(encoding="utf-8")
     rows = [line.split("|")[1] for line in text.splitlines() if line.startswith("| `")]
     told = [name for row in rows for name in re.findall(r"`(\w+)`", row) if name in LAYERS]
     there = {room_of(f) for f in sources(SRC)} - {"__init__", "__main__"}

@@ -1,4 +1,4 @@
-"""Rows of `run.py` as a table and a plot: docs/benchmarks.md between its two marks, docs/images/peers.png.
+"""Rows of `run.py` as a table and a plot: docs/notes/benchmarks.md between its two marks, docs/images/peers.png.
 
     python benchmarks/peers/report.py [ROWS.jsonl ...]          benchmarks/results/peers/*.jsonl if none are named
 
@@ -17,7 +17,7 @@ HERE = pathlib.Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE.parent))
 
 ROOT = HERE.parent.parent
-PAGE, PLOT = ROOT / "docs" / "benchmarks.md", ROOT / "docs" / "images" / "peers.png"
+PAGE, PLOT = ROOT / "docs" / "notes" / "benchmarks.md", ROOT / "docs" / "images" / "peers.png"
 BEGIN, END = "<!-- peers: written by benchmarks/peers/report.py -->", "<!-- /peers -->"
 
 ENGINES = {"ig2mj": "ig2mj", "mujoco_warp": "MuJoCo Warp", "genesis": "Genesis"}
@@ -125,7 +125,7 @@ def written(rows: list[Row]) -> str:
         text += ["Ours with what comes on top (agent steps a second are a third of the last column):", ""]
         text += [*table([row for row in rows if (row["scene"], row["worlds"]) in whole], ours), ""]
     engines = [ENGINES[engine] for engine in ENGINES if any(row["engine"] == engine for row in rows)]
-    text += [f"![Control steps a second of {', '.join(engines)}](images/peers.png)", ""]
+    text += [f"![Control steps a second of {', '.join(engines)}](../images/peers.png)", ""]
     text += ["<details><summary>What each row did</summary>", "", *details(rows), "", "</details>"]
     return "\n".join(text)
 

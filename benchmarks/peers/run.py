@@ -1,7 +1,7 @@
 """Ours, MuJoCo Warp as it comes, and Genesis in the same homes with the same hand: all rows in one command on a GPU.
 
     python3 benchmarks/peers/run.py --minutes 9 [--genesis-path DIR | --genesis-python PYTHON] [--rows FILE]
-    python3 benchmarks/peers/report.py                   table and plot in docs/benchmarks.md from the rows
+    python3 benchmarks/peers/report.py                   table and plot in docs/notes/benchmarks.md from the rows
 
 Every case is a process of its own with its own time limit. Several are made ready (compiled) side by side; while one is
 timed none other is timed on the same device. Genesis takes minutes to build; where there is a second GPU it gets that

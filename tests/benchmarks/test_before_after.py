@@ -1,4 +1,4 @@
-"""The table of one core in docs/benchmarks.md is that of its rows."""
+"""The table of one core in docs/notes/benchmarks.md is that of its rows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tables of docs/learning.md are those of the curves and evaluations on file."""
+"""The tables of docs/guide/learning.md are those of the curves and evaluations on file."""
 
 from __future__ import annotations
 

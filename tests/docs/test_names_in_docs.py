@@ -10,7 +10,8 @@ import sys
 import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")), *sorted((ROOT / "docs" / "reference").glob("*.md"))]
+DOCS = [ROOT / "docs" / folder for folder in (".", "guide", "reference", "design")]
+PAGES = [ROOT / "README.md", *(page for folder in DOCS for page in sorted(folder.glob("*.md")))]
 NAME = re.compile(r"(?<![\w/.-])ig2mj(?:\.[A-Za-z_]\w*)+")
 FILE = re.compile(r"\.(?:py|md|toml|h5|npz|mujoco)$")
 

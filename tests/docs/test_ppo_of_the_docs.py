@@ -1,4 +1,4 @@
-"""The PPO that docs/learning.md shows learns, on a processor: a point that must reach a goal is its environment."""
+"""The PPO that docs/guide/learning.md shows learns, on a processor: a point that must reach a goal is its environment."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 
 @pytest.mark.slow
 def test_the_hundred_lines_learn():
-    page = (ROOT / "docs" / "learning.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "guide" / "learning.md").read_text(encoding="utf-8")
     (block,) = re.findall(r"^## PPO in a hundred lines.*?```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
     assert len(block.splitlines()) <= 110
     made, count = 'env = ig2mj.make("CookingMeat", worlds=2048, engine="warp")', "iterations, length"
     assert block.count(made) == block.count(count + ", epochs, parts = 20") == 1
     block = block.replace(made, "env = PointMass(128)").replace("parts = 20,", "parts = 120,")
     names = {"PointMass": PointMass, "print": lambda *words: None}
-    exec(compile(block, "docs/learning.md", "exec"), names)
+    exec(compile(block, "docs/guide/learning.md", "exec"), names)
     assert float(names["success"]) > 0.85

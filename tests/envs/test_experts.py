@@ -39,7 +39,7 @@ LEAST = {
     ("SoakingTowel", "fetch"): 0.95,
     ("SlicingFruit", "fetch"): 0.95,
 }
-"""Share of held-out states that each expert solves, at least (docs/experts.md has what was measured)."""
+"""Share of held-out states that each expert solves, at least (docs/guide/experts.md has what was measured)."""
 
 
 @pytest.mark.slow

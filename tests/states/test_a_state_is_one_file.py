@@ -65,11 +65,11 @@ print(json.dumps(told))
 
 @pytest.fixture(scope="module")
 def told(repository: pathlib.Path, tiny_home_folder: pathlib.Path, tmp_path_factory: pytest.TempPathFactory) -> dict:
-    """What a copy of the package tells of the state that docs/states.md adds: one file, one line in the order."""
+    """What a copy of the package tells of the state that docs/guide/states.md adds: one file, one line in the order."""
     folder = tmp_path_factory.mktemp("made_up")
     package = folder / "ig2mj"
     shutil.copytree(pathlib.Path(ig2mj.__file__).parent, package, ignore=shutil.ignore_patterns("__pycache__"))
-    page = (repository / "docs" / "states.md").read_text()
+    page = (repository / "docs" / "guide" / "states.md").read_text()
     (package / "states/definitions/age.py").write_text(
         page.split("## Add a state")[1].split("```python\n")[1].split("```")[0]
     )
@@ -152,6 +152,6 @@ def test_every_state_that_keeps_something_has_its_place_in_the_order_of_update()
 
 
 def test_every_state_is_in_the_documentation(repository):
-    text = (repository / "docs" / "states.md").read_text()
+    text = (repository / "docs" / "guide" / "states.md").read_text()
     for spec in registry.SPECS:
         assert f"`{spec.name}`" in text, spec.name

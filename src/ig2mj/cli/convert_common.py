@@ -32,7 +32,7 @@ class Common:
       no_cache: convert even if nothing has changed, and write nothing to the cache.
       strict: treat warnings as errors: exit status 2, no output.
       no_report: skip the checks, report.json and report.html.
-      limit: raise or lower limits of the readers, e.g. mesh-faces=3000000 (see docs/untrusted_input.md).
+      limit: raise or lower limits of the readers, e.g. mesh-faces=3000000 (see docs/guide/untrusted_input.md).
       json: print what was done as JSON.
     """
 

@@ -45,7 +45,7 @@ def run(
       agent: zero (no motion), random, expert (scripted; the six activities have one), or a policy: a file written by
         `ig2mj train`, or the name of one that ships.
       robot: humanoid, fetch or turtlebot; default: the task's first robot.
-      robot_urdf: URDF of a robot of your own to use instead (docs/environments.md).
+      robot_urdf: URDF of a robot of your own to use instead (docs/guide/environments.md).
       robot_layout: TOML or JSON file that assigns its joints to base, arm and gripper; default: guessed from their
         names.
       grasping: mitten, assisted, sticky or physical; default: the task's.

@@ -58,7 +58,7 @@ def run(
       pool: page through the rows of a pool of this scene, with the objects it adds: the right arrow turns the page;
         with --picture, draw one row.
       row: the row of the pool, or the policy's start state, to begin with.
-      robot_urdf: URDF of a robot to add to the scene (docs/environments.md).
+      robot_urdf: URDF of a robot to add to the scene (docs/guide/environments.md).
       robot_layout: TOML or JSON file that assigns its joints to base, arm and gripper; default: guessed from their
         names.
       robot_at: its position (metres) and its angle from the x axis (degrees).

@@ -1,4 +1,4 @@
-"""Recordings of environments: everything of every frame, to be replayed bit for bit (docs/demonstrations.md)."""
+"""Recordings of environments: everything of every frame, to be replayed bit for bit (docs/guide/demonstrations.md)."""
 
 from ig2mj.demos.environments import RecordedEnvironment, record
 from ig2mj.demos.reader import Recording, Run

@@ -2,7 +2,7 @@
 
 | name | what | shape |
 |---|---|---|
-| `rgb`, `depth`, `scan`, ... | any sensor of `ig2mj.sensors.registry.SENSORS` (docs/sensors.md) | the sensor's |
+| `rgb`, `depth`, `scan`, ... | any sensor of `ig2mj.sensors.registry.SENSORS` (docs/guide/sensors.md) | the sensor's |
 | `privileged_state` | ground truth, in the frame of the robot's base (`Objective.vectors`) | [p] |
 | others of the task | such as iGibson's `task_obs` of navigation (`Objective.vectors`) | [n] |
 

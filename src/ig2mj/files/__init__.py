@@ -2,5 +2,5 @@
 
 `limits` says how much is read, `content` reads bytes, text and JSON, `npz` and `hdf5` read arrays, `inside` keeps paths
 below a folder, and `heartbeat` says whether whoever made a temporary folder still works on it. Every reader of the
-project is built on these; `docs/untrusted_input.md` says what they promise.
+project is built on these; `docs/guide/untrusted_input.md` says what they promise.
 """

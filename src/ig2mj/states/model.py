@@ -43,7 +43,7 @@ class StateModel:
 
     @property
     def paper(self) -> bool:
-        """Whether the paper's rules are in force, rather than iGibson's code's (docs/states.md)."""
+        """Whether the paper's rules are in force, rather than iGibson's code's (docs/guide/states.md)."""
         return self.options.compat == "paper"
 
     @functools.cached_property

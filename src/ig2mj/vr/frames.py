@@ -6,7 +6,7 @@ Every source turns its own axes into these, once:
 - a head looks along its x, its left is y, its up is z (as the humanoid's eye);
 - a hand is the humanoid's: fingers along -y (right) or y (left), the palm's face along z (`agents.humanoid.frames`).
 
-A frame is kept as arrays of fixed shape, which a recording has of every step (`devices/<name>`, docs/vr.md).
+A frame is kept as arrays of fixed shape, which a recording has of every step (`devices/<name>`, docs/guide/vr.md).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """WetnessLevel: droplets that a soakable object has absorbed (paper table A.4); Soaked is read from it.
 
 The paper's level is a number that grows by one per droplet. iGibson's code keeps a latch only: here, with
-compat="igibson", one drop on the object makes the level the soaked threshold and no more (docs/states.md,
+compat="igibson", one drop on the object makes the level the soaked threshold and no more (docs/guide/states.md,
 row 2). Drying is no part of either and off by default (`StateOptions.drying_rate`).
 """
 
