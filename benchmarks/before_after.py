@@ -1,4 +1,4 @@
-"""One core, before and after robots moved in: measures it, and writes the table of docs/notes/benchmarks.md from the rows.
+"""One core, before and after robots moved in: writes the table of docs/notes/benchmarks.md.
 
     python benchmarks/before_after.py measure [--tree FOLDER --which before]   some 80 s of two quiet cores
     python benchmarks/before_after.py write                                    the table, from the newest rows

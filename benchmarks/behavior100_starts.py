@@ -1,6 +1,6 @@
 """The starts of BEHAVIOR-100's activities, sampled: how many seeds succeed in the home that fits best.
 
-    python benchmarks/behavior100_starts.py --seeds 10             every activity; then writes docs/notes/behavior100.md anew
+    python benchmarks/behavior100_starts.py --seeds 10             every activity; writes docs/notes/behavior100.md
     python benchmarks/behavior100_starts.py --seeds 10 --resume    only the seeds that no earlier run got to
     python benchmarks/behavior100_starts.py --activities cleaning_toilet --part 0 2    every second of these activities
     python benchmarks/behavior100_starts.py --suite behavior1k --seeds 3 --resume    those of BEHAVIOR-1K that fit

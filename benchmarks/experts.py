@@ -2,7 +2,7 @@
 
     python benchmarks/experts.py --jobs 48 --episodes 200 --minutes 8      # everything; goes on where it ended
     python benchmarks/experts.py --tasks SlicingFruit --robots fetch --grasping mitten --episodes 32 --out out/experts
-    python benchmarks/experts.py --table                                   # the table of docs/guide/experts.md, from the rows
+    python benchmarks/experts.py --table                                   # the table of docs/guide/experts.md
 
 First the pools of held-out states are sampled, as far as they are not in the cache. Then every case is cut into parts
 of `--worlds` episodes, each played in a process of its own, native engine, one thread. A part that is done adds a line

@@ -120,9 +120,7 @@ def sources(*folders: pathlib.Path) -> list[pathlib.Path]:
 
 def test_every_room_of_the_package_has_its_place_in_the_order():
     rooms = {room_of(f) for f in sources(SRC)} - {"__init__"}
-    assert rooms <= set(LAYERS), (
-        f"give {sorted(rooms - set(LAYERS))} a place in LAYERS and in docs/design/architecture.md"
-    )
+    assert rooms <= set(LAYERS), f"add {sorted(rooms - set(LAYERS))} to LAYERS and to docs/design/architecture.md"
 
 
 def test_the_order_is_that_of_the_document():

@@ -1,4 +1,4 @@
-"""The PPO that docs/guide/learning.md shows learns, on a processor: a point that must reach a goal is its environment."""
+"""The PPO that docs/guide/learning.md shows learns, on a CPU: a point that must reach a goal."""
 
 from __future__ import annotations
 

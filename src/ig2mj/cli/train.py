@@ -70,7 +70,7 @@ def run(
       save_buffer: also store the replay buffer in checkpoints; otherwise a resumed run first refills it.
       until: stop once this share of the last episodes succeeds, e.g. 0.98.
       programs: compiled programs per iteration: 1, or 2 to time simulation and learning separately.
-      devices: number of GPUs, or all: those of this machine, or of all processes started together (docs/guide/scale.md).
+      devices: number of GPUs, or all: of this machine, or of all processes started together (docs/guide/scale.md).
       paper_rl: use the success thresholds of the paper's experiments.
       pool_size: number of start states; 0: all of the split.
       mixed: train on this many start states made of those: every object lies where it does in one, turned as in
