@@ -5,7 +5,7 @@
 Reads `progress.csv` files of `ig2mj train` in benchmarks/results/learning, named
 ENVIRONMENT-ROBOT-GRASPING-ALGORITHM-OBSERVATION-SEED.csv, and writes a plot for each environment and robot and a table
 (curves.md) there, and with --write the tables of docs/guide/learning.md. A row's success is that of the episodes that
-ended since the row before, exploration noise included; in the first seconds only those that succeeded have ended, so a run
+ended since the row before, exploration noise included; in the first seconds only successes have ended, so a run
 counts as there once every later row is, too.
 """
 
