@@ -54,9 +54,9 @@ def measure(what: str, worlds: int, beforehand: bool | str, cache: pathlib.Path)
 
     tick("interpreter")
 
-    from ig2mj.process.collector import REST
+    from ig2mj.process.gc_pause import GC_PAUSED
 
-    REST.begin()  # as `ig2mj.Worlds` and `make_engine` do, which import the same in this order
+    GC_PAUSED.begin()  # as `ig2mj.Worlds` and `make_engine` do, which import the same in this order
     import jax
     import numpy as np
 
@@ -74,7 +74,7 @@ def measure(what: str, worlds: int, beforehand: bool | str, cache: pathlib.Path)
 
     from ig2mj.engine.warp.engine import WarpEngine
 
-    REST.end()
+    GC_PAUSED.end()
     tick("imports")
     jax.devices()
     tick("JAX's devices")

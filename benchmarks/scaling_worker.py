@@ -4,8 +4,8 @@
 
 Says `READY {...}` on standard output; for each line `{"seconds": 8}` on standard input it answers `DONE {...}`; it ends
 with its input. For `{"kernels": FILE}` a learner learns from one rollout ten times, and writes what ran on its GPU. A
-learner of several processes finds the others by the variables of `ig2mj.cluster.place`; what they measure together they
-time together. It takes all GPUs that it sees.
+learner of several processes finds the others by the variables of `ig2mj.cluster.process_topology`; what they measure
+together they time together. It takes all GPUs that it sees.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from captures import Counts, Moves
 from kernel_times import profiled_to
 from throughput import device, memory, program
 
-from ig2mj.cluster.place import place_of
+from ig2mj.cluster.process_topology import find_topology
 from ig2mj.cluster.team import Team
 from ig2mj.process import keep_scratch_in_place
 
@@ -203,7 +203,7 @@ def main() -> None:
     case, settings = sys.argv[1], json.loads(sys.argv[2])
     if settings["several"]:
         keep_scratch_in_place()  # as `ig2mj train` does
-    team = Team.join(place_of(os.environ))
+    team = Team.join(find_topology(os.environ))
     with team.together():
         profile = None
         if case == "simulator":

@@ -17,7 +17,7 @@ import numpy as np
 
 import ig2mj
 from ig2mj.demos import Recording, Replayer, record
-from ig2mj.demos.thin import write_thin
+from ig2mj.demos.compact import write_compact
 from ig2mj.envs.experts import expert_of
 from ig2mj.tasks.experts.expert import PLANS
 
@@ -57,7 +57,7 @@ def main() -> None:
                 runs = [run for run in recording.runs if run.attributes.get("success")][:EPISODES]
                 done = Replayer(recording)(check=True, runs=runs)
                 assert not done.differences, str(done.differences[0])
-                write_thin(recording, FOLDER / f"{task}.h5", runs, noise=NOISE, disturbed=DISTURBED)
+                write_compact(recording, FOLDER / f"{task}.h5", runs, noise=NOISE, disturbed=DISTURBED)
                 played = sum(1 for run in recording.runs if run.attributes["ended"])
         size = (FOLDER / f"{task}.h5").stat().st_size / 1e6
         print(f"{task}: {len(runs)} runs of {played}, {done.frames} frames, {size:.2f} MB", flush=True)

@@ -84,7 +84,7 @@ def pytest_xdist_make_scheduler(config: pytest.Config, log):
 @pytest.fixture(scope="session", autouse=True)
 def _programs_from_shapes():
     """JAX describes arguments of a lowered program in trees whose leaves are no arrays: not checked there."""
-    from ig2mj.process.collector import Compiled, Traced
+    from ig2mj.process.gc_pause import Compiled, Traced
 
     def unchecked(method):
         def call(self, *args):

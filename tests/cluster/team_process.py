@@ -15,7 +15,7 @@ from typing import Any
 
 sys.path.insert(0, str(pathlib.Path(__file__).parents[1] / "learn"))
 
-from ig2mj.cluster.place import place_of
+from ig2mj.cluster.process_topology import find_topology
 from ig2mj.cluster.team import Team
 
 WORLDS, LENGTH = 16, 8
@@ -140,7 +140,7 @@ def turns(team: Team) -> dict:
 
 def main() -> None:
     task, out = sys.argv[1:3]
-    team = Team.join(place_of(os.environ), patience=60.0)
+    team = Team.join(find_topology(os.environ), patience=60.0)
     with team.together():
         if task == "gradient":
             found = gradient(team)

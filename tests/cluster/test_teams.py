@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from ig2mj.cluster.place import Place
+from ig2mj.cluster.process_topology import ProcessTopology
 from ig2mj.cluster.team import Team, _Link
 from ig2mj.cluster.versions import versions
 from ig2mj.errors import ClusterError
@@ -127,14 +127,14 @@ def test_a_team_of_one_waits_for_nobody():
 
 
 def test_who_does_not_come_is_named():
-    place = Place("127.0.0.1", free_port(), 0, 3)
+    place = ProcessTopology("127.0.0.1", free_port(), 0, 3)
     with pytest.raises(ClusterError, match=r"processes 1, 2 of 3 have not come within 1.5 s"):
         Team.join(place, patience=1.5)
 
 
 def test_nobody_there():
     with pytest.raises(ClusterError, match=r"process 0 is not to be reached at 127.0.0.1:\d+: Connection refused"):
-        Team.join(Place("127.0.0.1", free_port(), 1, 2), patience=0.5)
+        Team.join(ProcessTopology("127.0.0.1", free_port(), 1, 2), patience=0.5)
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ def test_nobody_there():
 )
 def test_another_version_is_refused_on_both_sides(changes, said):
     own = {"rank": 0, "count": 2, "pid": 1, "host": "a", **versions()}
-    place, team = Place("127.0.0.1", free_port(), 0, 2), Team(0, 2)
+    place, team = ProcessTopology("127.0.0.1", free_port(), 0, 2), Team(0, 2)
     with socket.create_server(("127.0.0.1", 0)) as server:
         other = _Link(socket.create_connection(server.getsockname()))
         link = _Link(server.accept()[0])

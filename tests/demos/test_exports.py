@@ -17,12 +17,12 @@ import pytest
 import ig2mj
 from ig2mj.cli import call
 from ig2mj.demos import Recording, Replayer, record
-from ig2mj.demos.films import EpisodeFilms
 from ig2mj.demos.igibson import export_igibson, read_igibson
 from ig2mj.demos.lerobot import export_lerobot
 from ig2mj.demos.metrics import metrics_of
 from ig2mj.demos.robomimic import export_robomimic
 from ig2mj.demos.selection import chosen_runs, left_out
+from ig2mj.demos.videos import EpisodeVideos
 from ig2mj.envs.experts import expert_of
 from ig2mj.errors import InputError
 from ig2mj.sensors.base import SensorOptions
@@ -283,33 +283,33 @@ def test_lerobot_has_a_row_for_every_step_and_says_what_each_column_is(recorded)
 
 
 def test_films_of_many_episodes_follow_each_other(tmp_path):
-    films = EpisodeFilms(lambda place: tmp_path / "{file_index}.mp4".format(**place), fps=10, codec="h264")
+    videos = EpisodeVideos(lambda place: tmp_path / "{file_index}.mp4".format(**place), fps=10, codec="h264")
     shades = [40, 120, 200]
-    places = [films.add(np.full((4, 64, 96, 3), shade, np.uint8), limit=100) for shade in shades]
-    films.close()
+    places = [videos.add(np.full((4, 64, 96, 3), shade, np.uint8), limit=100) for shade in shades]
+    videos.close()
     assert places == [({"chunk_index": 0, "file_index": 0}, start) for start in (0.0, 0.4, 0.8)]
     with av.open(str(tmp_path / "0.mp4")) as opened:
         frames = [(float(f.time), f.to_ndarray(format="rgb24")) for f in opened.decode(video=0)]  # type: ignore[arg-type]
     assert [time for time, _ in frames] == pytest.approx([k / 10 for k in range(12)])
     for k, (_, picture) in enumerate(frames):
         assert picture.shape == (64, 96, 3) and abs(picture.mean() - shades[k // 4]) < 3
-    assert films.about["video.fps"] == 10
+    assert videos.about["video.fps"] == 10
 
 
 @pytest.mark.parametrize("size", [(64, 64), (63, 65), (1, 1), (2, 3)])
 @pytest.mark.parametrize("first", [1, 2, 3])
 def test_films_of_episodes_of_any_length_and_images_of_any_size(tmp_path, size, first):
-    films = EpisodeFilms(lambda place: tmp_path / "{file_index}.mp4".format(**place), fps=10, codec="h264")
+    videos = EpisodeVideos(lambda place: tmp_path / "{file_index}.mp4".format(**place), fps=10, codec="h264")
     shades = [40, 200]
     lengths = [first, 2]
     for shade, length in zip(shades, lengths, strict=True):
-        films.add(np.full((length, *size, 3), shade, np.uint8), limit=100)
-    films.close()
+        videos.add(np.full((length, *size, 3), shade, np.uint8), limit=100)
+    videos.close()
     with av.open(str(tmp_path / "0.mp4")) as opened:
         frames = [f.to_ndarray(format="rgb24") for f in opened.decode(video=0)]  # type: ignore[arg-type]
     assert [f.shape for f in frames] == [(*size, 3)] * sum(lengths)
     assert [round(f.mean() / 40) for f in frames] == [1] * first + [5] * 2
-    assert (films.about["video.height"], films.about["video.width"]) == size
+    assert (videos.about["video.height"], videos.about["video.width"]) == size
 
 
 def test_igibsons_logs_are_written_and_read_back(recorded):

@@ -16,10 +16,10 @@ import pytest
 import ig2mj
 from ig2mj.cli import call
 from ig2mj.demos import Recording, Replayer, record
+from ig2mj.demos.compact import write_compact
 from ig2mj.demos.metrics import metrics_of
 from ig2mj.demos.observing import observe
 from ig2mj.demos.origin import origin_of
-from ig2mj.demos.thin import write_thin
 from ig2mj.envs.experts import expert_of
 from ig2mj.errors import InputError
 from ig2mj.scene.paths import SHIPPED_HOMES
@@ -183,7 +183,7 @@ def test_a_recording_outlives_a_change_of_looks_and_names(env, recorded, tmp_pat
 def test_a_thin_recording_has_actions_and_first_and_last_frames_and_comes_out_the_same(env, recorded, tmp_path):
     thin = tmp_path / "thin.h5"
     with Recording(recorded[0]) as recording:
-        write_thin(recording, thin, recording.runs[1:4])
+        write_compact(recording, thin, recording.runs[1:4])
         actions, last = (
             recording.runs[2].all_rows("steps/action"),
             recording.runs[2].frame_rows(["states/temperature"], 12, 13),

@@ -13,7 +13,7 @@ import yaml
 from parsed_commands import parse_only
 
 from ig2mj.cli import train
-from ig2mj.cluster.place import place_of
+from ig2mj.cluster.process_topology import find_topology
 
 FOLDER = pathlib.Path(__file__).resolve().parents[2] / "examples" / "cluster"
 
@@ -94,7 +94,7 @@ def test_the_job_gives_every_pod_what_a_process_reads():
     (container,) = job["template"]["spec"]["containers"]
     assert job["completionMode"] == "Indexed" and job["completions"] == job["parallelism"]
     environment = {e["name"]: e["value"] for e in container["env"]} | {"JOB_COMPLETION_INDEX": "1"}
-    place = place_of(environment)
+    place = find_topology(environment)
     assert place is not None and (place.rank, place.count) == (1, job["completions"])
     assert place.host == f"{found['Job']['metadata']['name']}-0.{service['metadata']['name']}"
     assert (

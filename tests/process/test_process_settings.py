@@ -16,7 +16,7 @@ import warp as wp
 import ig2mj.process
 from ig2mj.errors import EngineError
 from ig2mj.process import prepare_warp, quiet_warp, settings
-from ig2mj.process.collector import CollectorRest, Compiled
+from ig2mj.process.gc_pause import Compiled, GcPause
 
 STATE = """
 import jax, warp as wp, gc, os
@@ -82,7 +82,7 @@ def test_no_other_module_changes_the_process(repository: pathlib.Path):
         for file in (repository / folder).rglob("*.py")
         if setters.search(file.read_text(encoding="utf-8"))
     }
-    assert found == {f"src/ig2mj/process/{name}.py" for name in ("settings", "warp_repairs", "collector")}
+    assert found == {f"src/ig2mj/process/{name}.py" for name in ("settings", "warp_repairs", "gc_pause")}
 
 
 def test_warp_is_quiet_inside_the_block_only():
@@ -101,7 +101,7 @@ def test_one_process_draws_with_one_backend(monkeypatch):
 
 
 def test_the_collector_rests_while_any_thread_is_in_a_block():
-    rest, inside, leave = CollectorRest(), threading.Event(), threading.Event()
+    rest, inside, leave = GcPause(), threading.Event(), threading.Event()
 
     def other() -> None:
         rest.begin()
@@ -125,7 +125,7 @@ def test_the_collector_rests_while_any_thread_is_in_a_block():
 def test_a_collector_that_the_user_switched_off_stays_off():
     gc.disable()
     try:
-        rest = CollectorRest()
+        rest = GcPause()
         rest.begin()
         rest.end()
         assert not gc.isenabled()

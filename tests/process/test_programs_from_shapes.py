@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from ig2mj.engine.snapshot import ScenePart
-from ig2mj.process.collector import Compiled, compile_together
+from ig2mj.process.gc_pause import Compiled, compile_together
 
 WIDTHS = {"eq_data": (2, 12), "mocap_pos": (1, 3), "mocap_quat": (1, 4), "touching": (3, 3)}
 KINDS = {"eq_active": bool, "touching": bool, "tree_asleep": np.int32}

@@ -9,7 +9,7 @@ pytest.importorskip("viser")
 
 import ig2mj
 from ig2mj.demos import Recording, record
-from ig2mj.demos.thin import write_thin
+from ig2mj.demos.compact import write_compact
 from ig2mj.envs.experts import expert_of
 from ig2mj.web.recorded import Recorded
 from ig2mj.web.runner import Runner
@@ -70,7 +70,7 @@ def test_every_frame_of_a_recording_is_shown_as_it_was(file):
 def test_a_thin_recording_shows_the_same_frames(file, tmp_path):
     thin = tmp_path / "thin.h5"
     with Recording(file[0]) as recording:
-        write_thin(recording, thin, recording.runs[:2])
+        write_compact(recording, thin, recording.runs[:2])
     with Recording(thin) as recording:
         source = Recorded(recording)
         for frame in (4, 5, 2, 6, 0):

@@ -88,7 +88,7 @@ def run(
     import jax
 
     from ig2mj.cli.train_films import Films
-    from ig2mj.cluster.place import place_of
+    from ig2mj.cluster.process_topology import find_topology
     from ig2mj.cluster.team import Team
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.errors import Ig2mjError
@@ -119,7 +119,7 @@ def run(
         from ig2mj.cli.clone import train_from_demos
 
         return train_from_demos(env, demos, robot, grasping, obs, pixels, kept_rows, minutes, seed, out, resume, set)
-    place = place_of(os.environ)
+    place = find_topology(os.environ)
     if devices != "1" or (place and place.count > 1):
         keep_scratch_in_place()
     team = Team.join(place)

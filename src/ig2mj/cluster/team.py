@@ -22,7 +22,7 @@ import traceback
 from collections.abc import Iterator
 from typing import Any
 
-from ig2mj.cluster.place import Place
+from ig2mj.cluster.process_topology import ProcessTopology
 from ig2mj.cluster.versions import versions
 from ig2mj.errors import ClusterError, Ig2mjError
 
@@ -62,11 +62,11 @@ class Team:
         return self.rank == 0
 
     @classmethod
-    def join(cls, place: Place | None, patience: float = PATIENCE) -> Team:
+    def join(cls, place: ProcessTopology | None, patience: float = PATIENCE) -> Team:
         """Waits for all processes, and tells JAX of them; before JAX is first used.
 
         Args:
-          place: which process this is (`place.place_of`); None: there is no other.
+          place: which process this is (`place.find_topology`); None: there is no other.
 
         Raises:
           ClusterError: one has not come, cannot be reached, or has other versions.
@@ -156,7 +156,7 @@ class Team:
 
     # Coming together.
 
-    def _gather(self, place: Place, own: dict[str, Any], patience: float) -> int:
+    def _gather(self, place: ProcessTopology, own: dict[str, Any], patience: float) -> int:
         """Process 0 takes in the others; the port of JAX's coordinator."""
         until = time.monotonic() + patience
         try:
@@ -207,7 +207,7 @@ class Team:
             with contextlib.suppress(OSError):
                 link.send(refused=reason)
 
-    def _connect(self, place: Place, own: dict[str, Any], patience: float) -> int:
+    def _connect(self, place: ProcessTopology, own: dict[str, Any], patience: float) -> int:
         """The others come to process 0; the port of JAX's coordinator."""
         until, why = time.monotonic() + patience, "nobody answers"
         while time.monotonic() < until:

@@ -2,10 +2,10 @@
 
     meta/info.json, stats.json, ig2mj.json, tasks.parquet, episodes/chunk-000/file-000.parquet
     data/chunk-000/file-000.parquet                      one row a step
-    videos/<camera>/chunk-000/file-000.mp4               pictures of many episodes, one after the other
+    videos/<camera>/chunk-000/file-000.mp4               images of many episodes, one after the other
 
 An episode is a run; its row t has the observations before step t, the action, and reward and ends after it. Colours are
-films (`observation.images.rgb`), depths columns of whole millimetres, all other observations columns of floats.
+videos (`observation.images.rgb`), depths columns of whole millimetres, all other observations columns of floats.
 `meta/ig2mj.json` says how `ig2mj.make` makes an environment with these observations.
 Source of the layout: LeRobot's documentation of datasets v3.0 and the files of LeRobot 0.4.4.
 
@@ -48,7 +48,7 @@ DEEPEST = 65.535
 """m, the largest depth in whole millimetres of 16 bits."""
 
 PIXEL_STRIDE = 4
-"""Of the pixels that statistics of pictures are made of, in each direction."""
+"""Of the pixels that statistics of images are made of, in each direction."""
 
 
 def export_lerobot(
@@ -62,7 +62,7 @@ def export_lerobot(
 
     Args:
       replayer: of the recording; its environment's observations are written. folder: must not be there yet.
-      codec: of the films, as PyAV names it. success_only, incomplete: see `ig2mj.demos.selection.chosen_runs`.
+      codec: of the videos, as PyAV names it. success_only, incomplete: see `ig2mj.demos.selection.chosen_runs`.
 
     Returns:
       What came of the replay.
@@ -111,15 +111,15 @@ class DatasetWriter:
 
     def __init__(self, folder: pathlib.Path, replayer: Replayer, codec: str):
         """`folder`: an empty one. Raises InputError: the format cannot hold the recording."""
-        from ig2mj.demos.films import EpisodeFilms
+        from ig2mj.demos.videos import EpisodeVideos
 
         env = replayer.env
         self.folder, self._fps, self._made = folder, _whole_rate(replayer), made_again(env)
         self._name, self._horizon = env.task.name, env.task.horizon
         self._robot, self._task = env.robot, getattr(env.task, "summary", env.task.name)
         self._features = _features(env)
-        self._films = {
-            name: EpisodeFilms(lambda place, name=name: self._at(VIDEO_PATH, place, video_key=name), self._fps, codec)
+        self._videos = {
+            name: EpisodeVideos(lambda place, name=name: self._at(VIDEO_PATH, place, video_key=name), self._fps, codec)
             for name, feature in self._features.items()
             if feature["dtype"] == "video"
         }
@@ -132,7 +132,7 @@ class DatasetWriter:
     def add(self, run: Run, seen: dict[str, np.ndarray]) -> None:
         """One episode, with its observations [T + 1, ...]."""
         length, number = run.frames - 1, len(self._episodes)
-        columns, films = self._columns(run, seen, number)
+        columns, videos = self._columns(run, seen, number)
         if self._data.grow(sum(c.nbytes for c in columns.values()) / 2**20, DATA_MB):
             self._write_data(_Place(*_before(self._data)))
         self._waiting.append(columns)
@@ -145,21 +145,21 @@ class DatasetWriter:
             **{f"data/{k}": v for k, v in self._data.indices.items()},
             **{f"meta/episodes/{k}": 0 for k in ("chunk_index", "file_index")},
         }
-        for name, pictures in films.items():
-            place, start = self._films[name].add(pictures, VIDEO_MB)
+        for name, images in videos.items():
+            place, start = self._videos[name].add(images, VIDEO_MB)
             of_film = {**place, "from_timestamp": start, "to_timestamp": start + length / self._fps}
             episode |= {f"videos/{name}/{k}": v for k, v in of_film.items()}
-        for name, rows in (columns | films).items():
-            statistics = _statistics(_for_statistics(rows, name in films))
+        for name, rows in (columns | videos).items():
+            statistics = _statistics(_for_statistics(rows, name in videos))
             episode |= {f"stats/{name}/{k}": v.tolist() for k, v in statistics.items()}
-            self._kept.setdefault(name, []).append(_for_statistics(rows, name in films))
+            self._kept.setdefault(name, []).append(_for_statistics(rows, name in videos))
         self._episodes.append(episode)
         self._frames += length
 
     def close(self) -> None:
-        """Closes the films; may be called twice."""
-        for film in self._films.values():
-            film.close()
+        """Closes the videos; may be called twice."""
+        for video in self._videos.values():
+            video.close()
 
     def finish(self) -> None:
         """Writes what is left, and the folder `meta`, after at least one episode."""
@@ -170,8 +170,8 @@ class DatasetWriter:
 
         pq.write_table(pa.Table.from_pylist(self._episodes), self._at(EPISODES_PATH, _Place().indices))
         pq.write_table(_tasks_table([self._task]), self.folder / "meta" / "tasks.parquet")
-        for name, film in self._films.items():
-            self._features[name]["info"] = film.about
+        for name, video in self._videos.items():
+            self._features[name]["info"] = video.about
         info = {
             "codebase_version": VERSION,
             "robot_type": self._robot,
@@ -184,7 +184,7 @@ class DatasetWriter:
             "fps": self._fps,
             "splits": {"train": f"0:{len(self._episodes)}"},
             "data_path": DATA_PATH,
-            "video_path": VIDEO_PATH if self._films else None,
+            "video_path": VIDEO_PATH if self._videos else None,
             "features": self._features,
         }
         stats = {name: _statistics(np.concatenate(rows)) for name, rows in self._kept.items()}
@@ -197,13 +197,13 @@ class DatasetWriter:
     def _columns(
         self, run: Run, seen: dict[str, np.ndarray], number: int
     ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-        """Columns [T, ...] and pictures [T, height, width, 3] of an episode."""
+        """Columns [T, ...] and images [T, height, width, 3] of an episode."""
         length = run.frames - 1
         columns: dict[str, np.ndarray] = {"action": run.all_rows("steps/action")}
-        films: dict[str, np.ndarray] = {}
+        videos: dict[str, np.ndarray] = {}
         for name, rows in seen.items():
             known = _name(name)
-            (films if known in self._films else columns)[known] = _column(name, rows[:-1])
+            (videos if known in self._videos else columns)[known] = _column(name, rows[:-1])
         ends = run.all_rows("steps/terminated") | run.all_rows("steps/truncated")
         columns["next.reward"] = run.all_rows("steps/reward/total").astype(np.float32)
         columns["next.done"], columns["next.success"] = ends, run.all_rows("steps/success")
@@ -212,7 +212,7 @@ class DatasetWriter:
         columns["episode_index"] = np.full(length, number)
         columns["index"] = self._frames + np.arange(length)
         columns["task_index"] = np.zeros(length, np.int64)
-        return columns, films
+        return columns, videos
 
     def _write_data(self, place: _Place) -> None:
         import pyarrow as pa
@@ -255,7 +255,7 @@ def _name(observation: str) -> str:
 
 
 def _features(env: Environment) -> dict[str, dict[str, Any]]:
-    """Every column and film, as `info.json` lists it."""
+    """Every column and video, as `info.json` lists it."""
     names = {"privileged_state": list(env.privileged_names), "proprioception": list(env.proprioception_names)}
     features: dict[str, dict[str, Any]] = {"action": _feature(np.float32, env.action_space.shape, env.action_names)}
     for name, space in env.observation_spaces.items():
@@ -284,7 +284,7 @@ def _column(name: str, rows: np.ndarray) -> np.ndarray:
 
 
 def _arrow(rows: np.ndarray) -> Any:
-    """[N, ...] as an array of Arrow's; fixed lists where rows are vectors, lists of lists where they are pictures."""
+    """[N, ...] as an array of Arrow's; fixed lists where rows are vectors, lists of lists where they are images."""
     import pyarrow as pa
 
     array = pa.array(np.ascontiguousarray(rows).reshape(-1))
@@ -295,9 +295,9 @@ def _arrow(rows: np.ndarray) -> Any:
     return array
 
 
-def _for_statistics(rows: np.ndarray, pictures: bool) -> np.ndarray:
-    """[n, k] values of which statistics are made: of pictures those of some pixels by channel, 0..1."""
-    if pictures:
+def _for_statistics(rows: np.ndarray, images: bool) -> np.ndarray:
+    """[n, k] values of which statistics are made: of images those of some pixels by channel, 0..1."""
+    if images:
         return (rows[:, ::PIXEL_STRIDE, ::PIXEL_STRIDE].reshape(-1, 3) / 255.0).astype(np.float32)
     if rows.ndim > 3:
         return rows[:, ::PIXEL_STRIDE, ::PIXEL_STRIDE].reshape(-1, rows.shape[-1]).astype(np.float32)
@@ -307,7 +307,7 @@ def _for_statistics(rows: np.ndarray, pictures: bool) -> np.ndarray:
 
 
 def _statistics(values: np.ndarray) -> dict[str, np.ndarray]:
-    """Of [n, k] values; those of pictures and depths have the shape [k, 1, 1] in LeRobot's files."""
+    """Of [n, k] values; those of images and depths have the shape [k, 1, 1] in LeRobot's files."""
     found = {"min": values.min(0), "max": values.max(0), "mean": values.mean(0), "std": values.std(0)}
     found |= {name: np.quantile(values, q, axis=0) for name, q in QUANTILES.items()}
     if values.dtype == np.float32 and values.shape[1] == 3:

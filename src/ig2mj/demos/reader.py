@@ -114,7 +114,7 @@ class Run:
         return parts
 
     def kept(self, start: int, stop: int) -> np.ndarray:
-        """Which of these frames are there: of a thin recording only the first and the last (`ig2mj.demos.thin`)."""
+        """[stop - start] which frames the file has: a compact one has first and last (`demos.compact`)."""
         of_world = [k for name, k in self._recording.columns.items() if name.startswith("frames/")]
         return np.all(self.index(start, stop)[:, of_world[:1]] >= 0, axis=1, keepdims=True)[:, 0]
 

@@ -1,6 +1,6 @@
 """Demonstrations that ship: episodes of the scripted experts, disturbed and recovered from, for each activity.
 
-They hold actions and the first and last frame of each run (`ig2mj.demos.thin`), and replay bit for bit.
+They hold actions and the first and last frame of each run (`ig2mj.demos.compact`), and replay bit for bit.
 """
 
 from __future__ import annotations

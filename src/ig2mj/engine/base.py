@@ -30,7 +30,7 @@ from ig2mj.engine.saved import SavedPhysics
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
-from ig2mj.process.collector import Traced
+from ig2mj.process.gc_pause import Traced
 from ig2mj.scene.scene import Scene
 from ig2mj.scene.tables import SceneTables
 

@@ -10,7 +10,7 @@ from typing import Any
 from ig2mj.engine.base import Engine
 from ig2mj.errors import UnknownNameError
 from ig2mj.process import entry_point
-from ig2mj.process.collector import REST
+from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.process.imports import find_devices, import_mjx
 from ig2mj.scene.scene import Scene
 
@@ -23,7 +23,7 @@ ENGINES = {
 
 
 @entry_point
-@REST
+@GC_PAUSED
 def make_engine(name: str, scene: Scene, num_worlds: int = 1, **options: Any) -> Engine:
     """Makes an engine for a scene.
 

@@ -22,7 +22,7 @@ from ig2mj.envs.environment import Environment
 from ig2mj.envs.state import EnvState
 from ig2mj.errors import ActionError
 from ig2mj.process import entry_point
-from ig2mj.process.collector import Compiled
+from ig2mj.process.gc_pause import Compiled
 
 STEPS = 20
 """The most agent steps of one call."""

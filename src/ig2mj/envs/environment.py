@@ -38,7 +38,7 @@ from ig2mj.envs.state import EnvState, Seen
 from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.process import entry_point
-from ig2mj.process.collector import REST, Compiled, compile_together
+from ig2mj.process.gc_pause import GC_PAUSED, Compiled, compile_together
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.actions import ActionMap
@@ -222,7 +222,7 @@ class Environment(StateCopies):
         number = as_seed(seed, self.num_worlds)
         if (physics := self.core.engine.awaited()) is not None:
             compile_together([self._start.traced(physics.returned, number), physics])
-        with REST:
+        with GC_PAUSED:
             return self._start(self.core.engine.reset(), number)
 
     def _start_fn(self, physics: Physics, seed: Seeds) -> EnvState:
@@ -240,7 +240,7 @@ class Environment(StateCopies):
         if rows.shape != (self.num_worlds,) or rows.min() < 0 or rows.max() >= size:
             raise EngineError(f"start_from takes {self.num_worlds} rows, each from 0 to {size - 1}")
         starts = self.core.starts.pool.rows(rows)
-        with REST:
+        with GC_PAUSED:
             return self._load(self.core.engine.reset(), as_seed(seed, self.num_worlds), starts, rows.astype(np.int32))
 
     def _load_fn(self, physics: Physics, seed: Seeds, starts: Pool, rows: Int[Array, "W"]) -> EnvState:

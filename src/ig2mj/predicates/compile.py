@@ -34,7 +34,7 @@ from ig2mj.predicates.logic import Atom, Expression
 from ig2mj.predicates.parse import parse
 from ig2mj.predicates.questions import Questions
 from ig2mj.process import entry_point
-from ig2mj.process.collector import REST
+from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Query, RelationPlan, Relations
 from ig2mj.states.world import ExtendedStates, WorldState
@@ -95,7 +95,7 @@ class CompiledExpression:
 
     def status(self, states: ExtendedStates, view: PhysicsView, relations: Relations | None = None) -> GoalStatus:
         """Truth, fraction and literals in all worlds. Pure."""
-        with REST:
+        with GC_PAUSED:
             return self.status_of(self.literals.facts(self.context(states, view, relations)), states)
 
     def context(self, states: ExtendedStates, view: PhysicsView, relations: Relations | None = None) -> Context:

@@ -24,7 +24,7 @@ from ig2mj.predicates.base import Context, Predicate
 from ig2mj.predicates.literals import Literals
 from ig2mj.predicates.registry import find
 from ig2mj.predicates.tracing import inputs_that_matter
-from ig2mj.process.collector import REST
+from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.asked import AskedRelations, PieceTables
@@ -140,7 +140,7 @@ class _Program:
         self._shapes = shapes
         rows = jax.ShapeDtypeStruct((ROWS, len(predicate.arguments)), np.int32)
         count = jax.ShapeDtypeStruct((), np.int32)
-        with REST:
+        with GC_PAUSED:
             traced = jax.make_jaxpr(self._everything)(list(shapes.values()), rows, count)
         matters = inputs_that_matter(traced.jaxpr)
         self.reads = tuple(name for name, used in zip(shapes, matters, strict=False) if used)
@@ -151,7 +151,7 @@ class _Program:
     def __call__(self, inputs: list[Array], rows: Int[np.ndarray, "N K"]) -> Bool[np.ndarray, "W N"]:
         padded = np.zeros((ROWS, rows.shape[1]), np.int32)
         padded[: len(rows)] = rows
-        with REST:  # the first call compiles
+        with GC_PAUSED:  # the first call compiles
             return np.asarray(self._call(inputs, padded, np.int32(len(rows))))[:, : len(rows)]
 
     def _everything(self, leaves: list[Array], rows: Int[Array, "N K"], count: Int[Array, ""]) -> Bool[Array, "W N"]:

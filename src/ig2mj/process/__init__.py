@@ -28,7 +28,7 @@ or earlier by whoever wants to; a second call does nothing. What the user has de
 
 Where engines are imported and made, their kernels loaded, worlds started and programs traced, and while Warp captures a
 graph:
-  - Python's cyclic garbage collector is off, and on again afterwards if it was (`ig2mj.process.collector`).
+  - Python's cyclic garbage collector is off, and on again afterwards if it was (`ig2mj.process.gc_pause`).
 
 While an entry point of ig2mj runs (`ig2mj.process.entry`):
   - JAX's option `jax_enable_x64` is off in this thread, and afterwards what it was.

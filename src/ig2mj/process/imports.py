@@ -15,8 +15,8 @@ import types
 from collections.abc import Iterator
 from typing import Any
 
-from ig2mj.process.collector import REST
-from ig2mj.process.crew import spawn
+from ig2mj.process.gc_pause import GC_PAUSED
+from ig2mj.process.worker_threads import spawn
 
 SPARED = ("trimesh", "scipy.spatial")
 
@@ -81,7 +81,7 @@ def _unsearched() -> Iterator[None]:
         kind._find_references = search
 
 
-@REST
+@GC_PAUSED
 def import_mjx() -> None:
     """Imports `mujoco.mjx`, if it is not yet; other modules that import the two libraries meanwhile may get ours."""
     if "mujoco.mjx" in sys.modules:

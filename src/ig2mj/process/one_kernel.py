@@ -15,7 +15,7 @@ import logging
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ig2mj.process.collector import REST
+from ig2mj.process.gc_pause import GC_PAUSED
 
 Options = dict[str, int | bool | str]
 
@@ -45,7 +45,7 @@ class OneKernel:
 
     def __call__(self, *arguments: Any) -> Any:
         if self._call is None:
-            with REST:
+            with GC_PAUSED:
                 return self._first(arguments)
         return self._call(*arguments)[0] if self.is_one else self._call(*arguments)
 

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Mapping
 from typing import Any
 
-from ig2mj.process.collector import REST
+from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.process.variables import error_of_variable
 
 EMPTY: Mapping[str, str] = {}
@@ -27,7 +27,7 @@ def public_name(package: str, name: str, homes: Mapping[str, str] = EMPTY) -> An
     if name not in homes and (name.startswith("_") or importlib.util.find_spec(f"{package}.{name}") is None):
         raise AttributeError(f"module '{package}' has no attribute '{name}'")
     try:
-        with REST:
+        with GC_PAUSED:
             if name in homes:
                 return getattr(importlib.import_module(homes[name]), name)
             return importlib.import_module(f"{package}.{name}")

@@ -26,7 +26,7 @@ from typing import Any
 
 import warp as wp
 
-from ig2mj.process.collector import REST
+from ig2mj.process.gc_pause import GC_PAUSED
 
 _REPAIRED = "_ig2mj_repaired"
 
@@ -57,18 +57,18 @@ def collect_nothing_during_captures() -> None:
 
     def enter_without_collector(self: Any) -> Any:
         concurrent.futures.wait(list(AWAITED))
-        REST.begin()
+        GC_PAUSED.begin()
         try:
             return enter(self)
         except BaseException:
-            REST.end()
+            GC_PAUSED.end()
             raise
 
     def leave_and_collect(self: Any, exc_type: Any, exc_value: Any, traceback: Any) -> None:
         try:
             leave(self, exc_type, exc_value, traceback)
         finally:
-            REST.end()
+            GC_PAUSED.end()
 
     wp.ScopedCapture.__enter__ = enter_without_collector
     wp.ScopedCapture.__exit__ = leave_and_collect

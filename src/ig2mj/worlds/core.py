@@ -40,7 +40,7 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import LostWorldError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.process import entry_point
-from ig2mj.process.collector import REST, Compiled, compile_together
+from ig2mj.process.gc_pause import GC_PAUSED, Compiled, compile_together
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
 from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Batch
@@ -266,7 +266,7 @@ class Core:
 
     # Episodes.
 
-    @REST
+    @GC_PAUSED
     def start(self, seed: Seeds = 0, first: int | Int[Array, ""] = 0) -> Batch:
         """All worlds at the start of their first episode.
 

@@ -19,7 +19,7 @@ from ig2mj.engine.view import PhysicsView
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus, compile_expression
 from ig2mj.predicates.logic import Expression
 from ig2mj.predicates.questions import Questions
-from ig2mj.process.collector import REST
+from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.scene.scene import Scene
 from ig2mj.states.initial import initial_states, states_of_manifest
 from ig2mj.states.model import DEFAULTS, StateModel
@@ -104,7 +104,7 @@ class Rules:
 
     def step(self, states: ExtendedStates, view: PhysicsView) -> Outcome:
         """One control step of all worlds; `view` is physics after it. Pure."""
-        with REST:
+        with GC_PAUSED:
             relations = self.plan.evaluate(view)
             states, swap = update(self.model, states, view, relations)
             if self.goal is not None:

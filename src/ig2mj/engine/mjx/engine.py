@@ -36,7 +36,7 @@ from ig2mj.engine.speed_limits import SpeedLimits
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
 from ig2mj.process import entry_point, prepare_jax
-from ig2mj.process.collector import Compiled, Traced
+from ig2mj.process.gc_pause import Compiled, Traced
 from ig2mj.scene.scene import Scene
 
 

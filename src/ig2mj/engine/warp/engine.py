@@ -36,7 +36,7 @@ from ig2mj.engine.warp.patches.ignored import DROP, encode
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile, fit, holds_everything, profile_of_scene
 from ig2mj.process import entry_point, prepare_warp
-from ig2mj.process.collector import Traced
+from ig2mj.process.gc_pause import Traced
 from ig2mj.scene.scene import Scene
 
 

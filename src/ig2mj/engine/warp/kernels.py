@@ -29,9 +29,9 @@ from ig2mj.engine.warp.patches import scratch
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile
 from ig2mj.errors import EngineError
-from ig2mj.process.collector import REST
-from ig2mj.process.crew import ENDING, Crew, spawn
+from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.process.warp_repairs import AWAITED
+from ig2mj.process.worker_threads import ENDING, WorkerThreads, spawn
 
 Launch = tuple[wp.Kernel, int]
 """A kernel, and the number of threads of its blocks."""
@@ -176,7 +176,7 @@ def load_meanwhile(
         first = None if architecture is None else tiles.builder(not_made(launches), architecture, workers)
         done: concurrent.futures.Future[int] = concurrent.futures.Future()
         AWAITED.add(done)
-        REST.begin()
+        GC_PAUSED.begin()
 
     def load_module(module: wp.Module, sizes: list[int]) -> None:
         for size in sizes:
@@ -191,7 +191,7 @@ def load_meanwhile(
             done.set_result(sum(map(len, by_size.values())))
         finally:
             AWAITED.discard(done)
-            REST.end()
+            GC_PAUSED.end()
 
     spawn(load_all, "ig2mj-kernels")
     return done
@@ -236,7 +236,7 @@ def side_by_side(
     convex = [module for module in sizes if "_ccd_" in module.name]
     plain = [module for module in sizes if module not in convex and sizes[module] == [DEFAULT_BLOCK]]
     last = [module for module in sizes if module not in convex and module not in plain]
-    with alone(), Crew(workers or len(os.sched_getaffinity(0)), "ig2mj-kernels") as crew:
+    with alone(), WorkerThreads(workers or len(os.sched_getaffinity(0)), "ig2mj-kernels") as crew:
         before = [crew.submit(first)] if first else []
         jobs = [crew.submit(act, module, sizes[module]) for module in convex + plain]
         concurrent.futures.wait(before)

@@ -23,7 +23,7 @@ import warp as wp
 
 from ig2mj.engine.warp.patches.compact_solver import TILE
 from ig2mj.process import tile_maker
-from ig2mj.process.crew import ENDING
+from ig2mj.process.worker_threads import ENDING
 
 
 class Tile(NamedTuple):

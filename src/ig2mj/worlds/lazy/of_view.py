@@ -13,7 +13,7 @@ import jax
 import jax.numpy as jnp
 
 from ig2mj.engine.view import SCHEMA, PhysicsView, assemble, read_fields
-from ig2mj.process.collector import REST
+from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.worlds.lazy.packing import PackedFunction
 
 
@@ -61,7 +61,7 @@ class OfView:
             structures.append(made_structure)
             return found
 
-        with REST:
+        with GC_PAUSED:
             function = PackedFunction(jax.make_jaxpr(whole)(shapes), self._name)
         return _Program(
             tuple(names[i] for i in function.takes if i < len(names)),

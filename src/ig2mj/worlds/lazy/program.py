@@ -24,7 +24,7 @@ from jaxtyping import Bool, Int
 from ig2mj.engine.view import SCHEMA, Array, PhysicsView, assemble, read_fields
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus
 from ig2mj.predicates.questions import COMPILED_FAST
-from ig2mj.process.collector import REST
+from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.asked import PairByPair
@@ -124,7 +124,7 @@ class _Traced(NamedTuple):
             structures.append(structure)
             return made
 
-        with REST:
+        with GC_PAUSED:
             traced = jax.make_jaxpr(flat)(leaves, read_fields(view, FIELDS), others)
         function = PackedFunction(traced, step.__name__.strip("_"), options)
         first, last = len(leaves), len(leaves) + len(FIELDS)

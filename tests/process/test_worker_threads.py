@@ -10,19 +10,19 @@ import time
 
 import pytest
 
-from ig2mj.process.crew import Crew
+from ig2mj.process.worker_threads import WorkerThreads
 
 
 def test_a_crew_works_side_by_side_and_ends_with_its_block():
     both = threading.Barrier(2, timeout=20)  # passed by two at a time only
-    with Crew(2, "test-crew") as crew:
+    with WorkerThreads(2, "test-crew") as crew:
         done = [crew.submit(lambda k=k: (both.wait(), k)[1]) for k in range(4)]
         assert [job.result(20) for job in done] == [0, 1, 2, 3]
     assert not any(thread.name.startswith("test-crew") for thread in threading.enumerate())
 
 
 def test_a_failure_is_the_jobs_own():
-    with Crew(1, "test-crew") as crew:
+    with WorkerThreads(1, "test-crew") as crew:
         failed, fine = crew.submit(lambda: 1 // 0), crew.submit(lambda: 7)
         assert fine.result(20) == 7
     with pytest.raises(ZeroDivisionError):
@@ -31,7 +31,7 @@ def test_a_failure_is_the_jobs_own():
 
 def test_a_block_left_by_an_error_begins_nothing_more():
     begun, go = threading.Event(), threading.Event()
-    with pytest.raises(KeyboardInterrupt), Crew(1, "test-crew") as crew:
+    with pytest.raises(KeyboardInterrupt), WorkerThreads(1, "test-crew") as crew:
         first = crew.submit(lambda: (begun.set(), go.wait(20)))
         second = crew.submit(lambda: None)
         assert begun.wait(20)
@@ -44,7 +44,7 @@ def test_a_block_left_by_an_error_begins_nothing_more():
 
 CODE = """
 import threading, time
-from ig2mj.process.crew import Crew, spawn
+from ig2mj.process.worker_threads import WorkerThreads, spawn
 begun = threading.Event()
 
 def job(k):
@@ -53,7 +53,7 @@ def job(k):
     print("ended", k, flush=True)
 
 def all_jobs():
-    with Crew(1, "test-crew") as crew:
+    with WorkerThreads(1, "test-crew") as crew:
         for done in [crew.submit(job, k) for k in range(100)]:
             done.result()
 

@@ -1,4 +1,4 @@
-"""`EpisodeFilms`: pictures of many episodes, one after the other in few mp4 files, each found by its time."""
+"""`EpisodeVideos`: images of many episodes, appended to few mp4 files; an episode is found by its start time."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 PIXELS, ODD_PIXELS = "yuv420p", "yuv444p"
-"""Formats of frames; the first halves the resolution of colours, and so is for even widths and heights only."""
+"""Pixel formats; the first halves the resolution of colours and needs even widths and heights."""
 
 
-class EpisodeFilms:
-    """Files of one camera. Attributes: about: what `info.json` says of them."""
+class EpisodeVideos:
+    """Video files of one camera. Attributes: about: their entry in `info.json`."""
 
     def __init__(self, path: Callable[[dict[str, int]], pathlib.Path], fps: int, codec: str):
-        """`path`: of the file with these indices."""
+        """`path`: maps chunk and file index to the file's path."""
         self._path, self._fps, self._codec = path, fps, codec
         self._place = {"chunk_index": 0, "file_index": 0}
         self._file: pathlib.Path | None = None
@@ -26,16 +26,16 @@ class EpisodeFilms:
         self._frames = 0
         self.about: dict[str, Any] = {}
 
-    def add(self, pictures: np.ndarray, limit: int) -> tuple[dict[str, int], float]:
+    def add(self, images: np.ndarray, limit: int) -> tuple[dict[str, int], float]:
         """Appends an episode, uint8 [T, height, width, 3].
 
         Args:
-          limit: MB of a file after which the next episode begins another.
+          limit: size in MB after which the next episode starts a new file.
 
         Returns:
-          Indices of its file, and the time in it at which it begins, s.
+          Indices of the episode's file, and its start time in that file in seconds.
         """
-        # Codecs hold frames back, so that the file of a short episode may not be there yet.
+        # Codecs buffer frames: the file of a short episode may not exist yet.
         if self._file is not None and self._file.exists() and self._file.stat().st_size > limit * 2**20:
             self.close()
             self._place = {**self._place, "file_index": self._place["file_index"] + 1}
@@ -44,17 +44,17 @@ class EpisodeFilms:
         import av
 
         if self._container is None:
-            self._open(*pictures.shape[1:3])
+            self._open(*images.shape[1:3])
         container: Any = self._container
         start = self._frames / self._fps
-        for picture in pictures:
-            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+        for image in images:
+            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(image), format="rgb24")
             frame.pts, self._frames = self._frames, self._frames + 1
             container.mux(self._stream.encode(frame))
         return self._place, start
 
     def close(self) -> None:
-        """Ends the file that is open; may be called twice."""
+        """Finishes the open file; may be called twice."""
         if self._container is not None:
             self._container.mux(self._stream.encode())
             self._container.close()
@@ -65,7 +65,7 @@ class EpisodeFilms:
 
         self._file = self._path(self._place)
         self._container = av.open(str(self._file), "w")
-        # A key frame every other picture: readers take single pictures in any order.
+        # A key frame every other image: readers access single images in random order.
         self._stream = self._container.add_stream(self._codec, rate=self._fps, options={"g": "2", "crf": "18"})
         pixels = PIXELS if width % 2 == height % 2 == 0 else ODD_PIXELS
         self._stream.width, self._stream.height, self._stream.pix_fmt = width, height, pixels

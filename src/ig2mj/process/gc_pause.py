@@ -1,10 +1,10 @@
-"""When Python's cyclic garbage collector rests.
+"""Pauses of Python's cyclic garbage collector.
 
-It looks through all that lives again and again while new objects are made, which JAX does by the hundred thousand where
-it traces a program: a third of the time that tracing takes (0.6 s instead of 0.4 for `next_to`, whose first answer
-somebody waits for). The imports of MJX and Warp make so many that a Warp engine's start takes 5.0 s of processor time
-instead of 6.8. What becomes garbage meanwhile, some megabytes, is collected afterwards. While Warp captures a CUDA
-graph it must not run at all (`ig2mj.process.warp_repairs`).
+The collector scans all live objects repeatedly while new ones are allocated. JAX allocates hundreds of thousands when
+it traces a program, and a third of the tracing time is the collector's (0.6 s with it, 0.4 s without, for the first
+answer of `next_to`). For the same reason the imports of MJX and Warp are paused: a Warp engine starts in 5.0 s of
+processor time instead of 6.8. The garbage of a pause, some megabytes, is collected afterwards. The collector must not
+run at all while Warp captures a CUDA graph (`ig2mj.process.warp_repairs`).
 """
 
 from __future__ import annotations
@@ -16,12 +16,11 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ig2mj.process.crew import spawn
+from ig2mj.process.worker_threads import spawn
 
 
-class CollectorRest(contextlib.ContextDecorator):
-    """Keeps Python's cyclic garbage collector off while at least one block is entered, in any thread; `@REST` makes a
-    function such a block."""
+class GcPause(contextlib.ContextDecorator):
+    """Keeps the cyclic garbage collector off while at least one block is entered, in any thread. Also a decorator."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -35,7 +34,7 @@ class CollectorRest(contextlib.ContextDecorator):
         self.end()
 
     def begin(self) -> None:
-        """Enters a block: the collector goes off."""
+        """Enters a block and turns the collector off."""
         with self._lock:
             if self._entered == 0:
                 self._was_on = gc.isenabled()
@@ -43,21 +42,21 @@ class CollectorRest(contextlib.ContextDecorator):
             self._entered += 1
 
     def end(self) -> None:
-        """Leaves a block; after the last one the collector is on again, if it was."""
+        """Leaves a block. After the last one the collector is on again if it was on before."""
         with self._lock:
             self._entered -= 1
             if self._entered == 0 and self._was_on:
                 gc.enable()
 
 
-REST = CollectorRest()
-"""The one of this process: there is only one collector."""
+GC_PAUSED = GcPause()
+"""The pause of this process, which has one collector."""
 
 
 class Compiled:
-    """`jax.jit` of a function, traced and lowered while the collector rests. Has what `jax.jit`'s functions have.
+    """`jax.jit` of a function, traced and lowered while the collector is paused. Offers what `jax.jit` offers.
 
-    For programs that take a millisecond or more: a call takes half a microsecond longer.
+    For programs of a millisecond or more: each call costs half a microsecond extra.
     """
 
     def __init__(self, function: Callable[..., Any], check: Callable[[Any], None] | None = None, **options: Any):
@@ -74,12 +73,12 @@ class Compiled:
     def __call__(self, *args: Any, **kwargs: Any) -> Any:
         if self._check is not None:
             self._check(args[0])
-        with REST:
+        with GC_PAUSED:
             return self._compiled(*args, **kwargs)
 
     def traced(self, *args: Any) -> Traced:
-        """Traces it for arguments of such shapes (arrays or `jax.ShapeDtypeStruct`), for `compile_together`."""
-        with REST:
+        """Traces the function for these shapes (arrays or `jax.ShapeDtypeStruct`), for `compile_together`."""
+        with GC_PAUSED:
             return Traced(self._compiled.trace(*args))
 
     def __getattr__(self, name: str) -> Any:
@@ -87,10 +86,10 @@ class Compiled:
 
 
 class Traced:
-    """A program that has been traced and is neither lowered nor compiled yet.
+    """A traced program, neither lowered nor compiled.
 
     Attributes:
-      returned: shapes of what a call will return.
+      returned: shapes of the values that a call returns.
     """
 
     def __init__(self, traced: Any):
@@ -99,8 +98,8 @@ class Traced:
         self._traced = traced
 
     def compiling(self) -> concurrent.futures.Future[Any]:
-        """Lowers it, and compiles it in a thread: ends when a call finds the program."""
-        with REST:
+        """Lowers the program here and compiles it in a thread; done when a call finds it compiled."""
+        with GC_PAUSED:
             lowered = self._traced.lower()
         done: concurrent.futures.Future[Any] = concurrent.futures.Future()
 
@@ -115,10 +114,9 @@ class Traced:
 
 
 def compile_together(programs: Sequence[Traced]) -> None:
-    """Compiles programs, or reads them where they are cached, and runs nothing: calls find them.
+    """Compiles programs, or reads them from the cache, without running them.
 
-    Python is needed for lowering, one program after the other, and not for the rest, which goes on meanwhile. So the
-    longest should come first.
+    Lowering holds Python's lock and is sequential; compilation runs in parallel to it. List the longest program first.
     """
     for compiling in [program.compiling() for program in programs]:
         compiling.result()

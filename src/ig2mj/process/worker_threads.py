@@ -1,8 +1,8 @@
-"""`Crew`: threads that work through a list of jobs beside the rest of the process, and end with it.
+"""`WorkerThreads`: threads that work through a queue of calls and end with the process.
 
-The threads of `concurrent.futures` work off all that was handed in before a process may end: after Ctrl+C somebody
-would wait for every kernel that was still to be compiled. A crew's threads begin nothing more when the process ends,
-which waits only for what they are in the middle of: libraries must not be taken away from under it.
+The threads of `concurrent.futures` finish everything in the queue before the process may exit: after Ctrl+C that is
+every kernel that is still to be compiled. These threads start no further call when the process exits; the exit waits
+only for the calls in progress, so that libraries are not unloaded while a call runs.
 """
 
 from __future__ import annotations
@@ -16,22 +16,22 @@ from collections.abc import Callable
 from typing import Any
 
 ENDING = threading.Event()
-"""The process ends."""
+"""Set when the process exits."""
 
 _threads: set[threading.Thread] = set()
 
 
-class Crew(contextlib.AbstractContextManager):
-    """So many threads; they end when the block is left and all jobs are done, or dropped if it is left by an error."""
+class WorkerThreads(contextlib.AbstractContextManager):
+    """A fixed number of threads. At the end of the block they finish the queue, or drop it if the block raised."""
 
     def __init__(self, workers: int, name: str):
-        """`name`: of the threads."""
+        """`name`: prefix of the threads' names."""
         self._jobs: queue.SimpleQueue[Callable[[], None] | None] = queue.SimpleQueue()
         self._dropped = threading.Event()
         self._members = [spawn(self._work, f"{name}-{k}") for k in range(workers)]
 
     def submit(self, act: Callable[..., Any], *arguments: Any) -> concurrent.futures.Future[Any]:
-        """What a call will give. It is cancelled if the process ends, or the block by an error, before it begins."""
+        """Queues a call. Its future is cancelled if the process exits, or the block raises, before the call starts."""
         done: concurrent.futures.Future[Any] = concurrent.futures.Future()
 
         def job() -> None:
@@ -61,7 +61,7 @@ class Crew(contextlib.AbstractContextManager):
 
 
 def spawn(act: Callable[[], None], name: str) -> threading.Thread:
-    """A thread that the end of the process waits for, but only after it has set `ENDING`."""
+    """Starts a thread that the exit of the process joins after `ENDING` is set."""
 
     def run() -> None:
         try:
@@ -69,7 +69,7 @@ def spawn(act: Callable[[], None], name: str) -> threading.Thread:
         finally:
             _threads.discard(thread)
 
-    thread = threading.Thread(target=run, name=name, daemon=True)  # the others are waited for before `ENDING` is set
+    thread = threading.Thread(target=run, name=name, daemon=True)  # others are joined before `ENDING` is set
     _threads.add(thread)
     thread.start()
     return thread
@@ -77,7 +77,7 @@ def spawn(act: Callable[[], None], name: str) -> threading.Thread:
 
 @atexit.register
 def end() -> None:
-    """Nothing more begins; returns when the threads have ended."""
+    """Sets `ENDING` and joins the threads."""
     ENDING.set()
     for thread in list(_threads):
         thread.join()

@@ -1,6 +1,6 @@
-"""`place_of`: which process of how many this is, as the variables of its surroundings say.
+"""`find_topology`: rank and number of the processes of a distributed run, from environment variables.
 
-| who starts the processes | variables |
+| started by | variables |
 |---|---|
 | by hand, a script | `JAX_COORDINATOR_ADDRESS` (host:port of process 0), `JAX_NUM_PROCESSES`, `JAX_PROCESS_ID` |
 | Kubernetes (an indexed Job) | the first two, and `JOB_COMPLETION_INDEX`, which Kubernetes sets |
@@ -16,16 +16,16 @@ from collections.abc import Mapping
 from ig2mj.errors import ClusterError
 
 FIRST_PORT, PORTS = 61440, 4096
-"""Ports that a Slurm job's number is mapped to, as JAX does it."""
+"""Range of ports that Slurm job numbers map to, the same as JAX's."""
 
 
 @dataclasses.dataclass(frozen=True)
-class Place:
-    """A process of a team.
+class ProcessTopology:
+    """One process of a distributed run.
 
     Attributes:
-      host, port: where process 0 listens. rank, count: this process, and how many there are.
-      local_devices: numbers of the devices that are this process's own; None: all that it sees.
+      host, port: address at which process 0 listens. rank, count: index of this process, number of processes.
+      local_devices: indices of this process's devices; None: all visible ones.
     """
 
     host: str
@@ -35,19 +35,19 @@ class Place:
     local_devices: tuple[int, ...] | None = None
 
 
-def place_of(environ: Mapping[str, str]) -> Place | None:
-    """See the module's text; None where nothing says that there are other processes.
+def find_topology(environ: Mapping[str, str]) -> ProcessTopology | None:
+    """The topology that the environment variables describe (see the module); None for a single process.
 
     Raises:
-      ClusterError: a variable is missing, or not what it should be.
+      ClusterError: a variable is missing or malformed.
     """
     if "JAX_COORDINATOR_ADDRESS" in environ:
         host, port = _address(environ["JAX_COORDINATOR_ADDRESS"])
         index = "JAX_PROCESS_ID" if "JAX_PROCESS_ID" in environ else "JOB_COMPLETION_INDEX"
-        return _checked(Place(host, port, _number(environ, index), _number(environ, "JAX_NUM_PROCESSES")))
+        return _checked(ProcessTopology(host, port, _number(environ, index), _number(environ, "JAX_NUM_PROCESSES")))
     if "SLURM_STEP_NODELIST" in environ and int(environ.get("SLURM_NTASKS", "1")) > 1:
         job = _number(environ, "SLURM_JOB_ID")
-        place = Place(
+        place = ProcessTopology(
             first_host(environ["SLURM_STEP_NODELIST"]),
             FIRST_PORT + job % PORTS,
             _number(environ, "SLURM_PROCID"),
@@ -67,7 +67,7 @@ def first_host(nodes: str) -> str:
 
 
 def _own_devices(environ: Mapping[str, str]) -> tuple[int, ...] | None:
-    """With several tasks on a host that all see its GPUs, each takes the one of its own number."""
+    """Where several tasks of a host all see its GPUs, each uses the one of its local index."""
     if "JAX_LOCAL_DEVICE_IDS" in environ:
         return None  # JAX reads it
     local = _number(environ, "SLURM_LOCALID") if "SLURM_LOCALID" in environ else 0
@@ -77,7 +77,7 @@ def _own_devices(environ: Mapping[str, str]) -> tuple[int, ...] | None:
     return (local,) if tasks > 1 and len(visible) >= tasks else None
 
 
-def _checked(place: Place) -> Place:
+def _checked(place: ProcessTopology) -> ProcessTopology:
     if not 0 <= place.rank < place.count:
         raise ClusterError(f"this is process {place.rank} of {place.count}: they are numbered from 0 on")
     return place

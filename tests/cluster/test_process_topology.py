@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from ig2mj.cluster.place import Place, first_host, place_of
+from ig2mj.cluster.process_topology import ProcessTopology, find_topology, first_host
 from ig2mj.errors import ClusterError
 
 SLURM = {
@@ -18,26 +18,26 @@ SLURM = {
 
 
 def test_alone_where_nothing_says_otherwise():
-    assert place_of({}) is None
-    assert place_of({**SLURM, "SLURM_NTASKS": "1"}) is None, "one task of Slurm is alone, too"
+    assert find_topology({}) is None
+    assert find_topology({**SLURM, "SLURM_NTASKS": "1"}) is None, "one task of Slurm is alone, too"
 
 
 def test_jaxs_variables():
     given = {"JAX_COORDINATOR_ADDRESS": "node7:1234", "JAX_NUM_PROCESSES": "4", "JAX_PROCESS_ID": "2"}
-    assert place_of(given) == Place("node7", 1234, 2, 4)
-    assert place_of({**given, "JAX_COORDINATOR_ADDRESS": "[::1]:99"}) == Place("::1", 99, 2, 4)
+    assert find_topology(given) == ProcessTopology("node7", 1234, 2, 4)
+    assert find_topology({**given, "JAX_COORDINATOR_ADDRESS": "[::1]:99"}) == ProcessTopology("::1", 99, 2, 4)
 
 
 def test_an_indexed_job_of_kubernetes():
     given = {"JAX_COORDINATOR_ADDRESS": "train-0.train:1234", "JAX_NUM_PROCESSES": "3", "JOB_COMPLETION_INDEX": "1"}
-    assert place_of(given) == Place("train-0.train", 1234, 1, 3)
+    assert find_topology(given) == ProcessTopology("train-0.train", 1234, 1, 3)
 
 
 def test_slurms_variables():
-    assert place_of(SLURM) == Place("gpu011", 61440 + 1, 5, 8)
+    assert find_topology(SLURM) == ProcessTopology("gpu011", 61440 + 1, 5, 8)
     seen = {**SLURM, "CUDA_VISIBLE_DEVICES": "0,1"}
-    assert place_of(seen) == Place("gpu011", 61441, 5, 8, (1,)), "two tasks that see both GPUs take one each"
-    assert place_of({**SLURM, "CUDA_VISIBLE_DEVICES": "0"}).local_devices is None, "Slurm gave each task its own"
+    assert find_topology(seen) == ProcessTopology("gpu011", 61441, 5, 8, (1,)), "two tasks on two visible GPUs"
+    assert find_topology({**SLURM, "CUDA_VISIBLE_DEVICES": "0"}).local_devices is None, "Slurm gave each task its own"
 
 
 @pytest.mark.parametrize(
@@ -61,4 +61,4 @@ def test_the_first_host_of_slurms_lists(nodes, first):
 def test_bad_variables_are_named(changes, said):
     given = {"JAX_COORDINATOR_ADDRESS": "node7:1234", "JAX_NUM_PROCESSES": "4", "JAX_PROCESS_ID": "2", **changes}
     with pytest.raises(ClusterError, match=said):
-        place_of({name: value for name, value in given.items() if value is not None})
+        find_topology({name: value for name, value in given.items() if value is not None})

@@ -1,8 +1,8 @@
-"""`write_thin`: runs with their actions, and of the world's frames only the first and the last.
+"""`write_compact`: runs with all their steps but only the first and last frame of the world.
 
-What is left out comes out again, bit for bit, when the actions are replayed; a run takes a hundredth of the room.
+A replay by action reproduces the omitted frames bit for bit. A compact run takes a hundredth of the space.
 
-Axis: N frames of all runs that are kept.
+Axis: N frames of all kept runs.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from ig2mj.demos.whole_output import whole_output
 from ig2mj.demos.writer import FLUSH, FORMAT, PACKED
 
 
-def write_thin(recording: Recording, file: str | os.PathLike, runs: Sequence[Run], **attributes: Any) -> None:
-    """Writes some runs of a recording, numbered anew in their order; the file appears when it is complete.
+def write_compact(recording: Recording, file: str | os.PathLike, runs: Sequence[Run], **attributes: Any) -> None:
+    """Writes some runs of a recording, renumbered in this order. The file appears once it is complete.
 
     Args:
-      attributes: added to the file's.
+      attributes: further attributes of the file.
 
     Raises:
       InputError: the recording is broken, or the file cannot be written.
