@@ -40,7 +40,7 @@ class BulletBody(msgspec.Struct):
       name: of the MJCF body that stands for it; also of its files. object: the object it belongs to.
       pos, quat: of its base link's frame, world, metres and x-y-z-w.
       fixed: the base does not move.
-      sleeps: ENABLE_SLEEPING; a robot never sleeps (robots_tasks_sensors.md 6.2).
+      sleeps: ENABLE_SLEEPING; a robot never sleeps (as in iGibson).
       joints: URDF joint -> start position. motor_force: of the velocity motor that stands for joint friction, N or N m.
     """
 

@@ -1,9 +1,4 @@
-"""Bugs of iGibson's that show in a whole world; the others are tested where the state is.
-
-19.1 test_relations_facts · 19.2 test_relations_facts · 19.3 test_room_facts, test_table_a1 · 19.4 test_table_a1 · 19.6
-test_water_facts · 19.7 test_sliced_facts · 19.8 test_sliced_facts, test_dirt_facts · 19.9 test_open_facts · 19.11
-test_halves_stand_for_wholes · 19.17 test_dirt_facts · 19.18 test_water_facts · 19.19 test_temperature_vectors.
-"""
+"""Faults of iGibson that show in a whole world (docs/design/rules.md); the others are tested with their state."""
 
 from __future__ import annotations
 
@@ -22,21 +17,21 @@ def world(tiny_home) -> ig2mj.Simulation:
     return ig2mj.Simulation(tiny_home)
 
 
-def test_19_5_what_the_agent_sees_can_be_asked_before_the_first_step(tiny_home_folder):
+def test_what_the_agent_sees_can_be_asked_before_the_first_step(tiny_home_folder):
     above_the_box = functools.partial(add_floating_hand, pos=(0.1, 0.0, 1.5))  # its camera looks straight down
     world = ig2mj.Simulation(ig2mj.load_scene(tiny_home_folder, agents=[above_the_box]))
     assert world.predicate("in_fov_of_agent", "box")
     assert not world.predicate("in_fov_of_agent", "ball")  # on the floor, 1.5 m to the side
 
 
-def test_19_10_setting_a_sliced_object_works_and_sets_its_halves(world):
+def test_setting_a_sliced_object_works_and_sets_its_halves(world):
     world.set_state("sliced", "apple", True)
     world.set_state("frozen", "apple", True)
     assert world.predicate("frozen", "apple")
     assert world.predicate("frozen", "apple_half_0") and world.predicate("frozen", "apple_half_1")
 
 
-def test_19_12_contacts_of_sleeping_objects_are_remembered(world):
+def test_contacts_of_sleeping_objects_are_kept(world):
     world.step(count=150)
     assert not world.view.awake[0, world.scene.object_index("box")]
     assert world.predicate("in_contact_with", "box", "table")
@@ -44,7 +39,7 @@ def test_19_12_contacts_of_sleeping_objects_are_remembered(world):
     assert not world.predicate("in_contact_with", "box", "table")
 
 
-def test_19_14_a_restored_world_answers_of_itself(world, tmp_path):
+def test_predicates_of_a_restored_world_are_those_of_its_own_state(world, tmp_path):
     world.save(tmp_path / "before.npz")
     assert world.predicate("on_top", "box", "table")
     world.set_object_pose("box", (-1.0, 0.5, 0.05))
@@ -54,7 +49,7 @@ def test_19_14_a_restored_world_answers_of_itself(world, tmp_path):
     assert world.predicate("on_top", "box", "table")
 
 
-def test_19_15_two_runs_are_the_same(tiny_home):
+def test_two_runs_are_the_same(tiny_home):
     ends = []
     for _ in range(2):
         world = ig2mj.Simulation(tiny_home, seed=7)
@@ -67,7 +62,7 @@ def test_19_15_two_runs_are_the_same(tiny_home):
         assert np.array_equal(np.asarray(a), np.asarray(b), equal_nan=True)
 
 
-def test_19_16_fixed_objects_stand_where_they_stand(world):
+def test_fixed_objects_have_their_own_pose(world):
     # The cabinet and the table are part of the house, and still have poses and centres of mass of their own.
     view = world.view
     for name, place in (("table", (0, 0)), ("cabinet", (1.5, 0)), ("stove", (0, 1.6))):

@@ -99,7 +99,7 @@ def test_table_a5_an_opened_door_stays_open_in_physics(world):
     assert max(world.state("joint_states", "cabinet")) > 0.01
 
 
-def test_section_10_2_slicing_swaps_the_apple_for_its_halves(world):
+def test_slicing_swaps_the_apple_for_its_halves(world):
     world.set_state("temperature", "apple", 55.0)
     where, _ = world.object_pose("apple")
     world.set_state("sliced", "apple", True)

@@ -65,7 +65,7 @@ def test_a_sound_scene_passes_every_check():
 
 
 @pytest.mark.parametrize(("asked", "fine"), [(0.1, True), (0.1014, True), (0.11, False), (0.09, False)])
-def test_bounding_box_may_be_off_by_one_and_a_half_percent_section_8(asked, fine):
+def test_bounding_box_may_be_off_by_one_and_a_half_percent(asked, fine):
     """1.5 %, or 2 mm for what is thin."""
     result = check([block("block", "0 0 0.05")], [entry("block", (asked, 0.1, 0.1))])["bounding_box"]
     assert result.passed == fine

@@ -191,7 +191,7 @@ def test_a_broken_model_is_exit_2_also_from_a_worker_process(own, tmp_path, caps
     assert "st0.urdf" in capsys.readouterr().err and not out.exists()
 
 
-def test_rooms_and_categories_can_be_chosen_section_3(convert):
+def test_rooms_and_categories_can_be_chosen(convert):
     kitchen = convert(only_rooms=("kitchen",)).entries
     assert "stove_0" in kitchen and "bed_0" not in kitchen and "walls" in kitchen
     beds = convert(only_categories=("bed",)).entries

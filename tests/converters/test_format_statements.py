@@ -85,32 +85,32 @@ def box_of(scene, body: str) -> np.ndarray:
     return np.max([b[1] for b in boxes], axis=0) - np.min([b[0] for b in boxes], axis=0)
 
 
-def test_the_size_is_metadatas_even_where_the_mesh_is_smaller_section_0_fact_3(scene):
+def test_the_size_is_metadatas_even_where_the_mesh_is_smaller(scene):
     assert scene.entries["desk_0"].scale == pytest.approx((1.0, 1.0, 2.0))
     np.testing.assert_allclose(box_of(scene, "desk_0"), (0.96, 0.48, 1.44), atol=1e-4)
 
 
-def test_mass_is_of_the_asked_box_not_of_the_mesh_section_0_fact_5(scene):
+def test_mass_is_of_the_asked_box_not_of_the_mesh(scene):
     assert scene.entries["desk_0"].mass == pytest.approx(67.0 * 1.0 * 0.5 * 1.5, rel=1e-4)
 
 
-def test_the_copies_of_the_pose_that_save_wrote_are_ignored_section_2_1(scene):
+def test_the_copies_of_the_pose_that_save_wrote_are_ignored(scene):
     np.testing.assert_allclose(scene.data.body("desk_0").xpos, (1.0, 1.0, 0.76), atol=1e-5)
     np.testing.assert_allclose(scene.data.body("desk_0").xquat, (1, 0, 0, 0), atol=1e-6)
 
 
-def test_fixed_or_free_is_the_scene_joints_type_section_0_fact_9(scene):
+def test_fixed_or_free_is_the_scene_joints_type(scene):
     assert scene.entries["desk_0"].fixed and not scene.entries["basket_0"].fixed
 
 
-def test_an_agent_becomes_no_body_but_a_start_pose_of_the_task_section_2_1(scene):
+def test_an_agent_becomes_no_body_but_a_start_pose_of_the_task(scene):
     assert "agent_0" not in scene.entries
     assert "agent_0" not in [scene.model.body(b).name for b in range(scene.model.nbody)]
     (agent,) = scene.manifest.task["agents"]
     assert (agent["name"], agent["model"], agent["pos"]) == ("agent_0", "BehaviorRobot", [1.0, -0.4, 0.9])
 
 
-def test_a_door_belongs_to_both_rooms_and_its_frame_does_not_touch_the_wall_section_2_4(scene):
+def test_a_door_belongs_to_both_rooms_and_its_frame_does_not_touch_the_wall(scene):
     assert scene.entries["door_0"].rooms == ["kitchen_0", "bedroom_0"]
     m, d = scene.model, scene.data
     frame, walls = m.body("door_0").id, m.body("walls").id
@@ -118,7 +118,7 @@ def test_a_door_belongs_to_both_rooms_and_its_frame_does_not_touch_the_wall_sect
     assert not [c for c in d.contact if {m.geom_bodyid[c.geom1], m.geom_bodyid[c.geom2]} == {frame, walls}]
 
 
-def test_a_moving_door_panel_still_touches_the_wall_section_2_4(scene):
+def test_a_moving_door_panel_still_touches_the_wall(scene):
     m, d = scene.model, mujoco.MjData(scene.model)
     mujoco.mj_resetDataKeyframe(m, d, 0)
     d.qpos[m.joint("door_0_joint_0").qposadr[0]] = 3.1  # swung back against the wall beside the hole
@@ -127,48 +127,48 @@ def test_a_moving_door_panel_still_touches_the_wall_section_2_4(scene):
     assert any({m.geom_bodyid[c.geom1], m.geom_bodyid[c.geom2]} == {panel, walls} for c in d.contact)
 
 
-def test_a_handle_chained_on_the_panel_moves_with_it_section_2_4(scene):
+def test_a_handle_chained_on_the_panel_moves_with_it(scene):
     m = scene.model
     assert m.body("door_0_link_1").parentid[0] == m.body("door_0_link_0").id
 
 
-def test_a_closed_pose_that_is_not_zero_is_clamped_to_its_limit_section_7(scene):
+def test_a_closed_pose_that_is_not_zero_is_clamped_to_its_limit(scene):
     assert scene.data.joint("door_0_joint_0").qpos[0] == pytest.approx(0.03, abs=1e-6)
 
 
-def test_joint_states_have_prefixed_names_and_may_name_some_joints_only_section_7(scene):
+def test_joint_states_have_prefixed_names_and_may_name_some_joints_only(scene):
     assert scene.data.joint("bottom_cabinet_1_joint_0").qpos[0] == pytest.approx(0.12, abs=1e-6)
     assert scene.data.joint("bottom_cabinet_1_joint_1").qpos[0] == 0.0
 
 
-def test_box_collisions_of_simplified_urdfs_stay_and_scale_section_4(scene):
+def test_box_collisions_of_simplified_urdfs_stay_and_scale(scene):
     m = scene.model
     sizes = sorted((2 * m.geom_size[g]).tolist() for g in scene.geoms("basket_0", 3))
     np.testing.assert_allclose(sizes, [(0.56, 0.56, 0.02), (0.6, 0.6, 0.4)], atol=1e-5)
 
 
-def test_box_visuals_and_visuals_of_links_without_collision_are_dropped_sections_4_and_8(scene):
+def test_box_visuals_and_visuals_of_links_without_collision_are_dropped(scene):
     (visual,) = scene.geoms("basket_0", 0)
     assert scene.model.geom_type[visual] == mujoco.mjtGeom.mjGEOM_MESH
 
 
-def test_a_blade_box_is_scaled_and_turned_with_its_own_rpy_section_4_2(scene):
+def test_a_blade_box_is_scaled_and_turned_with_its_own_rpy(scene):
     blade = scene.model.geom("carving_knife-kn1-0/slicer")
     np.testing.assert_allclose(2 * blade.size, (0.4, 0.008, 0.02), atol=1e-6)
     np.testing.assert_allclose(blade.pos, (0.2, 0, 0), atol=1e-6)
     np.testing.assert_allclose(blade.quat, (np.cos(0.25), 0, 0, np.sin(0.25)), atol=1e-6)
 
 
-def test_names_of_clutter_keep_their_dashes_section_2_1(scene):
+def test_names_of_clutter_keep_their_dashes(scene):
     assert scene.model.body("carving_knife-kn1-0").jntnum[0] == 1
 
 
-def test_no_speed_or_force_limits_and_no_springs_section_7(scene):
+def test_no_speed_or_force_limits_and_no_springs(scene):
     m = scene.model
     assert not m.jnt_stiffness.any() and not m.jnt_actfrclimited.any()
 
 
-def test_bullets_contact_tags_are_read_over_section_7(tmp_path, folder_of_a_ycb_like_urdf):
+def test_bullets_contact_tags_are_read_over(tmp_path, folder_of_a_ycb_like_urdf):
     from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.conversion import convert_object
 

@@ -196,7 +196,7 @@ def test_primitives_of_the_source_stay_exact_and_scale():
     assert len(result.warnings) == 1 and "unevenly" in result.warnings[0]
 
 
-def test_scale_is_in_mesh_axes_before_the_pose_section_5():
+def test_scale_is_in_mesh_axes_before_the_pose():
     turn = trimesh.transformations.rotation_matrix(np.pi / 2, [0, 0, 1])
     result = decompose_link([shape(box((1, 1, 1)), scale=(3, 2, 1), pose=turn)], NO_CACHE)
     np.testing.assert_allclose(outline(result), [2, 3, 1], atol=1e-9)

@@ -50,7 +50,7 @@ def compiled(assembly, tmp_path, fixed=True):
     return builder.spec.compile(), elements, builder
 
 
-def test_links_behind_fixed_joints_are_geoms_of_the_parent_body_section_6():
+def test_links_behind_fixed_joints_are_geoms_of_the_parent_body():
     plan = thing(
         ["base_link", "a", "b"],
         [joint("j", "fixed", "base_link", "a", (0.2, 0, 0)), joint("k", "fixed", "a", "b", (0, 0.3, 0))],
@@ -62,7 +62,7 @@ def test_links_behind_fixed_joints_are_geoms_of_the_parent_body_section_6():
     np.testing.assert_allclose(extent(plan, np.eye(4))[1], [0.25, 0.35, 0.05])
 
 
-def test_masses_of_merged_links_add_and_their_centre_is_the_weighted_mean_section_6():
+def test_masses_of_merged_links_add_and_their_centre_is_the_weighted_mean():
     merged = merge_inertials(
         [(Inertial(1.0, np.zeros((3, 3))), at(0, 0, 0)), (Inertial(3.0, np.zeros((3, 3))), at(0.4, 0, 0))]
     )
@@ -93,7 +93,7 @@ def test_a_moving_link_starts_its_own_body_at_the_joint(tmp_path):
 @pytest.mark.parametrize(
     ("kind", "lower", "upper"), [("continuous", None, None), ("revolute", None, None), ("revolute", 1.0, -1.0)]
 )
-def test_joints_without_usable_limits_are_unlimited_section_7(kind, lower, upper, tmp_path):
+def test_joints_without_usable_limits_are_unlimited(kind, lower, upper, tmp_path):
     plan = thing(["base_link", "a"], [joint("j", kind, "base_link", "a", lower=lower, upper=upper)])
     assert joint_range(plan.joints()[0]) is None
     model, _, _ = compiled(plan, tmp_path)
@@ -106,7 +106,7 @@ def test_a_joint_without_room_between_its_limits_is_rigid():
     np.testing.assert_allclose(plan.link_poses["a"][1], at(0.2, 0, 0))
 
 
-def test_mimic_becomes_a_joint_equality_section_7(tmp_path):
+def test_mimic_becomes_a_joint_equality(tmp_path):
     joints = [
         joint("lead", "revolute", "base_link", "a"),
         joint("follow", "revolute", "base_link", "b", lower=-9.0, upper=9.0, mimic=Mimic("lead", -2.0, 0.1)),
@@ -130,7 +130,7 @@ def test_a_mimic_of_a_joint_that_does_not_move_is_a_warning(tmp_path):
     assert model.neq == 0 and "nothing" in builder.warnings["thing"][0]
 
 
-def test_zero_mass_moving_links_get_a_small_floor_section_6(tmp_path):
+def test_zero_mass_moving_links_get_a_small_floor(tmp_path):
     nothing = Inertial(0.0, np.zeros((3, 3)))
     plan = thing(
         ["base_link", "a"], [joint("j", "revolute", "base_link", "a")], {"a": nothing}, {"base_link": [hull()]}
@@ -139,7 +139,7 @@ def test_zero_mass_moving_links_get_a_small_floor_section_6(tmp_path):
     assert model.body("thing_a").mass[0] == pytest.approx(MIN_MASS)
 
 
-def test_a_free_base_without_mass_is_flagged_section_6():
+def test_a_free_base_without_mass_is_flagged():
     plan = thing(["base_link"], [], {"base_link": Inertial(0.0, np.zeros((3, 3)))})
     assert "static" in plan.warnings[0]
 

@@ -12,7 +12,7 @@ from ig2mj_converters.mjcf.model_builder import write_model
 from ig2mj.errors import InputError
 
 
-def test_no_self_collision_inside_an_object_section_0_fact_7(house):
+def test_no_self_collision_inside_an_object(house):
     m, d = house.model, mujoco.MjData(house.model)
     drawer, door = m.joint("bottom_cabinet_0_joint_0"), m.joint("bottom_cabinet_0_joint_1")
     bodies = {m.body(b).id for b in ("bottom_cabinet_0", "bottom_cabinet_0_link_0", "bottom_cabinet_0_link_1")}
@@ -23,14 +23,14 @@ def test_no_self_collision_inside_an_object_section_0_fact_7(house):
         assert not any(pair <= bodies for pair in pairs)
 
 
-def test_every_pair_of_bodies_of_one_object_is_excluded_section_7(house):
+def test_every_pair_of_bodies_of_one_object_is_excluded(house):
     m = house.model
     names = ("bottom_cabinet_0", "bottom_cabinet_0_link_0", "bottom_cabinet_0_link_1")
     wanted = {frozenset(m.body(b).id for b in pair) for pair in itertools.combinations(names, 2)}
     assert wanted <= {frozenset((s >> 16, s & 0xFFFF)) for s in m.exclude_signature.tolist()}
 
 
-def test_links_and_joints_carry_the_objects_name_section_7(house):
+def test_links_and_joints_carry_the_objects_name(house):
     names = [house.model.body(b).name for b in range(house.model.nbody)]
     assert {"bottom_cabinet_0", "bottom_cabinet_0_link_0", "bottom_cabinet_0_link_1"} <= set(names)
     assert "bottom_cabinet_0_base_link" not in names
@@ -38,7 +38,7 @@ def test_links_and_joints_carry_the_objects_name_section_7(house):
     assert joints == ["bottom_cabinet_0_joint_0", "bottom_cabinet_0_joint_1"]
 
 
-def test_floating_joints_split_the_object_into_independent_bodies_section_0_fact_8(house):
+def test_floating_joints_split_the_object_into_independent_bodies(house):
     entry = house.entries["bed_0"]
     assert entry.fixed and entry.bodies == ["bed_0", "bed_0_link_0", "bed_0_link_1"]
     for pillow in entry.bodies[1:]:
@@ -63,13 +63,13 @@ def test_a_pillow_rests_on_its_bed_although_both_are_one_object(house):
     assert d.body("bed_0_link_0").xpos[2] == pytest.approx(0.451, abs=5e-3)
 
 
-def test_fixed_objects_have_no_joint_and_loose_ones_a_free_joint_section_8_8(house):
+def test_fixed_objects_have_no_joint_and_loose_ones_a_free_joint(house):
     assert house.entries["stove_0"].fixed and house.model.body("stove_0").jntnum[0] == 0
     assert not house.entries["apple_0"].fixed
     assert house.model.joint("apple_0/free").type[0] == mujoco.mjtJoint.mjJNT_FREE
 
 
-def test_frictionloss_is_the_velocity_motor_of_section_0_fact_10(house):
+def test_frictionloss_stands_for_the_velocity_motor_that_igibson_puts_on_joints(house):
     m = house.model
     assert m.dof_frictionloss[m.joint("bottom_cabinet_0_joint_0").dofadr[0]] == 10.0
     assert m.dof_frictionloss[m.joint("fridge_0_joint_0").dofadr[0]] == 10.0
@@ -78,7 +78,7 @@ def test_frictionloss_is_the_velocity_motor_of_section_0_fact_10(house):
 @pytest.mark.parametrize(
     ("category", "force"), [("oven", 30.0), ("dishwasher", 30.0), ("toilet", 3.0), ("fridge", 10.0)]
 )
-def test_friction_of_ovens_dishwashers_and_toilets_section_0_fact_10(category, force):
+def test_friction_of_ovens_dishwashers_and_toilets(category, force):
     from ig2mj_converters.base.description import Joint
     from ig2mj_converters.bodies.joint_rules import friction
 
@@ -96,7 +96,7 @@ def test_a_knob_is_not_held_by_a_furniture_hinges_torque():
     assert friction(hinge, "stove", 0.02) == pytest.approx(2.0)
 
 
-def test_contacts_are_as_section_7_and_the_gap_lists_three_millimetres(house):
+def test_friction_and_margin_are_igibsons_and_the_gap_lists_three_millimetres(house):
     m = house.model
     collision = m.geom_group == 3
     assert np.allclose(m.geom_friction[collision, 0], 0.25)
@@ -106,14 +106,14 @@ def test_contacts_are_as_section_7_and_the_gap_lists_three_millimetres(house):
     assert not m.geom_contype[visual].any() and not m.geom_conaffinity[visual].any()
 
 
-def test_physics_options_of_section_7(house):
+def test_gravity_and_timestep_are_igibsons(house):
     option = house.model.opt
     assert option.timestep == pytest.approx(1 / 120, rel=1e-5)
     assert tuple(option.gravity) == (0.0, 0.0, -9.8)
     assert option.enableflags & mujoco.mjtEnableBit.mjENBL_SLEEP
 
 
-def test_point_links_are_sites_on_the_base_body_section_4_2(house):
+def test_point_links_are_sites_on_the_base_body(house):
     site = house.model.site("stove_0/heat_source")
     assert house.model.body(site.bodyid[0]).name == "stove_0"
     np.testing.assert_allclose(site.pos, [0.1, 0.0, 0.45], atol=1e-6)
@@ -123,7 +123,7 @@ def test_point_links_are_sites_on_the_base_body_section_4_2(house):
     assert house.entries["sink_0"].links["water_source"].site == "sink_0/water_source"
 
 
-def test_box_links_are_colliding_geoms_of_their_own_name_section_4_2(house):
+def test_box_links_are_colliding_geoms_of_their_own_name(house):
     geom = house.model.geom("knife-kn0-0/slicer")
     assert geom.type[0] == mujoco.mjtGeom.mjGEOM_BOX and geom.group[0] == 3 and geom.contype[0] == 1
     np.testing.assert_allclose(geom.size, [0.09, 0.002, 0.002], atol=1e-6)
@@ -131,20 +131,20 @@ def test_box_links_are_colliding_geoms_of_their_own_name_section_4_2(house):
     assert house.entries["knife-kn0-0"].links["slicer"].geom == "knife-kn0-0/slicer"
 
 
-def test_the_masses_of_a_moving_object_are_the_category_density_times_its_box_section_6(house):
+def test_the_masses_of_a_moving_object_are_the_category_density_times_its_box(house):
     cabinet = house.entries["bottom_cabinet_0"]
     assert cabinet.mass == pytest.approx(30.0 / (0.6 * 0.5 * 0.8) * (0.61 * 0.5 * 0.8), rel=1e-3)
     bodies = ("bottom_cabinet_0", "bottom_cabinet_0_link_0", "bottom_cabinet_0_link_1")
     assert sum(house.model.body(b).mass[0] for b in bodies) == pytest.approx(cabinet.mass, rel=1e-4)
 
 
-def test_encrypted_visuals_are_replaced_by_the_hulls_section_0_fact_11(house):
+def test_encrypted_visuals_are_replaced_by_the_hulls(house):
     visuals, collisions = (house.geoms("breakfast_table_0", group) for group in (0, 3))
     assert len(visuals) == len(collisions) == 5
     np.testing.assert_allclose(house.model.geom_size[visuals], house.model.geom_size[collisions])
 
 
-def test_the_closed_end_is_the_upper_limit_where_direction_is_minus_one_section_4_1(house):
+def test_the_closed_end_is_the_upper_limit_where_direction_is_minus_one(house):
     (fridge,) = house.entries["fridge_0"].openable
     assert (fridge.joint, fridge.closed, fridge.open) == ("fridge_0_joint_0", 0.0, -1.5)
     drawer, door = house.entries["bottom_cabinet_0"].openable
@@ -152,14 +152,14 @@ def test_the_closed_end_is_the_upper_limit_where_direction_is_minus_one_section_
     assert (door.closed, door.open) == (0.0, 1.5)
 
 
-def test_abilities_and_synset_come_from_the_taxonomy_section_10(house):
+def test_abilities_and_synset_come_from_the_taxonomy(house):
     assert house.entries["stove_0"].synset == "stove.n.01"
     assert house.entries["stove_0"].abilities["heatSource"]["temperature"] == 500
     assert "sliceable" in house.entries["apple_0"].abilities
     assert "slicer" in house.entries["knife-kn0-0"].abilities
 
 
-def test_assisted_grasp_is_enable_ag_of_the_category_section_1_1(house):
+def test_assisted_grasp_is_enable_ag_of_the_category(house):
     assert house.entries["apple_0"].assisted_grasp
     assert not house.entries["fridge_0"].assisted_grasp
 

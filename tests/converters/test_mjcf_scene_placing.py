@@ -14,14 +14,14 @@ from ig2mj_converters.bodies.placements import Placement
 from ig2mj_converters.mjcf.scene import root_poses
 
 
-def test_the_joint_origin_is_the_pose_of_the_bounding_box_centre_section_2_2(house):
+def test_the_joint_origin_is_the_pose_of_the_bounding_box_centre(house):
     for name, centre in (("bottom_cabinet_0", (-1.6, 1.0, 0.41)), ("fridge_0", (-1.6, -1.1, 0.9))):
         entry, body = house.entries[name], house.model.body(name)
         assert np.allclose(body.quat, [1, 0, 0, 0])
         np.testing.assert_allclose(body.pos + entry.base_link_offset, centre, atol=1e-5)
 
 
-def test_the_offset_is_turned_with_the_object_section_2_2():
+def test_the_offset_is_turned_with_the_object():
     model = ObjectModel("c", "m", pathlib.Path("m.urdf"), {}, {}, "base_link")
     model.metadata = Metadata(bbox_size=np.ones(3), base_link_offset=np.array([0.3, 0.0, 0.1]))
     body = BodyPlan("base_link", None, np.eye(4), None, ["base_link"], [], [], Inertial(1.0, np.eye(3)), np.zeros(3))
@@ -48,7 +48,7 @@ def two_bodied(box: bool) -> Assembly:
     return Assembly(model, np.ones(3), bodies, {}, [])
 
 
-def test_saved_poses_are_of_centres_of_mass_and_place_the_split_off_bodies_section_2_2():
+def test_saved_poses_are_of_centres_of_mass_and_place_the_split_off_bodies():
     saved = [[[9.0, 9.0, 9.0], [1.0, 0.0, 0.0, 0.0]], [[2.0, 3.2, 4.0], [1.0, 0.0, 0.0, 0.0]]]
     instance = Instance("c_0", "c", "m", np.eye(4), fixed=True, base_poses=saved)
     base, other = root_poses(Placement(instance), two_bodied(box=True))
@@ -56,7 +56,7 @@ def test_saved_poses_are_of_centres_of_mass_and_place_the_split_off_bodies_secti
     np.testing.assert_allclose(other[:3, 3], [2.0, 3.0, 4.0])
 
 
-def test_without_a_bounding_box_the_saved_pose_places_the_base_section_2_2():
+def test_without_a_bounding_box_the_saved_pose_places_the_base():
     saved = [[[1.1, 2.0, 3.0], [1.0, 0.0, 0.0, 0.0]], [[0.0, 0.2, 5.0], [1.0, 0.0, 0.0, 0.0]]]
     instance = Instance("c_0", "c", "m", np.eye(4), fixed=True, base_poses=saved)
     base, other = root_poses(Placement(instance), two_bodied(box=False))
@@ -64,19 +64,19 @@ def test_without_a_bounding_box_the_saved_pose_places_the_base_section_2_2():
     np.testing.assert_allclose(other[:3, 3], [0.0, 0.0, 5.0])
 
 
-def test_legacy_scenes_leave_split_off_bodies_at_their_default_places_section_2_2():
+def test_legacy_scenes_leave_split_off_bodies_at_their_default_places():
     instance = Instance("c_0", "c", "m", np.eye(4), fixed=True, base_poses=[[[0, 0, 0], [1, 0, 0, 0]]])
     _, other = root_poses(Placement(instance), two_bodied(box=True))
     np.testing.assert_allclose(other[:3, 3], [0.0, 0.0, 1.0])
 
 
-def test_scale_is_the_bounding_box_over_the_models_size_section_0_fact_2(house):
+def test_scale_is_the_bounding_box_over_the_models_size(house):
     fridge = house.entries["fridge_0"]
     np.testing.assert_allclose(fridge.scale, [1.0, 1.2, 1.1], atol=1e-6)
     np.testing.assert_allclose(fridge.bounding_box, [0.6, 0.72, 1.76], atol=1e-6)
 
 
-def test_rooms_are_lists_of_room_instances_section_2_1(house):
+def test_rooms_are_lists_of_room_instances(house):
     assert house.entries["stove_0"].rooms == ["kitchen_0"]
     assert house.entries["walls"].rooms == []
     assert {name: room.type for name, room in house.manifest.rooms.instances.items()} == {
@@ -93,47 +93,47 @@ def ray(scene, start, direction) -> float:
     return hit if hit >= 0 else math.inf
 
 
-def test_walls_have_real_door_holes_section_2_3(house):
+def test_walls_have_real_door_holes(house):
     assert ray(house, (-0.3, 0.0, 1.5), (1, 0, 0)) > 1.0  # through the door
     assert ray(house, (-0.3, 0.0, 2.25), (1, 0, 0)) == pytest.approx(0.25, abs=1e-3)  # above it
     assert ray(house, (-0.3, 1.0, 1.5), (1, 0, 0)) == pytest.approx(0.25, abs=1e-3)  # beside it
 
 
-def test_the_hull_budget_does_not_merge_wall_segments_section_2_3(convert):
+def test_the_hull_budget_does_not_merge_wall_segments(convert):
     small = convert(max_hulls=1)
     assert len(small.geoms("walls", 3)) == 7
     assert ray(small, (-0.3, 0.0, 1.5), (1, 0, 0)) > 1.0
 
 
-def test_the_floors_top_is_at_zero_section_2_3(house):
+def test_the_floors_top_is_at_zero(house):
     assert ray(house, (1.0, -1.2, 1.0), (0, 0, -1)) == pytest.approx(1.0, abs=1e-3)
 
 
-def test_ceilings_collide_only_when_asked_section_2_3(house, convert):
+def test_ceilings_collide_only_when_asked(house, convert):
     assert ray(house, (1.0, -1.2, 1.0), (0, 0, 1)) == math.inf
     assert house.geoms("ceilings", 3) == [] and len(house.geoms("ceilings", 4)) == 1
     closed = convert(ceiling_collision=True)
     assert ray(closed, (1.0, -1.2, 1.0), (0, 0, 1)) == pytest.approx(1.5, abs=1e-3)
 
 
-def test_fixed_furniture_turns_tables_fixed_section_8_8(house, convert):
+def test_fixed_furniture_turns_tables_fixed(house, convert):
     fixed = convert(fixed_furniture=True)
     assert not house.entries["breakfast_table_0"].fixed and fixed.entries["breakfast_table_0"].fixed
     assert fixed.model.body("breakfast_table_0").jntnum[0] == 0
     assert not fixed.entries["apple_0"].fixed
 
 
-def test_joint_positions_are_zero_without_a_saved_state_section_7(house):
+def test_joint_positions_are_zero_without_a_saved_state(house):
     for joint in ("bottom_cabinet_0_joint_0", "bottom_cabinet_0_joint_1", "fridge_0_joint_0"):
         assert house.data.joint(joint).qpos[0] == 0.0
 
 
-def test_legacy_joint_positions_are_read_and_clamped_and_unknown_names_ignored_section_7(task_house):
+def test_legacy_joint_positions_are_read_and_clamped_and_unknown_names_ignored(task_house):
     assert task_house.data.joint("bottom_cabinet_9_joint_0").qpos[0] == pytest.approx(0.25, abs=1e-6)
     assert task_house.data.joint("bottom_cabinet_9_joint_1").qpos[0] == pytest.approx(1.5, abs=1e-6)
 
 
-def test_a_multiplexer_at_one_parks_the_whole_and_shows_the_halves_section_2_1(task_house):
+def test_a_multiplexer_at_one_parks_the_whole_and_shows_the_halves(task_house):
     whole, half = task_house.entries["apple_7"], task_house.entries["apple_7_part_0"]
     assert whole.parked and not half.parked and half.part_of == "apple_7"
     assert [part.object for part in whole.parts] == ["apple_7_part_0", "apple_7_part_1"]
@@ -182,7 +182,7 @@ def test_woken_parked_objects_still_rest_on_the_slab(house):
     assert d.qpos[half.qposadr[0] + 2] == pytest.approx(height, abs=0.01)
 
 
-def test_object_scope_becomes_the_task_section_2_1(task_house):
+def test_object_scope_becomes_the_task(task_house):
     task = task_house.manifest.task
     assert (task["activity"], task["definition"], task["instance"]) == ("slicing_fruit", 0, 7)
     assert task["object_scope"] == {
@@ -200,7 +200,7 @@ def test_a_plain_scene_has_no_task(house):
     assert house.manifest.task is None
 
 
-def test_saved_states_have_our_names_section_9(task_house):
+def test_saved_states_have_our_names(task_house):
     entries = task_house.entries
     assert entries["apple_7"].state == {"temperature": 23.0, "sliced": True, "wetness": 0.0}
     assert entries["apple_7_part_0"].state == {"temperature": 60.0, "max_temperature": 75.5, "sliced": True}
@@ -215,7 +215,7 @@ def test_saved_states_have_our_names_section_9(task_house):
     assert sink["water"] == {"steps_since_drop": None, "drops": [None, [-0.8, -1.1, 0.9]]}
 
 
-def test_saved_particles_move_from_the_world_into_the_links_frame_section_9(task_house):
+def test_saved_particles_move_from_the_world_into_the_links_frame(task_house):
     state = task_house.entries["breakfast_table_9"].state
     nothing, named, base = state["dust"]
     assert nothing is None and named["body"] == base["body"] == "breakfast_table_9"
@@ -244,7 +244,7 @@ def test_hovering_objects_are_let_down_unless_told_otherwise(house, convert):
     assert house.model.body("knife-kn0-0").pos[2] == pytest.approx(asked, abs=1e-5)
 
 
-def test_the_house_stays_put_for_a_second_section_8_15(house):
+def test_the_house_stays_put_for_a_second(house):
     m, d = house.model, mujoco.MjData(house.model)
     mujoco.mj_resetDataKeyframe(m, d, 0)
     mujoco.mj_kinematics(m, d)

@@ -93,7 +93,7 @@ def test_igibsons_box_is_the_local_box_with_bullets_margin_rotated(tiny_home):
 
 
 def test_igibsons_margin_of_a_compound_is_four_millimetres(tiny_home):
-    """section 24; the box is that of the whole compound."""
+    """The box is that of the whole compound."""
     view = ig2mj.Simulation(tiny_home, boxes="igibson").view
     table = tiny_home.object_index("table")
     top = [0.4, 0.3, homes.TABLE_TOP]

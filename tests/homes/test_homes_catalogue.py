@@ -99,7 +99,7 @@ def test_openable_categories_have_an_openable_joint(firsts: dict[str, HouseholdO
 
 
 def test_sliceable_wholes_have_two_halves_of_their_own_category(firsts: dict[str, HouseholdObject]):
-    """Whole and halves must share one category (states.md 10.3)."""
+    """Whole and halves must share one category."""
     for category, model in firsts.items():
         if "sliceable" not in abilities(category) or category.startswith("half_"):
             assert not model.parts, category

@@ -56,7 +56,7 @@ def test_categories_file_lists_objects_and_building_parts(root: pathlib.Path):
 
 
 def test_specs_hold_the_density_of_the_bounding_box(root: pathlib.Path):
-    """Section 1.1: density = mass / (sx sy sz)."""
+    """Density = mass / (sx sy sz)."""
     specs = json.loads((root / "metadata/avg_category_specs.json").read_text())
     for name, spec in specs.items():
         assert spec["density"] == pytest.approx(spec["mass"] / np.prod(spec["size"]), rel=1e-3), name
@@ -76,7 +76,7 @@ def test_urdf_names_files_that_exist(root: pathlib.Path, category: str):
         for mesh in tree.iter("mesh"):
             assert (model / mesh.attrib["filename"]).is_file()
         for link in tree.iter("link"):
-            assert len(link.findall("collision")) == 1, "one collision OBJ per link (fact 4)"
+            assert len(link.findall("collision")) == 1, "one collision OBJ per link"
         links = {link.attrib["name"] for link in tree.iter("link")}
         children = {joint.find("child").attrib["link"] for joint in tree.iter("joint")}  # type: ignore[union-attr]
         assert links - children == {"base_link"}
@@ -93,7 +93,7 @@ def test_collision_files_hold_one_convex_group_per_piece(root: pathlib.Path, cat
 
 @pytest.mark.parametrize("category", SOME)
 def test_metadata_box_is_that_of_the_collision_meshes(root: pathlib.Path, category: str):
-    """Section 4.1: bbox_size and base_link_offset at scale 1, all joints at 0, base axes."""
+    """bbox_size and base_link_offset hold at scale 1, all joints at 0, base axes."""
     for model in models(root, category):
         tree = ElementTree.parse(model / f"{model.name}.urdf").getroot()
         origin = {"base_link": np.zeros(3)}
@@ -111,7 +111,6 @@ def test_metadata_box_is_that_of_the_collision_meshes(root: pathlib.Path, catego
 
 
 def test_material_groups_name_classes_that_the_library_has(root: pathlib.Path):
-    """Section 4.4."""
     library = json.loads((root / "materials/materials.json").read_text())
     for instances in library.values():
         for files in instances.values():
@@ -137,7 +136,6 @@ def test_openable_joints_are_named_and_directed(root: pathlib.Path):
 
 
 def test_point_links_have_no_geometry_and_blades_are_boxes(root: pathlib.Path):
-    """Section 4.2."""
     stove = metadata(models(root, "stove")[0])["links"]
     assert stove["heat_source"]["geometry"] is None and stove["toggle_button"]["geometry"] is None
     blade = metadata(models(root, "carving_knife")[0])["links"]["slicer"]
@@ -145,7 +143,7 @@ def test_point_links_have_no_geometry_and_blades_are_boxes(root: pathlib.Path):
 
 
 def test_halves_lie_beside_their_whole(root: pathlib.Path):
-    """Section 4.1 `object_parts`; the halves' category is the whole's."""
+    """The halves' category is the whole's."""
     wholes = [m for m in models(root, "apple") if "object_parts" in metadata(m)]
     assert len(wholes) == catalogue()["apple"].count
     for whole in wholes:

@@ -194,7 +194,7 @@ def test_a_closed_fridge_stays_closed_when_bumped_gently(convert, index: int):
         fridge.run(1 / SECONDS, {dof: 0.3 * SECONDS * (width if "door" in openable.joint else 1.0)})
         fridge.run(1.0)
         moved = (fridge.data.qpos[qpos] - openable.closed) / (openable.open - openable.closed)
-        assert 0 <= moved < 0.05, "from 5 % of its range on it counts as open (states.md)"
+        assert 0 <= moved < 0.05, "from 5 % of its range on it counts as open"
 
 
 def test_halves_of_an_apple_lie_still(convert):

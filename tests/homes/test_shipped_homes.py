@@ -163,7 +163,7 @@ def test_a_closed_fridge_stays_closed_when_bumped_gently(name: str):
         data.qfrc_applied[v] = 0.0
         mujoco.mj_step(model, data, nstep=120)
         moved = (data.qpos[int(joint.qposadr[0])] - openable.closed) / (openable.open - openable.closed)
-        assert 0 <= moved < 0.05, f"{openable.joint}: from 5 % of its range on it counts as open (states.md)"
+        assert 0 <= moved < 0.05, f"{openable.joint}: from 5 % of its range on it counts as open"
 
 
 def test_the_bowl_holds_its_apple_when_the_table_is_shaken():

@@ -38,7 +38,7 @@ def categories_with(ability):
     return {c for c, found in IN_DATA.items() if ability in found}
 
 
-def test_counts_of_synsets_per_ability_are_those_of_section_3():
+def test_counts_of_synsets_per_ability_are_those_of_the_taxonomy():
     owners = {knowledge.synset(c) for c in knowledge.categories()}
     counts = collections.Counter(a for s in owners for a in knowledge.abilities_of_synset(s))
     assert counts == COUNTS
@@ -53,7 +53,7 @@ def test_counts_of_synsets_per_ability_are_those_of_section_3():
         ("burner", 500, 0.02, True, False, False),
     ],
 )
-def test_heat_sources_have_the_values_of_section_0(category, temperature, rate, toggled, closed, inside):
+def test_heat_sources_have_the_taxonomys_values(category, temperature, rate, toggled, closed, inside):
     assert knowledge.abilities(category)["heatSource"] == {
         "temperature": temperature,
         "heating_rate": rate,
@@ -102,7 +102,7 @@ def test_cleaning_tools_that_can_be_soaked_are_brush_napkin_towels_and_rag():
     assert categories_with("soakable") - both == {"pot_plant", "tea_bag"}
 
 
-def test_openable_categories_are_those_of_section_3():
+def test_openable_categories_are_those_of_the_taxonomy():
     assert categories_with("openable") == set(
         [
             "bottom_cabinet",

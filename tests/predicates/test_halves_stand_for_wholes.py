@@ -40,7 +40,7 @@ def test_before_the_cut_the_whole_speaks_for_itself():
     assert _holds("(sliced apple)", [])
 
 
-def test_section_19_11_a_sliced_object_may_be_the_second_argument():
+def test_a_sliced_object_may_be_the_second_argument():
     assert _holds("(in_contact_with table apple)", [("table", "right")])
     assert not _holds("(in_contact_with table apple)", [])
     assert _holds("(under table apple)", [])  # one half is above it

@@ -255,6 +255,6 @@ def test_predicates_hold_world_by_world():
     assert goal(_world(view))[:].tolist() == [True, False]
 
 
-def test_section_20_touching_needs_no_rays():
+def test_touching_needs_no_rays():
     assert _compiled("(in_contact_with fish table)", "paper").queries == []
     assert _compiled("(inside fish fridge)", "paper").queries == [("inside", 0, 2)]

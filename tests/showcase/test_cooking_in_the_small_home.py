@@ -31,7 +31,7 @@ def test_everything_happens(cooked):
 
 
 @pytest.mark.parametrize("celsius, steps", [(70.0, 156), (100.0, 264), (200.0, 696)])
-def test_the_stove_heats_the_fish_from_23_degrees_in_the_steps_of_section_22(cooked, celsius, steps):
+def test_the_stove_heats_the_fish_from_23_degrees_in_this_many_steps(cooked, celsius, steps):
     _, kitchen, log = cooked
     switched_on = log.first("toggled_on", kitchen.stove)
     reached = log.first_step_at(kitchen.fish, celsius)

@@ -62,7 +62,7 @@ def _counts(states) -> tuple[int, int]:
 
 
 @pytest.mark.parametrize(("alive", "dirty"), [(11, True), (10, False)])
-def test_section_22_twenty_placed_are_dirty_at_eleven_and_clean_at_ten(alive, dirty):
+def test_twenty_placed_are_dirty_at_eleven_and_clean_at_ten(alive, dirty):
     model = ROOM.model()
     rows = _dirty().dust
     rows = rows.replace(alive=rows.alive & (np.arange(NUM_PARTICLES) < alive))
@@ -71,7 +71,7 @@ def test_section_22_twenty_placed_are_dirty_at_eleven_and_clean_at_ten(alive, di
 
 
 @pytest.mark.parametrize(("alive", "dirty"), [(16, True), (15, False)])
-def test_section_22_floors_are_dirty_at_sixteen_and_clean_at_fifteen_in_igibsons_code(alive, dirty):
+def test_floors_are_dirty_at_sixteen_and_clean_at_fifteen_in_igibsons_code(alive, dirty):
     home = HandWorld(Item("floor", abilities=DIRT, category="floors", floor=True))
     model = home.model(compat="igibson")
     rows, _ = _set_dusty(model, initial_states(model, 1).dust, 0, *_points())
@@ -109,12 +109,12 @@ def test_table_a4_any_cleaning_tool_takes_dust_in_its_region():
     assert np.allclose(PLACES[gone, 0], [0.35, 0.45, 0.55, 0.65])
 
 
-def test_section_8_3_without_an_annotated_area_the_whole_tool_cleans():
+def test_without_an_annotated_area_the_whole_tool_cleans():
     states = step(ROOM.model(), _dirty(), ROOM.view({"rag": (0.0, 0, 0.02)}, touching=[("rag", "table")]))
     assert _counts(states) == (18, 20)
 
 
-def test_section_8_3_only_contacts_through_the_annotated_area_clean():
+def test_only_contacts_through_the_annotated_area_clean():
     handle = _swept({"broom": (0.5, 0, 0.0)}, newtons=0.0)
     assert _counts(step(ROOM.model(), _dirty(), handle)) == (20, 20)
     asleep = handle.replace(awake=handle.awake & False)  # contacts of what sleeps are remembered, without their links
@@ -122,13 +122,13 @@ def test_section_8_3_only_contacts_through_the_annotated_area_clean():
 
 
 @pytest.mark.parametrize(("height", "left"), [(0.0229, 18), (0.0231, 20)])
-def test_section_8_3_the_whole_tools_region_has_bullets_margin(height, left):
+def test_the_region_of_a_whole_tool_has_bullets_margin(height, left):
     """3 mm for one hull. Without it a rag that rests 2 mm off its plate would reach nothing on it."""
     states = step(ROOM.model(), _dirty(), ROOM.view({"rag": (0.0, 0, height)}, touching=[("rag", "table")]))
     assert _counts(states)[0] == left
 
 
-def test_section_4_2_the_box_of_an_annotated_area_has_no_margin():
+def test_the_box_of_an_annotated_area_has_no_margin():
     """The area is a box shape in Bullet: 1 mm above the points it reaches none of them, and at their height all."""
     reach = PLACES[0, 2] + 0.02
     apart = step(ROOM.model(), _dirty(), _swept({"broom": (0.5, 0, reach + 0.001)}))
@@ -137,7 +137,7 @@ def test_section_4_2_the_box_of_an_annotated_area_has_no_margin():
 
 
 @pytest.mark.parametrize(("tool", "half", "margin"), [("rag", (0.1, 0.1, 0.01), 0.003), ("broom", (0.2, 0.1, 0.02), 0)])
-def test_section_4_2_a_region_turns_with_the_tool_and_so_does_its_margin(tool, half, margin):
+def test_a_region_turns_with_the_tool_and_so_does_its_margin(tool, half, margin):
     turn = (np.cos(0.4), np.sin(0.4), 0.0, 0.0)  # 0.8 rad about x
     low, high = cleaning.regions(ROOM.model(), ROOM.view({tool: (0, 0, 0)}, quat={tool: turn}))
     number = {"broom": 0, "rag": 1}[tool]
@@ -147,7 +147,7 @@ def test_section_4_2_a_region_turns_with_the_tool_and_so_does_its_margin(tool, h
     np.testing.assert_allclose([-np.asarray(low[0, number]), high[0, number]], [reach, reach], atol=1e-6)
 
 
-def test_section_8_3_the_tool_must_touch_what_it_cleans():
+def test_the_tool_must_touch_what_it_cleans():
     states = step(ROOM.model(), _dirty(), ROOM.view({"rag": (0.0, 0, 0.02)}))
     assert _counts(states) == (20, 20)
 
@@ -161,7 +161,7 @@ def test_table_a4_stains_go_only_with_a_soaked_tool():
     assert _counts(step(ROOM.model(), wet, broom))[1] == 20  # a broom cannot be soaked
 
 
-def test_section_19_17_a_vacuum_cleaner_cleans_only_while_it_is_on():
+def test_a_vacuum_cleaner_cleans_only_while_it_is_on():
     view = ROOM.view({"vacuum": (0.0, 0, 0.1)}, touching=[("vacuum", "table")])
     off = _dirty()
     on = off.replace(toggled_on=off.toggled_on.at[0, 3].set(True))
@@ -184,7 +184,7 @@ def test_a_tool_cleans_where_the_moved_table_is():
     assert _counts(step(ROOM.model(), _dirty(), view))[0] == 20
 
 
-def test_section_19_8_dirtying_what_is_dirty_replaces_the_particles():
+def test_dirtying_what_is_dirty_replaces_the_particles():
     model = ROOM.model()
     half = _dirty().dust
     half = half.replace(alive=half.alive & (np.arange(NUM_PARTICLES) < 5))
@@ -203,7 +203,7 @@ def test_table_a5_dusty_false_removes_all_particles():
     ("compat", "valid", "works"),
     [("paper", 20, True), ("paper", 19, False), ("igibson", 5, True), ("igibson", 4, False)],
 )
-def test_section_17_row_19_how_many_particles_must_find_a_place(compat, valid, works):
+def test_dirt_needs_all_particles_placed_or_five_in_igibsons_code(compat, valid, works):
     model = ROOM.model(compat=compat)
     rows, done = _set_dusty(model, initial_states(model, 1).dust, 0, *_points(valid))
     assert bool(done[0]) == works
@@ -211,7 +211,7 @@ def test_section_17_row_19_how_many_particles_must_find_a_place(compat, valid, w
     assert bool(dust.dusty(model, rows)[0, 0]) == works
 
 
-def test_section_19_8_the_number_placed_is_part_of_the_state():
+def test_the_number_placed_is_part_of_the_state():
     # Eight of twenty left is clean; iGibson reloads it as eight of eight, dirty.
     rows = _dirty().dust
     rows = rows.replace(alive=rows.alive & (np.arange(NUM_PARTICLES) < 8))
@@ -225,7 +225,7 @@ def test_setting_dirt_in_some_worlds_leaves_the_others():
     assert rows.alive.sum(axis=(1, 2)).tolist() == [20, 0, 20]
 
 
-def test_section_8_2_stain_sizes_follow_the_median_edge():
+def test_stain_sizes_follow_the_median_edge():
     sizes = particles.stain_sizes(np.array([[0.1, 0.5, 3.0], [0.01, 0.01, 0.01], [5.0, 5.0, 5.0]]))
     assert sizes[0, 0] == pytest.approx(0.02) and sizes[0, -1] == pytest.approx(0.05)
     assert sizes[1, 0] == pytest.approx(0.01) and sizes[1, -1] == pytest.approx(0.02)

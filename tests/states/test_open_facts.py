@@ -29,7 +29,7 @@ def _open(joints: list[float], compat: str = "paper") -> list[bool]:
 
 
 @pytest.mark.parametrize(("q", "is_open"), [(0.0, False), (0.078, False), (0.079, True), (1.57, True), (np.nan, False)])
-def test_section_22_a_hinge_of_0_to_1_57_opens_above_0_0785(q, is_open):
+def test_a_hinge_of_0_to_1_57_opens_above_0_0785(q, is_open):
     assert _open([q, 0, 0.5, 0, 0])[0] == is_open
 
 
@@ -43,13 +43,13 @@ def test_table_a1_any_relevant_joint_opens_the_object():
     assert _open([0, 0.0, 0.44, 0, 0])[1] is True
 
 
-def test_section_17_row_10_the_annotated_end_is_closed_also_at_the_upper_limit():
+def test_the_annotated_end_is_the_closed_one_also_at_the_upper_limit():
     for compat in ("paper", "igibson"):
         assert _open([0, 0.0, 0.46, 0, 0], compat)[1] is False
         assert _open([0, 0.0, -0.5, 0, 0], compat)[1] is True
 
 
-def test_section_17_row_10_what_opens_to_both_sides_is_open_between_them_in_igibsons_code():
+def test_what_opens_to_both_sides_is_open_between_them_in_igibsons_code():
     ends = {q: (_open([0, 0, 0.5, q, 0])[2], _open([0, 0, 0.5, q, 0], "igibson")[2]) for q in (0.0, 0.5, 1.0)}
     assert ends == {0.0: (False, False), 0.5: (True, True), 1.0: (True, False)}
 
@@ -83,7 +83,7 @@ def test_table_a5_a_random_subset_of_the_joints_is_opened():
     assert first.sum() > 20 and second.sum() > 20
 
 
-def test_section_19_9_each_joint_keeps_its_own_direction():
+def test_each_joint_keeps_its_own_direction():
     model = HOME.model()
     start = jnp.tile(jnp.asarray([0.0, 0.0, 0.5, 0.0, 0.0]), (60, 1))
     joints, moved = _sample(model, start, jnp.ones((60, 5), bool), True, jax.random.key(1))

@@ -35,14 +35,14 @@ def _ask(name: str, target: str, pos, compat: str = "paper", **view) -> bool:
     return bool(row[1 if name == "below" else 0])
 
 
-def test_section_22_horizontal_angles():
+def test_horizontal_axes_stand_at_five_angles():
     angles = np.rad2deg(np.arctan2(HORIZONTAL_LINES[:4, 1], HORIZONTAL_LINES[:4, 0]))
     assert np.allclose(angles, [0, 22.5, 45, 67.5], atol=1e-4)
     assert np.allclose(np.sum(HORIZONTAL_LINES[:4] * HORIZONTAL_LINES[4:], axis=-1), 0, atol=1e-6)
     assert np.allclose(HORIZONTAL_LINES[4], [0, 1, 0])  # the plane at 90 degrees is this one again
 
 
-def test_section_0_lengths_of_igibsons_rays():
+def test_lengths_of_igibsons_rays():
     assert (HORIZONTAL_LENGTH["igibson"], VERTICAL_LENGTH["igibson"]) == (1.0, 5.0)
 
 
@@ -58,17 +58,17 @@ def test_table_a4_in_same_horizontal_plane_objs():
     assert not _ask("beside", "slab", (0.9, 0, 1.1))
 
 
-def test_section_4_4_a_ray_that_starts_inside_a_piece_does_not_hit_it():
+def test_a_ray_that_starts_inside_a_piece_does_not_hit_it():
     assert not _ask("above", "slab", (0, 0, 1)) and not _ask("below", "slab", (0, 0, 1))
 
 
-def test_section_17_row_8_igibsons_rays_end_after_one_and_five_metres():
+def test_igibsons_rays_end_after_one_and_five_metres():
     assert _ask("below", "slab", (0, 0, 6.5)) and not _ask("below", "slab", (0, 0, 6.5), "igibson")
     assert _ask("below", "slab", (0, 0, 5.9), "igibson")
     assert _ask("beside", "slab", (1.6, 0, 1)) and not _ask("beside", "slab", (1.6, 0, 1), "igibson")
 
 
-def test_section_19_2_no_number_of_pieces_on_the_ray_hides_one():
+def test_no_number_of_pieces_on_the_ray_hides_one():
     stack = [((0, 0, -0.1 * k), (0.1, 0.1, 0.02)) for k in range(30)]
     home = HandWorld(Item("ball", SMALL, pos=(0, 0, 1)), Item("rack", stack), Item("floor", pos=(0, 0, -6)))
     plan = RelationPlan.build(home.model(), [("vertical", 0, 2), ("vertical", 0, 1)])
@@ -89,11 +89,11 @@ def test_section_19_2_no_number_of_pieces_on_the_ray_hides_one():
     ],
 )
 @pytest.mark.parametrize("compat", ["paper", "igibson"])
-def test_section_5_4_inside_needs_two_orthogonal_axes(target, place, inside, compat):
+def test_inside_needs_two_orthogonal_axes(target, place, inside, compat):
     assert _ask("inside", target, place, compat) == inside
 
 
-def test_section_5_4_one_axis_is_not_enough():
+def test_one_axis_is_not_enough():
     # Between two walls, with nothing above, below, in front or behind.
     walls = [((-0.5, 0, 0), (0.05, 0.3, 0.3)), ((0.5, 0, 0), (0.05, 0.3, 0.3))]
     tunnel = [*walls, ((0, 0, -0.4), (0.5, 0.3, 0.05)), ((0, 0, 0.4), (0.5, 0.3, 0.05))]
@@ -102,14 +102,14 @@ def test_section_5_4_one_axis_is_not_enough():
     assert answers(plan, home.view()).inside([(0, 1), (0, 2)])[0].tolist() == [False, True]
 
 
-def test_section_5_4_a_wide_container_is_out_of_reach_of_igibsons_rays():
+def test_a_wide_container_is_out_of_reach_of_igibsons_rays():
     home = HandWorld(Item("ball", SMALL), Item("hall", shell(4, 4, 2)))
     for compat, expected in (("paper", True), ("igibson", False)):
         plan = RelationPlan.build(home.model(compat=compat), [("inside", 0, 1)])
         assert bool(answers(plan, home.view()).inside([(0, 1)])[0, 0]) == expected
 
 
-def test_section_5_5_near_is_a_third_of_the_mean_edge():
+def test_near_is_a_third_of_the_mean_edge():
     # Unit cubes: one third of a metre between them.
     cubes = HandWorld(Item("a"), Item("b"))
     for compat in ("paper", "igibson"):
@@ -119,7 +119,7 @@ def test_section_5_5_near_is_a_third_of_the_mean_edge():
         assert near(cubes.view({"b": (0.2, 0.1, 0)}))
 
 
-def test_section_17_row_7_the_paper_measures_closest_points_and_the_code_boxes():
+def test_the_paper_measures_closest_points_and_the_code_boxes():
     # A cube turned by 45 degrees: its box reaches farther than its side.
     turned = {"b": (np.cos(np.pi / 8), 0, 0, np.sin(np.pi / 8))}
     cubes = HandWorld(Item("a"), Item("b"))
@@ -146,7 +146,7 @@ def test_nan_poses_and_the_object_itself_relate_to_nothing():
     assert not _ask("below", "ball", (0, 0, 2)) and not _ask("near", "ball", (0, 0, 2))
 
 
-def test_section_19_1_the_memo_notices_that_something_turned():
+def test_the_memo_notices_that_something_turned():
     # A plank under the ball turns about its own centre: no position changes.
     home = HandWorld(Item("ball", SMALL, pos=(0.5, 0, 1)), Item("plank", (((0, 0, 0), (0.8, 0.1, 0.02)),)))
     plan = RelationPlan.build(home.model(), [("vertical", 0, 1), ("near", 0, 1)])

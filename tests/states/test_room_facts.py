@@ -20,24 +20,24 @@ HOME = HandWorld(
 @pytest.mark.parametrize(
     ("x", "room"), [(-2.0, 0), (1.0, 1), (3.5, -1), (-4.5, -1), (50.0, -1), (-50.0, -1), (np.nan, -1), (np.inf, -1)]
 )
-def test_section_12_the_pixel_under_a_point_names_the_room(x, room):
+def test_the_pixel_under_a_point_names_the_room(x, room):
     assert int(room_at(HOME.tables, jnp.array([x, 0.3]))) == room
 
 
-def test_section_12_pixels_are_truncated_towards_zero():
+def test_pixels_are_truncated_towards_zero():
     home = HandWorld(Item("cup"), rooms={"hall_0": (-5.0, 5.0)})
     assert int(room_at(home.tables, jnp.array([-5.05, 0.0]))) == 0  # half a pixel outside is still pixel 0
     assert int(room_at(home.tables, jnp.array([5.05, 0.0]))) == -1
 
 
-def test_section_12_fixed_objects_are_in_their_annotated_rooms_and_others_where_they_stand():
+def test_fixed_objects_are_in_their_annotated_rooms_and_others_where_they_stand():
     view = HOME.view({"cup": (-1, 0, 0)})
     assert rooms_of(HOME.tables, view, 0) == ["kitchen_0"]
     assert rooms_of(HOME.tables, view, 1) == ["kitchen_0", "hall_0"]
     assert rooms_of(HOME.tables, view, 2) == ["kitchen_0"]
 
 
-def test_section_19_3_a_movable_object_is_compared_by_room_instance():
+def test_a_movable_object_is_compared_by_room_instance():
     view = HOME.view({"cup": (-1, 0, 0)})
     rooms = jnp.array([[0, 0, 0], [1, 1, 1]])
     view = HOME.view({"cup": (-1, 0, 0)}, worlds=2)

@@ -47,11 +47,11 @@ def test_table_a4_the_force_is_configurable_per_model():
     assert _cut(21.0, "bread")[0].sliced[0, BREAD]
 
 
-def test_section_10_1_a_blade_that_is_a_mere_point_never_cuts():
+def test_a_blade_that_is_a_mere_point_never_cuts():
     assert not _cut(100.0, blade="stick")[0].sliced.any()
 
 
-def test_section_19_7_a_blade_may_touch_what_cannot_be_sliced():
+def test_a_blade_may_touch_what_cannot_be_sliced():
     assert not _cut(100.0, "stove")[0].sliced.any()
 
 
@@ -117,7 +117,7 @@ def test_table_a5_halves_inherit_every_scalar_state():
         assert states.sliced[0, half]
 
 
-def test_section_19_8_halves_inherit_particles_where_they_are():
+def test_halves_inherit_particles_where_they_are():
     model = HOME.model()
     states, swap = _cut(50.0, states=_used())
     where = {"apple": (50, 0, 0), "half_a": swap.pos[0, 1].tolist(), "half_b": swap.pos[0, 2].tolist()}
@@ -131,12 +131,12 @@ def test_section_19_8_halves_inherit_particles_where_they_are():
         assert bool(stain.stained(model, states.stain)[0, row])
 
 
-def test_section_2_halves_are_heated_in_the_step_of_their_birth_like_the_whole():
+def test_halves_are_heated_in_the_step_of_the_cut_like_the_whole():
     states, _ = _cut(50.0, pos={"stove": (1, 2, 0.8)})
     assert states.temperature[0, HALF_A] == pytest.approx(23.318, abs=1e-3)
 
 
-def test_section_10_3_parked_halves_and_a_parked_whole_are_not_updated():
+def test_parked_halves_and_a_parked_whole_are_not_updated():
     model = HOME.model()
     start = initial_states(model, 1)
     start = start.replace(temperature=start.temperature + 50.0)

@@ -31,7 +31,7 @@ def _press(pattern: str, start: bool = False) -> list[bool]:
     return found
 
 
-def test_section_22_in_range_for_eight_steps_flips_at_update_five_only():
+def test_a_finger_in_range_for_eight_steps_flips_the_switch_at_update_five_only():
     assert _press("11111111") == [False] * 4 + [True] * 4
 
 

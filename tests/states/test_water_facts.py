@@ -54,7 +54,7 @@ def _emissions(history: list) -> list[int]:
     return found
 
 
-def test_section_22_a_tap_on_from_update_k_drops_at_k_plus_1_and_then_every_four():
+def test_a_tap_on_from_update_k_drops_at_k_plus_1_and_then_every_four():
     # Far from everything, no drop comes back: the tenth is the last.
     air = Item("air_tap", (((0, 0, 100), (0.1, 0.1, 0.1)),), {"waterSource": {}, "toggleable": {}},
                 links={"water_source": (0, 0, 0.5)})  # fmt: skip
@@ -66,7 +66,7 @@ def test_section_22_a_tap_on_from_update_k_drops_at_k_plus_1_and_then_every_four
 
 @pytest.mark.parametrize("compat", ["paper", "igibson"])
 def test_what_lies_under_a_tap_does_not_make_it_run_dry(compat):
-    """Section 22 has the tenth drop at k + 37. iGibson's drops then roll away; ours make room, the oldest first."""
+    """iGibson's drops roll away after the tenth, at k + 37; ours make room, the oldest first."""
     bench = Item("bench", PLATE, pos=(0, 0, 0.3))
     _, history = _run(HandWorld(SINK, bench), [HandWorld(SINK, bench).view()] * 60, compat=compat)
     assert _emissions(history) == list(range(2, 61, 4))
@@ -75,7 +75,7 @@ def test_what_lies_under_a_tap_does_not_make_it_run_dry(compat):
     assert history[-1].water.active.all()
 
 
-def test_a_tap_whose_drops_all_still_fall_waits_as_in_section_7_2():
+def test_a_tap_whose_drops_all_still_fall_waits():
     air = Item("air_tap", (((0, 0, 100), (0.1, 0.1, 0.1)),), {"waterSource": {}}, links={"water_source": (0, 0, 0.5)})
     deep = Item("ground", PLATE, pos=(0, 0, -9.4))  # 9.8 m: 1.41 s, two updates more than ten drops take
     home = HandWorld(air, deep)
@@ -105,7 +105,7 @@ def test_a_rag_held_under_a_tap_after_a_plate_gets_soaked(compat):
     assert bool(soaked(model, history[-1].wetness)[0, 1])
 
 
-def test_section_7_2_the_count_stands_still_while_the_tap_is_off():
+def test_the_count_stands_still_while_the_tap_is_off():
     model = KITCHEN.model()
     states = initial_states(model, 1)
     marks = []
@@ -135,14 +135,14 @@ def test_table_a4_wetness_counts_the_droplets_absorbed():
     assert bool(soaked(model, history[-1].wetness)[0, 1])
 
 
-def test_section_17_row_2_igibsons_code_keeps_a_latch_and_does_not_take_the_drop():
+def test_igibsons_code_keeps_a_latch_and_does_not_take_the_drop():
     view = KITCHEN.view({"rag": (0, 0, 0.3)})
     _, history = _run(KITCHEN, [view] * 40, compat="igibson")
     assert float(history[-1].wetness[0, 1]) == 1.0
     assert history[-1].water.active.sum() >= 9
 
 
-def test_section_17_row_3_sinks_take_drops_in_the_paper_and_not_in_the_code():
+def test_sinks_take_drops_in_the_paper_and_not_in_the_code():
     drain = Item("drain", PLATE, {"waterSink": {}}, links={"water_sink": (0, 0, 0)}, pos=(0, 0, 0.3))
     home = HandWorld(SINK, drain)
     _, paper = _run(home, [home.view()] * 60)
@@ -195,14 +195,14 @@ def test_a_drop_that_leaves_the_house_comes_back():
     assert sum(int(s.water.active[0].all()) for s in history[80:]) < 40
 
 
-def test_section_19_6_a_source_without_its_link_crashes_nothing():
+def test_a_source_without_its_link_crashes_nothing():
     home = HandWorld(Item("sink", abilities={"waterSource": {}, "toggleable": {}}), RAG)
     _, history = _run(home, [home.view()] * 2)
     assert history[-1].water.active.shape == (1, 0, NUM_DROPS)
     assert float(history[-1].wetness.sum()) == 0.0
 
 
-def test_section_19_18_drying_is_off_and_can_be_switched_on():
+def test_drying_is_off_and_can_be_switched_on():
     wet = initial_states(KITCHEN.model(), 1)
     wet = wet.replace(wetness=wet.wetness.at[0, 1].set(2.0))
     assert float(step(KITCHEN.model(), wet, KITCHEN.view()).wetness[0, 1]) == 2.0

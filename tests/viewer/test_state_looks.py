@@ -23,7 +23,7 @@ def _tint(world, name: str) -> str | None:
     return TINTS[index].predicate.name if index != UNTINTED else None
 
 
-def test_section_3_7_the_state_of_highest_priority_colours_an_object(world):
+def test_the_state_of_highest_priority_colours_an_object(world):
     assert _tint(world, "apple") is None
     for name in ("cooked", "burnt", "frozen"):
         world.set_state(name, "apple", True)
@@ -33,7 +33,7 @@ def test_section_3_7_the_state_of_highest_priority_colours_an_object(world):
     assert (_tint(world, "sponge"), _tint(world, "stove"), _tint(world, "box")) == ("soaked", "toggled_on", None)
 
 
-def test_section_3_7_tints_mix_and_are_taken_back(world):
+def test_tints_mix_and_are_taken_back(world):
     model, tables = world.model, world.scene.tables
     before = model.geom_rgba.copy()
     tint = np.full(tables.num_objects, -1)

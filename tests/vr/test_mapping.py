@@ -248,7 +248,7 @@ def test_xr_axes_go_there_and_back():
 
 
 @pytest.mark.parametrize("hand", [0, 1])
-def test_7_4_1_a_hand_held_like_a_hammer_points_forward_with_the_palm_inwards(hand):
+def test_a_hand_held_like_a_hammer_points_forward_with_the_palm_inwards(hand):
     """Quarter turns are exact, not degrees taken for radians. XR's identity grip: the tube of the fingers points
     forward, its x to the right."""
     pose = hand_from_grip(hand, (0, 1, 0), (0, 0, 0, 1))
@@ -259,7 +259,7 @@ def test_7_4_1_a_hand_held_like_a_hammer_points_forward_with_the_palm_inwards(ha
     assert palm == pytest.approx((0, (-1, 1)[hand], 0))  # the left palm looks to the right, the right one to the left
 
 
-def test_7_4_2_the_left_hands_grip_point_is_the_mirror_image_of_the_rights():
+def test_the_left_hands_grip_point_is_the_mirror_image_of_the_rights():
     left, right = (hand_from_grip(hand, (0, 0, 0), (0, 0, 0, 1)) for hand in range(2))
     for hand, pose in enumerate((left, right)):
         assert pose.pos + pose.turn.apply(mirrored(hand, PALM_CENTER)) == pytest.approx(0, abs=1e-12)
@@ -267,7 +267,7 @@ def test_7_4_2_the_left_hands_grip_point_is_the_mirror_image_of_the_rights():
     assert left.pos == pytest.approx(right.pos * (1, -1, 1))
 
 
-def test_7_4_3_a_hand_can_move_both_ways():
+def test_a_hand_can_move_both_ways():
     now = robot()
     for sign in (1, -1):
         moved_hand = Hand(
@@ -278,7 +278,7 @@ def test_7_4_3_a_hand_can_move_both_ways():
 
 
 @pytest.mark.parametrize("hand", [0, 1])
-def test_7_4_4_a_pulled_trigger_closes_and_a_released_one_opens(hand):
+def test_a_pulled_trigger_closes_and_a_released_one_opens(hand):
     def trigger(value: float, of: Robot) -> float:
         hands = [Hand(), Hand()]
         hands[hand] = Hand(trigger=value)
@@ -291,7 +291,7 @@ def test_7_4_4_a_pulled_trigger_closes_and_a_released_one_opens(hand):
     assert trigger(7.0, robot()) == 1.0
 
 
-def test_7_4_5_without_a_tracker_the_head_is_where_its_neck_lets_it_be():
+def test_without_a_tracker_the_head_is_where_its_neck_lets_it_be():
     """The eye's rest above the body's middle is within reach of the neck; with the swapped constants it is not."""
     now = robot()
     tall = Pose.of(np.add((now.body * now.eye).pos, (0, 0, 0.6)), now.body.turn)
@@ -304,14 +304,14 @@ def test_7_4_5_without_a_tracker_the_head_is_where_its_neck_lets_it_be():
 
 
 @pytest.mark.parametrize("hand", [0, 1])
-def test_7_4_9_a_reset_is_that_of_its_own_hand(hand):
+def test_a_reset_is_that_of_its_own_hand(hand):
     hands = [Hand(), Hand()]
     hands[hand] = Hand(squeeze=1.0)
     action, _ = action_of(PoseFrame(0.0, None, (hands[0], hands[1])), robot(), Memory())
     assert (action[19], action[27]) == ((1.0, 0.0), (0.0, 1.0))[hand]
 
 
-def test_7_4_13_head_and_hands_are_relative_to_the_same_new_body():
+def test_head_and_hands_are_relative_to_the_same_new_body():
     now = robot()
     step = np.array([0.2, -0.1, 0.0])
     moved_frame = frame_at_rest(now)
@@ -325,7 +325,7 @@ def test_7_4_13_head_and_hands_are_relative_to_the_same_new_body():
     assert action[6:] == pytest.approx(np.zeros(22), abs=1e-9)  # all move with the body, none in it
 
 
-def test_7_4_22_a_robot_that_nobody_drives_returns_to_where_it_was_sent():
+def test_a_robot_that_nobody_drives_returns_to_where_it_was_sent():
     """A load has pushed it aside; iGibson would take the new place for its target."""
     memory = action_of(frame_at_rest(robot()), robot(), Memory())[1]
     pushed = robot(body=Pose.of((1.02, 2.0, 0.55), turned(z=95)))

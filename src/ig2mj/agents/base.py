@@ -72,7 +72,7 @@ class Controller(Protocol):
         ...
 
     def grip(self, state: ControllerState) -> Float[Array, "W H"]:
-        """How far each hand is asked to close: 0 open, 1 closed. From one half on it grasps (spec A.1)."""
+        """How far each hand is asked to close: 0 open, 1 closed. From one half on it grasps (paper, appendix A.1)."""
         ...
 
     def lag(self, view: PhysicsView, state: ControllerState) -> Float[Array, "W H"]:

@@ -28,7 +28,7 @@ def abilities(
     Args:
       category: iGibson category. One that the taxonomy does not know has no abilities but those an override gives.
       model: model name within the category, for overrides per model.
-      compat: "paper", or "igibson" for the code's rule where the two differ (docs/guide/states.md).
+      compat: "paper", or "igibson" for the code's rule where the two differ (docs/design/rules.md).
       overrides: a project's own, from `load_overrides`.
 
     Returns:
@@ -53,7 +53,7 @@ def required_states(ability: str) -> tuple[str, ...]:
     """Extended states that an object with this ability carries (table A.2). Raises UnknownNameError.
 
     Table A.2 gives every heat source the toggled state; in the data it is optional, and a fridge has none
-    (`requires_toggled_on` says which; docs/guide/states.md).
+    (`requires_toggled_on` says which; docs/design/rules.md#sources).
     """
     return _ability(ability).states
 

@@ -35,7 +35,7 @@ class Space:
 
 @dataclasses.dataclass(frozen=True)
 class SensorOptions:
-    """Settings of all sensors; the defaults are the paper's camera and iGibson's laser (spec robots_tasks_sensors 2.2).
+    """Settings of all sensors; the defaults are the paper's camera and iGibson's laser.
 
     Attributes:
       width, height: pixels of all pictures.

@@ -1,4 +1,4 @@
-"""Dropout noise: readings that are missing, at random (iGibson's only sensor noise, spec robots_tasks_sensors 3.1)."""
+"""Dropout noise: readings that are missing, at random (the only sensor noise of iGibson)."""
 
 from __future__ import annotations
 

@@ -43,7 +43,7 @@ class StateModel:
 
     @property
     def paper(self) -> bool:
-        """Whether the paper's rules are in force, rather than iGibson's code's (docs/guide/states.md)."""
+        """Whether the paper's rules are in force, not iGibson's (docs/design/rules.md#paper-and-code)."""
         return self.options.compat == "paper"
 
     @functools.cached_property

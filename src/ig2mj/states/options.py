@@ -16,7 +16,7 @@ class StateOptions:
     """Choices, fixed for a run.
 
     Attributes:
-      compat: "paper", or "igibson" for the rule of iGibson's code where the two differ (docs/guide/states.md).
+      compat: "paper", or "igibson" for the rule of iGibson's code where both differ (docs/design/rules.md).
       timestep: seconds between two updates of the states.
       drying_rate: droplets per second that a wet object loses. Beyond iGibson, where nothing ever dries; 0 is off.
       contact_heat_rate: 1/s, rate at which two touching objects with temperatures approach each other. Beyond

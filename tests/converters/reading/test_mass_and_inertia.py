@@ -109,7 +109,7 @@ def test_com_of_a_watertight_mesh_is_the_volumes():
 
 
 def test_com_of_an_open_mesh_is_the_surfaces_taken_before_scaling():
-    """Fact 6. An open box: five faces; the surface's centre of the unscaled mesh, then times s."""
+    """An open box has five faces; the surface's centre of the unscaled mesh, then times s."""
     cube = box_mesh((2, 2, 2))
     open_box = Mesh(cube.vertices, cube.faces[(cube.vertices[cube.faces][:, :, 2] < 0.9).any(axis=1)])
     found, _ = inertials(model_of(Link("a", [Shape("mesh", meshes=[open_box])])), s=(1, 1, 10))
@@ -117,7 +117,7 @@ def test_com_of_an_open_mesh_is_the_surfaces_taken_before_scaling():
 
 
 def test_touching_hulls_are_not_watertight_so_their_surface_counts():
-    """Fact 6: merged vertices of touching hulls give edges with four faces."""
+    """Merged vertices of touching hulls give edges with four faces."""
     parts = boxes(((1, 1, 1), (0, 0, 0)), ((1, 1, 1), (1, 0, 0)), ((1, 1, 1), (2, 0, 0)))
     tall = boxes(((1, 1, 1), (0, 0, 0)), ((1, 1, 1), (1, 0, 0)))
     assert inertials(model_of(Link("a", [parts])))[0]["a"].pose[0, 3] == pytest.approx(1)
@@ -147,7 +147,7 @@ def test_true_inertia_is_that_of_the_hulls():
 
 
 def test_inside_out_and_double_sided_meshes_use_hull_volumes():
-    """Section 13: PartNet originals enclose a signed volume of about 0."""
+    """PartNet originals enclose a signed volume of about 0."""
     cube = box_mesh()
     inside_out = Mesh(cube.vertices, cube.faces[:, ::-1])
     double = Mesh(np.concatenate([cube.vertices] * 2), np.concatenate([cube.faces, cube.faces[:, ::-1] + 8]))
@@ -179,7 +179,7 @@ def test_building_parts_and_objects_without_box_keep_the_urdfs_inertial():
     assert inertials(model_of(link, bbox=None), density=100.0)[0]["a"].mass == 10000
 
 
-def test_an_objects_inertial_is_thrown_away_within_a_dataset_section_6():
+def test_an_objects_inertial_is_thrown_away_within_a_dataset():
     """A basket in four sizes that weighs 1.056 kg by its URDF weighs density x box in each."""
     link = Link("a", [boxes(((1, 1, 1), (0, 0, 0)))], inertial=Inertial(1.056, np.eye(3)))
     for s in (0.5, 1.0, 1.5, 2.0):

@@ -31,7 +31,7 @@ def extents(meshes):
 
 @pytest.mark.parametrize("word", ["o", "g"])
 def test_each_o_or_g_is_a_group(folder, make, word):
-    """Fact 4: one collision OBJ per link holds many `o convex_N` groups; `g` counts as well."""
+    """One collision OBJ per link holds many `o convex_N` groups; `g` counts as well."""
     text = make.boxes_obj(((1, 1, 1), (0, 0, 0)), ((2, 1, 1), (3, 0, 0)), ((1, 3, 1), (0, 5, 0)))
     meshes, grouped = collision(folder.write("c.obj", text.replace("o convex", f"{word} convex")))
     assert grouped

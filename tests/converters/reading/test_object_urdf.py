@@ -198,7 +198,7 @@ def test_a_visual_outside_the_root_is_an_error_all_the_same(root, make):
         Dataset(root.root).model("cup", "m")
 
 
-def test_metadata_of_section_4_1(root):
+def test_metadata_of_a_model_is_read(root):
     root.write(
         "objects/cup/m/misc/metadata.json",
         json.dumps(
@@ -269,7 +269,7 @@ def test_ros_packages_are_found_by_walking_up(root, make, urdf, name, manifest):
 
 
 def test_groups_of_a_plain_obj_are_pieces_only_if_they_are_convex(root, make):
-    """Blender writes `o` for any object; in the dataset a group is one hull by convention (fact 4)."""
+    """Blender writes `o` for any object; in the dataset a group is one hull by convention."""
     corner = make.boxes_obj(((1, 1, 1), (0, 0, 0)), ((1, 1, 1), (3, 0, 0)))
     table = corner.replace("o convex_1\n", "")
     assert len(corner) > len(table)

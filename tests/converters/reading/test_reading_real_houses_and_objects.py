@@ -39,7 +39,7 @@ def test_the_house_has_84_objects_of_60_models(house, scene):
 
 
 def test_every_scaled_object_has_the_box_it_asked_for(house, scene):
-    """Section 8, step 15: within 1.5 %; here the metadata's boxes are exact."""
+    """The tolerance is 1.5 %; here the metadata's boxes are exact."""
     for instance in scene.instances:
         if instance.kind == "object":
             model = house.model(instance.category, instance.model)

@@ -113,14 +113,14 @@ def test_scale_acts_on_the_mesh_before_its_origin():
 
 
 def test_turned_origins_are_sheared_not_scaled_in_mesh_axes():
-    """Fact 12: a visual turned by 90 degrees about z and scaled along the base's x grows along its own y."""
+    """A visual turned by 90 degrees about z and scaled along the base's x grows along its own y."""
     shape = mesh_shape(rpy=(0, 0, np.pi / 2))
     found = scale_model(model_of([Link("a", [shape])]), (5, 1, 1)).links["a"].collisions[0]
     np.testing.assert_allclose(found.meshes[0].vertices, TETRAHEDRON * [1, 5, 1], atol=1e-9)
 
 
 def test_raw_partnet_rotations_scale_in_base_axes():
-    """Fact 12: rpy = (pi/2, 0, -pi/2) on a joint permutes the axes."""
+    """rpy = (pi/2, 0, -pi/2) on a joint permutes the axes."""
     joint = make_joint("revolute", (0, 1, 0), rpy=(np.pi / 2, 0, -np.pi / 2))
     model = model_of([Link("a"), Link("b", [mesh_shape()])], joint)
     scaled = scale_model(model, (2, 3, 4))
@@ -223,7 +223,7 @@ def test_metadata_is_scaled_in_base_axes(folder):
 
 
 def test_scale_is_bounding_box_over_bbox_size(folder):
-    """Fact 2; without bbox_size a bounding box says nothing (4.1)."""
+    """Without bbox_size a bounding box says nothing."""
     folder.write("misc/metadata.json", '{"bbox_size": [1, 2, 4]}')
     model = model_of([Link("a")])
     instance = Instance("o", "cup", "m", np.eye(4), True, bounding_box=np.array([2.0, 2.0, 2.0]))

@@ -170,7 +170,7 @@ def test_kinds(root, make):
 
 
 def test_cached_attributes(root, make):
-    """Quaternions leave the reader as w, x, y, z; Infinity is JSON here (sections 9, 13); unknown joints stay."""
+    """Quaternions leave the reader as w, x, y, z; Infinity is JSON here; unknown joints stay."""
     states = {
         "Temperature": 23.0,
         "MaxTemperature": float("-inf"),

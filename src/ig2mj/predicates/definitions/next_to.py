@@ -2,7 +2,7 @@
 
 Near means: at most a sixth of the sum of their mean edge lengths apart, a third of the average of their six box edges.
 The paper measures the closest points of the two objects, and asks for b in a's horizontal plane. iGibson's code
-measures the gap of the world boxes, and takes either object's horizontal plane (docs/guide/states.md, row 7).
+measures the gap of the world boxes, and takes either object's horizontal plane (docs/design/rules.md#next-to).
 """
 
 from __future__ import annotations

@@ -3,7 +3,7 @@
 A source that asks for it is on only while its object is toggled on, or while it is closed. It acts either on the
 objects inside it (oven, microwave, fridge) or on those whose centre of mass is near its annotated link (stove, burner).
 Tables A.2 and A.3 give every source a switch and a link; the taxonomy's fridge has no switch and an oven acts on what
-is inside whatever its link, so both sets of rules read these per category (docs/guide/states.md, rows 11, 12).
+is inside whatever its link, so both sets of rules read these per category (docs/design/rules.md#sources).
 
 Axes: W worlds, O objects, S sources (`StateParameters.heat_*`).
 """

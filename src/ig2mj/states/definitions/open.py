@@ -3,7 +3,7 @@
 A joint is open strictly beyond 5 % of its range from the closed end towards the open end. The paper calls the closed
 end the lower limit; where a model's annotation says that it closes at the upper one, that end counts. An object is open
 when any joint is. iGibson's code knows models that open to both sides (a sliding door in the middle of its range is
-open, at either end it is not): there, every side must be open (docs/guide/states.md, row 10).
+open, at either end it is not): there, every side must be open (docs/design/rules.md#open).
 
 Axes: W worlds, O objects, J openable joints.
 """

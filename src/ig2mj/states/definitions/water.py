@@ -5,7 +5,7 @@ pieces of all objects on the way it falls during the step, so that none is skipp
 decides: a soakable object absorbs it (wetness.py), a sink or the source's own object takes it back, on anything else
 it rests until that goes away. Drops that fall out of the house come back to the source.
 
-Rules in force (docs/guide/states.md, rows 2 and 3): the paper's droplets are absorbed, and sinks (`water_sink`
+Rules in force (docs/design/rules.md#water): the paper's droplets are absorbed, and sinks (`water_sink`
 links) take drops; in iGibson's code a soaked object leaves the drop where it is, and only the source's own object takes
 drops back.
 

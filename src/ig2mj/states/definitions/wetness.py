@@ -1,8 +1,8 @@
 """WetnessLevel: droplets that a soakable object has absorbed (paper table A.4); Soaked is read from it.
 
 The paper's level is a number that grows by one per droplet. iGibson's code keeps a latch only: here, with
-compat="igibson", one drop on the object makes the level the soaked threshold and no more (docs/guide/states.md,
-row 2). Drying is no part of either and off by default (`StateOptions.drying_rate`).
+compat="igibson", one drop on the object makes the level the soaked threshold and no more
+(docs/design/rules.md#wetness). Drying is no part of either and off by default (`StateOptions.drying_rate`).
 """
 
 from __future__ import annotations

@@ -31,7 +31,7 @@ HORIZONTAL_ANGLES = np.deg2rad([0.0, 22.5, 45.0, 67.5])
 """Of the first axis of each plane; the second one is perpendicular."""
 
 HORIZONTAL_LENGTH = {"paper": 100.0, "igibson": 1.0}
-"""Metres. The paper's axes have no end; 100 m is longer than any house (docs/guide/states.md, row 8)."""
+"""Metres. The paper's axes have no end; 100 m is longer than any house (docs/design/rules.md#axes)."""
 
 VERTICAL_LENGTH = {"paper": 100.0, "igibson": 5.0}
 """Metres."""

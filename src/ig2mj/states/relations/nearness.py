@@ -2,7 +2,7 @@
 
 The limit is a sixth of the sum of the two boxes' mean edge lengths. In the paper's rules the distance is that of the
 closest points of the two collision meshes and must be under the limit; in iGibson's code it is the gap of the world
-boxes and may equal it (docs/guide/states.md, row 7).
+boxes and may equal it (docs/design/rules.md#next-to).
 
 Closest points are dear (`ig2mj.geometry.gjk`), and two cluttered objects have thousands of pairs of pieces. So only
 those of object pairs that a mask names are looked at, some at a time, and of their pieces only those whose boxes are
