@@ -6,7 +6,7 @@ import pytest
 import tyro
 
 from ig2mj import cli
-from ig2mj.cli import parsing
+from ig2mj.cli.common import parsing
 
 
 def parse_only(words: list[str], monkeypatch: pytest.MonkeyPatch) -> int:

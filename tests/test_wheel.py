@@ -79,7 +79,7 @@ def test_the_page_of_a_headset_comes_with_the_wheel(installed):
 
 
 def test_a_picture_of_a_shipped_home_from_any_folder(installed, tmp_path):
-    command = [sys.executable, "-m", "ig2mj", "view", "small_home", "--picture", "p.png"]
+    command = [sys.executable, "-m", "ig2mj", "view", "small_home", "--image", "p.png"]
     run(*command, "--size", "64", "48", cwd=tmp_path, PYTHONPATH=str(installed))
     assert (tmp_path / "p.png").stat().st_size > 500
 

@@ -44,7 +44,7 @@ learn() {  # NAME EPISODES WORDS...: trains, and plays so many held-out episodes
   wait $job; echo "$name: trained, ended with $? after $SECONDS s" | tee -a "$out/times.txt"
   if [ "${PLAY:-1}" = 1 ]; then
     held "$name" "$out/$name/policy.npz" "$episodes"
-    held "$name" "$out/$name/policy.npz" 500 --drawn
+    held "$name" "$out/$name/policy.npz" 500 --stochastic
   fi
   echo "$name: played after $SECONDS s" | tee -a "$out/times.txt"; rm -rf "$run"; [ ! -f "$out/$name/evaluations.jsonl" ] || cut -c1-600 "$out/$name/evaluations.jsonl"
 }

@@ -10,8 +10,8 @@ import pytest
 from rich.console import Console
 
 from ig2mj import cli
-from ig2mj.cli import printing
-from ig2mj.cli.printing import least_width, make_table, print_json
+from ig2mj.cli.common import printing
+from ig2mj.cli.common.printing import least_width, make_table, print_json
 from ig2mj.scene.manifest import load_manifest
 
 COLUMNS = ("object", "?model", "?>size", "room")
@@ -75,7 +75,7 @@ def test_homes_and_categories_are_listed_apart(narrow, capsys):
     [
         (["homes", "list", "--only", "frige"], "near matches: fridge"),
         (["homes", "convert", "--dataset", "{tmp}", "--out", "{tmp}/out"], "holds no scenes/"),
-        (["homes", "sheet", "--out", "{tmp}/a.xyz", "--only", "apple"], "is not a picture format"),
+        (["homes", "sheet", "--out", "{tmp}/a.xyz", "--only", "apple"], "is not an image format"),
         (["homes", "sheet", "--out", "{tmp}/a.png", "--models", "0"], "at least one is needed"),
         (["sample", "{home}", "--disturb", "--out", "{tmp}/none/pool.npz"], "does not exist"),
         (["sample", "{home}", "--disturb", "--jobs", "-1"], "--jobs -1"),

@@ -24,7 +24,7 @@ def can_draw() -> None:
 @pytest.mark.parametrize("options", [[], ["--from", "2", "-2", "2", "--at", "0", "0", "0.4"], ["--collision"]])
 def test_a_picture_has_the_size_asked_for_and_shows_something(can_draw, tiny_home_folder, tmp_path, options):
     file = tmp_path / "out.png"
-    status = cli.call(["view", str(tiny_home_folder), "--picture", str(file), "--size", "160", "120", *options])
+    status = cli.call(["view", str(tiny_home_folder), "--image", str(file), "--size", "160", "120", *options])
     assert status == 0
     image = np.asarray(Image.open(file))
     assert image.shape == (120, 160, 3)
@@ -63,7 +63,7 @@ def test_a_free_view_stands_where_it_was_put_and_looks_where_it_was_told(tiny_ho
     ],
 )
 def test_contradictions_are_one_line_and_status_2(can_draw, tiny_home_folder, tmp_path, capsys, options, says):
-    status = cli.call(["view", str(tiny_home_folder), "--picture", str(tmp_path / "a.png"), *options])
+    status = cli.call(["view", str(tiny_home_folder), "--image", str(tmp_path / "a.png"), *options])
     assert status == 2
     line = capsys.readouterr().err
     assert says in line
@@ -73,10 +73,10 @@ def test_contradictions_are_one_line_and_status_2(can_draw, tiny_home_folder, tm
 
 @pytest.mark.parametrize(
     ("file", "says"),
-    [("a.doc", "not a picture format"), ("none/a.png", "does not exist"), ("a", "not a picture format")],
+    [("a.doc", "not an image format"), ("none/a.png", "does not exist"), ("a", "not a picture format")],
 )
 def test_a_picture_file_that_cannot_be_written_is_told_before_loading(tiny_home_folder, tmp_path, capsys, file, says):
-    assert cli.call(["view", str(tiny_home_folder), "--picture", str(tmp_path / file)]) == 2
+    assert cli.call(["view", str(tiny_home_folder), "--image", str(tmp_path / file)]) == 2
     assert says in capsys.readouterr().err
 
 

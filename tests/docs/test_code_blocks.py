@@ -37,10 +37,10 @@ PARSED_ONLY = {
     "ig2mj vr": "waits for a person",
     "ig2mj calibrate": "takes minutes on a CPU",
     "ig2mj homes build": "takes minutes; run by `make homes-check`",
-    "ig2mj homes pictures": "needs what the lines before it make",
+    "ig2mj homes images": "needs what the lines before it make",
     "ig2mj homes convert": "takes minutes; run by `make homes-check`",
 }
-"""Commands that are not run here, but whose arguments must be right; `--picture` makes `view` run."""
+"""Commands that are not run here, but whose arguments must be right; `--image` makes `view` run."""
 
 
 def blocks(page: pathlib.Path) -> list[tuple[str, str, str]]:
@@ -122,7 +122,7 @@ def test_the_commands_of_a_page_run_or_parse(page, tmp_path, monkeypatch, capsys
             if words[0] == "make":
                 assert set(words[1:]) <= targets, line
             elif words[0] == "ig2mj":
-                only_parsed = line.startswith(tuple(PARSED_ONLY)) and not ("view" in words and "--picture" in words)
+                only_parsed = line.startswith(tuple(PARSED_ONLY)) and not ("view" in words and "--image" in words)
                 status = parse_only(words[1:], monkeypatch) if only_parsed else cli.call(words[1:])
                 assert status == 0, f"{line}\n{capsys.readouterr().err}"
             elif words[:2] in (["python", "benchmarks"], ["python", "-m"]) or words[0] == "pip":

@@ -58,7 +58,7 @@ def test_wrong_options_name_what_is_near(tmp_path, capsys):
         (["evaluate", "CookingMeat", "--out", "no/such.json"], "folder no does not exist"),
         (["rollout", "CookingMeat", "--agent", "expart"], "near matches: expert"),
         (["rollout", "CookingMeat", "--pool-size", "-1"], "pool_size = -1: a whole number of at least 1"),
-        (["rollout", "CookingMeat", "--video", "a.doc"], "not a film format"),
+        (["rollout", "CookingMeat", "--video", "a.doc"], "not a video format"),
         (["rollout", "CookingMeat", "--record", "no/such.h5"], "folder no does not exist"),
         (["rollout", "CookingMeat", "--record", str(tmp_path)], "is a folder"),
         (["rollout", "CookingMeat", "--format", "igibson"], "--record FILE, which is missing"),

@@ -148,7 +148,7 @@ def test_without_a_display_the_error_tells_how_to_get_a_picture(tiny_home, data,
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
-    with pytest.raises(MissingDependencyError, match="--picture"):
+    with pytest.raises(MissingDependencyError, match="--image"):
         open_viewer(tiny_home, data, lambda: None)
 
 

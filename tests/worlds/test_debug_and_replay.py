@@ -137,7 +137,7 @@ def can_draw() -> None:
 
 def test_the_command_writes_a_picture_and_a_video(can_draw, dump, bare, tmp_path, capsys):
     command = ["view", str(bare.folder), "--dump", str(dump), "--size", "96", "64"]
-    assert cli.call([*command, "--picture", str(tmp_path / "last.png")]) == 0
+    assert cli.call([*command, "--image", str(tmp_path / "last.png")]) == 0
     assert "(step 4 of 4)" in capsys.readouterr().err
     assert np.asarray(Image.open(tmp_path / "last.png")).shape == (64, 96, 3)
     assert cli.call([*command, "--video", str(tmp_path / "steps.gif")]) == 0
@@ -148,12 +148,12 @@ def test_the_command_writes_a_picture_and_a_video(can_draw, dump, bare, tmp_path
 @pytest.mark.parametrize(
     ("options", "says"),
     [
-        (["--dump", "absent.npz", "--picture", "a.png"], "there is no such file"),
+        (["--dump", "absent.npz", "--image", "a.png"], "there is no such file"),
         (["--video", "a.mp4"], "--video belongs to --dump"),
-        (["--dump", "{dump}", "--video", "a.txt"], "is not a picture format"),
+        (["--dump", "{dump}", "--video", "a.txt"], "is not an image format"),
         (["--dump", "{dump}", "--video", "a.png"], "is not a video format"),
-        (["--dump", "{dump}", "--video", "a.gif", "--picture", "a.png"], "goes with one of"),
-        (["--dump", "{dump}", "--picture", "a.png", "--seconds", "1"], "without --seconds"),
+        (["--dump", "{dump}", "--video", "a.gif", "--image", "a.png"], "goes with one of"),
+        (["--dump", "{dump}", "--image", "a.png", "--seconds", "1"], "without --seconds"),
     ],
 )
 def test_the_command_refuses(dump, bare, tmp_path, monkeypatch, capsys, options, says):

@@ -25,6 +25,8 @@ Rules for such a file:
     that is absent (ModuleNotFoundError) and an OSError are treated the same way.
   - Results go to stdout, progress and remarks to stderr, so that `--json` can be piped.
   - The name of a parameter that is a Python keyword: `Annotated[Vec3, tyro.conf.arg(name="from")]`.
+  - Old names of options and sub-commands keep working for one release: see `ig2mj.cli.common.deprecated`.
+  - What several commands share is in `ig2mj.cli.common`.
 
 Exit statuses: 0 done, 1 something failed (a check, or an error of ig2mj itself), 2 bad input or bad usage, 3 converted
 with models skipped (`convert`), 130 interrupted.
@@ -45,6 +47,7 @@ from collections.abc import Callable, Mapping, Sequence
 from inspect import getdoc
 from typing import Any
 
+from ig2mj.cli.common.deprecated import new_subcommand
 from ig2mj.errors import Ig2mjError
 from ig2mj.install_hint import pip_install_module
 from ig2mj.process.variables import error_of_variable
@@ -145,7 +148,7 @@ def _written(error: OSError) -> pathlib.Path | None:
         return None
     frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
     for frame in reversed(frames):
-        if frame.f_globals.get("__name__", "").startswith(("rich.", "ig2mj.cli.printing")):
+        if frame.f_globals.get("__name__", "").startswith(("rich.", "ig2mj.cli.common.printing")):
             return None  # the terminal, or where standard output goes
         found = [value for value in frame.f_locals.values() if isinstance(value, pathlib.Path)]
         if found:
@@ -172,13 +175,14 @@ def _dispatch(args: list[str]) -> int:
     if not rest or rest[0] in ("-h", "--help"):
         print(_nested_help(name, module.__doc__, subcommands))
         return 0 if rest else 2
-    if rest[0] not in subcommands:
-        return _unknown(f"command of 'ig2mj {name}'", rest[0], subcommands, f"ig2mj {name} --help")
-    return _run(subcommands[rest[0]], f"ig2mj {name} {rest[0]}", rest[1:])
+    sub = new_subcommand(name, rest[0], getattr(module, "RENAMED", {}))
+    if sub not in subcommands:
+        return _unknown(f"command of 'ig2mj {name}'", sub, subcommands, f"ig2mj {name} --help")
+    return _run(subcommands[sub], f"ig2mj {name} {sub}", rest[1:])
 
 
 def _run(function: Callable[..., Any], prog: str, args: list[str]) -> int:
-    from ig2mj.cli.parsing import parse_and_call
+    from ig2mj.cli.common.parsing import parse_and_call
 
     return _exit_status(parse_and_call(function, prog, args))
 

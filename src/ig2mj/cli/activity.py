@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 from ig2mj.cli.activity_pools import sample
-from ig2mj.cli.bindings import binding_as_text, find_homes
+from ig2mj.cli.common.bindings import binding_as_text, find_homes
+from ig2mj.cli.common.deprecated import renamed_options
 
 if TYPE_CHECKING:
     from ig2mj.tasks.bddl.binding import Binding
@@ -24,7 +25,7 @@ def list_(behavior1k: Flag = False, json: Flag = False) -> None:
       behavior1k: list BEHAVIOR-1K's activities instead of BEHAVIOR-100's; run `ig2mj activity fetch` first.
       json: print JSON instead of a table.
     """
-    from ig2mj.cli.printing import make_table, print_json, stdout_console
+    from ig2mj.cli.common.printing import make_table, print_json, stdout_console
     from ig2mj.tasks.bddl.definitions import activity_names, load_activity
     from ig2mj.tasks.bddl.start import fitting
     from ig2mj.tasks.bddl.vocabulary import VocabularyError
@@ -63,13 +64,14 @@ def list_(behavior1k: Flag = False, json: Flag = False) -> None:
     console.print(make_table(title, ("activity", ">objects", ">homes", ">to add", "?where"), rows, console.width))
 
 
+@renamed_options({"--picture": "--image"})
 def show(
     name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ACTIVITY")],
     scene: Annotated[str | None, tyro.conf.arg(metavar="HOME")] = None,
     behavior1k: Flag = False,
     pool: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="POOL.npz")] = None,
     row: int = 0,
-    picture: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    image: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     json: Flag = False,
 ) -> int:
     """Show what an activity requires and which objects of a home it uses; or what is still false in a row of a pool.
@@ -82,11 +84,11 @@ def show(
       behavior1k: look the name up in BEHAVIOR-1K instead of BEHAVIOR-100; some names occur in both.
       pool: a pool made by `ig2mj activity sample`; show which goal conditions are still false in one of its rows.
       row: which row of the pool.
-      picture: also write a picture of that row.
+      image: also write an image of that row.
       json: print JSON instead of text.
     """
     from ig2mj.cli.activity_pools import show_row
-    from ig2mj.cli.printing import print_json
+    from ig2mj.cli.common.printing import print_json
     from ig2mj.errors import Ig2mjError
     from ig2mj.tasks.bddl.definitions import load_activity
     from ig2mj.tasks.bddl.start import fitting
@@ -94,17 +96,17 @@ def show(
 
     activity = load_activity(name, behavior1k)
     if pool is not None:
-        if picture is not None:
-            from ig2mj.cli.files import check_picture
+        if image is not None:
+            from ig2mj.cli.common.files import check_image
 
-            check_picture(picture)
+            check_image(image)
         found, errors = fitting(activity, find_homes(scene or scene_name(pool)))
         if not found:
             raise Ig2mjError(" ".join(line.strip() for line in binding_as_text(None, [], errors)))
-        show_row(found[0], pool, row, picture, scene, json)
+        show_row(found[0], pool, row, image, scene, json)
         return 0
-    if picture is not None or row:
-        raise Ig2mjError("--row and --picture belong to --pool")
+    if image is not None or row:
+        raise Ig2mjError("--row and --image belong to --pool")
     bound, errors = fitting(activity, find_homes(scene))
     best = bound[0] if bound else None
     if json:

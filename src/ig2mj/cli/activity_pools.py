@@ -48,8 +48,8 @@ def sample(
       behavior1k: look the name up in BEHAVIOR-1K instead of BEHAVIOR-100.
       json: print the result as JSON.
     """
-    from ig2mj.cli.bindings import binding_as_text, find_homes
-    from ig2mj.cli.files import check_output
+    from ig2mj.cli.common.bindings import binding_as_text, find_homes
+    from ig2mj.cli.common.files import check_output
     from ig2mj.errors import Ig2mjError
     from ig2mj.tasks.bddl.definitions import load_activity
     from ig2mj.tasks.bddl.start import first_that_works, fitting, sample_start
@@ -86,7 +86,7 @@ def _tell(done: SampledStart, binding: Binding, file: pathlib.Path, as_json: boo
     """`show`: the command that shows the pool's rows."""
     import sys
 
-    from ig2mj.cli.printing import make_table, print_json, stdout_console
+    from ig2mj.cli.common.printing import make_table, print_json, stdout_console
 
     sampled = done.sampled
     if as_json:
@@ -108,7 +108,7 @@ def _tell(done: SampledStart, binding: Binding, file: pathlib.Path, as_json: boo
         print(
             f"{file}: {len(sampled.rows)} of {sampled.requested} starts of {binding.activity.name} in {binding.home}, "
             f"{len(binding.additions)} objects added, {sampled.seconds:.1f} s\n"
-            f"look: {show} --row 0 --picture row.png"
+            f"look: {show} --row 0 --image row.png"
         )
     if done.reached:
         print(f"the goal holds already in rows {', '.join(map(str, done.reached))}", file=sys.stderr)
@@ -120,7 +120,7 @@ def _tell(done: SampledStart, binding: Binding, file: pathlib.Path, as_json: boo
 
 
 def show_row(
-    binding: Binding, pool: pathlib.Path, row: int, picture: pathlib.Path | None, scene: str | None, json: bool
+    binding: Binding, pool: pathlib.Path, row: int, image: pathlib.Path | None, scene: str | None, json: bool
 ) -> bool:
     """Tells what is still false in a row of a pool of the activity; whether that is nothing.
 
@@ -129,7 +129,7 @@ def show_row(
     """
     import sys
 
-    from ig2mj.cli.printing import print_json
+    from ig2mj.cli.common.printing import print_json
     from ig2mj.errors import Ig2mjError, InputError
     from ig2mj.tasks.bddl.start import row_status
     from ig2mj.viewer.pool_pages import PoolPages
@@ -149,7 +149,7 @@ def show_row(
             f"row {row} of {rows.size} in {loaded.name}: {100 * status.fraction:.0f} % of the goal holds; still false:"
         )
         print("\n".join(status.missing or ("nothing",)), status.explanation, sep="\n\n")
-    if picture is not None:
-        PoolPages(loaded, rows, at=row).picture(picture)
-        print(f"wrote {picture}", file=sys.stderr)
+    if image is not None:
+        PoolPages(loaded, rows, at=row).picture(image)
+        print(f"wrote {image}", file=sys.stderr)
     return status.holds

@@ -42,7 +42,7 @@ def run(
     if worlds < 0 or rounds < 1 or not 0 <= safety < float("inf"):
         raise Ig2mjError("--worlds and --safety must be finite and not negative, --rounds at least 1")
     from ig2mj.calibration.measuring import calibrate
-    from ig2mj.cli.printing import add_bar, print_json, progress_bar, stdout_console
+    from ig2mj.cli.common.printing import add_bar, print_json, progress_bar, stdout_console
     from ig2mj.engine.warp.profile import profile_file, save_profile
 
     profiles = {}
@@ -72,7 +72,7 @@ def run(
 
 def _with_hand(scene: pathlib.Path, hand: bool):
     """The scene, with a hand where it reaches most, and what it reaches; without one where it reaches nothing."""
-    from ig2mj.cli.hand import with_hand
+    from ig2mj.cli.common.hand import with_hand
     from ig2mj.errors import EngineError
     from ig2mj.scene.scene import load_scene
 

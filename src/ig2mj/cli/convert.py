@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from ig2mj.cli.convert_common import DEFAULTS, Common, Flag, options_of
+from ig2mj.cli.common.conversion import DEFAULTS, Common, Flag, options_of
 from ig2mj.cli.convert_dataset import convert_dataset
 
 if TYPE_CHECKING:
@@ -134,7 +134,7 @@ SUBCOMMANDS = {"scene": convert_scene, "object": convert_object, "robot": conver
 @contextlib.contextmanager
 def _progress(title: str) -> Iterator[Any]:
     """A progress bar on stderr; yields a function that makes options report to it."""
-    from ig2mj.cli.printing import add_bar, progress_bar
+    from ig2mj.cli.common.printing import add_bar, progress_bar
 
     with progress_bar() as bar:
         report = add_bar(bar, title)
@@ -143,7 +143,7 @@ def _progress(title: str) -> Iterator[Any]:
 
 def _tell(outcome: Outcome, out: pathlib.Path, main_file: str, as_json: bool) -> int:
     """Prints what was done and where it lies; the exit status."""
-    from ig2mj.cli.printing import print_json
+    from ig2mj.cli.common.printing import print_json
 
     failed = [check for check in outcome.checks if not check.passed]
     if as_json:

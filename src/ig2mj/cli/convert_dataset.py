@@ -16,7 +16,7 @@ from typing import Annotated, Any
 
 import tyro
 
-from ig2mj.cli.convert_common import DEFAULTS, Common, Flag, options_of
+from ig2mj.cli.common.conversion import DEFAULTS, Common, Flag, options_of
 from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures, where_of
 from ig2mj.files.unfinished import unfinished
 

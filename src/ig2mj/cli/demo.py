@@ -36,7 +36,7 @@ def run(
     require_extras("convert", "demo")
     from ig2mj_homes.furnish import small_home
 
-    from ig2mj.cli.printing import add_bar, progress_bar, stdout_console
+    from ig2mj.cli.common.printing import add_bar, progress_bar, stdout_console
     from ig2mj.errors import Ig2mjError
 
     if jobs < 1:
@@ -84,7 +84,7 @@ def _convert(console: Console, step: Step, name: str, dataset: pathlib.Path, sce
 
 def _look(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Path) -> None:
     """Runs the home for two seconds, tells what stands where, takes pictures."""
-    from ig2mj.cli.printing import make_table
+    from ig2mj.cli.common.printing import make_table
     from ig2mj.showcase import first_home
 
     began = time.perf_counter()

@@ -50,7 +50,7 @@ def collect(
       cluster: run on a Ray cluster: its address, or auto.
       resume: continue an interrupted collection.
     """
-    from ig2mj.cli.files import check_output
+    from ig2mj.cli.common.files import check_output
     from ig2mj.cluster.pieces import run
     from ig2mj.cluster.work import Work
     from ig2mj.envs.experts import expert_of

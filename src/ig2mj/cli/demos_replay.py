@@ -44,9 +44,9 @@ def replay(
     """
     import sys
 
+    from ig2mj.cli.common.files import check_output, check_video
     from ig2mj.cli.demos_folder import files_of, of_files
     from ig2mj.cli.demos_pieces import replay_in_pieces
-    from ig2mj.cli.files import check_film, check_output
     from ig2mj.demos.replay import MODES
     from ig2mj.errors import Ig2mjError, UnknownNameError
 
@@ -58,7 +58,7 @@ def replay(
     if len(files) > 1 and (video is not None or out is not None):
         raise Ig2mjError("--video and --out are of one recording: name a file")
     if video is not None:
-        check_film(video)
+        check_video(video)
     if out is not None:
         check_output(out)
     names = tuple(name.strip() for name in sensors.split(",") if name.strip())
@@ -149,7 +149,7 @@ def export(
     """
     import sys
 
-    from ig2mj.cli.files import check_output
+    from ig2mj.cli.common.files import check_output
     from ig2mj.demos.exports import EXPORTS
     from ig2mj.demos.reader import Recording
     from ig2mj.demos.replay import MODES, Replayer, recorded_observations

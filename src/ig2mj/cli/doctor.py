@@ -33,7 +33,7 @@ def _print_json(checks, ok: bool) -> None:
     import dataclasses
     from importlib.metadata import version
 
-    from ig2mj.cli.printing import print_json
+    from ig2mj.cli.common.printing import print_json
 
     print_json({"ig2mj": version("ig2mj"), "ok": ok, "checks": [dataclasses.asdict(c) for c in checks]})
 
@@ -42,7 +42,7 @@ def _print_table(checks, ok: bool) -> None:
     from rich.markup import escape
     from rich.table import Table
 
-    from ig2mj.cli.printing import stdout_console
+    from ig2mj.cli.common.printing import stdout_console
 
     table = Table(box=None, pad_edge=False, show_header=False)
     table.add_column(no_wrap=True)

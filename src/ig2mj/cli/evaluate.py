@@ -7,6 +7,7 @@ from typing import Annotated
 
 import tyro
 
+from ig2mj.cli.common.deprecated import renamed_options
 from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures, where_of
 
 WORLDS = {"native": 8}
@@ -15,6 +16,7 @@ WORLDS = {"native": 8}
 PURE_WORLDS = 1000
 
 
+@renamed_options({"--drawn": "--stochastic"})
 def run(
     policy: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLICY")],
     episodes: int = 1000,
@@ -24,7 +26,7 @@ def run(
     robot: str | None = None,
     grasping: str | None = None,
     pool_size: int = 0,
-    drawn: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    stochastic: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     jobs: int = 1,
     cluster: Cluster = None,
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
@@ -42,7 +44,7 @@ def run(
       robot: refuse a policy of another robot (the policy's card says which it is for).
       grasping: refuse a policy of another grasping mode.
       pool_size: number of start states; 0: all of the split.
-      drawn: draw actions from the policy's distribution, as in training, instead of taking its mean.
+      stochastic: sample actions from the policy's distribution, as in training, instead of taking its mode.
       jobs: number of processes, each with its own worlds (the native engine uses all processors in any case).
       cluster: run on a Ray cluster: its address, or auto.
       out: file for the JSON result; needed for --resume.
@@ -56,7 +58,7 @@ def run(
 
     import jax
 
-    from ig2mj.cli.files import check_output
+    from ig2mj.cli.common.files import check_output
     from ig2mj.cluster.pieces import run
     from ig2mj.cluster.work import Work
     from ig2mj.envs.pieces import shared_pool, shipped_states
@@ -91,7 +93,7 @@ def run(
         "paper_rl": loaded.card.get("paper_rl", False),
         "split": split,
         "pool_size": pool_size or None,
-        "drawn": drawn,
+        "drawn": stochastic,
     }
     states = pool_size or COUNT.get(split, episodes)
     if episodes > states:
@@ -128,7 +130,7 @@ def run(
             "paper_rl": settings["paper_rl"],
             "variant": 0,  # of the objects: policies are trained with the task's own
             "split": split,
-            "drawn": drawn,
+            "drawn": stochastic,
             "engine": engine,
             "worlds": count,
             "start_states": shipped_states(depends["task"], settings["grasping"], split),

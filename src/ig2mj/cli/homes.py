@@ -39,7 +39,7 @@ def build(
     from ig2mj_homes.dataset.root import build_dataset
     from ig2mj_homes.dataset.shipped_homes import build_homes, categories_of, furnished
 
-    from ig2mj.cli.printing import add_bar, print_json, progress_bar
+    from ig2mj.cli.common.printing import add_bar, print_json, progress_bar
 
     if home and not only:
         only = tuple(sorted({c for name in home for c in categories_of(furnished(name, seed))}))
@@ -86,7 +86,7 @@ def convert(
     from ig2mj_converters.conversion import convert_scene
     from ig2mj_homes.dataset.ship import remove_unused, strip_report, total_bytes
 
-    from ig2mj.cli.printing import add_bar, progress_bar
+    from ig2mj.cli.common.printing import add_bar, progress_bar
 
     names = _scenes_of(dataset, home)
     failed: list[str] = []
@@ -158,7 +158,7 @@ def list_(
       only: list only these categories.
       json: print JSON instead of a table.
     """
-    from ig2mj.cli.printing import make_table, print_json, stdout_console
+    from ig2mj.cli.common.printing import make_table, print_json, stdout_console
 
     kind, data = ("categories", _categories(only)) if objects or only else ("homes", shipped_homes())
     if json:
@@ -208,7 +208,7 @@ def sheet(
     """Draw a contact sheet of models; needs OpenGL (see `ig2mj doctor`).
 
     Args:
-      out: output picture.
+      out: output image.
       only: draw only these categories; default: all.
       models: number of models of each category.
       seed: random seed of all variation.
@@ -218,21 +218,21 @@ def sheet(
     from ig2mj_homes.objects.catalogue import build_model
     from ig2mj_homes.sheet import contact_sheet
 
-    from ig2mj.cli.files import check_picture
+    from ig2mj.cli.common.files import check_image
     from ig2mj.errors import Ig2mjError
     from ig2mj.process.opengl import use_opengl
 
     if models < 1:
         raise Ig2mjError(f"--models {models}: at least one is needed")
     entries = _entries(only)
-    check_picture(out)
+    check_image(out)
     use_opengl()
     chosen = [build_model(e, k, seed) for e in entries for k in range(min(models, e.count))]
     contact_sheet(chosen, opened=opened, collision=collision).save(out)
     print(f"{out}: {len(chosen)} model{'s' * (len(chosen) != 1)}")
 
 
-def pictures(
+def images(
     out: Annotated[pathlib.Path, tyro.conf.arg(metavar="DIR")],
     home: tuple[str, ...] = (),
     rooms: Flag = False,
@@ -283,6 +283,8 @@ SUBCOMMANDS: dict[str, Callable[..., int | None]] = {
     "build": build,
     "convert": convert,
     "list": list_,
-    "pictures": pictures,
+    "images": images,
     "sheet": sheet,
 }
+
+RENAMED = {"pictures": "images"}

@@ -59,7 +59,7 @@ def _select(manifest: Manifest, room: str | None, category: str | None) -> list[
 def _print_json(manifest: Manifest, objects: list[ObjectEntry], show: tuple[Kind, ...]) -> None:
     import msgspec
 
-    from ig2mj.cli.printing import print_json
+    from ig2mj.cli.common.printing import print_json
 
     out: dict[str, Any] = {"name": manifest.name}
     if "rooms" in show:
@@ -90,7 +90,7 @@ def _print_json(manifest: Manifest, objects: list[ObjectEntry], show: tuple[Kind
 
 
 def _print_tables(manifest: Manifest, objects: list[ObjectEntry], show: tuple[Kind, ...]) -> None:
-    from ig2mj.cli.printing import make_table, stdout_console
+    from ig2mj.cli.common.printing import make_table, stdout_console
 
     console = stdout_console()
     household = [o for o in objects if o.in_household]

@@ -15,7 +15,7 @@ def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
     """
     import json as form
 
-    from ig2mj.cli.printing import make_table, stdout_console
+    from ig2mj.cli.common.printing import make_table, stdout_console
     from ig2mj.envs.names import NAMESPACE, VERSION
     from ig2mj.envs.registry import TASKS
 

@@ -53,7 +53,7 @@ def opened(
 def follow(title: str, where: Where) -> Iterator[Report]:
     """A bar on the terminal, or lines now and then where there is none. What a piece that is done in this process says
     of itself (`ig2mj.process.progress`) stands next to the bar."""
-    from ig2mj.cli.printing import add_bar, progress_bar
+    from ig2mj.cli.common.printing import add_bar, progress_bar
     from ig2mj.process.progress import shown_by
 
     last, words = [time.monotonic()], [""]

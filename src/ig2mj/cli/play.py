@@ -49,7 +49,7 @@ def run(
         for binding in BINDINGS:
             print(f"{binding.shown:16} {binding.command}")
         return 0
-    from ig2mj.cli.files import check_output
+    from ig2mj.cli.common.files import check_output
     from ig2mj.cli.robot_urdf import check_layout, own_robot
     from ig2mj.envs.registry import find_task, make
     from ig2mj.errors import UnknownNameError

@@ -14,7 +14,7 @@ def list_(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
     Args:
       json: print one JSON object.
     """
-    from ig2mj.cli.printing import make_table, print_json, stdout_console
+    from ig2mj.cli.common.printing import make_table, print_json, stdout_console
     from ig2mj.learn.policies import Policy
     from ig2mj.learn.shipped import shipped
 
@@ -42,7 +42,7 @@ def show(name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="POLIC
     Args:
       name: name of a policy that ships, or a file written by `ig2mj train`.
     """
-    from ig2mj.cli.printing import print_json
+    from ig2mj.cli.common.printing import print_json
     from ig2mj.learn.policies import Policy
     from ig2mj.learn.shipped import find_policy, model_card
 

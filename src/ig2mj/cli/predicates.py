@@ -36,7 +36,7 @@ def run(
       strict: report an error, instead of false, for an object that lacks the predicate's ability.
       json: print JSON instead of text.
     """
-    from ig2mj.cli.worlds import started
+    from ig2mj.cli.common.worlds import started
     from ig2mj.predicates import parse
 
     parsed = None if expression is None else parse(expression, "EXPRESSION")
@@ -61,7 +61,7 @@ def _print_holding(world: Simulation, json: bool) -> None:
     if json:
         _print_json(world, {"holding": [[a.predicate, *a.arguments] for a in holding]})
         return
-    from ig2mj.cli.printing import make_table, stdout_console
+    from ig2mj.cli.common.printing import make_table, stdout_console
     from ig2mj.predicates import PREDICATES
 
     console = stdout_console()
@@ -76,7 +76,7 @@ def _print_holding(world: Simulation, json: bool) -> None:
 
 
 def _print_json(world: Simulation, found: dict) -> None:
-    from ig2mj.cli.printing import print_json
+    from ig2mj.cli.common.printing import print_json
 
     print_json({"name": world.scene.name, "time": round(world.time, 6), **found})
 

@@ -33,7 +33,7 @@ def own_robot(urdf: pathlib.Path, layout: pathlib.Path | None, robot: str | None
     from ig2mj_converters.convert_robot import convert_robot
 
     from ig2mj.agents.urdf import UrdfRobot
-    from ig2mj.cli.printing import add_bar, progress_bar
+    from ig2mj.cli.common.printing import add_bar, progress_bar
 
     if robot is not None:
         raise Ig2mjError("give either --robot or --robot-urdf")

@@ -69,7 +69,7 @@ def run(
 
     import numpy as np
 
-    from ig2mj.cli.files import check_film, check_output
+    from ig2mj.cli.common.files import check_output, check_video
     from ig2mj.cli.robot_urdf import check_layout, own_robot
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.envs.rollout import play
@@ -88,7 +88,7 @@ def run(
     if video is not None:
         from ig2mj.showcase.film_strip import ENDINGS
 
-        check_film(video, ENDINGS)
+        check_video(video, ENDINGS)
         engine = engine or "native"
     if record is not None:
         require_module("h5py")

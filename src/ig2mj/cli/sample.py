@@ -47,7 +47,7 @@ def run(
       share: with --disturb: probability that a loose object is moved.
       json: print the result as JSON.
     """
-    from ig2mj.cli.files import check_output
+    from ig2mj.cli.common.files import check_output
     from ig2mj.errors import Ig2mjError
     from ig2mj.scene.scene import load_scene
 
@@ -90,8 +90,8 @@ def _sample(loaded, conditions, count: int, file: pathlib.Path, seed: int, where
     import json
     import sys
 
+    from ig2mj.cli.common.printing import make_table, stdout_console
     from ig2mj.cli.pieces import follow, opened, tell_failures
-    from ig2mj.cli.printing import make_table, stdout_console
     from ig2mj.sampling.many import sample
     from ig2mj.worlds.pool import save_pool
 

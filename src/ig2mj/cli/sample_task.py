@@ -7,16 +7,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from ig2mj.cli.common.deprecated import renamed_options
+
 if TYPE_CHECKING:
     from ig2mj.tasks.task import Task
 
 
+@renamed_options({"--anew": "--force"})
 def run(
     task: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="TASK")],
     split: str = "train",
     count: int = 0,
     jobs: int = 0,
-    anew: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    force: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     variant: int = 0,
     grasping: str = "mitten",
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="DIR")] = None,
@@ -33,7 +36,7 @@ def run(
       split: train, or held_out for evaluation (other seeds).
       count: number of rows; 0: 512 for training, 1000 held out. Fewer are the first rows of more.
       jobs: number of processes; 0: one per processor.
-      anew: sample again what is in the cache.
+      force: sample again even if the cache has the pool.
       variant: variant of the activity's objects: 1 and 2 use other models of the same categories.
       grasping: physical: objects that fit between two fingers, for activities that have them (TASK all: both).
       out: folder for the pools, instead of the cache.
@@ -53,19 +56,19 @@ def run(
     if task == "all":
         tasks = [task_variant(each, variant) for each in ACTIVITIES.values()]
         tasks += [task_variant(each, variant, "physical") for each in ACTIVITIES.values() if each.physical is not None]
-        return _keep([(each, part) for part in COUNT for each in tasks], count, jobs, anew, out)
+        return _keep([(each, part) for part in COUNT for each in tasks], count, jobs, force, out)
     found = find_task(task)
     if not isinstance(found, Task):
         raise UnknownNameError("task with a pool of start states", task, ACTIVITIES)
-    return _keep([(task_variant(found, variant, grasping), split)], count, jobs, anew, out)
+    return _keep([(task_variant(found, variant, grasping), split)], count, jobs, force, out)
 
 
-def _keep(wanted: list[tuple[Task, str]], count: int, jobs: int, anew: bool, out: pathlib.Path | None) -> int:
+def _keep(wanted: list[tuple[Task, str]], count: int, jobs: int, force: bool, out: pathlib.Path | None) -> int:
     """Samples the pools that are not there, side by side; 1 where rows of one differ from those that ship."""
     import concurrent.futures
     import contextlib
 
-    from ig2mj.cli.printing import add_bar, progress_bar
+    from ig2mj.cli.common.printing import add_bar, progress_bar
     from ig2mj.tasks.pool_files import different_rows
     from ig2mj.tasks.pools import COUNT, make_pool, pool_of, sampling_processes, start_states
     from ig2mj.worlds.pool import load_pool
@@ -81,14 +84,14 @@ def _keep(wanted: list[tuple[Task, str]], count: int, jobs: int, anew: bool, out
             about = f"{rows} start states of {task.name} ({split})"
             ships = None if states.shipped is None else load_pool(states.shipped, states.scene)
             if out is None:
-                if anew:
+                if force:
                     states.cached.unlink(missing_ok=True)
                 pool_of(task, split, rows, **options)
                 if ships is not None and ships.size >= rows:
                     return f"{states.shipped}: {about}, which ship", False
                 return f"{states.cached}: {about}", False
             file = out / states.cached.name
-            if anew:
+            if force:
                 file.unlink(missing_ok=True)
             pool = make_pool(task, split, rows, file=file, **options)
             if ships is None:

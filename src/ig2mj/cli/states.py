@@ -34,8 +34,8 @@ def run(
       compat: follow the paper, or iGibson's code where the two differ.
       json: print JSON instead of a table.
     """
-    from ig2mj.cli.printing import print_json
-    from ig2mj.cli.worlds import started
+    from ig2mj.cli.common.printing import print_json
+    from ig2mj.cli.common.worlds import started
     from ig2mj.errors import UnknownNameError
     from ig2mj.states import registry
 
@@ -64,7 +64,7 @@ def run(
 
 def _print_table(world: Simulation, names: list[str], rows: dict[str, dict[str, Any]]) -> None:
     """One column for each state; where that does not fit, one line for each object that lists its states."""
-    from ig2mj.cli.printing import least_width, make_table, stdout_console
+    from ig2mj.cli.common.printing import least_width, make_table, stdout_console
     from ig2mj.states.registry import STATES
 
     used = [n for n in names if any(n in r for r in rows.values())]

@@ -1,4 +1,4 @@
-"""`ig2mj view SCENE`: opens a scene in MuJoCo's viewer, or writes a picture of it without a display."""
+"""`ig2mj view SCENE`: opens a scene in MuJoCo's viewer, or writes an image of it without a display."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from ig2mj.cli.common.deprecated import renamed_options
 from ig2mj.errors import Ig2mjError
 
 if TYPE_CHECKING:
@@ -18,9 +19,10 @@ VIDEOS = (".mp4", ".gif")
 """As `ig2mj.viewer.film.FORMATS`."""
 
 
+@renamed_options({"--picture": "--image"})
 def run(
     scene: Annotated[pathlib.Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="SCENE")] = None,
-    picture: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
+    image: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     camera: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None,
     eye: Annotated[Vec3 | None, tyro.conf.arg(name="from", metavar="X Y Z")] = None,
     target: Annotated[Vec3 | None, tyro.conf.arg(name="at", metavar="X Y Z")] = None,
@@ -37,26 +39,26 @@ def run(
     robot_at: Annotated[Vec3, tyro.conf.arg(metavar="X Y DEGREES")] = (0.0, 0.0, 0.0),
     policy: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None,
 ) -> None:
-    """Open a scene in MuJoCo's viewer, or write a picture of it.
+    """Open a scene in MuJoCo's viewer, or write an image of it.
 
     In the window: Space pauses, Enter lists the keys.
 
     Args:
       scene: folder of a converted scene, its scene.xml, or the name of a home that comes with ig2mj.
-      picture: write this picture file instead of opening a window; needs no display.
-      camera: with --picture: the scene's camera to draw from.
-      eye: with --picture: the point to look from, metres.
-      target: with --picture: the point to look at, metres.
-      size: with --picture: width and height in pixels.
+      image: write this image file instead of opening a window; needs no display.
+      camera: with --image: the name of the scene's camera to render from.
+      eye: with --image: the position of the camera, metres.
+      target: with --image: the point to look at, metres.
+      size: with --image: width and height in pixels.
       seconds: simulate this many seconds first.
-      collision: draw the collision geometry instead of the visual one (picture only; key 3 in the window).
+      collision: draw the collision geometry instead of the visual one (images only; key 3 in the window).
       paused: open the window paused.
-      dump: replay the last steps of a world that went wrong, from the file that debug mode wrote; with --picture, draw
-        the last one whose numbers are finite.
+      dump: replay the last steps of a world that became non-finite, from the file that debug mode wrote; with
+        --image, render the last finite step.
       video: write the dump, or an episode of the policy, as a video (.mp4, .gif) instead of opening a window; of a
         policy also as a film strip (.png, .jpg).
-      pool: page through the rows of a pool of this scene, with the objects it adds: the right arrow turns the page;
-        with --picture, draw one row.
+      pool: page through the start states (rows) of a pool of this scene with the arrow keys; with --image, render one
+        row.
       row: the row of the pool, or the policy's start state, to begin with.
       robot_urdf: URDF of a robot to add to the scene (docs/guide/environments.md).
       robot_layout: TOML or JSON file that assigns its joints to base, arm and gripper; default: guessed from their
@@ -68,7 +70,7 @@ def run(
     if policy is not None:
         from ig2mj.cli.view_policy import view_policy
 
-        _only_policy(scene, picture, dump, pool, camera, eye, target, seconds, collision)
+        _only_policy(scene, image, dump, pool, camera, eye, target, seconds, collision)
         view_policy(policy, video, row, paused)
         return
     if scene is None:
@@ -78,22 +80,22 @@ def run(
     check_layout(robot_urdf, robot_layout)
     if robot_urdf is not None and (dump is not None or pool is not None):
         raise Ig2mjError("--robot-urdf goes neither with --dump nor with --pool")
-    _check(picture or video, camera, eye, target, size, seconds)
+    _check(image or video, camera, eye, target, size, seconds)
     if dump is not None:
-        _replay(scene, dump, picture, video, camera, eye, target, size, seconds, collision, paused)
+        _replay(scene, dump, image, video, camera, eye, target, size, seconds, collision, paused)
         return
     if video is not None:
         raise Ig2mjError("--video belongs to --dump")
     if pool is not None:
         if seconds > 0:
             raise Ig2mjError("--pool shows rows as they are: without --seconds")
-        _page_through(scene, pool, row, picture, camera, eye, target, size, collision)
+        _page_through(scene, pool, row, image, camera, eye, target, size, collision)
         return
     if row:
         raise Ig2mjError("--row belongs to --pool")
-    if picture is not None:
+    if image is not None:
         home = _with_robot(scene, robot_urdf, robot_layout, robot_at)
-        _write_picture(home, picture, camera, eye, target, size, seconds, collision)
+        _write_image(home, image, camera, eye, target, size, seconds, collision)
         return
     import sys
 
@@ -102,7 +104,7 @@ def run(
 
     model_file(scene)
     check_display()
-    print(f"opening {scene}: first the scene is loaded, then the window comes", file=sys.stderr, flush=True)
+    print(f"loading {scene}; the viewer opens when it is ready", file=sys.stderr, flush=True)
     from ig2mj.simulation import Simulation
 
     world = Simulation(_with_robot(scene, robot_urdf, robot_layout, robot_at))
@@ -118,7 +120,7 @@ def _only_policy(scene, *others) -> None:
         raise Ig2mjError("with --policy go --video, --row and --paused alone")
 
 
-def _check(picture, camera, eye, target, size, seconds) -> None:
+def _check(image, camera, eye, target, size, seconds) -> None:
     import math
 
     numbers = [*(eye or ()), *(target or ()), seconds]
@@ -132,12 +134,12 @@ def _check(picture, camera, eye, target, size, seconds) -> None:
         raise Ig2mjError("--from, --at and --seconds must be finite, and --seconds not negative")
     if not all(1 <= n <= 8192 for n in size):
         raise Ig2mjError("--size must be between 1 and 8192 pixels")
-    if picture is None and (camera is not None or eye is not None):
-        raise Ig2mjError("--camera, --from and --at are for --picture; in the window the mouse moves the camera")
-    if picture is not None:
-        from ig2mj.cli.files import check_picture
+    if image is None and (camera is not None or eye is not None):
+        raise Ig2mjError("--camera, --from and --at are for --image; in the window the mouse moves the camera")
+    if image is not None:
+        from ig2mj.cli.common.files import check_image
 
-        check_picture(picture, VIDEOS)
+        check_image(image, VIDEOS)
 
 
 def _view(home, data, camera: str | None, eye: Vec3 | None, target: Vec3 | None):
@@ -161,7 +163,7 @@ def _view(home, data, camera: str | None, eye: Vec3 | None, target: Vec3 | None)
     )
 
 
-def _replay(scene, dump, picture, video, camera, eye, target, size, seconds, collision, paused) -> None:
+def _replay(scene, dump, image, video, camera, eye, target, size, seconds, collision, paused) -> None:
     import sys
 
     from PIL import Image
@@ -171,13 +173,13 @@ def _replay(scene, dump, picture, video, camera, eye, target, size, seconds, col
     from ig2mj.viewer.offscreen import render
     from ig2mj.viewer.replay import Replay
 
-    if (picture is not None and video is not None) or seconds > 0:
-        raise Ig2mjError("--dump goes with one of --picture and --video, and without --seconds")
+    if (image is not None and video is not None) or seconds > 0:
+        raise Ig2mjError("--dump goes with one of --image and --video, and without --seconds")
     if video is not None and video.suffix.lower() not in VIDEOS:
         raise Ig2mjError(f"{video}: is not a video format that can be written (use {' or '.join(VIDEOS)})")
     replay = Replay(load_scene(scene), dump)
     print(f"{dump}: {len(replay)} steps; {replay.note.get('text', '')}", file=sys.stderr)
-    if picture is None and video is None:
+    if image is None and video is None:
         replay.launch(paused=paused)
         return
     step = replay.show_last()
@@ -186,14 +188,14 @@ def _replay(scene, dump, picture, video, camera, eye, target, size, seconds, col
         count = replay.video(video, view, width=size[0], height=size[1])
         print(f"wrote {video} ({count} steps)", file=sys.stderr)
         return
-    assert picture is not None
+    assert image is not None
     groups = (3,) if collision else VISIBLE_GROUPS
-    image = render(replay.scene.model, replay.data, view, width=size[0], height=size[1], groups=groups)
-    Image.fromarray(image).save(picture)
-    print(f"wrote {picture} (step {step + 1} of {len(replay)})", file=sys.stderr)
+    pixels = render(replay.scene.model, replay.data, view, width=size[0], height=size[1], groups=groups)
+    Image.fromarray(pixels).save(image)
+    print(f"wrote {image} (step {step + 1} of {len(replay)})", file=sys.stderr)
 
 
-def _page_through(scene, pool, row, picture, camera, eye, target, size, collision) -> None:
+def _page_through(scene, pool, row, image, camera, eye, target, size, collision) -> None:
     import sys
 
     from ig2mj.scene.geom_groups import VISIBLE_GROUPS
@@ -205,12 +207,12 @@ def _page_through(scene, pool, row, picture, camera, eye, target, size, collisio
     if not 0 <= row < rows.size:
         raise Ig2mjError(f"--row {row}: {pool} has rows 0 to {rows.size - 1}")
     pages = PoolPages(loaded, rows, at=row)
-    if picture is None:
+    if image is None:
         pages.launch()
         return
     groups = (3,) if collision else VISIBLE_GROUPS
-    pages.picture(picture, _view(loaded, pages.data, camera, eye, target), size=size, groups=groups)
-    print(f"wrote {picture} (row {row} of {rows.size})", file=sys.stderr)
+    pages.picture(image, _view(loaded, pages.data, camera, eye, target), size=size, groups=groups)
+    print(f"wrote {image} (row {row} of {rows.size})", file=sys.stderr)
 
 
 def _with_robot(scene: pathlib.Path, urdf: pathlib.Path | None, layout: pathlib.Path | None, at: Vec3) -> Scene:
@@ -226,8 +228,8 @@ def _with_robot(scene: pathlib.Path, urdf: pathlib.Path | None, layout: pathlib.
     return load_scene(scene, agents=[own_robot(urdf, layout).at(at[0], at[1], math.radians(at[2]))])
 
 
-def _write_picture(home, file, camera, eye, target, size, seconds, collision) -> None:
-    """MuJoCo alone is enough for a picture: the scene's start, `seconds` later."""
+def _write_image(home, file, camera, eye, target, size, seconds, collision) -> None:
+    """MuJoCo alone is enough for an image: the scene's start, `seconds` later."""
     import sys
 
     import mujoco
@@ -244,4 +246,4 @@ def _write_picture(home, file, camera, eye, target, size, seconds, collision) ->
     groups = (3,) if collision else VISIBLE_GROUPS
     image = render(home.model, data, view, width=size[0], height=size[1], groups=groups, backend=backend)
     Image.fromarray(image).save(file)
-    print(f"wrote {file} ({size[0]} x {size[1]}, drawn with {backend})", file=sys.stderr)
+    print(f"wrote {file} ({size[0]} x {size[1]}, rendered with {backend})", file=sys.stderr)

@@ -22,7 +22,7 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
 
     import numpy as np
 
-    from ig2mj.cli.files import check_film
+    from ig2mj.cli.common.files import check_video
     from ig2mj.envs.registry import make
     from ig2mj.errors import Ig2mjError
     from ig2mj.learn.evaluate import acting
@@ -39,7 +39,7 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
     if video is None:
         check_display()
     else:
-        check_film(video, ENDINGS)
+        check_video(video, ENDINGS)
     policy = Policy.load(file)
     depends = policy.card["depends"]
     env = make(

@@ -139,7 +139,7 @@ def _home(
     import jax
     import numpy as np
 
-    from ig2mj.cli.worlds import started
+    from ig2mj.cli.common.worlds import started
     from ig2mj.engine.registry import make_engine
     from ig2mj.predicates import parse
     from ig2mj.scene.scene import load_scene

@@ -110,7 +110,7 @@ def machine_checks(nvidia: tuple[str, int] | None) -> list[Check]:
     display = next((f"{v}={os.environ[v]}" for v in ("WAYLAND_DISPLAY", "DISPLAY") if os.environ.get(v)), None)
     if sys.platform in ("darwin", "win32"):
         display = sys.platform
-    fix = "" if display else "`ig2mj view SCENE --picture out.png` needs no display; for the viewer set DISPLAY"
+    fix = "" if display else "`ig2mj view SCENE --image out.png` needs no display; for the viewer set DISPLAY"
     return [*checks, Check("machine", "display", display is not None, display or "none", fix=fix)]
 
 

@@ -193,5 +193,5 @@ def model_card(name: str, policy: Policy) -> str:
         "It is for this task, robot, way of grasping and observation alone, and refused for others. It was trained and "
         "evaluated in one simulated home, with the same objects at other places; it has not been tried on a real robot."
     )
-    evaluate = f"    ig2mj evaluate {name}" + " --drawn" * found["drawn"]
+    evaluate = f"    ig2mj evaluate {name}" + " --stochastic" * found["drawn"]
     return "\n".join([*lines, "", evaluate, f"    ig2mj view --policy {name}", "", limits, ""])

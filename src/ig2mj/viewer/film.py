@@ -37,7 +37,7 @@ class Film:
         self._file, self._shape = pathlib.Path(file), (height, width, 3)
         form = FORMATS.get(self._file.suffix.lower())
         if form is None:
-            raise InputError(file, "is not a film format that can be written", fix=f"use {' or '.join(FORMATS)}")
+            raise InputError(file, "is not a video format that can be written", fix=f"use {' or '.join(FORMATS)}")
         source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}", "-r", f"{frames_per_second:g}"]
         # A process of its own and not imageio's writer, which forks: JAX's threads forbid that.
         self._ffmpeg = subprocess.Popen(

@@ -16,21 +16,21 @@ def check_output(file: pathlib.Path) -> None:
         raise InputError(file, "is a folder", fix="name a file")
 
 
-def check_picture(file: pathlib.Path, others: Iterable[str] = ()) -> None:
+def check_image(file: pathlib.Path, others: Iterable[str] = ()) -> None:
     """The ending must be one that Pillow writes, or of `others`, and the folder must be there. Raises InputError."""
     from PIL import Image
 
     Image.init()
     endings = {ending for ending, form in Image.registered_extensions().items() if form in Image.SAVE}
     if file.suffix.lower() not in {*endings, *others}:
-        raise InputError(file, "is not a picture format that can be written", fix="use .png or .jpg")
+        raise InputError(file, "is not an image format that can be written", fix="use .png or .jpg")
     check_output(file)
 
 
-def check_film(file: pathlib.Path, others: Iterable[str] = ()) -> None:
+def check_video(file: pathlib.Path, others: Iterable[str] = ()) -> None:
     """The ending must be that of a film, or of `others`, and the folder must be there. Raises InputError."""
     from ig2mj.viewer.film import FORMATS
 
     if file.suffix.lower() not in {*FORMATS, *others}:
-        raise InputError(file, "is not a film format that can be written", fix=f"use {' or '.join(FORMATS)}")
+        raise InputError(file, "is not a video format that can be written", fix=f"use {' or '.join(FORMATS)}")
     check_output(file)

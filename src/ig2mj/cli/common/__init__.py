@@ -1,0 +1,1 @@
+"""What several commands share: parsing, printing, checks of files, scenes that are set up."""

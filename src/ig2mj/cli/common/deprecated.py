@@ -1,0 +1,74 @@
+"""Old names of options and of sub-commands, which keep working for one release.
+
+A function of the command line names the options that were renamed:
+
+    @renamed_options({"--drawn": "--stochastic", "--mixed": "--set augment_starts="})
+    def run(stochastic: bool = False, set: tuple[str, ...] = ()) -> int: ...
+
+An option that became a setting is written "--set NAME=": `--mixed 4` is then `--set augment_starts=4`, and one without
+a value `--set NAME=true`. A module names sub-commands that were renamed in `RENAMED = {"pictures": "images"}`, next to
+its `SUBCOMMANDS`. Help and completion list the new names only; each old name that is typed prints one line on stderr.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_ATTRIBUTE = "renamed_options"
+_SET = "--set "
+
+
+def renamed_options(names: Mapping[str, str]) -> Callable[[F], F]:
+    """Marks a function of the command line: old option -> new option, or "--set NAME=". See the module's text."""
+
+    def mark(function: F) -> F:
+        setattr(function, _ATTRIBUTE, dict(names))
+        return function
+
+    return mark
+
+
+def renamed_options_of(function: Callable[..., Any]) -> Mapping[str, str]:
+    """Old options of a function, and what replaces them."""
+    return getattr(function, _ATTRIBUTE, {})
+
+
+def with_new_names(function: Callable[..., Any], prog: str, args: Sequence[str]) -> list[str]:
+    """The command line with the names of today. Prints one line on stderr for each old one."""
+    renamed = renamed_options_of(function)
+    out, settings = list[str](), list[str]()
+    waiting = list(args)
+    while waiting:
+        word = waiting.pop(0)
+        option, equals, value = word.partition("=")
+        new = renamed.get(option.replace("_", "-")) if word.startswith("--") else None
+        if new is None:
+            out.append(word)
+            continue
+        _warn(prog, option, new)
+        if not new.startswith(_SET):
+            out.append(new + equals + value)
+            continue
+        if not equals:
+            value = waiting.pop(0) if waiting and not waiting[0].startswith("--") else "true"
+        settings.append(new.removeprefix(_SET) + value)
+    if settings:
+        at = out.index(_SET.strip()) if _SET.strip() in out else len(out)
+        out[at : at + 1] = [_SET.strip(), *settings]
+    return out
+
+
+def new_subcommand(command: str, name: str, renamed: Mapping[str, str]) -> str:
+    """The name of today of a sub-command. Prints one line on stderr where the old one was typed."""
+    if name not in renamed:
+        return name
+    _warn(f"ig2mj {command}", name, renamed[name])
+    return renamed[name]
+
+
+def _warn(prog: str, old: str, new: str) -> None:
+    print(f"{prog}: '{old}' is now '{new}'; the old name will be removed in the next release", file=sys.stderr)
