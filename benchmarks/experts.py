@@ -184,7 +184,7 @@ def table(rows: list[dict[str, Any]]) -> list[str]:
         cells = []
         for robot, grasping in columns:
             good, played = sums.get((name, number, robot, grasping), (0, 0))
-            absent = "takes no part" if robot not in ACTIVITIES[name].robots else "-"
+            absent = "n/a" if robot not in ACTIVITIES[name].robots else "-"
             cells.append(f"{good} of {played}" if played else absent)
         lines.append(f"| {name}{f', variant {number}' if number else ''} | " + " | ".join(cells) + " |")
     return lines

@@ -1,4 +1,4 @@
-"""The tables of docs/guide/scale.md, computed from the results on file.
+"""The tables of docs/notes/scale.md, computed from the results on file.
 
     python benchmarks/scale_tables.py [--write] [--price 3.0] [--inside 300] [--between 25]
 
@@ -18,7 +18,7 @@ import pathlib
 from typing import Any
 
 HERE = pathlib.Path(__file__).resolve().parent
-RESULTS, PAGE = HERE / "results", HERE.parent / "docs" / "guide" / "scale.md"
+RESULTS, PAGE = HERE / "results", HERE.parent / "docs" / "notes" / "scale.md"
 
 BEGIN, END = "<!-- tables: benchmarks/scale_tables.py -->", "<!-- end of tables -->"
 
@@ -244,7 +244,7 @@ def tables(args: argparse.Namespace) -> str:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=str(__doc__).splitlines()[0])
-    parser.add_argument("--write", action="store_true", help="put them into docs/guide/scale.md")
+    parser.add_argument("--write", action="store_true", help="put them into docs/notes/scale.md")
     parser.add_argument("--price", type=float, default=3.0, help="of an hour of a GPU, in your currency")
     parser.add_argument("--inside", type=float, default=300.0, help="GB/s between GPUs of a host")
     parser.add_argument("--between", type=float, default=25.0, help="GB/s between hosts")

@@ -18,7 +18,7 @@ def test_parts_of_a_case_are_added_up():
     assert "| CookingMeat, variant 1 | - | 25 of 25 |" in experts.table([row(variant=1), row(robot="humanoid")])
     assert lines[0] == "| | humanoid, mitten | fetch, mitten |"
     assert "| CookingMeat | 23 of 25 | 49 of 50 |" in lines
-    assert "| BimanualPickAndPlace | - | takes no part |" in lines
+    assert "| BimanualPickAndPlace | - | n/a |" in lines
 
 
 def test_of_two_rows_of_one_part_the_later_counts(tmp_path):
