@@ -63,7 +63,7 @@ def _done(request: dict[str, Any], out: Path, options: ConvertOptions, work: Cal
     if not options.cache:
         return work()
     start = time.perf_counter()
-    options.progress("comparing with earlier conversions", 0, 1)
+    options.progress(0, 1, "comparing with earlier conversions")
     key = output_cache.key_of(request, options)
     known = output_cache.fetch(key, out)
     if known is not None:

@@ -69,12 +69,12 @@ def convert_object(
     options = options or ConvertOptions()
     file = pathlib.Path(urdf)
     start = time.perf_counter()
-    options.progress(f"reading {file.name}", 0, 2)
+    options.progress(0, 2, f"reading {file.name}")
     source, dataset = _read(file, category, model, options)
     built = {source.model: _build(source, dataset, _scale(source, bounding_box), options)}
     built |= _halves(dataset, built[source.model], options)
     read_seconds = time.perf_counter() - start
-    options.progress(f"writing {source.model}", 1, 2)
+    options.progress(1, 2, f"writing {source.model}")
     with replaced_folder(out) as folder:
         start = time.perf_counter()
         ag = dataset is None or source.category not in dataset.specs or dataset.enable_ag(source.category)
@@ -94,7 +94,7 @@ def convert_object(
         )
         if source.category == ROBOT_CATEGORY:
             (folder / ROBOT_FILE).write_text(robot_json(source), encoding="utf-8")
-        options.progress(source.model, 2, 2)
+        options.progress(2, 2, source.model)
     return outcome
 
 

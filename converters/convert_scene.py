@@ -56,7 +56,7 @@ def convert_scene(
     options = options or ConvertOptions()
     timings: dict[str, float] = {}
     start = time.perf_counter()
-    options.progress("reading the scene", 0, 1)
+    options.progress(0, 1, "reading the scene")
     forget_datasets()
     dataset = Dataset(dataset_root)
     scene = dataset.scene(name, urdf, options.scene_options())
@@ -70,7 +70,7 @@ def convert_scene(
 
     with replaced_folder(out) as folder:
         start = time.perf_counter()
-        options.progress("writing the scene", 0, 1)
+        options.progress(0, 1, "writing the scene")
         build = build_scene(
             ModelBuilder(name, folder, category_colours=_use_category_colours(built, options), assets=options.assets),
             placements,
@@ -86,7 +86,7 @@ def convert_scene(
         if scene.rooms is not None:
             write_rooms(scene.rooms, folder / ROOMS_FILE)
         timings["writing"] = time.perf_counter() - start
-        options.progress("checking and reporting", 0, 1)
+        options.progress(0, 1, "checking and reporting")
         return finish(
             folder,
             model,

@@ -10,11 +10,11 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.errors import Ig2mjError
 
 from .base import inputs
 from .base.description import Instance, ObjectModel, SceneDescription
-from .base.options import Progress, no_progress
 from .base.process_pool import TaskPool
 from .base.read_limits import ReadLimits, limits, limits_of
 from .bodies.assembly import Assembly, assemble
@@ -125,7 +125,7 @@ def is_quick(task: ModelTask) -> bool:
 
 
 def decompose_model(
-    model: ObjectModel, hulls: HullOptions, pool: TaskPool | None = None, progress: Progress = no_progress
+    model: ObjectModel, hulls: HullOptions, pool: TaskPool | None = None, progress: ProgressCallback = no_progress
 ) -> dict[str, LinkPieces]:
     """The convex pieces of every link of a model as it was read, unscaled: the work that takes long.
 
@@ -145,7 +145,7 @@ def build_model(
     *,
     igibson_visuals: bool,
     masses: MassRule,
-    progress: Progress = no_progress,
+    progress: ProgressCallback = no_progress,
 ) -> BuiltModel:
     """From a model as read to one ready to be written (see `scale_model`, `scaled_pieces`, `link_inertials`).
 
@@ -159,7 +159,7 @@ def build_model(
     maps = link_maps(model, scale)
     decomposed = {}
     for name, link in scaled.links.items():
-        progress(f"link {name}: collision geoms", len(decomposed), len(scaled.links))
+        progress(len(decomposed), len(scaled.links), f"link {name}: collision geoms")
         decomposed[name] = scaled_pieces(found[name], link.collisions, maps[name], hulls)
     inertials = link_inertials(scaled, density, bullet_inertia, masses)
     pieces = {name: link_hulls.pieces for name, link_hulls in decomposed.items()}

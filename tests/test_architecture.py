@@ -19,6 +19,7 @@ SRC = ROOT / "src" / "ig2mj"
 LAYERS = [
     "errors",
     "install_hint",
+    "callbacks",
     "files",
     "process",
     "cluster",
@@ -58,8 +59,15 @@ FORBIDDEN = {
 }
 #: Packages beside `ig2mj` -> what they may import of it.
 GUESTS = {
-    "converters": ("ig2mj.knowledge", "ig2mj.scene.manifest", "ig2mj.errors", "ig2mj.install_hint", "ig2mj.files"),
-    "homes": ("ig2mj.knowledge", "ig2mj.errors", "ig2mj.install_hint"),
+    "converters": (
+        "ig2mj.knowledge",
+        "ig2mj.scene.manifest",
+        "ig2mj.errors",
+        "ig2mj.install_hint",
+        "ig2mj.files",
+        "ig2mj.callbacks",
+    ),
+    "homes": ("ig2mj.knowledge", "ig2mj.errors", "ig2mj.install_hint", "ig2mj.callbacks"),
 }
 GUEST_NAMES = {"ig2mj_converters", "ig2mj_homes"}
 

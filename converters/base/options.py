@@ -8,19 +8,14 @@ import pathlib
 from collections.abc import Callable, Collection
 from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
 
+from ig2mj.callbacks import ProgressCallback, no_progress
+
 from .read_limits import ReadLimits, limits_of
 
 if TYPE_CHECKING:  # what these import takes seconds, which a conversion out of the cache need not spend
     from ..hulls.pieces import HullOptions
     from ..reading.scene_urdf import SceneOptions
     from ..report.page import Renderer
-
-#: Called with what is worked on, how many units are done, and how many there are.
-Progress = Callable[[str, int, int], None]
-
-
-def no_progress(text: str, done: int, total: int) -> None:
-    """A progress callback that does nothing."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -73,7 +68,7 @@ class ConvertOptions:
     limits: ReadLimits = dataclasses.field(default_factory=ReadLimits)
     renderer: Renderer | None = None
     view: Callable[..., Any] | None = None
-    progress: Progress = no_progress
+    progress: ProgressCallback = no_progress
 
     def hull_options(self, *, building: bool = False) -> HullOptions:
         """How collision geometry is decomposed. Wall segments are never merged: the gaps between them are doors."""

@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
-from .options import Progress
+from ig2mj.callbacks import ProgressCallback
 
 Task = TypeVar("Task")
 Result = TypeVar("Result")
@@ -39,7 +39,7 @@ class TaskPool:
         function: Callable[[Task], Result],
         tasks: Sequence[Task],
         labels: Sequence[str],
-        progress: Progress,
+        progress: ProgressCallback,
         is_quick: Callable[[Task], bool] | None = None,
     ) -> list[Result]:
         """`[function(task) for task in tasks]`, over the processes where that is worth it.
@@ -50,20 +50,20 @@ class TaskPool:
         if self.jobs <= 1 or len(tasks) <= 1:
             results = []
             for done, (task, label) in enumerate(zip(tasks, labels, strict=True)):
-                progress(label, done, len(tasks))
+                progress(done, len(tasks), label)
                 results.append(function(task))
             return results
         found: dict[int, Result] = {}
         sent: dict[concurrent.futures.Future, int] = {}
         for index, task in enumerate(tasks):
-            progress(labels[index], len(found), len(tasks))
+            progress(len(found), len(tasks), labels[index])
             if is_quick is not None and is_quick(task):
                 found[index] = function(task)
             else:
                 sent[self._submit(function, task)] = index
         waiting = {index: labels[index] for index in sent.values()}
         for future in concurrent.futures.as_completed(sent):
-            progress(next(iter(waiting.values())), len(found), len(tasks))
+            progress(len(found), len(tasks), next(iter(waiting.values())))
             found[sent[future]] = future.result()
             waiting.pop(sent[future])
         return [found[index] for index in range(len(tasks))]

@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from ig2mj.callbacks import ProgressCallback, no_progress
+
 from ..base.description import Shape
-from ..base.options import Progress, no_progress
 from ..base.process_pool import TaskPool
 from . import piece_cache as cache
 from .budget import drop_contained
@@ -106,7 +107,7 @@ def decompose_links(
     links: Mapping[str, Sequence[Shape]],
     options: HullOptions,
     pool: TaskPool | None = None,
-    progress: Progress = no_progress,
+    progress: ProgressCallback = no_progress,
 ) -> dict[str, LinkPieces]:
     """The convex pieces of every link, at the size the shapes have; each link's are looked up in the cache first.
 
@@ -160,7 +161,11 @@ def _take_apart(task: tuple[Shape, str, HullOptions]) -> ShapeParts:
 
 
 def _cut_concave(
-    apart: Mapping[str, list[ShapeParts]], options: HullOptions, size: ModelSize, pool: TaskPool, progress: Progress
+    apart: Mapping[str, list[ShapeParts]],
+    options: HullOptions,
+    size: ModelSize,
+    pool: TaskPool,
+    progress: ProgressCallback,
 ) -> None:
     """Cuts up the concave parts of all links, side by side, and puts the pieces in their places."""
     tasks: list[CutTask] = []

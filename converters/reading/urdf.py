@@ -8,12 +8,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.errors import InputError
 
 from ..base import inputs
 from ..base.description import Inertial, Joint, Link, Mimic, ObjectModel
 from ..base.file_access import FileGuard
-from ..base.options import Progress, no_progress
 from ..base.transforms import read_origin
 from .urdf_geometry import GeometryReader
 from .urdf_leftovers import read_leftovers
@@ -35,7 +35,7 @@ def read_urdf(
     allow_outside: bool = False,
     mesh_root: pathlib.Path | None = None,
     package_path: Sequence[pathlib.Path] = (),
-    progress: Progress = no_progress,
+    progress: ProgressCallback = no_progress,
 ) -> ObjectModel:
     """Reads an object's URDF and its meshes (unscaled, link frames); metadata is left empty.
 
@@ -64,7 +64,7 @@ def read_urdf(
     links: dict[str, Link] = {}
     elements = robot.findall("link")
     for done, element in enumerate(elements):
-        progress(f"reading link {element.get('name', '')}", done, len(elements))
+        progress(done, len(elements), f"reading link {element.get('name', '')}")
         link = _read_link(element, reader)
         if link.name in links:
             raise InputError(path, "this name occurs twice", element=where(element))

@@ -10,8 +10,9 @@ import json
 import multiprocessing
 import pathlib
 import shutil
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
+from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.errors import UnknownNameError
 from ig2mj.knowledge import synset
 
@@ -32,8 +33,6 @@ ROOM_TYPES = (
 )  # fmt: skip
 CHUNK = 12  # models per task of the pool
 
-Progress = Callable[[int, int], None]
-
 
 def build_dataset(
     out: pathlib.Path,
@@ -41,7 +40,7 @@ def build_dataset(
     seed: int = 0,
     only: Iterable[str] | None = None,
     jobs: int | None = None,
-    progress: Progress | None = None,
+    progress: ProgressCallback = no_progress,
 ) -> dict[str, int]:
     """Writes VERSION, metadata and all object models under `out`; what was in `out/objects/<category>` is replaced.
 
@@ -67,8 +66,7 @@ def build_dataset(
     for done, (category, size) in enumerate(_run(chunks, jobs), start=1):
         if len(sizes[category]) < usual[category]:  # models come in the order of their numbers
             sizes[category].append(size)
-        if progress:
-            progress(done, len(tasks))
+        progress(done, len(tasks))
     write_metadata(out, entries, sizes)
     write_material_library(out, seed)
     return {category: len(found) for category, found in sizes.items()}

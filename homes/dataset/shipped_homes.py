@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import pathlib
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 
+from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.errors import UnknownNameError
 
 from ..furnish import small_home
@@ -13,8 +14,6 @@ from ..furnish.home import furnish_home
 from ..furnish.kit import HomeInProgress
 from ..plans.shipped import DRAWINGS, plan
 from .scene_writer import write_scene
-
-Progress = Callable[[str, int, int], None]
 
 
 def home_names() -> list[str]:
@@ -32,7 +31,7 @@ def furnished(name: str, seed: int = 0) -> HomeInProgress:
 
 
 def build_homes(
-    root: pathlib.Path, names: Iterable[str] | None = None, seed: int = 0, progress: Progress | None = None
+    root: pathlib.Path, names: Iterable[str] | None = None, seed: int = 0, progress: ProgressCallback = no_progress
 ) -> dict[str, int]:
     """Writes `scenes/<name>` of homes into a dataset root whose objects were built with the same seed.
 
@@ -48,8 +47,7 @@ def build_homes(
             raise UnknownNameError("home", name, home_names())
     counts = {}
     for done, name in enumerate(chosen):
-        if progress:
-            progress(name, done, len(chosen))
+        progress(done, len(chosen), name)
         home = furnished(name, seed)
         jams = blocked(home.plan, home.things.things.values())
         assert not jams, f"{name}: no room to open: {jams}"

@@ -1,4 +1,4 @@
-"""A torn or damaged line of a journal costs the piece that it is of, and nothing else."""
+"""A torn or damaged line of a journal costs the job that it is of, and nothing else."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from ig2mj.cluster.journal import DONE, Journal
 from ig2mj.errors import InputError
 
 REQUEST = {"command": "sample", "versions": {"numpy": "2"}}
-PIECES = {f"row/{k}": f"piece {k}".encode() for k in range(4)}
+PIECES = {f"row/{k}": f"job {k}".encode() for k in range(4)}
 
 
 @pytest.fixture
 def interrupted(tmp_path):
-    """The output of a run that was interrupted after four pieces."""
+    """The output of a run that was interrupted after four jobs."""
     with Journal(tmp_path / "out.npz", REQUEST) as journal:
         for name, result in PIECES.items():
             journal.put(name, result)
@@ -25,7 +25,7 @@ def interrupted(tmp_path):
     [b"", b'{"name": "row/1", "sha', b"\xff\xfe\0", b"[]", b"null", b'{"name": [], "sha256": 3}', b"[" * 5000, b"7"],
 )
 def test_a_torn_line_costs_its_piece(interrupted, torn):
-    file = interrupted.with_name("out.npz.pieces") / DONE
+    file = interrupted.with_name("out.npz.jobs") / DONE
     lines = file.read_bytes().splitlines()
     lines[1] = torn
     file.write_bytes(b"\n".join(lines) + b"\n")
@@ -35,7 +35,7 @@ def test_a_torn_line_costs_its_piece(interrupted, torn):
 
 
 def test_a_last_line_without_an_end_does_not_cost_the_next_one(interrupted):
-    file = interrupted.with_name("out.npz.pieces") / DONE
+    file = interrupted.with_name("out.npz.jobs") / DONE
     file.write_bytes(file.read_bytes()[:-20])
     with Journal(interrupted, REQUEST, resume=True) as journal:
         assert set(journal.names()) == set(PIECES) - {"row/3"}
@@ -46,7 +46,7 @@ def test_a_last_line_without_an_end_does_not_cost_the_next_one(interrupted):
 
 def test_a_line_with_a_path_reads_nothing_outside(interrupted, tmp_path):
     (tmp_path / "secret.bin").write_bytes(b"secret")
-    file = interrupted.with_name("out.npz.pieces") / DONE
+    file = interrupted.with_name("out.npz.jobs") / DONE
     sha = "2bb80d537b1da3e38bd30361aa855686bde0eacd7162fef6a25fe97bf527a25b"
     with file.open("a") as lines:
         lines.write(f'{{"name": "../secret", "sha256": "{sha}"}}\n')
@@ -56,7 +56,7 @@ def test_a_line_with_a_path_reads_nothing_outside(interrupted, tmp_path):
 
 @pytest.mark.parametrize("text", ["", "[]", "null", '"a"', "[" * 5000])
 def test_a_broken_request_is_named(interrupted, text):
-    file = interrupted.with_name("out.npz.pieces") / "request.json"
+    file = interrupted.with_name("out.npz.jobs") / "request.json"
     file.write_text(text)
     with pytest.raises(InputError, match=r"request\.json: (is|holds)"):
         Journal(interrupted, REQUEST, resume=True)

@@ -1,4 +1,4 @@
-"""Pieces of work on a real Ray cluster of two nodes of one processor each: the same bytes, also where a node dies."""
+"""Jobs on a real Ray cluster of two nodes of one processor each: the same bytes, also where a node dies."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ import pytest
 from tiny_dataset import write_dataset
 
 from ig2mj.cluster import ray_nodes
-from ig2mj.cluster.pieces import Status, Where, run
-from ig2mj.cluster.work import Piece, Work
+from ig2mj.cluster.job_runner import Where, map_jobs
+from ig2mj.cluster.jobs import Job, JobSet
 from ig2mj.errors import ClusterError
 
 pytest.importorskip("ray")
@@ -30,9 +30,9 @@ def ig2mj(cluster, folder: pathlib.Path, *words: str) -> subprocess.CompletedPro
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=500)
 
 
-def pieces(count: int, **arguments) -> Work:
-    found = [Piece(f"piece_{n:03d}", {"number": n, **arguments}) for n in range(count)]
-    return Work("piece_functions:digest", "testing", found, {"file": b"shared content"})
+def jobs(count: int, **arguments) -> JobSet:
+    found = [Job(f"job_{n:03d}", {"number": n, **arguments}) for n in range(count)]
+    return JobSet("job_functions:digest", "testing", found, {"file": b"shared content"})
 
 
 @pytest.fixture
@@ -46,23 +46,23 @@ def joined(ray_cluster, monkeypatch):
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_a_node_that_dies_costs_nothing(joined, tmp_path):
-    """The second node is killed while both work: every piece comes out, with the bytes of one process."""
+    """The second node is killed while both work: every job comes out, with the bytes of one process."""
     import ray
 
-    local, _ = run(pieces(30))
+    local, _ = map_jobs(jobs(30))
     ray.init(address=joined.address, namespace="ig2mj", logging_level="ERROR", log_to_driver=False)
     try:
         wait_for_nodes(ray, 2)
-        wanted, killed = pieces(30, seconds=0.3, note=str(tmp_path)), []
+        wanted, killed = jobs(30, seconds=0.3, note=str(tmp_path)), []
 
-        def kill_once(status: Status) -> None:
-            if status.done >= 6 and not killed:
-                killed.append(status.done)
+        def kill_once(done, total, text="") -> None:
+            if done >= 6 and not killed:
+                killed.append(done)
                 threading.Thread(target=joined.kill_node).start()
 
-        store, failed = run(wanted, Where(cluster=joined.address), report=kill_once)
+        store, failed = map_jobs(wanted, Where(cluster=joined.address), progress=kill_once)
         assert killed and not failed
-        assert [store.get(p.name) for p in wanted.pieces] == [local.get(p.name) for p in wanted.pieces]
+        assert [store.get(p.name) for p in wanted.jobs] == [local.get(p.name) for p in wanted.jobs]
         workers = {file.name.split("-")[1] for file in tmp_path.iterdir()}
         assert len(workers) >= 2, "both nodes worked"
         wait_for_nodes(ray, 1)
@@ -74,16 +74,16 @@ def test_a_node_that_dies_costs_nothing(joined, tmp_path):
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_a_full_disk_on_one_node_fails_its_pieces_and_not_the_run(joined, tmp_path):
-    """The second node writes to a full device. A piece fails only where each of its three tries fell to that node."""
+    """The second node writes to a full device. A job fails only where each of its three tries fell to that node."""
     import ray
 
     joined.kill_node()
-    joined.add_node(PIECES_DISK="/dev/full")
+    joined.add_node(JOBS_DISK="/dev/full")
     ray.init(address=joined.address, namespace="ig2mj", logging_level="ERROR", log_to_driver=False)
     try:
         wait_for_nodes(ray, 2)
-        asked = [Piece(f"piece_{n:03d}", {"number": n, "note": str(tmp_path)}) for n in range(12)]
-        store, failed = run(Work("piece_functions:on_disk", "testing", asked), Where(cluster=joined.address))
+        asked = [Job(f"job_{n:03d}", {"number": n, "note": str(tmp_path)}) for n in range(12)]
+        store, failed = map_jobs(JobSet("job_functions:on_disk", "testing", asked), Where(cluster=joined.address))
         assert set(store.names()) | set(failed) == {p.name for p in asked} and len(store.names()) >= 4
         assert all(store.get(p.name) == b"%d" % p.arguments["number"] for p in asked if p.name not in failed)
         assert {reason.split(": ", 1)[1] for reason in failed.values()} <= {"[Errno 28] No space left on device"}
@@ -127,8 +127,8 @@ def test_a_dataset_has_the_same_bytes_and_what_is_broken_is_listed(ray_cluster, 
     for done in (here, there):
         assert done.returncode == 1, done.stderr
         assert f"  {name}: " in done.stderr and "--resume tries them again" in done.stderr
-    shutil.rmtree(tmp_path / "here" / ".pieces")
-    shutil.rmtree(tmp_path / "there" / ".pieces")
+    shutil.rmtree(tmp_path / "here" / ".jobs")
+    shutil.rmtree(tmp_path / "there" / ".jobs")
     files = [
         {f.relative_to(top): f.read_bytes() for f in top.rglob("*") if f.is_file()}
         for top in (tmp_path / "here", tmp_path / "there")
@@ -143,24 +143,24 @@ def test_a_node_without_the_files_or_with_another_version_is_told_before_any_wor
 
     note = tmp_path / "note"
     note.mkdir()
-    wanted = pieces(3, note=str(note))
+    wanted = jobs(3, note=str(note))
     ray.init(address=joined.address, namespace="ig2mj", logging_level="ERROR", log_to_driver=False)
     try:
         wait_for_nodes(ray, 2)
         file = tmp_path / "scene.xml"
         file.write_text("here")
-        other = Work(wanted.function, "", wanted.pieces, check=("piece_functions:node_files", {"path": str(file)}))
+        other = JobSet(wanted.function, "", wanted.jobs, check=("job_functions:node_files", {"path": str(file)}))
         monkeypatch.setattr(ray_nodes, "digest_seen", lambda check: "what this machine has")
         with pytest.raises(ClusterError, match=r"node .* has other files than this machine"):
             run(other, Where(cluster=joined.address))
-        gone = Work(wanted.function, "", wanted.pieces, check=("piece_functions:node_files", {"path": "/no/such"}))
+        gone = JobSet(wanted.function, "", wanted.jobs, check=("job_functions:node_files", {"path": "/no/such"}))
         with pytest.raises(ClusterError, match=r"node .*: .*No such file or directory: '/no/such'"):
             run(gone, Where(cluster=joined.address))
         monkeypatch.undo()
         monkeypatch.setattr(ray_nodes, "versions", lambda: {"ig2mj": "9.9 (abc)"})
         with pytest.raises(ClusterError, match=r"node .* has ig2mj .*, and here it is 9.9"):
-            run(wanted, Where(cluster=joined.address))
-        assert not list(note.iterdir()), "no piece was begun"
+            map_jobs(wanted, Where(cluster=joined.address))
+        assert not list(note.iterdir()), "no job was begun"
     finally:
         ray.shutdown()
 
@@ -175,7 +175,7 @@ def test_a_node_without_the_files_or_with_another_version_is_told_before_any_wor
 )
 def test_an_address_where_nobody_is(address, said):
     with pytest.raises(ClusterError, match=said):
-        run(pieces(1), Where(cluster=address))
+        map_jobs(jobs(1), Where(cluster=address))
 
 
 def test_a_cluster_that_has_ended_is_not_waited_for(tmp_path, monkeypatch):
@@ -184,7 +184,7 @@ def test_a_cluster_that_has_ended_is_not_waited_for(tmp_path, monkeypatch):
     (tmp_path / "ray").mkdir()
     (tmp_path / "ray" / "ray_current_cluster").write_text("127.0.0.1:9\n")
     with pytest.raises(ClusterError, match="--cluster auto: nobody answers at 127"):
-        run(pieces(1), Where(cluster="auto"))
+        map_jobs(jobs(1), Where(cluster="auto"))
 
 
 def test_commands_ask_for_the_cluster_before_they_do_anything(tmp_path, monkeypatch, capsys):

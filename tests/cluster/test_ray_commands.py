@@ -37,7 +37,7 @@ def done(process: subprocess.Popen) -> str:
 
 
 def at_work(session: int) -> bool:
-    """Whether a process of this session does a piece: Ray gives it the task's name."""
+    """Whether a process of this session does a job: Ray gives it the task's name."""
     for entry in pathlib.Path("/proc").iterdir():
         try:
             own = entry.name.isdigit() and os.getsid(int(entry.name)) == session
@@ -49,7 +49,7 @@ def at_work(session: int) -> bool:
 
 
 def with_a_death(cluster, folder: pathlib.Path, *words: str) -> str:
-    """Runs a command on the cluster, whose second node is killed as soon as it does a piece of it."""
+    """Runs a command on the cluster, whose second node is killed as soon as it does a job of it."""
     assert cluster.second is not None
     process = command(cluster, folder, *words, "--cluster", cluster.address)
     try:
@@ -108,7 +108,7 @@ def test_demonstrations_are_the_same(both_nodes, tmp_path):
     with_a_death(both_nodes, tmp_path, *words, "there.h5")
     done(command(both_nodes, tmp_path, *words, "here.h5", "--jobs", "1"))
     assert (tmp_path / "here.h5").read_bytes() == (tmp_path / "there.h5").read_bytes()
-    assert not list(tmp_path.glob("*.pieces")), "the journals went"
+    assert not list(tmp_path.glob("*.jobs")), "the journals went"
 
 
 def test_replays_are_the_same(both_nodes, tmp_path):

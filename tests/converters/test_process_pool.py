@@ -8,12 +8,13 @@ import sys
 import time
 
 import pytest
-from ig2mj_converters.base.options import no_progress
 from ig2mj_converters.base.process_pool import TaskPool
+
+from ig2mj.callbacks import no_progress
 
 SCRIPT = """
 import os, sys, time
-from ig2mj_converters.base.options import no_progress
+from ig2mj.callbacks import no_progress
 from ig2mj_converters.base.process_pool import TaskPool
 
 def work(folder):

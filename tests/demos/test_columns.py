@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from hostile_readers import recordings
 
-from ig2mj.demos.pieces import TOLD, join_replays
 from ig2mj.demos.reader import Recording
+from ig2mj.demos.replay_jobs import TOLD, join_replays
 from ig2mj.demos.writer import FLUSH, RunWriter
 from ig2mj.engine.native.recorded import Cut
 from ig2mj.errors import InputError

@@ -13,7 +13,7 @@ from hostile_readers import demonstrations, policies
 from limits import run_limited
 
 from ig2mj.errors import InputError
-from ig2mj.learn.demo_pieces import FAILED, join_demos
+from ig2mj.learn.demo_jobs import FAILED, join_demos
 from ig2mj.learn.demos import about, load_demos
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy

@@ -31,10 +31,10 @@ def test_the_time_that_is_left_is_that_of_the_pace_so_far(clock):
     share = Share("playing")
     assert share.text() == "playing"
     clock.now += 60.0  # compiling
-    share(0.0, "0 of 8 episodes")
+    share(0, 8, "0 of 8 episodes")
     assert share.text() == "playing: 0 of 8 episodes"
     clock.now += 10.0
-    share(0.25, "2 of 8 episodes")
+    share(2, 8, "2 of 8 episodes")
     assert share.text() == "playing: 2 of 8 episodes, about 30 s left"
 
 
@@ -45,7 +45,7 @@ def test_long_times_are_in_minutes_and_hours():
 def test_a_bar_shows_the_words_in_place_of_a_line():
     told = []
     with shown_by(told.append), progress("playing") as report:
-        report(0.5, "4 of 8 episodes")
+        report(4, 8, "4 of 8 episodes")
     assert told == ["playing", "playing: 4 of 8 episodes"]
 
 
@@ -55,7 +55,7 @@ def test_without_a_bar_a_line_is_on_stderr(monkeypatch):
     monkeypatch.setattr(progress_module, "WAITING", Waiting())
     monkeypatch.setattr(sys, "stderr", io.StringIO())
     with progress("playing") as report:
-        report(0.5, "4 of 8 episodes")
+        report(4, 8, "4 of 8 episodes")
         deadline = time.monotonic() + 20
         while "4 of 8" not in sys.stderr.getvalue():
             assert time.monotonic() < deadline

@@ -19,7 +19,7 @@ from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import EngineError, InputError
 from ig2mj.sampling import settled
 from ig2mj.sampling.settled import make_pool
-from ig2mj.sampling.settled_pieces import sample_settled
+from ig2mj.sampling.settled_jobs import sample_settled
 from ig2mj.worlds import Core, Rules
 from ig2mj.worlds.archive import read_header, save_tree
 from ig2mj.worlds.pool import FORMAT_VERSION, Pool, load_pool, save_pool
@@ -58,7 +58,7 @@ def test_pieces_of_work_give_the_same_pool(pool, tiny_home, tmp_path):
     assert found is not None and not failed and same(pool, found)
     assert turns == [f"turn_{n:06d}" for n in range(len(turns))], "no more turns than it takes"
     with Journal(tmp_path / "pool.npz", {}, resume=True) as journal:
-        again, _ = sample_settled(tiny_home, 3, seed=5, share=0.4, journal=journal, report=lambda status: pytest.fail())
+        again, _ = sample_settled(tiny_home, 3, seed=5, share=0.4, journal=journal, progress=lambda *_: pytest.fail())
     assert again is not None and same(pool, again), "of what was kept, nothing is done again"
 
 
@@ -69,7 +69,7 @@ def test_halves_stay_parked(pool, tiny_home):
 
 def test_progress_counts_the_rows(tiny_home, home_model):
     seen: list[int] = []
-    make_pool(tiny_home, home_model, 2, threads=1, progress=seen.append)
+    make_pool(tiny_home, home_model, 2, threads=1, progress=lambda *a: seen.append(a[0]))
     assert seen == sorted(seen) and seen[-1] == 2
 
 

@@ -8,8 +8,6 @@ constraint rows (four contacts per face against face, where Warp keeps up to as 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import jax
 import jax.numpy as jnp
 import msgspec
@@ -19,6 +17,7 @@ import numpy as np
 from ig2mj.calibration.acting import ACTION_STEPS, Acting, act_at_random, robot_of, start_acting
 from ig2mj.calibration.pushing import Pusher, push, start_pushing
 from ig2mj.calibration.reach import Reach
+from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.engine.health import CAPACITY, SETTING
 from ig2mj.engine.mjx.contacts import warp_contacts
 from ig2mj.engine.native.engine import NativeEngine
@@ -52,8 +51,6 @@ ROUND = 60
 BINS = 1 << 14
 """Counts of constraint rows and of contacts are kept up to this; more is counted as this much."""
 
-Progress = Callable[[int, int], None]
-
 
 @entry_point
 def calibrate(
@@ -65,7 +62,7 @@ def calibrate(
     rounds: int = 6,
     seed: int = 0,
     safety: float = 0.0,
-    progress: Progress = lambda done, total: None,
+    progress: ProgressCallback = no_progress,
 ) -> EngineProfile:
     """Measures a scene.
 
@@ -96,11 +93,11 @@ def calibrate(
         min(worlds, WORLDS["native"]) if first else worlds,
         native_rounds,
         seed,
-        lambda done, _: progress(done, native_rounds + (rounds if first else 0)),
+        lambda done, _, text="": progress(done, native_rounds + (rounds if first else 0)),
     )
     if first:
         on_warp = _measure_warp(
-            scene, reach, start, measured, worlds, rounds, seed, lambda d, n: progress(d + 1, n + 1)
+            scene, reach, start, measured, worlds, rounds, seed, lambda d, n, text="": progress(d + 1, (n or 0) + 1)
         )
         measured = Measurement(
             tails={**measured.tails, **on_warp.tails},
@@ -153,7 +150,7 @@ class _Disturbance:
 
 
 def _measure_native(
-    scene: Scene, reach: Reach | None, start: Snapshot, worlds: int, rounds: int, seed: int, progress: Progress
+    scene: Scene, reach: Reach | None, start: Snapshot, worlds: int, rounds: int, seed: int, progress: ProgressCallback
 ) -> Measurement:
     engine = NativeEngine(scene, worlds)
     pairs = CandidatePairs(scene.model)
@@ -188,7 +185,7 @@ def _measure_warp(
     worlds: int,
     rounds: int,
     seed: int,
-    progress: Progress,
+    progress: ProgressCallback,
 ) -> Measurement:
     """As the Warp engine sees it; with larger buffers, until they hold everything."""
     profile = profile_of(native, scene.model, FIRST_GUESS)
@@ -221,7 +218,7 @@ def _count_warp(
     worlds: int,
     rounds: int,
     seed: int,
-    progress: Progress,
+    progress: ProgressCallback,
 ) -> tuple[Measurement, int]:
     """One measurement, and the capacity flags that any world raised (its count then leaves objects out)."""
     engine = WarpEngine(scene, worlds, profile=profile.for_worlds(worlds), initial=start)

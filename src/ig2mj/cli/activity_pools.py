@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures, where_of
+from ig2mj.cli.common.jobs import Cluster, Resume, follow, opened, tell_failures, where_of
 
 if TYPE_CHECKING:
     from ig2mj.tasks.bddl.binding import Binding
@@ -68,8 +68,8 @@ def sample(
         raise Ig2mjError(" ".join(line.strip() for line in binding_as_text(None, [], errors)))
     binding, loaded = first_that_works(bound, seed, scene)
     request = {"command": "activity sample", "activity": name, "scene": loaded.digest, "rows": count, "seed": seed}
-    with opened(file, request, where) as journal, follow(f"sampling in {loaded.name}", where) as report:
-        done = sample_start(binding, loaded, count, seed, where=where, journal=journal, report=report)
+    with opened(file, request, where) as journal, follow(f"sampling in {loaded.name}") as report:
+        done = sample_start(binding, loaded, count, seed, where=where, journal=journal, progress=report)
         if done.sampled.pool is not None:
             note = {"activity": name, "behavior1k": behavior1k, "seed": seed, "rows": list(done.sampled.rows)}
             save_pool(done.sampled.pool, file, loaded, note)

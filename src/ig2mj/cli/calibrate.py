@@ -58,7 +58,7 @@ def run(
                 rounds=rounds,
                 seed=seed,
                 safety=safety,
-                progress=lambda done, total, report=report: report("", done, total),
+                progress=report,
             )
         folder = loaded.folder if out is None else out / loaded.folder.name
         folder.mkdir(parents=True, exist_ok=True)

@@ -1,4 +1,4 @@
-"""`ig2mj convert dataset`: all scenes and all objects of a dataset, each a piece of work of its own."""
+"""`ig2mj convert dataset`: all scenes and all objects of a dataset, each a job of work of its own."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from typing import Annotated, Any
 import tyro
 
 from ig2mj.cli.common.conversion import DEFAULTS, Common, Flag, options_of
-from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures, where_of
+from ig2mj.cli.common.jobs import Cluster, Resume, follow, opened, tell_failures, where_of
 from ig2mj.files.unfinished import unfinished
 
 MARK = "manifest.json"
@@ -49,8 +49,8 @@ def convert_dataset(
       cluster: run on a Ray cluster: its address, or auto.
       resume: continue an interrupted run.
     """
-    from ig2mj.cluster.pieces import run
-    from ig2mj.cluster.work import Piece, Work
+    from ig2mj.cluster.job_runner import map_jobs
+    from ig2mj.cluster.jobs import Job, JobSet
     from ig2mj.errors import InputError
 
     root = dataset.resolve()
@@ -65,10 +65,10 @@ def convert_dataset(
     out.mkdir(parents=True, exist_ok=True)
     chosen = {"skip_missing": skip_missing, "fixed_furniture": fixed_furniture}
     settings = {**dataclasses.asdict(common), "jobs": 1, "json": False}
-    pieces = [Piece(name, {"root": str(root), "name": name, "common": settings, "chosen": chosen}) for name in names]
+    jobs = [Job(name, {"root": str(root), "name": name, "common": settings, "chosen": chosen}) for name in names]
     check = ("ig2mj.cli.convert_dataset:digest_of", {"root": str(root)})
     title = f"converting {root.name}"
-    work = Work("ig2mj.cli.convert_dataset:convert_piece", title, pieces, check=check)
+    work = JobSet("ig2mj.cli.convert_dataset:convert_job", title, jobs, check=check)
     request = {"command": "convert dataset", "dataset": str(root), "names": names, "options": settings | chosen}
 
     def deliver(name: str, packed: bytes) -> None:
@@ -77,8 +77,8 @@ def convert_dataset(
     def there(name: str) -> bool:
         return (out / name / MARK).is_file()
 
-    with opened(out, request, where, deliver, there=there) as journal, follow(title, where) as report:
-        _, failed = run(work, where, journal, report)
+    with opened(out, request, where, deliver, there=there) as journal, follow(title) as report:
+        _, failed = map_jobs(work, where, journal, report)
         if not failed:
             journal.finish()
     done = len(names) - len(failed)
@@ -120,7 +120,7 @@ def digest_of(root: str) -> str:
     return hashlib.blake2b(listing.encode(), digest_size=12).hexdigest()
 
 
-def convert_piece(root: str, name: str, common: Mapping[str, Any], chosen: Mapping[str, Any]) -> bytes:
+def convert_job(root: str, name: str, common: Mapping[str, Any], chosen: Mapping[str, Any]) -> bytes:
     """Converts one scene or object; the folder as a tar archive, the same bytes every time. Raises InputError."""
     from ig2mj_converters.conversion import convert_object, convert_scene
 

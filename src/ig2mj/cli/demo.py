@@ -13,8 +13,10 @@ import tyro
 if TYPE_CHECKING:
     from rich.console import Console
 
-Step = Callable[[str], Callable[[str, int, int | None], None]]
-"""Opens a line of progress with a title; what it returns moves it: text, done, total."""
+    from ig2mj.callbacks import ProgressCallback
+
+Step = Callable[[str], "ProgressCallback"]
+"""Opens a progress bar with a title."""
 
 
 def run(
@@ -64,9 +66,7 @@ def _convert(console: Console, step: Step, name: str, dataset: pathlib.Path, sce
     from ig2mj.viewer.offscreen import FreeView, render
 
     report = step("building the source")
-    counts = build_dataset(
-        dataset, only=small_home.categories(), jobs=jobs, progress=lambda done, total: report("", done, total)
-    )
+    counts = build_dataset(dataset, only=small_home.categories(), jobs=jobs, progress=report)
     small_home.build(dataset)
     console.print(f"[bold]source[/]     {dataset}: {sum(counts.values())} models, scene '{name}'")
 
@@ -92,9 +92,9 @@ def _look(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
     seconds = time.perf_counter() - began
     console.print(f"[bold]ran[/]        {world.time:.1f} s of physics in {seconds:.1f} s, loading included; "
                   f"nothing moved more than {moved * 1000:.1f} mm")  # fmt: skip
-    step("asking the predicates")("what stands where (the first time compiles)", 0, None)
+    step("asking the predicates")(0, None, "what stands where (the first time compiles)")
     places = first_home.what_stands_where(world)
-    step("taking pictures")("", 0, None)
+    step("taking pictures")(0, None, "")
     pictures = first_home.take_pictures(world, folder)
     rows = [(place.object, place.relation, place.support, place.room) for place in places]
     console.print(make_table("what stands where", ("object", "is", "what", "room"), rows))
@@ -113,7 +113,7 @@ def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
     from ig2mj.viewer.offscreen import default_backend
 
     report = step("cooking")
-    report("compiling the states", 0, None)
+    report(0, None, "compiling the states")
     world, kitchen = enter_kitchen(scene)
     folder.mkdir(parents=True, exist_ok=True)
     cameras = KitchenCameras(world, kitchen)
@@ -125,7 +125,7 @@ def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
         if film:
             film.see(log)
         sheet.see(f"{log.times[-1]:.1f} s", changed if log.steps else None)
-        report(f"{log.times[-1]:.0f} s" + (f", {changed[-1]}" if changed else ""), log.steps, None)
+        report(log.steps, None, f"{log.times[-1]:.0f} s" + (f", {changed[-1]}" if changed else ""))
 
     began = time.perf_counter()
     try:
@@ -163,7 +163,7 @@ def _watch_expert(console: Console, step: Step, file: pathlib.Path) -> int:
     from ig2mj.viewer.offscreen import default_backend
 
     report = step("a robot cooks")
-    report("sampling where the steak lies", 0, None)
+    report(0, None, "sampling where the steak lies")
     env = make("CookingMeat", robot="humanoid", engine="native", split="held_out", pool_size=1)
     filming = default_backend() != "warp"  # its pictures take seconds
     film = EpisodeFilm(file, env) if filming else None
@@ -172,7 +172,7 @@ def _watch_expert(console: Console, step: Step, file: pathlib.Path) -> int:
         if film is not None:
             film.see(state)
         seconds = int(state.info["steps"][0]) * env.period
-        report(f"{seconds:.1f} s", int(state.info["steps"][0]), None)
+        report(int(state.info["steps"][0]), None, f"{seconds:.1f} s")
 
     try:
         played = play(env, expert_of(env), 1, in_order=True, watch=watch)

@@ -7,9 +7,9 @@ from typing import Annotated
 
 import tyro
 
+from ig2mj.cli.common.jobs import Cluster, Resume, follow, opened, tell_failures, where_of
 from ig2mj.cli.demos_folder import metrics
 from ig2mj.cli.demos_replay import export, replay
-from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures, where_of
 
 
 def collect(
@@ -51,14 +51,14 @@ def collect(
       resume: continue an interrupted collection.
     """
     from ig2mj.cli.common.files import check_output
-    from ig2mj.cluster.pieces import run
-    from ig2mj.cluster.work import Work
+    from ig2mj.cluster.job_runner import map_jobs
+    from ig2mj.cluster.jobs import JobSet
     from ig2mj.envs.experts import expert_of
-    from ig2mj.envs.pieces import shared_pool
     from ig2mj.envs.registry import VECTORS, make
+    from ig2mj.envs.shared_starts import shared_pool
     from ig2mj.errors import Ig2mjError, UnknownNameError
     from ig2mj.install_hint import require_module
-    from ig2mj.learn.demo_pieces import collection_pieces, join_demos
+    from ig2mj.learn.demo_jobs import collection_jobs, join_demos
     from ig2mj.learn.perception import MODES
 
     if obs not in MODES:
@@ -90,22 +90,22 @@ def collect(
     first.close()
     title = f"demonstrations of {env}"
     starts = {"task": env, "split": split, "count": pool_size or None}
-    work = Work(
-        "ig2mj.learn.demo_pieces:collect_piece",
+    work = JobSet(
+        "ig2mj.learn.demo_jobs:collect_job",
         title,
-        collection_pieces(settings, episodes, seed),
+        collection_jobs(settings, episodes, seed),
         shared_pool(**starts) if cluster is not None else {},
-        ("ig2mj.envs.pieces:start_states", starts),
+        ("ig2mj.envs.shared_starts:start_states", starts),
         gpu=engine != "native",
     )
     request = {"command": "demos collect", "episodes": episodes, "seed": seed, **settings}
-    with opened(out, request, where) as journal, follow(title, where) as report:
-        store, failed = run(work, where, journal, report)
-        parts = (store.get(piece.name) for piece in work.pieces if piece.name not in failed)
-        kept, lost = join_demos(parts, out) if len(failed) < len(work.pieces) else (0, 0)
+    with opened(out, request, where) as journal, follow(title) as report:
+        store, failed = map_jobs(work, where, journal, report)
+        parts = (store.get(job.name) for job in work.jobs if job.name not in failed)
+        kept, lost = join_demos(parts, out) if len(failed) < len(work.jobs) else (0, 0)
         if not failed:
             journal.finish()
-    tell_failures(failed, len(work.pieces))
+    tell_failures(failed, len(work.jobs))
     if kept:
         print(f"{out}: {kept} episodes; {lost} more failed and are left out")
     return 1 if failed else 0

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
-from ig2mj.cli.pieces import Cluster, Resume, where_of
+from ig2mj.cli.common.jobs import Cluster, Resume, where_of
 
 if TYPE_CHECKING:
     from ig2mj.demos.reader import Run
@@ -39,14 +39,14 @@ def replay(
       out: HDF5 file of the observations; default: FILE with the ending .sensors.h5.
       threads: threads on which the native engine steps worlds; 0: one per processor.
       jobs: number of processes; each takes one recording at a time.
-      cluster: run on a Ray cluster, one piece per run: its address, or auto.
+      cluster: run on a Ray cluster, one job per run: its address, or auto.
       resume: continue an interrupted replay.
     """
     import sys
 
     from ig2mj.cli.common.files import check_output, check_video
     from ig2mj.cli.demos_folder import files_of, of_files
-    from ig2mj.cli.demos_pieces import replay_in_pieces
+    from ig2mj.cli.demos_jobs import replay_by_jobs
     from ig2mj.demos.replay import MODES
     from ig2mj.errors import Ig2mjError, UnknownNameError
 
@@ -66,7 +66,7 @@ def replay(
         if video is not None:
             raise Ig2mjError("--video is made on this machine: leave --cluster and --resume out")
         where = where_of(jobs, cluster, resume)
-        return max(replay_in_pieces(one, by, check, names, out, threads, where) for one in files)
+        return max(replay_by_jobs(one, by, check, names, out, threads, where) for one in files)
     status = 0
     for one, done in of_files(_replayed, files, jobs, by, check, video, names, out, threads):
         if isinstance(done, Ig2mjError):
@@ -94,9 +94,9 @@ def _replayed(
     out: pathlib.Path | None,
     threads: int,
 ) -> Replayed:
-    from ig2mj.demos.pieces import Observing
     from ig2mj.demos.reader import Recording
     from ig2mj.demos.replay import Replayer
+    from ig2mj.demos.replay_jobs import Observing
     from ig2mj.envs.registry import VECTORS
 
     options: dict[str, Any] = {"threads": threads} if threads else {}

@@ -8,7 +8,7 @@ from typing import Annotated
 import tyro
 
 from ig2mj.cli.common.deprecated import renamed_options
-from ig2mj.cli.pieces import Cluster, Resume, follow, opened, tell_failures, where_of
+from ig2mj.cli.common.jobs import Cluster, Resume, follow, opened, tell_failures, where_of
 
 WORLDS = {"native": 8}
 """So many worlds unless another number is asked for; on the others as many as episodes, up to `PURE_WORLDS`."""
@@ -59,11 +59,11 @@ def run(
     import jax
 
     from ig2mj.cli.common.files import check_output
-    from ig2mj.cluster.pieces import run
-    from ig2mj.cluster.work import Work
-    from ig2mj.envs.pieces import shared_pool, shipped_states
+    from ig2mj.cluster.job_runner import map_jobs
+    from ig2mj.cluster.jobs import JobSet
+    from ig2mj.envs.shared_starts import shared_pool, shipped_states
     from ig2mj.errors import Ig2mjError
-    from ig2mj.learn.evaluate import evaluation_pieces, summary
+    from ig2mj.learn.evaluate import evaluation_jobs, summary
     from ig2mj.learn.policies import Policy
     from ig2mj.learn.shipped import find_policy
     from ig2mj.tasks.pools import COUNT
@@ -73,7 +73,7 @@ def run(
             f"--episodes {episodes}, --jobs {jobs}, --worlds {worlds}: at least one episode, and none below 0"
         )
     if resume and out is None:
-        raise Ig2mjError("--resume needs --out, the file beside which the finished pieces are")
+        raise Ig2mjError("--resume needs --out, the file beside which the finished jobs are")
     if out is not None:
         check_output(out)
     file = find_policy(policy)
@@ -102,22 +102,22 @@ def run(
     where, title = where_of(jobs, cluster, resume), f"evaluating {policy}"
     starts = (depends["task"], split, pool_size or None)
     shared = {"policy": file.read_bytes(), **(shared_pool(*starts) if cluster is not None or jobs != 1 else {})}
-    work = Work(
-        "ig2mj.learn.evaluate:evaluate_piece",
+    work = JobSet(
+        "ig2mj.learn.evaluate:evaluate_job",
         title,
-        evaluation_pieces(settings, episodes),
+        evaluation_jobs(settings, episodes),
         shared,
-        ("ig2mj.envs.pieces:start_states", dict(zip(("task", "split", "count"), starts, strict=True))),
+        ("ig2mj.envs.shared_starts:start_states", dict(zip(("task", "split", "count"), starts, strict=True))),
         gpu=engine != "native" and jax.default_backend() == "gpu",
     )
     began = time.monotonic()
     with contextlib.ExitStack() as stack:
         request = {"command": "evaluate", "episodes": episodes, "weights": loaded.weights_digest, **settings}
         journal = stack.enter_context(opened(out, request, where)) if out is not None else None
-        store, failed = run(work, where, journal, stack.enter_context(follow(title, where)))
-        done = [form.loads(store.get(piece.name)) for piece in work.pieces if piece.name not in failed]
+        store, failed = map_jobs(work, where, journal, stack.enter_context(follow(title)))
+        done = [form.loads(store.get(job.name)) for job in work.jobs if job.name not in failed]
         seconds = time.monotonic() - began
-        tell_failures(failed, len(work.pieces))
+        tell_failures(failed, len(work.jobs))
         if not done:
             return 1
         found = summary(done)
@@ -140,8 +140,8 @@ def run(
             out.write_text(form.dumps(result) + "\n", encoding="utf-8")  # the same bytes wherever it was done
         if journal is not None and not failed:
             journal.finish()
-    if not resume:  # pieces of an earlier call took time that is not in `seconds`
-        start = max(d["start_seconds"] for d in done)  # making and compiling; next to nothing in pieces that follow
+    if not resume:  # jobs of an earlier call took time that is not in `seconds`
+        start = max(d["start_seconds"] for d in done)  # making and compiling; next to nothing in jobs that follow
         result["start_seconds"] = round(start, 1)
         result["steps_per_second"] = round(sum(d["steps"] for d in done) / max(seconds - start, 1e-9), 1)
     if json:

@@ -11,6 +11,8 @@ import tyro
 if TYPE_CHECKING:
     from ig2mj_homes.objects.entry import Entry
 
+    from ig2mj.callbacks import ProgressCallback
+
 Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
 
 
@@ -50,7 +52,7 @@ def build(
             seed=seed,
             only=only or None,
             jobs=jobs,
-            progress=lambda done, total: report("", done, total),
+            progress=report,
         )
         homes: dict[str, int] = {}
         if home or not only:
@@ -94,7 +96,7 @@ def convert(
     with progress_bar() as bar:
         whole = add_bar(bar, "homes")
         for number, name in enumerate(names):
-            whole(name, number, len(names))
+            whole(number, len(names), name)
             part = add_bar(bar, name)
             options = ConvertOptions(jobs=jobs, assets="..", cache=not no_cache, progress=part, max_hulls=MAX_HULLS)
             cached += convert_scene(dataset, name, out / name, options=options).cached
@@ -114,7 +116,7 @@ def _convert_objects(
     dataset: pathlib.Path,
     out: pathlib.Path,
     cache: bool,
-    progress: Callable[[str, int, int | None], None],
+    progress: ProgressCallback,
     failed: list[str],
 ) -> int:
     """Converts the object library; adds lines of failed checks to `failed`. How many models."""
@@ -125,7 +127,7 @@ def _convert_objects(
 
     models = library_models(dataset)
     for number, (category, model, urdf) in enumerate(models):
-        progress(category, number, len(models))
+        progress(number, len(models), category)
         folder = out / FOLDER / category / model
         options = ConvertOptions(assets=ASSETS, cache=cache, max_hulls=MAX_HULLS)
         convert_object(urdf, category, folder, model=model, fixed=is_fixed(category), options=options)

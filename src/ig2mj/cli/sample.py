@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
-from ig2mj.cli.pieces import Cluster, Resume, where_of
+from ig2mj.cli.common.jobs import Cluster, Resume, where_of
 
 if TYPE_CHECKING:
-    from ig2mj.cluster.pieces import Where
+    from ig2mj.cluster.job_runner import Where
 
 
 def run(
@@ -69,13 +69,13 @@ def run(
 
 
 def _disturb(loaded, count: int, file: pathlib.Path, seed: int, share: float, where: Where) -> int:
-    from ig2mj.cli.pieces import follow, opened, tell_failures
-    from ig2mj.sampling.settled_pieces import sample_settled
+    from ig2mj.cli.common.jobs import follow, opened, tell_failures
+    from ig2mj.sampling.settled_jobs import sample_settled
     from ig2mj.worlds.pool import save_pool
 
     request = {"command": "sample --disturb", "scene": loaded.digest, "rows": count, "seed": seed, "share": share}
-    with opened(file, request, where) as journal, follow(f"settling {loaded.name}", where) as report:
-        pool, failed = sample_settled(loaded, count, seed, share, where=where, journal=journal, report=report)
+    with opened(file, request, where) as journal, follow(f"settling {loaded.name}") as report:
+        pool, failed = sample_settled(loaded, count, seed, share, where=where, journal=journal, progress=report)
         if pool is not None:
             save_pool(pool, file, loaded, {"seed": seed, "share": share})
             journal.finish()
@@ -90,14 +90,14 @@ def _sample(loaded, conditions, count: int, file: pathlib.Path, seed: int, where
     import json
     import sys
 
+    from ig2mj.cli.common.jobs import follow, opened, tell_failures
     from ig2mj.cli.common.printing import make_table, stdout_console
-    from ig2mj.cli.pieces import follow, opened, tell_failures
     from ig2mj.sampling.many import sample
     from ig2mj.worlds.pool import save_pool
 
     request = {"command": "sample", "scene": loaded.digest, "conditions": list(conditions), "rows": count, "seed": seed}
-    with opened(file, request, where) as journal, follow(f"sampling in {loaded.name}", where) as report:
-        done = sample(loaded, conditions, count, seed, where=where, journal=journal, report=report)
+    with opened(file, request, where) as journal, follow(f"sampling in {loaded.name}") as report:
+        done = sample(loaded, conditions, count, seed, where=where, journal=journal, progress=report)
         if done.pool is not None:
             save_pool(done.pool, file, loaded, {"seed": seed, "conditions": list(conditions), "rows": list(done.rows)})
         if not done.failed:

@@ -80,7 +80,7 @@ def _keep(wanted: list[tuple[Task, str]], count: int, jobs: int, force: bool, ou
         def make(task: Task, split: str) -> tuple[str, bool]:
             states, rows = start_states(task, split), count or COUNT[split]
             report = add_bar(bar, f"start states of {task.name} ({split})")
-            options = {"progress": lambda made, wanted: report("", made, wanted), "workers": workers}
+            options = {"progress": report, "workers": workers}
             about = f"{rows} start states of {task.name} ({split})"
             ships = None if states.shipped is None else load_pool(states.shipped, states.scene)
             if out is None:

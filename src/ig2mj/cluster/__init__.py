@@ -1,4 +1,4 @@
-"""Work on several machines: processes that train together, and pieces of work that any of them can do."""
+"""Work on several processes and machines: teams of processes that train together, and independent jobs."""
 
 from ig2mj.process.public_names import offer_modules
 

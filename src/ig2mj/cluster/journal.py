@@ -1,10 +1,10 @@
-"""`Journal`: finished pieces of a run on disk, so that a run that was broken off can go on.
+"""`Journal`: the finished jobs of a run on disk, so that an interrupted run can be resumed.
 
-Beside the output `FILE` lies a folder `FILE.pieces`, or in an output folder `.pieces`, as long as the run is not
-complete: what was asked for (`request.json`), a line for each finished piece (`done.jsonl`), its bytes, and a lock: two
-runs with one output cannot be. When all is done, the folder goes.
+Until a run is complete there is a folder `FILE.jobs` next to its output `FILE`, or `.jobs` inside an output folder. It
+holds the request (`request.json`), a line per finished job (`done.jsonl`), the jobs' bytes, and a lock that refuses a
+second run with the same output. The folder is removed when the run is complete.
 
-Nothing in it is pickled; a piece counts as finished only if its bytes have the hash that its line says.
+Nothing in it is pickled. A job counts as finished only if its bytes have the hash of its line.
 """
 
 from __future__ import annotations
@@ -24,36 +24,36 @@ from ig2mj.errors import InputError
 from ig2mj.files.content import read_bytes, read_json
 
 DONE = "done.jsonl"
-"""File of a journal with a line for each finished piece."""
+"""File with one line per finished job."""
 
 _HASH = re.compile(r"[0-9a-f]{64}")
 _OTHER = re.compile(r"[/\0]")
 
 Deliver = Callable[[str, bytes], None]
-"""Puts the bytes of a finished piece, by its name, where they belong."""
+"""Writes the bytes of a finished job, by its name, to their destination."""
 
 
 class Memory:
-    """Results of a run that leaves nothing behind."""
+    """Results in memory."""
 
     def __init__(self) -> None:
         self._results: dict[str, bytes] = {}
 
     def names(self) -> Collection[str]:
-        """Of the pieces that are finished."""
+        """Names of the finished jobs."""
         return self._results.keys()
 
     def put(self, name: str, result: bytes) -> None:
-        """A piece is finished."""
+        """Adds a finished job."""
         self._results[name] = result
 
     def get(self, name: str) -> bytes:
-        """What a finished piece gave."""
+        """The bytes of a finished job."""
         return self._results[name]
 
 
 class Journal:
-    """See the module's text; a context manager, which holds the lock."""
+    """See the module. A context manager that holds the lock."""
 
     def __init__(
         self,
@@ -65,20 +65,24 @@ class Journal:
     ):
         """
         Args:
-          out: the output: a file, or a folder, which must be there.
-          request: what is asked for, for JSON: only a run of the same request can be resumed.
-          resume: go on with the run that was broken off; without one, begin.
-          deliver: where results go instead of into the journal. there: whether one that was delivered still is.
+          out: the output, a file or an existing folder.
+          request: the settings of the run, for JSON. Only a run with the same request can be resumed.
+          resume: continue an interrupted run, if there is one.
+          deliver: receives the results in place of the journal. there: whether a delivered result still exists.
 
         Raises:
-          ClusterError: another run is at it. InputError: an unfinished run is there and not to be resumed, or is of
-            another request.
+          ClusterError: another run writes to this output. InputError: there is an interrupted run that is not to be
+            resumed, has another request, or is one of ig2mj 0.1.0.
         """
         self.out = pathlib.Path(out)
         inside = self.out.is_dir()
-        self.folder = self.out / ".pieces" if inside else self.out.with_name(self.out.name + ".pieces")
+        self.folder = self.out / ".jobs" if inside else self.out.with_name(self.out.name + ".jobs")
         self._request = json.loads(json.dumps(dict(request)))
         self._deliver, self._there, self._done = deliver, there, {}
+        old = self.folder.with_name(self.folder.name.removesuffix("jobs") + "pieces")
+        if (old / DONE).exists():
+            fix = f"finish it with ig2mj 0.1.0, or remove {old}"
+            raise InputError(self.out, "an interrupted run of ig2mj 0.1.0 is there", fix=fix)
         self.folder.mkdir(exist_ok=True)
         self._lock = hold(self.folder / "lock", self.out)
         try:
@@ -89,7 +93,7 @@ class Journal:
 
     def _begin(self, resume: bool) -> None:
         file = self.folder / "request.json"
-        if (self.folder / DONE).exists():  # else there is nothing to go on with
+        if (self.folder / DONE).exists():  # else nothing was finished
             if not resume:
                 fix = f"--resume continues it; to start over, remove {self.folder}"
                 raise InputError(self.out, "an earlier run of this was interrupted", fix=fix)
@@ -107,13 +111,13 @@ class Journal:
         for name in {**known, **wanted}:
             if known.get(name) != wanted.get(name):
                 was, now = (json.dumps(r.get(name))[:80] for r in (known, wanted))
-                fix = f"to begin anew, remove {self.folder}"
+                fix = f"to start over, remove {self.folder}"
                 problem = f"the interrupted run had {name} = {was}, and here it is {now}"
                 raise InputError(self.out, problem, fix=fix)
 
     def _read(self) -> None:
         for line in self._lines():
-            with contextlib.suppress(ValueError, KeyError, TypeError, RecursionError):  # torn by a full disk or a kill
+            with contextlib.suppress(ValueError, KeyError, TypeError, RecursionError):  # cut off
                 entry = json.loads(line)
                 if isinstance(entry["name"], str) and _HASH.fullmatch(entry["sha256"]):
                     self._done[entry["name"]] = entry["sha256"]
@@ -126,7 +130,7 @@ class Journal:
         return read_bytes(file, fix=f"remove {self.folder}").split(b"\n") if file.exists() else []
 
     def _mend(self) -> None:
-        """Ends a last line that was torn, so that the next one is not lost with it."""
+        """Ends an incomplete last line, so that the next one is not lost with it."""
         lines = self._lines()
         if lines and lines[-1]:
             with (self.folder / DONE).open("ab") as end:
@@ -135,19 +139,19 @@ class Journal:
     def _whole(self, name: str, known: str) -> bool:
         try:
             return hashlib.sha256(self._file(name).read_bytes()).hexdigest() == known
-        except (OSError, ValueError):  # of a name that no file can have
+        except (OSError, ValueError):  # a name that no file can have
             return False
 
     def _file(self, name: str) -> pathlib.Path:
-        """Of a finished piece; a name from a damaged line stays in the folder as well."""
+        """Of a finished job; a name from a damaged line cannot leave the folder."""
         return self.folder / f"{_OTHER.sub('+', name)[:200]}.bin"
 
     def names(self) -> Collection[str]:
-        """Of the pieces that are finished."""
+        """Names of the finished jobs."""
         return self._done.keys()
 
     def put(self, name: str, result: bytes) -> None:
-        """A piece is finished. Raises OSError: the disk of this machine is full."""
+        """Adds a finished job. Raises OSError: the disk is full."""
         if self._deliver is not None:
             self._deliver(name, result)
         else:
@@ -159,11 +163,11 @@ class Journal:
             lines.write(json.dumps({"name": name, "sha256": self._done[name], "bytes": len(result)}) + "\n")
 
     def get(self, name: str) -> bytes:
-        """What a finished piece gave, where nothing else was done with it."""
+        """The bytes of a finished job that was not delivered elsewhere."""
         return self._file(name).read_bytes()
 
     def finish(self) -> None:
-        """The run is complete: the folder goes."""
+        """Removes the folder of a complete run."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
     def _unlock(self) -> None:
@@ -174,12 +178,12 @@ class Journal:
 
     def __exit__(self, *error: object) -> None:
         if not self._done:
-            self.finish()  # nothing to go on with
+            self.finish()  # nothing to resume
         self._unlock()
 
 
 def _flat(request: Mapping[str, Any]) -> dict[str, Any]:
-    """The same with what is inside of tables by its own name, as "versions.numpy"."""
+    """Nested tables flattened to names such as "versions.numpy"."""
     found: dict[str, Any] = {}
     for name, value in request.items():
         found |= {f"{name}.{k}": v for k, v in value.items()} if isinstance(value, dict) else {name: value}

@@ -1,7 +1,7 @@
-"""Pieces of work in this process, or on several processes of this machine.
+"""Runs jobs in this process or on several processes of this machine.
 
-Each process does one piece at a time and keeps what it has loaded for the next. One that dies (out of memory, a crash
-in a library) costs the piece that it was doing, and another takes its place.
+Each process runs one job at a time and keeps its modules and caches for the next. If a process dies (out of memory, a
+crash in a library), its job fails and another process takes its place.
 """
 
 from __future__ import annotations
@@ -17,82 +17,82 @@ import signal
 import threading
 from collections.abc import Mapping
 
-from ig2mj.cluster.work import Answer, Piece, Work, do
+from ig2mj.cluster.jobs import Job, JobResult, JobSet, run_job
 
 
 class ThisProcess:
-    """One piece after the other, here."""
+    """Runs one job after the other in this process."""
 
     width = 1
 
-    def __init__(self, work: Work):
-        """Does nothing yet."""
-        self._work, self._handed = work, collections.deque[Piece]()
+    def __init__(self, job_set: JobSet):
+        """Runs nothing yet."""
+        self._job_set, self._handed = job_set, collections.deque[Job]()
 
     @property
     def running(self) -> int:
-        """Pieces that were handed out and have no answer."""
+        """Number of submitted jobs without a result."""
         return len(self._handed)
 
-    def submit(self, piece: Piece) -> None:
-        """Hands a piece out."""
-        self._handed.append(piece)
+    def submit(self, job: Job) -> None:
+        """Queues a job."""
+        self._handed.append(job)
 
-    def wait(self) -> list[Answer]:
-        """Does one piece."""
-        return [do(self._work.function, self._handed.popleft(), self._work.shared)]
+    def wait(self) -> list[JobResult]:
+        """Runs one job."""
+        return [run_job(self._job_set.function, self._handed.popleft(), self._job_set.shared)]
 
     def close(self, now: bool) -> None:
-        """Nothing is left behind."""
+        """Nothing to stop."""
 
 
 class LocalProcesses:
-    """`width` processes of this machine, each of which can die alone."""
+    """`width` processes of this machine; the death of one does not affect the others."""
 
-    def __init__(self, work: Work, width: int):
-        """Starts no process yet: each starts with its first piece."""
-        self._work, self.width = work, width
+    def __init__(self, job_set: JobSet, width: int):
+        """Starts no process yet; each starts with its first job."""
+        self._job_set, self.width = job_set, width
         self._others = set(multiprocessing.active_children())
         self._free: list[concurrent.futures.ProcessPoolExecutor] = []
-        self._busy: dict[concurrent.futures.Future[Answer], tuple[Piece, concurrent.futures.ProcessPoolExecutor]] = {}
+        self._busy: dict[concurrent.futures.Future[JobResult], tuple[Job, concurrent.futures.ProcessPoolExecutor]] = {}
 
     @property
     def running(self) -> int:
-        """Pieces that were handed out and have no answer."""
+        """Number of submitted jobs without a result."""
         return len(self._busy)
 
-    def submit(self, piece: Piece) -> None:
-        """Hands a piece out to a process that is free, or a new one."""
+    def submit(self, job: Job) -> None:
+        """Sends a job to a free process, or to a new one."""
         process = self._free.pop() if self._free else self._new()
         # A process that starts here inherits this: Ctrl-C would have it print a traceback until `_begin` has run.
         before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
-            self._busy[process.submit(_do_here, self._work.function, piece)] = (piece, process)
+            self._busy[process.submit(_do_here, self._job_set.function, job)] = (job, process)
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def _new(self) -> concurrent.futures.ProcessPoolExecutor:
-        context = multiprocessing.get_context("spawn")  # forking a process that has threads can hang
+        context = multiprocessing.get_context("spawn")  # a forked process that has threads can hang
         return concurrent.futures.ProcessPoolExecutor(
-            1, context, initializer=_begin, initargs=(dict(self._work.shared), self._work.gpu)
+            1, context, initializer=_begin, initargs=(dict(self._job_set.shared), self._job_set.gpu)
         )
 
-    def wait(self) -> list[Answer]:
-        """Waits for the first answers."""
+    def wait(self) -> list[JobResult]:
+        """Waits for at least one result."""
         done, _ = concurrent.futures.wait(self._busy, return_when=concurrent.futures.FIRST_COMPLETED)
         answers = []
         for future in done:
-            piece, process = self._busy.pop(future)
+            job, process = self._busy.pop(future)
             try:
                 answers.append(future.result())
                 self._free.append(process)
             except concurrent.futures.process.BrokenProcessPool:
                 process.shutdown(wait=False)
-                answers.append(Answer(piece.name, error="the process that did it died", again=True))
+                answers.append(JobResult(job.name, error="the process that ran it died", again=True))
         return answers
 
     def close(self, now: bool) -> None:
-        """Ends the processes."""
+        """Stops the processes."""
         for process in [*self._free, *(p for _, p in self._busy.values())]:
             process.shutdown(wait=not now, cancel_futures=True)
         if now:
@@ -101,11 +101,11 @@ class LocalProcesses:
 
 
 _shared: dict[str, bytes] = {}
-"""What all pieces need, in a process that does some."""
+"""`JobSet.shared`, in a worker process."""
 
 
 def _begin(shared: Mapping[str, bytes], gpu: bool) -> None:
-    """Ctrl-C reaches every process of the terminal, and only the parent answers it; a dead parent ends this one."""
+    """Set-up of a worker process. Ctrl-C reaches every process of the terminal; only the parent handles it."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     _shared.update(shared)
@@ -116,12 +116,12 @@ def _begin(shared: Mapping[str, bytes], gpu: bool) -> None:
 
 
 def _end_with_parent() -> None:
-    """Waits for the parent's end, however it comes."""
+    """Exits when the parent process ends for any reason."""
     parent = multiprocessing.parent_process()
     if parent is not None:
         multiprocessing.connection.wait([parent.sentinel])
         os._exit(1)
 
 
-def _do_here(function: str, piece: Piece) -> Answer:
-    return dataclasses.replace(do(function, piece, _shared), cause=None)  # not all errors can be sent
+def _do_here(function: str, job: Job) -> JobResult:
+    return dataclasses.replace(run_job(function, job, _shared), cause=None)  # not all errors can be sent

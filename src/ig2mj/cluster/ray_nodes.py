@@ -1,7 +1,7 @@
-"""Pieces of work on a Ray cluster (`pip install "ig2mj[cluster]"`).
+"""Runs jobs on a Ray cluster (`pip install "ig2mj[cluster]"`).
 
-Before any work one task on every node says which versions it has and whether it sees the same files; a node that
-differs is named. A node that dies while it works costs the pieces that it was doing, which are tried again on another.
+Before the first job, one task per node reports the versions and a digest of the files there; a node that differs is
+named in the error. Jobs of a node that dies are retried on another.
 """
 
 from __future__ import annotations
@@ -15,94 +15,94 @@ import sys
 import urllib.parse
 from typing import Any
 
+from ig2mj.cluster.jobs import Job, JobResult, JobSet, import_function, run_job
 from ig2mj.cluster.versions import difference, versions
-from ig2mj.cluster.work import Answer, Piece, Work, do, found
 from ig2mj.errors import ClusterError
 
 REACH = 10.0
-"""Seconds in which somebody must answer at the address."""
+"""Timeout in seconds for a connection to the address."""
 
 ASK = 180.0
-"""Seconds that a node may take to say what it has: its first import reads a gigabyte from a network's disk."""
+"""Timeout in seconds for a node's report: its first import may read a gigabyte from a network disk."""
 
 AHEAD = 2
-"""Pieces handed out for each processor: the next is there when one is done."""
+"""Jobs in flight per processor, so that a processor never waits for its next job."""
 
 
 class RayNodes:
     """All nodes of a cluster."""
 
-    def __init__(self, work: Work, address: str):
-        """Connects, and asks every node.
+    def __init__(self, job_set: JobSet, address: str):
+        """Connects, and checks every node.
 
         Raises:
-          ClusterError: nobody is there, or a node has other versions or files. ModuleNotFoundError: no Ray here.
+          ClusterError: no cluster at the address, or a node has other versions or files. ModuleNotFoundError: no Ray.
         """
         import ray
 
-        self._ray, self._work = ray, work
+        self._ray, self._job_set = ray, job_set
         self._mine = not ray.is_initialized()
         self._quiet = contextlib.ExitStack()
         if self._mine:
             _connect(ray, address)
-            # Ray prints what happens to nodes on standard output, where a command's result belongs
+            # Ray prints node events on standard output, which is for a command's result
             self._quiet.enter_context(contextlib.redirect_stdout(sys.stderr))
         try:
             nodes = _alive(ray)
-            self._shared = {name: ray.put(content) for name, content in work.shared.items()}
+            self._shared = {name: ray.put(content) for name, content in job_set.shared.items()}
             self._ask(nodes)
-            self._resources: dict[str, Any] = {"num_gpus": 1, "num_cpus": 1} if work.gpu else {"num_cpus": 1}
+            self._resources: dict[str, Any] = {"num_gpus": 1, "num_cpus": 1} if job_set.gpu else {"num_cpus": 1}
             if not self.width:
-                what = "a GPU" if work.gpu else "a processor for work"
+                what = "a GPU" if job_set.gpu else "a processor for work"
                 raise ClusterError(f"no node of the cluster at {address} has {what}")
         except BaseException:
             self.close(now=True)
             raise
         self._task = ray.remote(_task).options(max_retries=0, **self._resources)
-        self._busy: dict[Any, Piece] = {}
+        self._busy: dict[Any, Job] = {}
 
     @property
     def width(self) -> int:
-        """Grows and shrinks with the cluster."""
-        with contextlib.suppress(Exception):  # while a node goes, Ray may have no answer
+        """Follows the size of the cluster."""
+        with contextlib.suppress(Exception):  # Ray may not answer while a node leaves
             there = self._ray.cluster_resources()
-            self._width = AHEAD * int(there.get("GPU" if self._work.gpu else "CPU", 0))
+            self._width = AHEAD * int(there.get("GPU" if self._job_set.gpu else "CPU", 0))
         return self._width
 
     _width = 0
-    _busy: dict[Any, Piece] = {}  # noqa: RUF012  until there is a task
+    _busy: dict[Any, Job] = {}  # noqa: RUF012  until there is a task
 
     @property
     def running(self) -> int:
-        """Pieces that were handed out and have no answer."""
+        """Number of submitted jobs without a result."""
         return len(self._busy)
 
-    def submit(self, piece: Piece) -> None:
-        """Hands a piece out to the cluster, which finds a node."""
+    def submit(self, job: Job) -> None:
+        """Submits a job; Ray chooses the node."""
         keys = list(self._shared)
         ref = self._task.remote(
-            self._work.function, self._work.gpu, piece.name, dict(piece.arguments), keys, *self._shared.values()
+            self._job_set.function, self._job_set.gpu, job.name, dict(job.arguments), keys, *self._shared.values()
         )
-        self._busy[ref] = piece
+        self._busy[ref] = job
 
-    def wait(self) -> list[Answer]:
-        """Waits for the first answers."""
+    def wait(self) -> list[JobResult]:
+        """Waits for at least one result."""
         done, _ = self._ray.wait(list(self._busy), num_returns=1, timeout=None)
         answers = []
         for ref in done:
-            piece = self._busy.pop(ref)
+            job = self._busy.pop(ref)
             try:
                 result, error, kind, again, all_fail = self._ray.get(ref)
-                answers.append(Answer(piece.name, result, error, kind, again, all_fail))
+                answers.append(JobResult(job.name, result, error, kind, again, all_fail))
             except self._ray.exceptions.RayError as e:
-                answers.append(Answer(piece.name, error=_line(e), again=True))
+                answers.append(JobResult(job.name, error=_line(e), again=True))
         return answers
 
     def _ask(self, nodes: list[dict[str, Any]]) -> None:
         """Compares every node with this process. Raises ClusterError."""
         from ray.util.scheduling_strategies import NodeAffinitySchedulingStrategy
 
-        check = self._work.check and (self._work.check[0], dict(self._work.check[1]))
+        check = self._job_set.check and (self._job_set.check[0], dict(self._job_set.check[1]))
         own, files = versions(), digest_seen(check)
         if not nodes:
             raise ClusterError("the cluster has no node that is alive")
@@ -129,7 +129,7 @@ class RayNodes:
                 raise ClusterError(f"{name} has other files than this machine ({check and check[1]})")
 
     def close(self, now: bool) -> None:
-        """Leaves the cluster; `now`: what is being done is given up."""
+        """Leaves the cluster. `now`: abort jobs in flight."""
         if now:
             for ref in self._busy:
                 with contextlib.suppress(Exception):
@@ -142,10 +142,10 @@ class RayNodes:
 def _task(
     function: str, gpu: bool, name: str, arguments: dict[str, Any], keys: list[str], *shared: bytes
 ) -> tuple[bytes, str, str, bool, bool]:
-    """Does a piece; runs on a node."""
+    """Runs a job, on a node."""
     if not gpu:
         _leave_gpus_alone()
-    answer = do(function, Piece(name, arguments), dict(zip(keys, shared, strict=True)))
+    answer = run_job(function, Job(name, arguments), dict(zip(keys, shared, strict=True)))
     return answer.result, answer.error, answer.kind, answer.again, answer.all_fail
 
 
@@ -157,12 +157,12 @@ def _leave_gpus_alone() -> None:
 
 
 def digest_seen(check: tuple[str, dict[str, Any]] | None) -> str:
-    """What a check says here."""
-    return "" if check is None else str(found(check[0])(**check[1]))
+    """Result of `JobSet.check` on this machine; "" without one."""
+    return "" if check is None else str(import_function(check[0])(**check[1]))
 
 
 def _about(check: tuple[str, dict[str, Any]] | None) -> tuple[dict[str, str], str, str]:
-    """Versions, what the check says, and what went wrong with it; runs on a node."""
+    """Versions, result of the check, and its error, on a node."""
     try:
         return versions(), digest_seen(check), ""
     except Exception as e:
@@ -170,15 +170,15 @@ def _about(check: tuple[str, dict[str, Any]] | None) -> tuple[dict[str, str], st
 
 
 def check_address(address: str) -> None:
-    """Whether somebody answers at the address of a cluster; for "auto" at the one that Ray has a record of, if any.
+    """Checks that the address of a cluster accepts connections; for "auto", the address that Ray has recorded, if any.
 
     Raises:
-      ClusterError: nobody does. ModuleNotFoundError: there is no Ray here.
+      ClusterError: it does not. ModuleNotFoundError: no Ray.
     """
     import ray  # noqa: F401
 
     wanted, what = address, "nobody answers there"
-    if address == "auto":  # Ray would wait for minutes for a cluster that has ended without taking back its record
+    if address == "auto":  # Ray waits for minutes for a cluster that ended without removing its record
         wanted = _recorded()
         if not wanted:
             return
@@ -197,7 +197,7 @@ def check_address(address: str) -> None:
 
 
 def _recorded() -> str:
-    """The address that Ray would take for "auto": of the environment, or of the last `ray start`; "" without one."""
+    """The address that "auto" means to Ray: that of the environment, or of the last `ray start`; "" without one."""
     folder = pathlib.Path(os.environ.get("RAY_TMPDIR") or "/tmp")
     try:
         return os.environ.get("RAY_ADDRESS") or (folder / "ray" / "ray_current_cluster").read_text().strip()
@@ -222,6 +222,6 @@ def _alive(ray: Any) -> list[dict[str, Any]]:
 
 
 def _line(error: BaseException) -> str:
-    """The first words of one of Ray's errors, which go over many lines."""
+    """The start of one of Ray's errors, on one line."""
     text = " ".join(str(error).split()) or type(error).__name__
     return text if len(text) < 200 else f"{text[:200]} ..."

@@ -1,4 +1,4 @@
-"""What must be the same wherever parts of one piece of work are done."""
+"""Versions that must be equal wherever jobs of one run are executed."""
 
 from __future__ import annotations
 

@@ -14,11 +14,11 @@ from collections.abc import Callable, Mapping
 import jax
 import numpy as np
 
+from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.engine.view import Array
 from ig2mj.envs.actor import STEPS, Actor, Tally, ending, lifted_by_all, resting
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.process import entry_point
-from ig2mj.process.progress import Report
 
 Act = Callable[[EnvState], Array]
 """Actions [W, n] from the state of all worlds."""
@@ -58,7 +58,7 @@ def play(
     in_order: bool = False,
     watch: Watch | None = None,
     first: int = 0,
-    report: Report = lambda share, words: None,
+    report: ProgressCallback = no_progress,
 ) -> Played:
     """Plays episodes.
 
@@ -67,14 +67,16 @@ def play(
       in_order: begin with the rows of the environment's pool, each once; again from the first where there are fewer.
         Where an episode is over actions are zero until all are.
       first: of these rows.
-      report: takes after every step the share that is done, and how far it is in words.
+      report: called after every step with a share of the episodes (0 to 1) and 1.
     """
     if in_order:
         return _in_order(env, act, episodes, seed, watch, first, report)
     return _drawn(env, act, episodes, seed, watch, report)
 
 
-def _drawn(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None, report: Report) -> Played:
+def _drawn(
+    env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None, report: ProgressCallback
+) -> Played:
     state = env.reset(seed)
     pace = Pace(watch)
     pace.look(state)
@@ -98,13 +100,13 @@ def _drawn(env: Environment, act: Act, episodes: int, seed: int, watch: Watch | 
         running[done] = 0.0
         step = int(np.asarray(state.info["steps"]).max())
         words = f"{len(total)} of {episodes} episodes, step {step} of at most {env.task.horizon}"
-        report(max(len(total) / episodes, min(steps / env.num_worlds / most, 1.0)), words)
+        report(max(len(total) / episodes, min(steps / env.num_worlds / most, 1.0)), 1, words)
     both = lifted if lifts.told else None
     return Played(success, in_hand, both, total, steps, pace.steps_per_second(), env.metrics(state), state)
 
 
 def _in_order(
-    env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None, start: int, report: Report
+    env: Environment, act: Act, episodes: int, seed: int, watch: Watch | None, start: int, report: ProgressCallback
 ) -> Played:
     size, worlds = env.core.starts.pool.size, env.num_worlds
     tallies, pace, state, metrics = list[Tally](), Pace(watch), None, collections.Counter[str]()
@@ -125,7 +127,7 @@ def _in_order(
             step = int(tally.steps)
             share = min((first + min(step / env.task.horizon, 1.0) * worlds) / episodes, 1.0)
             words = f"{over} of {episodes} episodes, step {step} of at most {env.task.horizon}"
-            report(max(share, over / episodes), words)
+            report(max(share, over / episodes), 1, words)
         tallies.append(jax.device_get(tally))
         metrics.update(env.metrics(state))
 

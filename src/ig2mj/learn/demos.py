@@ -24,6 +24,7 @@ import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float
 
+from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.engine.view import Array
 from ig2mj.envs.observations import Space
 from ig2mj.errors import Ig2mjError, InputError
@@ -35,7 +36,6 @@ from ig2mj.learn.collect import FINAL, TrainingEnv
 from ig2mj.learn.perception import Perception, Seen, blank
 from ig2mj.learn.policies import world_of
 from ig2mj.process import entry_point
-from ig2mj.process.progress import Report
 
 FORMAT, FORMAT_VERSION = "ig2mj demonstrations", 1
 
@@ -114,14 +114,14 @@ def collect_demos(
     seed: int = 0,
     noise: float = 0.0,
     disturbed: float = 0.0,
-    progress: Report = lambda share, words: None,
+    progress: ProgressCallback = no_progress,
 ) -> dict[str, int]:
     """Plays the expert until so many of its episodes have succeeded, and writes those.
 
     Args:
       noise: deviation of what is added to its actions. disturbed: share of the steps that begin a disturbance: five
         steps of one random action, from which the expert finds its way back.
-      progress: takes after every step the share that is done, and how far it is in words.
+      progress: called after every step with successful and all episodes.
 
     Returns:
       Numbers of episodes: "kept", and "failed", which are left out.
@@ -157,7 +157,7 @@ def collect_demos(
             left[w] = 0
         step = max(len(run) for run in open_runs)
         words = f"{writer.runs} of {episodes} successful episodes, {failed} failed, step {step} of the present ones"
-        progress(writer.runs / episodes, words)
+        progress(writer.runs, episodes, words)
     return {"kept": writer.runs, "failed": failed}
 
 

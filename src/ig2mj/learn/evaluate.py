@@ -1,6 +1,6 @@
 """How good a policy is: `ig2mj.envs.rollout.play` from every start state in turn, and how sure the rate is.
 
-An evaluation is done in pieces (`ig2mj.cluster.pieces`), each of as many episodes as there are worlds.
+An evaluation is done in jobs (`ig2mj.cluster.job_runner`), each of as many episodes as there are worlds.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from ig2mj.cluster.work import Piece, WholeRunError
+from ig2mj.cluster.jobs import Job, WholeRunError
 from ig2mj.envs.actor import Actor
 from ig2mj.envs.environment import Environment
-from ig2mj.envs.pieces import keep_pool
 from ig2mj.envs.registry import make
 from ig2mj.envs.rollout import play
+from ig2mj.envs.shared_starts import keep_pool
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.policies import Policy, perception_of
 from ig2mj.process import entry_point
@@ -51,7 +51,7 @@ def draws(policy: Policy) -> bool:
 
 
 def summary(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Rates and means over what pieces gave; the success with the limits of its 95 % interval."""
+    """Rates and means over what jobs gave; the success with the limits of its 95 % interval."""
     success, in_hand, total = (
         [x for r in results for x in r[name]] for name in ("success", "success_in_hand", "total")
     )
@@ -78,18 +78,18 @@ def wilson(successes: int, count: int, z: float = 1.96) -> tuple[float, float]:
     return max(middle - half, 0.0), min(middle + half, 1.0)
 
 
-def evaluation_pieces(settings: Mapping[str, Any], episodes: int) -> list[Piece]:
-    """Pieces of an evaluation. `settings`: the arguments of `evaluate_piece` but `first`, `episodes` and `shared`."""
+def evaluation_jobs(settings: Mapping[str, Any], episodes: int) -> list[Job]:
+    """Jobs of an evaluation. `settings`: the arguments of `evaluate_job` but `first`, `episodes` and `shared`."""
     worlds = settings["worlds"]
     starts = range(0, episodes, worlds)
     return [
-        Piece(f"episodes_{first:07d}", {**settings, "first": first, "episodes": min(worlds, episodes - first)})
+        Job(f"episodes_{first:07d}", {**settings, "first": first, "episodes": min(worlds, episodes - first)})
         for first in starts
     ]
 
 
 @entry_point
-def evaluate_piece(
+def evaluate_job(
     file: str,
     task: str,
     robot: str,
@@ -146,10 +146,10 @@ def _player(
     split: str,
     pool_size: int | None,
 ) -> tuple[Environment, Actor]:
-    """What is played, and who acts: the same in all pieces of an evaluation, so that each is compiled once.
+    """What is played, and who acts: the same in all jobs of an evaluation, so that each is compiled once.
 
     Args:
-      content: of the policy's file. The others: of `evaluate_piece`.
+      content: of the policy's file. The others: of `evaluate_job`.
     """
     made: dict[str, Any] = {"observations": observations, "paper_rl": paper_rl, "split": split, "pool_size": pool_size}
     env = make(task, robot, worlds, engine, grasping, **made)

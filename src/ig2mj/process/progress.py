@@ -1,7 +1,7 @@
-"""How far work is that takes long, and how long it may take: a line on stderr, or words next to a bar of a command.
+"""Progress of long work and its remaining time: a line on stderr, or text next to the progress bar of a command.
 
 with progress("playing CookingMeat") as report:
-    report(0.25, "64 of 256 episodes")      # playing CookingMeat: 64 of 256 episodes, about 3 min left (58 s)
+    report(64, 256, "64 of 256 episodes")      # playing CookingMeat: 64 of 256 episodes, about 3 min left (58 s)
 """
 
 from __future__ import annotations
@@ -10,35 +10,34 @@ import contextlib
 import time
 from collections.abc import Callable, Iterator
 
+from ig2mj.callbacks import ProgressCallback
 from ig2mj.process.waiting import WAITING
 
-Report = Callable[[float, str], None]
-"""Takes the share of the work that is done, 0 to 1, and how far it is in words."""
-
 BARS: list[Callable[[str], None]] = []
-"""What shows the words of a command's bar, the innermost last; where there is one no lines are printed."""
+"""Show text next to a command's progress bar, the innermost last. While there is one, no lines are printed."""
 
 SOON = 2.0
-"""Seconds of work before which nothing is predicted."""
+"""Seconds of work before the remaining time is predicted."""
 
 
 class Share:
-    """Work of which a share is done. The time that is left is predicted from the pace since the first report."""
+    """Work in progress. The remaining time is predicted from the pace since the first report."""
 
     def __init__(self, what: str):
         self._what, self._words, self._share = what, "", 0.0
         self._began: tuple[float, float] | None = None
 
-    def __call__(self, share: float, words: str = "") -> None:
-        """See `Report`."""
-        self._words, self._share = words, share
+    def __call__(self, done: float | int, total: float | int | None, text: str = "", /) -> None:
+        """See `ig2mj.callbacks.ProgressCallback`."""
+        share = done / total if total else 0.0
+        self._words, self._share = text, share
         if self._began is None:
             self._began = time.monotonic(), share
         if BARS:
             BARS[-1](self.text())
 
     def text(self) -> str:
-        """What is done, how far it is, and how long it may take."""
+        """What is done, how far it is, and the remaining time."""
         parts = [part for part in (self._words, self._left()) if part]
         return f"{self._what}: {', '.join(parts)}" if parts else self._what
 
@@ -57,8 +56,8 @@ def in_words(seconds: float | int) -> str:
 
 
 @contextlib.contextmanager
-def progress(what: str) -> Iterator[Report]:
-    """Shows how far some work is, from the second second on, until the block ends."""
+def progress(what: str) -> Iterator[ProgressCallback]:
+    """Shows the progress of the block, after its second second."""
     share = Share(what)
     if BARS:
         BARS[-1](share.text())
@@ -70,7 +69,7 @@ def progress(what: str) -> Iterator[Report]:
 
 @contextlib.contextmanager
 def shown_by(bar: Callable[[str], None]) -> Iterator[None]:
-    """While the block runs, this shows the words of `progress`, in place of lines."""
+    """During the block, `bar` shows the text of `progress` in place of lines."""
     BARS.append(bar)
     try:
         yield

@@ -1,7 +1,7 @@
 """`sample`: many initial states of a scene that fulfil conditions, on several processes, as a pool.
 
-Every row has a random stream of its own, which belongs to (seed, row, attempt), and is a piece of work of its own
-(`ig2mj.cluster.pieces`): the rows are the same for any number of processes, and on a cluster. A row that cannot be
+Every row has a random stream of its own, which belongs to (seed, row, attempt), and is a job of its own
+(`ig2mj.cluster.job_runner`): the rows are the same for any number of processes, and on a cluster. A row that cannot be
 sampled within its budget is tried again with another stream, and the reasons are counted.
 """
 
@@ -12,22 +12,23 @@ import dataclasses
 import functools
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import jax
 import numpy as np
 
+from ig2mj.callbacks import ProgressCallback, no_progress
+from ig2mj.cluster.job_runner import Where, map_jobs
+from ig2mj.cluster.jobs import Job, JobSet, WholeRunError
 from ig2mj.cluster.journal import Journal
-from ig2mj.cluster.pieces import Report, Status, Where, run
-from ig2mj.cluster.work import Piece, WholeRunError, Work
 from ig2mj.errors import EngineError
 from ig2mj.predicates.logic import Expression
 from ig2mj.process import entry_point
 from ig2mj.sampling.conditions import Condition, bind, read_conditions
-from ig2mj.sampling.offered import check_of, lent, named, scene_named
 from ig2mj.sampling.placement import Budget, Rejections
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.row import Row, RowSampler
+from ig2mj.sampling.scene_refs import check_of, lent, named, scene_named
 from ig2mj.scene.scene import Scene
 from ig2mj.states.initial import states_of_manifest
 from ig2mj.states.model import StateModel
@@ -42,9 +43,6 @@ ATTEMPTS = 3
 
 SETTLE_SECONDS = 10.0
 """Simulated seconds within which the scene itself must come to rest before anything is sampled in it."""
-
-Progress = Callable[[int, int], None]
-"""Called with the number of rows done and of rows given up."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -80,10 +78,9 @@ def sample(
     first: int = 0,
     jobs: int = 1,
     seconds_per_row: float = math.inf,
-    progress: Progress = lambda done, failed: None,
+    progress: ProgressCallback = no_progress,
     where: Where | None = None,
     journal: Journal | None = None,
-    report: Report = lambda status: None,
 ) -> Sampled:
     """Samples rows.
 
@@ -97,33 +94,29 @@ def sample(
 
     Raises:
       StateError, AbilityError, UnknownNameError, ExpressionError: a condition can never be made true.
-      EngineError: the scene itself does not come to rest. ClusterError: see `ig2mj.cluster.pieces.run`.
+      EngineError: the scene itself does not come to rest. ClusterError: see `ig2mj.cluster.job_runner.map_jobs`.
     """
     began = time.monotonic()
     wanted = read_conditions(conditions)
     bind(wanted, scene.tables, np.random.default_rng(0))  # errors before any work
 
-    def tell(status: Status) -> None:
-        progress(status.done, status.failed)
-        report(status)
-
-    work = row_work(scene, wanted, range(first, first + count), seed, seconds_per_row)
+    work = row_jobs(scene, wanted, range(first, first + count), seed, seconds_per_row)
     try:
         with lent(scene):
-            store, failed = run(work, where or Where(jobs), journal, tell)
+            store, failed = map_jobs(work, where or Where(jobs), journal, progress)
     finally:
         _sampler.cache_clear()
     if failed and journal is None:
         raise EngineError(next(iter(failed.values())))
     numbers, pools, rejected = [], [], collections.Counter()
-    for number, piece in enumerate(work.pieces, first):
-        if piece.name in failed:
+    for number, job in enumerate(work.jobs, first):
+        if job.name in failed:
             continue
-        arrays, header = unpack(store.get(piece.name))
+        arrays, header = unpack(store.get(job.name))
         rejected.update(header["rejected"])
         if arrays:
             numbers.append(number)
-            pools.append(build(Pool, arrays, piece.name))
+            pools.append(build(Pool, arrays, job.name))
     return Sampled(
         pool=dataclasses.replace(stack(pools), digest=scene.digest) if pools else None,
         rows=tuple(numbers),
@@ -134,26 +127,26 @@ def sample(
     )
 
 
-def row_work(
+def row_jobs(
     scene: Scene, wanted: Sequence[Condition], numbers: Sequence[int], seed: int, seconds: float = math.inf
-) -> Work:
-    """Rows as pieces of work."""
+) -> JobSet:
+    """Jobs that sample one row each."""
     common = {
         **named(scene),
         "conditions": [[c.predicate, list(c.arguments), c.value] for c in wanted],
         "seed": seed,
         "seconds": None if math.isinf(seconds) else seconds,
     }
-    return Work(
-        "ig2mj.sampling.many:row_piece",
+    return JobSet(
+        "ig2mj.sampling.many:row_job",
         f"sampling in {scene.name}",
-        [Piece(f"row_{n:06d}", {**common, "number": n}) for n in numbers],
+        [Job(f"row_{n:06d}", {**common, "number": n}) for n in numbers],
         check=check_of(scene),
     )
 
 
 @entry_point
-def row_piece(
+def row_job(
     scene: str, objects: Sequence[str], conditions: Sequence[Sequence], seed: int, seconds: float | None, number: int
 ) -> bytes:
     """One row, packed, with the reasons why candidates were turned down; no arrays where it was given up."""

@@ -6,13 +6,13 @@ Native engine only: it puts to sleep what rests, and what sleeps costs nothing i
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.engine.base import Write
 from ig2mj.engine.native.engine import NativeEngine, NativePhysics
 from ig2mj.errors import EngineError
@@ -40,8 +40,6 @@ stands deeper and is asleep flies off as soon as something wakes it."""
 TAKEN_BACK = 3
 """Times that disturbed objects are looked through; each time those that overlap go back to where they were."""
 
-Progress = Callable[[int], None]
-
 
 @entry_point
 def make_pool(
@@ -52,7 +50,7 @@ def make_pool(
     seed: int = 0,
     share: float = 0.3,
     threads: int | None = None,
-    progress: Progress = lambda done: None,
+    progress: ProgressCallback = no_progress,
 ) -> Pool:
     """A pool of `count` rows.
 
@@ -62,7 +60,7 @@ def make_pool(
       seed: the same seed gives the same pool, whatever the number of threads; `sample_settled` gives the same.
       share: probability that an object is disturbed, per object and row.
       threads: of the native engine; None: one per processor.
-      progress: called with the number of rows done so far.
+      progress: called with the finished rows and `count`.
 
     Raises:
       EngineError: too few rows come to rest with everything still in the house and nothing stuck in something.
@@ -71,7 +69,7 @@ def make_pool(
     rows: list[Pool] = []
     for turn in range(most_turns(count)):
         rows += disturber.rows(turn, seed, share)
-        progress(min(len(rows), count))
+        progress(min(len(rows), count), count)
         if len(rows) >= count:
             return dataclasses.replace(stack(rows[:count]), digest=scene.digest)
     raise too_few(scene, count, len(rows))

@@ -20,6 +20,7 @@ import jax
 import numpy as np
 from jaxtyping import Bool
 
+from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.engine.registry import make_engine
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process import entry_point, use_processor_only
@@ -51,9 +52,6 @@ MAX_CHUNKS = 400
 FLAT = 0.98
 """Cosine of the angle between an object's z axis and the vertical from which it lies flat: 11 degrees."""
 
-Progress = Callable[[int, int], None]
-"""Called with the number of rows made and wanted."""
-
 
 _loading = threading.Lock()
 """Pools may be made in threads (`ig2mj sample-task all`); MuJoCo does not promise that two may parse XML at a time."""
@@ -72,7 +70,7 @@ def pool_of(
     count: int | None = None,
     *,
     jobs: int = 1,
-    progress: Progress = lambda made, wanted: None,
+    progress: ProgressCallback = no_progress,
     workers: concurrent.futures.Executor | None = None,
 ) -> Pool:
     """The pool, read from the cache or made now.
@@ -137,7 +135,7 @@ def make_pool(
     *,
     file: pathlib.Path,
     jobs: int = 1,
-    progress: Progress = lambda made, wanted: None,
+    progress: ProgressCallback = no_progress,
     workers: concurrent.futures.Executor | None = None,
 ) -> Pool:
     """As `pool_of`, but in this file alone: what ships or is in the cache is not read."""
@@ -150,7 +148,7 @@ def _pool(
     split: str,
     count: int | None,
     jobs: int,
-    progress: Progress,
+    progress: ProgressCallback,
     workers: concurrent.futures.Executor | None,
     file: pathlib.Path | None = None,
 ) -> Pool:
@@ -165,10 +163,10 @@ def _pool(
                 shared = stack_of.enter_context(sampling_processes(processes))
             batches = _batches(task, split, states.scene, shared, tried, limit, lambda: rows - made)
             report = stack_of.enter_context(shown(f"sampling start states of {task.name}"))
-            report(0.0, f"0 of {rows}")
+            report(0, rows, f"0 of {rows}")
             for tried, drawn in stack_of.enter_context(contextlib.closing(batches)):
                 made += 0 if drawn is None else drawn.size
-                report(min(made, rows) / rows, f"{min(made, rows)} of {rows}")
+                report(min(made, rows), rows, f"{min(made, rows)} of {rows}")
                 progress(wanted - rows + min(made, rows), wanted)
                 yield tried, drawn
                 if made >= rows or (tried - first >= HOPELESS and not made):

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 from rich.table import Table
+
+from ig2mj.callbacks import ProgressCallback
 
 #: Columns of text where stdout is not a terminal, wide enough that nothing is folded away.
 PIPED_WIDTH = 180
@@ -83,10 +85,10 @@ def progress_bar() -> Progress:
     )
 
 
-def add_bar(bar: Progress, title: str) -> Callable[[str, int, int | None], None]:
-    """Opens a bar; what it returns moves it: text, done, total (None: not known yet)."""
+def add_bar(bar: Progress, title: str) -> ProgressCallback:
+    """Opens a progress bar; returns the callback that moves it."""
     task = bar.add_task(title, total=None, text="")
-    return lambda text, done, total: bar.update(task, completed=done, total=total, text=text)
+    return lambda done, total, text="", /: bar.update(task, completed=done, total=total, text=text)
 
 
 def _name(column: str) -> str:

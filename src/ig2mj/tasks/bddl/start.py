@@ -14,11 +14,12 @@ from typing import Any
 import jax
 import numpy as np
 
+from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.predicates.compile import compile_expression
 from ig2mj.predicates.questions import Questions
 from ig2mj.sampling import many
 from ig2mj.sampling.conditions import Condition, read_conditions
-from ig2mj.sampling.many import Progress, Sampled
+from ig2mj.sampling.many import Sampled
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.scene.manifest import Manifest
 from ig2mj.scene.scene import Scene, load_scene
@@ -130,7 +131,7 @@ def sample_start(
     *,
     jobs: int = 1,
     seconds_per_row: float = float("inf"),
-    progress: Progress = lambda done, failed: None,
+    progress: ProgressCallback = no_progress,
     **options: Any,
 ) -> SampledStart:
     """Samples initial states of an activity.

@@ -106,7 +106,7 @@ def activity_pool(task: BddlTask, split: str = "train", count: int | None = None
                     count,
                     SEEDS[split],
                     first=tried,
-                    progress=lambda done, failed, made=made: report((made + done) / rows, f"{made + done} of {rows}"),
+                    progress=lambda done, _, text="", made=made: report(made + done, rows, f"{made + done} of {rows}"),
                 )
             tried += count
             reasons += done.sampled.rejected

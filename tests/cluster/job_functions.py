@@ -1,4 +1,4 @@
-"""Functions that tests of pieces call by name: `piece_functions:NAME`, here and on nodes of a Ray cluster."""
+"""Functions that tests of jobs call by name: `job_functions:NAME`, here and on nodes of a Ray cluster."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import os
 import pathlib
 import time
 
-from ig2mj.cluster.work import WholeRunError
+from ig2mj.cluster.jobs import WholeRunError
 from ig2mj.errors import EngineError, Ig2mjError
 
 
@@ -39,8 +39,8 @@ def failing(number: int, how: str, folder: str) -> bytes:
 
 
 def on_disk(number: int, note: str) -> bytes:
-    """The number, which is written first to the file that this node's variable PIECES_DISK names."""
-    file = os.environ.get("PIECES_DISK", "/dev/null")
+    """The number, which is written first to the file that this node's variable JOBS_DISK names."""
+    file = os.environ.get("JOBS_DISK", "/dev/null")
     if file == "/dev/full":
         (pathlib.Path(note) / f"full-{number}-{time.monotonic_ns()}").touch()
     time.sleep(0.2)

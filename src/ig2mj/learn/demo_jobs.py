@@ -1,5 +1,5 @@
-"""Demonstrations in pieces (`ig2mj.cluster.pieces`): each plays an expert for some episodes from a seed of its own, and
-gives a file; the files of all pieces become one, run after run.
+"""Collection of demonstrations by jobs: each plays an expert for some episodes from a seed of its own, and
+gives a file; the files of all jobs become one, run after run.
 """
 
 from __future__ import annotations
@@ -11,33 +11,33 @@ from typing import Any
 
 import numpy as np
 
-from ig2mj.cluster.work import Piece, WholeRunError
+from ig2mj.cluster.jobs import Job, WholeRunError
 from ig2mj.envs.experts import expert_of
-from ig2mj.envs.pieces import keep_pool
 from ig2mj.envs.registry import make
+from ig2mj.envs.shared_starts import keep_pool
 from ig2mj.errors import Ig2mjError
 from ig2mj.files.hdf5 import Hdf5File
 from ig2mj.learn.demos import DemoWriter, collect_demos
 from ig2mj.process.progress import progress
 
-PIECE = 32
-"""Episodes of a piece."""
+EPISODES_PER_JOB = 32
+"""Episodes of a job."""
 
 FAILED = "failed"
 """Attribute of a file: episodes that failed and are left out."""
 
 
-def collection_pieces(settings: Mapping[str, Any], episodes: int, seed: int) -> list[Piece]:
-    """Pieces of a collection. `settings`: the arguments of `collect_piece` but `episodes`, `seed` and `shared`."""
+def collection_jobs(settings: Mapping[str, Any], episodes: int, seed: int) -> list[Job]:
+    """Jobs of a collection. `settings`: the arguments of `collect_job` but `episodes`, `seed` and `shared`."""
     found = []
-    for number, first in enumerate(range(0, episodes, PIECE)):
+    for number, first in enumerate(range(0, episodes, EPISODES_PER_JOB)):
         own = seed if number == 0 else int(np.random.SeedSequence([seed, number]).generate_state(1)[0] >> 1)
-        arguments = {**settings, "episodes": min(PIECE, episodes - first), "seed": own}
-        found.append(Piece(f"episodes_{first:07d}", arguments))
+        arguments = {**settings, "episodes": min(EPISODES_PER_JOB, episodes - first), "seed": own}
+        found.append(Job(f"episodes_{first:07d}", arguments))
     return found
 
 
-def collect_piece(
+def collect_job(
     env: str,
     robot: str | None,
     grasping: str | None,

@@ -1,4 +1,4 @@
-"""Pieces of work on this machine: the same results in any order, retries, reasons, journals."""
+"""Jobs on this machine: the same results in any order, retries, reasons, journals."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import time
 
 import pytest
 
+from ig2mj.cluster.job_runner import Where, _Counter, map_jobs, stream_jobs
+from ig2mj.cluster.jobs import Job, JobSet
 from ig2mj.cluster.journal import Journal
-from ig2mj.cluster.pieces import Status, Where, run
 from ig2mj.cluster.versions import difference, versions
-from ig2mj.cluster.work import Piece, Work
 from ig2mj.errors import ClusterError, EngineError, InputError
 
 HERE = pathlib.Path(__file__).parent
@@ -25,17 +25,17 @@ def functions_are_found(monkeypatch):
     monkeypatch.syspath_prepend(str(HERE))
     monkeypatch.setenv("PYTHONPATH", str(HERE))
     yield
-    sys.modules.pop("piece_functions", None)
+    sys.modules.pop("job_functions", None)
 
 
-def work(count: int = 5, function: str = "digest", shared: dict[str, bytes] | None = None, **arguments) -> Work:
-    pieces = [Piece(f"piece_{n}", {"number": n, **arguments}) for n in range(count)]
-    return Work(f"piece_functions:{function}", "testing", pieces, shared or {})
+def work(count: int = 5, function: str = "digest", shared: dict[str, bytes] | None = None, **arguments) -> JobSet:
+    jobs = [Job(f"job_{n}", {"number": n, **arguments}) for n in range(count)]
+    return JobSet(f"job_functions:{function}", "testing", jobs, shared or {})
 
 
-def everything(work: Work, where: Where = Where(), **options) -> tuple[list[bytes | None], dict[str, str]]:  # noqa: B008
-    store, failed = run(work, where, **options)
-    return [None if p.name in failed else store.get(p.name) for p in work.pieces], failed
+def everything(work: JobSet, where: Where = Where(), **options) -> tuple[list[bytes | None], dict[str, str]]:  # noqa: B008
+    store, failed = map_jobs(work, where, **options)
+    return [None if p.name in failed else store.get(p.name) for p in work.jobs], failed
 
 
 def test_the_same_results_here_and_on_two_processes():
@@ -56,7 +56,7 @@ def test_the_same_results_here_and_on_two_processes():
 def test_what_fails_is_told_with_its_reason_while_the_others_finish(tmp_path, how, tries, reason):
     results, failed = everything(work(function="failing", how=how, folder=str(tmp_path)))
     assert results == [b"0", b"1", None, b"3", b"4"]
-    assert failed == {"piece_2": reason}
+    assert failed == {"job_2": reason}
     assert len(list(tmp_path.glob("try-*"))) == tries, "the user's mistakes are not tried again"
 
 
@@ -68,8 +68,24 @@ def test_a_second_try_helps(tmp_path):
 def test_a_process_that_dies_costs_its_piece_alone(tmp_path):
     results, failed = everything(work(function="failing", how="death", folder=str(tmp_path)), Where(jobs=2))
     assert results == [b"0", b"1", None, b"3", b"4"]
-    assert failed == {"piece_2": "the process that did it died"}
+    assert failed == {"job_2": "the process that ran it died"}
     assert len(list(tmp_path.glob("try-*"))) == 3
+
+
+def test_jobs_are_drawn_from_an_iterator_as_results_arrive():
+    seen: list[str] = []
+
+    def until_three():
+        for n in range(100):
+            if len(seen) == 3:
+                return
+            yield Job(f"job_{n}", {"number": n})
+
+    counts: list[tuple] = []
+    for result in stream_jobs(JobSet("job_functions:digest", "", until_three()), progress=lambda *c: counts.append(c)):
+        seen.append(result.name)
+    assert seen == ["job_0", "job_1", "job_2"]
+    assert counts[-1] == (3, None, "0 running"), "how many there will be is not known"
 
 
 def test_what_would_fail_everywhere_ends_the_run(tmp_path):
@@ -77,13 +93,16 @@ def test_what_would_fail_everywhere_ends_the_run(tmp_path):
         everything(work(function="failing", how="all", folder=str(tmp_path)))
 
 
-def test_progress_counts_and_foretells(tmp_path):
-    told: list[Status] = []
-    everything(work(function="failing", how="input", folder=str(tmp_path)), report=told.append)
-    assert (told[0].done, told[0].failed, told[0].running, told[0].total) == (0, 0, 1, 5)
-    assert (told[-1].done, told[-1].failed, told[-1].running) == (4, 1, 0)
-    assert told[0].seconds_left is None and told[-1].seconds_left == 0
-    assert str(Status(3, 1, 2, 9, 3725.0)) == "1 failed, 2 running, 1:02:05 left"
+def test_progress_counts_jobs_and_predicts_the_remaining_time(tmp_path, monkeypatch):
+    seen: list[tuple] = []
+    everything(work(function="failing", how="input", folder=str(tmp_path)), progress=lambda *now: seen.append(now))
+    assert seen[0] == (0, 5, "1 running")
+    assert seen[-1] == (5, 5, "1 failed, 0 running, nearly done")
+    clock = iter([0.0, 3725.0])
+    monkeypatch.setattr("time.monotonic", lambda: next(clock))
+    counter = _Counter(total=9, before=0)
+    counter.done, counter.failed = 3, 1
+    assert counter.text(running=2) == "1 failed, 2 running, 1:17:36 left", "five of nine, at the pace of the first four"
 
 
 class Killed(Exception):
@@ -93,14 +112,14 @@ class Killed(Exception):
 def test_a_killed_run_goes_on_where_it_stopped(tmp_path):
     out, wanted, count = tmp_path / "pool.npz", work(note=str(tmp_path)), []
 
-    def die_after_three(status: Status) -> None:
-        if status.done == 3:
+    def die_after_three(done, total, text="") -> None:
+        if done == 3:
             raise Killed
 
     with pytest.raises(Killed), Journal(out, {"rows": 5}) as journal:
-        run(wanted, Where(), journal, die_after_three)
-    with (tmp_path / "pool.npz.pieces" / "done.jsonl").open("a") as lines:
-        lines.write('{"name": "piece_4", "sha2')  # half a line, as a kill leaves it
+        map_jobs(wanted, Where(), journal, die_after_three)
+    with (tmp_path / "pool.npz.jobs" / "done.jsonl").open("a") as lines:
+        lines.write('{"name": "job_4", "sha2')  # half a line, as a kill leaves it
     with pytest.raises(InputError, match=r"an earlier run of this was interrupted \(--resume continues it"):
         Journal(out, {"rows": 5})
     with pytest.raises(InputError, match="the interrupted run had rows = 5, and here it is 6"):
@@ -110,8 +129,8 @@ def test_a_killed_run_goes_on_where_it_stopped(tmp_path):
         count, failed = everything(wanted, store=journal)
         journal.finish()
     assert count == everything(work())[0] and not failed
-    assert len(set(tmp_path.glob("*-*")) | before) == 5 and len(before) == 3, "finished pieces were not done again"
-    assert not (tmp_path / "pool.npz.pieces").exists()
+    assert len(set(tmp_path.glob("*-*")) | before) == 5 and len(before) == 3, "finished jobs were not done again"
+    assert not (tmp_path / "pool.npz.jobs").exists()
 
 
 @pytest.mark.slow
@@ -120,7 +139,7 @@ def test_a_command_that_was_killed_goes_on_to_the_same_bytes(tmp_path):
     """SIGKILL of `ig2mj sample`, then `--resume`: rows that were finished are not sampled again."""
     words = ["sample", "small_home", "(on_top apple_0 breakfast_table_0)", "--count", "12", "--out"]
     command = [sys.executable, "-m", "ig2mj", *words]
-    done, deadline = tmp_path / "killed.npz.pieces" / "done.jsonl", time.monotonic() + 300
+    done, deadline = tmp_path / "killed.npz.jobs" / "done.jsonl", time.monotonic() + 300
     where = {"cwd": tmp_path, "env": {**os.environ, "JAX_PLATFORMS": "cpu"}}
     with subprocess.Popen([*command, "killed.npz"], **where, stderr=subprocess.DEVNULL) as driver:
         while not done.exists() or len(done.read_text().splitlines()) < 3:
@@ -141,9 +160,9 @@ def test_a_result_that_is_damaged_is_made_again(tmp_path):
     out, wanted = tmp_path / "pool.npz", work()
     with Journal(out, {}) as journal:
         first, _ = everything(wanted, store=journal)
-    (tmp_path / "pool.npz.pieces" / "piece_1.bin").write_bytes(b"half")
+    (tmp_path / "pool.npz.jobs" / "job_1.bin").write_bytes(b"half")
     with Journal(out, {}, resume=True) as journal:
-        assert "piece_1" not in journal.names() and len(journal.names()) == 4
+        assert "job_1" not in journal.names() and len(journal.names()) == 4
         assert everything(wanted, store=journal)[0] == first
 
 
@@ -172,9 +191,9 @@ def test_results_can_be_delivered_at_once(tmp_path):
         return Journal(tmp_path, {}, resume, placed.__setitem__, lambda name: name in placed)
 
     with journal() as first:
-        run(work(), Where(), first)
-    assert len(placed) == 5 and json.loads((tmp_path / ".pieces" / "request.json").read_text()) == {}
-    placed.pop("piece_3")
+        map_jobs(work(), Where(), first)
+    assert len(placed) == 5 and json.loads((tmp_path / ".jobs" / "request.json").read_text()) == {}
+    placed.pop("job_3")
     with journal(resume=True) as second:
         assert len(second.names()) == 4, "what has gone since is made again"
 

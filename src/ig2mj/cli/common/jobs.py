@@ -1,4 +1,4 @@
-"""What commands share that do their work in pieces: options, the journal beside the output, the progress bar."""
+"""What commands share that run jobs: options, the journal next to the output, the progress bar."""
 
 from __future__ import annotations
 
@@ -12,25 +12,26 @@ from typing import TYPE_CHECKING, Annotated, Any
 import tyro
 
 if TYPE_CHECKING:
+    from ig2mj.callbacks import ProgressCallback
+    from ig2mj.cluster.job_runner import Where
     from ig2mj.cluster.journal import Deliver, Journal
-    from ig2mj.cluster.pieces import Report, Status, Where
 
 Cluster = Annotated[str | None, tyro.conf.arg(metavar="auto|ADDRESS")]
 """Option: the Ray cluster that does the work."""
 
 Resume = Annotated[bool, tyro.conf.FlagCreatePairsOff]
-"""Option: go on with a run that was broken off."""
+"""Option: continue an interrupted run."""
 
 EVERY = 30.0
 """Seconds between two lines where there is no terminal."""
 
 LISTED = 20
-"""Failed pieces that are listed by name."""
+"""Number of failed jobs to list by name."""
 
 
 def where_of(jobs: int, cluster: str | None, resume: bool) -> Where:
-    """Where pieces are to be done. Raises ClusterError where the cluster does not answer, before anything is made."""
-    from ig2mj.cluster.pieces import Where
+    """Where jobs run. Raises ClusterError if the cluster does not answer, before any output is made."""
+    from ig2mj.cluster.job_runner import Where
 
     if cluster is not None:
         from ig2mj.cluster.ray_nodes import check_address
@@ -42,7 +43,7 @@ def where_of(jobs: int, cluster: str | None, resume: bool) -> Where:
 def opened(
     out: pathlib.Path, request: Mapping[str, Any], where: Where, deliver: Deliver | None = None, **options: Any
 ) -> Journal:
-    """The journal of a run with this output. Raises ClusterError, InputError."""
+    """Opens the journal of a run with this output. Raises ClusterError, InputError."""
     from ig2mj.cluster.journal import Journal
     from ig2mj.cluster.versions import versions
 
@@ -50,32 +51,31 @@ def opened(
 
 
 @contextlib.contextmanager
-def follow(title: str, where: Where) -> Iterator[Report]:
-    """A bar on the terminal, or lines now and then where there is none. What a piece that is done in this process says
-    of itself (`ig2mj.process.progress`) stands next to the bar."""
+def follow(title: str) -> Iterator[ProgressCallback]:
+    """A progress bar on a terminal, else a line every `EVERY` seconds. The progress text of a job that runs in this
+    process (`ig2mj.process.progress`) is shown next to the bar."""
     from ig2mj.cli.common.printing import add_bar, progress_bar
     from ig2mj.process.progress import shown_by
 
-    last, words = [time.monotonic()], [""]
-    told: list[Status] = []
+    printed, counts, job_text = time.monotonic(), (0.0, None, ""), ""
     with progress_bar() as bar, contextlib.ExitStack() as stack:
         move = add_bar(bar, title)
 
         def show() -> None:
-            status = told[-1] if told else None
-            texts = [*([str(status)] if status else []), *([words[0]] if words[0] else [])]
-            move("; ".join(texts), status.done + status.failed if status else 0, status.total if status else None)
+            done, total, text = counts
+            move(done, total, "; ".join(part for part in (text, job_text) if part))
 
-        def report(status: Status) -> None:
-            told.append(status)
-            words[0] = ""
+        def report(done: float | int, total: float | int | None, text: str = "", /) -> None:
+            nonlocal printed, counts, job_text
+            counts, job_text = (done, total, text), ""
             show()
-            if bar.disable and time.monotonic() - last[0] > EVERY:
-                last[0] = time.monotonic()
-                print(f"{title}: {status.done} of {status.total} done, {status}", file=sys.stderr, flush=True)
+            if bar.disable and time.monotonic() - printed > EVERY:
+                printed = time.monotonic()
+                print(f"{title}: {done} of {total} done, {text}", file=sys.stderr, flush=True)
 
         def say(text: str) -> None:
-            words[0] = text
+            nonlocal job_text
+            job_text = text
             show()
 
         if not bar.disable:
@@ -84,10 +84,10 @@ def follow(title: str, where: Where) -> Iterator[Report]:
 
 
 def tell_failures(failed: Mapping[str, str], total: int) -> None:
-    """Lists failed pieces with their reasons, on standard error."""
+    """Lists failed jobs with their reasons on standard error."""
     if not failed:
         return
-    print(f"{len(failed)} of {total} pieces failed; --resume tries them again:", file=sys.stderr)
+    print(f"{len(failed)} of {total} jobs failed; --resume tries them again:", file=sys.stderr)
     for name, reason in list(failed.items())[:LISTED]:
         print(f"  {name}: {reason}", file=sys.stderr)
     if len(failed) > LISTED:

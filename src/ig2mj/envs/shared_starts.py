@@ -1,4 +1,4 @@
-"""What pieces of work need of an environment on another machine: its start states, which take minutes to sample."""
+"""Start states of an environment for jobs on other machines, since sampling them takes minutes."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from ig2mj.tasks.task import Task
 from ig2mj.tasks.variants import variant
 
 POOL = "pool"
-"""Name of the start states among the bytes that pieces share."""
+"""Name of the start states in `JobSet.shared`."""
 
 
 def shared_pool(task: str, split: str, count: int | None) -> dict[str, bytes]:
-    """The start states of an environment, to be shared by pieces; nothing where they ship or are made each time."""
+    """The start states of an environment for `JobSet.shared`; empty if they ship, or if none are stored."""
     found = find_task(task)
     if not isinstance(found, Task):
         return {}
@@ -25,7 +25,7 @@ def shared_pool(task: str, split: str, count: int | None) -> dict[str, bytes]:
 
 
 def keep_pool(shared: Mapping[str, bytes], task: str, split: str, count: int | None) -> None:
-    """Puts shared start states where `ig2mj.make` finds them, unless it finds as many already."""
+    """Stores shared start states where `ig2mj.make` finds them, unless as many are there already."""
     found = find_task(task)
     if POOL in shared and isinstance(found, Task):
         states = pools.start_states(found, split)
@@ -34,13 +34,13 @@ def keep_pool(shared: Mapping[str, bytes], task: str, split: str, count: int | N
 
 
 def start_states(task: str, split: str, count: int | None) -> str:
-    """What start states another machine would take: the same text where its homes and objects are the same."""
+    """Digest of the start states that this machine would use; equal where homes and objects are equal."""
     found = find_task(task)
     return f"{pools.start_states(found, split).cached.name} {count}" if isinstance(found, Task) else task
 
 
 def shipped_states(task: str, grasping: str, split: str) -> str | None:
-    """Name of the file of start states that ships with the package; None: they are made on each machine."""
+    """Name of the file of start states that ships with the package; None: each machine samples them."""
     found = find_task(task)
     if not isinstance(found, Task):
         return None

@@ -1,4 +1,4 @@
-"""`ig2mj demos replay --cluster`: the runs of a recording in pieces, with a journal."""
+"""`ig2mj demos replay --cluster`: the runs of a recording in jobs, with a journal."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from ig2mj.cli.pieces import follow, opened, tell_failures
+from ig2mj.cli.common.jobs import follow, opened, tell_failures
 
 if TYPE_CHECKING:
-    from ig2mj.cluster.pieces import Where
+    from ig2mj.cluster.job_runner import Where
 
 
-def replay_in_pieces(
+def replay_by_jobs(
     file: pathlib.Path,
     by: str,
     check: bool,
@@ -25,30 +25,32 @@ def replay_in_pieces(
     where: Where,
 ) -> int:
     """Replays one recording; the exit status. Arguments: of `ig2mj demos replay`."""
-    from ig2mj.cluster.pieces import run
-    from ig2mj.cluster.work import Work
-    from ig2mj.demos.pieces import RECORDING, join_replays, replay_pieces
+    from ig2mj.cluster.job_runner import map_jobs
+    from ig2mj.cluster.jobs import JobSet
     from ig2mj.demos.reader import Recording
-    from ig2mj.envs.pieces import shared_pool
+    from ig2mj.demos.replay_jobs import RECORDING, join_replays, replay_jobs
+    from ig2mj.envs.shared_starts import shared_pool
 
     settings = {"file": str(file.resolve()), "by": by, "check": check, "sensors": list(sensors), "threads": threads}
     observed = (out or file.with_suffix(".sensors.h5")) if sensors else None
     with Recording(file) as recording:
         made = recording.value("made_with", dict)
         starts = {"task": recording.value("task", str), "split": made.get("split"), "count": made.get("pool_size")}
-        pieces = replay_pieces(recording, {**settings, "starts": starts})
+        jobs = replay_jobs(recording, {**settings, "starts": starts})
     title = f"replaying {file.name}"
     shared = {} if where.cluster is None else {RECORDING: file.read_bytes(), **shared_pool(**starts)}
-    work = Work("ig2mj.demos.pieces:replay_piece", title, pieces, shared, ("ig2mj.envs.pieces:start_states", starts))
+    work = JobSet(
+        "ig2mj.demos.replay_jobs:replay_job", title, jobs, shared, ("ig2mj.envs.shared_starts:start_states", starts)
+    )
     request = {"command": "demos replay", "digest": hashlib.sha256(file.read_bytes()).hexdigest(), **settings}
     with contextlib.ExitStack() as stack:
         journal = stack.enter_context(opened(observed or file.with_suffix(".replay"), request, where))
-        store, failed = run(work, where, journal, stack.enter_context(follow(title, where)))
-        parts = (store.get(piece.name) for piece in pieces if piece.name not in failed)
+        store, failed = map_jobs(work, where, journal, stack.enter_context(follow(title)))
+        parts = (store.get(job.name) for job in jobs if job.name not in failed)
         done = join_replays(parts, observed)
         if not failed:
             journal.finish()
-    tell_failures(failed, len(pieces))
+    tell_failures(failed, len(jobs))
     for warning in done["warnings"]:
         print(f"warning: {warning}", file=sys.stderr)
     for difference in done["differences"]:

@@ -1,4 +1,4 @@
-"""Replays in pieces (`ig2mj.cluster.pieces`): one run of each world at a time, as `Replayer` does it."""
+"""Replays as jobs (`ig2mj.cluster.job_runner`): one run of each world at a time, as `Replayer` does it."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from ig2mj.cluster.work import Piece, WholeRunError
+from ig2mj.cluster.jobs import Job, WholeRunError
 from ig2mj.demos.reader import Recording, Run
 from ig2mj.demos.replay import Replayer
 from ig2mj.demos.whole_output import whole_output
 from ig2mj.envs.environment import EnvState
-from ig2mj.envs.pieces import keep_pool
 from ig2mj.envs.registry import VECTORS
+from ig2mj.envs.shared_starts import keep_pool
 from ig2mj.errors import Ig2mjError
 from ig2mj.files.content import decode_struct
 from ig2mj.files.hdf5 import Hdf5File
 
 TOLD = "told"
-"""Attribute of a piece's file: what came of the replay, as JSON."""
+"""Attribute of a job's file: what came of the replay, as JSON."""
 
 FORMAT = "ig2mj observations"
 """Of files of observations."""
 
 RECORDING = "recording"
-"""Name of the recording among the bytes that pieces share, where they are done on other machines."""
+"""Name of the recording among the bytes that jobs share, where they run on other machines."""
 
 
 class _Told(msgspec.Struct):
-    """What a piece's `TOLD` holds."""
+    """What a job's `TOLD` holds."""
 
     runs: int
     frames: int
@@ -42,8 +42,8 @@ class _Told(msgspec.Struct):
     warnings: list[str]
 
 
-def replay_pieces(recording: Recording, settings: Mapping[str, Any]) -> list[Piece]:
-    """Pieces of a replay. `settings`: the arguments of `replay_piece` but `runs` and `shared`."""
+def replay_jobs(recording: Recording, settings: Mapping[str, Any]) -> list[Job]:
+    """Pieces of a replay. `settings`: the arguments of `replay_job` but `runs` and `shared`."""
     layers: list[list[str]] = []
     depth: dict[int, int] = {}
     for run in recording.runs:
@@ -53,10 +53,10 @@ def replay_pieces(recording: Recording, settings: Mapping[str, Any]) -> list[Pie
             if at == len(layers):
                 layers.append([])
             layers[at].append(run.name)
-    return [Piece(f"runs_{n:06d}", {**settings, "runs": names}) for n, names in enumerate(layers)]
+    return [Job(f"runs_{n:06d}", {**settings, "runs": names}) for n, names in enumerate(layers)]
 
 
-def replay_piece(
+def replay_job(
     file: str,
     by: str,
     check: bool,
@@ -80,7 +80,7 @@ def replay_piece(
         raise WholeRunError(e) from e
     wanted = [run for run in replayer.recording.runs if run.name in set(runs)]
     with tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:
-        out = pathlib.Path(folder) / "piece.h5"
+        out = pathlib.Path(folder) / "part.h5"
         with h5py.File(out, "w") as opened:
             watcher = Observing(opened, sensors)
             done = replayer(check, watcher.see if sensors else None, wanted)
@@ -102,7 +102,7 @@ class Observing:
         import h5py
 
         found = cls(h5py.File(_beside(file, "frames"), "w"), names)
-        found._file, found._order = file, [piece.arguments["runs"] for piece in replay_pieces(recording, {})]
+        found._file, found._order = file, [job.arguments["runs"] for job in replay_jobs(recording, {})]
         return found
 
     def see(self, state: EnvState, runs: Mapping[int, Run], frame: int) -> None:
@@ -139,7 +139,7 @@ class Observing:
 
 
 def join_replays(parts: Iterable[bytes], out: pathlib.Path | None) -> dict[str, Any]:
-    """What came of all pieces; with `out` their observations in one file. Raises OSError, and InputError:
+    """What came of all jobs; with `out` their observations in one file. Raises OSError, and InputError:
     a part is broken, or takes anything from another file."""
     import h5py
 

@@ -1,4 +1,4 @@
-"""The scene that pieces of work sample in: loaded by name wherever they are done, or lent to those of this process."""
+"""References to the scene that jobs sample in: loaded by name where a job runs, or lent to jobs of this process."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _lent: dict[tuple[str, tuple[str, ...]], Scene] = {}
 
 
 def named(scene: Scene) -> dict[str, Any]:
-    """What `load_scene` needs on any machine that has the scene, as arguments of a piece.
+    """Arguments of `load_scene` that find the scene on any machine that has it, for a job.
 
     `scene`: its name if it ships, else its folder. `objects`: what was added to it.
     """
@@ -20,13 +20,13 @@ def named(scene: Scene) -> dict[str, Any]:
 
 
 def check_of(scene: Scene) -> tuple[str, dict[str, Any]]:
-    """`Work.check`: every machine has the same scene."""
+    """`JobSet.check`: every machine has the same scene."""
     return "ig2mj.scene.scene:digest_of", named(scene)
 
 
 @contextlib.contextmanager
 def lent(scene: Scene) -> Iterator[None]:
-    """Inside, pieces that are done in this process take the scene as it is."""
+    """During the block, jobs that run in this process use this scene object."""
     key = scene.portable_name, tuple(a.wanted for a in scene.additions)
     _lent[key] = scene
     try:

@@ -1,7 +1,7 @@
-"""`sample_settled`: the rows of `make_pool`, in pieces of work: on several processes, on a cluster, with a journal.
+"""`sample_settled`: the rows of `make_pool`, sampled by jobs: on several processes, on a cluster, with a journal.
 
-A piece is one turn of `ig2mj.sampling.settled.Disturber`. How many turns are needed shows only as they come: pieces are
-handed out until there are enough rows, and the first ones, in the order of the turns, are the pool.
+A job is one turn of `ig2mj.sampling.settled.Disturber`. How many turns are needed shows only as they come: jobs are
+run until there are enough rows; the first rows in the order of the turns are the pool.
 """
 
 from __future__ import annotations
@@ -12,11 +12,12 @@ from collections.abc import Sequence
 
 import jax
 
+from ig2mj.callbacks import ProgressCallback, no_progress
+from ig2mj.cluster.job_runner import Where, map_jobs
+from ig2mj.cluster.jobs import Job, JobSet, WholeRunError
 from ig2mj.cluster.journal import Journal, Memory
-from ig2mj.cluster.pieces import Report, Where, run
-from ig2mj.cluster.work import Piece, WholeRunError, Work
 from ig2mj.errors import EngineError
-from ig2mj.sampling.offered import check_of, lent, named, scene_named
+from ig2mj.sampling.scene_refs import check_of, lent, named, scene_named
 from ig2mj.sampling.settled import Disturber, most_turns, too_few, width_of
 from ig2mj.scene.scene import Scene
 from ig2mj.states.model import StateModel
@@ -32,9 +33,9 @@ def sample_settled(
     *,
     where: Where | None = None,
     journal: Journal | None = None,
-    report: Report = lambda status: None,
+    progress: ProgressCallback = no_progress,
 ) -> tuple[Pool | None, dict[str, str]]:
-    """Samples rows; the pool is that of `make_pool`, wherever the pieces are done.
+    """Samples rows. The pool equals that of `make_pool`, wherever the jobs run.
 
     Args:
       scene: without agents. count, seed, share: as `make_pool` has them.
@@ -44,28 +45,28 @@ def sample_settled(
       The pool, None where turns failed; and by the name of a turn, why it failed.
 
     Raises:
-      EngineError: too few rows come to rest. ClusterError: see `ig2mj.cluster.pieces.run`.
+      EngineError: too few rows come to rest. ClusterError: see `ig2mj.cluster.job_runner.map_jobs`.
     """
     width, store = width_of(count), Memory() if journal is None else journal
     common = {**named(scene), "seed": seed, "share": share, "width": width}
-    pieces: list[Piece] = []
+    jobs: list[Job] = []
     pools: list[Pool] = []
     made = 0
     try:
-        while made < count and len(pieces) < most_turns(count):
-            yielded = made / len(pieces) if pieces else width  # rows a turn
+        while made < count and len(jobs) < most_turns(count):
+            yielded = made / len(jobs) if jobs else width  # rows a turn
             more = -(-(count - made) // max(yielded, 1.0))
-            until = min(len(pieces) + int(more), most_turns(count))
-            pieces += [Piece(f"turn_{n:06d}", {**common, "turn": n}) for n in range(len(pieces), until)]
+            until = min(len(jobs) + int(more), most_turns(count))
+            jobs += [Job(f"turn_{n:06d}", {**common, "turn": n}) for n in range(len(jobs), until)]
             title = f"settling {scene.name}"
-            work = Work("ig2mj.sampling.settled_pieces:turn_piece", title, pieces, check=check_of(scene))
+            work = JobSet("ig2mj.sampling.settled_jobs:turn_job", title, jobs, check=check_of(scene))
             with lent(scene):
-                _, failed = run(work, where or Where(), store, report)
+                _, failed = map_jobs(work, where or Where(), store, progress)
             if failed and journal is None:
                 raise EngineError(next(iter(failed.values())))
             if failed:
                 return None, failed
-            pools = [pool for piece in pieces for pool in _unpacked(store.get(piece.name), piece.name)]
+            pools = [pool for job in jobs for pool in _unpacked(store.get(job.name), job.name)]
             made = sum(pool.size for pool in pools)
     finally:
         _disturber.cache_clear()
@@ -74,7 +75,7 @@ def sample_settled(
     return dataclasses.replace(jax.tree.map(lambda a: a[:count], stack(pools)), digest=scene.digest), {}
 
 
-def turn_piece(scene: str, objects: Sequence[str], seed: int, share: float, width: int, turn: int) -> bytes:
+def turn_job(scene: str, objects: Sequence[str], seed: int, share: float, width: int, turn: int) -> bytes:
     """The rows of one turn, packed as a pool; no arrays where there are none."""
     try:
         rows = _disturber(scene, tuple(objects), width).rows(turn, seed, share)
