@@ -136,7 +136,7 @@ format: setup
 	@$(BIN)/ruff format
 
 bench: $(VENV)/.benchmarks
-	@set -e; for b in idle_a6 idle_a7 idle_robots states_share; do echo "== $$b"; $(BIN)/python benchmarks/$$b.py; done
+	@set -e; for b in idle_a6 idle_a7 idle_robots states_share; do echo "== $$b"; $(BIN)/python -m benchmarks.speed.$$b; done
 
 $(VENV)/.benchmarks: $(VENV)/.installed $(VENV)/.gl
 	@if uv --version >/dev/null 2>&1; then uv pip install -q --python $(BIN)/python -e '.[bench]'; \

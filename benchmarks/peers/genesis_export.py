@@ -1,6 +1,6 @@
 """A home with our hand, written for a process that has Genesis and not ig2mj.
 
-    python benchmarks/peers/genesis_export.py OUT HOME [HOME ...]
+    python -m benchmarks.peers.genesis_export OUT HOME [HOME ...]
 
 OUT/<home>/ gets `scene.xml`, the collision meshes, and `home.json`: the settled pose of every joint, what the hand can
 reach (`ig2mj.calibration.reach`), and masses and places of the bodies, by which the other process checks what it read.

@@ -1,4 +1,4 @@
-"""One batch of an exported home in Genesis, pushed about by the hand: a row like those of `benchmarks/throughput.py`.
+"""One batch of an exported home in Genesis, pushed about by the hand: a row like those of `benchmarks/speed/batch.py`.
 
     python3 benchmarks/peers/genesis_run.py FOLDER --worlds 4096 --variant hibernation+performance --rows FILE
 
@@ -19,15 +19,12 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-import genesis_absent
-import genesis_scene
 import numpy as np
 import torch  # pyright: ignore[reportMissingImports]
-from genesis_hand import TorchHand
 
-sys.path.append(str(pathlib.Path(__file__).resolve().parent.parent))
-
-from turns import exclusive, preparing
+from benchmarks.harness.turns import exclusive, preparing
+from benchmarks.peers import genesis_absent, genesis_scene
+from benchmarks.peers.genesis_hand import TorchHand
 
 TIMESTEP, SUBSTEPS = 1 / 120, 4
 STEPS, CALLS, LEAST_CALLS, CALL_SECONDS = 30, 4, 2, 10.0
@@ -40,11 +37,11 @@ CONTACTS = {"made_60": 260, "birch": 200}
 """Contacts of a world: about a fifth more than were seen. Genesis keeps a Jacobian of all constraints and degrees of
 freedom of all worlds in one tensor of at most 2^31 numbers, so this bounds the worlds. Other homes: `_contacts`."""
 MOVED, OUTSIDE, UNDER_FLOOR = 0.02, 50.0, -0.1
-"""Metres, as in `benchmarks/disturbance.py`: an object has moved; is outside the house; is below the floor."""
+"""Metres, as in `benchmarks/harness/disturbance.py`: an object has moved; is outside the house; is below the floor."""
 MOST_LOST = 1e-3
-"""Share of worlds that may have lost an object in a row that counts, as in `benchmarks/throughput.py`."""
+"""Share of worlds that may have lost an object in a row that counts, as in `benchmarks/speed/batch.py`."""
 LEAST_TOUCHED = 0.1
-"""Share of control steps in which the hand must touch an object, as in `benchmarks/disturbance.py`."""
+"""Share of control steps in which the hand must touch an object, as in `benchmarks/harness/disturbance.py`."""
 
 Row = dict[str, Any]
 

@@ -1,6 +1,6 @@
 """Rows of `run.py` as a table and a plot: docs/notes/benchmarks.md between its two marks, docs/images/peers.png.
 
-    python benchmarks/peers/report.py [ROWS.jsonl ...]          benchmarks/results/peers/*.jsonl if none are named
+    python -m benchmarks.peers.report [ROWS.jsonl ...]          benchmarks/results/peers/*.jsonl if none are named
 
 Of rows of the same case the last counts. A row that does not count (`counts` is false) is shown with its reason.
 """
@@ -10,13 +10,10 @@ from __future__ import annotations
 import argparse
 import json
 import pathlib
-import sys
 from collections.abc import Sequence
 
-HERE = pathlib.Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent))
+from benchmarks.harness.paths import RESULTS, ROOT
 
-ROOT = HERE.parent.parent
 PAGE, PLOT = ROOT / "docs" / "notes" / "benchmarks.md", ROOT / "docs" / "images" / "peers.png"
 BEGIN, END = "<!-- peers: written by benchmarks/peers/report.py -->", "<!-- /peers -->"
 
@@ -132,7 +129,7 @@ def written(rows: list[Row]) -> str:
 
 def draw(rows: list[Row], file: pathlib.Path) -> None:
     """Bars of physics alone by home and worlds, where one of the others was measured; only rows that count."""
-    import plots
+    from benchmarks.harness import plots
 
     physics = [row for row in rows if row["what"] == "physics" and row["counts"]]
     compared = [row for row in physics if row["engine"] != "ig2mj"] or physics
@@ -153,7 +150,7 @@ def main() -> None:
     parser.add_argument("--page", type=pathlib.Path, default=PAGE, help="Markdown with the two marks")
     parser.add_argument("--plot", type=pathlib.Path, default=PLOT)
     args = parser.parse_args()
-    rows = read(args.rows or sorted((HERE.parent / "results" / "peers").glob("*.jsonl")))
+    rows = read(args.rows or sorted((RESULTS / "peers").glob("*.jsonl")))
     if not rows:
         raise SystemExit("error: no rows with a speed; run benchmarks/peers/run.py on a GPU first")
     before, rest = args.page.read_text().split(BEGIN)

@@ -22,14 +22,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 
-HERE = pathlib.Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parent))
+from benchmarks.harness.made_home import write_home
+from benchmarks.harness.paths import RESULTS, module
+from benchmarks.harness.paths import WORK as ALL_WORK
+from benchmarks.speed import suite as gpu_suite
 
-import gpu_suite  # noqa: E402
-from made_home import write_home  # noqa: E402
-
-ROWS = HERE.parent / "results" / "peers" / "rows.jsonl"
-WORK = HERE.parent.parent / "out" / "benchmarks" / "peers"
+ROWS = RESULTS / "peers" / "rows.jsonl"
+WORK = ALL_WORK / "peers"
 
 OURS = (
     ("birch", 8192, "physics"),
@@ -106,7 +105,7 @@ def ours(args: argparse.Namespace, homes: dict[str, str], device: str) -> Iterat
         plan.insert(2 * place + 1, ("mujoco_warp", home, worlds, "physics"))
     for engine, home, worlds, what in plan:
         count = min(worlds, args.most_worlds or worlds)
-        words = (str(HERE.parent / "throughput.py"), homes[home], "--worlds", str(count), "--what", what)
+        words = (*module("speed.batch"), homes[home], "--worlds", str(count), "--what", what)
         words = (*words, "--engine", engine, *common(args, device))
         job = gpu_suite.Job(f"{engine}-{home}-{count}-{what}", words, LIMIT, on(device))
         if (engine, "", home, count, what) not in args.measured:
@@ -118,7 +117,7 @@ def genesis(args: argparse.Namespace, device: str, label: str) -> Iterator[gpu_s
     env = on(device) | ({"PYTHONPATH": args.genesis_path, "MUJOCO_GL": "disable"} if args.genesis_path else {})
     for home, worlds, variant in GENESIS:
         count = min(worlds, args.most_worlds or worlds)
-        words = (str(HERE / "genesis_run.py"), str(args.work / "homes" / home), "--worlds", str(count))
+        words = (*module("peers.genesis_run"), str(args.work / "homes" / home), "--worlds", str(count))
         words = (*words, "--variant", variant, "--label", label, *common(args, device))
         words += ("--cpu",) if args.genesis_cpu else ()
         name = f"genesis-{home}-{count}-physics-{variant}"
@@ -143,8 +142,8 @@ def export(args: argparse.Namespace, homes: dict[str, str], jobs: list[gpu_suite
     folders = {pathlib.Path(job.words[1]) for job in jobs}
     started = []
     for folder in sorted(folder for folder in folders if not (folder / "home.json").exists()):
-        words = [sys.executable, str(HERE / "genesis_export.py"), str(folder.parent), homes[folder.name]]
-        started.append(subprocess.Popen(words, env={**os.environ, "JAX_PLATFORMS": "cpu"}))
+        words = [sys.executable, *module("peers.genesis_export"), str(folder.parent), homes[folder.name]]
+        started.append(subprocess.Popen(words, env=environment(JAX_PLATFORMS="cpu")))
     for process in started:
         process.wait()
 

@@ -11,14 +11,14 @@ import pytest
 pytest.importorskip("pybullet", reason="the comparison needs PyBullet (extra: bench)")
 pytest.importorskip("matplotlib", reason="plots need matplotlib (extra: bench)")
 
-import idle_a7
-import pybullet_process
-from homes_at_hand import Home, convert
-from idle_robot import NAME, write_robot_urdf
-from made_dataset import Item, write_dataset
-from made_dataset import _Models as Models
-from made_dataset import _write_scene as write_scene
-from pybullet_scene import BulletCamera, write_bullet_scene, write_obj
+from benchmarks.harness.homes import Home, convert
+from benchmarks.harness.idle_robot import NAME, write_robot_urdf
+from benchmarks.harness.made_dataset import Item, write_dataset
+from benchmarks.harness.made_dataset import _Models as Models
+from benchmarks.harness.made_dataset import _write_scene as write_scene
+from benchmarks.peers import pybullet_process
+from benchmarks.peers.pybullet_scene import BulletCamera, write_bullet_scene, write_obj
+from benchmarks.speed import idle_a7
 
 ROBOT_AT = (0.0, 1.8, 0.0)
 

@@ -1,4 +1,4 @@
-"""Which arrays lie elsewhere, for which Warp captures a CUDA graph anew (`benchmarks/captures.py`)."""
+"""Which arrays lie elsewhere, for which Warp captures a CUDA graph anew (`benchmarks/harness/captures.py`)."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import warp as wp
 
 @pytest.fixture
 def moves(monkeypatch):
-    from captures import FfiCallable, Moves
+    from benchmarks.harness.captures import FfiCallable, Moves
 
     monkeypatch.setattr(FfiCallable, "__init__", FfiCallable.__init__)  # given back afterwards
     return Moves()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 
-import experts
+from benchmarks.learning import experts
 
 
 def row(**changes) -> dict:
@@ -28,7 +28,7 @@ def test_of_two_rows_of_one_part_the_later_counts(tmp_path):
 
 
 def test_the_page_has_the_table_of_the_rows():
-    """Write it with `python benchmarks/experts.py --table`."""
+    """Write it with `python -m benchmarks.learning.experts --table`."""
     text = experts.PAGE.read_text(encoding="utf-8")
     assert experts.page_with(text, experts.read_rows(experts.ROWS)) == text
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import learning_curves
+from benchmarks.learning import curves as learning_curves
 
 
 def test_the_tables_in_the_documentation_are_computed_from_what_is_on_file():

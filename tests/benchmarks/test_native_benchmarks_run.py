@@ -13,15 +13,10 @@ import pytest
 
 pytest.importorskip("matplotlib", reason="plots need matplotlib (extra: bench)")
 
-import homes_at_hand
-import idle_a6
-import idle_robot
-import idle_robots
-import made_dataset
-import states_share
-import timing
-from one_world import OneWorld
-
+from benchmarks.harness import homes as homes_at_hand
+from benchmarks.harness import idle_robot, made_dataset, timing
+from benchmarks.harness.one_world import OneWorld
+from benchmarks.speed import idle_a6, idle_robots, states_share
 from ig2mj.states.model import StateModel
 
 

@@ -8,16 +8,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
-import genesis_export
-import genesis_scene
 import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-import report
-from made_home import write_home
 
+from benchmarks.harness.made_home import write_home
+from benchmarks.peers import genesis_export, genesis_scene, report
 from ig2mj.calibration.pushing import push, start_pushing
 from ig2mj.calibration.reach import Reach
 from ig2mj.worlds.random_streams import step_keys
@@ -57,7 +55,7 @@ def test_an_exported_home_keeps_every_geom_that_collides(exported):
 
 def test_the_hand_in_torch_does_what_the_hand_in_jax_does(exported):
     torch: Any = pytest.importorskip("torch", reason="Genesis' hand is written in torch")
-    from genesis_hand import TorchHand
+    from benchmarks.peers.genesis_hand import TorchHand
 
     written = json.loads((exported / "home.json").read_text())
     fields: dict[str, Any] = {k: np.asarray(v) if isinstance(v, list) else v for k, v in written["reach"].items()}
@@ -84,7 +82,7 @@ def test_the_hand_in_torch_does_what_the_hand_in_jax_does(exported):
 
 
 def test_a_case_that_is_measured_is_not_measured_again(tmp_path):
-    import run
+    from benchmarks.peers import run
 
     rows = tmp_path / "rows.jsonl"
     rows.write_text(json.dumps({"engine": "ig2mj", "worlds": 8192, "control_steps_per_s": 1} | ROW | {"worlds": 8192}))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 
-import placement
+from benchmarks.sampling import placement
 
 
 def test_pairs_are_measured_once_and_summed_up(tmp_path, capsys):

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 
-import placement_disturbed
 import pytest
+
+from benchmarks.sampling import placement_disturbed
 
 
 def line(made: bool, possible: bool, **more):

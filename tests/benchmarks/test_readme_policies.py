@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import pathlib
 
-import readme_policies
+from benchmarks.learning import readme_table as readme_policies
 
 
 def test_the_table_is_that_of_the_cards():
     page = readme_policies.PAGE.read_text(encoding="utf-8")
-    assert page == readme_policies.page_with(readme_policies.table()), "python benchmarks/readme_policies.py --write"
+    assert page == readme_policies.page_with(readme_policies.table()), (
+        "python -m benchmarks.learning.readme_table --write"
+    )
 
 
 def test_there_is_a_row_for_each_policy():

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 
-import readme_speed
+from benchmarks.speed import readme_table as readme_speed
 
 
 def test_the_table_is_that_of_the_result_files():
     page = readme_speed.PAGE.read_text(encoding="utf-8")
-    assert page == readme_speed.page_with(readme_speed.table()), "python benchmarks/readme_speed.py --write"
+    assert page == readme_speed.page_with(readme_speed.table()), "python -m benchmarks.speed.readme_table --write"
 
 
 def test_the_speed_in_the_introduction_is_one_of_the_table():

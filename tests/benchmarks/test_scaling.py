@@ -10,10 +10,8 @@ import pytest
 
 pytest.importorskip("tyro")
 
-import all_reduce
-import scale_tables
-import scaling
-from waiting import Process
+from benchmarks.harness.waiting import Process
+from benchmarks.speed import scale_tables, scaling
 
 WORKER = """
 import json, sys
@@ -115,10 +113,3 @@ def test_ways_to_learn_on_two_gpus_are_told_apart(tmp_path, monkeypatch):
     assert named == {f"learner-{n}.json" for n in ("1-apart-0", "2-processes-0", "2-processes-1", "2-together-0")}
     told = [(r["gpus"], r.get("way")) for r in scale_tables.runs(tmp_path / "rows.jsonl")]
     assert told == [(1, None), (2, "processes")], "the tables tell what a GPU's own process does"
-
-
-def test_what_nccl_says_of_the_ways_between_gpus(tmp_path):
-    (tmp_path / "nccl-2-0").write_text("vm:1:9 [0] NCCL INFO Channel 00/0 : 0[0] -> 1[1] via SHM/direct/direct\n")
-    (tmp_path / "nccl-1-0").write_text("vm:1:9 [0] NCCL INFO Channel 23/0 : 0[0] -> 1[1] via P2P/direct pointer\n")
-    assert all_reduce.transports(tmp_path, "nccl-2-*") == ["SHM/direct/direct"]
-    assert all_reduce.transports(tmp_path, "nccl-1-*") == ["P2P/direct"]

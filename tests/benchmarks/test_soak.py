@@ -9,12 +9,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-import soak
-import soak_energy
-import soak_replay
-import soak_watch
 
 import ig2mj
+from benchmarks.soak import energy as soak_energy
+from benchmarks.soak import replay as soak_replay
+from benchmarks.soak import soak
+from benchmarks.soak import watch as soak_watch
 from ig2mj.agents.floating_hand import add_floating_hand
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.native.sleep import FULLY_AWAKE

@@ -7,11 +7,11 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
-from batch_case import Case
-from disturbance import Activity, geoms_of, join, lost_worlds, summary
-from made_home import write_home
 
 import ig2mj
+from benchmarks.harness.batch_case import Case
+from benchmarks.harness.disturbance import Activity, geoms_of, join, lost_worlds, summary
+from benchmarks.harness.made_home import write_home
 from ig2mj.engine.warp.profile import EngineProfile, save_profile
 from ig2mj.sampling.perturbation import loose_objects
 

@@ -9,8 +9,8 @@ import pytest
 
 pytest.importorskip("matplotlib", reason="plots need matplotlib (extra: bench)")
 
-import gpu_suite
-import throughput_report
+from benchmarks.speed import batch_report as throughput_report
+from benchmarks.speed import suite as gpu_suite
 
 ROW = {
     "scene": "made_60",

@@ -1,7 +1,7 @@
 """The solid ceiling of a home: one box over its walls that nobody sees, so that nothing flies out over them.
 
 Homes are converted with ceilings that everything passes. This one belongs to the compiled model only
-(`scene/unseen.py`). `benchmarks/throws.py`.
+(`scene/unseen.py`). `docs/notes/lost.md`.
 """
 
 from __future__ import annotations

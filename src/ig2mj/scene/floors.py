@@ -4,7 +4,7 @@ Contacts push a body out of a solid on the nearest side. What is dropped from sh
 several centimetres into the floor before it is pushed; where the floor is thin, part of it is then nearer to the
 underside and is pushed out there. In a deep floor it stays, but with contacts as stiff as others' (0.02 s, 2.4 physics
 steps) what is long and light is turned by a radian in a step, gains energy with each, and is thrown out.
-`benchmarks/drops.py`.
+`docs/notes/lost.md`.
 """
 
 from __future__ import annotations

@@ -1,0 +1,1 @@
+"""The same homes in PyBullet, MuJoCo Warp and Genesis."""

@@ -1,0 +1,1 @@
+"""How well conditions are made true."""

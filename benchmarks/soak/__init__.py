@@ -1,0 +1,1 @@
+"""Very many steps under random actions: what is lost, and whether energy grows."""

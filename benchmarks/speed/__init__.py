@@ -1,0 +1,1 @@
+"""Steps per second: one world on one core, batches on a GPU, environments, start-up."""
