@@ -22,13 +22,13 @@ import matplotlib
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 
-from benchmarks.harness.paths import ROOT
+from benchmarks.harness.paths import RESULTS, ROOT
 
 PAGE = ROOT / "docs" / "guide" / "learning.md"
 
 BEGIN, END = "<!-- tables: benchmarks/learning/curves.py -->", "<!-- end of tables -->"
 
-FOLDER = pathlib.Path(__file__).parent / "results" / "learning"
+FOLDER = RESULTS / "learning"
 
 PAPER = {
     "GraspingBook": (100, 25),

@@ -23,7 +23,7 @@ import time
 from collections.abc import Callable, Iterator
 
 from benchmarks.harness.made_home import write_home
-from benchmarks.harness.paths import RESULTS, module
+from benchmarks.harness.paths import RESULTS, environment, module
 from benchmarks.harness.paths import WORK as ALL_WORK
 from benchmarks.speed import suite as gpu_suite
 

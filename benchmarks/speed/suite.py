@@ -27,7 +27,7 @@ from typing import Literal
 import tyro
 
 from benchmarks.harness.made_home import write_home
-from benchmarks.harness.paths import ROOT, WORK, module
+from benchmarks.harness.paths import ROOT, WORK, environment, module
 
 SIZES = (20, 60, 120)
 PROFILES = WORK / "profiles"
