@@ -22,7 +22,7 @@ from ig2mj.engine.warp.profile import save_profile
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("home")
     parser.add_argument("--out", type=pathlib.Path, required=True)
     parser.add_argument("--worlds", type=int, default=0)

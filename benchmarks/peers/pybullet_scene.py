@@ -18,6 +18,7 @@ from xml.sax.saxutils import quoteattr
 import msgspec
 import mujoco
 import numpy as np
+from ig2mj_converters.base.description import PackedImage
 from ig2mj_converters.base.options import ConvertOptions
 from ig2mj_converters.bodies.assembly import Assembly, BodyPlan, VisualPart
 from ig2mj_converters.bodies.joint_limits import joint_range, unit_axis
@@ -119,7 +120,10 @@ def _assembly(scene: Scene, dataset: Dataset, entry: ObjectEntry) -> Assembly:
     hulls = ConvertOptions(**budget).hull_options(building=building)
     density = None if building else dataset.density(entry.category)
     found = decompose_model(model, hulls)
-    return build_model(model, found, np.array(entry.scale), density, hulls, False, igibson_visuals=True).assembly
+    return build_model(
+        model, found, np.array(entry.scale), density, hulls, False,
+        igibson_visuals=True, masses="object" if building else "dataset",
+    ).assembly  # fmt: skip
 
 
 def _write_object(
@@ -222,6 +226,7 @@ def _visual(folder: pathlib.Path, name: str, part: VisualPart) -> str:
         assert part.vertices is not None and part.faces is not None
         material = None
         if part.texture is not None:
+            assert not isinstance(part.texture, PackedImage), "datasets in iGibson's layout have image files"
             picture = pathlib.Path(part.texture)
             kept = f"{picture.parent.parent.name}_{picture.name}"
             if not (folder / kept).exists():

@@ -21,7 +21,7 @@ import pathlib
 import sys
 import time
 
-import pybullet as p
+import pybullet as p  # pyright: ignore[reportMissingImports]
 
 TIMESTEP, SUBSTEPS, SOLVER_ITERATIONS = 1 / 120, 4, 100
 NEAR, FAR = 0.05, 100.0

@@ -151,15 +151,15 @@ def measure(args: Args, folder: pathlib.Path) -> None:
         turn[one[0]] += 1
     todo.sort(key=turns.__getitem__)
     if args.jobs == 1:
-        for file, *what in todo:
-            _keep(file, _request(*what, args.seeds))
+        for file, home, predicate, first, second in todo:
+            _keep(file, _request(home, predicate, first, second, args.seeds))
         return
     spawn = multiprocessing.get_context("spawn")
     cores = spawn.Queue()
     for core in sorted(os.sched_getaffinity(0))[: args.jobs]:
         cores.put(core)
     with concurrent.futures.ProcessPoolExecutor(args.jobs, spawn, _take_core, (cores,)) as pool:
-        running = {pool.submit(_request, *what, args.seeds): file for file, *what in todo}
+        running = {pool.submit(_request, *one[1:], args.seeds): one[0] for one in todo}
         for k, done in enumerate(concurrent.futures.as_completed(running)):
             _keep(running[done], done.result())
             print(f"{k + 1} of {len(todo)} pairs", flush=True)
