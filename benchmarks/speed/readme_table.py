@@ -28,7 +28,9 @@ Row = dict[str, Any]
 def table() -> str:
     """Both tables, Markdown, each with its commit and command."""
     return (
-        _block(_one_core(), "control steps per second of processor time") + "\n" + _block(_one_gpu(), "control steps/s")
+        _block(_one_core(), "control steps per second of processor time")
+        + "\n"
+        + _block(_one_gpu(), "control steps/s: median and range of the calls")
     )
 
 
@@ -73,7 +75,7 @@ def _one_gpu() -> tuple[str, list[tuple[str, str]]]:
     def speed(scene: str, worlds: int, what: str = "full", engine: str = "ig2mj") -> str:
         asked = {"scene": scene, "worlds": worlds, "what": what, "engine": engine, "counts": True}
         found = [row for row in rows if asked.items() <= row.items()]
-        return _thousands(found[-1]["control_steps_per_s"]) if found else ""
+        return _median_and_range(found[-1]) if found else ""
 
     def cooking(*observations: str) -> str:
         asked = {"environment": "CookingMeat", "observations": list(observations)}
@@ -89,10 +91,27 @@ def _one_gpu() -> tuple[str, list[tuple[str, str]]]:
         ("the home `birch`, 8,192 worlds", speed("birch", 8192)),
         ("`birch` with an image in every step", speed("birch", 8192, "camera")),
         ("`birch`, physics alone", speed("birch", 8192, "physics")),
+        ("`birch`, time with states over time of physics alone, call by call", _states_cost(rows)),
         ("`birch`, physics alone, MuJoCo Warp as it comes", speed("birch", 8192, "physics", "mujoco_warp")),
         ("environment CookingMeat with the humanoid, 4,096 worlds", cooking()),
         ("CookingMeat with an image in every agent step", cooking("rgb", "depth")),
     ]
+
+
+def _median_and_range(row: Row) -> str:
+    """Of the timed calls, each of 30 control steps; without a range in rows that do not have it."""
+    median = _thousands(row["control_steps_per_s"])
+    ends = row.get("range_of_calls")
+    return f"{median} ({_thousands(ends[0])} to {_thousands(ends[1])})" if ends else median
+
+
+def _states_cost(rows: list[Row]) -> str:
+    """How much longer the k-th call takes with states than without, from rows that were measured in turns."""
+    found = [row["time_by_call_over"] for row in rows if row.get("time_by_call_over", {}).get("what") == "physics"]
+    if not found:
+        return ""
+    median, low, high = (f"{value:.2f}" for value in (found[-1]["median"], *found[-1]["range"]))
+    return f"{median} ({low} to {high})"
 
 
 def _thousands(rate: float) -> str:
