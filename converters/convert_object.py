@@ -20,6 +20,7 @@ from .base.naming import file_slug
 from .base.options import ConvertOptions, under_limits
 from .base.output import replaced_folder
 from .base.process_pool import TaskPool
+from .base.xml_reader import shortened
 from .bodies.assembly import Assembly, extent
 from .bodies.inertia import MassRule
 from .bodies.joint_limits import start_positions
@@ -27,6 +28,7 @@ from .bodies.kinematics import model_bounds
 from .bodies.placements import Placement, make_halves
 from .bodies.robot_description import ROBOT_FILE, put_on_floating_base, robot_json
 from .finish import Outcome, finish, version_record
+from .hulls.pieces import HullOptions
 from .mjcf.appearance import add_ground, add_setting
 from .mjcf.manifest_entries import object_entry
 from .mjcf.model_builder import ModelBuilder, write_model
@@ -38,7 +40,6 @@ from .reading.dataset import Dataset
 from .reading.metadata import read_metadata
 from .reading.scaling import scale_model
 from .reading.urdf import read_urdf
-from .reading.xml_reader import shortened
 
 
 @under_limits
@@ -131,7 +132,7 @@ def _dataset_root(file: pathlib.Path) -> pathlib.Path | None:
 
 def _build(source: ObjectModel, dataset: Dataset | None, scale: np.ndarray, options: ConvertOptions) -> BuiltModel:
     density = None if dataset is None else dataset.density(source.category)
-    hulls = options.hull_options()
+    hulls = HullOptions.of(options)
     with TaskPool(options.jobs) as pool:
         found = decompose_model(source, hulls, pool, options.progress)
     masses: MassRule = "robot" if source.category == ROBOT_CATEGORY else "object"

@@ -29,7 +29,7 @@ from .mjcf.scene import SceneBuild, build_scene, fill_states, rest_start
 from .model_task import BuiltModel, forget_datasets, is_quick, model_tasks, run_task
 from .reading.dataset import Dataset
 from .reading.room_maps import write_rooms
-from .reading.scene_urdf import parse_object_scope
+from .reading.scene_urdf import SceneOptions, parse_object_scope
 
 ROOMS_FILE = "rooms.npz"
 
@@ -59,7 +59,7 @@ def convert_scene(
     options.progress(0, 1, "reading the scene")
     forget_datasets()
     dataset = Dataset(dataset_root)
-    scene = dataset.scene(name, urdf, options.scene_options())
+    scene = dataset.scene(name, urdf, SceneOptions.of(options))
     skipped = _drop_missing(dataset, scene, options)
     placements, warnings = place_instances(scene)
     timings["scene"] = time.perf_counter() - start
@@ -168,7 +168,7 @@ def _run_tasks(
     """Builds each model at each of its sizes once, over the process pool."""
 
     def hulls(instance: Instance) -> HullOptions:
-        return options.hull_options(building=instance.kind == "building")
+        return HullOptions.of(options, building=instance.kind == "building")
 
     tasks, names = model_tasks(dataset, scene, instances, hulls, options.bullet_inertia)
     with TaskPool(options.jobs) as pool:

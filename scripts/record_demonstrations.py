@@ -19,7 +19,7 @@ import ig2mj
 from ig2mj.demos import Recording, Replayer, record
 from ig2mj.demos.compact import write_compact
 from ig2mj.envs.experts import expert_of
-from ig2mj.tasks.experts.expert import PLANS
+from ig2mj.tasks.activities import ACTIVITIES
 
 EPISODES, WORLDS, ROWS, SEED = 32, 4, 40, 14
 NOISE, DISTURBED, LENGTH = 0.1, 0.02, 5
@@ -49,7 +49,7 @@ def episodes_of(task: str, file: pathlib.Path) -> None:
 
 def main() -> None:
     FOLDER.mkdir(exist_ok=True)
-    for task in sys.argv[1:] or PLANS:
+    for task in sys.argv[1:] or ACTIVITIES:
         with tempfile.TemporaryDirectory() as scratch:
             file = pathlib.Path(scratch) / "runs.h5"
             episodes_of(task, file)

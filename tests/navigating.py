@@ -8,12 +8,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from ig2mj.envs.actor import Actor
-from ig2mj.tasks.navigation.task import NAVIGATION
+from ig2mj.tasks.registry import load_task
 
 
 def small(name: str, **changes):
     """The task in the smallest home."""
-    return dataclasses.replace(NAVIGATION[name], home="small_home", **changes)
+    return dataclasses.replace(load_task(name), home="small_home", **changes)
 
 
 def column(env, state, *names):

@@ -23,6 +23,7 @@ from ig2mj_converters.base.options import ConvertOptions
 from ig2mj_converters.bodies.assembly import Assembly, BodyPlan, VisualPart
 from ig2mj_converters.bodies.joint_limits import joint_range, unit_axis
 from ig2mj_converters.bodies.joint_rules import FRICTION, FRICTION_BY_CATEGORY
+from ig2mj_converters.hulls.pieces import HullOptions
 from ig2mj_converters.model_task import build_model, decompose_model
 from ig2mj_converters.reading.dataset import Dataset
 from scipy.spatial.transform import Rotation
@@ -117,7 +118,7 @@ def _assembly(scene: Scene, dataset: Dataset, entry: ObjectEntry) -> Assembly:
     model = read or dataset.model(entry.category, entry.model)
     given = scene.manifest.source.get("options", {})
     budget = {name: given[name] for name in ("seed", "max_hulls", "max_hull_vertices") if name in given}
-    hulls = ConvertOptions(**budget).hull_options(building=building)
+    hulls = HullOptions.of(ConvertOptions(**budget), building=building)
     density = None if building else dataset.density(entry.category)
     found = decompose_model(model, hulls)
     return build_model(

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 
 from ig2mj.errors import InputError
 
-from ..reading.xml_reader import read_xml, shortened
 from . import inputs
+from .xml_reader import read_xml, shortened
 
 PACKAGE_SEARCH_DEPTH = 8  # how many folders above an URDF are looked at for its ROS package
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+)://")

@@ -5,17 +5,30 @@ from __future__ import annotations
 import dataclasses
 import functools
 import pathlib
-from collections.abc import Callable, Collection
-from typing import TYPE_CHECKING, Any, Literal, ParamSpec, TypeVar
+from collections.abc import Callable, Collection, Sequence
+from typing import Any, Literal, ParamSpec, Protocol, TypeVar
 
 from ig2mj.callbacks import ProgressCallback, no_progress
 
 from .read_limits import ReadLimits, limits_of
 
-if TYPE_CHECKING:  # what these import takes seconds, which a conversion out of the cache need not spend
-    from ..hulls.pieces import HullOptions
-    from ..reading.scene_urdf import SceneOptions
-    from ..report.page import Renderer
+
+class Renderer(Protocol):
+    """What draws pictures: `ig2mj.viewer.offscreen.render`, handed in because the converter may not import it.
+
+    `camera` is given as an `ig2mj.viewer.offscreen.FreeView`.
+    """
+
+    def __call__(
+        self,
+        model: Any,
+        data: Any,
+        camera: Any = None,
+        *,
+        width: int = 640,
+        height: int = 480,
+        groups: Sequence[int] = (0, 1, 2),
+    ) -> Any: ...
 
 
 @dataclasses.dataclass(frozen=True)
@@ -69,28 +82,6 @@ class ConvertOptions:
     renderer: Renderer | None = None
     view: Callable[..., Any] | None = None
     progress: ProgressCallback = no_progress
-
-    def hull_options(self, *, building: bool = False) -> HullOptions:
-        """How collision geometry is decomposed. Wall segments are never merged: the gaps between them are doors."""
-        from ..hulls.pieces import HullOptions
-
-        return HullOptions(
-            max_hulls=None if building else self.max_hulls,
-            max_hull_vertices=self.max_hull_vertices,
-            seed=self.seed,
-            cache=self.cache,
-        )
-
-    def scene_options(self) -> SceneOptions:
-        """What of a scene is read."""
-        from ..reading.scene_urdf import SceneOptions
-
-        return SceneOptions(
-            seed=self.seed,
-            fixed_furniture=self.fixed_furniture,
-            only_rooms=self.only_rooms,
-            only_categories=self.only_categories,
-        )
 
     def record(self) -> dict[str, Any]:
         """What the manifest keeps of the options: those that decide what comes out."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from ..reading.xml_reader import Element, numbers
+from .xml_reader import Element, numbers
 
 ROTATION_TOLERANCE = 1e-9
 

@@ -7,6 +7,8 @@ from typing import Literal
 
 import numpy as np
 
+from ..base.options import ConvertOptions
+
 PieceKind = Literal["box", "cylinder", "sphere", "capsule", "hull"]
 PieceSource = Literal[
     "primitive", "group", "hull", "component", "boxes", "sheet", "coacd", "fallback", "merged", "recut"
@@ -49,6 +51,16 @@ class HullOptions:
     seed: int = 0
     threads: int = 1
     cache: bool = True
+
+    @classmethod
+    def of(cls, options: ConvertOptions, *, building: bool = False) -> HullOptions:
+        """Those of a conversion. Wall segments are never merged: the gaps between them are doors."""
+        return cls(
+            max_hulls=None if building else options.max_hulls,
+            max_hull_vertices=options.max_hull_vertices,
+            seed=options.seed,
+            cache=options.cache,
+        )
 
     def __post_init__(self) -> None:
         if self.max_hulls is not None and self.max_hulls < 1:

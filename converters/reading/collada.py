@@ -21,11 +21,11 @@ from collada.triangleset import TriangleSet
 from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  it has no stubs
 
 from ..base.read_limits import check_limit
+from ..base.xml_reader import Element, decode_xml, parse_number, parse_strictly, strip_namespace
 from .collada_looks import ColladaLooks
 from .geometry_parts import Geometry, Placed
 from .looks import Look, TextureReader
 from .mesh_limits import MeshError
-from .xml_reader import Element, decode_xml, parse_number, parse_strictly, strip_namespace
 
 NAMESPACE = "http://www.collada.org/2005/11/COLLADASchema"
 X_UP = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])

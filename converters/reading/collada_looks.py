@@ -5,8 +5,8 @@ from __future__ import annotations
 import pathlib
 
 from ..base.description import Rgba
+from ..base.xml_reader import Element, parse_number
 from .looks import Look, TextureReader
-from .xml_reader import Element, parse_number
 
 SHADINGS = ("constant", "lambert", "phong", "blinn")
 IMAGE_STEPS = 8

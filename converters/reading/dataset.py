@@ -13,6 +13,7 @@ from ig2mj.errors import InputError, UnknownNameError
 from ..base import inputs
 from ..base.description import Instance, ObjectModel, SceneDescription
 from ..base.file_access import FileGuard, OutsideError
+from ..base.xml_reader import read_xml
 from ..bodies.inertia import DEFAULT_DENSITY
 from .dataset_files import CategorySpec, read_lines, read_overlaps, read_specs, read_version
 from .looks import encrypted_twin
@@ -20,7 +21,6 @@ from .metadata import read_metadata
 from .room_maps import read_room_maps, room_at
 from .scene_urdf import FIXED_FURNITURE, SceneOptions, read_scene
 from .urdf import read_urdf
-from .xml_reader import read_xml
 
 __all__ = ["CategorySpec", "Dataset", "SceneOptions"]
 

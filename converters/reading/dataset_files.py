@@ -10,9 +10,9 @@ from typing import Any
 from ig2mj.errors import InputError
 
 from ..base import inputs
+from ..base.text import decoded
+from ..base.xml_reader import read_bytes
 from .json_reader import read_json, scalar, vector
-from .text import decoded
-from .xml_reader import read_bytes
 
 OLDEST, BEYOND = (2, 0, 6), (2, 2, 3)
 """iGibson 2.2.2 accepts OLDEST <= VERSION < BEYOND."""

@@ -20,11 +20,11 @@ from scipy.spatial.transform import Rotation
 from ig2mj.errors import InputError
 
 from ..base.read_limits import check_limit, limits
+from ..base.text import without_mark
 from .geometry_parts import Geometry, Placed
 from .json_reader import decode_json
 from .looks import Look, Texture, TextureReader
 from .mesh_limits import MeshError, check_faces
-from .text import without_mark
 
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}

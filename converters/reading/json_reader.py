@@ -12,8 +12,8 @@ import numpy as np
 from ig2mj.errors import InputError
 
 from ..base.read_limits import check_limit
-from .text import without_mark
-from .xml_reader import MAX_NUMBER, read_bytes
+from ..base.text import without_mark
+from ..base.xml_reader import MAX_NUMBER, read_bytes
 
 MAX_JSON_BYTES = 64 * 2**20
 

@@ -29,14 +29,14 @@ from ..base import inputs
 from ..base.description import Mesh, Rgba
 from ..base.file_access import FileGuard
 from ..base.read_limits import check_limit, limits
+from ..base.text import without_mark
+from ..base.xml_reader import read_bytes
 from .collada import Y_UP, read_collada
 from .geometry_parts import Geometry, MeshPart, Placed, parts_of
 from .gltf import read_gltf
 from .looks import Look, TextureReader, mean_vertex_colour
 from .mesh_limits import MeshError, check_faces
 from .obj_files import Material, ObjFile, group_meshes, material_meshes, read_mtl, read_obj
-from .text import without_mark
-from .xml_reader import read_bytes
 
 FORMATS = (".obj", ".stl", ".dae", ".glb", ".gltf", ".ply")
 

@@ -16,9 +16,9 @@ import numpy as np
 
 from ..base.description import Mesh
 from ..base.read_limits import check_limit, limits
+from ..base.text import decoded, without_mark
+from ..base.xml_reader import MAX_NUMBER, parse_number, read_bytes
 from .mesh_limits import MeshError, check_faces, check_vertices
-from .text import decoded, without_mark
-from .xml_reader import MAX_NUMBER, parse_number, read_bytes
 
 
 @dataclasses.dataclass

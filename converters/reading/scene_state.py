@@ -10,8 +10,8 @@ import numpy as np
 from ig2mj.errors import InputError
 
 from ..base.transforms import wxyz
+from ..base.xml_reader import Element, where
 from .json_reader import decode_json, scalar, vector
-from .xml_reader import Element, where
 
 
 def read_body_poses(link: Element, file: pathlib.Path) -> list[tuple[np.ndarray, np.ndarray]] | None:

@@ -16,11 +16,12 @@ import numpy as np
 from ig2mj.errors import InputError
 
 from ..base.description import Instance, SceneDescription
+from ..base.options import ConvertOptions
 from ..base.transforms import read_origin
+from ..base.xml_reader import Element, numbers, read_xml, where
 from .json_reader import decode_json
 from .scene_state import read_body_poses, read_body_velocities, read_joint_states, read_pose_offsets
 from .urdf_tree import check_name
-from .xml_reader import Element, numbers, read_xml, where
 
 BUILDING = ("walls", "floors", "ceilings")
 KINDS = {name: "building" for name in BUILDING} | {
@@ -63,6 +64,16 @@ class SceneOptions:
     only_categories: Collection[str] | None = None
     without_categories: Collection[str] = ()
     random_index: int | None = None
+
+    @classmethod
+    def of(cls, options: ConvertOptions) -> SceneOptions:
+        """Those of a conversion."""
+        return cls(
+            seed=options.seed,
+            fixed_furniture=options.fixed_furniture,
+            only_rooms=options.only_rooms,
+            only_categories=options.only_categories,
+        )
 
 
 def read_scene(file: str | os.PathLike, name: str) -> SceneDescription:

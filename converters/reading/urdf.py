@@ -15,11 +15,11 @@ from ..base import inputs
 from ..base.description import Inertial, Joint, Link, Mimic, ObjectModel
 from ..base.file_access import FileGuard
 from ..base.transforms import read_origin
+from ..base.xml_reader import Element, is_huge, number, numbers, read_xml, where
 from .urdf_geometry import GeometryReader
 from .urdf_leftovers import read_leftovers
 from .urdf_materials import UrdfMaterials
 from .urdf_tree import check_counts, check_name, find_tree
-from .xml_reader import Element, is_huge, number, numbers, read_xml, where
 
 JOINT_TYPES = ("fixed", "revolute", "prismatic", "continuous", "floating")
 MOVING = ("revolute", "prismatic", "continuous")

@@ -14,12 +14,12 @@ from ..base import inputs
 from ..base.description import Mesh, Shape
 from ..base.file_access import FileGuard
 from ..base.transforms import read_origin
+from ..base.xml_reader import Element, local_name, number, numbers, shortened, where
 from .geometry_parts import MeshPart
 from .looks import Look, TextureReader, encrypted_twin, is_encrypted
 from .mesh_files import read_collision, read_visual
 from .mesh_limits import MeshError
 from .urdf_materials import UrdfMaterials
-from .xml_reader import Element, local_name, number, numbers, shortened, where
 
 CONVEX_ENOUGH = 0.9
 """A group of a plain URDF's OBJ counts as a convex piece if it fills this much of its hull."""

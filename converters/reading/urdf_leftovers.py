@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from .xml_reader import Element, shortened, where
+from ..base.xml_reader import Element, shortened, where
 
 VECTORS = (("origin", "xyz"), ("origin", "rpy"), ("axis", "xyz"), ("mesh", "scale"), ("box", "size"))
 """Elements and attributes of three numbers."""

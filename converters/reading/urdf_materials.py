@@ -9,8 +9,8 @@ import numpy as np
 
 from ..base.description import Rgba
 from ..base.file_access import FileGuard
+from ..base.xml_reader import Element, parse_number, shortened, where
 from .looks import Look, TextureReader
-from .xml_reader import Element, parse_number, shortened, where
 
 
 class UrdfMaterials:

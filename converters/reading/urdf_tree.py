@@ -8,7 +8,7 @@ from ig2mj.errors import InputError
 
 from ..base.description import Joint, Link
 from ..base.read_limits import check_limit
-from .xml_reader import Element, where
+from ..base.xml_reader import Element, where
 
 MAX_NAME = 200
 

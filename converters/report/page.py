@@ -7,7 +7,7 @@ import json
 import math
 import pathlib
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -15,6 +15,7 @@ import numpy as np
 from ig2mj.scene.manifest import Manifest, ObjectEntry
 
 from ..base.description import RoomMaps
+from ..base.options import Renderer
 from ..base.outcome import CheckResult
 from ..hulls.pieces import LinkHulls
 from ..mjcf.model_index import ModelIndex, index_model
@@ -23,24 +24,6 @@ from .pictures import Pictures
 FORMAT_VERSION = 1
 RENDERED = "rendered"
 """What the report says of its pictures where they are not drawings."""
-
-
-class Renderer(Protocol):
-    """What draws pictures: `ig2mj.viewer.offscreen.render`, handed in because the converter may not import it.
-
-    `camera` is given as an `ig2mj.viewer.offscreen.FreeView`.
-    """
-
-    def __call__(
-        self,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        camera: Any = None,
-        *,
-        width: int = 640,
-        height: int = 480,
-        groups: Sequence[int] = (0, 1, 2),
-    ) -> np.ndarray: ...
 
 
 @dataclasses.dataclass

@@ -15,7 +15,7 @@ from ig2mj.predicates import logic
 from ig2mj.tasks import points
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.bddl.task import bddl_task
-from ig2mj.tasks.navigation.task import NAVIGATION
+from ig2mj.tasks.registry import load_task
 
 MESH = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
@@ -143,6 +143,6 @@ def test_every_class_that_tasks_are_made_of_has_a_word_of_its_own():
 
 def test_every_kind_of_task_has_a_hash():
     meal, *others = [bddl_task(name) for name in ("cleaning_up_after_a_meal", "putting_away_toys")]
-    tasks = [*ACTIVITIES.values(), NAVIGATION["PointNavigation"], NAVIGATION["Reaching"], meal, *others]
+    tasks = [*ACTIVITIES.values(), load_task("PointNavigation"), load_task("Reaching"), meal, *others]
     assert len({task_hash(task) for task in tasks}) == len(tasks)
     assert task_hash(meal) == task_hash(bddl_task("cleaning_up_after_a_meal"))

@@ -16,14 +16,13 @@ from ig2mj.demos.task_hash import task_hash
 from ig2mj.errors import UnknownNameError
 from ig2mj.scene.scene import load_scene
 from ig2mj.tasks.activities import ACTIVITIES
-from ig2mj.tasks.experts.expert import PLANS
-from ig2mj.tasks.task import make_robot
+from ig2mj.tasks.task import place_robot
 
 MEGABYTES = 10
 
 
 def test_there_are_32_successes_of_each_activity_in_ten_megabytes():
-    assert shipped() == sorted(PLANS)
+    assert shipped() == sorted(ACTIVITIES)
     assert sum(file.stat().st_size for file in folder().iterdir()) < MEGABYTES * 1e6
     for name in shipped():
         with Recording(find_recording(name)) as recording:
@@ -43,7 +42,7 @@ def test_they_are_of_the_activities_as_they_are_now():
     """Else they are refused by action: `make demonstrations` records them again."""
     for name in shipped():
         task = ACTIVITIES[name]
-        scene = load_scene(task.home, agents=[make_robot(task, "humanoid")], objects=task.objects)
+        scene = load_scene(task.home, agents=[place_robot(task, "humanoid")[1]], objects=task.objects)
         with Recording(find_recording(name)) as recording:
             assert recording.header["task_hash"] == task_hash(task, "humanoid", scene.object_names)
             assert recording.header["model_hash"] == physics_hash(scene.model)
@@ -56,7 +55,7 @@ def test_a_name_that_does_not_ship_is_an_error_with_near_matches():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", sorted(PLANS))
+@pytest.mark.parametrize("name", sorted(ACTIVITIES))
 def test_they_replay_by_state_and_where_the_processor_is_the_same_by_action(name):
     with Recording(find_recording(name)) as recording:
         replayer, ends = Replayer(recording, "state"), []

@@ -16,7 +16,7 @@ from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.bddl.binding import BindingError
 from ig2mj.tasks.bddl.task import bddl_task
 from ig2mj.tasks.homes import check_inside, in_home
-from ig2mj.tasks.navigation.task import NAVIGATION
+from ig2mj.tasks.registry import load_task
 
 COOKING = ACTIVITIES["CookingMeat"]
 
@@ -31,7 +31,7 @@ def test_navigation_goes_into_another_home_and_says_so_to_recordings():
 def test_a_task_in_a_home_of_ones_own_knows_the_whole_path(tmp_path, monkeypatch):
     shutil.copytree(scene_folder("small_home"), tmp_path / "mine", symlinks=True)
     monkeypatch.chdir(tmp_path)
-    task = in_home(NAVIGATION["PointNavigation"], "mine")
+    task = in_home(load_task("PointNavigation"), "mine")
     assert task.home == str(tmp_path / "mine") and task.goal == "point"
 
 

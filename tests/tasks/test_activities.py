@@ -8,11 +8,11 @@ from scipy.spatial.transform import Rotation
 
 from ig2mj.engine.registry import make_engine
 from ig2mj.envs.names import NAMES
-from ig2mj.errors import UnknownNameError
+from ig2mj.errors import EngineError
 from ig2mj.scene.scene import load_scene
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.reward import Reward
-from ig2mj.tasks.task import make_robot
+from ig2mj.tasks.task import place_robot
 from ig2mj.worlds.rules import Rules
 
 FLOOR = ("floors", "carpet")
@@ -26,7 +26,7 @@ def test_names_are_known_without_loading_tasks():
 def test_a_home_of_at_least_sixty_objects_has_all_that_the_activity_is_about(name):
     task = ACTIVITIES[name]
     for robot in task.robots:
-        scene = load_scene(task.home, agents=[make_robot(task, robot)], objects=task.objects)
+        scene = load_scene(task.home, agents=[place_robot(task, robot)[1]], objects=task.objects)
         rules = Rules.of_scene(scene).with_goal(task.goal)
         Reward(task, robot, scene, rules.model)
         assert len(load_scene(task.home).object_names) >= 60
@@ -37,14 +37,14 @@ def test_a_home_of_at_least_sixty_objects_has_all_that_the_activity_is_about(nam
 
 def test_one_arm_does_not_lift_the_cauldron():
     """Paper, appendix A.3: five of the six activities were learned by Fetch."""
-    with pytest.raises(UnknownNameError, match="humanoid"):
-        make_robot(ACTIVITIES["BimanualPickAndPlace"], "fetch")
+    with pytest.raises(EngineError, match=r"'fetch' has 1 hand: .* takes 2 \(humanoid can\)"):
+        place_robot(ACTIVITIES["BimanualPickAndPlace"], "fetch")
 
 
 @pytest.mark.parametrize("robot", ["humanoid", "fetch"])
 def test_whoever_slices_fruit_sees_the_part_of_the_table_where_things_lie(robot):
     task = ACTIVITIES["SlicingFruit"]
-    scene = load_scene(task.home, agents=[make_robot(task, robot)], objects=task.objects)
+    scene = load_scene(task.home, agents=[place_robot(task, robot)[1]], objects=task.objects)
     engine = make_engine("native", scene, 1)
     view, table = engine.view(engine.reset()), scene.object_index("coffee_table_0")
     low, high = np.asarray(view.aabb_low)[0, table], np.asarray(view.aabb_high)[0, table]

@@ -9,12 +9,12 @@ from ig2mj.sampling.bystanders import MOVED
 from ig2mj.scene.scene import load_scene
 from ig2mj.tasks.navigation.floor import FloorMap
 from ig2mj.tasks.navigation.starts import _Households
-from ig2mj.tasks.navigation.task import NAVIGATION
+from ig2mj.tasks.registry import load_task
 
 
 @pytest.mark.parametrize("name", ["RoomRearrangement", "InteractiveNavigation"])
 def test_furniture_that_is_opened_and_things_on_the_floor_move_nothing_else(name):
-    task = NAVIGATION[name]
+    task = load_task(name)
     scene = load_scene(task.home, objects=task.objects)
     households, tables = _Households(task, scene), scene.tables
     assert scene.rooms is not None and scene.rooms.traversable is not None

@@ -10,7 +10,7 @@ from ig2mj.engine.registry import make_engine
 from ig2mj.scene.scene import load_scene
 from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.reward import Measures, Reward
-from ig2mj.tasks.task import make_robot
+from ig2mj.tasks.task import place_robot
 from ig2mj.worlds.rules import Rules
 
 
@@ -28,7 +28,7 @@ def cleaning():
     """Scene, rules and rewards of both robots for the stained shelf, and one world of it."""
     task, made = ACTIVITIES["CleaningStainedShelf"], {}
     for robot in task.robots:
-        scene = load_scene(task.home, agents=[make_robot(task, robot)], objects=task.objects)
+        scene = load_scene(task.home, agents=[place_robot(task, robot)[1]], objects=task.objects)
         rules = Rules.of_scene(scene).with_goal(task.goal)
         made[robot] = Reward(task, robot, scene, rules.model), rules, make_engine("native", scene, 1)
     return made

@@ -34,6 +34,7 @@ from ig2mj.agents.parts import (
     set_inertia,
     visual,
 )
+from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.tables import SceneTables
@@ -66,13 +67,15 @@ LASER = (0.16, 0.0, 0.36)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class TurtleBot:
+class TurtleBot(TaskRobot):
     """The robot. `pos`, `quat`: its base on the floor. `discrete`: actions are one number, 0 to 4."""
 
     name: str = "turtlebot"
     pos: Vector = (0, 0, 0)
     quat: Vector = (1, 0, 0, 0)
     discrete: bool = False
+
+    drives = True
 
     def attach(self, spec: mujoco.MjSpec, pos: Vector | None = None, quat: Vector | None = None) -> AgentEntry:
         pos, quat = self.pos if pos is None else pos, normalized(self.quat if quat is None else quat)

@@ -17,7 +17,7 @@ def run(
     seed: int = 0,
     safety: float = 0.0,
     hand: bool = True,
-    robot: Literal["hand", "humanoid", "fetch", "turtlebot"] = "hand",
+    robot: str = "hand",
     out: pathlib.Path | None = None,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> None:
@@ -88,19 +88,18 @@ def _with_hand(scene: pathlib.Path, hand: bool):
 
 def _with_robot(scene: pathlib.Path, robot: str):
     """The scene with a robot on the free place from which a hand reaches most; where there is none, at its start."""
-    from ig2mj.agents import Fetch, Humanoid, TurtleBot
+    from ig2mj.agents.registry import make_robot
     from ig2mj.calibration.reach import find_reach
     from ig2mj.errors import EngineError
     from ig2mj.scene.scene import load_scene
 
-    kind = {"humanoid": Humanoid, "fetch": Fetch, "turtlebot": TurtleBot}[robot]
-    height = kind().pos[2]
+    body = make_robot(robot)
     try:
         x, y, _ = find_reach(load_scene(scene)).start
     except EngineError as e:
         print(f"note: {e}; the robot stands at its own start", file=sys.stderr)
-        return load_scene(scene, [kind()])
-    return load_scene(scene, [kind(pos=(x, y, height))])
+        return load_scene(scene, [body])
+    return load_scene(scene, [body.at(x, y, 0.0)])
 
 
 def _table(title: str, profile, model):

@@ -49,6 +49,7 @@ def run(
         for binding in BINDINGS:
             print(f"{binding.shown:16} {binding.command}")
         return 0
+    from ig2mj.agents.registry import ROBOTS
     from ig2mj.cli.common.files import check_output
     from ig2mj.cli.robot_urdf import check_layout, own_robot
     from ig2mj.envs.registry import find_task, make
@@ -58,8 +59,8 @@ def run(
     from ig2mj.viewer.play.session import PlaySession, launch
 
     task = find_task(env)
-    if robot is not None and robot not in task.robots:
-        raise UnknownNameError("robot", robot, task.robots)
+    if robot is not None and robot not in ROBOTS:
+        raise UnknownNameError("robot", robot, ROBOTS)
     check_display()
     check_layout(robot_urdf, robot_layout)
     if record is not None:

@@ -17,8 +17,8 @@ from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment
 from ig2mj.errors import UnknownNameError
 from ig2mj.process import entry_point
+from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.experts import Expert
-from ig2mj.tasks.experts.expert import PLANS
 from ig2mj.tasks.task import Task
 
 
@@ -26,8 +26,9 @@ def make_expert(env: Environment) -> Expert:
     """The expert of an environment's task and robot, not compiled: from view and states to actions. Raises as
     `expert_of`."""
     rules = env.core.rules
-    if not isinstance(env.task, Task) or rules is None:
-        raise UnknownNameError("task with an expert", env.task.name, PLANS)
+    if not isinstance(env.task, Task) or env.task.expert is None or rules is None:
+        names = [name for name, task in ACTIVITIES.items() if task.expert is not None]
+        raise UnknownNameError("task with an expert", env.task.name, names)
     return Expert(env.task, env.robot, env.scene, rules.model, env.grasping)
 
 
@@ -37,7 +38,7 @@ def expert_of(env: Environment) -> Callable[..., Float[Array, "W n"]]:
     `ig2mj.tasks.experts.Expert` does, to actions.
 
     Raises:
-      UnknownNameError: the task has no expert.
+      UnknownNameError: the task has no expert. EngineError: the robot lacks hands that tasks move.
     """
     acts = jax.jit(make_expert(env))
     return lambda state, beliefs=None: acts(state.batch.world.view, state.batch.world.states, beliefs)

@@ -1,4 +1,4 @@
-"""Names of all environments, for Gymnasium and for the shell; nothing else is imported for them."""
+"""Names of all environments, for Gymnasium and for the shell; no task is imported for them."""
 
 from __future__ import annotations
 
@@ -6,23 +6,12 @@ import re
 from typing import Any
 
 from ig2mj.errors import InputError
+from ig2mj.tasks.registry import TASKS
 
 NAMESPACE, VERSION = "ig2mj", 0
 """Of the names that Gymnasium knows: ig2mj/CookingMeat-v0."""
 
-NAMES = (
-    "GraspingBook",
-    "SoakingTowel",
-    "CleaningStainedShelf",
-    "CookingMeat",
-    "SlicingFruit",
-    "BimanualPickAndPlace",
-    "PointNavigation",
-    "InteractiveNavigation",
-    "DynamicNavigation",
-    "Reaching",
-    "RoomRearrangement",
-)
+NAMES = tuple(TASKS)
 
 _NAME = re.compile(rf"(?:{NAMESPACE}/)?(?P<name>[^/]+?)(?:-v(?P<version>\d+))?")
 

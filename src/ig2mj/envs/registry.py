@@ -18,7 +18,7 @@ import jax
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import MODES, Grasping
-from ig2mj.agents.urdf import UrdfRobot
+from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.engine.base import whole_number
 from ig2mj.engine.registry import check_options, make_engine
 from ig2mj.envs.environment import Environment
@@ -29,11 +29,12 @@ from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.process import entry_point, run_programs_inline
 from ig2mj.sensors.base import SensorOptions
 from ig2mj.sensors.suite import SensorSuite
-from ig2mj.tasks.activities import ACTIVITIES
 from ig2mj.tasks.bddl.task import BddlTask, bddl_task
 from ig2mj.tasks.homes import AnyTask, in_home
 from ig2mj.tasks.mixing import mixed_pool
-from ig2mj.tasks.navigation.task import NAVIGATION, NavigationTask
+from ig2mj.tasks.navigation.task import NavigationTask
+from ig2mj.tasks.registry import TASKS as TASK_NAMES
+from ig2mj.tasks.registry import load_task
 from ig2mj.tasks.task import Task
 from ig2mj.tasks.variants import variant as task_variant
 from ig2mj.worlds.core import Core
@@ -42,7 +43,7 @@ from ig2mj.worlds.pool import Pool
 VECTORS = ("proprioception", "privileged_state")
 """Observations that every engine and every task can make."""
 
-TASKS: dict[str, Task | NavigationTask] = {**ACTIVITIES, **NAVIGATION}
+TASKS: dict[str, Task | NavigationTask] = {name: load_task(name) for name in TASK_NAMES}
 """By name, in the order of `list_envs`."""
 
 
@@ -69,7 +70,7 @@ def find_task(name: str) -> AnyTask:
 @entry_point
 def make(
     name: str | AnyTask,
-    robot: str | UrdfRobot | None = None,
+    robot: str | TaskRobot | None = None,
     worlds: int = 1,
     engine: str | None = None,
     grasping: str | None = None,
@@ -92,9 +93,10 @@ def make(
 
     Args:
       name: of a task (`list_envs`), "activity/" and the name of an activity of BEHAVIOR-100, or a task of your own.
-      robot: "humanoid", "fetch" or "turtlebot"; None: the first that the task lists. Or one of your own from a URDF
-        (`ig2mj.agents.urdf`): an action then has every number of its controller, and in activities it stands where
-        Fetch would.
+      robot: a name of `ig2mj.agents.registry` ("humanoid", "fetch", "turtlebot", or one that you have registered), or
+        a robot itself, as one from a URDF (`ig2mj.agents.urdf`), whose actions have every number of its controller;
+        None: the first that the task lists. One that an activity does not list stands where the listed one with the
+        lowest base would.
       worlds: how many step together.
       engine: "native", "warp" or "jax"; None: "warp" where JAX has a GPU, else "native".
       grasping: "mitten" (sticks to the task's first object at the first touch, as in the paper's experiments),
@@ -179,8 +181,8 @@ def make(
         settings = dataclasses.replace(settings, width=image_size, height=image_size)
     perceived = SensorSuite(physics, scene, rules.model, controllers[0], chosen, settings)
     observer = Observer(observations, setup.objective, perceived)
-    name = robot if isinstance(robot, str) else robot.name
-    env = Environment(task, name, scene, core, setup.actions, setup.objective, observer, mode, setup.companions, period)
+    who = robot if isinstance(robot, str) else robot.name
+    env = Environment(task, who, scene, core, setup.actions, setup.objective, observer, mode, setup.companions, period)
     # Of a BDDL activity fewer rows than asked for may be good, and its robot stands where the first row wants it.
     size = pool_size if isinstance(task, BddlTask) else rows
     env.made_with = {"paper_rl": paper_rl, "split": split, "pool_size": size, **options}

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD, Controller, Robot
-from ig2mj.agents.fetch import Fetch
+from ig2mj.agents.registry import make_robot
+from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.agents.turtlebot import TurtleBot
-from ig2mj.agents.urdf import UrdfRobot
 from ig2mj.envs.environment import Companions
-from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.errors import EngineError
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.tasks.actions import ActionMap, hand_actions, robot_actions, whole_actions
 from ig2mj.tasks.activity_objective import ActivityObjective
@@ -27,18 +26,12 @@ from ig2mj.tasks.navigation.starts import make_starts
 from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.objective import Objective
 from ig2mj.tasks.pools import pool_of
-from ig2mj.tasks.task import ROBOTS, Task, make_robot
+from ig2mj.tasks.task import Task, place_robot
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.rules import Rules
 
 PAPER_RL_STAINS = 0.75
 """Share of the stains that may stay in the paper's runs (appendix of the paper)."""
-
-STANDING = {"humanoid": 0.55, "fetch": 0.0}
-"""m above the floor at which robots start."""
-
-DRIVERS: dict[str, Any] = {"turtlebot": TurtleBot, "fetch": Fetch}
-"""Robots of navigation tasks by name."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -47,6 +40,10 @@ class Control:
 
     whole: bool = False
     period: float = ACTION_PERIOD
+
+    def of(self, robot: TaskRobot) -> Control:
+        """The same for a robot that tasks give every number of its controller."""
+        return dataclasses.replace(self, whole=self.whole or robot.own_actions)
 
     def controller(self, robot: Robot, scene: Scene) -> Controller:
         """Of the scene's first robot."""
@@ -79,7 +76,7 @@ class Setup:
 
 def setup_activity(
     task: Task,
-    robot: str | UrdfRobot,
+    robot: str | TaskRobot,
     grasping: str,
     pool: Pool | None,
     split: str,
@@ -88,13 +85,8 @@ def setup_activity(
     control: Control,
 ) -> Setup:
     """Of an activity. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
-    if isinstance(robot, UrdfRobot):
-        (task, body), robot = _in_place_of_fetch(task, robot), robot.name
-        control = dataclasses.replace(control, whole=True)
-    elif robot not in ROBOTS:
-        raise UnknownNameError("robot", robot, ROBOTS)
-    else:
-        body = make_robot(task, robot, drives=control.whole)
+    task, body = place_robot(task, robot, drives=control.whole)
+    name, control = robot if isinstance(robot, str) else robot.name, control.of(body)
     scene = load_scene(task.home, agents=[body], objects=task.objects)
     check_inside(task.name, scene)
     rules = rules_of(task, scene, paper_rl)
@@ -104,12 +96,13 @@ def setup_activity(
         rules,
         lambda: pool if pool is not None else pool_of(task, split, count),
         (controller,),
-        ActivityObjective(task, robot, scene, rules.model),
+        ActivityObjective(task, name, scene, rules.model),
         control.actions(
             controller,
             lambda: hand_actions(
                 controller.action_names,
-                task.acts(robot).hands,
+                body.hand_controls,
+                task.acts(name).hands,
                 closing=grasping != "mitten",
                 period=control.period,
             ),
@@ -119,20 +112,15 @@ def setup_activity(
 
 
 def setup_navigation(
-    task: NavigationTask, robot: str | UrdfRobot, split: str, count: int | None, control: Control
+    task: NavigationTask, robot: str | TaskRobot, split: str, count: int | None, control: Control
 ) -> Setup:
     """Of a navigation task. Arguments as of `ig2mj.make`; `count`: start states."""
-    if isinstance(robot, UrdfRobot):
-        if not robot.drives:
-            raise EngineError(f"robot '{robot.name}' is fixed to the floor: it cannot do {task.name}")
-        if task.goal != "point" and robot.layout.hand is None:
-            raise EngineError(f"robot '{robot.name}' has no hand: it cannot do {task.name}")
-        first: Robot = robot
-        control = dataclasses.replace(control, whole=True)
-    elif robot not in task.robots:
-        raise UnknownNameError(f"robot that can do {task.name}", robot, task.robots)
-    else:
-        first = DRIVERS[robot]()
+    first = make_robot(robot) if isinstance(robot, str) else robot
+    name, control = robot if isinstance(robot, str) else robot.name, control.of(first)
+    if not first.drives:
+        raise EngineError(f"robot '{name}' does not drive: it cannot do {task.name} ({', '.join(task.robots)} can)")
+    if task.goal != "point" and not first.hand_count:
+        raise EngineError(f"robot '{name}' has no hand: it cannot do {task.name} ({', '.join(task.robots)} can)")
     others = [TurtleBot(name=f"other_{k}") for k in range(task.others)]
     robots: list[Robot] = [first, *others]
     scene = load_scene(task.home, agents=robots, objects=task.objects)
@@ -152,21 +140,25 @@ def setup_navigation(
         controllers,
         NavigationObjective(task, scene, starts),
         control.actions(
-            controllers[0], lambda: robot_actions(controllers[0].action_names, arm=arm, gripper=task.goal == "close")
+            controllers[0],
+            lambda: robot_actions(
+                controllers[0].action_names, first.hand_controls, arm=arm, gripper=task.goal == "close"
+            ),
         ),
         companions=companions,
     )
 
 
 def setup_bddl(
-    task: BddlTask, robot: str | UrdfRobot, pool: Pool | None, split: str, count: int | None, control: Control
+    task: BddlTask, robot: str | TaskRobot, pool: Pool | None, split: str, count: int | None, control: Control
 ) -> Setup:
     """Of an activity that BDDL defines. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
-    if isinstance(robot, str) and robot not in task.robots:
-        raise UnknownNameError(f"robot that can do {task.name}", robot, task.robots)
+    body = make_robot(robot) if isinstance(robot, str) else robot
+    if isinstance(robot, str) and not body.hand_count:
+        raise EngineError(f"robot '{robot}' has no hand: it cannot do {task.name} ({', '.join(task.robots)} can)")
     rows = pool if pool is not None else activity_pool(task, split, count)
     x, y = standing_place(task, rows)
-    body: Robot = robot.at(x, y, 0.0) if isinstance(robot, UrdfRobot) else ROBOTS[robot](pos=(x, y, STANDING[robot]))
+    body = body.at(x, y, 0.0)
     scene = load_scene(task.home, agents=[body], objects=task.binding.additions)
     rules = Rules.of_scene(scene)
     goal = conditions(task.binding).compile_goal(rules.model)
@@ -174,15 +166,6 @@ def setup_bddl(
     objective = BddlObjective(task.objects_in(scene), goal, scene)
     actions = whole_actions(controller.action_names, controller.action_high)
     return Setup(scene, rules.with_goal(goal), lambda: rows, (controller,), objective, actions)
-
-
-def _in_place_of_fetch(task: Task, robot: UrdfRobot) -> tuple[Task, UrdfRobot]:
-    """The task with a robot of one's own, and that robot where Fetch would stand. Raises EngineError without a hand."""
-    if robot.layout.hand is None:
-        raise EngineError(f"robot '{robot.name}' has no hand: it cannot do {task.name}")
-    acts = dataclasses.replace(task.acts("fetch"), hands=(0,))
-    placed = robot.at(acts.pos[0], acts.pos[1], np.radians(acts.yaw))
-    return dataclasses.replace(task, robots={**task.robots, robot.name: acts}), placed
 
 
 def rules_of(task: Task, scene: Scene, paper_rl: bool = False) -> Rules:

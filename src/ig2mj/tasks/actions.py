@@ -1,10 +1,8 @@
-"""What an action of a task moves: the velocities of one hand or of both, while the rest of the robot stays.
+"""The action of a task: velocities of one hand or of both, while the rest of the robot stays where it is.
 
 Six numbers of -1 to 1 for each hand: linear velocity, then angular velocity, about the axes of the robot's base. At 1
-they are 0.5 m/s and 0.5 rad/s (paper, appendix A.3). Where hands do not stick by themselves a
-seventh number of each closes them: the humanoid's opens or closes by that much, Fetch's opens from 0 on.
-
-Fetch's controller makes a fifth of the way to a goal 0.2 m ahead in an action: its 1 is 0.4 m/s.
+they are 0.5 m/s and 0.5 rad/s (paper, appendix A.3), or what the robot's `HandControl` says. Where hands do not stick
+by themselves, a seventh number of each closes them.
 
 Axes: W worlds, n numbers of an action, m of the controller's action.
 """
@@ -19,17 +17,15 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.agents.task_robot import HandControl
 from ig2mj.engine.view import Array
 from ig2mj.errors import EngineError
 
-SPEED, TURN_SPEED = 0.5, 0.5
-"""m/s and rad/s of a 1."""
+TURN_SPEED = 0.5
+"""rad/s of a hand at 1 (paper, appendix A.3)."""
 
-FETCH_TURN = 0.5
-"""Share of Fetch's largest turn, 1 rad/s, that is `TURN_SPEED`."""
-
-_POSE = ("x", "y", "z", "roll", "pitch", "yaw")
-_ROTATION = ("x", "y", "z", "rx", "ry", "rz")
+DRIVE = ("forward", "turn_left")
+"""Numbers of a controller's action that drive a robot."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -58,36 +54,34 @@ class ActionMap:
 
 
 def hand_actions(
-    names: Sequence[str], hands: tuple[int, ...], closing: bool, period: float = ACTION_PERIOD
+    names: Sequence[str],
+    controls: Sequence[HandControl],
+    hands: tuple[int, ...],
+    closing: bool,
+    period: float = ACTION_PERIOD,
 ) -> ActionMap:
     """The action that moves these hands of a robot.
 
     Args:
-      names: of the robot's action (`Controller.action_names`). hands: numbers among the robot's hands.
-      closing: with a number for each hand that closes it. period: seconds of an action.
+      names: of the robot's action (`Controller.action_names`). controls: of all of its hands.
+      hands: numbers among them. closing: with a number for each hand that closes it. period: seconds of an action.
 
     Raises:
       EngineError: the robot has no such hands to move.
     """
     names = tuple(names)
-    rest = np.zeros(len(names), np.float32)
-    step = SPEED * period, TURN_SPEED * period
-    if "right_hand_x" in names:
-        sides = [("left_hand", "right_hand")[h] for h in hands]
-        wanted = [[f"{s}_{n}" for n in (*_POSE, *(["trigger"] if closing else []))] for s in sides]
-        scale = [step[0]] * 3 + [step[1]] * 3 + [1.0] * closing
-    elif "eef_x" in names and hands == (0,):
-        wanted = [[*(f"eef_{n}" for n in _ROTATION), *(["gripper"] if closing else [])]]
-        scale = [1.0] * 3 + [FETCH_TURN] * 3 + [1.0] * closing
-    else:
-        raise EngineError(
-            f"a robot with the actions {', '.join(names[:6])}, ... has no hands {hands} that a task moves"
-        )
-    if "gripper" in names and not closing:
-        rest[names.index("gripper")] = 1.0  # open
-    chosen = [name for hand in wanted for name in hand]
+    if not set(hands) <= set(range(len(controls))):
+        raise EngineError(f"a robot with {len(controls)} hands that tasks can move has no hands {hands}")
+    chosen, scale = [], []
+    for control in (controls[h] for h in hands):
+        rate = period if control.displaces else 1.0
+        chosen += [*control.move, *control.turn]
+        scale += [control.move_scale * rate] * 3 + [control.turn_scale * rate] * 3
+        if closing:
+            chosen.append(control.close)
+            scale.append(1.0)
     places = np.array([names.index(name) for name in chosen])
-    return ActionMap(tuple(chosen), places, np.array(scale * len(hands), np.float32), rest)
+    return ActionMap(tuple(chosen), places, np.array(scale, np.float32), _rest(names, controls))
 
 
 def whole_actions(names: Sequence[str], high: Float[np.ndarray, "n"]) -> ActionMap:
@@ -95,26 +89,34 @@ def whole_actions(names: Sequence[str], high: Float[np.ndarray, "n"]) -> ActionM
     return ActionMap(tuple(names), np.arange(len(names)), high.astype(np.float32), np.zeros(len(names), np.float32))
 
 
-DRIVE = ("forward", "turn_left")
-ARM = tuple(f"eef_{n}" for n in _ROTATION)
-
-
-def robot_actions(names: Sequence[str], arm: bool = False, gripper: bool = False) -> ActionMap:
-    """The robot's own numbers, -1 to 1, of its drive, and where they are wanted of its arm and gripper.
+def robot_actions(
+    names: Sequence[str], controls: Sequence[HandControl] = (), arm: bool = False, gripper: bool = False
+) -> ActionMap:
+    """The robot's own numbers, -1 to 1, of its drive, and where asked for of its first hand.
 
     Args:
-      names: of the robot's action (`Controller.action_names`). What is not wanted stays as it is, the gripper open.
+      names: of the robot's action (`Controller.action_names`). controls: of its hands.
+      arm, gripper: the first hand is moved, and closed. What is not asked for stays as it is, open hands open.
 
     Raises:
-      EngineError: the robot does not drive, or has no arm.
+      EngineError: the robot does not drive, or has no hand.
     """
     names = tuple(names)
-    wanted = (*DRIVE, *(ARM if arm else ()), *(("gripper",) if gripper else ()))
-    missing = [name for name in wanted if name not in names]
+    if (arm or gripper) and not controls:
+        raise EngineError(f"a robot with the actions {', '.join(names[:6])} has no hand that tasks can move")
+    moved = (*controls[0].move, *controls[0].turn) if arm else ()
+    chosen = (*DRIVE, *moved, *((controls[0].close,) if gripper else ()))
+    missing = [name for name in chosen if name not in names]
     if missing:
         raise EngineError(f"a robot with the actions {', '.join(names[:6])} lacks {', '.join(missing)}")
+    places = np.array([names.index(name) for name in chosen])
+    return ActionMap(chosen, places, np.ones(len(chosen), np.float32), _rest(names, controls))
+
+
+def _rest(names: tuple[str, ...], controls: Sequence[HandControl]) -> Float[np.ndarray, "m"]:
+    """The controller's action in which nothing moves and hands that rest open are open."""
     rest = np.zeros(len(names), np.float32)
-    if "gripper" in names:
-        rest[names.index("gripper")] = 1.0
-    places = np.array([names.index(name) for name in wanted])
-    return ActionMap(wanted, places, np.ones(len(wanted), np.float32), rest)
+    for control in controls:
+        if control.rests_open:
+            rest[names.index(control.close)] = control.opens
+    return rest

@@ -7,20 +7,27 @@ them), a goal, what the reward is made of, and for each robot where it starts an
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Collection, Mapping
-from typing import Any, ClassVar, Protocol, runtime_checkable
+import math
+from collections.abc import Callable, Collection, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
 
-from ig2mj.agents.base import Robot
-from ig2mj.agents.fetch import Fetch
-from ig2mj.agents.humanoid import Humanoid
-from ig2mj.errors import UnknownNameError
+from ig2mj.agents.registry import make_robot
+from ig2mj.agents.task_robot import TaskRobot
+from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.tasks.points import Hand, Point
+
+if TYPE_CHECKING:
+    from ig2mj.tasks.experts.motion import Wish
+    from ig2mj.tasks.experts.sight import Sight
 
 HORIZON = 200
 """Agent steps of 1/10 s in an episode: 20 s (paper, appendix A.3)."""
 
 GROUND = ("floors", "carpet", "mat", "rug")
 """Categories that count as the floor: a robot that touches them has not run into anything."""
+
+Plan = Callable[["Sight"], "list[Wish]"]
+"""Of an expert: from what it sees to what each acting hand should do now."""
 
 Vector3 = tuple[float, float, float]
 
@@ -74,7 +81,8 @@ class TaskLike(Protocol):
 
     Attributes:
       name: as `ig2mj.make` takes it. summary: one sentence. home: a shipped home. horizon: agent steps of an episode.
-      robots: names of those that can do it.
+      robots: names of those that it is made for, the usual one first. Others of the registry take part if they have
+        what it takes.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
@@ -134,9 +142,11 @@ class Task:
       objects_of_interest: the objects that the task is about; the first is what mittens take hold of.
       distances: pairs of points whose distances the reward is made of, in the order of the stages.
       stains_of: object whose stains are counted in the reward, or None.
-      robots: name of each robot that can do it, and how it takes part.
+      robots: name of each robot that it is made for, and how it takes part (others: `place_robot`).
       horizon: agent steps until an episode is truncated. grasping: mode unless another is asked for.
       physical: what is different with "physical" grasping; None: nothing.
+      expert: what each acting hand should do now, a function of this module's file that is pure and batched
+        (`ig2mj.tasks.experts`); None: the task has no scripted expert.
     """
 
     name: str
@@ -156,6 +166,7 @@ class Task:
     grasping: str = "mitten"
     # Not in the text that recordings know a task by: where it applies, it shows in `objects` and `near`.
     physical: Physical | None = dataclasses.field(default=None, repr=False)
+    expert: Plan | None = dataclasses.field(default=None, repr=False)
 
     def acts(self, robot: str) -> Acts:
         """How a robot takes part. Raises UnknownNameError."""
@@ -173,24 +184,46 @@ def _own_hand(point: Point, hands: tuple[int, ...]) -> Point:
     return Hand(hands[point.number]) if isinstance(point, Hand) else point
 
 
-ROBOTS: dict[str, type] = {"humanoid": Humanoid, "fetch": Fetch}
-"""Robots that tasks know by name."""
-
 RIGHT = (1,)
 BOTH = (0, 1)
 """Hands of the humanoid."""
 
 
-def make_robot(task: Task, robot: str, *, drives: bool = False) -> Robot:
-    """The robot at its start in a task. Fetch's base is pinned there, as in iGibson's experiments, unless it `drives`.
+def role_of(task: Task, robot: str, body: TaskRobot) -> Acts:
+    """How a robot takes part in a task. One that the task does not list takes the role of the listed one whose base
+    starts lowest: it stands on the floor there, and acts with its first hands, as many as the task takes.
+
+    Args:
+      robot: its name. body: the robot.
 
     Raises:
-      UnknownNameError: the robot cannot do the task.
+      EngineError: it has fewer hands than the task takes.
     """
-    import math
+    if robot in task.robots and not body.own_actions:  # a robot from a URDF may have the name of another
+        return task.robots[robot]
+    role = min(task.robots.values(), key=lambda listed: listed.pos[2])
+    hands = tuple(range(len(role.hands)))
+    if body.hand_count < len(hands):
+        count = f"{body.hand_count or 'no'} hand{'s' * (body.hand_count > 1)}"
+        raise EngineError(
+            f"robot '{robot}' has {count}: it cannot do {task.name}, which takes {len(hands)} "
+            f"({', '.join(task.robots)} can)"
+        )
+    return dataclasses.replace(role, pos=(*role.pos[:2], body.stands), hands=hands)
 
-    acts = task.acts(robot)
-    half = math.radians(acts.yaw) / 2
-    camera = {"camera_tilt": acts.camera_tilt, "camera_pan": acts.camera_pan}
-    options = {"proprioception": "experiments", "pinned": not drives, **camera} if robot == "fetch" else {}
-    return ROBOTS[robot](pos=acts.pos, quat=(math.cos(half), 0.0, 0.0, math.sin(half)), **options)
+
+def place_robot(task: Task, robot: str | TaskRobot, *, drives: bool = False) -> tuple[Task, TaskRobot]:
+    """The task, which then lists the robot, and the robot at its start.
+
+    Args:
+      robot: a name of the registry, or a robot. drives: its base is free to move even where the paper's experiments
+        pin it.
+
+    Raises:
+      UnknownNameError: no such robot. EngineError: see `role_of`.
+    """
+    name, body = (robot, make_robot(robot)) if isinstance(robot, str) else (robot.name, robot)
+    role = role_of(task, name, body)
+    body = body.for_activity(drives=drives, camera_tilt=role.camera_tilt, camera_pan=role.camera_pan)
+    task = dataclasses.replace(task, robots={**task.robots, name: role})
+    return task, body.at(*role.pos[:2], math.radians(role.yaw), role.pos[2])

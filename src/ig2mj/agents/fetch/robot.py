@@ -39,6 +39,7 @@ from ig2mj.agents.parts import (
     servo,
     set_inertia,
 )
+from ig2mj.agents.task_robot import HandControl, TaskRobot
 from ig2mj.errors import UnknownNameError
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.tables import SceneTables
@@ -66,8 +67,18 @@ LASER = (0.30, 0.0, 0.2878)
 """m: before the shell. The maker's laser_link is at 0.235, in a slot that our shell has not, and sees 220 degrees."""
 
 
+HAND = HandControl(
+    move=("eef_x", "eef_y", "eef_z"),
+    turn=("eef_rx", "eef_ry", "eef_rz"),
+    close="gripper",
+    turn_scale=0.5,  # of 1 rad/s
+    speed=0.4,  # a fifth of the way to a goal 0.2 m ahead in an action of 0.1 s
+    rests_open=True,
+)
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
-class Fetch:
+class Fetch(TaskRobot):
     """The robot.
 
     Attributes:
@@ -89,11 +100,20 @@ class Fetch:
     camera_pan: float = 0.0
     pinned: bool = False
 
+    drives = True
+    hand_controls = (HAND,)
+
     def __post_init__(self) -> None:
         if self.pose not in ARM_POSES:
             raise UnknownNameError("pose of Fetch's arm", self.pose, ARM_POSES)
         if self.proprioception not in LISTS:
             raise UnknownNameError("proprioception of Fetch", self.proprioception, LISTS)
+
+    def for_activity(self, *, drives: bool, camera_tilt: float | None, camera_pan: float) -> Fetch:
+        """With the proprioception of iGibson's experiments, pinned as there unless it drives."""
+        return dataclasses.replace(
+            self, proprioception="experiments", pinned=not drives, camera_tilt=camera_tilt, camera_pan=camera_pan
+        )
 
     def attach(self, spec: mujoco.MjSpec, pos: Vector | None = None, quat: Vector | None = None) -> AgentEntry:
         pos, quat = self.pos if pos is None else pos, normalized(self.quat if quat is None else quat)

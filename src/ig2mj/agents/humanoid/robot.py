@@ -38,6 +38,7 @@ from ig2mj.agents.parts import (
     rotate,
     visual,
 )
+from ig2mj.agents.task_robot import HandControl, TaskRobot
 from ig2mj.errors import UnknownNameError
 from ig2mj.scene.manifest import AgentEntry
 from ig2mj.scene.tables import SceneTables
@@ -64,8 +65,26 @@ LASER = (0.07, 0.0, -0.25)
 """m: before the column, 0.3 m above the floor while the body stands; iGibson's humanoid has no scanner."""
 
 
+def _control(hand: str) -> HandControl:
+    """Position targets of one hand, displaced by so many m and rad in an action."""
+    return HandControl(
+        move=(f"{hand}_x", f"{hand}_y", f"{hand}_z"),
+        turn=(f"{hand}_roll", f"{hand}_pitch", f"{hand}_yaw"),
+        close=f"{hand}_trigger",
+        move_scale=0.5,
+        turn_scale=0.5,
+        displaces=True,
+        speed=0.5,
+        opens=-1.0,
+        opens_high=False,
+        closed_empty=0.6,
+        on_arm=False,
+        two_fingers=False,
+    )
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
-class Humanoid:
+class Humanoid(TaskRobot):
     """The robot.
 
     Attributes:
@@ -81,6 +100,9 @@ class Humanoid:
     compat: str = "paper"
     grasp_flags: bool = True
     look: str = "grey"
+
+    stands = BODY_HEIGHT
+    hand_controls = tuple(_control(hand) for hand in HANDS)
 
     def __post_init__(self) -> None:
         if self.compat not in BODY:

@@ -25,6 +25,7 @@ import numpy as np
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.hand_rays import HandRays
 from ig2mj.agents.parts import Vector, exclude_all, extend_keyframes, multiply, normalized, servo
+from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.agents.urdf.body import RobotBody
 from ig2mj.agents.urdf.controller import UrdfController
 from ig2mj.agents.urdf.description import Description
@@ -60,7 +61,7 @@ FROM_LINK = (0.5, 0.5, -0.5, -0.5)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class UrdfRobot:
+class UrdfRobot(TaskRobot):
     """See the module's text.
 
     Attributes:
@@ -74,6 +75,8 @@ class UrdfRobot:
     layout: Layout
     pos: Vector = (0, 0, 0)
     quat: Vector = (1, 0, 0, 0)
+
+    own_actions = True
 
     @classmethod
     def load(
@@ -114,9 +117,9 @@ class UrdfRobot:
         """It can go somewhere."""
         return self.layout.base == "differential"
 
-    def at(self, x: float, y: float, yaw: float) -> UrdfRobot:
-        """The same robot somewhere else: m, rad."""
-        return dataclasses.replace(self, pos=(x, y, 0.0), quat=(np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)))
+    @property
+    def hand_count(self) -> int:
+        return len(self.layout.hands)
 
     def attach(self, spec: mujoco.MjSpec, pos: Vector | None = None, quat: Vector | None = None) -> AgentEntry:
         pos = np.array(self.pos if pos is None else pos, np.float64)

@@ -5,46 +5,24 @@ Axes: W worlds, n numbers of an action.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from ig2mj.agents.base import ACTION_PERIOD, Robot
+from ig2mj.agents.task_robot import HandControl, TaskRobot
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.errors import UnknownNameError
+from ig2mj.errors import EngineError
 from ig2mj.geometry.poses import quat_conjugate, quat_multiply, quat_rotate, quat_rotate_inverse
 from ig2mj.scene.scene import Scene
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
-from ig2mj.tasks.actions import SPEED, TURN_SPEED
-from ig2mj.tasks.experts import (
-    bimanual_pick_and_place,
-    cleaning_stained_shelf,
-    cooking_meat,
-    grasping_book,
-    slicing_fruit,
-    soaking_towel,
-)
+from ig2mj.tasks.actions import TURN_SPEED
 from ig2mj.tasks.experts.motion import Wish
 from ig2mj.tasks.experts.sight import Belief, Sight
-from ig2mj.tasks.task import Task
-
-Plan = Callable[[Sight], list[Wish]]
-
-PLANS: dict[str, Plan] = {
-    "GraspingBook": grasping_book.plan,
-    "SoakingTowel": soaking_towel.plan,
-    "CleaningStainedShelf": cleaning_stained_shelf.plan,
-    "CookingMeat": cooking_meat.plan,
-    "SlicingFruit": slicing_fruit.plan,
-    "BimanualPickAndPlace": bimanual_pick_and_place.plan,
-}
-"""Plans by the task's name: what each acting hand should do now."""
-
-STEP = {"humanoid": SPEED * ACTION_PERIOD, "fetch": 0.04}
-"""m that a hand moves in an action of 1 (`ig2mj.tasks.actions`)."""
+from ig2mj.tasks.task import Task, role_of
 
 TURN_STEP = TURN_SPEED * ACTION_PERIOD
 """rad."""
@@ -64,14 +42,19 @@ class Expert:
           scene: with the robot. model: of the scene's states.
 
         Raises:
-          UnknownNameError: the task has no expert, or the robot has no part in it.
+          EngineError: the task has no expert, or the robot lacks hands that tasks move.
         """
-        if task.name not in PLANS:
-            raise UnknownNameError("task with an expert", task.name, PLANS)
+        if task.expert is None:
+            raise EngineError(f"{task.name} has no expert: give its Task one (`expert=`)")
         self.task, self.robot, self.grasping = task, robot, grasping
-        self._plan, self._scene, self._model = PLANS[task.name], scene, model
+        self._plan, self._scene, self._model = task.expert, scene, model
         own = np.flatnonzero(scene.tables.hand_agent == 0)
-        self._hands = tuple(int(own[h]) for h in task.acts(robot).hands)
+        body = scene.agents[0]
+        if not isinstance(body, TaskRobot) or not body.hand_controls:
+            raise EngineError(f"robot '{robot}' has no hands that an expert can move")
+        hands = role_of(task, robot, body).hands
+        self._hands = tuple(int(own[h]) for h in hands)
+        self._controls = tuple(body.hand_controls[h] for h in hands)
         rays = [hand for agent in scene.agents if isinstance(agent, Robot) for hand in agent.hand_rays()]
         self._grips = np.stack([hand.grasp_point for hand in rays]).astype(np.float32)
 
@@ -89,22 +72,23 @@ class Expert:
             states,
             self._scene,
             self._model,
-            self.robot,
+            self._controls,
             self.task.objects_of_interest,
             self._hands,
             self._grips,
             self.grasping,
             {name: _of_the_world(base, belief) for name, belief in (beliefs or {}).items()},
         )
-        return jnp.concatenate([self._action(base, wish) for wish in self._plan(see)], axis=1)
+        return jnp.concatenate(
+            [self._action(base, wish, hand) for wish, hand in zip(self._plan(see), self._controls, strict=True)], axis=1
+        )
 
-    def _action(self, base: Float[Array, "W 4"], wish: Wish) -> Float[Array, "W k"]:
+    def _action(self, base: Float[Array, "W 4"], wish: Wish, hand: HandControl) -> Float[Array, "W k"]:
         """Of one hand: in the base's frame, slowed down evenly where a number would be beyond 1."""
-        parts = [_limited(quat_rotate_inverse(base, wish.move) / STEP[self.robot])]
+        parts = [_limited(quat_rotate_inverse(base, wish.move) / (hand.speed * ACTION_PERIOD))]
         parts.append(_limited(quat_rotate_inverse(base, wish.turn) / TURN_STEP))
         if self.grasping != "mitten":
-            opens = -1.0 if self.robot == "humanoid" else 1.0
-            parts.append(jnp.where(wish.close, -opens, opens)[:, None])
+            parts.append(jnp.where(wish.close, -hand.opens, hand.opens)[:, None])
         return jnp.concatenate(parts, axis=1)
 
 

@@ -40,6 +40,6 @@ def draw(see: Sight, name: str, goal: Float[Array, "W 3"], behind: float = 0.0, 
     on_it = see.touches(name) & (length(off[:, :2]) < ON_IT) & (off[:, 2] < ABOVE)
     down = SINK * jnp.clip(1.0 - see.pressed(name) / PRESS, -1.0, 1.0)
     step = jnp.minimum(SPEED, length(way))[:, None] * ahead
-    turn = far_out(see, place, hand) if see.robot == "fetch" else None
+    turn = far_out(see, place, hand) if see.controls[hand].on_arm else None
     along = wish(step.at[:, 2].set(-down), turn, close=True)
     return where(on_it, along, Wish(take_at(see, place, hand).move, along.turn, along.close))

@@ -23,14 +23,13 @@ BELOW = 0.03
 THIN, CLOSE_TO = 0.015, 0.035
 """m that take the place of `BELOW` and `CLOSING` where what is to be taken is thin and slips away."""
 
-MISSED, AGAIN = {"humanoid": 0.6, "fetch": 0.9}, 0.03
-"""How far fingers have closed when they have missed what they close on; m that the hand then rises, opens, and begins
-again."""
+AGAIN = 0.03
+"""m that a hand rises, opens, and begins again, when its fingers have closed on nothing."""
 
 UP = np.array([0.0, 0.0, 1.0], np.float32)
 
 FAR, BLEND = 0.62, 0.1
-"""m from the robot's middle beyond which Fetch's gripper turns outwards, and over which it comes to do so."""
+"""m from the robot's middle beyond which the gripper of an arm turns outwards, and over which it comes to do so."""
 
 ASIDE = 0.8
 """rad that it may then point aside: turned wholly outwards over a low table, the elbow comes down onto its edge."""
@@ -57,7 +56,7 @@ def take_thin(see: Sight, place: Float[Array, "W 3"], hand: int = 0) -> Wish:
         return take_at(see, place, hand)
     grip = see.grip(hand)
     move, near = over(grip, place - THIN * UP, place[:, 2] + CLEARANCE), length(grip - place) < CLOSE_TO
-    missed = near & (see.closed(hand) > MISSED[see.robot])
+    missed = near & (see.closed(hand) > see.controls[hand].closed_empty)
     return wish(jnp.where(missed[:, None], AGAIN * UP, move), close=near & ~missed)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float
 
+from ig2mj.agents.task_robot import HandControl
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import quat_multiply, quat_rotate
 from ig2mj.scene.scene import Scene
@@ -40,7 +41,7 @@ class Sight:
     """All worlds of a scene as they are now, or as they are believed to be; positions in the world frame, m.
 
     Attributes:
-      robot: name of the robot that acts. objects: names of what the task is about, the first object first.
+      controls: of the acting hands. objects: names of what the task is about, the first object first.
       hands: numbers of the acting hands among all hands of the scene.
       grips: [H, 3] grasp point of every hand in the hand's frame. grasping: the mode.
       beliefs: of objects by name, world frame; the others are seen where they are.
@@ -50,7 +51,7 @@ class Sight:
     states: ExtendedStates
     scene: Scene
     model: StateModel
-    robot: str
+    controls: tuple[HandControl, ...]
     objects: tuple[str, ...]
     hands: tuple[int, ...]
     grips: Float[np.ndarray, "H 3"]
@@ -61,6 +62,16 @@ class Sight:
     def physical(self) -> bool:
         """Nothing holds but friction."""
         return self.grasping == "physical"
+
+    @property
+    def on_arm(self) -> bool:
+        """An arm carries the first acting hand."""
+        return self.controls[0].on_arm
+
+    @property
+    def two_fingers(self) -> bool:
+        """The first acting hand has two parallel fingers."""
+        return self.controls[0].two_fingers
 
     def hand_pos(self, hand: int = 0) -> Float[Array, "W 3"]:
         """Palm or end effector; `hand` counts the acting hands."""
@@ -92,7 +103,7 @@ class Sight:
         places = [int(np.flatnonzero(tables.agent_joint_qposadr == model.jnt_qposadr[joint])[0]) for joint in joints]
         low, high = model.jnt_range[joints].T
         share = (jnp.asarray(self.view.agent.joint_pos)[:, np.array(places)] - low) / (high - low)
-        return share.mean(1) if self.robot == "humanoid" else 1.0 - share.mean(1)
+        return 1.0 - share.mean(1) if self.controls[hand].opens_high else share.mean(1)
 
     def squeeze(self, name: str, hand: int = 0) -> Float[Array, "W"]:
         """N with which the second strongest finger link of an acting hand presses on an object."""

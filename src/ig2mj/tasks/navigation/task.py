@@ -14,7 +14,8 @@ class NavigationTask:
 
     Attributes:
       name: as `ig2mj.make` takes it. summary: one sentence. home: a shipped home.
-      robots: names of those that can do it; the first is the usual one.
+      robots: names of those that it is made for; the first is the usual one. Any other that drives, and has a hand
+        where the goal takes one, can do it, too.
       goal: "point" (the base at a point of the floor), "reach" (the first hand at a point in the air) or "close"
         (furniture closed).
       objects: of the object library, put on free floor at random in every episode.
@@ -22,7 +23,7 @@ class NavigationTask:
       opened: categories of furniture whose joints are opened at random.
       target_dist: m along the floor from the start to the target, least and most.
       target_height: m above the floor, least and most, of a target to reach.
-      tolerance: m from the target at which it is reached.
+      tolerance: m from the target at which it is reached; iGibson's of its TurtleBot.
       geodesic: the potential is the length of the shortest way on the floor, not of the straight line.
       success_reward, potential_weight, collision_reward: of the reward's terms.
       prismatic_weight, revolute_weight: of the opening of drawers (1 / m) and doors (1 / rad) in the potential.
@@ -63,42 +64,41 @@ _FURNITURE = (
 )
 """iGibson's list. A forgotten comma joins its last two names to `washerdryer`, so that it never opens either."""
 
-NAVIGATION: dict[str, NavigationTask] = {
-    task.name: task
-    for task in (
-        NavigationTask("PointNavigation", "Drive to a point of the floor.", ("turtlebot", "fetch")),
-        NavigationTask(
-            "InteractiveNavigation",
-            "Drive to a point of the floor on which five things lie about.",
-            ("turtlebot", "fetch"),
-            objects=_LOOSE,
-        ),
-        NavigationTask(
-            "DynamicNavigation",
-            "Drive to a point of the floor on which another robot drives about.",
-            ("turtlebot", "fetch"),
-            others=1,
-        ),
-        NavigationTask(
-            "Reaching",
-            "Bring the gripper to a point in the air.",
-            ("fetch",),
-            goal="reach",
-            target_dist=(1.0, 3.0),
-            target_height=(0.0, 1.0),
-            tolerance=0.1,
-            geodesic=False,
-        ),
-        NavigationTask(
-            "RoomRearrangement",
-            "Close the doors and drawers that stand open.",
-            ("fetch",),
-            goal="close",
-            opened=_FURNITURE,
-            prismatic_weight=3.0,
-            collision_reward=0.0,
-        ),
-    )
-}
-"""Tasks by name. Targets of `Reaching` are at most 3 m away, where iGibson's are up to 10: its potential is the
-straight line, which leads through walls. The tolerance of navigation is that of iGibson's TurtleBot, 0.36 m."""
+POINT_NAVIGATION = NavigationTask("PointNavigation", "Drive to a point of the floor.", ("turtlebot", "fetch"))
+
+INTERACTIVE_NAVIGATION = NavigationTask(
+    "InteractiveNavigation",
+    "Drive to a point of the floor on which five things lie about.",
+    ("turtlebot", "fetch"),
+    objects=_LOOSE,
+)
+
+DYNAMIC_NAVIGATION = NavigationTask(
+    "DynamicNavigation",
+    "Drive to a point of the floor on which another robot drives about.",
+    ("turtlebot", "fetch"),
+    others=1,
+)
+
+REACHING = NavigationTask(
+    "Reaching",
+    "Bring the gripper to a point in the air.",
+    ("fetch",),
+    goal="reach",
+    target_dist=(1.0, 3.0),
+    target_height=(0.0, 1.0),
+    tolerance=0.1,
+    geodesic=False,
+)
+"""Targets are at most 3 m away, where iGibson's are up to 10: its potential is the straight line, which leads through
+walls."""
+
+ROOM_REARRANGEMENT = NavigationTask(
+    "RoomRearrangement",
+    "Close the doors and drawers that stand open.",
+    ("fetch",),
+    goal="close",
+    opened=_FURNITURE,
+    prismatic_weight=3.0,
+    collision_reward=0.0,
+)

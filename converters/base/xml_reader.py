@@ -20,8 +20,8 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  it has no
 
 from ig2mj.errors import InputError
 
-from ..base import inputs
-from ..base.read_limits import check_limit
+from . import inputs
+from .read_limits import check_limit
 from .text import marked_encoding
 
 MAX_NUMBER = 1e15  # beyond, products of a few numbers are no numbers any more
