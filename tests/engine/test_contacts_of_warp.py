@@ -11,7 +11,7 @@ from mujoco.mjx.third_party.mujoco_warp._src import collision_driver
 from ig2mj.engine.warp.patches import awake_kernels, pins
 from ig2mj.engine.warp.patches.contacts import FAR, mend_contacts
 
-pytestmark = pytest.mark.skipif(bool(pins.mismatches()), reason=f"our kernels do not fit: {pins.mismatches()}")
+pytestmark = pytest.mark.skipif(bool(pins.obstacles()), reason=f"our kernels do not fit: {pins.obstacles()}")
 
 FLOOR = 6.0
 HALF = np.array([0.05, 0.04, 0.03])

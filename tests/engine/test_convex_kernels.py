@@ -15,8 +15,8 @@ from tumbling_shapes import SCENE
 
 from ig2mj.engine.warp.patches import awake_kernels, pins
 
-if pins.mismatches():
-    pytest.skip(f"our kernels do not fit: {pins.mismatches()}", allow_module_level=True)
+if pins.obstacles():
+    pytest.skip(f"our kernels do not fit: {pins.obstacles()}", allow_module_level=True)
 
 from ig2mj.engine.warp.kernels import launches_of
 from ig2mj.engine.warp.patches import branches, pair_lists

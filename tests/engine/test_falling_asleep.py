@@ -8,8 +8,8 @@ import warp as wp
 
 from ig2mj.engine.warp.patches import pins
 
-pytestmark = pytest.mark.skipif(bool(pins.mismatches()), reason=f"our kernels do not fit: {pins.mismatches()}")
-if not pins.mismatches():
+pytestmark = pytest.mark.skipif(bool(pins.obstacles()), reason=f"our kernels do not fit: {pins.obstacles()}")
+if not pins.obstacles():
     from mujoco.mjx.third_party.mujoco_warp._src import sleep as upstream
 
     from ig2mj.engine.warp.patches import sleeping

@@ -17,7 +17,7 @@ from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile
 from ig2mj.scene.scene import load_scene
 
-pytestmark = pytest.mark.skipif(bool(pins.mismatches()), reason=f"our kernels do not fit: {pins.mismatches()}")
+pytestmark = pytest.mark.skipif(bool(pins.obstacles()), reason=f"our kernels do not fit: {pins.obstacles()}")
 
 SCENE = """<mujoco><option timestep="0.00833333" integrator="implicitfast"><flag sleep="enable"/></option>
 <worldbody><geom type="plane" size="5 5 1"/><body pos="0 0 .04"><freejoint/><geom type="box" size=".04 .04 .04"/></body>

@@ -18,12 +18,12 @@ from ig2mj.agents import Humanoid
 from ig2mj.agents.grasping import Grasping
 from ig2mj.engine.warp import patches
 from ig2mj.engine.warp.engine import WarpEngine
-from ig2mj.engine.warp.patches import pins
+from ig2mj.engine.warp.patches import pins, table
 from ig2mj.engine.warp.patches.replacements import KERNELS, original
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
-from ig2mj.errors import EngineError
+from ig2mj.errors import EngineError, UnknownNameError
 
-fits = pytest.mark.skipif(bool(pins.mismatches()), reason=f"our kernels do not fit: {pins.mismatches()}")
+fits = pytest.mark.skipif(bool(pins.obstacles()), reason=f"our kernels do not fit: {pins.obstacles()}")
 
 BALL = """<mujoco><option timestep="0.00833333"><flag sleep="enable"/></option><worldbody>
 <geom type="box" size="2 2 .1" pos="0 0 -.1"/><body pos="0 0 .049"><freejoint/><geom size=".05"/></body>
@@ -215,21 +215,37 @@ def test_with_another_version_engines_run_upstreams_functions_and_one_warning_sa
         assert not KERNELS.active
 
 
-def test_with_another_version_grasping_by_constraints_is_refused_when_worlds_are_made(unfit, tiny_home_folder):
-    """Nothing is compiled, and no step is taken before the refusal; hands that hold by friction alone are fine."""
+def test_with_another_version_hands_hold_by_constraints_all_the_same(unfit, tiny_home_folder):
+    """Nothing is compiled; `tests/engine/test_without_patches.py` takes steps."""
     unfit.setattr(pins, "VERSION", "0.0.1")
     unfit.setattr(patches, "_warned", True)
     pins.mismatches.cache_clear()
     scene = ig2mj.load_scene(tiny_home_folder, agents=[Humanoid(pos=(0.3, 0.6, 0.6))])
     engine = WarpEngine(scene, 1, substeps=1)
-    reason = r"engine 'warp' cannot: .* mujoco-mjx [\d.]+ is not 0\.0\.1 \(take engine='native' or grasping="
+    assert not engine.own_kernels and not engine.cannot_ignore
     for grasping in ("assisted", "sticky", Grasping(scene, "mitten", "can")):
-        with pytest.raises(EngineError, match=reason):
-            ig2mj.Worlds(scene, 1, engine, grasping=grasping)
-        with pytest.raises(EngineError, match=reason):
-            ig2mj.Simulation(scene, engine, grasping=grasping)
-    assert ig2mj.Worlds(scene, 1, engine).core.grasping is None
-    assert ig2mj.Worlds(scene, 1, "native", grasping="sticky").core.grasping is not None
+        assert ig2mj.Worlds(scene, 1, engine, grasping=grasping).core.grasping is not None
+
+
+@fits
+def test_all_that_changed_is_listed_after_the_version(unfit):
+    unfit.setattr(pins, "VERSION", "0.0.1")
+    unfit.setattr(solver, "smooth_solve_compact", ig2mj.load_scene)
+    unfit.delattr(solver, "_gather_M_sparse")
+    pins.mismatches.cache_clear()
+    module = "third_party.mujoco_warp._src.solver"
+    version, *others = pins.mismatches()
+    assert version.endswith("is not 0.0.1")
+    assert others == [f"{module}.smooth_solve_compact has changed", f"{module}._gather_M_sparse is missing"]
+
+
+@fits
+def test_kernels_run_in_spite_of_the_pins_on_request(unfit, recwarn):
+    unfit.setattr(pins, "VERSION", "0.0.1")
+    unfit.setenv(pins.TRY, "1")
+    pins.mismatches.cache_clear()
+    assert pins.mismatches() and not pins.obstacles()
+    assert patches.fit() and not len(recwarn)
 
 
 @fits
@@ -240,7 +256,7 @@ def test_a_function_or_constant_that_changed_is_named(unfit, name):
     assert pins.mismatches() == (f"{module}.{name} has changed",)
     unfit.delattr(solver, name)
     pins.mismatches.cache_clear()
-    assert pins.mismatches() == (f"{module}.{name} has changed",)
+    assert pins.mismatches() == (f"{module}.{name} is missing",)
     assert f'"{name}": "missing"' in pins.renewed()
 
 
@@ -251,3 +267,54 @@ def test_every_replaced_function_is_pinned():
         if module is wp:
             continue  # of its public interface
         assert name in pins.PINS[module.__name__.removeprefix("mujoco.mjx.")]
+
+
+@pytest.fixture
+def variable(monkeypatch):
+    """Sets `IG2MJ_PATCHES` and gives the groups that run then."""
+
+    def chosen(value: str) -> frozenset[str]:
+        monkeypatch.setenv(table.VARIABLE, value)
+        table.chosen.cache_clear()
+        return table.chosen()
+
+    yield chosen
+    monkeypatch.delenv(table.VARIABLE, raising=False)
+    table.chosen.cache_clear()
+
+
+def test_a_variable_leaves_groups_of_patches_out(variable):
+    everything = set(table.GROUPS)
+    assert variable("") == variable("all") == everything
+    assert variable("none") == set()
+    assert variable("-solver_loop, -gravity") == everything - {"solver_loop", "gravity"}
+    assert variable("contacts,graphs") == {"contacts", "graphs"}
+
+
+def test_a_wrong_name_of_a_group_is_answered_with_the_near_ones(variable):
+    with pytest.raises(UnknownNameError, match="'solver_lop'; near matches: solver_loop"):
+        variable("-solver_lop")
+    with pytest.raises(EngineError, match="a minus sign before all names, or before none"):
+        variable("contacts,-graphs")
+
+
+@fits
+def test_of_a_group_that_is_left_out_nothing_is_replaced(variable):
+    from ig2mj.engine.warp.patches import places
+
+    variable("all")
+    everything = set(places.own())
+    variable("none")
+    assert not places.own() and not places.substitutes() and not patches.for_new_engines()
+    missing = set()
+    for group in table.GROUPS:
+        variable(f"-{group}")
+        missing |= everything - set(places.own())
+    shared = {(module, name) for _, functions in places.SHARED for module, name in functions}
+    assert missing == everything - shared, "what several groups share stays until none of them runs"
+
+
+def test_the_modules_of_each_group_exist():
+    modules = [name for group in table.GROUPS.values() for name in group.modules]
+    assert len(modules) == len(set(modules))
+    assert all(group.lines > 10 for group in table.GROUPS.values())

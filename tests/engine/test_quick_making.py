@@ -14,7 +14,7 @@ from ig2mj.engine.warp.hashing import shared_hashes
 from ig2mj.engine.warp.patches import pins
 from ig2mj.process import prepare_warp
 
-fits = pytest.mark.skipif(bool(pins.mismatches()), reason=f"our kernels do not fit: {pins.mismatches()}")
+fits = pytest.mark.skipif(bool(pins.obstacles()), reason=f"our kernels do not fit: {pins.obstacles()}")
 
 ARMS = """<mujoco><worldbody><geom type="plane" size="5 5 1" {floor}/>
 <body pos="0 0 .5"><freejoint/><geom size=".1" {free}/>

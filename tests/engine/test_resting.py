@@ -19,7 +19,7 @@ from ig2mj.engine.warp.patches.flags import FELL_ASLEEP, REPLACED
 from ig2mj.scene.scene import load_scene
 
 pytestmark = [
-    pytest.mark.skipif(bool(pins.mismatches()), reason=f"our kernels do not fit: {pins.mismatches()}"),
+    pytest.mark.skipif(bool(pins.obstacles()), reason=f"our kernels do not fit: {pins.obstacles()}"),
     pytest.mark.slow,
 ]
 

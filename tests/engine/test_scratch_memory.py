@@ -92,7 +92,7 @@ class Poisoned(Arena):
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(bool(pins.mismatches()), reason="our kernels do not fit")
+@pytest.mark.skipif(bool(pins.obstacles()), reason="our kernels do not fit")
 def test_steps_need_nothing_of_what_was_in_their_memory_before(monkeypatch):
     from ig2mj.engine.warp.patches import branches
 

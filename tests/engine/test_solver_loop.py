@@ -13,7 +13,7 @@ from mujoco.mjx.third_party.mujoco_warp._src.types import OverflowType
 from ig2mj.engine.warp.patches import awake_kernels, pins
 
 pytestmark = [
-    pytest.mark.skipif(bool(pins.mismatches()), reason=f"our kernels do not fit: {pins.mismatches()}"),
+    pytest.mark.skipif(bool(pins.obstacles()), reason=f"our kernels do not fit: {pins.obstacles()}"),
     pytest.mark.slow,
 ]
 

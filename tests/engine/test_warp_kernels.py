@@ -11,7 +11,7 @@ from mujoco.mjx.third_party import mujoco_warp
 
 from ig2mj.engine.warp.patches import awake_kernels, pins
 
-pytestmark = pytest.mark.skipif(bool(pins.mismatches()), reason=f"our kernels do not fit: {pins.mismatches()}")
+pytestmark = pytest.mark.skipif(bool(pins.obstacles()), reason=f"our kernels do not fit: {pins.obstacles()}")
 
 STEPS = 100
 AWAKE = 40  # buffer: over 32, where the blocked factorisation begins, and below the model's 51

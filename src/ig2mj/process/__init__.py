@@ -25,6 +25,8 @@ or earlier by whoever wants to; a second call does nothing. What the user has de
   - `warp.config.log_level`: WARNING where it was INFO, and long compilations are reported on stderr instead.
   - `warp.config.kernel_cache_dir`: below IG2MJ_CACHE_DIR, where that is set and Warp's own folder was not chosen.
   - Three repairs of Warp 1.18, of its streams, graph captures and devices (`ig2mj.process.warp_repairs`).
+  - Steps of MJX get a contact filter, MuJoCo Warp's callback, which drops what our engines' hands ignore and nothing
+    in other models (`ig2mj.engine.warp.ignored_contacts`).
 
 Where engines are imported and made, their kernels loaded, worlds started and programs traced, and while Warp captures a
 graph:
@@ -40,7 +42,8 @@ While MJX is imported by an engine (`ig2mj.process.imports`):
   - The class of OpenGL contexts that `mujoco.Renderer` makes. Environment variables are not changed.
 
 Environment variables that are read: IG2MJ_CACHE_DIR (moves ig2mj's cache folder, and with it JAX's and Warp's),
-MUJOCO_GL (the backend tried first), and those named above. MuJoCo Warp's functions are not replaced process-wide: what
+MUJOCO_GL (the backend tried first), IG2MJ_PATCHES and IG2MJ_TRY_KERNELS (which of our functions run in place of MuJoCo
+Warp's), and those named above. MuJoCo Warp's functions are not replaced process-wide: what
 `ig2mj.engine.warp.patches` has in their place runs inside our own engines' programs only.
 """
 

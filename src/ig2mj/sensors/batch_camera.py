@@ -104,7 +104,7 @@ class BatchCamera:
         self.width, self.height, self.slots = width, height, particles
         self._wants, self._shown = (rgb, depth, segmentation), rows or (0, height)
         # lines of rays; where kernels are not those that we know all are cast
-        self._lines = height if pins.mismatches() else self._shown[1] - self._shown[0]
+        self._lines = height if pins.obstacles() else self._shown[1] - self._shown[0]
         self._sectors = sectors_of(rays)
         self._patterns = {pattern.name: len(pattern.directions) for pattern in rays}
         self._host = host = make_render_model(engine.scene, particles, [s.camera for s in self._sectors])
@@ -113,7 +113,7 @@ class BatchCamera:
             fit_textures(host, float(2 * np.tan(np.deg2rad(host.cam_fovy[self.cameras].min()) / 2) / height))
         self._plan(host)
         self._model = mjx.put_model(host, own_device(), impl="warp")
-        self._merged = self._merge(groups) if merge_meshes and mergeable(host) and not pins.mismatches() else None
+        self._merged = self._merge(groups) if merge_meshes and mergeable(host) and not pins.obstacles() else None
         data = mujoco.MjData(host)
         mujoco.mj_forward(host, data)
         self._template = mjx.put_data(host, data, own_device(), impl="warp", naconmax=1, naccdmax=1, njmax=1)
@@ -156,7 +156,7 @@ class BatchCamera:
             from ig2mj.sensors.ray_caster import use_merged
 
             use_merged(contexts, self._host, self._merged, self.engine.num_worlds)
-        elif not pins.mismatches():
+        elif not pins.obstacles():
             from ig2mj.sensors.shading import limit_light
 
             for context in contexts:

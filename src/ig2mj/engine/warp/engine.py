@@ -30,9 +30,9 @@ from ig2mj.engine.native.settle import settle
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.engine.warp import kernels, patches
-from ig2mj.engine.warp.patches import scratch
+from ig2mj.engine.warp.ignored_contacts import DROP, encode, filter_contacts
+from ig2mj.engine.warp.patches import scratch, table
 from ig2mj.engine.warp.patches.flags import REPLACED
-from ig2mj.engine.warp.patches.ignored import DROP, encode
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.profile import EngineProfile, fit, holds_everything, profile_of_scene
 from ig2mj.process import entry_point, prepare_warp
@@ -112,7 +112,8 @@ class WarpEngine(MjxEngine):
         counter = scratch.Counter(device.get_allocator())
         with wp.ScopedDevice(device):
             self._launches = self.launches(counter)
-        self._scratch = counter.block(self.num_worlds) if self.own_kernels else 0
+        own = self.own_kernels and table.runs("scratch")
+        self._scratch = counter.block(self.num_worlds) if own else 0
         self.serve([gpu])
         if compile_beforehand:
             self.loading = kernels.load_meanwhile(self._launches, device)
@@ -178,7 +179,7 @@ class WarpEngine(MjxEngine):
             return super()._map(act, *arguments)
 
     def _act(self, act: Any, model: mjx.Model, data: mjx.Data, ignored: Bool[Array, "H O"] | None) -> mjx.Data:
-        if ignored is not None and self._filters:  # see `ig2mj.engine.warp.patches.ignored`
+        if ignored is not None and self._filters:  # see `ig2mj.engine.warp.ignored_contacts`
             model = model.tree_replace({"_impl.pair_adhesion": ignored.reshape(-1).astype(jnp.float32)})
         return act(model, data)
 
@@ -186,10 +187,6 @@ class WarpEngine(MjxEngine):
     def cannot_ignore(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
         """See `Engine.cannot_ignore`."""
         model = self.host_model
-        if not self.own_kernels:
-            wrong = patches.pins.mismatches()
-            why = wrong[0] if wrong else "the engine was made inside `upstream_kernels()`"
-            return f"that needs ig2mj's kernels for MuJoCo Warp, which do not run: {why}"
         if model.npair or np.any(model.geom_adhesion):
             return f"scene '{self.scene.name}' has <pair> elements or adhesion, whose fields the contact filter takes"
         return ""
@@ -202,6 +199,7 @@ class WarpEngine(MjxEngine):
         with kernels.models_put() as self._models_put:
             put = mjx.put_model(model, own_device(), impl="warp", graph_mode=self._graph_mode)
         if len(self.tables.hand_body) and self._filters:
+            filter_contacts()
             code = encode(geom_hands(model, self.tables), self.tables.geom_object, self.tables.num_objects)
             put = put.tree_replace({"_impl.geom_adhesion": jnp.asarray(code)})
         return put if self._print_overflow else put.tree_replace({"opt._impl.warn_overflow": 0})

@@ -18,6 +18,7 @@ from mujoco.mjx.third_party.mujoco_warp._src import collision_convex, collision_
 from ig2mj.engine.warp.patches import pair_lists, phases
 from ig2mj.engine.warp.patches.replacements import original
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
+from ig2mj.engine.warp.patches.table import runs
 
 MOST = 8
 """Streams of a device; further kernels follow the first ones."""
@@ -53,16 +54,18 @@ def convex_narrowphase(m: Any, d: Any, ctx: Any, collision_table: Any) -> None:
     if not convex:
         return
     # All memory is there and counts are 0 before the streams begin: what comes later on this one, they do not wait for.
-    lists = pair_lists.listed_by_kind(m, d, ctx, [kind for kind in kinds if kind is not None])
-    memory = phases.handover(d, len(convex))
-    launches = []
-    for number, (call, pairs) in enumerate(zip(convex, lists, strict=True)):
-        call["inputs"] = _of_list(m, d, ctx, call["inputs"], pairs)
-        launches.append(phases.launches(d, call, memory, number))
+    if runs("pair_lists"):
+        lists = pair_lists.listed_by_kind(m, d, ctx, [kind for kind in kinds if kind is not None])
+        for call, pairs in zip(convex, lists, strict=True):
+            call["inputs"] = _of_list(m, d, ctx, call["inputs"], pairs)
+    launches = [[call] for call in convex]
+    if runs("phases"):
+        memory = phases.handover(d, len(convex))
+        launches = [phases.launches(d, call, memory, number) for number, call in enumerate(convex)]
     _here.kept = [convex, launches]  # freed where the branches have joined, and not at the end of this function
     for of_kind, options in zip(launches, _in_turn(device), strict=False):
         for launch in of_kind:
-            wp.launch(**launch, **options)
+            wp.launch(**{**launch, **options})
 
 
 def narrowphase(m: Any, d: Any, ctx: Any) -> None:
@@ -113,7 +116,7 @@ def _of_list(m: Any, d: Any, ctx: Any, inputs: list[Any], pairs: pair_lists.Pair
 
 def _in_turn(device: Any) -> Iterator[dict[str, Any]]:
     """The stream of each kernel, as an option of `warp.launch`; without a GPU none."""
-    if not device.is_cuda:
+    if not (device.is_cuda and runs("branches")):
         while True:
             yield {}
     streams, main = _streams_of(device), device.stream

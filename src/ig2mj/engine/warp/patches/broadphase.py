@@ -20,6 +20,8 @@ import warp as wp
 from mujoco.mjx.third_party.mujoco_warp._src import collision_driver, types
 from mujoco.mjx.third_party.mujoco_warp._src.math import upper_tri_index
 
+from ig2mj.engine.warp.patches.replacements import original
+
 LANES = 32
 """Threads that share the candidates of one world."""
 
@@ -296,3 +298,11 @@ def awake_broadphase(m: Any, d: Any, ctx: Any, awake_prev: Any = None) -> None:
 def serves(m: Any) -> bool:
     """Whether `awake_broadphase` finds all pairs of a model."""
     return bool(m.opt.enableflags & types.EnableBit.SLEEP and m.npair == 0 and m.nsensorcollision == 0)
+
+
+def choose_broadphase(name: str, m: Any, d: Any, ctx: Any, awake_prev: Any = None) -> None:
+    """`awake_broadphase` where it finds all pairs; else `name`, the one that MuJoCo Warp chose."""
+    if serves(m):
+        awake_broadphase(m, d, ctx, awake_prev)
+    else:
+        original(collision_driver, name)(m, d, ctx, awake_prev)

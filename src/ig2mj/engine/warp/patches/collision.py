@@ -1,4 +1,8 @@
-"""Collision detection: a broad phase for what is awake, contacts looked through, and pairs counted in both passes."""
+"""Collision detection as a whole: contacts are checked, and pairs are counted in both passes.
+
+MuJoCo Warp counts pairs again in the second pass of a step, which looks for pairs of what the first pass woke, and
+compares only that number with the size of the buffer. Too many pairs in the first pass are not flagged.
+"""
 
 # Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
 # pyright: reportIndexIssue=false, reportArgumentType=false, reportCallIssue=false
@@ -8,18 +12,9 @@ from typing import Any, no_type_check
 import warp as wp
 from mujoco.mjx.third_party.mujoco_warp._src import collision_driver
 
-from ig2mj.engine.warp.patches.broadphase import awake_broadphase, serves
 from ig2mj.engine.warp.patches.contacts import mend_contacts
-from ig2mj.engine.warp.patches.ignored import drop_ignored
 from ig2mj.engine.warp.patches.replacements import original
-
-
-def choose_broadphase(name: str, m: Any, d: Any, ctx: Any, awake_prev: Any = None) -> None:
-    """The broad phase of what is awake where it finds all pairs; else `name`, the one that MuJoCo Warp chose."""
-    if serves(m):
-        awake_broadphase(m, d, ctx, awake_prev)
-    else:
-        original(collision_driver, name)(m, d, ctx, awake_prev)
+from ig2mj.engine.warp.patches.table import runs
 
 
 @wp.kernel(enable_backward=False)
@@ -29,17 +24,14 @@ def _keep_larger(first: wp.array[int], ncollision: wp.array[int]):
 
 
 def collision(m: Any, d: Any, awake_prev: Any = None) -> None:
-    """Collision detection as upstream; then contacts are checked against their geoms and ignored ones dropped.
-
-    Upstream counts pairs anew in the second pass, of what the first woke, and looks only at that number for an
-    overflow; afterwards `d.ncollision` is that of the larger pass here.
-    """
-    if awake_prev is None:
-        original(collision_driver, "collision")(m, d)
+    """Collision detection as upstream; afterwards `d.ncollision` is that of the larger pass, and contacts are checked
+    against their geoms."""
+    find = original(collision_driver, "collision")
+    if awake_prev is None or not runs("pair_overflow"):
+        find(m, d, awake_prev)
     else:
         first = wp.clone(d.ncollision)
-        original(collision_driver, "collision")(m, d, awake_prev)
+        find(m, d, awake_prev)
         wp.launch(_keep_larger, dim=1, inputs=[first], outputs=[d.ncollision])
-    if d.naconmax > 0:
+    if d.naconmax > 0 and runs("contacts"):
         mend_contacts(m, d)
-        drop_ignored(m, d)

@@ -178,13 +178,6 @@ def cholesky_factorize_solve(m: Any, d: Any, ctx: Any, skip_unchanged: bool = Fa
     wp.launch_tiled(kernel, dim=d.nworld, inputs=inputs, outputs=outputs, block_dim=block_dim)
 
 
-def solve_init_dof(warmstart: bool, sparse: bool) -> wp.Kernel:
-    """Start of a solve; also zeroes the constraint forces of worlds without constraints, which a dense model needs as
-    much as a sparse one."""
-    del sparse
-    return original(solver, "_solve_init_dof")(warmstart, True)
-
-
 def smooth_solve_compact(m: Any, d: Any) -> None:
     """Accelerations without constraints, of what is awake."""
     size = d.nvmax_pad

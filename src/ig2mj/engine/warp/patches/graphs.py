@@ -17,6 +17,7 @@ from typing import Any
 import warp as wp
 
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
+from ig2mj.engine.warp.patches.table import runs
 
 GRAPHS = 128
 """CUDA graphs of a call that are kept. Warp keeps 32; an environment that is stepped from Python may need more in turn,
@@ -56,5 +57,5 @@ def graphs_kept() -> Iterator[None]:
     MJX keeps what it registered of a function. Its cameras are the same functions for everybody: theirs find graphs so
     for all users in the process, or for none where another one drew first.
     """
-    with _callables.entered():
+    with _callables.entered(runs("graphs")):
         yield

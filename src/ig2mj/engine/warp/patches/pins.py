@@ -1,7 +1,9 @@
 """What `ig2mj.engine.warp.patches` was written for: a version of MuJoCo Warp and the source of each function it needs.
 
-For another version, hold each function of ours against the new original, run `make test-slow` and, on a machine with a
-GPU, `make test-gpu`, and then put into this file what `renewed()` gives.
+For another version: `mismatches()` lists what changed. Compare each function of ours with the new original, run `make
+test-slow` and, on a machine with a GPU, `make test-gpu`, both with `IG2MJ_TRY_KERNELS=1` in the environment, which lets
+our functions run in spite of these pins. Then put into this file what `renewed()` gives. `docs/notes/upgrade.md` has
+the recipe and its last dry run.
 """
 
 from __future__ import annotations
@@ -12,10 +14,13 @@ import importlib
 import importlib.metadata
 import inspect
 import linecache
+import os
 from typing import Any
 
 PACKAGE, VERSION = "mujoco-mjx", "3.17.0"
 """The package that MuJoCo Warp comes in; the one version that will do."""
+
+TRY, MISSING = "IG2MJ_TRY_KERNELS", "missing"
 
 PINS: dict[str, dict[str, str]] = {
     "third_party.mujoco_warp._src.solver": {
@@ -184,16 +189,21 @@ PINS: dict[str, dict[str, str]] = {
 
 @functools.cache
 def mismatches() -> tuple[str, ...]:
-    """What is not as it was when our functions were written; empty: they fit. Looked up once per process."""
+    """All that differs from what our functions were written for: the version, and each function that has changed or is
+    missing. Empty: they fit. Looked up once per process."""
     version = importlib.metadata.version(PACKAGE)
-    if version != VERSION:
-        return (f"{PACKAGE} {version} is not {VERSION}",)
-    return tuple(
-        f"{module}.{name} has changed"
-        for module, pins in PINS.items()
-        for name, pin in pins.items()
-        if fingerprint(module, name) != pin
-    )
+    found = [] if version == VERSION else [f"{PACKAGE} {version} is not {VERSION}"]
+    for module, pins in PINS.items():
+        for name, pin in pins.items():
+            now = fingerprint(module, name)
+            if now != pin:
+                found.append(f"{module}.{name} {'is missing' if now == MISSING else 'has changed'}")
+    return tuple(found)
+
+
+def obstacles() -> tuple[str, ...]:
+    """Why our functions do not run: `mismatches`, and nothing where `IG2MJ_TRY_KERNELS` is 1."""
+    return () if os.environ.get(TRY) == "1" else mismatches()
 
 
 def fingerprint(module: str, name: str) -> str:
@@ -201,7 +211,7 @@ def fingerprint(module: str, name: str) -> str:
     try:
         found: Any = getattr(importlib.import_module(f"mujoco.mjx.{module}"), name)
     except (ImportError, AttributeError):
-        return "missing"
+        return MISSING
     found = getattr(found, "func", found)  # of Warp's kernels and functions
     if not callable(found):
         return _beginning(repr(found))

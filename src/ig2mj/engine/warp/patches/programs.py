@@ -56,7 +56,7 @@ _registrations.add({(ffi, REGISTER): _register})
 @contextlib.contextmanager
 def traced_with(own: bool) -> Iterator[None]:
     """What this thread traces inside the block runs, whenever it does, with our functions or (not `own`) upstream's."""
-    if pins.mismatches():  # MJX may register its functions in another way
+    if pins.obstacles():  # MJX may register its functions in another way
         yield
         return
     before = getattr(_here, "own", False)

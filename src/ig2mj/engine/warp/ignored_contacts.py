@@ -1,18 +1,22 @@
 """Contacts of hands with objects that they ignore, dropped where contacts are found (`Write.ignored_contacts`).
 
-MJX hands MuJoCo Warp the fields of its model and nothing else. Two that say how sticky geoms are (`flg_adhesion` is off
-in every household) carry what is needed here: `geom_adhesion` which hand or object a geom is part of, as `encode`
-writes it; `pair_adhesion`, of which there is none without `<pair>`, the worlds' flags.
+MuJoCo Warp calls a contact filter at the end of each collision pass (`Callback.contactfilter`); `filter_contacts` puts
+one into MJX's steps. MJX passes the fields of its model to MuJoCo Warp and nothing else. Two that say how sticky geoms
+are (`flg_adhesion` is off in every household) carry what the filter needs: `geom_adhesion` says which hand or object a
+geom is part of, as `encode` writes it; `pair_adhesion`, which is empty without `<pair>`, says what each world's hands
+ignore. In models without them the filter does nothing, so that other users of MJX in the process notice none of it.
 """
 
 # Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
 # pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
-# pyright: reportGeneralTypeIssues=false, reportOperatorIssue=false, reportReturnType=false
+# pyright: reportGeneralTypeIssues=false, reportOperatorIssue=false, reportReturnType=false, reportPrivateUsage=false
 
+import functools
 from typing import Any, no_type_check
 
 import numpy as np
 import warp as wp
+from mujoco.mjx.warp import forward
 
 from ig2mj.engine.warp.patches.contacts import FAR
 
@@ -52,8 +56,8 @@ DROP = _drop
 """The kernel that takes ignored contacts out, where there are hands."""
 
 
-def drop_ignored(m: Any, d: Any) -> None:
-    """Takes ignored contacts of all worlds out; after collision detection."""
+def _drop_ignored(m: Any, d: Any) -> None:
+    """Takes ignored contacts of all worlds out; after a pass of collision detection."""
     if m.npair or m.flg_adhesion or not m.pair_adhesion.shape[1]:
         return
     threads = max(1, min(d.naconmax, 1 << 17))
@@ -63,3 +67,17 @@ def drop_ignored(m: Any, d: Any) -> None:
         inputs=[m.geom_adhesion, m.pair_adhesion, d.nacon, d.contact.worldid, threads],
         outputs=[d.contact.geom, d.contact.dist],
     )
+
+
+@functools.cache
+def filter_contacts() -> None:
+    """Lets the steps of MJX in this process drop ignored contacts. A filter that is there already runs first."""
+    callback = forward._cb
+    before = callback.contactfilter
+
+    def contactfilter(m: Any, d: Any) -> None:
+        if before is not None:
+            before(m, d)
+        _drop_ignored(m, d)
+
+    callback.contactfilter = contactfilter

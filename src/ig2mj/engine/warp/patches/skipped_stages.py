@@ -1,11 +1,11 @@
-"""What a step does for nobody: left out.
+"""Stages of a step whose results nobody reads, skipped.
 
-- Islands' own numbering of degrees of freedom and constraints, nine kernels after the solver: they serve solvers that
-  work island by island, which neither ours nor MuJoCo Warp's compacted one does. Which trees form an island, which
-  sleeping needs, is another function's.
+- Islands' own numbering of degrees of freedom and constraints takes nine kernels after the solver. It serves solvers
+  that work island by island, which neither ours nor MuJoCo Warp's compacted one does. Another function finds which
+  trees form an island, which sleeping needs.
 - The list of awake degrees of freedom is made before the smooth accelerations and again before the constraints are
-  solved; nothing wakes or falls asleep between.
-- Derivatives of islands' kernels, which are about whole numbers: compiling them takes as long as a convex kernel.
+  solved. Nothing wakes or falls asleep between the two.
+- Island kernels work on integers. Compiling their derivatives takes as long as compiling a convex kernel.
 """
 
 from __future__ import annotations

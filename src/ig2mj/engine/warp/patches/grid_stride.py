@@ -1,9 +1,8 @@
-"""Constraint rows and entries of the Hessian gone through by a few threads of each world, as far as there are any.
+"""Constraint rows and entries of the Hessian in grid-stride loops: a few threads of each world go over what there is.
 
-MuJoCo Warp starts a thread for each row that fits into a world's buffer, and for each entry of the largest Hessian; of
-some hundred rows a few dozen are used, and when most worlds have converged, next to none, but starting and ending a
-thread costs as much. One step of the solver's loop was mostly that. Here each world has `LANES` threads for its rows
-and `ENTRIES` for its Hessian, which loop over what there is.
+MuJoCo Warp starts a thread for each row that fits into a world's buffer, and for each entry of the largest Hessian. Of
+some hundred rows a few dozen are used, and next to none when most worlds have converged, but starting and ending a
+thread costs as much. Here each world has `LANES` threads for its rows and `ENTRIES` for its Hessian.
 """
 
 # Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
@@ -40,7 +39,7 @@ def _by_lanes(kernel: wp.Kernel) -> wp.Kernel:
     # The first row has something to do where there is none, too: it counts.
     room = ROWS[kernel.key.split("__locals__")[0]]
     rows = f"wp.min(wp.max(nefc_in[worldid], 1), {room}.shape[1])"
-    return strided(kernel, "efcid", rows, LANES, f"ig2mj_lanes_{LANES}_{kernel.module.name}")
+    return strided(kernel, "efcid", rows, LANES, f"ig2mj_grid_stride_{LANES}_{kernel.module.name}")
 
 
 @wp.kernel(enable_backward=False)
