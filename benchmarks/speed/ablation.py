@@ -1,7 +1,7 @@
 """What each group of patches over MuJoCo Warp gains: published rows with one group left out at a time.
 
-    python benchmarks/speed/ablation.py birch-physics [made_60-full ...] [--groups G ...] [--minutes 9] [--out DIR]
-    python benchmarks/speed/ablation.py write DIR/ablation.jsonl ...        the table of docs/notes/gpu.md
+    python -m benchmarks.speed.ablation birch-physics [made_60-full ...] [--groups G ...] [--minutes 9] [--out DIR]
+    python -m benchmarks.speed.ablation write DIR/ablation.jsonl ...        the table of docs/notes/gpu.md
 
 Each variant of a row is a process with its own `IG2MJ_PATCHES`: "all" (the baseline), one for each group that is left
 out, and "none" (MuJoCo Warp as it comes). On every card a batch of variants and a baseline are compiled side by side.
@@ -21,10 +21,7 @@ import concurrent.futures
 import contextlib
 import dataclasses
 import json
-import os
 import pathlib
-import queue
-import signal
 import statistics
 import subprocess
 import sys
@@ -32,18 +29,16 @@ import threading
 import time
 from typing import Any
 
-HERE = pathlib.Path(__file__).resolve().parent
-BENCHMARKS = HERE.parent
-sys.path.insert(0, str(BENCHMARKS))
+from benchmarks.harness.paths import ROOT, WORK, environment, module
+from benchmarks.harness.results import command, keep_row
+from benchmarks.harness.waiting import Process, end_all
 
-WORK = BENCHMARKS.parent / "out" / "benchmarks"
 PROFILES = WORK / "profiles"
-PAGE = BENCHMARKS.parent / "docs" / "notes" / "gpu.md"
-WORKER = HERE / "ablation.py"
-BEGIN, END = "<!-- begin: python benchmarks/speed/ablation.py write -->\n", "<!-- end of ablation -->"
+PAGE = ROOT / "docs" / "notes" / "gpu.md"
+BEGIN, END = "<!-- begin: python -m benchmarks.speed.ablation write -->\n", "<!-- end of ablation -->"
 
-MARK = "ablation: "
-"""Before each line that a worker sends to the driver; the rest is its log."""
+WORKER = module("speed.ablation")
+"""Words after `python` that run a worker, before its own."""
 
 BASELINE, UNPATCHED = "all", "none"
 
@@ -76,35 +71,38 @@ ROWS = {
 
 
 def work(name: str, worlds: int) -> None:
-    """Makes a row ready, says so, and answers each line of stdin with a timed call."""
+    """Makes a row ready, says so, and answers each line of standard input with a timed call.
+
+    A line that asks for the end is answered with what became of the worlds.
+    """
+    import jax
+
     row = ROWS[name]
     began = time.monotonic()
     prepared = _environment if row.what == "environment" else _batch
     call, carry, steps, report = prepared(row, worlds or row.worlds)
-    _send({"ready_s": round(time.monotonic() - began, 1), "steps": steps})
-    import jax
-
+    _say("READY", {"ready_s": round(time.monotonic() - began, 1), "steps": steps})
     for line in sys.stdin:
-        if line.strip() == "end":
-            break
+        if json.loads(line).get("end"):
+            _say("DONE", report(carry))
+            continue
         start = time.perf_counter()
         carry, _ = jax.block_until_ready(call(carry))
-        _send({"seconds": time.perf_counter() - start})
-    _send(report(carry))
+        _say("DONE", {"seconds": time.perf_counter() - start})
 
 
-def _send(message: dict[str, Any]) -> None:
-    print(MARK + json.dumps(message), flush=True)
+def _say(word: str, message: dict[str, Any]) -> None:
+    print(f"{word} {json.dumps(message)}", flush=True)
 
 
 def _batch(row: Row, num_worlds: int) -> tuple[Any, Any, int, Any]:
-    """A batch as of `throughput.py`."""
+    """A batch as of `batch.py`."""
     import jax
     import numpy as np
-    import throughput
-    from batch_case import Case
-    from disturbance import Watch
 
+    from benchmarks.harness.batch_case import Case
+    from benchmarks.harness.disturbance import Watch
+    from benchmarks.speed import batch
     from ig2mj.engine.health import CAPACITY
     from ig2mj.engine.warp.engine import WarpEngine
     from ig2mj.worlds import Core, Rules
@@ -115,7 +113,7 @@ def _batch(row: Row, num_worlds: int) -> tuple[Any, Any, int, Any]:
     engine = WarpEngine(case.scene, num_worlds, profile=profile, initial=initial)
     core = Core(engine, Rules(case.model, case.goal), case.pool)
     watch = Watch(engine)
-    call, carry = throughput.program(case, core, watch, True, row.what)
+    call, carry = batch.program(case, core, watch, True, row.what)
     compiled = call.lower(carry).compile()
 
     def report(carry: Any) -> dict[str, Any]:
@@ -124,18 +122,17 @@ def _batch(row: Row, num_worlds: int) -> tuple[Any, Any, int, Any]:
             "capacity_overflows": int(((np.asarray(physics.overflow) & int(CAPACITY)) != 0).sum()),
             "non_finite": int((~np.asarray(engine.health(physics).finite)).sum()),
             "lost_object_worlds": watch.lost(carry[2]),
-            **throughput.memory(num_worlds),
+            **batch.memory(num_worlds),
             "profile": [profile.awake_dofs, profile.constraints, profile.contacts, profile.convex_contacts],
-            **_about(),
+            **batch.device(),
         }
 
-    return compiled, carry, throughput.STEPS, report
+    return compiled, carry, batch.STEPS, report
 
 
 def _environment(row: Row, num_worlds: int) -> tuple[Any, Any, int, Any]:
     """An environment as of `environments.py`, the humanoid with mittens."""
-    import environments
-    import throughput
+    from benchmarks.speed import environments
 
     args = argparse.Namespace(
         robot="humanoid", engine=None, grasping="mitten", observations=[], pool_size=None, profile=None, hold=5
@@ -143,159 +140,103 @@ def _environment(row: Row, num_worlds: int) -> tuple[Any, Any, int, Any]:
     env, call, carry = environments.prepared(row.home, num_worlds, args)
 
     def report(carry: Any) -> dict[str, Any]:
-        return {"metrics": env.metrics(carry[0]), **throughput.memory(num_worlds), **_about()}
+        return {"metrics": env.metrics(carry[0]), **environments.memory(num_worlds), **environments.device()}
 
     return call, carry, environments.CALL, report
-
-
-def _about() -> dict[str, Any]:
-    import throughput
-
-    return throughput.device()
 
 
 # The driver.
 
 
-class Worker:
-    """A variant of a row in a process of its own on one card."""
+@dataclasses.dataclass
+class Variant:
+    """A row with a choice of groups, in a process of its own on one card.
 
-    def __init__(self, row: str, variant: str, card: str, out: pathlib.Path, worlds: int):
-        self.variant, self.card = variant, card
-        self.ready: dict[str, Any] | None = None
-        self.seconds: list[float] = []
-        self.report: dict[str, Any] = {}
-        choice = variant if variant in (BASELINE, UNPATCHED) else f"-{variant}"
-        env = {**os.environ, "IG2MJ_PATCHES": choice, "XLA_PYTHON_CLIENT_PREALLOCATE": "false"}
-        if card:
-            env["CUDA_VISIBLE_DEVICES"] = card
-        words = [sys.executable, str(WORKER), "work", row, "--worlds", str(worlds)]
-        self.log = out / "logs" / f"{row}-{variant}-{time.monotonic_ns()}.txt"
-        self.log.parent.mkdir(parents=True, exist_ok=True)
-        with self.log.open("a") as log:
-            self._process = subprocess.Popen(
-                words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=log, env=env, text=True,
-                start_new_session=True,
-            )  # fmt: skip
-        self._answers: queue.Queue[dict[str, Any] | None] = queue.Queue()
-        self._reader = threading.Thread(target=self._read, daemon=True)
-        self._reader.start()
+    Attributes:
+      seconds: of its timed calls. report: what became of its worlds, and what it ran on.
+    """
 
-    def _read(self) -> None:
-        assert self._process.stdout is not None
-        with self.log.open("a") as log:
-            for line in self._process.stdout:
-                if line.startswith(MARK):
-                    self._answers.put(json.loads(line[len(MARK) :]))
-                else:
-                    log.write(line)
-        self._answers.put(None)
+    row: str
+    without: str
+    process: Process
+    seconds: list[float] = dataclasses.field(default_factory=list)
+    report: dict[str, Any] = dataclasses.field(default_factory=dict)
 
-    def answer(self, until: float) -> dict[str, Any] | None:
-        """The next message; None: the process has ended, or it is too late."""
-        try:
-            return self._answers.get(timeout=max(0.0, until - time.monotonic()))
-        except queue.Empty:
-            return None
+    def ask(self, message: dict[str, Any], until: float) -> dict[str, Any] | None:
+        """What it answers; None: it has ended, or it is too late."""
+        self.process.tell(message)
+        return self.process.hear("DONE", until)
 
-    def call(self, until: float) -> float | None:
-        """Seconds of one call."""
-        answer = self.ask("call", until)
-        return None if answer is None else answer["seconds"]
 
-    def ask(self, word: str, until: float) -> dict[str, Any] | None:
-        """What it answers to a word."""
-        assert self._process.stdin is not None
-        try:
-            self._process.stdin.write(word + "\n")
-            self._process.stdin.flush()
-        except OSError:
-            return None
-        return self.answer(until)
-
-    def end(self) -> None:
-        """Ends the process with its children."""
-        if self._process.poll() is None:
-            os.killpg(self._process.pid, signal.SIGKILL)
-        self._process.wait()
-        self._reader.join()
-        for pipe in (self._process.stdin, self._process.stdout):
-            assert pipe is not None
-            with contextlib.suppress(OSError):
-                pipe.close()
-
-    @property
-    def trouble(self) -> str:
-        """The last line of its log."""
-        lines = self.log.read_text(errors="replace").split("\n")
-        return next((line.strip() for line in reversed(lines) if line.strip()), "it said nothing")
+def start(row: str, without: str, card: str, args: argparse.Namespace) -> Variant:
+    """Starts a variant; `without` is the name of a group, "all" or "none"."""
+    choice = without if without in (BASELINE, UNPATCHED) else f"-{without}"
+    more = {"IG2MJ_PATCHES": choice, "XLA_PYTHON_CLIENT_PREALLOCATE": "false"}
+    more |= {"CUDA_VISIBLE_DEVICES": card} if card else {}
+    log = args.out / "logs" / f"{row}-{without}-{time.monotonic_ns()}.txt"
+    return Variant(row, without, Process([*WORKER, "work", row, "--worlds", str(args.worlds)], log, more))
 
 
 def measure(
     row: str, variants: list[str], card: str, args: argparse.Namespace, end: float, barrier: threading.Barrier
 ) -> list[dict[str, Any]]:
-    """The rows of one batch on one card; the first worker is the baseline.
+    """The rows of one batch on one card; the first variant is the baseline.
 
     Args:
       end: on the monotonic clock, when all is ended. barrier: of all cards; nothing is timed before all are ready.
     """
-    workers = [Worker(row, name, card, args.out, args.worlds) for name in (BASELINE, *variants)]
+    every = [start(row, name, card, args) for name in (BASELINE, *variants)]
     try:
-        for worker in workers:
-            worker.ready = worker.answer(end)
+        able = [each for each in every if each.process.wait_until_ready(end)]
         with contextlib.suppress(threading.BrokenBarrierError):
             barrier.wait()
-        able = [worker for worker in workers if worker.ready]
         for k in range(WARM_UP + args.calls):
-            for worker in list(able):
-                seconds = worker.call(end)
-                if seconds is None:
-                    able.remove(worker)
+            for each in list(able):
+                answer = each.ask({}, end)
+                if answer is None:
+                    able.remove(each)
                 elif k >= WARM_UP:
-                    worker.seconds.append(seconds)
-        for worker in able:
-            worker.report = worker.ask("end", end) or {}
-        return [_row(row, worker, workers[0], args) for worker in workers]
+                    each.seconds.append(answer["seconds"])
+        for each in able:
+            each.report = each.ask({"end": True}, end) or {}
+        return [_row(each, every[0], args.worlds) for each in every]
     finally:
         barrier.abort()
-        for worker in workers:
-            worker.end()
+        end_all([each.process for each in every], 2.0)
 
 
-def _row(name: str, worker: Worker, baseline: Worker, args: argparse.Namespace) -> dict[str, Any]:
-    row = ROWS[name]
-    worlds = args.worlds or row.worlds
-    found: dict[str, Any] = {"row": name, "without": "" if worker is baseline else worker.variant, "worlds": worlds}
-    if not worker.seconds or not worker.ready or not baseline.seconds:
-        return found | {"failed": worker.trouble if not worker.seconds else "the baseline failed"}
-    steps = worker.ready["steps"]
-    median = statistics.median(worker.seconds)
+def _row(each: Variant, baseline: Variant, worlds: int) -> dict[str, Any]:
+    worlds = worlds or ROWS[each.row].worlds
+    without = "" if each is baseline else each.without
+    found: dict[str, Any] = {"row": each.row, "without": without, "worlds": worlds}
+    if not each.seconds or not each.process.ready or not baseline.seconds:
+        return found | {"failed": "the baseline failed" if each.seconds else each.process.trouble()}
+    steps = each.process.ready["steps"]
     found |= {
-        "steps_per_s": round(worlds * steps / median),
-        "ms_of_calls": [round(1e3 * s / steps, 2) for s in worker.seconds],
-        "ready_s": worker.ready["ready_s"],
+        "steps_per_s": round(worlds * steps / statistics.median(each.seconds)),
+        "ms_of_calls": [round(1e3 * s / steps, 2) for s in each.seconds],
+        "ready_s": each.process.ready["ready_s"],
     }
-    if worker is not baseline:
-        cost = [100 * (own / base - 1) for own, base in zip(worker.seconds, baseline.seconds, strict=False)]
+    if each is not baseline:
+        cost = [100 * (own / base - 1) for own, base in zip(each.seconds, baseline.seconds, strict=False)]
         found |= {
             "cost_percent": round(statistics.median(cost), 1),
             "cost_range": [round(min(cost), 1), round(max(cost), 1)],
         }
-    words = [pathlib.PurePath(word).name if "/" in word else word for word in args.words]
-    return found | worker.report | {"command": " ".join(["python benchmarks/speed/ablation.py", *words])}
+    return found | each.report | {"command": command()}
 
 
 def make_homes(rows: list[str]) -> None:
     """Homes that benchmarks make, and their buffer sizes, before several processes need them."""
-    from made_home import write_home
+    from benchmarks.harness.made_home import write_home
 
     for home in {ROWS[row].home for row in rows}:
         if not home.startswith("made_"):
             continue
         folder = write_home(WORK / home, int(home.split("_")[1]))
         if not (PROFILES / home / "engine_profile.json").exists():
-            words = [sys.executable, str(BENCHMARKS / "calibrate_home.py"), str(folder), "--out", str(PROFILES)]
-            subprocess.run(words, check=True)
+            words = [sys.executable, *module("harness.calibrate_home"), str(folder), "--out", str(PROFILES)]
+            subprocess.run(words, check=True, env=environment())
 
 
 def run(args: argparse.Namespace) -> None:
@@ -326,10 +267,7 @@ def run(args: argparse.Namespace) -> None:
             ]
             for job in jobs:
                 for found in job.result():
-                    line = json.dumps(found)
-                    print(line, flush=True)
-                    with file.open("a", encoding="utf-8") as opened:
-                        opened.write(line + "\n")
+                    keep_row(found, file)
 
 
 # The table.
@@ -378,9 +316,7 @@ def main(words: list[str]) -> None:
     parser.add_argument("--minutes", type=float, default=9.0, help="when all is ended")
     parser.add_argument("--worlds", type=int, default=0, help="for small machines; 0: the row's number")
     parser.add_argument("--out", type=pathlib.Path, default=WORK / "ablation", help="folder for rows and logs")
-    args = parser.parse_args(words)
-    args.words = words
-    run(args)
+    run(parser.parse_args(words))
 
 
 if __name__ == "__main__":
