@@ -17,36 +17,51 @@ BEGIN, END = "<!-- begin: python -m benchmarks.learning.readme_table --write -->
 EPISODES = "1,000 held-out episodes"
 
 
+COLUMNS = (("humanoid", "mitten"), ("fetch", "mitten"), ("fetch", "physical"), ("turtlebot", "physical"))
+"""Robot and grasping of each column, in order."""
+
+
 def table() -> str:
-    """A row for each policy, Markdown. Cards of another number of episodes are an error: a table has one protocol."""
-    lines = ["| task | robot, hands | sees | learns from | trained | success |", "|---|---|---|---|--:|--:|"]
-    cards = [_card(file) for file in sorted((ROOT / "policies").glob("*.md")) if file.name != "README.md"]
-    for card in cards:
+    """A row for each task and a column for each robot, Markdown. Success of the cards, with what they learn from.
+
+    Raises ValueError: a card is of another number of episodes (a table has one protocol), or fits no column.
+    """
+    cells = dict[str, dict[tuple[str, str], str]]()
+    for file in sorted((ROOT / "policies").glob("*.md")):
+        if file.name == "README.md":
+            continue
+        card = _card(file)
         success = re.match(r"([\d.]+)% of ([\d,]+ held-out episodes)", card["success"])
         if success is None or success[2] != EPISODES:
-            raise ValueError(f"{card['task']}: success is not of {EPISODES}: {card['success']}")
-        sees = "images" if "rgb" in card["sees"] else "state"
-        by = {"dagger": "expert"}.get(card["algorithm"], "reward")
-        minutes = f"{float(card['minutes of training']):.1f} min, {_device(card['device'])}"
-        engine = card["evaluated on"].split()[1]
-        row = (card["task"], card["robot, grasping"], sees, by, minutes, f"{success[1]} % ({engine})")
-        lines.append("| " + " | ".join(row) + " |")
+            raise ValueError(f"{file.name}: success is not of {EPISODES}: {card['success']}")
+        robot, grasping = card["robot, grasping"].split(", ")
+        if (robot, grasping) not in COLUMNS:
+            raise ValueError(f"{file.name}: there is no column for {robot}, {grasping}")
+        cells.setdefault(card["task"], {})[robot, grasping] = f"{success[1]} %{_remarks(card)}"
+    head = " | ".join(f"{robot}, {grasping}" for robot, grasping in COLUMNS)
+    lines = [f"| task | {head} |", "|---" + "|--:" * len(COLUMNS) + "|"]
+    lines += [f"| {task} | " + " | ".join(row.get(c, "") for c in COLUMNS) + " |" for task, row in cells.items()]
     return "\n".join(lines) + "\n"
+
+
+def _remarks(card: dict[str, str]) -> str:
+    """What differs from the usual: images, reward alone, evaluated on the native engine."""
+    remarks = [] if "rgb" in card["sees"] else ["state"]
+    remarks += ["expert"] if card["algorithm"] == "dagger" else []
+    engine = card["evaluated on"].split()[1]
+    remarks += [engine] if engine != "native" else []
+    return f" ({', '.join(remarks)})" if remarks else ""
 
 
 def page_with(text: str) -> str:
     """README.md with another table between the marks."""
     before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
-    return before + BEGIN + "\n" + text + "\n" + END + rest.split(END)[1]
+    return before + BEGIN + text + END + rest.split(END)[1]
 
 
 def _card(file: pathlib.Path) -> dict[str, str]:
     rows = re.findall(r"^\| ([^|]+) \| (.+) \|$", file.read_text(encoding="utf-8"), re.MULTILINE)
     return {key.strip(): value.strip() for key, value in rows}
-
-
-def _device(name: str) -> str:
-    return next((card for card in ("H200", "H100") if card in name), "processor")
 
 
 if __name__ == "__main__":

@@ -37,7 +37,7 @@ def table() -> str:
 def page_with(text: str) -> str:
     """README.md with another table between the marks."""
     before, rest = PAGE.read_text(encoding="utf-8").split(BEGIN)
-    return before + BEGIN + "\n" + text + "\n" + END + rest.split(END)[1]
+    return before + BEGIN + text + END + rest.split(END)[1]
 
 
 def _block(block: tuple[str, list[tuple[str, str]]], unit: str) -> str:
