@@ -31,7 +31,7 @@ from ig2mj.engine.view import PhysicsView
 from ig2mj.predicates import compile_expression
 from ig2mj.process import run_programs_inline
 from ig2mj.states import StateModel, initial_states
-from ig2mj.worlds.lazy.stepper import StateStepper
+from ig2mj.worlds.incremental import IncrementalRules
 from ig2mj.worlds.rules import Rules
 
 SETTLE_STEPS = 200
@@ -135,7 +135,7 @@ class Stepped:
     """States that go on from step to step; every step waits for its status."""
 
     def __init__(self, rules: Rules):
-        self.stepper, self.states, self.count = StateStepper.of(rules, 1), rules.initial, 0
+        self.stepper, self.states, self.count = IncrementalRules(rules, 1), rules.initial, 0
 
     def step(self, view: PhysicsView) -> bool:
         self.states, _, status = self.stepper.step(self.states, view)

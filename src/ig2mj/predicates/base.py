@@ -78,15 +78,13 @@ def no_queries(model: StateModel, arguments: Arguments) -> list[Query]:
 class Predicate:
     """One logical predicate.
 
-    What it depends on is not written down but found by tracing it (`ig2mj.predicates.tracing`, `Questions.reads`).
+    `Questions.reads` finds what it depends on by tracing it.
 
     Attributes:
       name: snake_case. arguments: what each argument is; an agent's index is the number of objects plus its own.
         evaluate: truth for argument tuples. ability: without it the first argument's answer is False.
         aliases: other names (iGibson's, BDDL's tokens, the paper's). queries: relations it needs. why: for people, the
-        numbers behind the answer in one world. per_object: see `of_states`. of_arguments: of all that a view says of
-        objects, an answer depends on what it says of the argument objects only, their links, bodies, pieces and
-        contacts, and of floors, which stay; what else moves changes no answer.
+        numbers behind the answer in one world. per_object: see `of_states`.
     """
 
     name: str
@@ -97,7 +95,6 @@ class Predicate:
     queries: Queries = no_queries
     why: Why | None = None
     per_object: OfStates | None = None
-    of_arguments: bool = False
 
     @classmethod
     def of_states(cls, of_states: OfStates, **fields: Any) -> Predicate:

@@ -14,7 +14,6 @@ import functools
 import warnings
 from collections.abc import Sequence
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool
@@ -24,11 +23,8 @@ from ig2mj.errors import AbilityError, Ig2mjError, UnknownNameError
 from ig2mj.predicates.base import ANY_ROOM, Context, Predicate
 from ig2mj.predicates.logic import Atom
 from ig2mj.predicates.registry import find
-from ig2mj.predicates.tracing import reads_of_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import Query
-from ig2mj.states.update import HEAT_FIELDS
-from ig2mj.states.world import ExtendedStates
 
 Instance = tuple[str, tuple[int, ...]]
 """A predicate's name and the indices of its arguments."""
@@ -60,8 +56,7 @@ class Literals:
     """Literals of a scene, ready to be evaluated in one go.
 
     Evaluating has two parts: `facts`, the truth of every instance (a predicate of object indices, each once), and
-    `combine`, which makes literals of them. `update_heat` brings the facts that rest on temperature alone up to date
-    after a step in which nothing else changed.
+    `combine`, which makes literals of them.
 
     Attributes:
       model: constants. literals: the L axis. instances: rows of argument indices per predicate; the I axis is these one
@@ -102,48 +97,12 @@ class Literals:
         """Truth of every literal in every world."""
         return self.combine(self.facts(context), context.states.sliced)
 
-    def facts(self, context: Context, lasting: Bool[Array, "W I"] | None = None) -> Bool[Array, "W I"]:
-        """Truth of every instance.
-
-        Args:
-          lasting: `lasting_facts` of the same states, which are then not computed again.
-        """
-        facts = self._none(context.num_worlds) if lasting is None else jnp.asarray(lasting)
+    def facts(self, context: Context) -> Bool[Array, "W I"]:
+        """Truth of every instance."""
+        facts: Bool[Array, "W I"] = jnp.zeros((context.num_worlds, len(self.place) + 1), bool)
         for name, rows in self.instances.items():
-            if lasting is None or name not in self._lasting:
-                facts = self._laid(facts, name, find(name).evaluate(context, np.array(rows, int)))
+            facts = self._laid(facts, name, find(name).evaluate(context, np.array(rows, int)))
         return facts
-
-    def lasting_facts(self, states: ExtendedStates) -> Bool[Array, "W I"]:
-        """Truth of the instances that follow from the states alone and from no temperature; false for the others."""
-        facts = self._none(states.sliced.shape[0])
-        for name in self._lasting:
-            of_states, rows = find(name).per_object, np.array(self.instances[name], int)
-            assert of_states is not None
-            facts = self._laid(facts, name, of_states(self.model, states)[:, rows[:, 0]])
-        return facts
-
-    def update_heat(self, facts: Bool[Array, "W I"], states: ExtendedStates) -> Bool[Array, "W I"]:
-        """The facts with those replaced that read temperatures and nothing else."""
-        for name, reads in self._reads.items():
-            of_states = find(name).per_object
-            if of_states is not None and reads <= set(HEAT_FIELDS):
-                value = of_states(self.model, states)
-                facts = self._laid(facts, name, value[:, np.array(self.instances[name])[:, 0]])
-        return facts
-
-    @functools.cached_property
-    def _reads(self) -> dict[str, set[str]]:
-        """What of the states the predicates read that read nothing else."""
-        every = {name: find(name).per_object for name in self.instances}
-        return {name: reads_of_states(f, self.model) for name, f in every.items() if f is not None}
-
-    @functools.cached_property
-    def _lasting(self) -> tuple[str, ...]:
-        return tuple(name for name, reads in self._reads.items() if reads.isdisjoint(HEAT_FIELDS))
-
-    def _none(self, num_worlds: int) -> Bool[jax.Array, "W I"]:
-        return jnp.zeros((num_worlds, len(self.place) + 1), bool)
 
     def _laid(self, facts: Bool[Array, "W I"], name: str, answer: Bool[Array, "W P"]) -> Bool[Array, "W I"]:
         """Puts a predicate's answers in their places by selection: XLA fuses that, but not a concatenation."""

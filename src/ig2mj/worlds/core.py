@@ -8,9 +8,9 @@
 A control step is, in this order: the robots' controllers, physics, the view of it, extended states and the goal, what
 slicing moves, what hands take hold of and let go of, guards, clocks. It is the same for every engine. On a pure engine
 (see `ig2mj.engine.base`) the methods are compiled; on the native one they work on the engine's worlds in place, and
-states are only computed where something can have changed (`ig2mj.worlds.lazy`). Either way a batch that was given to
-`step`, `reset`, `rollout`, `write` or `load` is used up: go on with the one that is returned. A batch that was used up
-raises StaleStateError; `fork` copies one first.
+states are only computed where something can have changed (`ig2mj.worlds.incremental`). Either way a batch that was
+given to `step`, `reset`, `rollout`, `write` or `load` is used up: go on with the one that is returned. A batch that was
+used up raises StaleStateError; `fork` copies one first.
 
 `step_fn`, `reset_fn` and `start_fn` are the same functions, not compiled: call them inside your own `jax.jit` or
 `lax.scan` on a pure engine, or directly on any.
@@ -49,7 +49,7 @@ from ig2mj.worlds.controls import Controls
 from ig2mj.worlds.eyes import Eyes
 from ig2mj.worlds.hand_resets import HandResets
 from ig2mj.worlds.hands import Hands
-from ig2mj.worlds.lazy.stepper import StateStepper
+from ig2mj.worlds.incremental import IncrementalRules
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import Seeds
 from ig2mj.worlds.rules import Outcome, Rules, States
@@ -116,7 +116,10 @@ class Core:
             self._step, self._reset = self.step_fn, self.reset_fn
             self._rollout, self._begin = self._looped, self.start_fn
             self._write, self._load = self.write_fn, self.load_fn
-            self._react = StateStepper.of(rules, engine.num_worlds).step if rules is not None else self._no_rules
+            incremental = bool(getattr(engine, "incremental", True))
+            self._react = self._no_rules
+            if rules is not None:
+                self._react = IncrementalRules(rules, engine.num_worlds, incremental).step
             self._if_any, self._index = call, np.asarray
         self._no_status = GoalStatus.empty(engine.num_worlds)
 

@@ -70,6 +70,7 @@ class NativeEngine:
         boxes: str = "tight",
         model_fields: Sequence[str] = (),
         threads: int | None = None,
+        incremental: bool = True,
     ):
         """Makes an engine.
 
@@ -81,6 +82,8 @@ class NativeEngine:
           boxes: rule of the view's world boxes, "tight" or "igibson".
           model_fields: fields of the model that may differ per world (`ig2mj.engine.model_fields`).
           threads: how many to step worlds on; None: one per processor, and no more than worlds.
+          incremental: work that cannot change anything is skipped, in physics and in the states of the worlds that are
+            stepped with this engine (`ig2mj.worlds.incremental`). Results are the same to the bit.
 
         Raises:
           EngineError: an argument is out of range.
@@ -91,7 +94,7 @@ class NativeEngine:
         if threads is not None:
             whole_number("threads", threads)
         self.scene, self.tables, self.num_worlds = scene, scene.tables, num_worlds
-        self.substeps, self.timestep, self.boxes = substeps, timestep, boxes
+        self.substeps, self.timestep, self.boxes, self.incremental = substeps, timestep, boxes, incremental
         self.threads = min(threads or os.cpu_count() or 1, num_worlds)
         self._slots = [ModelSlot(_engine_model(scene.model, timestep)) for _ in range(self.threads)]
         model = self._slots[0].model
@@ -119,6 +122,7 @@ class NativeEngine:
             tolerance=touch_tolerance,
             own_fields=check_names(model_fields),
             substeps=range(substeps),
+            incremental=incremental,
         )
         self._free_dofs = self.layout.object_linear_dofs
         self._masks = [Masks(self._statics.vicinity, slot.model) for slot in self._slots]

@@ -36,6 +36,7 @@ class Statics:
       later: plan of the fields that are made later. has_agents: there is one.
       layers: the contact filter. forces: what forces of contacts are of interest.
       own_fields: fields of the model that each world has for itself besides eq_data. substeps: a number for each.
+      incremental: a world in which everything sleeps is not stepped.
       See `ig2mj.engine.layout`, `ig2mj.engine.native.view_rows` and `ig2mj.engine.native.vicinity` for the rest.
     """
 
@@ -51,6 +52,7 @@ class Statics:
     speed_limits: SpeedLimits
     tolerance: float
     substeps: range
+    incremental: bool
 
 
 class World:
@@ -102,7 +104,7 @@ class World:
         self._from_outside = self.data.qvel, self.data.xfrc_applied, self.data.qfrc_applied
         self._still, self._no_force = (np.zeros_like(array).tobytes() for array in self._from_outside[:2])
         self.wrong_controls, self.lost = False, ""
-        self._never_left_alone = model.nmocap > 0
+        self._never_left_alone = model.nmocap > 0 or not statics.incremental
 
     def step(self, ctrl: np.ndarray | None) -> int:
         """One control step, and the refresh after it. The data stands after `mj_step1` before and after."""

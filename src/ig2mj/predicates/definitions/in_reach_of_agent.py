@@ -29,7 +29,6 @@ IN_REACH_OF_AGENT = Predicate(
     name="in_reach_of_agent",
     arguments=("object",),
     evaluate=_evaluate,
-    of_arguments=True,
     aliases=("in_reach_of_robot", "inreachofagent", "inreachofrobot"),
     why=_why,
 )

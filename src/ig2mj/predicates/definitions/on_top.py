@@ -31,7 +31,6 @@ ON_TOP = Predicate(
     name="on_top",
     arguments=("object", "object"),
     evaluate=_evaluate,
-    of_arguments=True,
     aliases=("ontop", "on_top_of"),
     queries=_queries,
     why=_why,

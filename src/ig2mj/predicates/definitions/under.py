@@ -27,7 +27,6 @@ UNDER = Predicate(
     name="under",
     arguments=("object", "object"),
     evaluate=_evaluate,
-    of_arguments=True,
     queries=_queries,
     why=_why,
 )

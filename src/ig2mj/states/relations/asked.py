@@ -25,7 +25,7 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.relations.adjacency import AdjacencyPairs
 from ig2mj.states.relations.containment import surrounded
 from ig2mj.states.relations.nearness import NearPairs, pieces_of
-from ig2mj.states.relations.plan import Kind, RelationPlan, gate
+from ig2mj.states.relations.plan import Kind, gate
 
 PLANES_AT_ONCE = 8
 """Half-spaces in each turn of a loop (`ig2mj.geometry.rays.clip_line`): one pair is little work."""
@@ -112,31 +112,3 @@ class AskedRelations:
         positive, negative = rays.horizontal(view, (pos, quat))
         beside = jnp.any(positive | negative, axis=-1)
         return jnp.broadcast_to(beside, (len(beside), 2))
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class PairByPair(RelationPlan):
-    """As `RelationPlan`, but one pair is computed after the other by one program for each kind.
-
-    Where pairs are many and worlds are one or two, this is compiled in a fraction of the time. A pair then takes longer
-    to compute, but few pairs change in a step.
-    """
-
-    @functools.cached_property
-    def _tables(self) -> PieceTables:
-        return PieceTables(self.model)
-
-    def _compute(self, kind: Kind, view: PhysicsView, needed: Bool[Array, "W P"]) -> Bool[Array, "W P V"]:
-        """Answers where they are needed, false elsewhere."""
-        asked, worlds = AskedRelations(self._tables, view), len(needed)
-
-        def one(pair: tuple[Int[Array, "2"], Bool[Array, "W"]]) -> Bool[Array, "W 2"]:
-            objects, wanted = pair[0][None], pair[1][:, None]
-            return jax.lax.cond(
-                jnp.any(wanted),
-                lambda: wanted & asked.computed(kind, objects, wanted),
-                lambda: jnp.zeros((worlds, 2), bool),
-            )
-
-        found = jax.lax.map(one, (jnp.asarray(self.pairs[kind]), needed.T))
-        return jnp.moveaxis(found, 0, 1)[..., : 2 if kind == "vertical" else 1]

@@ -1,13 +1,10 @@
 """Relations between named pairs of objects, each computed once per step for everyone who asks.
 
 Heat sources ask what is inside them; predicates ask for inside, above and below, beside, distance. `RelationPlan`
-gathers the pairs before tracing; `Relations` holds the answers. Rays are the dearest part of a step, so a `Memo` can
-carry the last answers along: a pair is computed anew unless every number it depends on (the object's centre of mass,
-the pose of every body of the target) is bitwise the same. iGibson's own memo looks at two positions only, and goes
-stale when something turns, opens or closes. The memo pays where worlds are few and mostly asleep;
-without one, everything is computed every time.
+gathers the pairs before tracing; `Relations` holds the answers. iGibson remembers answers while two positions are the
+same, and goes stale when something turns, opens or closes; here all are computed in every step.
 
-Axes: W worlds, P pairs of a kind, K numbers that an answer depends on.
+Axes: W worlds, P pairs of a kind, V answers of a pair.
 """
 
 from __future__ import annotations
@@ -17,11 +14,9 @@ import functools
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Literal
 
-import jax
 import jax.numpy as jnp
 import numpy as np
-from flax import struct
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Int
 
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import AnyArray
@@ -37,18 +32,6 @@ Query = tuple[Kind, int, int]
 """What is asked: kind, object, target. Answers: `Relations.inside`, `.above` with `.below`, `.beside`, `.near`."""
 
 KINDS: tuple[Kind, ...] = ("inside", "vertical", "horizontal", "near")
-
-
-@struct.dataclass
-class Memo:
-    """The last answers and what they were computed from, per kind.
-
-    Attributes:
-      inputs: NaN at first, which equals nothing. values: one or two booleans per pair.
-    """
-
-    inputs: dict[str, Float[Array, "W P K"]]
-    values: dict[str, Bool[Array, "W P V"]]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -112,35 +95,10 @@ class RelationPlan:
             if pairs
         }
 
-    def empty_memo(self, num_worlds: int) -> Memo:
-        """A memo that knows nothing yet."""
-        inputs, values = {}, {}
-        for kind, work in self._work.items():
-            shape = (num_worlds, len(work.pairs))
-            inputs[kind] = jnp.full((*shape, 3 + 7 * self._bodies[kind].shape[1]), jnp.nan, jnp.float32)
-            values[kind] = jnp.zeros((*shape, 2 if kind == "vertical" else 1), bool)
-        return Memo(inputs, values)
-
     def evaluate(self, view: PhysicsView) -> Relations:
         """All answers, computed now."""
         values = {kind: self._compute(kind, view, self._gate(kind, view)) for kind in self._work}
         return Relations(self, self._padded(values, view))
-
-    def evaluate_changed(self, view: PhysicsView, memo: Memo) -> tuple[Relations, Memo]:
-        """All answers, those of pairs where nothing moved from the memo, and the memo for the next step."""
-        inputs: dict[str, Array] = {}
-        values: dict[str, Array] = {}
-        for kind in self._work:
-            inputs[kind] = self._inputs(kind, view)
-            changed = jnp.any(inputs[kind] != memo.inputs[kind], axis=-1)
-            needed = changed & self._gate(kind, view)
-            computed = jax.lax.cond(
-                jnp.any(needed),
-                lambda kind=kind, needed=needed: self._compute(kind, view, needed),
-                lambda kind=kind: jnp.zeros(memo.values[kind].shape, bool),
-            )
-            values[kind] = jnp.where(changed[..., None], computed, memo.values[kind])
-        return Relations(self, self._padded(values, view)), Memo(inputs, values)
 
     def _compute(self, kind: Kind, view: PhysicsView, needed: Bool[Array, "W P"]) -> Bool[Array, "W P V"]:
         """Answers where they are needed, false elsewhere."""
@@ -158,23 +116,6 @@ class RelationPlan:
 
     def _gate(self, kind: Kind, view: PhysicsView) -> Bool[Array, "W P"]:
         return gate(kind, view, self._work[kind].pairs)
-
-    def _inputs(self, kind: Kind, view: PhysicsView) -> Float[Array, "W P K"]:
-        pairs, bodies = self._work[kind].pairs, self._bodies[kind]
-        com = jnp.asarray(view.object_com)[:, pairs[:, 0]]
-        poses = jnp.concatenate([jnp.asarray(view.body_pos), jnp.asarray(view.body_quat)], axis=-1)[:, bodies]
-        return jnp.concatenate([com, poses.reshape(*com.shape[:2], -1)], axis=-1)
-
-    @functools.cached_property
-    def _bodies(self) -> dict[Kind, Int[np.ndarray, "P B"]]:
-        """Bodies whose poses each pair's answer depends on, padded by repetition."""
-        tables, found = self.model.tables, {}
-        for kind, work in self._work.items():
-            owners = [{a, b} if kind == "near" else {b} for a, b in work.pairs.tolist()]
-            rows = [np.unique(tables.piece_body[np.isin(tables.piece_object, list(o))]) for o in owners]
-            width = max(len(r) for r in rows)
-            found[kind] = np.array([np.resize(r, width) if len(r) else np.zeros(width, int) for r in rows], int)
-        return found
 
     def _padded(self, values: Mapping[str, Array], view: PhysicsView) -> dict[str, Array]:
         """Adds kinds that nobody asked for, so that asking for no pairs gives empty arrays."""

@@ -45,6 +45,11 @@ class OfView:
         taken = read_fields(view, found.reads) + [leaves[i] for i in found.takes]
         return jax.tree.unflatten(found.structure, found.function(taken))
 
+    @property
+    def reads(self) -> frozenset[str]:
+        """Fields of the view on which results depend, of all calls so far."""
+        return frozenset[str]().union(*(program.reads for program in self._programs.values()))
+
     def _cache_size(self) -> int:
         """How many programs were compiled; the name that JAX's own functions have for it."""
         return sum(program.function.call._cache_size() for program in self._programs.values())  # pyright: ignore
