@@ -190,8 +190,9 @@ class _Goal:
 
     def __init__(self, goal: CompiledExpression | None, num_worlds: int):
         self._goal, self._none = goal, GoalStatus.empty(num_worlds)
-        many = goal is not None and num_worlds == 1 and len(set(goal.queries)) > MANY
-        self._questions = Questions.of(goal.model) if many else None
+        self._questions: Questions | None = None
+        if goal is not None and num_worlds == 1 and len(set(goal.queries)) > MANY:
+            self._questions = Questions.of(goal.model)
         self._status = OfView(self._status_fn)
 
     @staticmethod
