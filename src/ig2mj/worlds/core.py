@@ -116,10 +116,7 @@ class Core:
             self._step, self._reset = self.step_fn, self.reset_fn
             self._rollout, self._begin = self._looped, self.start_fn
             self._write, self._load = self.write_fn, self.load_fn
-            incremental = bool(getattr(engine, "incremental", True))
-            self._react = self._no_rules
-            if rules is not None:
-                self._react = IncrementalRules(rules, engine.num_worlds, incremental).step
+            self._react = IncrementalRules.of(rules, engine).step if rules is not None else self._no_rules
             self._if_any, self._index = call, np.asarray
         self._no_status = GoalStatus.empty(engine.num_worlds)
 

@@ -4,8 +4,8 @@ It is one optimisation layer with one switch, the native engine's option `increm
 control step runs MuJoCo and `Rules.step` in full. Results are the same to the bit
 (`tests/worlds/test_incremental_is_the_plain_path.py`).
 
-The core uses `IncrementalRules(rules, num_worlds).step(states, view) -> Outcome`, which replaces `rules.step`; it calls
-it with the states and the view of each control step. Three facts decide what runs:
+The core uses `IncrementalRules.of(rules, engine).step(states, view) -> Outcome`, which replaces `rules.step`; it calls it
+with the states and the view of each control step. Three facts decide what runs:
 
 - All of a step is a pure function of the states and the view. Where both are those of the last step and the last step
   changed no state, its outcome is returned.
@@ -28,6 +28,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool
 
+from ig2mj.engine.base import Engine
 from ig2mj.engine.view import Array, PhysicsView, but_agents
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus
 from ig2mj.predicates.questions import Questions
@@ -65,6 +66,11 @@ class IncrementalRules:
         self._settled = False  # the last step changed no state
         self._view: PhysicsView | None = None
         self._fingers_away: bool | None = None  # in `_view`; None: not looked at
+
+    @classmethod
+    def of(cls, rules: Rules, engine: Engine) -> IncrementalRules:
+        """Those of an engine's worlds, with the engine's switch."""
+        return cls(rules, engine.num_worlds, getattr(engine, "incremental", True))
 
     def step(self, states: ExtendedStates, view: PhysicsView) -> Outcome:
         """`Rules.step`: one control step; `view` is physics after it."""
