@@ -4,8 +4,8 @@ It is one optimisation layer with one switch, the native engine's option `increm
 control step runs MuJoCo and `Rules.step` in full. Results are the same to the bit
 (`tests/worlds/test_incremental_is_the_plain_path.py`).
 
-The core uses `IncrementalRules.of(rules, engine).step(states, view) -> Outcome`, which replaces `rules.step`; it calls it
-with the states and the view of each control step. Three facts decide what runs:
+The core calls `IncrementalRules.of(rules, engine).step(states, view) -> Outcome` where it calls `rules.step` on other
+engines, with the states and the view of each control step. Three facts decide what runs:
 
 - All of a step is a pure function of the states and the view. Where both are those of the last step and the last step
   changed no state, its outcome is returned.

@@ -14,7 +14,7 @@ from ig2mj.engine.native.view_rows import FIELDS
 from ig2mj.engine.snapshot import FULLY_AWAKE, Snapshot
 from ig2mj.engine.view import PhysicsView
 
-_OWN = frozenset({"data", "rows", "_near", "_copied", "_cvel", "_numbers", "_from_outside", "_plans"})
+_OWN = frozenset({"data", "rows", "_copied", "_cvel", "_numbers", "_from_outside", "_plans"})
 """Attributes of a world that refer to its own memory. All others are numbers, shared constants, and objects that
 worlds replace and never change."""
 
@@ -25,12 +25,11 @@ def clone(world: World, rows: dict[str, np.ndarray]) -> World:
     Args:
       rows: its rows of the working arrays, which hold copies of those of `world` already.
     """
-    new = World(world.statics, world.model_slot, world.masks, rows, world.number)
+    new = World(world.statics, world.model_slot, rows, world.number)
     mujoco.mj_copyData(new.data, world.model, world.data)
     for name, value in vars(world).items():
         if name not in _OWN:
             setattr(new, name, value)
-    new.disturbed()
     return new
 
 

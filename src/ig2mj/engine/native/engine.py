@@ -36,7 +36,6 @@ from ig2mj.engine.native.model_slot import ModelSlot
 from ig2mj.engine.native.one_world import Statics, World
 from ig2mj.engine.native.physics import LiveWorlds, NativePhysics
 from ig2mj.engine.native.recorded import Pieces
-from ig2mj.engine.native.vicinity import Masks, VicinityTable
 from ig2mj.engine.native.view_rows import FIELDS, Changed, PoseRows
 from ig2mj.engine.native.writing import apply_write
 from ig2mj.engine.object_boxes import make_box_table
@@ -110,7 +109,6 @@ class NativeEngine:
             ),
             later=LaterPlan.build(model, self.tables, self.layout, touch_tolerance),
             has_agents=len(self.tables.agent_names) > 0,
-            vicinity=VicinityTable.build(model, self.layout.equality_tree),
             layers=BitLayers(model, self.tables),
             forces=ForcePlan.build(
                 self.layout,
@@ -125,7 +123,6 @@ class NativeEngine:
             incremental=incremental,
         )
         self._free_dofs = self.layout.object_linear_dofs
-        self._masks = [Masks(self._statics.vicinity, slot.model) for slot in self._slots]
         self._shares = np.array_split(np.arange(num_worlds), self.threads)
         self._pool = ThreadPoolExecutor(self.threads, "ig2mj-native") if self.threads > 1 else None
 
@@ -146,7 +143,7 @@ class NativeEngine:
     def _new_worlds(self) -> LiveWorlds:
         arrays = self._working_arrays(self.num_worlds)
         worlds = [
-            World(self._statics, self._slots[share], self._masks[share], {n: a[w] for n, a in arrays.items()}, int(w))
+            World(self._statics, self._slots[share], {n: a[w] for n, a in arrays.items()}, int(w))
             for share, numbers in enumerate(self._shares)
             for w in numbers
         ]
@@ -169,7 +166,7 @@ class NativeEngine:
     def _start(self) -> Snapshot:
         """World 0 of a reset."""
         rows = {name: array[0] for name, array in self._working_arrays(1).items()}
-        world = World(self._statics, self._slots[0], self._masks[0], rows, 0)
+        world = World(self._statics, self._slots[0], rows, 0)
         self._slots[0].put(world.fields)
         world.start()
         return world.save()

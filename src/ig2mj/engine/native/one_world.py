@@ -17,7 +17,6 @@ from ig2mj.engine.native.later import RAW, AgentContacts, LaterPlan, agents_touc
 from ig2mj.engine.native.lost import why_lost
 from ig2mj.engine.native.model_slot import ModelSlot
 from ig2mj.engine.native.sleep import restore_sleep, wake_trees
-from ig2mj.engine.native.vicinity import Masks, Vicinity, VicinityTable
 from ig2mj.engine.native.view_rows import Changed, PosePlan, PoseRows
 from ig2mj.engine.snapshot import AXIS, Snapshot, closed_circles, make_snapshot
 from ig2mj.engine.speed_limits import SpeedLimits
@@ -37,7 +36,7 @@ class Statics:
       layers: the contact filter. forces: what forces of contacts are of interest.
       own_fields: fields of the model that each world has for itself besides eq_data. substeps: a number for each.
       incremental: a world in which everything sleeps is not stepped.
-      See `ig2mj.engine.layout`, `ig2mj.engine.native.view_rows` and `ig2mj.engine.native.vicinity` for the rest.
+      See `ig2mj.engine.layout` and `ig2mj.engine.native.view_rows` for the rest.
     """
 
     tables: SceneTables
@@ -45,7 +44,6 @@ class Statics:
     poses: PoseRows
     later: LaterPlan
     has_agents: bool
-    vicinity: VicinityTable
     layers: BitLayers
     forces: ForcePlan
     own_fields: tuple[str, ...]
@@ -70,11 +68,10 @@ class World:
         keep the poses of the control step before, and no forces.
     """
 
-    def __init__(self, statics: Statics, slot: ModelSlot, masks: Masks, rows: dict[str, np.ndarray], number: int):
-        self.statics, self.model, self.masks, self.rows, self.number = statics, slot.model, masks, rows, number
+    def __init__(self, statics: Statics, slot: ModelSlot, rows: dict[str, np.ndarray], number: int):
+        self.statics, self.model, self.rows, self.number = statics, slot.model, rows, number
         self.model_slot, model = slot, slot.model
         self.data = mujoco.MjData(model)
-        self._near = Vicinity(statics.vicinity, model, self.data)
         count = statics.layout.num_object_units
         self.units = np.zeros((count, count), bool)
         nothing = np.zeros((statics.layout.num_units - count, count), bool)
@@ -122,8 +119,6 @@ class World:
         except mujoco.FatalError:  # between bodies that are nowhere there may be more contacts than memory
             self._check_finite()
             raise
-        finally:
-            self.masks.open()  # nobody else is to see a model with masks
         for contacts in steps:
             if contacts is not None:
                 changed |= self._note_forces(contacts)
@@ -132,19 +127,13 @@ class World:
     def _physics_steps(self) -> list[StepContacts | None]:
         """The physics steps of a control step, and the contacts of each whose forces are of interest."""
         model, data, statics = self.model, self.data, self.statics
-        self._near.begin()
-        self._let_near()
         mujoco.mj_step2(model, data)
         steps = [self._collect()] if statics.forces.kinds else []
         for _ in range(len(statics.substeps) - 1):
-            self._near.moved()
-            self._let_near()
             mujoco.mj_step(model, data)
             if steps:
                 steps.append(self._collect())
         statics.speed_limits.hold(data.qvel)
-        self._near.moved()
-        self._let_near()
         mujoco.mj_step1(model, data)
         return steps
 
@@ -152,13 +141,6 @@ class World:
         forces, data = self.statics.forces, self.data
         self._met = met = forces.met(data, self._met)
         return forces.collect(data, met)
-
-    def _let_near(self) -> None:
-        self.masks.put(self._near.contype, self._near.conaffinity)
-
-    def disturbed(self) -> None:
-        """To be called where the data was changed by another way than a step."""
-        self._near.forget()
 
     def only_time_passes(self) -> bool:
         """Lets time pass by one control step where that is all that happens; false where the world must be stepped.
@@ -222,7 +204,6 @@ class World:
 
     def start(self) -> int:
         """The scene's initial state: its first keyframe, else the zero pose."""
-        self.disturbed()
         model, data = self.model, self.data
         if model.nkey:
             mujoco.mj_resetDataKeyframe(model, data, 0)
@@ -261,7 +242,6 @@ class World:
 
     def load(self, snapshot: Snapshot) -> int:
         """Takes a snapshot without the world axis, and refreshes everything."""
-        self.disturbed()
         self.wrong_controls, self.lost = False, ""
         model, data = self.model, self.data
         mujoco.mj_resetData(model, data)

@@ -62,7 +62,6 @@ def apply_write(world: World, rows: dict[str, np.ndarray]) -> int:
         trees[free[free >= 0]] = True
     if rows and not trees.any() and not filtered:
         return Changed.NOTHING
-    world.disturbed()
     wake_trees(model, data, np.flatnonzero(trees))
     mujoco.mj_step1(model, data)
     if not rows and (moved := _moved_by_hand(world)) is not None:
