@@ -7,26 +7,48 @@ from typing import TYPE_CHECKING, Any
 from ig2mj.envs.gymnasium_hook import register_now_or_later
 
 if TYPE_CHECKING:
+    from ig2mj import errors
+    from ig2mj.demos.environments import record
+    from ig2mj.envs.config import EnvConfig
     from ig2mj.envs.environment import Environment
-    from ig2mj.envs.registry import list_envs, make
+    from ig2mj.envs.registry import default_config, list_envs, make
     from ig2mj.envs.state import EnvState
+    from ig2mj.learn.policies import Policy
     from ig2mj.scene.scene import Scene, load_scene
     from ig2mj.simulation import Simulation
     from ig2mj.worlds import Worlds
 
     __version__: str
 
-__all__ = ["EnvState", "Environment", "Scene", "Simulation", "Worlds", "list_envs", "load_scene", "make"]
+__all__ = [
+    "EnvConfig",
+    "EnvState",
+    "Environment",
+    "Policy",
+    "Scene",
+    "Simulation",
+    "Worlds",
+    "default_config",
+    "errors",
+    "list_envs",
+    "load_scene",
+    "make",
+    "record",
+]
 
 _HOME = {
+    "EnvConfig": "ig2mj.envs.config",
     "EnvState": "ig2mj.envs.state",
     "Environment": "ig2mj.envs.environment",
+    "Policy": "ig2mj.learn.policies",
     "Scene": "ig2mj.scene.scene",
+    "Simulation": "ig2mj.simulation",
+    "Worlds": "ig2mj.worlds",
+    "default_config": "ig2mj.envs.registry",
     "list_envs": "ig2mj.envs.registry",
     "load_scene": "ig2mj.scene.scene",
     "make": "ig2mj.envs.registry",
-    "Simulation": "ig2mj.simulation",
-    "Worlds": "ig2mj.worlds",
+    "record": "ig2mj.demos.environments",
 }
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import functools
-import inspect
 import json
 from typing import Any
 
@@ -23,6 +22,7 @@ from ig2mj.demos.metrics import metrics_of
 from ig2mj.demos.robomimic import export_robomimic
 from ig2mj.demos.selection import chosen_runs, left_out
 from ig2mj.demos.videos import EpisodeVideos
+from ig2mj.envs.config import Overrides
 from ig2mj.envs.experts import expert_of
 from ig2mj.errors import InputError
 from ig2mj.sensors.base import SensorOptions
@@ -100,7 +100,7 @@ def test_a_demonstration_says_how_its_environment_is_made_again(exported, record
     made, env = about["env_kwargs"], recorded[1]
     assert about["horizon"] == HORIZON and made["period"] == pytest.approx(0.1)
     assert made["sensors"]["width"] == 128 and made["observations"] == list(env.observation_spaces)
-    assert set(made) <= set(inspect.signature(ig2mj.make).parameters) | {"threads"}
+    assert set(made) <= set(Overrides.__annotations__)
 
 
 def test_episodes_that_were_cut_off_are_marked_and_left_out(mixed, tmp_path, capsys):

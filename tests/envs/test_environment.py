@@ -75,7 +75,7 @@ def test_what_cannot_be_done_is_refused_by_name(env):
         ({"grasping": "glue"}, UnknownNameError),
         ({"worlds": 0}, EngineError),
         ({"name": "PointNavigation", "variant": 1}, EngineError),
-        ({"name": "PointNavigation", "paper_rl": True}, EngineError),
+        ({"name": "PointNavigation", "relaxed_thresholds": True}, EngineError),
         ({"name": "PointNavigation", "pool": env.core.starts.pool}, EngineError),
     ):
         with pytest.raises(kind):

@@ -87,7 +87,7 @@ def test_a_traced_action_is_refused_on_the_native_engine(env, action):
         ("pool_size", 2.5),
         ("image_size", 17.5),
         ("image_size", 0),
-        ("mixed", -1),
+        ("augment_starts", -1),
         ("period", "x"),
         ("sensors", 3),
         ("threads", "a"),

@@ -16,7 +16,7 @@ NAMES = ["apple_0", "carving_knife_0"]
 
 def test_objects_lie_where_they_do_in_one_state_turned_as_in_another():
     task = ACTIVITIES["SlicingFruit"]
-    env = ig2mj.make("SlicingFruit", "humanoid", 2, "native", pool_size=4, mixed=200)
+    env = ig2mj.make("SlicingFruit", "humanoid", 2, "native", pool_size=4, augment_starts=200)
     mixed, pool, scene = env.core.starts.pool, pool_of(task, "train", 4), bare_scene(task)
     assert isinstance(mixed, mixing.MixedPool) and mixed.size == 200
     own, rows = (np.asarray(p.physics.scene.qpos) for p in (pool, mixed.rows(np.arange(200))))
@@ -37,7 +37,7 @@ def test_objects_lie_where_they_do_in_one_state_turned_as_in_another():
     state = env.start_from(np.array([150, 199]), 0)
     knife = np.asarray(state.batch.world.view.object_pos)[:, scene.object_index("carving_knife_0")]
     assert np.allclose(knife, rows[[150, 199]][:, columns[7:10]], atol=1e-6)
-    assert env.made_with["mixed"] == 200 and env.made_with["pool_size"] == 4
+    assert env.config.augment_starts == 200 and env.config.pool_size == 4
 
 
 def test_boxes_meet_seen_from_above():
@@ -54,5 +54,5 @@ def test_boxes_meet_seen_from_above():
 
 def test_only_what_lies_on_one_thing_is_mixed():
     for name in ("CookingMeat", "PointNavigation"):
-        with pytest.raises(EngineError, match="mixed"):
-            ig2mj.make(name, worlds=1, engine="native", pool_size=1, mixed=8)
+        with pytest.raises(EngineError, match="augment_starts"):
+            ig2mj.make(name, worlds=1, engine="native", pool_size=1, augment_starts=8)

@@ -101,7 +101,7 @@ def run(
         engine,
         grasping,
         observations=VECTORS if policy is None else policy.observations,
-        paper_rl=paper_rl,
+        relaxed_thresholds=paper_rl,
         split=split,
         pool_size=pool_size or None,
         variant=variant,

@@ -142,9 +142,9 @@ def run(
                 engine,
                 grasping,
                 observations=names,
-                paper_rl=paper_rl,
+                relaxed_thresholds=paper_rl,
                 pool_size=pool_size or None,
-                mixed=mixed,
+                augment_starts=mixed,
                 sensors=SensorOptions(rows=drawn_rows(kept_rows, pixels)),
             )
         lens = lens_of(world, pixels, kept_rows) if obs == "rgbd" else None

@@ -49,7 +49,7 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
         "native",
         depends["grasping"],
         observations=policy.observations,
-        paper_rl=policy.card.get("paper_rl", False),
+        relaxed_thresholds=policy.card.get("paper_rl", False),
         split="held_out",
         pool_size=max(ROWS, row + 1),
     )

@@ -36,6 +36,7 @@ from ig2mj.demos.origin import BINDING, LOOSE, WHOLE_HASHES, differences, origin
 from ig2mj.demos.reader import Recording, Run
 from ig2mj.demos.shipped import find_recording
 from ig2mj.demos.writer import FLUSH
+from ig2mj.envs.config import current_names
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.envs.registry import VECTORS, find_task, make
 from ig2mj.errors import EngineError, InputError, UnknownNameError
@@ -285,7 +286,7 @@ def _environment(recording: Recording, observations: str | Sequence[str], option
     Runs begin at frames of their own. Of a pool only navigation's tasks need more, which is where to go; to sample
     hundreds of an activity's start states would take minutes.
     """
-    made = recording.value("made_with", dict)
+    made = current_names(recording.value("made_with", dict))
     if recording.header.get("not_made_with", "[]") != "[]":
         missing = ", ".join(map(str, recording.value("not_made_with", list)))
         raise InputError(recording.file, f"does not have what its environment was made with: {missing}", fix=FIX_ENV)
@@ -304,7 +305,7 @@ def _environment(recording: Recording, observations: str | Sequence[str], option
     try:
         task = find_task(recording.value("task", str))
         if isinstance(task, Task):
-            made = {**made, "pool_size": 1, "mixed": 0}
+            made = {**made, "pool_size": 1, "augment_starts": 0}
         env = make(task, robot, worlds, engine, grasping, observations=observations, **(made | options))
     except UnknownNameError as e:
         if e.kind.startswith("option of "):

@@ -25,6 +25,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt
 
@@ -32,6 +33,7 @@ from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.engine.base import Physics
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.envs.checks import checked_action, checked_state
+from ig2mj.envs.config import EnvConfig, default_of
 from ig2mj.envs.copies import StateCopies
 from ig2mj.envs.observations import Observer, Space, chosen
 from ig2mj.envs.state import EnvState, Seen
@@ -67,7 +69,8 @@ class Environment(StateCopies):
       num_worlds: W. action_names: [n]. observation_spaces: of each, without the world axis. sensor_options: settings.
       privileged_names, proprioception_names: what each number of these observations means.
       period: seconds of an agent step.
-      made_with: what else `ig2mj.make` was given, by the names of its arguments, so that it can be made again.
+      config: the settings that it was made with, each of them decided: `ig2mj.make(env.task.name, env.config)` makes it
+        again.
     """
 
     def __init__(
@@ -82,12 +85,14 @@ class Environment(StateCopies):
         grasping: str,
         companions: Companions | None = None,
         period: float = ACTION_PERIOD,
+        config: EnvConfig | None = None,
     ):
         """Binds a core, whose rules have the task's goal if it has one, to rewards and observations.
 
         Args:
           companions: what the scene's other robots do; None: there are none.
           period: seconds of an agent step.
+          config: what it was made with; None: not by `ig2mj.make`.
 
         Raises:
           EngineError: the core has no rules, or `period` is not a whole number of its control steps.
@@ -97,7 +102,7 @@ class Environment(StateCopies):
         self.task, self.robot, self.grasping = task, robot, grasping
         self.scene, self.core, self.num_worlds = scene, core, core.engine.num_worlds
         self.objective, self._goal, self._map, self._observer = objective, core.rules.goal, action_map, observer
-        self._companions, self.made_with = companions, dict[str, Any]()
+        self._companions, self.config = companions, config or EnvConfig(period=period)
         self.action_names, self.observation_spaces = action_map.names, observer.spaces
         self.sensor_options = observer.sensor_options
         self.privileged_names = objective.vectors["privileged_state"]
@@ -126,6 +131,21 @@ class Environment(StateCopies):
         """`step_fn`, `step_autoreset_fn` and `reset_fn` may be part of a compiled program."""
         return self.core.engine.pure
 
+    @property
+    def default_config(self) -> EnvConfig:
+        """The settings of its task where nothing else is asked for."""
+        return default_of(self.task)
+
+    @property
+    def made_with(self) -> dict[str, Any]:
+        """What recordings keep of `config`: all that no other attribute of theirs says."""
+        return self.config.kept_in_files()
+
+    @property
+    def mj_model(self) -> mujoco.MjModel:
+        """The compiled model of the home with its robots, as MuJoCo and MJX-based libraries take it."""
+        return self.scene.model
+
     def serve(self, devices: Sequence[Any]) -> None:
         """Makes ready for programs on other devices of this process, before they are compiled."""
         self.core.engine.serve(devices)
@@ -144,9 +164,9 @@ class Environment(StateCopies):
     def with_horizon(self, horizon: int) -> Environment:
         """The same environment, on the same core, with longer or shorter episodes."""
         parts = (self.robot, self.scene, self.core, self._map, self.objective, self._observer, self.grasping)
-        new = Environment(dataclasses.replace(self.task, horizon=horizon), *parts, self._companions, self.period)
-        new.made_with = self.made_with
-        return new
+        config = dataclasses.replace(self.config, horizon=horizon)
+        task = dataclasses.replace(self.task, horizon=horizon)
+        return Environment(task, *parts, self._companions, self.period, config)
 
     # Steps.
 

@@ -151,7 +151,12 @@ def _player(
     Args:
       content: of the policy's file. The others: of `evaluate_job`.
     """
-    made: dict[str, Any] = {"observations": observations, "paper_rl": paper_rl, "split": split, "pool_size": pool_size}
+    made: dict[str, Any] = {
+        "observations": observations,
+        "relaxed_thresholds": paper_rl,
+        "split": split,
+        "pool_size": pool_size,
+    }
     env = make(task, robot, worlds, engine, grasping, **made)
     with tempfile.TemporaryDirectory(prefix="ig2mj-") as folder:
         copy = pathlib.Path(folder) / "policy.npz"

@@ -82,7 +82,7 @@ class TaskLike(Protocol):
     Attributes:
       name: as `ig2mj.make` takes it. summary: one sentence. home: a shipped home. horizon: agent steps of an episode.
       robots: names of those that it is made for, the usual one first. Others of the registry take part if they have
-        what it takes.
+        what it takes. grasping: how hands hold unless something else is asked for.
     """
 
     __dataclass_fields__: ClassVar[dict[str, Any]]
@@ -101,6 +101,9 @@ class TaskLike(Protocol):
 
     @property
     def robots(self) -> Collection[str]: ...
+
+    @property
+    def grasping(self) -> str: ...
 
 
 @dataclasses.dataclass(frozen=True)
