@@ -96,7 +96,13 @@ def test_all_forms_make_the_same_environment_and_it_can_be_made_again():
         ig2mj.make("PointNavigation", options),
         ig2mj.make("PointNavigation", config),
         ig2mj.make("PointNavigation", {"worlds": 8}, config_overrides={"worlds": 5}, **options),
-        ig2mj.make("PointNavigation", "turtlebot", 2, "native", **{k: options[k] for k in list(options)[2:]}),
+        ig2mj.make(
+            "PointNavigation",
+            "turtlebot",
+            2,
+            "native",
+            **{k: v for k, v in options.items() if k not in ("robot", "worlds", "engine")},
+        ),
     ]
     made.append(ig2mj.make(made[0].task.name, made[0].config))
     made.append(ig2mj.make(made[0].task.name, made[0].config.by_name()))

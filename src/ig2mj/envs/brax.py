@@ -164,5 +164,4 @@ class BraxEnv:
         return found | {f"pixels/{name}": state.obs[name] for name in self._pictures}
 
     def _metrics(self, state: Any) -> dict[str, Array]:
-        wanted = [name for name in state.info if name.startswith("reward/") or name == "success"]
-        return {name: jnp.asarray(state.info[name], np.float32) for name in wanted}
+        return {name: jnp.asarray(array, np.float32) for name, array in state.metrics.items()}

@@ -182,6 +182,28 @@ def default_of(task: TaskLike) -> EnvConfig:
     return EnvConfig(robot=next(iter(task.robots)), grasping=task.grasping)
 
 
+class Configured:
+    """Part of `Environment`.
+
+    Attributes:
+      config: the settings that it was made with, each of them resolved: `ig2mj.make(env.task.name, env.config)` makes
+        it again. task: what is done.
+    """
+
+    config: EnvConfig
+    task: TaskLike
+
+    @property
+    def default_config(self) -> EnvConfig:
+        """The settings of its task where nothing else is asked for."""
+        return default_of(self.task)
+
+    @property
+    def made_with(self) -> dict[str, Any]:
+        """The settings that files of an environment keep together (`EnvConfig.kept_in_files`)."""
+        return self.config.kept_in_files()
+
+
 def current_names(values: Mapping[str, Any], warn: bool = False) -> dict[str, Any]:
     """Settings by their names of today. `warn`: about each old name, as its user typed it; files may have them."""
     for old in values.keys() & RENAMED.keys() if warn else ():

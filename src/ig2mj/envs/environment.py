@@ -33,8 +33,9 @@ from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.engine.base import Physics
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.envs.checks import checked_action, checked_state
-from ig2mj.envs.config import EnvConfig, default_of
+from ig2mj.envs.config import Configured, EnvConfig
 from ig2mj.envs.copies import StateCopies
+from ig2mj.envs.images import StateImages
 from ig2mj.envs.observations import Observer, Space, chosen
 from ig2mj.envs.state import EnvState, Seen
 from ig2mj.errors import EngineError
@@ -60,7 +61,7 @@ Companions = Callable[[UInt[Array, "W 2"], Int[Array, "W"]], Float[Array, "W m"]
 
 
 @entry_point
-class Environment(StateCopies):
+class Environment(StateCopies, StateImages, Configured):
     """See the module's text; `ig2mj.make` makes one.
 
     Attributes:
@@ -69,8 +70,6 @@ class Environment(StateCopies):
       num_worlds: W. action_names: [n]. observation_spaces: of each, without the world axis. sensor_options: settings.
       privileged_names, proprioception_names: what each number of these observations means.
       period: seconds of an agent step.
-      config: the settings that it was made with, each of them decided: `ig2mj.make(env.task.name, env.config)` makes it
-        again.
     """
 
     def __init__(
@@ -130,16 +129,6 @@ class Environment(StateCopies):
     def pure(self) -> bool:
         """`step_fn`, `step_autoreset_fn` and `reset_fn` may be part of a compiled program."""
         return self.core.engine.pure
-
-    @property
-    def default_config(self) -> EnvConfig:
-        """The settings of its task where nothing else is asked for."""
-        return default_of(self.task)
-
-    @property
-    def made_with(self) -> dict[str, Any]:
-        """What recordings keep of `config`: all that no other attribute of theirs says."""
-        return self.config.kept_in_files()
 
     @property
     def mj_model(self) -> mujoco.MjModel:

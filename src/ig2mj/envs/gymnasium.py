@@ -19,8 +19,7 @@ All arrays are new in every step, never buffers that are used again.
 from __future__ import annotations
 
 import dataclasses
-import pkgutil
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import gymnasium
@@ -41,9 +40,6 @@ from ig2mj.worlds.random_streams import as_seed
 from ig2mj.worlds.starts import checked_mask
 
 RENDER_MODES = ("rgb_array",)
-
-IMAGES = "ig2mj.viewer.episode_view:EpisodeView"
-"""What makes images of a world. By name, since drawing is built on environments and not they on it."""
 
 
 def gym_space(space: Space) -> spaces.Box:
@@ -68,18 +64,10 @@ def _checked(render_mode: str | None) -> str | None:
     return render_mode
 
 
-class _Images:
-    """Images of worlds of an environment, as they are asked for."""
-
-    def __init__(self, env: Environment):
-        self._env, self._views = env, dict[int, Callable[[EnvState], np.ndarray]]()
-
-    def __call__(self, state: EnvState | None, world: int) -> np.ndarray:
-        if state is None:
-            raise gymnasium.error.ResetNeeded("reset the environment before its first image")
-        if world not in self._views:
-            self._views[world] = pkgutil.resolve_name(IMAGES)(self._env, world)
-        return self._views[world](state)
+def _begun(state: EnvState | None) -> EnvState:
+    if state is None:
+        raise gymnasium.error.ResetNeeded("reset the environment before its first image")
+    return state
 
 
 class _NoSpace(spaces.Dict):
@@ -113,7 +101,6 @@ class GymEnv(gymnasium.Env):
             return
         self.env = make(task, worlds=1, **options)
         self.metadata = _metadata(self.env.period)
-        self._image = _Images(self.env)
         self.observation_space, self.action_space = _spaces(self.env)
 
     def reset(
@@ -143,7 +130,7 @@ class GymEnv(gymnasium.Env):
 
     def render(self) -> np.ndarray | None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """An image [480, 640, 3] of the world as it is now; None without a render mode."""
-        return None if self.render_mode is None else self._image(self.state, 0)
+        return None if self.render_mode is None else self.env.render(_begun(self.state))
 
     def close(self) -> None:
         """May be called twice."""
@@ -177,7 +164,6 @@ class GymVectorEnv(gymnasium.vector.VectorEnv):
         self.num_envs = num_envs
         self.autoreset_mode = _mode(autoreset_mode)
         self.metadata = {**_metadata(self.env.period), "autoreset_mode": self.autoreset_mode}
-        self._image = _Images(self.env)
         self.single_observation_space, self.single_action_space = _spaces(self.env)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
@@ -234,7 +220,9 @@ class GymVectorEnv(gymnasium.vector.VectorEnv):
 
     def render(self) -> tuple[np.ndarray, ...] | None:
         """An image [480, 640, 3] of each world as it is now; None without a render mode."""
-        return None if self.render_mode is None else tuple(self._image(self.state, w) for w in range(self.num_envs))
+        if self.render_mode is None:
+            return None
+        return tuple(self.env.render(_begun(self.state), world) for world in range(self.num_envs))
 
     def close(self, **kwargs: Any) -> None:
         """May be called twice."""

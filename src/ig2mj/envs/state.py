@@ -50,6 +50,11 @@ class EnvState:
         """The episode is over."""
         return self.terminated | self.truncated
 
+    @property
+    def metrics(self) -> dict[str, Array]:
+        """Of `info` what trainers log: "success", and each reward term as "reward/...", [W]."""
+        return {name: array for name, array in self.info.items() if name.startswith("reward/") or name == "success"}
+
     def __repr__(self) -> str:
         """Shapes only: nothing is read, so that it is quick and works for a state that was used up."""
         physics = getattr(getattr(self.batch, "world", None), "physics", None)

@@ -13,14 +13,12 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from ig2mj.envs.environment import Environment, EnvState
+from ig2mj.envs.images import HEIGHT, WIDTH
 from ig2mj.tasks.navigation.objective import NavigationObjective
 from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.task import Task
 from ig2mj.viewer.offscreen import FreeView, render
 from ig2mj.viewer.state_marks import Mark, Tinter, draw_marks, marks, tint_of_objects
-
-WIDTH, HEIGHT = 640, 480
-"""Pixels."""
 
 SIDES = (50.0, -50.0, 25.0, -25.0, 75.0, -75.0, 110.0, -110.0)
 """Degrees to the side of the robot's back at which cameras are tried."""
@@ -53,11 +51,16 @@ class EpisodeView:
         self._episode = -1
         self._tinter: Tinter | None = None
 
-    def __call__(self, state: EnvState, qpos: Float[np.ndarray, "nq"] | None = None) -> UInt8[np.ndarray, "Y X 3"]:
+    def __call__(
+        self,
+        state: EnvState,
+        qpos: Float[np.ndarray, "nq"] | None = None,
+        camera: int | str | FreeView | None = None,
+    ) -> UInt8[np.ndarray, "Y X 3"]:
         """An image of a state.
 
         Args:
-          qpos: positions in place of those of the state.
+          qpos: positions in place of those of the state. camera: in place of the one chosen for the episode.
 
         Raises:
           MissingDependencyError: nothing can draw here.
@@ -69,7 +72,8 @@ class EpisodeView:
             self._tinter = Tinter(model, self._env.scene.tables)
         drawn.qpos[:] = data.qpos if qpos is None else qpos
         mujoco.mj_forward(model, drawn)
-        camera = self._of_episode(model, drawn, state)
+        if camera is None:
+            camera = self._of_episode(model, drawn, state)
         states, view = state.batch.world.states, state.batch.world.view
         found = [*marks(self._states, states, view, self._world), *self._goal_marks(state)]
         width, height = self._size
