@@ -6,7 +6,6 @@ loses it. So it gets a file of its own with vertices, texture coordinates, colou
 
 from __future__ import annotations
 
-import dataclasses
 import io
 import pathlib
 import warnings as python_warnings
@@ -23,13 +22,12 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  it has no
 from ..base.read_limits import check_limit
 from ..base.xml_reader import Element, decode_xml, parse_number, parse_strictly, strip_namespace
 from .collada_looks import ColladaLooks
-from .geometry_parts import Geometry, Placed
-from .looks import Look, TextureReader
+from .geometry_parts import Y_UP, Geometry, MeshContent, MeshSource, Placed
+from .looks import Look
 from .mesh_limits import MeshError
 
 NAMESPACE = "http://www.collada.org/2005/11/COLLADASchema"
 X_UP = np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]])
-Y_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 _PRIMITIVES = ("polylist", "triangles", "tristrips", "trifans", "polygons")
 _INPUTS = ("VERTEX", "POSITION", "TEXCOORD", "COLOR")
 _TRANSFORMS = ("matrix", "translate", "rotate", "scale", "lookat")
@@ -37,22 +35,14 @@ _FALLBACK = "ig2mj-scene"
 _BINDING = "ig2mj-binding"
 
 
-@dataclasses.dataclass
-class ColladaFile:
-    """What a file holds. turn: 4x4 from its unit and axes to metres and Z up. lost: what pycollada could not read."""
-
-    placed: list[Placed]
-    turn: np.ndarray
-    lost: list[str]
-
-
-def read_collada(raw: bytes, file: pathlib.Path, textures: TextureReader | None) -> ColladaFile:
-    """Reads a DAE. textures: None: looks are passed over.
+def read_collada(source: MeshSource) -> MeshContent:
+    """Reads a DAE.
 
     Raises:
       InputError: no XML, a unit that is none. MeshError: nodes that hold themselves, or over a limit.
     """
-    root = parse_strictly(decode_xml(raw, file), file)
+    file, textures = source.file, source.textures
+    root = parse_strictly(decode_xml(source.raw, file), file)
     strip_namespace(root)
     turn = _frame(root, file)
     looks = None if textures is None else ColladaLooks(root, textures, file)
@@ -72,7 +62,7 @@ def read_collada(raw: bytes, file: pathlib.Path, textures: TextureReader | None)
     for symbol, bound, geometry, matrix in found:
         look = Look() if looks is None else looks.look(symbol, bindings.get(bound or "", {}))
         placed.append(Placed(geometry, matrix, look))
-    return ColladaFile(placed, turn, lost)
+    return MeshContent(placed, turn, lost)
 
 
 def _frame(root: Element, file: pathlib.Path) -> np.ndarray:

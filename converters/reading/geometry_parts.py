@@ -9,8 +9,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..base.description import Mesh, Rgba
+from ..base.file_access import FileGuard
 from .looks import Look, Texture, TextureReader, mean_vertex_colour
 from .mesh_limits import MeshError, check_faces, check_vertices
+
+Y_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+"""Turns a file whose y axis points up to Z up."""
 
 
 @dataclasses.dataclass
@@ -45,6 +49,34 @@ class Placed:
     geometry: Geometry
     matrix: np.ndarray
     look: Look = dataclasses.field(default_factory=Look)
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class MeshSource:
+    """What a reader of a mesh format gets.
+
+    Attributes:
+      raw: bytes of the file. guard: resolves names of further files. textures: reads looks; None: they are passed over.
+    """
+
+    raw: bytes
+    file: pathlib.Path
+    guard: FileGuard
+    textures: TextureReader | None
+
+
+@dataclasses.dataclass(eq=False)
+class MeshContent:
+    """What a reader finds.
+
+    Attributes:
+      placed: instances of geometries. turn: 4x4 from the file's unit and axes to metres and Z up.
+      lost: what could not be read while the rest could.
+    """
+
+    placed: list[Placed]
+    turn: np.ndarray = dataclasses.field(default_factory=lambda: np.eye(4))
+    lost: list[str] = dataclasses.field(default_factory=list)
 
 
 def parts_of(

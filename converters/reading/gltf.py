@@ -21,7 +21,8 @@ from ig2mj.errors import InputError
 
 from ..base.read_limits import check_limit, limits
 from ..base.text import without_mark
-from .geometry_parts import Geometry, Placed
+from ..base.xml_reader import read_bytes
+from .geometry_parts import Y_UP, Geometry, MeshContent, MeshSource, Placed
 from .json_reader import decode_json
 from .looks import Look, Texture, TextureReader
 from .mesh_limits import MeshError, check_faces
@@ -53,17 +54,17 @@ class _Broken(Exception):
     """Something in the file is not what it must be; the text says what."""
 
 
-def read_gltf(
-    raw: bytes, file: pathlib.Path, load: Callable[[str], bytes], textures: TextureReader | None
-) -> list[Placed]:
-    """Reads a glTF (JSON) or GLB, Y up as it stands.
-
-    Args:
-      load: bytes of a buffer that the file names. textures: None: looks are passed over.
+def read_gltf(source: MeshSource) -> MeshContent:
+    """Reads a glTF (JSON) or GLB: metres, Y up.
 
     Raises:
-      MeshError: broken, over a limit, or compressed by an extension. InputError: as `load` does.
+      MeshError: broken, over a limit, or compressed by an extension. InputError: a buffer that it names is missing.
     """
+    raw, file, textures = source.raw, source.file, source.textures
+
+    def load(uri: str) -> bytes:
+        return read_bytes(source.guard.resolve(uri, file.name, base=file.parent), "scene_bytes")
+
     text, binary = _chunks(raw, file) if file.suffix.lower() == ".glb" else (raw, None)
     try:
         tree = decode_json(without_mark(text), file)
@@ -78,11 +79,13 @@ def read_gltf(
         required = tree.get("extensionsRequired") or []
         if isinstance(required, list) and (packed := [name for name in required if name in _PLAIN]):
             raise MeshError(file, f"is compressed ({packed[0]})", fix="export it without compression")
-        source = _File(file, tree, binary, load, textures)
+        opened = _File(file, tree, binary, load, textures)
         for number, buffer in enumerate(_list(tree.get("buffers"))):
             if "uri" in _dict(buffer):
-                _buffer(source, number)  # a name that leads outside is refused whether the scene uses it or not
-        return list(_placed(source))
+                _buffer(opened, number)  # a name that leads outside is refused whether the scene uses it or not
+        turn = np.eye(4)
+        turn[:3, :3] = Y_UP
+        return MeshContent(list(_placed(opened)), turn)
     except _Broken as e:
         raise MeshError(file, f"cannot be read as {file.suffix[1:].upper()}: {e}") from e
 

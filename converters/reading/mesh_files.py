@@ -10,18 +10,13 @@ Images that the files name or hold are opened by `looks` alone, never by the lib
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-import io
-import logging
 import pathlib
 import warnings as python_warnings
-from collections.abc import Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import trimesh
-from trimesh.resolvers import Resolver
 
 from ig2mj.errors import InputError
 
@@ -29,16 +24,29 @@ from ..base import inputs
 from ..base.description import Mesh, Rgba
 from ..base.file_access import FileGuard
 from ..base.read_limits import check_limit, limits
-from ..base.text import without_mark
 from ..base.xml_reader import read_bytes
-from .collada import Y_UP, read_collada
-from .geometry_parts import Geometry, MeshPart, Placed, parts_of
+from .collada import read_collada
+from .geometry_parts import MeshContent, MeshPart, MeshSource, parts_of
 from .gltf import read_gltf
 from .looks import Look, TextureReader, mean_vertex_colour
-from .mesh_limits import MeshError, check_faces
+from .mesh_limits import MeshError
 from .obj_files import Material, ObjFile, group_meshes, material_meshes, read_mtl, read_obj
+from .trimesh_files import read_ply, read_stl
 
-FORMATS = (".obj", ".stl", ".dae", ".glb", ".gltf", ".ply")
+READERS: dict[str, Callable[[MeshSource], MeshContent]] = {
+    ".stl": read_stl,
+    ".dae": read_collada,
+    ".glb": read_gltf,
+    ".gltf": read_gltf,
+    ".ply": read_ply,
+}
+"""Readers by the end of a file's name: one line for each format. A reader takes the bytes of the file and gives its
+triangles; OBJ, whose groups are collision meshes of their own, is read apart."""
+
+WITH_IMAGES = (".dae", ".glb", ".gltf")
+"""Formats whose files hold whole scenes, with images: they may be larger (`ReadLimits.scene_bytes`)."""
+
+FORMATS = (".obj", *READERS)
 
 
 def read_collision(file: pathlib.Path, guard: FileGuard, warnings: list[str] | None = None) -> tuple[list[Mesh], bool]:
@@ -150,33 +158,6 @@ def _vertex_colour(colours: np.ndarray, file: pathlib.Path, textures: TextureRea
     return rgba
 
 
-class _Files(Resolver):
-    """Gives trimesh an image of one pixel for whatever a PLY names, so that it keeps texture coordinates and opens
-    nothing that a stranger made."""
-
-    def __init__(self):
-        self.image: str | None = None
-
-    def get(self, key: str) -> bytes:  # pyright: ignore[reportIncompatibleMethodOverride]
-        self.image = str(key)
-        return _PIXEL
-
-    def keys(self) -> list[str]:
-        return []
-
-    def write(self, name: str, data: Any) -> None:
-        raise NotImplementedError("meshes are only read")
-
-    def namespaced(self, namespace: str) -> _Files:
-        raise NotImplementedError("meshes have no namespaces")
-
-
-_PIXEL = bytes.fromhex(
-    "89504e470d0a1a0a0000000d4948445200000001000000010802000000907753de0000000c49444154789c63f8ffff3f0005fe02fe0def46b8"
-    "0000000049454e44ae426082"
-)
-"""A PNG of one white pixel."""
-
 MAX_LIBRARIES = 20
 """MTL files that an OBJ may name."""
 
@@ -184,85 +165,19 @@ MAX_LIBRARIES = 20
 def _read_scene_file(
     file: pathlib.Path, guard: FileGuard, textures: TextureReader | None, warnings: list[str]
 ) -> list[MeshPart]:
-    """Parts of a DAE, GLB, glTF, STL or PLY; textures: None for a collision file."""
+    """Parts of a file of another format than OBJ; textures: None for a collision file."""
     suffix = _suffix(file)
-    raw = read_bytes(_existing(file), "scene_bytes" if suffix in (".dae", ".glb", ".gltf") else "mesh_bytes")
+    raw = read_bytes(_existing(file), "scene_bytes" if suffix in WITH_IMAGES else "mesh_bytes")
     if raw.startswith(b"version https://git-lfs"):
         raise MeshError(file, "is a Git LFS pointer, not the mesh", fix="run git lfs pull")
-    turn = np.eye(4)
     try:
-        with python_warnings.catch_warnings(), _quiet_trimesh(), np.errstate(all="ignore"):
+        with python_warnings.catch_warnings(), np.errstate(all="ignore"):
             python_warnings.simplefilter("ignore")
-            if suffix == ".dae":
-                found = read_collada(raw, file, textures)
-                placed, turn = found.placed, found.turn
-                if placed and found.lost:
-                    warnings.append(f"parts of {file.name} cannot be read: {found.lost[0]}"[:300])
-            elif suffix in (".glb", ".gltf"):
-                turn[:3, :3] = Y_UP
-
-                def load(uri: str) -> bytes:
-                    path = guard.resolve(uri, file.name, base=file.parent)
-                    return read_bytes(path, "scene_bytes")
-
-                placed = read_gltf(raw, file, load, textures)
-            else:
-                placed = _with_trimesh(raw, file, suffix, textures)
-            return parts_of(placed, turn, file, textures)
+            found = READERS[suffix](MeshSource(raw, file, guard, textures))
+            if found.placed and found.lost:
+                warnings.append(f"parts of {file.name} cannot be read: {found.lost[0]}"[:300])
+            return parts_of(found.placed, found.turn, file, textures)
     except (InputError, MemoryError):
         raise
     except Exception as e:  # the readers behind trimesh and pycollada raise whatever the broken file leads them to
         raise MeshError(file, f"cannot be read as {suffix[1:].upper()}: {type(e).__name__}: {e}"[:500]) from e
-
-
-def _with_trimesh(raw: bytes, file: pathlib.Path, suffix: str, textures: TextureReader | None) -> list[Placed]:
-    """STL and PLY."""
-    raw = without_mark(raw)
-    if suffix == ".stl":
-        # Three words in four of an ASCII facet are numbers; in binary a facet takes 50 bytes.
-        ascii_ = raw.lstrip()[:5].lower() == b"solid" and b"facet" in raw[:4096].lower()
-        check_faces(raw.lower().count(b"endfacet") if ascii_ else (len(raw) - 84) // 50, file)
-    else:
-        _check_ply(raw, file)
-    files = _Files()
-    loaded = trimesh.load_scene(io.BytesIO(raw), file_type=suffix[1:], resolver=files, process=False)
-    placed = []
-    for name in sorted(loaded.geometry):
-        geometry: Any = loaded.geometry[name]
-        if not isinstance(geometry, trimesh.Trimesh) or not len(geometry.faces):
-            continue  # points and lines
-        visual: Any = geometry.visual
-        uv = colours = None
-        if textures is not None and visual.kind == "texture":
-            uv = visual.uv
-        elif textures is not None and visual.kind in ("vertex", "face"):
-            colours = np.asarray(visual.vertex_colors, dtype=float) / 255.0
-        image = None if textures is None or files.image is None else textures.file(files.image)
-        found = Geometry(np.asarray(geometry.vertices), np.asarray(geometry.faces), uv, colours)
-        placed.append(Placed(found, np.eye(4), Look(None, image)))
-    return placed
-
-
-def _check_ply(raw: bytes, file: pathlib.Path) -> None:
-    """The counts that a PLY's header declares."""
-    head = raw[: max(raw.find(b"end_header"), 0)].split(b"\n")
-    if not head or head == [b""]:
-        raise MeshError(file, "cannot be read as PLY: its header does not end")
-    for line in head:
-        words = line.split()
-        if len(words) == 3 and words[0] == b"element" and words[2].isdigit():
-            if int(words[2][:18]) > len(raw):
-                raise MeshError(file, f"declares more elements ({words[2][:18].decode()}) than it has bytes")
-            if words[1] == b"face":
-                check_faces(int(words[2][:18]), file)
-
-
-@contextlib.contextmanager
-def _quiet_trimesh() -> Iterator[None]:
-    """Keeps trimesh's log messages about broken textures off the screen."""
-    level = trimesh.util.log.level
-    trimesh.util.log.setLevel(logging.CRITICAL)
-    try:
-        yield
-    finally:
-        trimesh.util.log.setLevel(level)

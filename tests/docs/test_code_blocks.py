@@ -10,6 +10,7 @@ import pytest
 from parsed_commands import parse_only
 
 from ig2mj import cli
+from ig2mj.agents import registry
 from ig2mj.predicates.parse import parse
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -89,6 +90,7 @@ def test_every_block_says_what_it_is():
 @pytest.mark.parametrize("page", cases(with_python))
 def test_the_python_of_a_page_runs_from_top_to_bottom(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(registry, "ROBOTS", dict(registry.ROBOTS))  # pages register robots
     run_python(page, without=GPU)
 
 

@@ -110,5 +110,9 @@ class Clock:
 
 
 def default_overlays(scene: Scene) -> list[Overlay]:
-    """Names, rooms and clock."""
-    return [ObjectNames(scene), RoomNames(scene), Clock(scene)]
+    """Those that the viewer can show, one line each."""
+    return [
+        ObjectNames(scene),
+        RoomNames(scene),
+        Clock(scene),
+    ]
