@@ -90,7 +90,7 @@ def make(
 @overload
 def make(
     name: str | AnyTask,
-    config: str | TaskRobot | None = None,
+    config: str | TaskRobot | None,
     worlds: int = 1,
     engine: str | None = None,
     grasping: str | None = None,
