@@ -106,7 +106,7 @@ def play_part(part: Part) -> dict[str, Any]:
         "first": part.first,
         "count": part.count,
         "failed": [part.first + k for k, good in enumerate(done.success) if not good],
-        "not_in_hand": [part.first + k for k, good in enumerate(done.success_in_hand) if not good],
+        "not_in_hand": [part.first + k for k, good in enumerate(done.outcomes["success_in_hand"]) if not good],
         "mean_return": round(sum(done.total) / part.count, 3),
         "overflow": int(metrics["overflow"]),
         "non_finite": int(metrics["not_finite"]),

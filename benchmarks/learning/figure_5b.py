@@ -35,7 +35,6 @@ from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.experts import expert_of
 from ig2mj.envs.registry import VECTORS, make
-from ig2mj.envs.rollout import Lifts
 from ig2mj.learn.bc import BC, BCConfig, clone
 from ig2mj.learn.demos import Demos
 from ig2mj.learn.evaluate import wilson
@@ -87,7 +86,7 @@ def collect(env: Environment, perception: Perception, count: int, pace: float, n
             action = wanted + np.where(closing, 0.0, noise * pace) * rng.standard_normal(wanted.shape)
             action = np.clip(action, -1, 1).astype(np.float32)
             seen = perception(state.obs)
-            steps.append((action, Seen(np.asarray(seen.vector), np.asarray(seen.picture)), going.copy()))
+            steps.append((action, Seen(np.asarray(seen.vector), np.asarray(seen.image)), going.copy()))
             state = env.step(state, action)
             ended = going & np.asarray(state.done)
             won |= ended & np.asarray(state.info["success"])
@@ -95,7 +94,7 @@ def collect(env: Environment, perception: Perception, count: int, pace: float, n
         for w in range(env.num_worlds):
             own = [step for step in steps if step[2][w]]
             if won[w]:
-                parts = ([s[0][w] for s in own], [s[1].vector[w] for s in own], [s[1].picture[w] for s in own])
+                parts = ([s[0][w] for s in own], [s[1].vector[w] for s in own], [s[1].image[w] for s in own])
                 actions, vectors, pictures = (np.stack(p) for p in parts)
                 found.append(Shown(int(rows[w]), actions, vectors, pictures, True))
         if len(found) >= count:
@@ -115,12 +114,12 @@ def trained(
     env: Environment, perception: Perception, demos: Demos, steps: int, batch: int, seed: int
 ) -> tuple[Policy, float]:
     """A clone, and its loss on the tenth of the steps that is kept apart."""
-    config = BCConfig(steps=steps, batch=batch, noise=0.02, actor=(256, 256))
+    config = BCConfig(num_updates=steps, batch=batch, input_noise=0.02, actor_layers=(256, 256))
     algorithm = BC(perception, demos.action.shape[1], config)
     learner, row = clone(algorithm, demos, Run(minutes=600, seed=seed, quiet=True))
     depends = depends_on(env, perception)
     depends["actions"] = depends["actions"][: demos.action.shape[1]]
-    return Policy.of(algorithm, learner, depends, {}), row["loss_apart"]
+    return Policy.of(algorithm, learner, depends, {}), row["held_out_loss"]
 
 
 def take_over(
@@ -136,7 +135,7 @@ def take_over(
         length = np.array([len(shown.action) for shown, _ in part])
         lead = np.where([np.isinf(x) for _, x in part], length, [round(min(x, 1e3) / ACTION_PERIOD) for _, x in part])
         handover, going, won = np.maximum(length - lead, 0), np.ones(len(part), bool), np.zeros(len(part), bool)
-        lifts = Lifts(state.info, env.num_worlds)
+        by_all = np.zeros(len(part), bool)
         for k in range(env.task.horizon):
             action = np.stack([shown.action[min(k, len(shown.action) - 1)] for shown, _ in part])
             alone = k >= handover
@@ -144,13 +143,13 @@ def take_over(
             state = env.step(state, action)
             ended = going & np.asarray(state.done)
             won |= ended & np.asarray(state.info["success"])
-            lifts.see(state.info, np.asarray(state.done), going)
+            by_all |= ended & np.asarray(state.info["lifted_by_all"])
             going &= ~ended
             if not going.any():
                 break
         count = min(env.num_worlds, len(jobs) - first)
         success += won[:count].tolist()
-        lifted += (won & lifts.by_all)[:count].tolist()
+        lifted += by_all[:count].tolist()
     return success, lifted
 
 

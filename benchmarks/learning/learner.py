@@ -22,14 +22,17 @@ import numpy as np
 
 from benchmarks.harness import results
 from benchmarks.harness.kernel_times import profiled
+from ig2mj.agents.base import HandReading
 from ig2mj.envs.observations import Space
 from ig2mj.learn.collect import Transition
-from ig2mj.learn.dagger import GUESSED, RECALLED, Dagger, DaggerConfig
-from ig2mj.learn.options import configured
+from ig2mj.learn.dagger import PREDICTION, REMEMBERED, Dagger, DaggerConfig
+from ig2mj.learn.occlusion import OcclusionConfig, glimpses
+from ig2mj.learn.occlusion.object_memory import make_memory
+from ig2mj.learn.occlusion.projection import CameraProjection, with_object_targets
 from ig2mj.learn.perception import Perception, Seen
 from ig2mj.learn.ppo import PPO, PPOConfig
-from ig2mj.learn.projection import Lens
 from ig2mj.learn.sac import SAC, SACConfig
+from ig2mj.learn.settings import configure_all, configured
 
 PROPRIOCEPTION, PRIVILEGED, ACTIONS = 40, 60, 6
 """Numbers of a humanoid with one hand in CookingMeat, about."""
@@ -61,14 +64,19 @@ def perceived(args: argparse.Namespace) -> Perception:
         return Perception(spaces("state"))
     first, below = (int(row) for row in args.rows.split(":")) if args.rows else (0, args.pixels)
     names = [*POSES, *(f"number_{k}" for k in range(PRIVILEGED - len(POSES)))]
-    lens = Lens((0.0, 0.0, 0.0), AHEAD, (1.0, 1.0), args.pixels, (first, below))
-    felt = ["right_hand_is_grasping", *(f"felt_{k}" for k in range(PROPRIOCEPTION - 1))]
-    return Perception(spaces("rgbd"), "rgbd", args.pixels, (first, below), names, lens, felt)
+    ahead = CameraProjection((0.0, 0.0, 0.0), AHEAD, (1.0, 1.0), args.pixels, (first, below))
+    perception = Perception(spaces("rgbd"), "rgbd", args.pixels, (first, below), names)
+    return with_object_targets(perception, names, ahead)
+
+
+def encoder_of(perception: Perception, config: SACConfig | DaggerConfig) -> glimpses.GlimpseEncoder | None:
+    """The encoder that the algorithm does not make itself."""
+    return glimpses.encoder_of(perception) if config.encoder == glimpses.NAME else None
 
 
 def seen_by(perception: Perception, *count: int) -> Seen:
     """Random numbers and pictures."""
-    rng, shape = np.random.default_rng(0), perception.picture_shape
+    rng, shape = np.random.default_rng(0), perception.image_shape
     size = 0 if shape is None else int(np.prod(shape))
     pictures = rng.integers(0, 256, (*count, size), np.uint8)
     return Seen(jnp.asarray(rng.standard_normal((*count, perception.vector_size)), jnp.float32), jnp.asarray(pictures))
@@ -85,8 +93,8 @@ def made_up(algorithm: SAC | PPO | Dagger, worlds: int) -> Transition:
     raw = normal(ACTIONS)
     extra: dict[str, Any] = {"raw": raw, "chance": normal()} if algorithm.name == "ppo" else {}
     if isinstance(algorithm, Dagger):
-        extra = {"label": jnp.tanh(raw), **({RECALLED: normal(algorithm.recall.size)} if algorithm.recall else {})}
-        extra |= {GUESSED: normal(algorithm.guesses)} if algorithm.guesses else {}
+        extra = {"label": jnp.tanh(raw), **({REMEMBERED: normal(algorithm.memory.size)} if algorithm.memory else {})}
+        extra |= {PREDICTION: normal(algorithm.kept_predictions)} if algorithm.kept_predictions else {}
     terminated = jnp.asarray(ends & (rng.random((length, worlds)) < 0.5))
     seen = seen_by(perception, length, worlds)
     return Transition(seen, jnp.tanh(raw), extra, normal(), terminated, jnp.asarray(ends) & ~terminated, seen)
@@ -110,15 +118,22 @@ def main() -> None:
     args = parser.parse_args()
     perception = perceived(args)
     changes = list(args.set)
-    changes += [f"batch={args.batch}"] * bool(args.batch) + [f"capacity={args.capacity}"] * bool(args.capacity)
+    changes += [f"batch_size={args.batch}"] * bool(args.batch)
+    changes += [f"buffer_size={args.capacity}"] * bool(args.capacity)
     if args.algo == "sac":
-        algorithm = SAC(perception, ACTIONS, configured(SACConfig(), changes))
+        config = configured(SACConfig(), changes)
+        algorithm = SAC(perception, ACTIONS, config, encoder=encoder_of(perception, config))
     elif args.algo == "dagger":
         starts = seen_by(perception, args.starts) if args.starts else None
-        algorithm = Dagger(perception, ACTIONS, None, configured(DaggerConfig(), changes), None, starts)
+        config, occlusion = configure_all((DaggerConfig(), OcclusionConfig()), changes)
+        memory = None
+        if occlusion.object_memory != "none":
+            memory = make_memory(perception, [HandReading(0)], full=occlusion.object_memory == "full")
+        parts: dict[str, Any] = {"encoder": encoder_of(perception, config), "memory": memory}
+        algorithm = Dagger(perception, ACTIONS, None, config, None, starts, **parts)
     else:
         algorithm = PPO(perception, ACTIONS, configured(PPOConfig(), changes))
-    learner, memory = algorithm.init(jax.random.PRNGKey(0)), algorithm.memory(args.worlds)
+    learner, memory = algorithm.init(jax.random.PRNGKey(0)), algorithm.buffer(args.worlds)
     rollout = made_up(algorithm, args.worlds)
     learn = jax.jit(algorithm.learn, donate_argnums=(0, 1))
 
@@ -130,7 +145,7 @@ def main() -> None:
     learner, memory, _ = jax.block_until_ready(iteration(learner, memory, key, False))
     compile_s = time.perf_counter() - began
     # the buffer is filled before the clock starts
-    rows = max(getattr(algorithm.config, "capacity", 0) // (args.worlds * algorithm.length), 1)
+    rows = max(getattr(algorithm.config, "buffer_size", 0) // (args.worlds * algorithm.length), 1)
     for _ in range(rows):
         learner, memory, _ = iteration(learner, memory, key, False)
     learner, memory, _ = jax.block_until_ready(iteration(learner, memory, key, True))
@@ -149,8 +164,8 @@ def main() -> None:
         "pixels": args.pixels if args.obs == "rgbd" else None,
         "worlds": args.worlds,
         "batch": batch,
-        "updates_per_iteration": algorithm.samples,
-        "updates_per_second": round(algorithm.samples / seconds, 1),
+        "updates_per_iteration": algorithm.updates,
+        "updates_per_second": round(algorithm.updates / seconds, 1),
         "iteration_ms": round(1e3 * seconds, 3),
         "compile_s": round(compile_s, 1),
         "actor_weights": weights,
@@ -160,7 +175,7 @@ def main() -> None:
     if args.kernels:
         key, now = jax.random.split(key)
         _, row["kernels"] = profiled(
-            lambda: iteration(learner, memory, now, True), algorithm.samples, args.kernels, "update"
+            lambda: iteration(learner, memory, now, True), algorithm.updates, args.kernels, "update"
         )
     results.keep_row(row, args.out)
 

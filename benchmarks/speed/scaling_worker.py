@@ -110,7 +110,7 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
     """
     import ig2mj
     from ig2mj.envs.registry import VECTORS
-    from ig2mj.learn.algorithms import config_of, made
+    from ig2mj.learn.algorithms import config_of, make_algorithm
     from ig2mj.learn.checkpoints import Checkpoints
     from ig2mj.learn.iteration import AXIS, ManyDevices, OneDevice
     from ig2mj.learn.perception import Perception
@@ -122,12 +122,12 @@ def learner(settings: dict[str, Any], team: Team) -> tuple[dict[str, Any], Measu
         settings["env"], worlds=worlds, engine=settings["engine"], observations=names, pool_size=settings["pool_size"]
     )
     config: Any = dataclasses.replace(
-        config_of("sac"), batch=settings["batch"] * count, capacity=settings["capacity"] * count
+        config_of("sac"), batch_size=settings["batch"] * count, buffer_size=settings["capacity"] * count
     )
     perception = Perception(env.observation_spaces, settings["obs"])
-    sac = made(config, perception, env, None, AXIS if apart else None)
+    sac = make_algorithm(config, perception, env, None, AXIS if apart else None)
     step: Any = ManyDevices(env, sac, jax.devices(), team) if apart else OneDevice(env, sac)
-    held, memory_, key = *step.place(sac.init(jax.random.PRNGKey(0)), step.memory()), jax.random.PRNGKey(1)
+    held, memory_, key = *step.place(sac.init(jax.random.PRNGKey(0)), step.buffer()), jax.random.PRNGKey(1)
     play = step.begin(0)
     parts = {name: sum(a.size for a in jax.tree.leaves(getattr(held, name))) for name in ("actor", "critic")}
     state = [held, memory_, play, key]

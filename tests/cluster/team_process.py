@@ -53,18 +53,20 @@ def gradient(team: Team) -> dict:
     from ig2mj.learn.perception import Perception
     from ig2mj.learn.ppo import PPO, PPOConfig
 
-    config = PPOConfig(length=LENGTH, epochs=1, parts=1, actor=(32, 32), critic=(32, 32), lr=1e-3)
+    config = PPOConfig(
+        rollout_length=LENGTH, epochs=1, minibatches=1, actor_layers=(32, 32), critic_layers=(32, 32), lr=1e-3
+    )
     perception, count = Perception(PointMass.observation_spaces), jax.device_count()
     key = jax.random.PRNGKey(3)
     if team.count == 1:
         ppo = PPO(perception, 2, config)
         learner, _, losses = jax.jit(ppo.learn)(
-            ppo.init(key), ppo.memory(WORLDS), rollout(ppo, 0, WORLDS), key, 0.5, np.bool_(True)
+            ppo.init(key), ppo.buffer(WORLDS), rollout(ppo, 0, WORLDS), key, 0.5, np.bool_(True)
         )
     else:
         ppo = PPO(perception, 2, config, AXIS)
         step = ManyDevices(PointMass(WORLDS // count), ppo, jax.devices(), team)
-        learner, memory = step.place(ppo.init(key), step.memory())
+        learner, memory = step.place(ppo.init(key), step.buffer())
         share = WORLDS // count
         own = jax.device_put(rollout(ppo, team.rank * share, (team.rank + 1) * share), jax.local_devices()[0])
         progress = 0.5 if team.rank == 0 else 0.25  # the largest counts
@@ -90,7 +92,9 @@ def learn(team: Team, out: str, iterations: int, resume: bool, seconds: float = 
     from ig2mj.learn.train import Run, train
 
     devices = jax.devices()
-    config = SACConfig(updates=4, batch=64, capacity=4000, actor=(32,), critic=(32,), atoms=21)
+    config = SACConfig(
+        utd_ratio=4, batch_size=64, buffer_size=4000, actor_layers=(32,), critic_layers=(32,), num_atoms=21
+    )
     env = PointMass(32 // len(devices))
     sac = SAC(Perception(env.observation_spaces), 2, config, AXIS if len(devices) > 1 else None)
     minutes = seconds / 60 if seconds else 5.0
@@ -116,9 +120,9 @@ def turns(team: Team) -> dict:
     pools.make_pool = lambda *given, **named: sampled.append(1) or sample(*given, **named)
     with team.turns():
         make("GraspingBook", None, 1, "native", pool_size=2)
-    ppo = PPO(Perception(PointMass.observation_spaces), 2, PPOConfig(length=4, parts=1, epochs=1), AXIS)
+    ppo = PPO(Perception(PointMass.observation_spaces), 2, PPOConfig(rollout_length=4, minibatches=1, epochs=1), AXIS)
     step = ManyDevices(PointMass(4), ppo, jax.devices(), team)
-    learner, memory = step.place(ppo.init(jax.random.PRNGKey(0)), step.memory())
+    learner, memory = step.place(ppo.init(jax.random.PRNGKey(0)), step.buffer())
     plays, times, compiled = step.begin(0), [], step._compiled
 
     def timed(act: Callable[..., Any]) -> Callable[..., Any]:

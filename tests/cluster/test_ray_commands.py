@@ -78,13 +78,13 @@ def policy(tmp_path_factory) -> pathlib.Path:
 
     import ig2mj
     from ig2mj.envs.registry import VECTORS
-    from ig2mj.learn.algorithms import config_of, made
+    from ig2mj.learn.algorithms import config_of, make_algorithm
     from ig2mj.learn.perception import Perception
     from ig2mj.learn.policies import Policy, depends_on
 
     env = ig2mj.make(TASK, worlds=1, engine="native", observations=VECTORS, pool_size=4, split="held_out")
     perception = Perception(env.observation_spaces, "state")
-    sac = made(config_of("sac", small=True), perception, env)
+    sac = make_algorithm(config_of("sac", small=True), perception, env)
     file = tmp_path_factory.mktemp("policy") / "policy.npz"
     Policy.of(sac, sac.init(jax.random.PRNGKey(0)), depends_on(env, perception), {"seed": 0}).save(file)
     return file

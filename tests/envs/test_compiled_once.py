@@ -78,7 +78,7 @@ def test_an_actor_takes_the_steps_that_python_would_take(env, compiled):
     compiled.clear()
     again = play(short, actor.seeded(8), 3, in_order=True, first=1)
     assert not compiled
-    assert len(again.total) == len(again.success) == 3 and again.lifted_by_all is None
+    assert len(again.total) == len(again.success) == 3 and not again.outcomes
     wrong = Actor(short, _not_finite, parameters=jnp.float32(jnp.nan))
     with pytest.raises(ActionError, match="4 numbers of actions of PointNavigation are not finite"):
         play(short, wrong, 2, in_order=True)

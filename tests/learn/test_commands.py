@@ -17,9 +17,9 @@ def test_a_recorded_expert_is_cloned_and_judged(tmp_path, capsys):
     demos, run = tmp_path / "meat.h5", tmp_path / "run"
     assert call(["demos", "collect", "CookingMeat", "--out", str(demos), "--episodes", "8", *POOL]) == 0
     train = ["train", "CookingMeat", "--algo", "bc", "--demos", str(demos), "--out", str(run)]
-    assert call([*train, "--set", "steps=1500", "batch=128", "actor=64,64"]) == 0
+    assert call([*train, "--set", "num_updates=1500", "batch_size=128", "actor_layers=64,64"]) == 0
     assert call([*train[:-1], str(tmp_path / "other"), "--obs", "rgbd"]) == 2
-    assert "holds no pictures" in capsys.readouterr().err
+    assert "holds no images" in capsys.readouterr().err
     episodes = ["--episodes", "4", *POOL, "--split", "train", "--json"]
     assert call(["evaluate", str(run), "--worlds", "4", *episodes]) == 0
     found = json.loads(capsys.readouterr().out)
@@ -39,17 +39,19 @@ def test_wrong_options_name_what_is_near(tmp_path, capsys):
     for arguments, told in (
         (["train", "CookingMeat", "--algo", "sax"], "near matches: sac"),
         (["train", "CookingMeat", "--obs", "rgb"], "near matches: rgbd"),
-        (["train", "CookingMeat", "--set", "updatez=3"], "updates"),
+        (["train", "CookingMeat", "--set", "utd_ration=3"], "utd_ratio"),
         (["train", "CookingMeat", "--algo", "bc"], "needs --demos"),
-        (["train", "CookingMeat", "--algo", "bc", "--expert"], "--expert is for sac"),
-        (["train", "CookingMeat", "--begin-with", "CookingMeat"], "--begin-with is for --algo dagger"),
-        (["train", "CookingMeat", "--algo", "dagger", "--begin-with", "CookingMeet"], "near matches: CookingMeat"),
-        (["train", "CookingMeat", "--programs", "3"], "--programs 3"),
+        (["train", "CookingMeat", "--algo", "bc", "--expert"], "expert=true is for sac"),
+        (["train", "CookingMeat", "--begin-with", "CookingMeat"], "--init-from is for --algo dagger"),
+        (["train", "CookingMeat", "--algo", "dagger", "--init-from", "CookingMeet"], "near matches: CookingMeat"),
+        (["train", "CookingMeat", "--set", "programs=3"], "programs=3"),
         (["train", "CookingMeat", "--minutes", "nan"], "--minutes nan"),
-        (["train", "CookingMeat", "--until", "7"], "--until 7.0: a share"),
-        (["train", "CookingMeat", "--pixels", "0"], "--pixels 0"),
+        (["train", "CookingMeat", "--until", "7"], "--stop-at-success 7.0: a share"),
+        (["train", "CookingMeat", "--pixels", "0"], "image_size is at least 1"),
         (["evaluate", "CookingMeet"], "no policy is named"),
-        (["train", "GraspingBook", "--mixed", "-1"], "mixed = -1: a whole number of at least 0"),
+        (["train", "GraspingBook", "--set", "augment_starts=-1"], "augment_starts is at least 0"),
+        (["train"], "no environment"),
+        (["train", "--config", "no/such.toml"], "there is no such file"),
         (["train", "GraspingBook", "--out", __file__], "is a file"),
         (["train", "GraspingBook", "--devices", "4"], "--devices 4: this run can have 1"),
         (["evaluate", "no/such.npz"], "there is no such file"),
@@ -82,7 +84,7 @@ def test_a_training_that_does_not_fit_ends_in_one_line(tmp_path, capsys, monkeyp
 
     monkeypatch.setattr(loop, "train", full)
     arguments = ["train", "PointNavigation", "--worlds", "8", "--pool-size", "4", "--out", str(tmp_path / "run")]
-    assert call([*arguments, "--engine", "native"]) == 2
+    assert call([*arguments, "--set", "engine=native"]) == 2
     (line,) = [text for text in capsys.readouterr().err.splitlines() if "memory" in text]
     assert "8 worlds" in line and "--worlds 4" in line
 
@@ -101,4 +103,4 @@ def test_a_training_leaves_reports_checkpoints_a_policy_and_films(tmp_path, caps
     assert (run / "progress.csv").exists() and list(run.glob("events.out.tfevents.*"))
     assert [f.name for f in (run / "checkpoints").iterdir()]
     assert call(["train", "GraspingBook", "--minutes", "0.2", *settings]) == 2
-    assert "holds a run already: take --resume" in capsys.readouterr().err
+    assert "holds a run already: --resume continues it" in capsys.readouterr().err

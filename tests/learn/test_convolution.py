@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ig2mj.learn.convolution import by_product, by_xla
-from ig2mj.learn.networks import Encoder
+from ig2mj.learn.networks import Convolutions
 
 SIZES = [((32, 32), 2), ((48, 128), 2), ((15, 11), 2), ((24, 24), 1), ((5, 2), 3)]
 
@@ -27,7 +27,7 @@ def test_both_ways_give_the_same_and_the_same_gradients(shape, stride):
 
 @pytest.mark.parametrize(("platform", "convolves"), [("cpu", False), ("cuda", True)])
 def test_a_program_convolves_as_its_platform_does(platform, convolves):
-    encoder, pictures = Encoder((32, 32, 4), "points"), jnp.zeros((2, 32 * 32 * 4), jnp.uint8)
+    encoder, pictures = Convolutions((32, 32, 4), "points"), jnp.zeros((2, 32 * 32 * 4), jnp.uint8)
     params = encoder.init(jax.random.PRNGKey(0), pictures)
 
     def slope(params, pictures):

@@ -55,9 +55,9 @@ def test_a_clone_does_what_the_expert_does(recorded):
     env, file = recorded
     world, spaces = about(file)
     perception = Perception(spaces)
-    algorithm = BC(perception, 2, BCConfig(steps=400, batch=64, lr=3e-3, actor=(32, 32)))
+    algorithm = BC(perception, 2, BCConfig(num_updates=400, batch_size=64, lr=3e-3, actor_layers=(32, 32)))
     learner, row = clone(algorithm, load_demos(file, perception), Run(quiet=True))
-    assert row["loss_apart"] < 0.1
+    assert row["held_out_loss"] < 0.1
     policy = Policy.of(algorithm, learner, depends_of(world, perception), {})
     policy.check(env, perception)
     act, state, success = policy.actor(perception), env.reset(9), 0
@@ -103,10 +103,18 @@ def test_sac_that_begins_as_a_clone_is_better_at_once(recorded):
     env, file = recorded
     perception = Perception(env.observation_spaces)
     demos = load_demos(file, perception)
-    config = SACConfig(updates=8, batch=128, capacity=8000, actor=(32, 32), critic=(64, 64), atoms=51, head_start=300)
-    config = dataclasses.replace(config, tau=0.02, lr=1e-3, last_lr=3e-4)
+    config = SACConfig(
+        utd_ratio=8,
+        batch_size=128,
+        buffer_size=8000,
+        actor_layers=(32, 32),
+        critic_layers=(64, 64),
+        num_atoms=51,
+        critic_head_start=300,
+    )
+    config = dataclasses.replace(config, tau=0.02, lr=1e-3, final_lr=3e-4)
     algorithm = SAC(perception, 2, config, demos=demos)
-    learner = begin_as_clone(algorithm, demos, 0, steps=400)
+    learner = begin_as_clone(algorithm, demos, 0, updates=400)
     result = train(PointMass(32), algorithm, Run(iterations=60, quiet=True), learner=learner)
     assert result.row["success"] > 0.85  # without demonstrations: a third
     assert int(result.learner.updates) > 600  # the actor learned, too

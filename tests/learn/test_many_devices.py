@@ -23,10 +23,12 @@ from ig2mj.learn.train import Run, train
 
 env, out = PointMass(32), {{}}
 perception = Perception(env.observation_spaces)
-ppo = PPO(perception, 2, PPOConfig(length=16, parts=4, actor=(32, 32), critic=(32, 32), lr=1e-3), AXIS)
-sac = SAC(perception, 2, SACConfig(updates=4, batch=64, capacity=4000, actor=(32,), critic=(32,), atoms=21), AXIS)
+layers = {{"actor_layers": (32, 32), "critic_layers": (32, 32)}}
+ppo = PPO(perception, 2, PPOConfig(rollout_length=16, minibatches=4, lr=1e-3, **layers), AXIS)
+layers = {{"actor_layers": (32,), "critic_layers": (32,)}}
+sac = SAC(perception, 2, SACConfig(utd_ratio=4, batch_size=64, buffer_size=4000, num_atoms=21, **layers), AXIS)
 for name, algorithm, iterations in (("ppo", ppo, 100), ("sac", sac, 12)):
-    run = Run(3.0, iterations=iterations, until=0.9, quiet=True, out={out!r} + name)
+    run = Run(3.0, iterations=iterations, stop_at_success=0.9, quiet=True, out={out!r} + name)
     result = train(env, algorithm, run, devices=jax.devices())
     weights = [
         [np.asarray(s.data) for s in leaf.addressable_shards] for leaf in jax.tree.leaves(result.learner.actor)

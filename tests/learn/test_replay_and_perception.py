@@ -16,25 +16,28 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from small_envs import PointMass, SeenPointMass
 
-from ig2mj.cli.train import drawn_rows
+from ig2mj.cli.train import rendered_rows
 from ig2mj.envs.observations import Space
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.collect import Transition
 from ig2mj.learn.dagger import DaggerConfig
 from ig2mj.learn.evaluate import wilson
-from ig2mj.learn.hidden import Hidden, guess_loss
-from ig2mj.learn.labels import Imitation
-from ig2mj.learn.moments import Moments, RewardScale
-from ig2mj.learn.networks import GLIMPSE, SHAKEN, Actor, Encoder, brightest, coarse, projected, shifted, window
-from ig2mj.learn.perception import FAR, Perception, Seen, shrunk
+from ig2mj.learn.imitation import Imitation
+from ig2mj.learn.networks import AUGMENTATION, Actor, ConvEncoder, Convolutions, brightest, projected, shifted
+from ig2mj.learn.occlusion.glimpses import GLIMPSE, GlimpseEncoder, GlimpseFeatures, coarse, encoder_of, window
+from ig2mj.learn.occlusion.projection import FRAME, CameraProjection, ObjectTargets, with_object_targets
+from ig2mj.learn.perception import DEPTH_RANGE, Perception, Seen, shrunk
 from ig2mj.learn.policies import Policy, PolicyMismatch, depends_on, perception_of
-from ig2mj.learn.projection import FRAME, Lens
+from ig2mj.learn.privileged_targets import PrivilegedTargets, prediction_loss
 from ig2mj.learn.replay import Replay
+from ig2mj.learn.running_stats import RewardScale, RunningStats
 from ig2mj.learn.sac import SAC, SACConfig
 
 GAMMA = 0.5
 
-AHEAD = Lens((0.0, 0.0, 0.0), ((0.0, 0.0, -1.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), (1.0, 1.0), 16, (2, 14))
+AHEAD = CameraProjection(
+    (0.0, 0.0, 0.0), ((0.0, 0.0, -1.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), (1.0, 1.0), 16, (2, 14)
+)
 """In the middle of the base, looking ahead along x; rows 2 to 14 of 16x16 pixels."""
 
 GOAL = [*(f"goal_pos_{c}" for c in "xyz"), *(f"goal_quat_{c}" for c in "wxyz")]
@@ -93,7 +96,7 @@ def test_a_picture_is_averaged_over_areas_and_no_depth_is_far_away():
     picture[0, :2, :2, 0] = (1.0, 2.0)
     picture[0, 2:, 2:, 0] = 9.0
     small = np.asarray(shrunk(picture, "depth", 2, 0, 2))[0, :, :, 0]
-    assert small[0, 0] == round(255 * 1.5 / FAR)
+    assert small[0, 0] == round(255 * 1.5 / DEPTH_RANGE)
     assert small[1, 1] == small[0, 1] == 255
     assert np.asarray(shrunk((255 * (picture > 0)).astype(np.uint8), "rgb", 2, 0, 2))[0, :, :, 0].tolist() == [
         [255, 0],
@@ -105,7 +108,7 @@ def test_an_actor_from_pixels_does_not_see_the_privileged_state():
     env = SeenPointMass(2)
     perception = Perception(env.observation_spaces, "rgbd")
     assert perception.actor_size == 2 and perception.vector_size == 4
-    assert perception.picture_shape == (32, 32, 4)
+    assert perception.image_shape == (32, 32, 4)
     state = env.reset(0)
     seen = perception(state.obs)
     assert np.array_equal(seen.vector[:, :2], state.obs["proprioception"])
@@ -131,10 +134,10 @@ def test_the_interval_of_a_rate_is_that_of_the_textbook():
 def test_a_policy_sees_pictures_in_the_size_it_was_trained_on():
     env = SeenPointMass(2)
     perception = Perception(env.observation_spaces, "rgbd", 16)
-    sac = SAC(perception, 2, SACConfig(actor=(8,), critic=(8,)))
+    sac = SAC(perception, 2, SACConfig(actor_layers=(8,), critic_layers=(8,)))
     policy = Policy.of(sac, jax.jit(sac.init)(jax.random.PRNGKey(0)), depends_on(env, perception), {})
     again = perception_of(policy, env.observation_spaces)
-    assert again.picture_shape == (16, 16, 4)
+    assert again.image_shape == (16, 16, 4)
     obs = {name: jnp.zeros((2, *space.shape), space.dtype) for name, space in env.observation_spaces.items()}
     assert jax.eval_shape(policy.actor(again), obs).shape == (2, 2)
     with pytest.raises(PolicyMismatch, match="picture"):
@@ -161,7 +164,7 @@ def test_pictures_that_are_not_to_be_moved_stay_as_they_are():
 @pytest.mark.parametrize("side", [32, 64, 128])
 def test_an_encoder_ends_with_four_by_four_pixels(side):
     shape = jax.eval_shape(
-        Encoder((side, side, 4)).init, jax.random.PRNGKey(0), jnp.zeros((1, side * side * 4), jnp.uint8)
+        Convolutions((side, side, 4)).init, jax.random.PRNGKey(0), jnp.zeros((1, side * side * 4), jnp.uint8)
     )
     assert shape["params"]["Dense_0"]["kernel"].shape == (4 * 4 * 64, 50)
 
@@ -169,21 +172,20 @@ def test_an_encoder_ends_with_four_by_four_pixels(side):
 def test_rows_that_are_kept_are_those_of_the_whole_picture():
     env = SeenPointMass(2)
     state = env.reset(0)
-    whole = np.asarray(Perception(env.observation_spaces, "rgbd", 16)(state.obs).picture).reshape(2, 16, 16, 4)
+    whole = np.asarray(Perception(env.observation_spaces, "rgbd", 16)(state.obs).image).reshape(2, 16, 16, 4)
     perception = Perception(env.observation_spaces, "rgbd", 16, (4, 12))
-    assert perception.picture_shape == (8, 16, 4)
-    assert np.array_equal(np.asarray(perception(state.obs).picture).reshape(2, 8, 16, 4), whole[:, 4:12])
-    with pytest.raises(Ig2mjError, match="rows 12 to 20 of pictures of 16 rows"):
+    assert perception.image_shape == (8, 16, 4)
+    assert np.array_equal(np.asarray(perception(state.obs).image).reshape(2, 8, 16, 4), whole[:, 4:12])
+    with pytest.raises(Ig2mjError, match="rows 12 to 20 of images of 16 rows"):
         Perception(env.observation_spaces, "rgbd", 16, (12, 20))
 
 
-@pytest.mark.parametrize("net", ["places", "glimpses"])
-def test_a_policy_that_acts_on_its_guess_takes_it_along(net, tmp_path):
+def test_a_policy_that_acts_on_its_prediction_takes_it_along(tmp_path):
     env = SeenPointMass(2)
     spaces = {**env.observation_spaces, "privileged_state": Space((7,), np.float32, -np.inf, np.inf)}
-    perception = Perception(spaces, "rgbd", 16, (4, 16), GOAL, AHEAD)
-    assert perception.objects == 1
-    sac = SAC(perception, 2, SACConfig(actor=(8,), critic=(8,), net=net))
+    perception = with_object_targets(Perception(spaces, "rgbd", 16, (4, 16), GOAL), GOAL, AHEAD)
+    config = SACConfig(actor_layers=(8,), critic_layers=(8,), encoder="glimpses")
+    sac = SAC(perception, 2, config, encoder=encoder_of(perception))
     learner = jax.jit(sac.init)(jax.random.PRNGKey(0))
     learner.actor["guess"]["kernel"] += 1.0
     learner.actor["mean"]["kernel"] += 0.1
@@ -191,7 +193,7 @@ def test_a_policy_that_acts_on_its_guess_takes_it_along(net, tmp_path):
     policy.save(tmp_path / "policy.npz")
     again = Policy.load(tmp_path / "policy.npz")
     sees = perception_of(again, spaces)
-    assert sees.picture_shape == (12, 16, 4) and sees.rows == (4, 16)
+    assert sees.image_shape == (12, 16, 4) and sees.rows == (4, 16)
     obs = {**env.reset(0).obs, "privileged_state": jnp.zeros((2, 7))}
     wanted = jax.jit(sac._look)(learner.actor, learner.moments, perception(obs))[0]
     assert np.allclose(jax.jit(again.actor(sees))(obs), np.tanh(wanted), atol=0.02), "half precision"
@@ -201,7 +203,7 @@ def test_a_policy_that_acts_on_its_guess_takes_it_along(net, tmp_path):
 
 def test_a_guess_is_of_rotations_and_not_of_the_sign_of_a_quaternion():
     names = ["cup_pos_x", *(f"cup_quat_{c}" for c in "wxyz"), "cup_velocity_x", "hand_holds"]
-    hidden = Hidden(2, 7, names)
+    hidden = PrivilegedTargets(2, 7, names)
     assert hidden.size == 2 + 6
     quat = np.array([0.0, 0.6, 0.8, 0.0])
     vector = jnp.asarray([[9, 9, 0.1, *quat, 5.0, 1.0], [9, 9, 0.1, *-quat, -5.0, 1.0]], jnp.float32)
@@ -209,29 +211,28 @@ def test_a_guess_is_of_rotations_and_not_of_the_sign_of_a_quaternion():
     assert np.allclose(found[0], found[1])
     assert np.allclose(found[0, :2], [0.1, 1.0])
     assert np.allclose(found[0, 2:] / 3**0.5, [-0.28, 0.96, 0, 0.96, 0.28, 0], atol=1e-6), "columns x and y"
-    assert Hidden(2, 7).size == 7, "numbers without names are guessed as they are"
+    assert PrivilegedTargets(2, 7).size == 7, "numbers without names are guessed as they are"
     wanted = jnp.asarray(hidden(vector, vector))
     for number, more in ((0, 1.0), (5, 3.0)):  # a place: the absolute error; a rotation: its square
         one, two = (float(hidden.loss(wanted.at[:, number].add(far), vector, vector)) for far in (1.0, 2.0))
         assert two - one == pytest.approx(more / hidden.size, abs=1e-3)
-    assert guess_loss(jnp.ones((1, 2)), jnp.ones((1, 2))) == 0
-    far, farther = (float(guess_loss(jnp.full((1, 1), x), jnp.zeros((1, 1)))) for x in (1.0, 2.0))
+    assert prediction_loss(jnp.ones((1, 2)), jnp.ones((1, 2))) == 0
+    far, farther = (float(prediction_loss(jnp.full((1, 1), x), jnp.zeros((1, 1)))) for x in (1.0, 2.0))
     assert farther - far == pytest.approx(1.0, abs=1e-3)
 
 
 def test_rows_and_columns_of_objects_are_guessed_where_the_camera_is_known():
     cup = [*(f"cup_pos_{c}" for c in "xyz"), *(f"cup_quat_{c}" for c in "wxyz")]
     names = ["hand_1_pos_x", "hand_1_pos_y", "hand_1_pos_z", *cup, "stains"]
-    assert Hidden(1, 11, names).objects == 0
-    hidden, vector = Hidden(1, 11, names, AHEAD), jnp.array([[0.0, 1, 2, 3, 4, 0.5, -0.25, 1, 0, 0, 0, 7]])
-    assert (hidden.size, hidden.objects) == (13, 1)
-    found = np.asarray(hidden(vector, vector, 15))[0]
+    hidden, vector = ObjectTargets(1, 11, names, AHEAD), jnp.array([[0.0, 1, 2, 3, 4, 0.5, -0.25, 1, 0, 0, 0, 7]])
+    assert (hidden.size, hidden.pose_size, hidden.objects) == (15, 13, 1)
+    found = np.asarray(hidden(vector, vector))[0]
     assert np.allclose(found[:13], [1, 2, 3, 4, 0.5, -0.25, 7, 3**0.5, 0, 0, 0, 3**0.5, 0])
     row, column = found[13:] / FRAME
     # 4 m ahead, half a metre to the left, a quarter below: a quarter and an eighth of half the picture
     assert (column + 1) / 2 * 15 == pytest.approx(8 * (1 - 0.125) - 0.5)
     assert (row + 1) / 2 * 11 + 2 == pytest.approx(8 * (1 + 0.0625) - 0.5)
-    actor = Actor(2, (8,), (12, 16, 4), "glimpses", hidden.size, objects=hidden.objects)
+    actor = Actor(2, (8,), GlimpseEncoder((12, 16, 4), hidden.pose_size, hidden.objects))
     seen = jnp.ones((2, 1)), jnp.ones((2, 768), jnp.uint8)
     shapes = jax.eval_shape(lambda key: actor.init_with_output(key, *seen)[0], jax.random.PRNGKey(0))
     assert shapes[2].shape == (2, 15)
@@ -257,9 +258,11 @@ def test_the_depth_at_the_brightest_point_is_seen():
     assert np.allclose(found, [[1, 1, 1, 1, 1]], atol=1e-4), "row, column, depth, and depth times them"
 
 
-@pytest.mark.parametrize(("net", "moved"), [("places", False), ("glimpses", False), ("points", True)])
-def test_whether_actions_train_the_encoder(net, moved):
-    actor = Actor(2, (8,), (12, 16, 4), net, guess=15, objects=2)
+@pytest.mark.parametrize(
+    ("encoder", "moved"), [(GlimpseEncoder((12, 16, 4), 15, 2), False), (ConvEncoder((12, 16, 4), "points", 15), True)]
+)
+def test_whether_actions_train_the_encoder(encoder, moved):
+    actor = Actor(2, (8,), encoder)
     vector, picture = jnp.ones((4, 2)), jax.random.randint(jax.random.PRNGKey(0), (4, 768), 0, 256).astype(jnp.uint8)
 
     @jax.jit
@@ -281,7 +284,7 @@ def test_whether_actions_train_the_encoder(net, moved):
 
 
 def test_how_an_object_is_turned_is_learnt_from_its_own_glimpse_which_nothing_else_trains():
-    actor = Actor(2, (8,), (12, 16, 4), "glimpses", guess=15, objects=2)
+    actor = Actor(2, (8,), GlimpseEncoder((12, 16, 4), 15, 2))
     vector, picture = jnp.ones((4, 2)), jax.random.randint(jax.random.PRNGKey(0), (4, 768), 0, 256).astype(jnp.uint8)
 
     @jax.jit
@@ -290,8 +293,8 @@ def test_how_an_object_is_turned_is_learnt_from_its_own_glimpse_which_nothing_el
 
         def of(part):
             def loss(params):
-                looked: Any = actor.apply({"params": params}, vector, picture)
-                return jnp.square(looked[2][:, part] - 1.0).sum()
+                output: Any = actor.apply({"params": params}, vector, picture)
+                return jnp.square(output[2][:, part] - 1.0).sum()
 
             slope = jax.grad(loss)(params)["encoder"]
             return {k: sum(jnp.abs(a).sum() for a in jax.tree.leaves(v)) for k, v in slope.items()}
@@ -306,7 +309,7 @@ def test_how_an_object_is_turned_is_learnt_from_its_own_glimpse_which_nothing_el
 
 
 def test_half_precision_on_a_gpu_sees_nearly_the_same(monkeypatch):
-    encoder = Encoder((12, 16, 4), "places")
+    encoder = GlimpseFeatures((12, 16, 4), 1)
     picture = jax.random.randint(jax.random.PRNGKey(0), (3, 12 * 16 * 4), 0, 256).astype(jnp.uint8)
     params = jax.jit(encoder.init)(jax.random.PRNGKey(1), picture)
     full = np.asarray(jax.jit(encoder.apply)(params, picture))
@@ -317,21 +320,22 @@ def test_half_precision_on_a_gpu_sees_nearly_the_same(monkeypatch):
 
 
 def test_glimpses_look_beside_their_points_while_they_learn():
-    encoder = Encoder((48, 64, 4), "glimpses", 2)
+    encoder = GlimpseFeatures((48, 64, 4), 2)
     picture = jax.random.randint(jax.random.PRNGKey(0), (2, 48 * 64 * 4), 0, 256).astype(jnp.uint8)
     params = jax.jit(encoder.init)(jax.random.PRNGKey(1), picture)
-    looks = jax.jit(lambda *key: encoder.apply(params, picture, rngs=dict(zip([SHAKEN], key, strict=False))))
+    looks = jax.jit(lambda *key: encoder.apply(params, picture, rngs=dict(zip([AUGMENTATION], key, strict=False))))
     still, one, two = np.asarray(looks()), *(np.asarray(looks(jax.random.PRNGKey(k))) for k in (2, 3))
     seen = slice(4, 4 + 2 * GLIMPSE)
     assert (one[:, seen] != still[:, seen]).any() and (one[:, seen] != two[:, seen]).any()
     assert np.array_equal(np.delete(one, seen, 1), np.delete(still, seen, 1)), "nothing else moves"
     env = SeenPointMass(2)
     spaces = {**env.observation_spaces, "privileged_state": Space((7,), np.float32, -np.inf, np.inf)}
-    perception = Perception(spaces, "rgbd", 16, None, GOAL, AHEAD)
-    algorithm = Imitation(perception, 2, DaggerConfig(actor=(8,), net="glimpses", shift=0))
+    perception = with_object_targets(Perception(spaces, "rgbd", 16, None, GOAL), GOAL, AHEAD)
+    config = DaggerConfig(actor_layers=(8,), encoder="glimpses", image_shift=0)
+    algorithm = Imitation(perception, 2, config, encoder=encoder_of(perception))
     actor, _ = jax.jit(algorithm.init)(jax.random.PRNGKey(0))
     own, none = perception({**env.reset(0).obs, "privileged_state": jnp.ones((2, 7))}), jnp.zeros((2, 2))
-    moments = Moments.initial(perception.vector_size)
+    moments = RunningStats.initial(perception.vector_size)
     loss = jax.jit(lambda key: algorithm.loss(actor, moments, own, none, key)[0])
     assert loss(jax.random.PRNGKey(0)) != loss(jax.random.PRNGKey(1)), "it learns so"
 
@@ -340,7 +344,7 @@ def test_glimpses_look_beside_their_points_while_they_learn():
 def test_policies_of_glimpses_are_small_enough_to_ship(vector, sizes, recalled):
     """Of the humanoid's and Fetch's SlicingFruit, without and with memory. A file has 1.85 bytes for each number."""
     actor, picture = (
-        Actor(6, (sizes, sizes), (48, 128, 4), "glimpses", 47, 21, 2),
+        Actor(6, (sizes, sizes), GlimpseEncoder((48, 128, 4), 47, 2), 21),
         jnp.zeros((1, 48 * 128 * 4), jnp.uint8),
     )
     own, kept = jnp.zeros((1, vector)), jnp.zeros((1, recalled)) if recalled else None
@@ -351,8 +355,8 @@ def test_policies_of_glimpses_are_small_enough_to_ship(vector, sizes, recalled):
 @pytest.mark.parametrize(("pixels", "rows"), [(128, (60, 108)), (32, (20, 28)), (64, (0, 64))])
 def test_a_training_draws_the_rows_that_its_networks_see(pixels, rows):
     whole = np.random.default_rng(0).integers(1, 256, (2, 128, 128, 3), np.uint8)
-    drawn = drawn_rows(rows, pixels)
-    assert drawn is not None and drawn_rows(None, pixels) is None
+    drawn = rendered_rows(rows, pixels)
+    assert drawn is not None and rendered_rows(None, pixels) is None
     part = np.zeros_like(whole)
     part[:, slice(*drawn)] = whole[:, slice(*drawn)]
     seen = [np.asarray(shrunk(picture, "rgb", pixels, *rows)) for picture in (whole, part)]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -24,15 +26,16 @@ from ig2mj.learn.bc import BCConfig
 from ig2mj.learn.best import BEST, COUNTED, LAST, SUCCESS, Best
 from ig2mj.learn.checkpoints import Checkpoints, only_run
 from ig2mj.learn.dagger import DaggerConfig
-from ig2mj.learn.networks import Actor
-from ig2mj.learn.options import configured, written
+from ig2mj.learn.networks import ConvEncoder
+from ig2mj.learn.occlusion import OcclusionConfig
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy, depends_on
 from ig2mj.learn.ppo import PPO, PPOConfig
 from ig2mj.learn.sac import SAC, SACConfig
+from ig2mj.learn.settings import configure_all, configured, written
 from ig2mj.learn.train import Run, train
 
-CONFIG = PPOConfig(length=4, parts=1, epochs=1, actor=(16,), critic=(16,))
+CONFIG = PPOConfig(rollout_length=4, minibatches=1, epochs=1, actor_layers=(16,), critic_layers=(16,))
 
 KILLED = """
 import sys
@@ -42,7 +45,7 @@ from ig2mj.learn.perception import Perception
 from ig2mj.learn.ppo import PPO, PPOConfig
 from ig2mj.learn.train import Run, train
 env = PointMass(8)
-config = PPOConfig(length=4, parts=1, epochs=1, actor=(16,), critic=(16,))
+config = PPOConfig(rollout_length=4, minibatches=1, epochs=1, actor_layers=(16,), critic_layers=(16,))
 train(env, PPO(Perception(env.observation_spaces), 2, config), Run(5.0, out={out!r}, checkpoint_every=0.2, quiet=True))
 """
 
@@ -159,7 +162,9 @@ def test_a_killed_run_goes_on(tmp_path):
 def test_a_buffer_that_was_kept_needs_no_filling(tmp_path):
     """With it updates go on at once; without it the policy plays 100 steps of every world before."""
     env = PointMass(8)
-    config = SACConfig(updates=2, batch=32, capacity=2000, actor=(16,), critic=(16,), atoms=11)
+    config = SACConfig(
+        utd_ratio=2, batch_size=32, buffer_size=2000, actor_layers=(16,), critic_layers=(16,), num_atoms=11
+    )
     sac = SAC(Perception(env.observation_spaces), 2, config)
 
     def updates(kept: bool, iterations: int, resume: bool) -> int:
@@ -226,26 +231,26 @@ def test_a_policy_for_something_else_is_refused_with_the_pair_that_differs(done,
 
 
 def test_an_unknown_encoder_is_not_taken_for_the_small_one():
-    with pytest.raises(UnknownNameError, match="paper"):
-        Actor(6, net="papr")
+    with pytest.raises(UnknownNameError, match="points"):
+        ConvEncoder((32, 32, 4), "point")
 
 
 def test_settings_are_known_by_name_and_type():
-    assert configured(SACConfig(), ["updates=4", "actor=64,32", "lr=0.1"]).actor == (64, 32)
+    assert configured(SACConfig(), ["utd_ratio=4", "actor_layers=64,32", "lr=0.1"]).actor_layers == (64, 32)
     with pytest.raises(UnknownNameError, match="gamma"):
         configured(SACConfig(), ["gama=0.9"])
-    with pytest.raises(Ig2mjError, match="updates=32"):
-        configured(SACConfig(), ["updates=many"])
+    with pytest.raises(Ig2mjError, match="utd_ratio=32"):
+        configured(SACConfig(), ["utd_ratio=many"])
 
 
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        ("updates=0", "at least 1"),
-        ("alpha=-1", "at least 0"),
+        ("utd_ratio=0", "at least 1"),
+        ("init_alpha=-1", "at least 0"),
         ("gamma=1.5", "from 0 to 1"),
         ("lr=inf", "finite"),
-        ("actor=64,0", "at least 1"),
+        ("actor_layers=64,0", "at least 1"),
     ],
 )
 def test_settings_that_cannot_be_are_refused(change, told):
@@ -254,6 +259,29 @@ def test_settings_that_cannot_be_are_refused(change, told):
 
 
 def test_every_setting_of_an_algorithm_may_be_what_it_is():
-    for config in (SACConfig(), PPOConfig(), DaggerConfig(), BCConfig()):
+    for config in (SACConfig(), PPOConfig(), DaggerConfig(), BCConfig(), OcclusionConfig()):
         changes = [f"{name}={written(value)}" for name, value in dataclasses.asdict(config).items()]
         assert configured(config, changes) == config
+
+
+def test_names_of_version_0_1_work_and_say_what_they_are_called_now(capsys):
+    configs = DaggerConfig(), OcclusionConfig()
+    changes = ["updates=4", "net=points", "recall=2", "believed=1", "noise=0.2"]
+    dagger, occlusion = configure_all(configs, changes)
+    assert (dagger.utd_ratio, dagger.encoder, dagger.action_noise) == (4, "points", 0.2)
+    assert occlusion == OcclusionConfig(object_memory="full", belief_labels=True)
+    told = capsys.readouterr().err.splitlines()
+    assert len(told) == 5 and "'updates' is now 'utd_ratio'" in told[0]
+    with pytest.warns(DeprecationWarning, match="SACConfig: 'every' is now 'policy_delay'"):
+        assert SACConfig(every=2) == SACConfig(policy_delay=2)
+
+
+def test_a_checkpoint_of_version_0_1_is_refused_with_the_version_that_reads_it(done, tmp_path):
+    env, out, _ = done
+    shutil.copytree(out, tmp_path / "old")
+    for file in (tmp_path / "old" / "checkpoints").glob("*/meta.json"):
+        meta = json.loads(file.read_text())
+        del meta["format"]
+        file.write_text(json.dumps(meta))
+    with pytest.raises(InputError, match=r"ig2mj 0\.1\.0"):
+        train(env, algorithm(env), Run(iterations=30, out=tmp_path / "old", resume=True, quiet=True))

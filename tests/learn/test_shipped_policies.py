@@ -18,9 +18,9 @@ from ig2mj.errors import InputError, PolicyMismatch, UnknownNameError
 from ig2mj.learn import shipped
 from ig2mj.learn.bc import BC, BCConfig
 from ig2mj.learn.evaluate import draws
-from ig2mj.learn.moments import Moments
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy, depends_of, world_of
+from ig2mj.learn.running_stats import RunningStats
 
 EVALUATION = {
     "split": "held_out",
@@ -38,9 +38,9 @@ def made(sizes=(16, 16), **world) -> Policy:
     """An untrained policy, said to be for CookingMeat."""
     env = PointMass(2)
     perception = Perception(env.observation_spaces)
-    algorithm = BC(perception, 2, BCConfig(actor=sizes))
-    actor, _ = algorithm._imitation.init(jax.random.PRNGKey(0))
-    learner = type("Learner", (), {"actor": actor, "moments": Moments.initial(4)})
+    algorithm = BC(perception, 2, BCConfig(actor_layers=sizes))
+    actor, _ = algorithm.imitation.init(jax.random.PRNGKey(0))
+    learner = type("Learner", (), {"actor": actor, "moments": RunningStats.initial(4)})
     said = {"task": "CookingMeat", "robot": "humanoid", "grasping": "mitten", "actions": ["x", "y"], **world}
     depends = depends_of({**world_of(env), **said}, perception)
     command = "ig2mj train CookingMeat --algo bc --out /somewhere/runs/meat --demos /somewhere/meat.h5"

@@ -52,8 +52,8 @@ def actions(file: Path, *, sampled: bool) -> np.ndarray:
     """Of every step, [STEPS, WORLDS, n]."""
     policy = Policy.load(file)
     spaces, rows = observations(policy)
-    play: Any = jax.jit(policy.player(perception_of(policy, spaces), drawn=sampled))
-    kept = np.zeros((WORLDS, 0 if policy.recall is None else policy.recall.size), np.float32)
+    play: Any = jax.jit(policy.player(perception_of(policy, spaces), sampled=sampled))
+    kept = np.zeros((WORLDS, 0 if policy.memory is None else policy.memory.size), np.float32)
     found = []
     for step, obs in enumerate(rows):
         action, kept = play(obs, kept, BEGINS[step], jax.random.PRNGKey(step) if sampled else None)

@@ -9,7 +9,7 @@ import pytest
 from ig2mj.engine.registry import make_engine
 from ig2mj.scene.scene import load_scene
 from ig2mj.tasks.activities import ACTIVITIES
-from ig2mj.tasks.reward import Measures, Reward
+from ig2mj.tasks.reward import Lift, Measures, Reward
 from ig2mj.tasks.task import place_robot
 from ig2mj.worlds.rules import Rules
 
@@ -62,3 +62,16 @@ def test_a_distance_that_is_not_defined_any_more_keeps_its_last_value(cleaning):
     assert float(now.distances[0, 1]) == 0.25
     assert 0.0 < float(now.distances[0, 0]) != 5.0
     assert np.asarray(now.stains).tolist() == [0.0]
+
+
+def test_a_lift_is_by_all_hands_that_hold_the_object_when_it_last_leaves_the_floor():
+    lift = Lift(np.array([False, False, True]), np.zeros(3, bool))
+    steps = (
+        ([True, True, True], [True, False, True], [True, False, False], "the third was off the floor before"),
+        ([True, True, True], [False, True, True], [True, False, False], "hands that come later do not count"),
+        ([False, False, False], [True, True, True], [True, False, False], "on the floor again"),
+        ([True, True, True], [False, True, True], [False, True, True], "the last time counts"),
+    )
+    for off_floor, held_by_all, expected, why in steps:
+        lift = lift.after(np.array(off_floor), np.array(held_by_all))
+        assert lift.by_all.tolist() == expected, why

@@ -12,6 +12,7 @@ Axes: W worlds, n numbers of an action, m numbers of proprioception, U actuators
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any, Protocol, runtime_checkable
 
 import mujoco
@@ -26,6 +27,21 @@ from ig2mj.scene.tables import SceneTables
 
 ACTION_PERIOD = 0.1
 """Seconds between two actions: three control steps (appendix of the paper)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class HandReading:
+    """Where in `proprioception` a hand is described. A controller may list one for each hand, `hand_readings`.
+
+    Attributes:
+      holds: the number that says whether the hand holds something, above one half or not.
+      pose: the first of six numbers: x, y, z (m) and roll, pitch, yaw (rad) of the hand in the frame of the robot's
+        base; None: there are none.
+    """
+
+    holds: int
+    pose: int | None = None
+
 
 ControllerState = Any
 """What a controller remembers from step to step: a pytree of arrays that begin with the world axis."""

@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 import pathlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ig2mj.learn.bc import BCConfig
+    from ig2mj.learn.run_config import RunOptions, RunSettings
 
 
 def train_from_demos(
-    env: str,
-    demos: pathlib.Path | None,
-    robot: str | None,
-    grasping: str | None,
-    obs: str,
-    pixels: int,
-    rows: tuple[int, int] | None,
-    minutes: float,
-    seed: int,
-    out: pathlib.Path | None,
-    resume: bool,
-    changes: tuple[str, ...],
+    chosen: RunOptions, out: pathlib.Path | None, resume: bool, settings: RunSettings, config: BCConfig
 ) -> int:
-    """Clones demonstrations, and writes the policy. See `ig2mj.cli.train` for the arguments."""
+    """Clones demonstrations, and writes the policy.
+
+    Args:
+      out, resume: see `ig2mj.cli.train`.
+    """
     import dataclasses
     import shlex
     import sys
@@ -28,38 +26,43 @@ def train_from_demos(
 
     from ig2mj.envs.names import short_name
     from ig2mj.errors import Ig2mjError, InputError
-    from ig2mj.learn.bc import BC, BCConfig, clone
+    from ig2mj.learn.bc import BC, clone
     from ig2mj.learn.demos import about, load_demos
-    from ig2mj.learn.options import configured
-    from ig2mj.learn.perception import Perception
+    from ig2mj.learn.perception import DEPTH_RANGE, Perception
     from ig2mj.learn.policies import Policy, depends_of
     from ig2mj.learn.train import Run
 
+    demos, obs, seed = chosen.demos, chosen.obs, chosen.seed
     if demos is None:
         raise Ig2mjError("--algo bc needs --demos (`ig2mj demos collect` writes such files)")
     world, spaces = about(demos)
-    for name, wanted in (("task", short_name(env) or env), ("robot", robot), ("grasping", grasping)):
+    for name, wanted in (
+        ("task", short_name(chosen.env) or chosen.env),
+        ("robot", chosen.robot),
+        ("grasping", chosen.grasping),
+    ):
         if wanted is not None and world[name] != wanted:
             raise InputError(demos, f"is of {name} {world[name]}, not {wanted}")
     if obs == "rgbd" and not {"rgb", "depth"} & set(spaces):
-        raise InputError(demos, "holds no pictures", fix="`ig2mj demos collect --obs rgbd` records them")
-    perception = Perception(spaces, obs, pixels, rows, world.get("privileged", ()))
+        raise InputError(demos, "holds no images", fix="`ig2mj demos collect --obs rgbd` records them")
+    images = settings.image_size, settings.rows, world.get("privileged", ()), settings.depth_range or DEPTH_RANGE
+    perception = Perception(spaces, obs, *images)
     runs = load_demos(demos, perception)
-    config = configured(BCConfig(), changes)
     algorithm = BC(perception, runs.action.shape[1], config)
     names = [world["task"], world["robot"], world["grasping"], "bc", obs, str(seed)]
     folder = out or pathlib.Path("runs") / "-".join(names)
     depends = depends_of(world, perception)
-    learner, row = clone(algorithm, runs, Run(minutes, seed=seed, out=folder, resume=resume), depends)
+    learner, row = clone(algorithm, runs, Run(chosen.minutes, seed=seed, out=folder, resume=resume), depends)
     made = {
         "command": shlex.join(["ig2mj", *sys.argv[1:]]),
         "algorithm": "bc",
         "settings": dataclasses.asdict(config),
+        "run_settings": dataclasses.asdict(settings),
         "seed": seed,
         "device": jax.devices()[0].device_kind,
         "minutes": round(row["seconds"] / 60, 2),
         "demonstration_steps": int(runs.reward.shape[0]),
-        "loss_apart": row["loss_apart"],
+        "held_out_loss": row["held_out_loss"],
     }
     file = folder / "policy.npz"
     Policy.of(algorithm, learner, depends, made).save(file)

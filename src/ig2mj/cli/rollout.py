@@ -126,7 +126,7 @@ def run(
             film.close()
     if record is not None and format == "igibson":
         _write_igibson(record)
-    successes, in_hand = sum(outcome.success), sum(outcome.success_in_hand)
+    successes = sum(outcome.success)
     result = {
         "env": played.task.name,
         "robot": played.robot,
@@ -138,8 +138,7 @@ def run(
         "worlds": worlds,
         "episodes": episodes,
         "success_rate": successes / episodes,
-        "success_in_hand_rate": in_hand / episodes,
-        **({} if outcome.lifted_by_all is None else {"lifted_by_all_rate": sum(outcome.lifted_by_all) / episodes}),
+        **{f"{name}_rate": sum(found) / episodes for name, found in outcome.outcomes.items()},
         "mean_return": float(np.mean(outcome.total)),
         "steps_per_second": round(outcome.steps_per_second, 1),
         "overflow": outcome.metrics["overflow"],

@@ -1,4 +1,4 @@
-"""`Actor`: who acts by a pure function, such as a policy; and `Tally`, how episodes that run side by side end.
+"""`Actor`: an agent that is a pure function, such as a policy; and `Tally`, how episodes that run side by side end.
 
 On a pure engine an actor becomes part of the program that steps the worlds: many steps are one call, after which little
 is fetched. A step that is called from Python lets a GPU wait for Python.
@@ -8,7 +8,7 @@ Axes: W worlds, n numbers of an action, m numbers that are remembered.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import jax
@@ -40,67 +40,43 @@ class Tally:
     """How the first episodes of all worlds go on and end. All of it may be NumPy's, or traced.
 
     Attributes:
-      going: not over yet. won, in_hand: success, and success in the hand. total: the return. steps: that were taken.
-      off, by_all: the object is off the floor, and both hands held it when it last left it; None where one hand acts.
+      going: not over yet. success: how they ended. outcomes: the same of what the task measures, by name
+        (`ig2mj.tasks.objective.Objective.outcomes`). total: the return. steps: that were taken.
     """
 
     going: Bool[Array, "W"]
-    won: Bool[Array, "W"]
-    in_hand: Bool[Array, "W"]
+    success: Bool[Array, "W"]
+    outcomes: dict[str, Bool[Array, "W"]]
     total: Float[Array, "W"]
     steps: Int[Array, ""] | np.int32
-    off: Bool[Array, "W"] | None
-    by_all: Bool[Array, "W"] | None
-
-    @property
-    def told(self) -> bool:
-        """The environment tells who lifts the object."""
-        return self.by_all is not None
 
     @classmethod
-    def begun(cls, state: EnvState) -> Tally:
-        """At the start of episodes."""
+    def begun(cls, state: EnvState, outcomes: Sequence[str] = ()) -> Tally:
+        """At the start of episodes. `outcomes`: names of what the task measures."""
         none = np.zeros(np.shape(state.reward), bool)
-        off = np.array(state.info["off_floor"]) if "off_floor" in state.info else None
-        return cls(~none, none, none, none.astype(np.float32), np.int32(0), off, None if off is None else none)
+        return cls(~none, none, {name: none for name in outcomes}, none.astype(np.float32), np.int32(0))
 
     def after(self, ending: Ending) -> Tally:
         """After a step of all worlds, of which those that were over count no more."""
         reward, terminated, truncated, info = ending
         ends, going = self.going & (terminated | truncated), self.going & ~(terminated | truncated)
-        off, by_all = self.off, self.by_all
-        if off is not None and by_all is not None:
-            off, by_all = info["off_floor"], lifted_by_all(by_all, off, info, self.going)
         return Tally(
             going,
-            self.won | (ends & info["success"]),
-            self.in_hand | (ends & info.get("success_in_hand", info["success"])),
+            self.success | (ends & info["success"]),
+            {name: before | (ends & info[name]) for name, before in self.outcomes.items()},
             self.total + reward * self.going,
             self.steps + np.int32(1),
-            off,
-            by_all,
         )
 
 
-def ending(state: EnvState) -> Ending:
-    """What a tally needs of a state."""
-    names = ("success", "success_in_hand", "off_floor", "held_by_all")
-    return state.reward, state.terminated, state.truncated, {n: state.info[n] for n in names if n in state.info}
-
-
-def lifted_by_all(by_all: Array, off: Array, info: Mapping[str, Array], going: Array) -> Array:
-    """Whether all hands held the object when it last left the floor, [W]: anew where it does so now.
-
-    Args:
-      by_all: what was found before. off: it was off the floor before. going: worlds that count; others keep it.
-    """
-    leaves = info["off_floor"] & ~off & going
-    return (leaves & info["held_by_all"]) | (~leaves & by_all)
+def ending(state: EnvState, outcomes: Sequence[str] = ()) -> Ending:
+    """What a tally needs of a state. `outcomes`: names of what the task measures."""
+    return state.reward, state.terminated, state.truncated, {n: state.info[n] for n in ("success", *outcomes)}
 
 
 @entry_point
 class Actor:
-    """Who acts in an environment by a pure function of observations and a key: an `ig2mj.envs.rollout.Act`."""
+    """An agent that is a pure function of observations and a key: an `ig2mj.envs.rollout.Act`."""
 
     def __init__(self, env: Environment, choose: Choose, remembers: int = 0, seed: int = 0, parameters: Any = None):
         """Nothing is compiled before it acts.
@@ -116,7 +92,7 @@ class Actor:
         self._random, self._kept = np.random.default_rng(seed), np.zeros((env.num_worlds, remembers), np.float32)
 
     def seeded(self, seed: int) -> Actor:
-        """The same actor, whose keys begin anew."""
+        """The same actor, whose keys start again."""
         self._random = np.random.default_rng(seed)
         return self
 
@@ -156,7 +132,7 @@ class Actor:
             state, tally, kept, k = carry
             action, kept = self._choose(state.obs, kept, begins(state), keys[k], *more)
             state = self._env.step_fn(state, resting(action, tally.going))
-            return state, tally.after(ending(state)), kept, k + 1
+            return state, tally.after(ending(state, tuple(tally.outcomes))), kept, k + 1
 
         return jax.lax.while_loop(go_on, step, (state, tally, kept, jnp.int32(0)))[:3]
 

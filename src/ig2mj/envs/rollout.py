@@ -9,14 +9,14 @@ import collections
 import dataclasses
 import math
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import jax
 import numpy as np
 
 from ig2mj.callbacks import ProgressCallback, no_progress
 from ig2mj.engine.view import Array
-from ig2mj.envs.actor import STEPS, Actor, Tally, ending, lifted_by_all, resting
+from ig2mj.envs.actor import STEPS, Actor, Tally, ending, resting
 from ig2mj.envs.environment import Environment, EnvState
 from ig2mj.process import entry_point
 
@@ -32,16 +32,15 @@ class Played:
     """Of every episode, in the order in which they ended (or of the pool's rows, where those were played in order).
 
     Attributes:
-      success, success_in_hand: how it ended. total: its return.
-      lifted_by_all: success, and both hands held the object when it last left the floor; None where one hand acts.
+      success: how it ended. outcomes: the same of what the task measures, by name
+        (`ig2mj.tasks.objective.Objective.outcomes`). total: its return.
       steps: agent steps that were taken in all worlds together.
       steps_per_second: of them on the wall, without the first step, which compiles.
       metrics: `Environment.metrics` of all episodes together. state: of all worlds at the end.
     """
 
     success: list[bool]
-    success_in_hand: list[bool]
-    lifted_by_all: list[bool] | None
+    outcomes: dict[str, list[bool]]
     total: list[float]
     steps: int
     steps_per_second: float
@@ -80,8 +79,8 @@ def _drawn(
     state = env.reset(seed)
     pace = Pace(watch)
     pace.look(state)
-    success, in_hand, lifted, total = [], [], [], []
-    lifts = Lifts(state.info, env.num_worlds)
+    names = env.objective.outcomes
+    success, total, outcomes = [], [], {name: [] for name in names}
     running, steps = np.zeros(env.num_worlds), 0
     most = env.task.horizon * max(1, math.ceil(episodes / env.num_worlds))
     while len(total) < episodes:
@@ -90,19 +89,18 @@ def _drawn(
         steps += env.num_worlds
         pace.stepped(env.num_worlds)
         pace.look(state)
-        done, won = np.asarray(state.done), np.asarray(state.info["success"])
-        lifts.see(state.info, done, np.ones_like(done))
+        done = np.asarray(state.done)
+        ends = {name: np.asarray(state.info[name]) for name in ("success", *names)}
         for world in np.flatnonzero(done)[: episodes - len(total)]:
             total.append(float(running[world]))
-            success.append(bool(won[world]))
-            in_hand.append(bool(np.asarray(state.info.get("success_in_hand", won))[world]))
-            lifted.append(bool(won[world] & lifts.by_all[world]))
+            success.append(bool(ends["success"][world]))
+            for name in names:
+                outcomes[name].append(bool(ends[name][world]))
         running[done] = 0.0
         step = int(np.asarray(state.info["steps"]).max())
         words = f"{len(total)} of {episodes} episodes, step {step} of at most {env.task.horizon}"
         report(max(len(total) / episodes, min(steps / env.num_worlds / most, 1.0)), 1, words)
-    both = lifted if lifts.told else None
-    return Played(success, in_hand, both, total, steps, pace.steps_per_second(), env.metrics(state), state)
+    return Played(success, outcomes, total, steps, pace.steps_per_second(), env.metrics(state), state)
 
 
 def _in_order(
@@ -113,14 +111,14 @@ def _in_order(
     for first in range(0, episodes, worlds):
         state = env.start_from((start + first + np.arange(worlds)) % size, seed)
         pace.look(state)
-        tally = Tally.begun(state)
+        tally = Tally.begun(state, env.objective.outcomes)
         while tally.going.any():
             before = int(tally.steps)
             if isinstance(act, Actor) and env.pure and watch is None:
                 state, tally = act.several(state, tally, STEPS if pace.begun else 1)
             else:
                 state = env.step(state, resting(act(state), tally.going))
-                tally = tally.after(jax.device_get(ending(state)))
+                tally = tally.after(jax.device_get(ending(state, env.objective.outcomes)))
             pace.stepped(worlds * (int(tally.steps) - before))
             pace.look(state)
             over = min(first + worlds - int(np.asarray(tally.going).sum()), episodes)
@@ -131,16 +129,15 @@ def _in_order(
         tallies.append(jax.device_get(tally))
         metrics.update(env.metrics(state))
 
-    def told(name: str) -> list:
-        return np.concatenate([getattr(tally, name) for tally in tallies])[:episodes].tolist()
+    def joined(of: Callable[[Tally], Array]) -> list:
+        return np.concatenate([of(tally) for tally in tallies])[:episodes].tolist()
 
     assert state is not None
-    both = (
-        [won and by_all for won, by_all in zip(told("won"), told("by_all"), strict=True)] if tallies[0].told else None
-    )
+    outcomes = {name: joined(lambda t, name=name: t.outcomes[name]) for name in env.objective.outcomes}
     steps = worlds * sum(int(tally.steps) for tally in tallies)
     pace_now = pace.steps_per_second()
-    return Played(told("won"), told("in_hand"), both, told("total"), steps, pace_now, dict(metrics), state)
+    success, total = joined(lambda t: t.success), joined(lambda t: t.total)
+    return Played(success, outcomes, total, steps, pace_now, dict(metrics), state)
 
 
 class Pace:
@@ -175,30 +172,3 @@ class Pace:
     def steps_per_second(self) -> float:
         """0 where there was one step at most."""
         return self._steps / (time.monotonic() - self._began - self._watched) if self._steps else 0.0
-
-
-class Lifts:
-    """Whether all acting hands held a task's first object when it left the floor, for two hands.
-
-    Attributes:
-      told: the environment tells of it. by_all: [W], at the last time it left the floor; False before that.
-    """
-
-    def __init__(self, info: Mapping[str, Array], num_worlds: int):
-        """`info`: at the start of episodes."""
-        self.told = "off_floor" in info
-        self.by_all = np.zeros(num_worlds, bool)
-        self._off = np.array(info["off_floor"]) if self.told else self.by_all
-
-    def see(self, info: Mapping[str, Array], done: np.ndarray, going: np.ndarray) -> None:
-        """After a step.
-
-        Args:
-          done: [W], episodes that ended with it. going: [W], whose episodes had not ended before; others keep what was
-            found.
-        """
-        if not self.told:
-            return
-        now = {name: np.array(info[name]) for name in ("off_floor", "held_by_all")}
-        self.by_all = lifted_by_all(self.by_all, self._off, now, going)
-        self._off = now["off_floor"] & ~done  # a new episode begins on the floor

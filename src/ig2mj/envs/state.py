@@ -27,8 +27,8 @@ class EnvState:
       info: "success"; "steps" of the episode; "reward/..." of each term; "bad_actions" (numbers of the last action that
         were not finite); "flags" (`guards.Flag`); and the task's own. Of activities: "goal_progress" (share of the
         goal's literals), "held" (the first object is in an acting hand), "success_in_hand" (success while the first
-        object is in all acting hands); where two hands act also "held_by_all" (all of them hold it) and "off_floor" (it
-        touches no floor).
+        object is in all acting hands); where two hands act also "held_by_all" (all of them hold it), "off_floor"
+        (it touches no floor) and "lifted_by_all" (success, and all of them held it when it last left the floor).
       measures: what the reward is made of, for the next step's difference. status: of the task's goal.
       bad_actions: numbers that were not finite and were taken for 0, since the first reset.
       memory: what sensors know of the last reading; None where none of them asks.

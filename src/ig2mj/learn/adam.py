@@ -10,7 +10,7 @@ from typing import Any
 
 import optax
 
-from ig2mj.learn.moments import average
+from ig2mj.learn.running_stats import average
 
 
 def averaged_adam(largest: float, axis: str | None = None, eps: float = 1e-8) -> optax.GradientTransformation:

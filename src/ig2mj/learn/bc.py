@@ -1,7 +1,7 @@
 """Behaviour cloning: an actor learns what an expert did, from a file of demonstrations alone.
 
-One in ten runs' steps is kept apart: the loss on those says whether more training helps. No environment is stepped;
-`ig2mj evaluate` tells how good the policy is.
+One in ten steps is held out: the loss on those says whether more training helps. No environment is stepped; `ig2mj
+evaluate` measures the policy.
 
 Axes: N steps of all demonstrations, B samples, n numbers of an action.
 """
@@ -24,43 +24,46 @@ from ig2mj.engine.view import Array
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.checkpoints import TAKEN, Checkpoints, only_run
 from ig2mj.learn.demos import Demos
-from ig2mj.learn.labels import Imitation
+from ig2mj.learn.imitation import Imitation
 from ig2mj.learn.log import Log
-from ig2mj.learn.moments import Moments
 from ig2mj.learn.perception import Perception, Seen
+from ig2mj.learn.running_stats import RunningStats
+from ig2mj.learn.settings import old_names_work
 from ig2mj.learn.train import Run
 from ig2mj.process import entry_point
 
-APART = 10
-"""One in so many steps, in stretches of `STRETCH`, is kept apart."""
+HELD_OUT = 10
+"""One in so many steps, in stretches of `STRETCH`, is held out."""
 
 STRETCH = 50
 CALL = 100
 """Updates of one call."""
 
 
+@old_names_work
 @dataclasses.dataclass(frozen=True)
 class BCConfig:
-    """Settings; `ig2mj train --set name=value` changes them.
+    """Settings.
 
     Attributes:
-      steps: updates. batch: samples of an update. noise: deviation of what is added to normalized numbers that are
-        seen, against copying what was done before.
-      guess: weight of the actor's guess of the privileged state, from pixels. shift: pixels they are moved by at most.
-      lr: learning rate, falling to `last_lr` along a cosine. actor: sizes of the layers. net: encoder.
-      choices: values of each number of an action that the actor chooses from; 0: it is the mean of a Gaussian.
+      num_updates: of the run. batch_size: samples of an update. input_noise: deviation of what is added to normalized
+        observations, against copying what was done before.
+      aux_coef: weight of the privileged prediction's loss. image_shift: pixels that images are moved by at most.
+      lr: learning rate, falling to `final_lr` along a cosine.
+      action_bins: discretized values of each number of the action; 0: the action is the mean of a Gaussian.
+      actor_layers: sizes. encoder: of images (`ig2mj.learn.networks.ENCODERS`).
     """
 
-    steps: int = 20_000
-    batch: int = 1024
-    noise: float = 0.0
-    guess: float = 1.0
-    shift: int = 2
+    num_updates: int = 20_000
+    batch_size: int = 1024
+    input_noise: float = 0.0
+    aux_coef: float = 1.0
+    image_shift: int = 2
     lr: float = 1e-3
-    last_lr: float = 1e-5
-    choices: int = 0
-    actor: tuple[int, ...] = (256, 256, 256)
-    net: str = "small"
+    final_lr: float = 1e-5
+    action_bins: int = 0
+    actor_layers: tuple[int, ...] = (256, 256, 256)
+    encoder: str = "small"
 
 
 @struct.dataclass
@@ -69,7 +72,7 @@ class BCLearner:
 
     actor: Any
     opt: Any
-    moments: Moments
+    moments: RunningStats
     updates: Int[Array, ""]
 
 
@@ -83,15 +86,15 @@ class BC:
         """Compiles nothing yet."""
         self.perception, self.action_size = perception, action_size
         self.config = c = config or BCConfig()
-        self._imitation = Imitation(perception, action_size, c)
-        self.actor = self._imitation.actor
+        self.imitation = Imitation(perception, action_size, c)
+        self.actor = self.imitation.actor
         self.learn = jax.jit(self.learn_fn, donate_argnums=0)
         self.judge = jax.jit(self.judge_fn)
 
     def init(self, key: Array, demos: Demos) -> BCLearner:
         """Untrained, with the means of the demonstrations."""
-        actor, opt = self._imitation.init(key)
-        moments = Moments.initial(self.perception.vector_size).update(demos.seen.vector)
+        actor, opt = self.imitation.init(key)
+        moments = RunningStats.initial(self.perception.vector_size).update(demos.seen.vector)
         return BCLearner(actor, opt, moments, jnp.int32(0))
 
     def learn_fn(
@@ -102,13 +105,13 @@ class BC:
 
         def update(learner: BCLearner, key: Array) -> tuple[BCLearner, dict[str, Array]]:
             row_key, noise_key, shift_key = jax.random.split(key, 3)
-            row = rows[jax.random.randint(row_key, (c.batch,), 0, rows.shape[0])]
+            row = rows[jax.random.randint(row_key, (c.batch_size,), 0, rows.shape[0])]
             vector = demos.seen.vector[row]
             _, deviation = learner.moments.scales(len(learner.moments.var))
-            vector += c.noise * deviation * jax.random.normal(noise_key, vector.shape)
-            seen = Seen(vector, demos.seen.picture[row])
-            rate = jnp.asarray(optax.cosine_decay_schedule(c.lr, c.steps, c.last_lr / c.lr)(learner.updates))
-            return self._imitation.update(learner, seen, demos.label[row], shift_key, rate)
+            vector += c.input_noise * deviation * jax.random.normal(noise_key, vector.shape)
+            seen = Seen(vector, demos.seen.image[row])
+            rate = jnp.asarray(optax.cosine_decay_schedule(c.lr, c.num_updates, c.final_lr / c.lr)(learner.updates))
+            return self.imitation.update(learner, seen, demos.label[row], shift_key, rate)
 
         learner, found = jax.lax.scan(update, learner, jax.random.split(key, CALL))
         return learner, jax.tree.map(jnp.mean, found)
@@ -116,8 +119,8 @@ class BC:
     def judge_fn(self, learner: BCLearner, demos: Demos, rows: Int[Array, "k"], key: Array) -> Array:
         """The loss on these rows, 4,096 of them at most."""
         row = rows[: 4 * 1024]
-        seen = Seen(demos.seen.vector[row], demos.seen.picture[row])
-        _, found = self._imitation.loss(learner.actor, learner.moments, seen, demos.label[row], key)
+        seen = Seen(demos.seen.vector[row], demos.seen.image[row])
+        _, found = self.imitation.loss(learner.actor, learner.moments, seen, demos.label[row], key)
         return found["actor_loss"]
 
 
@@ -149,8 +152,8 @@ def _clone(algorithm: BC, demos: Demos, run: Run, depends: Mapping[str, Any]) ->
     elif checkpoints is not None and checkpoints.numbers():
         raise Ig2mjError(f"{run.out} {TAKEN}")
     rows = np.arange(demos.reward.shape[0])
-    apart = (rows // STRETCH) % APART == APART - 1 if len(rows) >= STRETCH * APART else rows % APART == 0
-    training, testing = jnp.asarray(rows[~apart]), jnp.asarray(rows[apart])
+    held_out = (rows // STRETCH) % HELD_OUT == HELD_OUT - 1 if len(rows) >= STRETCH * HELD_OUT else rows % HELD_OUT == 0
+    training, testing = jnp.asarray(rows[~held_out]), jnp.asarray(rows[held_out])
     began = logged = saved = time.monotonic()
     row: dict[str, Any] = {}
     while True:
@@ -160,13 +163,13 @@ def _clone(algorithm: BC, demos: Demos, run: Run, depends: Mapping[str, Any]) ->
         updates, clock = int(learner.updates), time.monotonic()
         if not all(np.isfinite(v) for v in losses.values()):
             raise Ig2mjError(f"training stopped: a loss is not finite ({losses})")
-        over = updates >= algorithm.config.steps or clock - began > run.minutes * 60
+        over = updates >= algorithm.config.num_updates or clock - began > run.minutes * 60
         if over or clock - logged > run.log_every:
-            kept_apart = float(algorithm.judge(learner, demos, testing, now))
+            row_held_out = float(algorithm.judge(learner, demos, testing, now))
             seconds = clock - began
             row = {"seconds": seconds, "iteration": updates // CALL, "env_steps": updates, "success": None}
             row |= {"steps_per_second": None, "updates_per_second": updates / seconds, **losses}
-            row["loss_apart"] = kept_apart
+            row["held_out_loss"] = row_held_out
             log.row(row)
             logged = clock
         if checkpoints is not None and (over or clock - saved > run.checkpoint_every):
@@ -179,10 +182,17 @@ def _clone(algorithm: BC, demos: Demos, run: Run, depends: Mapping[str, Any]) ->
 
 
 @entry_point
-def begin_as_clone(algorithm: Any, demos: Demos, seed: int, steps: int = 2000) -> Any:
+def begin_as_clone(algorithm: Any, demos: Demos, seed: int, updates: int = 2000) -> Any:
     """What another algorithm learns from, where its actor begins as a clone of demonstrations (SAC's `cloned`)."""
     c = algorithm.config
-    config = BCConfig(steps=steps, batch=min(c.batch, 1024), guess=c.guess, shift=c.shift, actor=c.actor, net=c.net)
+    config = BCConfig(
+        num_updates=updates,
+        batch_size=min(c.batch_size, 1024),
+        aux_coef=c.aux_coef,
+        image_shift=c.image_shift,
+        actor_layers=c.actor_layers,
+        encoder=c.encoder,
+    )
     cloner = BC(algorithm.perception, algorithm.action_size, config)
     learner, _ = clone(cloner, demos, Run(minutes=60.0, seed=seed, quiet=True))
     return algorithm.cloned(algorithm.init(jax.random.PRNGKey(seed)), learner.actor, learner.moments)

@@ -35,9 +35,12 @@ _NUMBER = re.compile(r"0|[1-9][0-9]{0,17}", re.ASCII)
 KEPT = 3
 """Checkpoints of a run that stay."""
 
+FORMAT_VERSION = 2
+"""Of `meta.json` and of the arrays; version 0.1 of the package wrote none."""
 
-TAKEN = "holds a run already: take --resume to go on with it, or another --out"
-"""What is said of a folder with checkpoints where a new run is to begin."""
+
+TAKEN = "holds a run already: --resume continues it; or choose another --out"
+"""Why a new run cannot use a folder with checkpoints."""
 
 
 @contextlib.contextmanager
@@ -54,6 +57,10 @@ def only_run(out: str | os.PathLike | None) -> Iterator[None]:
     folder.mkdir(parents=True, exist_ok=True)
     with hold(folder / ".lock", folder):
         yield
+
+
+class OldCheckpoint(InputError):
+    """A checkpoint of another version of the package: its arrays have other names."""
 
 
 class Checkpoints:
@@ -82,7 +89,8 @@ class Checkpoints:
         with Heartbeat(beside / SIGN):
             with _checkpointer() as writer:
                 writer.save(beside / "arrays", _full(_leaves(tree)))
-            (beside / "meta.json").write_text(json.dumps(meta, indent=1), encoding="utf-8")
+            text = json.dumps({"format": FORMAT_VERSION, **meta}, indent=1)
+            (beside / "meta.json").write_text(text, encoding="utf-8")
         if target.exists():
             shutil.rmtree(target)
         beside.replace(target)
@@ -97,6 +105,10 @@ class Checkpoints:
         """Of one checkpoint. Raises InputError."""
         file = self.folder / str(number) / "meta.json"
         found = read_json(file, kind=dict)
+        if found.get("format") != FORMAT_VERSION:
+            raise OldCheckpoint(
+                file, "is a checkpoint of another version", fix="ig2mj 0.1.0 continues runs of version 0.1"
+            )
         if not isinstance(found.get("depends"), dict):
             raise InputError(file, "does not say what it is of", element="depends")
         return found
@@ -115,6 +127,8 @@ class Checkpoints:
             folder = self.folder / str(number)
             try:
                 meta = self.meta(number)
+            except OldCheckpoint:
+                raise
             except InputError as e:
                 print(f"{e}; the checkpoint before it is taken", file=sys.stderr)
                 continue
@@ -165,7 +179,7 @@ def newest(
 
     A replay buffer, gigabytes of which each process needs only its own part, is read by each of them instead.
     """
-    if team.count == 1 or "memory" in like:
+    if team.count == 1 or "buffer" in like:
         with team.turns():
             return checkpoints.newest(like, depends)
     found = checkpoints.newest(like, depends) if team.first else None

@@ -21,8 +21,8 @@ from flax import struct
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.view import Array
-from ig2mj.learn.belief import true_at
 from ig2mj.learn.perception import Perception, Seen
+from ig2mj.learn.protocols import Adviser
 
 FINAL = "final_obs"
 
@@ -84,18 +84,19 @@ class Play:
     """Where all worlds stand.
 
     Attributes:
-      state: of the environment. memory: of the policy (noise that is held). total, steps: of the running episodes.
+      state: of the environment. acting: what the algorithm carries from step to step (`Algorithm.acting_state`).
+      total, steps: return and steps of the running episodes.
     """
 
     state: Any
-    memory: Any
+    acting: Any
     total: Float[Array, "W"]
     steps: Int[Array, "W"]
 
 
 @struct.dataclass
 class Advice:
-    """What an algorithm knows beside what is seen.
+    """What an algorithm knows besides what is seen.
 
     Attributes:
       steps: of the running episode so far; 0 at its start. label: what an expert would do; None without one.
@@ -106,26 +107,29 @@ class Advice:
 
 
 Act = Callable[[Any, Any, Seen, Array, Advice], tuple[Array, dict[str, Array], Any]]
-"""(what was learned, memory, seen, key, advice) -> (action, extra, memory)"""
+"""(learner, acting state, seen, key, advice) -> (action, extra, acting state)"""
 
 GUIDED = "guided"
 """The name among a transition's extras of whether the expert had a part in the episode [W]; such episodes are left out
 of the success that is reported."""
 
-Hint = Callable[..., Array] | None
-"""An expert: from the environment's state to actions [W, n] (`ig2mj.envs.experts.expert_of`), and where the policy's
-memory has `beliefs`, from those as well: where the policy took objects to be in the step before."""
 
-
-def begin(env: TrainingEnv, memory: Any, seed: int) -> Play:
+def begin(env: TrainingEnv, acting: Any, seed: int) -> Play:
     """All worlds at the start of an episode."""
     state = env.reset(seed)
     zero = np.zeros(env.num_worlds)
-    return Play(_kept(state), memory, jnp.asarray(zero, jnp.float32), jnp.asarray(zero, jnp.int32))
+    return Play(_kept(state), acting, jnp.asarray(zero, jnp.float32), jnp.asarray(zero, jnp.int32))
 
 
 def collect_fn(
-    env: TrainingEnv, perception: Perception, act: Act, hint: Hint, learned: Any, play: Play, key: Array, length: int
+    env: TrainingEnv,
+    perception: Perception,
+    act: Act,
+    adviser: Adviser | None,
+    learner: Any,
+    play: Play,
+    key: Array,
+    length: int,
 ) -> tuple[Play, Transition, dict[str, Array]]:
     """`length` steps of every world of a pure environment, as one scan.
 
@@ -133,55 +137,69 @@ def collect_fn(
       Where the worlds stand, the rollout [T, W, ...], and sums over it (see `_sums`).
     """
 
+    outcomes = outcomes_of(env)
+
     def step(play: Play, key: Array) -> tuple[Play, tuple[Transition, dict[str, Array]]]:
         seen = perception(play.state.obs)
-        action, extra, memory = act(learned, play.memory, seen, key, _advice(hint, play))
+        action, extra, acting = act(learner, play.acting, seen, key, _advice(adviser, play))
         state = env.step_autoreset_fn(play.state, action)
-        new, kept = _stepped(perception, play, seen, action, extra, memory, state)
+        new, kept = _stepped(perception, outcomes, play, seen, action, extra, acting, state)
         return dataclasses.replace(new, state=_kept(state)), kept
 
     play, (rollout, sums) = jax.lax.scan(step, play, jax.random.split(key, length))
     return play, rollout, jax.tree.map(lambda a: a.sum(0), sums)
 
 
-def _advice(hint: Hint, play: Play) -> Advice:
-    """What is known beside what is seen. In an episode's first step nothing is believed yet."""
-    if hint is None:
+def _advice(adviser: Adviser | None, play: Play) -> Advice:
+    """What is known besides what is seen."""
+    if adviser is None:
         return Advice(play.steps)
-    believed = getattr(play.memory, "beliefs", None)
-    return Advice(play.steps, hint(play.state, true_at(play.steps == 0, believed)) if believed else hint(play.state))
+    notes = getattr(play.acting, "notes", None)
+    return Advice(play.steps, adviser.label(play.state, notes, play.steps == 0))
+
+
+def outcomes_of(env: Any) -> tuple[str, ...]:
+    """What an environment's `info` says of an episode when it ends, besides success."""
+    objective = getattr(env, "objective", None)
+    return (*getattr(objective, "outcomes", ()), *(("goal_progress",) if objective is not None else ()))
+
+
+def horizon_of(env: Any) -> int:
+    """Agent steps of an environment's episodes; 0 where it does not say."""
+    return int(getattr(getattr(env, "task", env), "horizon", 0))
 
 
 class NativeCollector:
     """`collect_fn` for an environment that cannot be compiled: the policy is, the environment is called."""
 
-    def __init__(self, env: TrainingEnv, perception: Perception, act: Act, hint: Hint = None):
+    def __init__(self, env: TrainingEnv, perception: Perception, act: Act, adviser: Adviser | None = None):
         """Compiles nothing yet."""
         self._env = env
-        self._before, self._after = jax.jit(self._choose), jax.jit(functools.partial(_stepped, perception))
-        self._perception, self._act, self._hint = perception, act, hint
+        self._before = jax.jit(self._choose)
+        self._after = jax.jit(functools.partial(_stepped, perception, outcomes_of(env)))
+        self._perception, self._act, self._adviser = perception, act, adviser
 
     def _choose(
-        self, learned: Any, memory: Any, obs: Mapping[str, Array], key: Array, advice: Advice
+        self, learner: Any, acting: Any, obs: Mapping[str, Array], key: Array, advice: Advice
     ) -> tuple[Seen, Array, dict[str, Array], Any]:
         seen = self._perception(obs)
-        return seen, *self._act(learned, memory, seen, key, advice)
+        return seen, *self._act(learner, acting, seen, key, advice)
 
     def __call__(
-        self, learned: Any, play: Play, key: Array, length: int
+        self, learner: Any, play: Play, key: Array, length: int
     ) -> tuple[Play, Transition, dict[str, Any], float]:
         """As `collect_fn`; also the seconds that were spent in the environment."""
         rollout, sums, spent = [], [], 0.0
         for k in np.asarray(jax.random.split(key, length)):
-            advice = _advice(self._hint, play)
-            seen, action, extra, memory = self._before(learned, play.memory, play.state.obs, k, advice)
+            advice = _advice(self._adviser, play)
+            seen, action, extra, acting = self._before(learner, play.acting, play.state.obs, k, advice)
             action = np.asarray(action)
             began = time.perf_counter()
             state = self._env.step_autoreset(play.state, action)
             spent += time.perf_counter() - began
             light = _Light(state.obs, state.reward, state.terminated, state.truncated, dict(state.info))
             old = dataclasses.replace(play, state=None)
-            new, (transition, sum_) = self._after(old, seen, action, extra, memory, light)
+            new, (transition, sum_) = self._after(old, seen, action, extra, acting, light)
             play = dataclasses.replace(new, state=_kept(state))
             rollout.append(transition)
             sums.append(sum_)
@@ -201,7 +219,14 @@ class _Light:
 
 
 def _stepped(
-    perception: Perception, play: Play, seen: Seen, action: Array, extra: dict[str, Array], memory: Any, state: Any
+    perception: Perception,
+    outcomes: Sequence[str],
+    play: Play,
+    seen: Seen,
+    action: Array,
+    extra: dict[str, Array],
+    acting: Any,
+    state: Any,
 ) -> tuple[Play, tuple[Transition, dict[str, Array]]]:
     """The play after a step, without its state; what is kept of the step, and sums."""
     reward = jnp.asarray(state.reward, jnp.float32)
@@ -209,14 +234,16 @@ def _stepped(
     after = perception(state.info[FINAL])
     transition = Transition(seen, jnp.asarray(action), extra, reward, terminated, truncated, after)
     total, steps = play.total + reward, play.steps + 1
-    sums = _sums(transition, total, steps, state.info)
+    sums = _sums(transition, total, steps, state.info, outcomes)
     over = transition.done
-    new = Play(None, memory, jnp.where(over, 0.0, total), jnp.where(over, 0, steps))
+    new = Play(None, acting, jnp.where(over, 0.0, total), jnp.where(over, 0, steps))
     return new, (transition, sums)
 
 
-def _sums(transition: Transition, total: Array, steps: Array, info: Mapping[str, Any]) -> dict[str, Array]:
-    """Over the worlds: of the episodes that ended their number, return, success, steps; of all steps the rest."""
+def _sums(
+    transition: Transition, total: Array, steps: Array, info: Mapping[str, Any], outcomes: Sequence[str]
+) -> dict[str, Array]:
+    """Sums over worlds: of episodes that ended number, return, success, length and outcomes; the rest of steps."""
     over = transition.done.astype(jnp.float32)
     worlds = jnp.float32(over.shape[0])
     if GUIDED in transition.extra:
@@ -232,9 +259,8 @@ def _sums(transition: Transition, total: Array, steps: Array, info: Mapping[str,
     }
     if "flags" in info:
         sums["flagged"] = (over * (jnp.asarray(info["flags"]) != 0)).sum()
-    for name in ("success_in_hand", "goal_progress"):
-        if name in info:
-            sums[name] = (over * jnp.asarray(info[name], jnp.float32)).sum()
+    for name in outcomes:
+        sums[name] = (over * jnp.asarray(info[name], jnp.float32)).sum()
     sums |= {name: jnp.asarray(info[name]).sum() for name in info if name.startswith("reward/")}
     return sums
 

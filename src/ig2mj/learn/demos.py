@@ -270,8 +270,8 @@ def _read(
         seen = perception(of)
     except (ValueError, TypeError) as e:  # shapes that the file itself states, and that no picture has
         raise found.broken(f"{run}/obs", e) from e
-    vector, picture = np.asarray(seen.vector), np.asarray(seen.picture)
-    if vector.shape[1] != wanted.vector.shape[1] or picture.shape[1] != wanted.picture.shape[1]:
+    vector, picture = np.asarray(seen.vector), np.asarray(seen.image)
+    if vector.shape[1] != wanted.vector.shape[1] or picture.shape[1] != wanted.image.shape[1]:
         raise found.broken(f"{run}/obs", f"has {vector.shape[1]} numbers, and {wanted.vector.shape[1]} are expected")
     seen_after = {"seen_vector": vector[:-1], "seen_picture": picture[:-1]}
     return {**steps, **done, **seen_after, "after_vector": vector[1:], "after_picture": picture[1:]}

@@ -29,42 +29,38 @@ from ig2mj.process.progress import progress
 
 
 def acting(policy: Policy, env: Environment, file: object, *, drawn: bool | None = None, seed: int = 0) -> Actor:
-    """A policy as who acts in an environment.
+    """A policy as the agent of an environment.
 
     Args:
-      file: of the policy, for messages. seed: of drawn actions.
-      drawn: see `Policy.actor`; None: as the policy was evaluated, where it ships, else not.
+      file: of the policy, for messages. seed: of sampled actions.
+      drawn: actions are sampled; None: as the policy was evaluated, where it ships, else not.
 
     Raises:
       InputError: the policy is for something else.
     """
     perception = perception_of(policy, env.observation_spaces)
     policy.check(env, perception, file)
-    remembers = 0 if policy.recall is None else policy.recall.size
+    remembers = 0 if policy.memory is None else policy.memory.size
     drawn = draws(policy) if drawn is None else drawn
-    return Actor(env, policy.player(perception, drawn=drawn), remembers, seed, policy.parameters())
+    return Actor(env, policy.player(perception, sampled=drawn), remembers, seed, policy.parameters())
 
 
 def draws(policy: Policy) -> bool:
-    """Whether a policy ships with the success of drawn actions."""
+    """Whether a policy ships with the success of sampled actions."""
     return bool(policy.card.get("evaluation", {}).get("drawn"))
 
 
 def summary(results: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Rates and means over what jobs gave; the success with the limits of its 95 % interval."""
-    success, in_hand, total = (
-        [x for r in results for x in r[name]] for name in ("success", "success_in_hand", "total")
-    )
+    success, total = ([x for r in results for x in r[name]] for name in ("success", "total"))
     count, successes = len(success), sum(success)
     low, high = wilson(successes, count)
-    lifted = [x for r in results for x in r.get("lifted_by_all", [])]
     return {
         "episodes": count,
         "success_rate": successes / count,
         "success_low": round(low, 4),
         "success_high": round(high, 4),
-        "success_in_hand_rate": sum(in_hand) / count,
-        **({"lifted_by_all_rate": sum(lifted) / count} if lifted else {}),
+        **{f"{name}_rate": sum(sum(r["outcomes"][name]) for r in results) / count for name in results[0]["outcomes"]},
         "mean_return": float(np.mean(total)),
         **{name: sum(r[name] for r in results) for name in ("overflow", "non_finite")},
     }
@@ -122,9 +118,7 @@ def evaluate_job(
         raise WholeRunError(e) from e
     with progress(f"playing {task} from start state {first}") as report:
         played = play(env, actor.seeded(first // worlds), episodes, in_order=True, first=first, report=report)
-    found = {"success": played.success, "success_in_hand": played.success_in_hand, "total": played.total}
-    if played.lifted_by_all is not None:
-        found["lifted_by_all"] = played.lifted_by_all
+    found = {"success": played.success, "outcomes": played.outcomes, "total": played.total}
     trouble = {"overflow": played.metrics["overflow"], "non_finite": played.metrics["not_finite"]}
     stepping = (played.steps - worlds) / played.steps_per_second if played.steps_per_second else 0.0
     start = time.monotonic() - began - stepping

@@ -27,13 +27,13 @@ from ig2mj.cluster.team import Team
 from ig2mj.engine.view import Array
 from ig2mj.errors import EngineError
 from ig2mj.learn.collect import NativeCollector, Play, TrainingEnv, begin, collect_fn
+from ig2mj.learn.nonempty_leaves import nonempty, nonempty_specs, restored, shards_of
 from ig2mj.learn.perception import Perception
-from ig2mj.learn.solid import parts_of, restored, solid, solid_specs
 
 AXIS = "devices"
 """The axis of devices, over which algorithms average gradients."""
 
-APART = 7919
+SEED_STRIDE = 7919
 """Between the seeds of two devices' worlds."""
 
 
@@ -46,7 +46,7 @@ class Algorithm(Protocol):
     action_size: int
     config: Any
     actor: Any
-    hint: Any
+    adviser: Any
 
     @property
     def length(self) -> int: ...
@@ -55,14 +55,14 @@ class Algorithm(Protocol):
 
     def init(self, key: Array) -> Any: ...
 
-    def memory(self, num_worlds: int) -> Any: ...
+    def buffer(self, num_worlds: int) -> Any: ...
 
-    def noise(self, num_worlds: int) -> Any: ...
+    def acting_state(self, num_worlds: int) -> Any: ...
 
-    def act(self, learner: Any, noise: Any, seen: Any, key: Array, advice: Any) -> tuple[Array, Any, Any]: ...
+    def act(self, learner: Any, acting: Any, seen: Any, key: Array, advice: Any) -> tuple[Array, Any, Any]: ...
 
     def learn(
-        self, learner: Any, memory: Any, rollout: Any, key: Array, progress: Array, ready: Array
+        self, learner: Any, buffer: Any, rollout: Any, key: Array, progress: Array, ready: Array
     ) -> tuple[Any, Any, dict[str, Array]]: ...
 
 
@@ -73,30 +73,37 @@ class OneDevice:
         """`programs`: 1 or 2, on a pure engine; with 2 the simulator's time is known.
 
         Where there are two, or the engine is not pure, they are `play` (learner, play, key -> play, rollout, sums,
-        seconds) and `learn` (learner, memory, rollout, key, progress, ready -> learner, memory, losses).
+        seconds) and `learn` (learner, buffer, rollout, key, progress, ready -> learner, buffer, losses).
         """
         self._env, self._algorithm, self.num_worlds = env, algorithm, env.num_worlds
         self._whole = None
         if env.pure and programs == 1:
 
-            def whole(learner: Any, memory: Any, play: Play, key: Array, progress: Array, ready: Array) -> Any:
+            def whole(learner: Any, buffer: Any, play: Play, key: Array, progress: Array, ready: Array) -> Any:
                 play_key, learn_key = jax.random.split(key)
                 play, rollout, sums = collect_fn(
-                    env, algorithm.perception, algorithm.act, algorithm.hint, learner, play, play_key, algorithm.length
+                    env,
+                    algorithm.perception,
+                    algorithm.act,
+                    algorithm.adviser,
+                    learner,
+                    play,
+                    play_key,
+                    algorithm.length,
                 )
-                learner, memory, losses = algorithm.learn(learner, memory, rollout, learn_key, progress, ready)
-                return learner, memory, play, sums, {**losses, "all_finite": finite(learner)}
+                learner, buffer, losses = algorithm.learn(learner, buffer, rollout, learn_key, progress, ready)
+                return learner, buffer, play, sums, {**losses, "all_finite": finite(learner)}
 
             self._whole = jax.jit(whole, donate_argnums=(0, 1, 2))
             return
 
-        def learn(learner: Any, memory: Any, rollout: Any, key: Array, progress: Array, ready: Array) -> Any:
-            learner, memory, losses = algorithm.learn(learner, memory, rollout, key, progress, ready)
-            return learner, memory, {**losses, "all_finite": finite(learner)}
+        def learn(learner: Any, buffer: Any, rollout: Any, key: Array, progress: Array, ready: Array) -> Any:
+            learner, buffer, losses = algorithm.learn(learner, buffer, rollout, key, progress, ready)
+            return learner, buffer, {**losses, "all_finite": finite(learner)}
 
         def collect(learner: Any, play: Play, key: Array) -> Any:
             return collect_fn(
-                env, algorithm.perception, algorithm.act, algorithm.hint, learner, play, key, algorithm.length
+                env, algorithm.perception, algorithm.act, algorithm.adviser, learner, play, key, algorithm.length
             )
 
         self.learn = jax.jit(learn, donate_argnums=(0, 1))
@@ -110,35 +117,35 @@ class OneDevice:
 
             self.play: Callable[..., tuple[Play, Any, dict[str, Any], float]] = timed
         else:
-            native = NativeCollector(env, algorithm.perception, algorithm.act, algorithm.hint)
+            native = NativeCollector(env, algorithm.perception, algorithm.act, algorithm.adviser)
             self.play = lambda learner, play, key: native(learner, play, key, algorithm.length)
 
-    def memory(self) -> Any:
+    def buffer(self) -> Any:
         """What belongs to the worlds, at first."""
-        return self._algorithm.memory(self.num_worlds)
+        return self._algorithm.buffer(self.num_worlds)
 
     def begin(self, seed: int) -> Any:
         """All worlds at the start of an episode."""
-        return begin(self._env, self._algorithm.noise(self.num_worlds), seed)
+        return begin(self._env, self._algorithm.acting_state(self.num_worlds), seed)
 
-    def place(self, learner: Any, memory: Any) -> tuple[Any, Any]:
+    def place(self, learner: Any, buffer: Any) -> tuple[Any, Any]:
         """Where an iteration wants them."""
-        return jax.tree.map(jnp.asarray, (learner, memory))
+        return jax.tree.map(jnp.asarray, (learner, buffer))
 
     def __call__(
-        self, learner: Any, memory: Any, play: Play, key: Array, progress: float, ready: bool, clock: float = 0.0
+        self, learner: Any, buffer: Any, play: Play, key: Array, progress: float, ready: bool, clock: float = 0.0
     ) -> tuple[Any, Any, Play, dict[str, float], dict[str, float], float | None]:
         """Where all stands after an iteration, sums over its steps, losses, and seconds of the simulator if known."""
         share, go = jnp.float32(progress), jnp.bool_(ready)
         if self._whole is not None:
-            learner, memory, play, sums, losses = self._whole(learner, memory, play, key, share, go)
+            learner, buffer, play, sums, losses = self._whole(learner, buffer, play, key, share, go)
             spent = None
         else:
             play_key, learn_key = jax.random.split(key)
             play, rollout, sums, spent = self.play(learner, play, play_key)
-            learner, memory, losses = self.learn(learner, memory, rollout, learn_key, share, go)
+            learner, buffer, losses = self.learn(learner, buffer, rollout, learn_key, share, go)
         sums, losses = jax.device_get((sums, losses))
-        return learner, memory, play, floats(sums), {**floats(losses), "clock": clock}, spent
+        return learner, buffer, play, floats(sums), {**floats(losses), "clock": clock}, spent
 
 
 class ManyDevices:
@@ -168,7 +175,7 @@ class ManyDevices:
 
         def collect(learner: Any, play: Play, key: Array) -> Any:
             play, rollout, sums = collect_fn(
-                env, algorithm.perception, algorithm.act, algorithm.hint, learner, play, key, algorithm.length
+                env, algorithm.perception, algorithm.act, algorithm.adviser, learner, play, key, algorithm.length
             )
             return play, rollout, jax.tree.map(lambda a: a[None], sums)
 
@@ -177,31 +184,31 @@ class ManyDevices:
         kinds: list[Any] = []
 
         def leaves() -> list[Any]:
-            memory = algorithm.memory(self.num_worlds)
-            kinds.append(jax.tree.structure(memory))
-            return jax.tree.leaves(memory)
+            buffer = algorithm.buffer(self.num_worlds)
+            kinds.append(jax.tree.structure(buffer))
+            return jax.tree.leaves(buffer)
 
         specs = self._specs(jax.eval_shape(leaves))
-        self._memory_specs = jax.tree.unflatten(kinds[0], specs)
+        self._buffer_specs = jax.tree.unflatten(kinds[0], specs)
         self._learn: Callable[..., tuple] | None = None
 
-    def _program(self, learner: Any, memory: Any, rollout: Any, sums: Any) -> Callable[..., tuple]:
-        """What learns, on all devices at once; of these shapes. It takes and gives trees as `solid` has them."""
+    def _program(self, learner: Any, buffer: Any, rollout: Any, sums: Any) -> Callable[..., tuple]:
+        """What learns, on all devices at once; of these shapes. It takes and gives trees as `nonempty` has them."""
         algorithm, whole, each = self._algorithm, PartitionSpec(), PartitionSpec(AXIS)
-        trees = (learner, memory, rollout, sums)
-        specs = (whole, self._memory_specs, PartitionSpec(None, AXIS), each)
-        parts = [parts_of(tree, of_it, self._count) for tree, of_it in zip(trees, specs, strict=True)]
-        into = [solid_specs(tree, of_it) for tree, of_it in zip(trees, specs, strict=True)]
+        trees = (learner, buffer, rollout, sums)
+        specs = (whole, self._buffer_specs, PartitionSpec(None, AXIS), each)
+        parts = [shards_of(tree, of_it, self._count) for tree, of_it in zip(trees, specs, strict=True)]
+        into = [nonempty_specs(tree, of_it) for tree, of_it in zip(trees, specs, strict=True)]
 
         def learn(*given: Any) -> tuple:
             *leaves, times, key, ready = given
-            learner, memory, rollout, sums = (restored(*pair) for pair in zip(parts, leaves, strict=True))
+            learner, buffer, rollout, sums = (restored(*pair) for pair in zip(parts, leaves, strict=True))
             own = jax.random.fold_in(key, jax.lax.axis_index(AXIS))
             progress, clock = jax.lax.pmax(times[0], AXIS)
-            learner, memory, losses = algorithm.learn(learner, memory, rollout, own, progress, ready)
+            learner, buffer, losses = algorithm.learn(learner, buffer, rollout, own, progress, ready)
             losses = jax.lax.pmean({**losses, "all_finite": 1.0 * finite(learner)}, AXIS)
             total = jax.tree.map(lambda a: jax.lax.psum(a[0], AXIS), sums)
-            return solid(learner), solid(memory), total, losses, clock
+            return nonempty(learner), nonempty(buffer), total, losses, clock
 
         mapped = jax.shard_map(
             learn,
@@ -213,7 +220,7 @@ class ManyDevices:
         return jax.jit(mapped, donate_argnums=(0, 1))
 
     def _specs(self, shapes: Sequence[Any]) -> list[PartitionSpec]:
-        """How the arrays of a memory are shared out: [W] and [T, W, ...] by worlds, all others are on every device."""
+        """How the arrays of a buffer are shared out: [W] and [T, W, ...] by worlds, all others are on every device."""
         found = []
         for shape in (a.shape for a in shapes):
             at = min(len(shape), 2) - 1
@@ -221,21 +228,23 @@ class ManyDevices:
             found.append(PartitionSpec(*[None] * at, AXIS) if mine else PartitionSpec())
         return found
 
-    def memory(self) -> Any:
+    def buffer(self) -> Any:
         """What belongs to the worlds, at first, each part where it belongs."""
-        shardings = jax.tree.map(lambda spec: NamedSharding(self._mesh, spec), self._memory_specs)
-        return jax.jit(lambda: self._algorithm.memory(self.num_worlds), out_shardings=shardings)()
+        shardings = jax.tree.map(lambda spec: NamedSharding(self._mesh, spec), self._buffer_specs)
+        return jax.jit(lambda: self._algorithm.buffer(self.num_worlds), out_shardings=shardings)()
 
     def begin(self, seed: int) -> Any:
         """All worlds at the start of an episode, in one batch for each device of this process."""
-        env, noise = self._env, self._algorithm.noise
-        plays = self._first_then_each(lambda k: begin(env, noise(env.num_worlds), seed + (self._first + k) * APART))
+        env, acting_state = self._env, self._algorithm.acting_state
+        plays = self._first_then_each(
+            lambda k: begin(env, acting_state(env.num_worlds), seed + (self._first + k) * SEED_STRIDE)
+        )
         return [jax.device_put(play, device) for play, device in zip(plays, self._devices, strict=True)]
 
-    def place(self, learner: Any, memory: Any) -> tuple[Any, Any]:
+    def place(self, learner: Any, buffer: Any) -> tuple[Any, Any]:
         """Weights on every device, the replay buffer's parts on their own."""
         learner = jax.tree.map(lambda a: self._placed(a, PartitionSpec()), learner)
-        return learner, jax.tree.map(self._placed, memory, self._memory_specs)
+        return learner, jax.tree.map(self._placed, buffer, self._buffer_specs)
 
     def _placed(self, array: Any, spec: PartitionSpec) -> jax.Array:
         sharding = NamedSharding(self._mesh, spec)
@@ -245,16 +254,16 @@ class ManyDevices:
         return jax.make_array_from_callback(held.shape, sharding, lambda index: held[index])
 
     def __call__(
-        self, learner: Any, memory: Any, plays: list[Play], key: Array, progress: float, ready: bool, clock: float = 0.0
+        self, learner: Any, buffer: Any, plays: list[Play], key: Array, progress: float, ready: bool, clock: float = 0.0
     ) -> tuple[Any, Any, list[Play], dict[str, float], dict[str, float], float]:
         """As `OneDevice.__call__`; `losses["clock"]` is the largest of all processes' clocks."""
         play_key, learn_key = jax.random.split(key)
         plays, rollouts, sums, spent = self.play(learner, plays, play_key)
-        learner, memory, sums, losses, told = self.learn(
-            learner, memory, rollouts, sums, np.asarray(learn_key), progress, ready, clock
+        learner, buffer, sums, losses, told = self.learn(
+            learner, buffer, rollouts, sums, np.asarray(learn_key), progress, ready, clock
         )
         losses = {**floats(losses), "clock": told}
-        return learner, memory, plays, floats(sums), losses, spent
+        return learner, buffer, plays, floats(sums), losses, spent
 
     def play(self, learner: Any, plays: list[Play], key: Array) -> tuple[list[Play], list[Any], list[Any], float]:
         """Steps the worlds of this process's devices, of which each begins where its part of `plays` ended.
@@ -279,7 +288,7 @@ class ManyDevices:
     def learn(
         self,
         learner: Any,
-        memory: Any,
+        buffer: Any,
         rollouts: Sequence[Any],
         sums: Sequence[Any],
         key: np.ndarray,
@@ -293,20 +302,20 @@ class ManyDevices:
           sums: of each rollout, arrays [1]. key: the same in every process. progress, clock: the largest count.
 
         Returns:
-          Learner, memory, sums over all devices, means of losses, and the largest clock.
+          Learner, buffer, sums over all devices, means of losses, and the largest clock.
         """
         rollout = jax.tree.map(lambda *a: self._joined(a, 1), *rollouts)
         total = jax.tree.map(lambda *a: self._joined(a, 0), *sums)
         row = np.array([[progress, clock]], np.float32)
         times = self._joined([jax.device_put(row, device) for device in self._devices], 0)
-        trees = (learner, memory, rollout, total)
+        trees = (learner, buffer, rollout, total)
         if self._learn is None:
             self._learn = self._program(*jax.eval_shape(lambda *trees: trees, *trees))
-        leaves = [solid(tree) for tree in trees]
+        leaves = [nonempty(tree) for tree in trees]
         learnt, kept, total, losses, told = self._learn(*leaves, times, key, np.bool_(ready))
-        learner, memory = restored(learner, learnt), restored(memory, kept)
+        learner, buffer = restored(learner, learnt), restored(buffer, kept)
         total, losses, told = jax.device_get((total, losses, told))
-        return learner, memory, total, losses, float(told)
+        return learner, buffer, total, losses, float(told)
 
     def _compiled(self, learner: Any, plays: list[Play], keys: np.ndarray) -> list[Callable[..., Any]]:
         """The program that plays, for every device of this process: traced in turn, compiled side by side."""

@@ -1,23 +1,26 @@
-"""Networks: an actor with or without an encoder of pictures, two distributional critics, and a value.
+"""Networks: an actor with or without an encoder of images, two distributional critics, and a value.
 
-Axes: B samples, n numbers of an action, K atoms.
+Axes: B samples, n numbers of an action, K atoms, x numbers an actor sees, q bytes of an image, f features, g numbers
+of a prediction, m numbers of a memory as a network sees it.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import flax.linen as nn
 import jax
 import jax.numpy as jnp
-from jaxtyping import Float, UInt8
+from jaxtyping import Bool, Float, UInt8
 
 from ig2mj.engine.view import Array
 from ig2mj.errors import UnknownNameError
 from ig2mj.learn.convolution import convolve
-from ig2mj.learn.projection import FRAME
+from ig2mj.learn.protocols import Memory
+from ig2mj.learn.running_stats import normal
 
 LOG_STD = (-5.0, 0.0)
 """Limits of the logarithm of an actor's standard deviation, before tanh (FlashSAC's recommendation)."""
@@ -25,24 +28,11 @@ LOG_STD = (-5.0, 0.0)
 FIRST_STD = 0.3
 """Standard deviation of an untrained actor."""
 
-NETS = ("small", "paper", "points", "places", "glimpses")
-"""Encoders of pictures."""
+ENCODERS = ("small", "points")
+"""Encoders of `ConvEncoder`."""
 
-WINDOW = 32
-"""Pixels, height and width, of what a glimpse sees around an object."""
-
-GLIMPSE = 64
-"""Numbers that say what a glimpse sees."""
-
-SHAKEN = "glimpse"
-"""The name of the random numbers (flax's `rngs`) with which glimpses are shaken; without them they are not."""
-
-SHAKE = 1.0
-"""Pixels, deviation of how far beside its point a glimpse looks while it learns. Exactly at the point, which is between
-pixels, start states are known by heart from how the pixels lie, and nothing else is learnt from them."""
-
-PRECISE = ("places", "glimpses")
-"""Those that the guess of hidden numbers alone trains, and whose guess the actor sees."""
+AUGMENTATION = "glimpse"
+"""Name of the random numbers (flax's `rngs`) with which an encoder augments what it sees while it learns."""
 
 SHARP = 3.0
 """Factor of maps before their softmax: without it an untrained softmax is even, and hardly changes."""
@@ -60,87 +50,88 @@ class Trunk(nn.Module):
         return x
 
 
-class Encoder(nn.Module):
-    """Features of pictures.
+class Convolutions(nn.Module):
+    """Features of images.
 
     `small`: convolutions of stride 2 until four rows of pixels are left, for 32x32 pixels three (32, 64, 64), and 50
-    numbers between -1 and 1, as in Squint. `paper`: three convolutions and 256 numbers (iGibson 2.0, appendix A.3).
-    `points`: `small`'s numbers, and where in the picture each of 32 channels is brightest after two halvings (the
-    spatial softmax of Levine et al. 2016), so that the place of a thin object need not be read from four by four coarse
-    cells. `places`: the same, with how far away it is there, on a GPU in half precision. Depth times row and column is
-    what a place in the camera's frame is linear in. `glimpses`: the same, and for each of so many `objects` two
-    numbers, which come first and are to be learnt as its row and column (`projection.FRAME`), and what is around that
-    point at full resolution: how a thin object lies shows in a few pixels, wherever they are.
+    numbers between -1 and 1, as in Squint. `points`: the same numbers, and where in the image each of 32 channels is
+    brightest after two halvings (the spatial softmax of Levine et al. 2016), so that the position of a thin object need
+    not be read from four by four coarse cells.
     """
 
     shape: tuple[int, int, int]
     net: str = "small"
-    objects: int = 0
 
     @nn.compact
-    def __call__(self, picture: UInt8[Array, "B q"]) -> Float[Array, "B f"]:
-        seen = x = picture.reshape(-1, *self.shape).astype(jnp.float32) / 255.0 - 0.5
-        halvings = 3 if self.net == "paper" else max(3, math.ceil(math.log2(self.shape[0] / 4)))
-        # processors have no fast way to convolve in half precision
-        half = self.net in PRECISE and jax.default_backend() == "gpu"
-        places, dtype = jnp.zeros((x.shape[0], 0)), jnp.bfloat16 if half else jnp.float32
-        first, second, later, few = (16, 32, 32, 32) if self.net == "glimpses" else (32, 64, 64, 50)
-        for k, channels in enumerate((first, second, *[later] * (halvings - 2))):
-            x = nn.relu(_conv(channels, 2, dtype)(x))
-            if self.net in ("points", *PRECISE) and k == 1:
-                normal = nn.LayerNorm(name="points_norm")(x)
-                light = self.net == "glimpses"  # its maps need not be fine: glimpses are
-                maps = (nn.Dense(16, dtype=dtype, name="points") if light else _conv(32, 1, dtype, "points"))(normal)
-                depth = coarse(seen[..., -1], maps.shape[1:3]) if self.net in PRECISE else None
-                places = brightest(SHARP * maps.astype(jnp.float32), depth)
-        x = x.reshape(x.shape[0], -1).astype(jnp.float32)
-        if self.net == "paper":
-            return nn.relu(nn.Dense(256)(x))
-        features = [places, jnp.tanh(nn.LayerNorm()(nn.Dense(few)(x)))]
-        if self.net == "glimpses" and self.objects:
-            points = nn.Dense(2 * self.objects, name="spots")(jnp.concatenate(features, axis=-1))
-            where = points.reshape(-1, self.objects, 2) / FRAME
-            around = [Glimpse(dtype, name=f"glimpse_{k}")(seen, where[:, k]) for k in range(self.objects)]
-            features = [points, *around, *features]
-        return jnp.concatenate(features, axis=-1)
+    def __call__(self, image: UInt8[Array, "B q"]) -> Float[Array, "B f"]:
+        x = centred(image, self.shape)
+        halvings = halvings_of(self.shape)
+        points = jnp.zeros((x.shape[0], 0))
+        for k, channels in enumerate((32, 64, *[64] * (halvings - 2))):
+            x = nn.relu(conv3(channels, 2)(x))
+            if self.net == "points" and k == 1:
+                maps = conv3(32, 1, name="points")(nn.LayerNorm(name="points_norm")(x))
+                points = brightest(SHARP * maps)
+        x = x.reshape(x.shape[0], -1)
+        return jnp.concatenate([points, jnp.tanh(nn.LayerNorm()(nn.Dense(50)(x)))], axis=-1)
 
 
-class Glimpse(nn.Module):
-    """What is around a point of the picture at full resolution, as `GLIMPSE` numbers."""
+@dataclasses.dataclass(frozen=True)
+class ConvEncoder:
+    """`Convolutions` as a `protocols.Encoder`, whose prediction is linear in the features and the actor's vector.
 
-    dtype: Any = jnp.float32
+    Raises:
+      UnknownNameError: `net` is none of `ENCODERS`.
+    """
 
-    @nn.compact
-    def __call__(self, seen: Float[Array, "B r s c"], point: Float[Array, "B 2"]) -> Float[Array, "B f"]:
-        point = jax.lax.stop_gradient(point)
-        if self.has_rng(SHAKEN):
-            pixel = 2.0 / (jnp.asarray(seen.shape[1:3], jnp.float32) - 1.0)
-            point += SHAKE * pixel * jax.random.normal(self.make_rng(SHAKEN), point.shape)
-        x = window(seen, point)
-        for channels in (32, 48, 48):
-            x = nn.relu(_conv(channels, 2, self.dtype)(x))
-        return nn.relu(nn.Dense(GLIMPSE)(x.reshape(x.shape[0], -1).astype(jnp.float32)))
+    shape: tuple[int, int, int]
+    net: str = "small"
+    predictions: int = 0
+    acts_on_prediction = False
+
+    def __post_init__(self) -> None:
+        if self.net not in ENCODERS:
+            raise UnknownNameError("encoder", self.net, ENCODERS)
+
+    def features(self, image: UInt8[Array, "B q"]) -> Float[Array, "B f"]:
+        return Convolutions(self.shape, self.net, name="encoder")(image)
+
+    def predict(
+        self, features: Float[Array, "B f"], vector: Float[Array, "B x"]
+    ) -> tuple[Float[Array, "B g"], Float[Array, "B h"]]:
+        if not self.predictions:
+            return jnp.zeros((vector.shape[0], 0)), features
+        known = jnp.concatenate([features, vector], axis=-1)
+        return nn.Dense(self.predictions, name="guess")(known), features
+
+    def card(self) -> dict[str, Any]:
+        return {"net": self.net}
 
 
-def _conv(channels: int, stride: int, dtype: Any, name: str | None = None) -> nn.Conv:
+def conv_encoder(shape: tuple[int, int, int] | None, net: str, predictions: int = 0) -> ConvEncoder | None:
+    """The encoder of images of a shape; None without images. Raises UnknownNameError."""
+    if shape is None:
+        return ConvEncoder((1, 1, 1), net, predictions) and None
+    return ConvEncoder(shape, net, predictions)
+
+
+def centred(image: UInt8[Array, "B q"], shape: tuple[int, int, int]) -> Float[Array, "B r s c"]:
+    """Bytes as numbers from -0.5 to 0.5."""
+    return image.reshape(-1, *shape).astype(jnp.float32) / 255.0 - 0.5
+
+
+def halvings_of(shape: tuple[int, int, int]) -> int:
+    """Convolutions of stride 2 until four rows are left, three at least."""
+    return max(3, math.ceil(math.log2(shape[0] / 4)))
+
+
+def conv3(channels: int, stride: int, dtype: Any = jnp.float32, name: str | None = None) -> nn.Conv:
     """A convolution of 3x3 pixels."""
     return nn.Conv(channels, (3, 3), stride, dtype=dtype, conv_general_dilated=convolve, name=name)
 
 
-def window(seen: Float[Array, "B r s c"], point: Float[Array, "B 2"]) -> Float[Array, "B w w c"]:
-    """`WINDOW` rows and columns of each picture around a point whose row and column are from -1 to 1, interpolated
-    linearly; 0 beside the picture."""
-
-    def weights(middle: Float[Array, "B"], size: int) -> Float[Array, "B w n"]:
-        places = (middle[:, None] + 1.0) * (0.5 * (size - 1)) + jnp.arange(WINDOW) - 0.5 * (WINDOW - 1)
-        return jnp.maximum(1.0 - jnp.abs(places[:, :, None] - jnp.arange(size)), 0.0)
-
-    rows, columns = weights(point[:, 0], seen.shape[1]), weights(point[:, 1], seen.shape[2])
-    return jnp.einsum("bir,brsc,bjs->bijc", rows, seen, columns)
-
-
 def brightest(maps: Float[Array, "B h w c"], depth: Float[Array, "B h w"] | None = None) -> Float[Array, "B f"]:
-    """Row and column, from -1 to 1, of the middle of each channel's softmax over the picture, [B, 2 * c]; with `depth`
+    """Row and column, from -1 to 1, of the middle of each channel's softmax over the image, [B, 2 * c]; with `depth`
     also the depth there, and its products with row and column, [B, 5 * c]."""
     count, height, width, channels = maps.shape
     share = jax.nn.softmax(maps.reshape(count, height * width, channels), axis=1).reshape(maps.shape)
@@ -152,101 +143,91 @@ def brightest(maps: Float[Array, "B h w c"], depth: Float[Array, "B h w"] | None
     return jnp.concatenate([row, column, there, there * row, there * column], axis=-1)
 
 
-def coarse(depth: Float[Array, "B r s"], shape: tuple[int, ...]) -> Float[Array, "B h w"]:
-    """A picture's depth averaged over the cells of a map, from about -2 to 2."""
-    count, rows, columns = depth.shape
-    height, width = shape
-    low, right = -rows % height, -columns % width  # where convolutions of stride 2 rounded up
-    padded = jnp.pad(depth, ((0, 0), (0, low), (0, right)), mode="edge")
-    cells = padded.reshape(count, height, -1, width, (columns + right) // width)
-    return 4.0 * cells.mean((2, 4))
-
-
 class Actor(nn.Module):
-    """Mean and logarithm of the standard deviation of a Gaussian, whose tanh is the action; with `choices` instead for
-    each number of the action how likely each of so many values is, as logits (`ig2mj.learn.heads` makes actions of it).
+    """Mean and logarithm of the standard deviation of a Gaussian, whose tanh is the action; with `bins` instead the
+    logits of so many values for each number of the action (`ig2mj.learn.action_distributions` samples from either).
 
-    With `guess`, that many hidden numbers are guessed linearly from the features of the picture, for an auxiliary loss.
-    With the encoders `places` and `glimpses` the guess is also what the actor's layers see, and the auxiliary loss
-    alone trains the encoder: gradients of actions are larger and noisier, and where both did, places were off by
-    centimetres. With `glimpses` the guess ends with how the `objects` are turned, and with their rows and columns
-    (`Hidden`); the actor's layers see the guess alone, so that it can also be told to them.
-
-    Raises:
-      UnknownNameError: `net` is none of `NETS`.
+    An encoder that predicts privileged numbers is trained by an auxiliary loss. Where its `acts_on_prediction` is set,
+    the actor's layers see the prediction, and the gradients of actions stop before it: they are larger and noisier, and
+    with both the predicted positions are off by centimetres.
     """
 
     action_size: int
     sizes: Sequence[int] = (256, 256, 256)
-    picture_shape: tuple[int, int, int] | None = None
-    net: str = "small"
-    guess: int = 0
-    choices: int = 0
-    objects: int = 0
-
-    def __post_init__(self) -> None:
-        if self.net not in NETS:
-            raise UnknownNameError("encoder", self.net, NETS)
-        super().__post_init__()
+    encoder: Any = None
+    """A `protocols.Encoder`; None without images."""
+    bins: int = 0
 
     @property
-    def uses_guess(self) -> bool:
-        """Whether its actions depend on the guess, which then belongs to the policy."""
-        return self.net in PRECISE and self.guess > 0
+    def predictions(self) -> int:
+        """g."""
+        return 0 if self.encoder is None else self.encoder.predictions
+
+    @property
+    def acts_on_prediction(self) -> bool:
+        """Whether its actions depend on the prediction, which then belongs to the policy."""
+        return self.predictions > 0 and self.encoder.acts_on_prediction
 
     @nn.compact
     def __call__(
         self,
         vector: Float[Array, "B x"],
-        picture: UInt8[Array, "B q"],
-        told: Float[Array, "B g"] | None = None,
-        recalled: Float[Array, "B m"] | None = None,
+        image: UInt8[Array, "B q"],
+        predicted: Float[Array, "B g"] | None = None,
+        remembered: Float[Array, "B m"] | None = None,
     ) -> tuple[Float[Array, "B n *K"], Float[Array, "B n"], Float[Array, "B g"]]:
-        """`told`: in place of the guess, with `glimpses`; the picture is not looked at then. `recalled`: what the
-        actor's layers know besides (`ig2mj.learn.recall`)."""
-        guessed = jnp.zeros((vector.shape[0], self.guess))
-        if told is not None:
-            guessed, vector = told, jnp.concatenate([vector, told], axis=-1)
-        elif self.picture_shape is not None:
-            features = Encoder(self.picture_shape, self.net, self.objects, name="encoder")(picture)
-            if self.guess:
-                guessed, features = self._guess(features, vector)
-            known = jax.lax.stop_gradient((features, guessed)) if self.uses_guess else (features,)
+        """Parameters of the distribution, and the prediction.
+
+        Args:
+          predicted: takes the place of the prediction; the image is not looked at. remembered: of a `protocols.Memory`.
+        """
+        prediction = jnp.zeros((vector.shape[0], self.predictions))
+        if predicted is not None:
+            prediction, vector = predicted, jnp.concatenate([vector, predicted], axis=-1)
+        elif self.encoder is not None:
+            prediction, features = self.encoder.predict(self.encoder.features(image), vector)
+            acts = self.acts_on_prediction
+            known = jax.lax.stop_gradient((features, prediction)) if acts else (features,)
             vector = jnp.concatenate([vector, *known], axis=-1)
-        if recalled is not None:
-            vector = jnp.concatenate([vector, recalled], axis=-1)
-        x = Trunk((256,) if self.net == "paper" else self.sizes, name="trunk")(vector)
+        if remembered is not None:
+            vector = jnp.concatenate([vector, remembered], axis=-1)
+        x = Trunk(self.sizes, name="trunk")(vector)
         small = nn.initializers.orthogonal(0.01)
-        if self.choices:
-            logits = nn.Dense(self.action_size * self.choices, kernel_init=small, name="choice")(x)
-            shape = (-1, self.action_size, self.choices)
-            return logits.reshape(shape), jnp.zeros((x.shape[0], self.action_size)), guessed
+        if self.bins:
+            logits = nn.Dense(self.action_size * self.bins, kernel_init=small, name="choice")(x)
+            shape = (-1, self.action_size, self.bins)
+            return logits.reshape(shape), jnp.zeros((x.shape[0], self.action_size)), prediction
         mean = nn.Dense(self.action_size, kernel_init=small, name="mean")(x)
         low, high = LOG_STD
         start = jnp.arctanh(2 * (jnp.log(FIRST_STD) - low) / (high - low) - 1)
         raw = nn.Dense(self.action_size, kernel_init=small, bias_init=nn.initializers.constant(start), name="std")(x)
-        return mean, low + (high - low) * (jnp.tanh(raw) + 1) / 2, guessed
+        return mean, low + (high - low) * (jnp.tanh(raw) + 1) / 2, prediction
 
-    def _guess(
-        self, features: Float[Array, "B f"], vector: Float[Array, "B x"]
-    ) -> tuple[Float[Array, "B g"], Float[Array, "B h"]]:
-        """The guess, and which of the features the actor's layers see, too.
 
-        How an object is turned is guessed from its own glimpse, and nothing else trains that: with the errors of all
-        other numbers in its gradients it does not find out on which side of a blade the edge is.
-        """
-        if self.net != "glimpses" or not self.objects:
-            return nn.Dense(self.guess, name="guess")(jnp.concatenate([features, vector], axis=-1)), features
-        points, around, others = jnp.split(features, [2 * self.objects, (2 + GLIMPSE) * self.objects], axis=-1)
-        known = jnp.concatenate([points, others, vector], axis=-1)
-        known = jnp.concatenate([known, nn.relu(nn.Dense(128, name="combined")(known))], axis=-1)
-        guessed = [nn.Dense(self.guess - 6 * self.objects, name="guess")(known)]
-        place = jnp.concatenate([jax.lax.stop_gradient(points), vector], axis=-1)
-        for k in range(self.objects):
-            own = jnp.concatenate([around[:, k * GLIMPSE : (k + 1) * GLIMPSE], place], axis=-1)
-            own = jnp.concatenate([own, nn.relu(nn.Dense(128, name=f"turning_{k}")(own))], axis=-1)
-            guessed.append(nn.Dense(6, name=f"turn_{k}")(own))
-        return jnp.concatenate([*guessed, points], axis=-1), features[:, :0]
+def apply_with_memory(
+    apply: Callable[..., Any],
+    memory: Memory | None,
+    scales: tuple[Float[Array, "_"], Float[Array, "_"]],
+    vector: Float[Array, "W x"],
+    image: UInt8[Array, "W q"],
+    kept: Float[Array, "W m"],
+    begins: Bool[Array, "W"],
+) -> tuple[Any, Float[Array, "W m"]]:
+    """What an actor gives that may have a memory, and what it remembers from then on.
+
+    Args:
+      apply: an `Actor` with its weights. scales: mean and deviation of the vector, and of the privileged numbers after
+        it where the memory needs those. vector: as it was observed. kept, begins: see `Memory.after`; without a memory
+        `kept` is returned as it is.
+    """
+    size = vector.shape[-1]
+    own = normal(vector, scales[0][:size], scales[1][:size])
+    if memory is None:
+        return apply(own, image), kept
+    _, _, prediction = apply(own, image, None, memory.normal(kept, vector, *scales))
+    kept = memory.after(kept, begins, vector, prediction)
+    # all that the actor knows of the image is the prediction, so the encoder does not run again
+    return apply(own, image[:, :0], prediction, memory.normal(kept, vector, *scales)), kept
 
 
 class Critic(nn.Module):
@@ -278,12 +259,12 @@ class Value(nn.Module):
         return nn.Dense(1)(Trunk(self.sizes)(vector))[:, 0]
 
 
-def shifted(picture: UInt8[Array, "B q"], shape: tuple[int, int, int], key: Array, by: int = 2) -> UInt8[Array, "B q"]:
-    """Each picture moved by at most so many pixels, its border repeated (DrQ's augmentation); by 0, as it is."""
+def shifted(image: UInt8[Array, "B q"], shape: tuple[int, int, int], key: Array, by: int = 2) -> UInt8[Array, "B q"]:
+    """Each image moved by at most so many pixels, its border repeated (DrQ's augmentation); by 0, as it is."""
     if not by:
-        return picture
-    count = picture.shape[0]
-    padded = jnp.pad(picture.reshape(count, *shape), ((0, 0), (by, by), (by, by), (0, 0)), mode="edge")
+        return image
+    count = image.shape[0]
+    padded = jnp.pad(image.reshape(count, *shape), ((0, 0), (by, by), (by, by), (0, 0)), mode="edge")
     start = jax.random.randint(key, (count, 2), 0, 2 * by + 1)
     moved = jax.vmap(lambda p, s: jax.lax.dynamic_slice(p, (s[0], s[1], 0), shape))(padded, start)
     return moved.reshape(count, -1)

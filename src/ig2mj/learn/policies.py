@@ -2,7 +2,7 @@
 
 A file is an npz archive: one array for each weight, the mean and deviation of what the actor sees, and the card as
 JSON. A policy belongs to a task, a robot, a way of grasping, the names of the actions and the observations; with
-others it is refused, and the message names what differs. The version of this package is of no account.
+others it is refused, and the message names what differs. The package version is not checked.
 
 Axes: W worlds, n numbers of an action.
 """
@@ -28,14 +28,14 @@ from ig2mj.errors import Ig2mjError, InputError, PolicyMismatch
 from ig2mj.files.content import decode_json
 from ig2mj.files.npz import read_npz
 from ig2mj.files.unfinished import unfinished
+from ig2mj.learn.action_distributions import mode, sample
 from ig2mj.learn.checkpoints import refuse_difference
-from ig2mj.learn.heads import drawn as drawn_from
-from ig2mj.learn.heads import likeliest
-from ig2mj.learn.moments import Moments
-from ig2mj.learn.networks import Actor
-from ig2mj.learn.perception import SIZE, Perception
+from ig2mj.learn.networks import Actor, apply_with_memory, conv_encoder
+from ig2mj.learn.occlusion import glimpses
+from ig2mj.learn.occlusion.object_memory import ObjectMemory
+from ig2mj.learn.perception import DEPTH_RANGE, SIZE, Perception
 from ig2mj.learn.policy_checks import check_arrays, check_card, check_play, check_scales
-from ig2mj.learn.recall import Recall, looked
+from ig2mj.learn.running_stats import RunningStats
 from ig2mj.process import entry_point
 
 FORMAT_VERSION = 1
@@ -65,9 +65,12 @@ def depends_of(world: Mapping[str, Any], perception: Perception) -> dict[str, An
     found = {name: world[name] for name in ("task", "robot", "grasping", "actions")}
     found["mode"] = perception.mode
     found["vector"] = {name: sizes[name] for name in seen}
-    found["picture"] = perception.picture_shape and list(perception.picture_shape)
-    if perception.picture_shape and perception.picture_shape[0] < perception.picture_shape[1]:
+    shape = perception.image_shape
+    found["picture"] = shape and list(shape)
+    if shape and shape[0] < shape[1]:
         found["rows"] = list(perception.rows)
+    if shape and perception.depth_range != DEPTH_RANGE:
+        found["depth_range"] = perception.depth_range
     found["privileged"] = list(world["privileged"]) if perception.mode == "state" else []
     return found
 
@@ -76,7 +79,8 @@ def perception_of(policy: Policy, spaces: Mapping[str, Any]) -> Perception:
     """How a policy sees an environment's observations: as in its training."""
     depends = policy.card["depends"]
     size, rows = depends["picture"][1] if depends["picture"] else SIZE, depends.get("rows")
-    return Perception(spaces, depends["mode"], size, (rows[0], rows[1]) if rows else None)
+    depth_range = depends.get("depth_range", DEPTH_RANGE)
+    return Perception(spaces, depends["mode"], size, (rows[0], rows[1]) if rows else None, depth_range=depth_range)
 
 
 def depends_on(env: Any, perception: Perception) -> dict[str, Any]:
@@ -96,7 +100,7 @@ class Policy:
 
     Attributes:
       card: "depends", "digest", "net", and how it was made ("command", "seed", "minutes", "device", "success", ...).
-      weights: by the path of the layer. mean, deviation: of what the actor sees. hidden: those of what it guesses;
+      weights: by the path of the layer. mean, deviation: of what the actor sees. hidden: those of what it predicts;
         None where it does not. file: where it was read from, for messages.
     """
 
@@ -115,23 +119,21 @@ class Policy:
           depends: see `depends_on`. made: for the card.
         """
         config, size = algorithm.config, algorithm.perception.actor_size
-        net: dict[str, Any] = {"net": config.net, "sizes": list(config.actor)}
+        actor, memory = algorithm.actor, getattr(algorithm, "memory", None)
+        net: dict[str, Any] = {"net": config.encoder, "sizes": list(config.actor_layers)}
+        net |= actor.encoder.card() if actor.encoder is not None else {}
         weights = {k: np.asarray(v) for k, v in flat(learner.actor).items()}
-        if algorithm.actor.uses_guess:
-            net["guess"] = algorithm.actor.guess
-            if config.net == "glimpses":
-                net["objects"] = algorithm.actor.objects
-        else:
+        if not actor.acts_on_prediction:
             weights = {k: w for k, w in weights.items() if not k.startswith("guess/")}
-        if algorithm.actor.choices:
-            net["choices"] = algorithm.actor.choices
-        if getattr(algorithm, "recall", None) is not None:
-            net["recall"] = algorithm.recall.card()
+        if actor.bins:
+            net["choices"] = actor.bins
+        if memory is not None:
+            net["recall"] = memory.card()
         own = dict(depends)
         card = {"format": FORMAT_VERSION, "depends": own, "digest": digest(own), "net": net, **made}
-        moments: Moments = jax.device_get(learner.moments)
+        moments: RunningStats = jax.device_get(learner.moments)
         mean, deviation = (np.asarray(a) for a in moments.scales(len(moments.mean)))
-        hidden = (mean[size:], deviation[size:]) if algorithm.actor.uses_guess else None
+        hidden = (mean[size:], deviation[size:]) if actor.acts_on_prediction else None
         return cls(card, weights, mean[:size], deviation[:size], hidden)
 
     def save(self, file: str | os.PathLike) -> None:
@@ -192,24 +194,25 @@ class Policy:
         return mark.hexdigest()
 
     @property
-    def recall(self) -> Recall | None:
+    def memory(self) -> ObjectMemory | None:
         """What it remembers; None: nothing."""
         card = self.card["net"].get("recall")
-        return None if card is None else Recall.of(card, len(self.mean))
+        return None if card is None else ObjectMemory.of(card, len(self.mean))
 
-    def actor(self, perception: Perception, *, drawn: bool = False) -> Any:
+    def actor(self, perception: Perception, *, sampled: bool = False) -> Any:
         """A pure function from observations by name to actions [W, n], of a policy that remembers nothing.
 
         Args:
-          drawn: actions are drawn from the policy's distribution, and the function takes a key, too; else they are the
-            middle of it, or the likeliest.
+          sampled: actions are sampled from the policy's distribution, and the function takes a key, too; else they are
+            its mode.
 
         Raises:
           Ig2mjError: it remembers something.
         """
-        if self.recall is not None:
-            raise Ig2mjError("this policy remembers what it saw: its actions do not follow from what is seen now alone")
-        play = self.player(perception, drawn=drawn)
+        if self.memory is not None:
+            words = "this policy has a memory: its actions do not follow from the observation alone (Policy.player)"
+            raise Ig2mjError(words)
+        play = self.player(perception, sampled=sampled)
 
         def act(obs: Mapping[str, Array], key: Array | None = None) -> Array:
             worlds = next(iter(obs.values())).shape[0]
@@ -217,45 +220,45 @@ class Policy:
 
         return act
 
-    def player(self, perception: Perception, *, drawn: bool = False) -> Any:
+    def player(self, perception: Perception, *, sampled: bool = False) -> Any:
         """A pure function from observations by name, what is remembered [W, m], in which worlds an episode begins [W],
-        and a key where actions are `drawn`, to actions [W, n] and what is remembered from then on. m is 0 for a policy
-        that remembers nothing (`recall`).
+        and a key where actions are `sampled`, to actions [W, n] and what is remembered from then on. m is 0 without a
+        `memory`.
 
         It also takes `parameters` instead of the policy's own: as constants they would make another program of each
         policy."""
-        depends, net, recall = self.card["depends"], self.card["net"], self.recall
+        depends, net, memory = self.card["depends"], self.card["net"], self.memory
         shape = depends["picture"] and tuple(depends["picture"])
-        sizes, more = tuple(net["sizes"]), (net.get("guess", 0), net.get("choices", 0), net.get("objects", 0))
-        network = Actor(len(depends["actions"]), sizes, shape, net["net"], *more)
+        glimpsing = shape and net["net"] == glimpses.NAME
+        encoder = glimpses.encoder_from_card(net, shape) if glimpsing else conv_encoder(shape, net["net"])
+        network = Actor(len(depends["actions"]), tuple(net["sizes"]), encoder, net.get("choices", 0))
         size, mine = perception.actor_size, self.parameters()
 
-        def heads(vector: Array, picture: Array, kept: Array, begins: Array, parameters: Any) -> Any:
+        def heads(vector: Array, image: Array, kept: Array, begins: Array, parameters: Any) -> Any:
             params, *scales = parameters
 
-            def look(*given: Any) -> Any:
+            def apply(*given: Any) -> Any:
                 return network.apply({"params": params}, *given)
 
-            return looked(look, recall, (scales[0], scales[1]), vector, picture, kept, begins)
+            return apply_with_memory(apply, memory, (scales[0], scales[1]), vector, image, kept, begins)
 
-        pixels, remembered = math.prod(shape) if shape else 0, 0 if recall is None else recall.size
+        pixels, remembered = math.prod(shape) if shape else 0, 0 if memory is None else memory.size
         check_play(heads, mine, size, pixels, remembered, self.file)
 
         def play(
             obs: Mapping[str, Array], kept: Array, begins: Array, key: Array | None = None, parameters: Any = mine
         ) -> tuple[Array, Array]:
             seen = perception(obs)
-            (head, log_std, _), kept = heads(seen.vector[:, :size], seen.picture, kept, begins, parameters)
-            if not drawn:
-                return likeliest(head), kept
-            assert key is not None, "a drawn action needs a key"
-            return drawn_from(head, log_std, key), kept
+            (head, log_std, _), kept = heads(seen.vector[:, :size], seen.image, kept, begins, parameters)
+            if not sampled:
+                return mode(head), kept
+            assert key is not None, "a sampled action needs a key"
+            return sample(head, log_std, key), kept
 
         return play
 
     def parameters(self) -> tuple[Any, Array, Array]:
-        """What was learned, as arrays of JAX: weights, and mean and deviation of what the network is told and
-        of what it guesses."""
+        """What was learned, as arrays of JAX: weights, and mean and deviation of what the network sees and predicts."""
         hidden = self.hidden or (np.zeros(0, np.float32), np.zeros(0, np.float32))
         scales = (np.concatenate(pair) for pair in zip((self.mean, self.deviation), hidden, strict=True))
         return jax.tree.map(jnp.asarray, (nested(self.weights), *scales))

@@ -13,13 +13,16 @@ import numpy as np
 from ig2mj.envs.names import refuse_path
 from ig2mj.errors import Ig2mjError, InputError
 from ig2mj.files.npz import refuse_nonfinite
-from ig2mj.learn.recall import POSE
+from ig2mj.learn.occlusion.object_memory import POSE
 
 Count = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
 Width = Annotated[int, msgspec.Meta(ge=1, le=100_000)]
 Name = Annotated[str, msgspec.Meta(max_length=1000)]
 
 _FIX = "`ig2mj train` writes policies"
+
+REMOVED = ("paper", "places")
+"""Encoders of version 0.1 that no policy that ships uses."""
 
 
 class _Depends(msgspec.Struct):
@@ -32,9 +35,10 @@ class _Depends(msgspec.Struct):
     picture: tuple[Width, Width, Width] | None
     privileged: list[Name]
     rows: tuple[Count, Count] | None = None
+    depth_range: Annotated[float, msgspec.Meta(gt=0, le=1e6)] | None = None
 
 
-class _Recall(msgspec.Struct):
+class _Memory(msgspec.Struct):
     poses: list[Count]
     grips: list[Count]
     hands: list[Count] = []
@@ -48,7 +52,7 @@ class _Net(msgspec.Struct):
     guess: Count = 0
     choices: Count = 0
     objects: Count = 0
-    recall: _Recall | None = None
+    recall: _Memory | None = None
 
 
 class _Card(msgspec.Struct):
@@ -64,14 +68,17 @@ def check_card(card: Mapping[str, Any], file: object) -> None:
     except (msgspec.ValidationError, RecursionError) as e:
         raise InputError(file, str(e), element="card.json", fix=_FIX) from e
     refuse_path(known.depends.task, file, "card.json: depends.task")
-    recall = known.net.recall
-    if recall is None:
+    if known.net.net in REMOVED or (known.net.net == "glimpses" and not known.net.objects):
+        words = f"its encoder '{known.net.net}' is not supported any more"
+        raise InputError(file, words, element="card.json: net", fix="ig2mj 0.1.0 reads it")
+    memory = known.net.recall
+    if memory is None:
         return
     width, guess = sum(known.depends.vector.values()), known.net.guess
-    fits = all(k < guess for k in recall.poses) and all(k < width for k in (*recall.grips, *recall.hands))
-    if recall.hands:
-        fits &= len(recall.hands) == len(recall.grips) and POSE * len(recall.places) == len(recall.poses)
-        fits &= all(k + 6 <= width for k in recall.hands)
+    fits = all(k < guess for k in memory.poses) and all(k < width for k in (*memory.grips, *memory.hands))
+    if memory.hands:
+        fits &= len(memory.hands) == len(memory.grips) and POSE * len(memory.places) == len(memory.poses)
+        fits &= all(k + 6 <= width for k in memory.hands)
     if not fits:
         raise InputError(file, "what it remembers does not fit together", element="card.json: net.recall", fix=_FIX)
 
@@ -94,7 +101,7 @@ def check_play(play: Callable[..., Any], parameters: Any, vector: int, picture: 
     """Traces one step of a policy and raises InputError where its arrays do not fit its card.
 
     Args:
-      play: from a vector [1, x], a picture [1, q] of bytes, what is remembered [1, m], whether an episode begins [1],
+      play: from a vector [1, x], a image [1, q] of bytes, what is remembered [1, m], whether an episode begins [1],
         and `parameters`. vector, picture, kept: x, q, m. file: the policy's, for the message.
     """
     rows = (((1, vector), jnp.float32), ((1, picture), jnp.uint8), ((1, kept), jnp.float32), ((1,), jnp.bool_))

@@ -1,10 +1,10 @@
-"""Proximal policy optimization for many worlds, from state or from pixels.
+"""Proximal policy optimization for many worlds, from state or from images.
 
 The value sees the whole vector, `privileged_state` included; the actor sees what `perception` shows it. An action is
-tanh of a Gaussian's sample. Time limits do not end the value: where an episode was cut off, the value of what was seen
-last is added to the reward; where it succeeded, nothing comes after.
+tanh of a Gaussian's sample. Time limits do not end the value: where an episode was cut off, the value of the last
+observation counts; after success nothing comes.
 
-An iteration is `length` steps of all worlds, then `epochs` passes over them in `parts` minibatches.
+An iteration is `rollout_length` steps of all worlds, then `epochs` passes over them in `minibatches` parts.
 
 Axes: W worlds, T steps, B samples, n numbers of an action, v of a vector.
 """
@@ -23,39 +23,41 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.engine.view import Array
 from ig2mj.learn.adam import averaged_adam
 from ig2mj.learn.collect import Advice, Transition, if_ready
-from ig2mj.learn.moments import Moments, RewardScale, average
-from ig2mj.learn.networks import Actor, Value, shifted
+from ig2mj.learn.networks import Actor, Value, conv_encoder, shifted
 from ig2mj.learn.perception import Perception, Seen, blank
+from ig2mj.learn.running_stats import RewardScale, RunningStats, average
+from ig2mj.learn.settings import old_names_work
 from ig2mj.process import entry_point
 
 
+@old_names_work
 @dataclasses.dataclass(frozen=True)
 class PPOConfig:
-    """Settings; `ig2mj train --set name=value` changes them.
+    """Settings.
 
     Attributes:
-      length: steps of the worlds in an iteration. epochs: passes over them. parts: minibatches of a pass.
-      gamma: discount of a step (1/10 s). smooth: lambda of the advantages (GAE).
-      clip: how far the ratio of new and old chances counts. value: weight of the value's loss.
-      entropy: weight of the entropy. guess: of the actor's guess of the privileged state, from pixels.
-      lr: learning rate, falling to `last_lr` linearly over the run.
-      actor, critic: sizes of the layers. net: encoder ("small" or "paper").
+      rollout_length: steps of the worlds in an iteration. epochs: passes over them. minibatches: of a pass.
+      gamma: discount of a step (1/10 s). gae_lambda: of the advantages (GAE).
+      clip_ratio: how far the ratio of new and old probabilities counts. value_coef: weight of the value's loss.
+      entropy_coef: of the entropy. aux_coef: of the privileged prediction's loss.
+      lr: learning rate, falling to `final_lr` linearly over the run.
+      actor_layers, critic_layers: sizes. encoder: of images (`ig2mj.learn.networks.ENCODERS`).
     """
 
-    length: int = 32
+    rollout_length: int = 32
     epochs: int = 4
-    parts: int = 16
+    minibatches: int = 16
     gamma: float = 0.97
-    smooth: float = 0.95
-    clip: float = 0.2
-    value: float = 0.5
-    entropy: float = 1e-3
-    guess: float = 0.5
+    gae_lambda: float = 0.95
+    clip_ratio: float = 0.2
+    value_coef: float = 0.5
+    entropy_coef: float = 1e-3
+    aux_coef: float = 0.5
     lr: float = 5e-4
-    last_lr: float = 1e-4
-    actor: tuple[int, ...] = (256, 256, 256)
-    critic: tuple[int, ...] = (256, 256, 256)
-    net: str = "small"
+    final_lr: float = 1e-4
+    actor_layers: tuple[int, ...] = (256, 256, 256)
+    critic_layers: tuple[int, ...] = (256, 256, 256)
+    encoder: str = "small"
 
 
 @struct.dataclass
@@ -65,12 +67,12 @@ class PPOLearner:
     actor: Any
     value: Any
     opt: Any
-    moments: Moments
+    moments: RunningStats
     updates: Int[Array, ""]
 
 
 @struct.dataclass
-class PPOMemory:
+class PPOBuffers:
     """What belongs to the worlds of a device."""
 
     scale: RewardScale
@@ -91,7 +93,7 @@ class Minibatch:
 class PPO:
     """See the module's text. All methods are pure."""
 
-    name, hint = "ppo", None
+    name, adviser = "ppo", None
 
     def __init__(
         self, perception: Perception, action_size: int, config: PPOConfig | None = None, axis: str | None = None
@@ -99,24 +101,24 @@ class PPO:
         """`axis`: the name of an axis of devices over which gradients are averaged."""
         self.perception, self.action_size, self.axis = perception, action_size, axis
         self.config = c = config or PPOConfig()
-        guess = perception.hidden.size if perception.hidden and c.guess else 0
-        self.actor = Actor(action_size, c.actor, perception.picture_shape, c.net, guess, objects=perception.objects)
-        self.value = Value(c.critic)
+        predictions = perception.targets.size if perception.targets and c.aux_coef else 0
+        self.actor = Actor(action_size, c.actor_layers, conv_encoder(perception.image_shape, c.encoder, predictions))
+        self.value = Value(c.critic_layers)
         self._adam = averaged_adam(1.0, axis, eps=1e-5)
 
     @property
     def length(self) -> int:
         """Steps of an iteration."""
-        return self.config.length
+        return self.config.rollout_length
 
     def warm_up(self, resumed: bool) -> int:
         """Iterations without updates: the means of observations are those of a policy that does not change."""
         return 2 if resumed else 3
 
     @property
-    def samples(self) -> int:
+    def updates(self) -> int:
         """Updates of an iteration."""
-        return self.config.epochs * self.config.parts
+        return self.config.epochs * self.config.minibatches
 
     # What there is at first.
 
@@ -124,33 +126,35 @@ class PPO:
         """Untrained."""
         seen, p = blank(self.perception, 1), self.perception
         actor_key, value_key = jax.random.split(key)
-        actor = self.actor.init(actor_key, seen.vector[:, : p.actor_size], seen.picture)["params"]
+        actor = self.actor.init(actor_key, seen.vector[:, : p.actor_size], seen.image)["params"]
         value = self.value.init(value_key, seen.vector)["params"]
-        return PPOLearner(actor, value, self._adam.init((actor, value)), Moments.initial(p.vector_size), jnp.int32(0))
+        return PPOLearner(
+            actor, value, self._adam.init((actor, value)), RunningStats.initial(p.vector_size), jnp.int32(0)
+        )
 
-    def memory(self, num_worlds: int) -> PPOMemory:
+    def buffer(self, num_worlds: int) -> PPOBuffers:
         """Nothing is replayed."""
-        return PPOMemory(RewardScale.initial(num_worlds))
+        return PPOBuffers(RewardScale.initial(num_worlds))
 
-    def noise(self, num_worlds: int) -> None:
-        """Noise of a step has nothing to do with that of the one before."""
+    def acting_state(self, num_worlds: int) -> None:
+        """The noise of a step does not depend on the one before."""
 
     # How it acts.
 
     def act(
-        self, learner: PPOLearner, noise: None, seen: Seen, key: Array, advice: Advice | None = None
+        self, learner: PPOLearner, acting: None, seen: Seen, key: Array, advice: Advice | None = None
     ) -> tuple[Float[Array, "W n"], dict[str, Array], None]:
         """Actions, with what is needed to learn from them."""
         mean, log_std, _ = self._look(learner.actor, learner.moments, seen)
         raw = mean + jnp.exp(log_std) * jax.random.normal(key, mean.shape)
         return jnp.tanh(raw), {"raw": raw, "chance": chance(raw, mean, log_std)}, None
 
-    def _look(self, actor: Any, moments: Moments, seen: Seen) -> tuple[Array, Array, Array]:
+    def _look(self, actor: Any, moments: RunningStats, seen: Seen) -> tuple[Array, Array, Array]:
         own = moments.normal(seen.vector[..., : self.perception.actor_size])
-        looked: Any = self.actor.apply({"params": actor}, own, seen.picture)
-        return looked
+        output: Any = self.actor.apply({"params": actor}, own, seen.image)
+        return output
 
-    def _worth(self, value: Any, moments: Moments, vector: Float[Array, "T W v"]) -> Float[Array, "T W"]:
+    def _worth(self, value: Any, moments: RunningStats, vector: Float[Array, "T W v"]) -> Float[Array, "T W"]:
         flat = moments.normal(vector).reshape(math.prod(vector.shape[:-1]), vector.shape[-1])
         found: Any = self.value.apply({"params": value}, flat)
         return found.reshape(vector.shape[:-1])
@@ -160,36 +164,36 @@ class PPO:
     def learn(
         self,
         learner: PPOLearner,
-        memory: PPOMemory,
+        buffers: PPOBuffers,
         rollout: Transition,
         key: Array,
         progress: Float[Array, ""],
         ready: Bool[Array, ""],
-    ) -> tuple[PPOLearner, PPOMemory, dict[str, Array]]:
+    ) -> tuple[PPOLearner, PPOBuffers, dict[str, Array]]:
         """All epochs over a rollout.
 
         Args:
           progress: share of the run that is over. ready: without it only the observations' means are updated.
         """
         c = self.config
-        memory = PPOMemory(memory.scale.update(rollout.reward, rollout.done, c.gamma, self.axis))
-        factor = memory.scale.factor(jnp.inf)
+        buffers = PPOBuffers(buffers.scale.update(rollout.reward, rollout.done, c.gamma, self.axis))
+        factor = buffers.scale.factor(jnp.inf)
         worth = self._worth(learner.value, learner.moments, rollout.seen.vector)
         after = self._worth(learner.value, learner.moments, rollout.after.vector)
         advantage = advantages(
-            rollout.reward * factor, worth, after, rollout.terminated, rollout.done, c.gamma, c.smooth
+            rollout.reward * factor, worth, after, rollout.terminated, rollout.done, c.gamma, c.gae_lambda
         )
         mean, square = average((advantage.mean(), jnp.square(advantage).mean()), self.axis)
         even = (advantage - mean) / jnp.sqrt(jnp.maximum(square - mean**2, 0.0) + 1e-8)
         rows = Minibatch(rollout.seen, rollout.extra["raw"], rollout.extra["chance"], even, advantage + worth)
         count = rollout.reward.size
         rows = jax.tree.map(lambda a: a.reshape(count, *a.shape[2:]), rows)
-        rate = c.lr + (c.last_lr - c.lr) * jnp.clip(progress, 0, 1)
-        size = max(count // c.parts, 1)
+        rate = c.lr + (c.final_lr - c.lr) * jnp.clip(progress, 0, 1)
+        size = max(count // c.minibatches, 1)
 
         def epoch(learner: PPOLearner, key: Array) -> tuple[PPOLearner, dict[str, Array]]:
             order_key, part_key = jax.random.split(key)
-            order = jax.random.permutation(order_key, count)[: c.parts * size].reshape(-1, size)
+            order = jax.random.permutation(order_key, count)[: c.minibatches * size].reshape(-1, size)
 
             def part(learner: PPOLearner, drawn: tuple[Array, Array]) -> tuple[PPOLearner, dict[str, Array]]:
                 return self._update(learner, jax.tree.map(lambda a: a[drawn[0]], rows), drawn[1], rate)
@@ -202,32 +206,32 @@ class PPO:
 
         learner, losses = if_ready(ready, epochs, learner)
         learner = dataclasses.replace(learner, moments=learner.moments.update(rollout.seen.vector, self.axis))
-        extra = {"reward_scale": factor, "updates": ready * jnp.float32(self.samples)}
-        return learner, memory, {**losses, **extra}
+        extra = {"reward_scale": factor, "updates": ready * jnp.float32(self.updates)}
+        return learner, buffers, {**losses, **extra}
 
     def _update(
         self, learner: PPOLearner, batch: Minibatch, key: Array, rate: Array
     ) -> tuple[PPOLearner, dict[str, Array]]:
         c, p = self.config, self.perception
         seen, normal = batch.seen, learner.moments.normal(batch.seen.vector)
-        if p.picture_shape is not None:
-            seen = Seen(seen.vector, shifted(seen.picture, p.picture_shape, key))
+        if p.image_shape is not None:
+            seen = Seen(seen.vector, shifted(seen.image, p.image_shape, key))
 
         def loss(params: tuple[Any, Any]) -> tuple[Array, dict[str, Array]]:
-            mean, log_std, guess = self._look(params[0], learner.moments, seen)
+            mean, log_std, prediction = self._look(params[0], learner.moments, seen)
             change = chance(batch.raw, mean, log_std) - batch.chance
             ratio = jnp.exp(change)
-            kept = jnp.clip(ratio, 1 - c.clip, 1 + c.clip)
+            kept = jnp.clip(ratio, 1 - c.clip_ratio, 1 + c.clip_ratio)
             actor = -jnp.minimum(ratio * batch.advantage, kept * batch.advantage).mean()
             worth: Any = self.value.apply({"params": params[1]}, normal)
             value = jnp.square(worth - batch.wanted).mean()
             entropy = (log_std + 0.5 * math.log(2 * math.pi * math.e)).sum(-1).mean()
-            total = actor + c.value * value - c.entropy * entropy
+            total = actor + c.value_coef * value - c.entropy_coef * entropy
             found = {"actor_loss": actor, "critic_loss": value, "entropy": entropy}
             found["divergence"] = (ratio - 1 - change).mean()
-            if p.hidden is not None and guess.shape[-1]:
-                found["guess_loss"] = p.hidden.loss(guess, batch.seen.vector, normal)
-                total += c.guess * found["guess_loss"]
+            if p.targets is not None and prediction.shape[-1]:
+                found["prediction_loss"] = p.targets.loss(prediction, batch.seen.vector, normal)
+                total += c.aux_coef * found["prediction_loss"]
             return total, found
 
         params = learner.actor, learner.value

@@ -3,7 +3,7 @@
 A ring of T steps of W worlds. What was seen after a step is kept beside what was seen before it: where an episode was
 cut off, the two neighbours in the ring are of different episodes, and the value of the last state is still needed.
 
-Axes: T steps, W worlds, B samples, n numbers of an action, v of a vector, q bytes of a picture.
+Axes: T steps, W worlds, B samples, n numbers of an action, v of a vector, q bytes of a image.
 """
 
 from __future__ import annotations
@@ -44,13 +44,13 @@ class Replay:
     that is written next. `size`: rows that are full."""
 
     vector: Float[Array, "T W v"]
-    picture: UInt8[Array, "T W q"]
+    image: UInt8[Array, "T W q"]
     action: Float[Array, "T W n"]
     reward: Float[Array, "T W"]
     terminated: Bool[Array, "T W"]
     truncated: Bool[Array, "T W"]
     after_vector: Float[Array, "T W v"]
-    after_picture: UInt8[Array, "T W q"]
+    after_image: UInt8[Array, "T W q"]
     label: Float[Array, "T W l"]
     head: Int[Array, ""]
     size: Int[Array, ""]
@@ -58,21 +58,20 @@ class Replay:
     @classmethod
     def empty(cls, steps: int, worlds: int, perception: Perception, action_size: int, label_size: int = 0) -> Replay:
         """Room for so many steps of so many worlds. `label_size`: numbers of an expert's action, 0 without one."""
-        shape = perception.picture_shape
-        bytes_ = 0 if shape is None else shape[0] * shape[1] * shape[2]
+        bytes_ = perception.image_bytes
 
         def zeros(*tail: int, dtype: type = jnp.float32) -> Array:
             return jnp.zeros((steps, worlds, *tail), dtype)
 
         return cls(
             vector=zeros(perception.vector_size),
-            picture=zeros(bytes_, dtype=jnp.uint8),
+            image=zeros(bytes_, dtype=jnp.uint8),
             action=zeros(action_size),
             reward=zeros(),
             terminated=zeros(dtype=jnp.bool_),
             truncated=zeros(dtype=jnp.bool_),
             after_vector=zeros(perception.vector_size),
-            after_picture=zeros(bytes_, dtype=jnp.uint8),
+            after_image=zeros(bytes_, dtype=jnp.uint8),
             label=zeros(label_size),
             head=jnp.int32(0),
             size=jnp.int32(0),
@@ -84,13 +83,13 @@ class Replay:
         count = demos.reward.shape[0]
         columns = {
             "vector": demos.seen.vector,
-            "picture": demos.seen.picture,
+            "image": demos.seen.image,
             "action": demos.action,
             "reward": demos.reward,
             "terminated": demos.terminated,
             "truncated": demos.truncated,
             "after_vector": demos.after.vector,
-            "after_picture": demos.after.picture,
+            "after_image": demos.after.image,
             "label": demos.label if labelled else demos.label[:, :0],
         }
         one = {name: a.reshape(count, 1, *a.shape[1:]) for name, a in columns.items()}
@@ -112,13 +111,13 @@ class Replay:
         return dataclasses.replace(
             self,
             vector=put(self.vector, rollout.seen.vector),
-            picture=put(self.picture, rollout.seen.picture),
+            image=put(self.image, rollout.seen.image),
             action=put(self.action, rollout.action),
             reward=put(self.reward, rollout.reward),
             terminated=put(self.terminated, rollout.terminated),
             truncated=put(self.truncated, rollout.truncated),
             after_vector=put(self.after_vector, rollout.after.vector),
-            after_picture=put(self.after_picture, rollout.after.picture),
+            after_image=put(self.after_image, rollout.after.image),
             label=put(self.label, rollout.extra["label"]) if self.label.shape[-1] else self.label,
             head=(self.head + length) % self.capacity,
             size=jnp.minimum(self.size + length, self.capacity),
@@ -145,10 +144,10 @@ class Replay:
         last = rows[jnp.arange(count), taken - 1]
         ends = self.terminated[last, world]
         return Sample(
-            seen=Seen(self.vector[row, world], self.picture[row, world]),
+            seen=Seen(self.vector[row, world], self.image[row, world]),
             action=self.action[row, world],
             reward=(running * rewards * discounts).sum(1),
             discount=jnp.where(ends, 0.0, gamma ** taken.astype(jnp.float32)),
-            after=Seen(self.after_vector[last, world], self.after_picture[last, world]),
+            after=Seen(self.after_vector[last, world], self.after_image[last, world]),
             label=self.label[row, world],
         )

@@ -25,13 +25,15 @@ import numpy as np
 from ig2mj.cluster.team import Team
 from ig2mj.errors import Ig2mjError
 from ig2mj.learn.checkpoints import TAKEN, Checkpoints, newest, only_run, same, whole
-from ig2mj.learn.collect import TrainingEnv
+from ig2mj.learn.collect import TrainingEnv, horizon_of
 from ig2mj.learn.iteration import Algorithm, ManyDevices, OneDevice
 from ig2mj.learn.log import Log
 from ig2mj.learn.progress import EPISODES, Window
+from ig2mj.learn.settings import old_names_work
 from ig2mj.process import entry_point
 
 
+@old_names_work
 @dataclasses.dataclass(frozen=True)
 class Run:
     """A run.
@@ -40,7 +42,7 @@ class Run:
       minutes: of the run's clock. iterations: at most so many; None: until the time is over.
       seed: of everything random. out: folder of reports and checkpoints; None: nothing is kept.
       resume: go on from the newest checkpoint in `out`. save_buffer: checkpoints hold the replay buffer, too.
-      checkpoint_every, log_every: seconds. until: stop once so large a share of the last episodes succeeds.
+      checkpoint_every, log_every: seconds. stop_at_success: stop once so large a share of the last episodes succeeds.
       programs: 1 or 2: of an iteration on a pure engine.
       quiet: nothing on the terminal.
     """
@@ -53,7 +55,7 @@ class Run:
     save_buffer: bool = False
     checkpoint_every: float = 60.0
     log_every: float = 5.0
-    until: float | None = None
+    stop_at_success: float | None = None
     programs: int = 1
     quiet: bool = False
 
@@ -122,14 +124,14 @@ class _Training:
         self.step: Any = (
             ManyDevices(env, algorithm, devices, team) if devices else OneDevice(env, algorithm, run.programs)
         )
-        self.memory = self.step.memory()
+        self.buffer = self.step.buffer()
         self.checkpoints = Checkpoints(run.out) if run.out is not None else None
         self.log = Log(run.out if team.first else None, quiet=run.quiet or not team.first, minutes=run.minutes)
         self.clock, self.iteration, self.env_steps = 0.0, 0, 0
         resumed = self._resume() if run.resume else self._begin()
         self.waiting = 2 if resumed and run.save_buffer else algorithm.warm_up(resumed)
         """Of the iterations of this process the first that learns."""
-        self.horizon = float(getattr(getattr(env, "task", env), "horizon", 0))
+        self.horizon = float(horizon_of(env))
 
     def _begin(self) -> bool:
         kept = self.checkpoints is not None and bool(self.checkpoints.numbers())
@@ -141,27 +143,27 @@ class _Training:
         """Goes on from the newest checkpoint; False: there is none."""
         if self.checkpoints is None:
             raise Ig2mjError("--resume needs --out, the folder of the run")
-        found = newest(self.checkpoints, self._tree(self.memory), self.depends, self.team)
+        found = newest(self.checkpoints, self._tree(self.buffer), self.depends, self.team)
         if found is None:
             if self.team.first and not self.run.quiet:
                 # A scheduler that starts a killed job again needs it to go on; but the folder may be a typo.
                 print(f"{self.run.out}: there is no checkpoint to resume, so the run begins", file=sys.stderr)
             return False
         tree, meta = found
-        self.learner, self.key, self.memory = tree["learner"], tree["key"], tree.get("memory", self.memory)
+        self.learner, self.key, self.buffer = tree["learner"], tree["key"], tree.get("buffer", self.buffer)
         self.clock, self.iteration, self.env_steps = (meta[name] for name in ("seconds", "iteration", "env_steps"))
         self.log.forget_after(self.clock)
         return True
 
-    def _tree(self, memory: Any) -> dict[str, Any]:
+    def _tree(self, buffer: Any) -> dict[str, Any]:
         """What a checkpoint holds."""
-        return {"learner": self.learner, "key": self.key, **({"memory": memory} if self.run.save_buffer else {})}
+        return {"learner": self.learner, "key": self.key, **({"buffer": buffer} if self.run.save_buffer else {})}
 
     def _save(self) -> None:
         """Writes a checkpoint; all processes of a team take part where it holds their replay buffers."""
         if self.checkpoints is None:
             return
-        tree = self._tree(whole(self.memory, self.team) if self.run.save_buffer else None)
+        tree = self._tree(whole(self.buffer, self.team) if self.run.save_buffer else None)
         if self.team.first:
             meta = {"seconds": self.clock, "iteration": self.iteration, "env_steps": self.env_steps}
             self.checkpoints.save(self.iteration, tree, {**meta, "depends": self.depends})
@@ -169,7 +171,7 @@ class _Training:
     def until_stopped(self, kept: Callable[[Any, dict[str, Any]], None], compiled: Callable[[], None]) -> Result:
         """Iterations until the run is over; see `train`."""
         run, team, worlds = self.run, self.team, self.step.num_worlds
-        self.learner, self.memory = self.step.place(same(self.learner, team), self.memory)
+        self.learner, self.buffer = self.step.place(same(self.learner, team), self.buffer)
         with team.turns():
             play = self.step.begin(run.seed + self.iteration)  # a resumed run has other starts
         zero = logged = time.monotonic()  # `zero`: when the clock was 0
@@ -223,8 +225,8 @@ class _Training:
         progress = min(self.clock / (self.run.minutes * 60), 1.0)
         if self.run.iterations is not None:
             progress = max(progress, self.iteration / self.run.iterations)
-        self.learner, self.memory, play, sums, losses, spent = self.step(
-            self.learner, self.memory, play, now, progress, learns, self.clock
+        self.learner, self.buffer, play, sums, losses, spent = self.step(
+            self.learner, self.buffer, play, now, progress, learns, self.clock
         )
         self.iteration += 1
         self.env_steps += int(sums["steps"])
@@ -234,13 +236,13 @@ class _Training:
         """Why the run is over: "iterations", "solved" or "time"; None: it goes on. `clock`: the team's."""
         if self.run.iterations is not None and self.iteration >= self.run.iterations:
             return "iterations"
-        if self.run.until is not None and window.solved(self.run.until):
+        if self.run.stop_at_success is not None and window.solved(self.run.stop_at_success):
             return "solved"
         return "time" if clock >= self.run.minutes * 60 else None
 
 
 def _guard(losses: dict[str, float], checkpoints: Checkpoints | None) -> None:
-    """Raises Ig2mjError for numbers that are lost."""
+    """Raises Ig2mjError where a loss or a weight is not finite."""
     lost = [name for name, value in losses.items() if not math.isfinite(value)]
     whole = losses.pop("all_finite")
     if not lost and whole:

@@ -15,7 +15,7 @@ from ig2mj.states.particles import NUM_PARTICLES
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.points import locator
 from ig2mj.tasks.reward import TERMS, Measures, Reward
-from ig2mj.tasks.task import GROUND, Task
+from ig2mj.tasks.task import Task
 
 DEGREES = 100.0
 """Celsius that are 1 in `privileged_state`."""
@@ -29,10 +29,10 @@ class ActivityObjective:
     def __init__(self, task: Task, robot: str, scene: Scene, model: StateModel):
         """Raises UnknownNameError, AbilityError: the task does not fit the scene."""
         self.reward = Reward(task, robot, scene, model)
-        self._ground = np.flatnonzero(np.isin(np.array(scene.tables.object_categories), GROUND))
         self._objects = np.array([scene.object_index(name) for name in task.objects_of_interest])
         self._ends = [locator(end, scene, model) for _, end in task.points(robot)]
-        self.vectors = {"privileged_state": _privileged_names(task, robot)}
+        self.vectors = {"privileged_state": privileged_names(task, robot)}
+        self.outcomes = ("success_in_hand", *(("lifted_by_all",) if len(self.reward.hands) > 1 else ()))
 
     def measure(
         self,
@@ -53,15 +53,18 @@ class ActivityObjective:
         return holds, jnp.zeros_like(holds)
 
     def info(self, view: PhysicsView, now: Measures, status: GoalStatus) -> dict[str, Array]:
-        by_all = self.reward.holding(view).all(1)
+        by_all, success = self.reward.holding(view).all(1), jnp.asarray(status.holds)
         found = {
-            "success_in_hand": jnp.asarray(status.holds) & by_all,
+            "success_in_hand": success & by_all,
             "goal_progress": jnp.asarray(status.fraction, jnp.float32),
             "held": now.held,
         }
-        if len(self.reward.hands) > 1:
-            stands = jnp.asarray(view.touching)[:, self._objects[0]][:, self._ground]
-            found |= {"held_by_all": by_all, "off_floor": ~stands.any(1)}
+        if now.lift is not None:
+            found |= {
+                "held_by_all": by_all,
+                "off_floor": now.lift.off_floor,
+                "lifted_by_all": success & now.lift.by_all,
+            }
         return found
 
     def observe(
@@ -108,7 +111,8 @@ class ActivityObjective:
         return {"privileged_state": jnp.concatenate(columns, axis=1)}
 
 
-def _privileged_names(task: Task, robot: str) -> tuple[str, ...]:
+def privileged_names(task: Task, robot: str) -> tuple[str, ...]:
+    """What each number of `privileged_state` means."""
     hands = [f"hand_{h}" for h in task.acts(robot).hands]
     moving = [*(f"pos_{a}" for a in "xyz"), *(f"quat_{a}" for a in "wxyz"), *(f"velocity_{a}" for a in "xyz")]
     objects, distances = task.objects_of_interest, range(len(task.distances))

@@ -24,11 +24,16 @@ class Objective(Protocol):
 
     Attributes:
       terms: names of the terms that the reward is the sum of.
+      outcomes: names in `info` of what is reported of an episode when it ends, besides success: booleans [W], whose
+        mean over episodes `ig2mj rollout`, `evaluate` and `train` report.
       vectors: observations that it makes, such as "privileged_state", and what each of their numbers means.
     """
 
     @property
     def terms(self) -> tuple[str, ...]: ...
+
+    @property
+    def outcomes(self) -> tuple[str, ...]: ...
 
     @property
     def vectors(self) -> Mapping[str, tuple[str, ...]]: ...

@@ -23,9 +23,26 @@ from ig2mj.states.definitions import stain
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.points import locator
-from ig2mj.tasks.task import Task
+from ig2mj.tasks.task import GROUND, Task
 
 TERMS = ("goal", "distance", "pickup", "stains")
+
+
+@struct.dataclass
+class Lift:
+    """How an object left the floor.
+
+    Attributes:
+      off_floor: it does not stand on the floor now. by_all: all acting hands held it when it last left the floor.
+    """
+
+    off_floor: Bool[Array, "W"]
+    by_all: Bool[Array, "W"]
+
+    def after(self, off_floor: Bool[Array, "W"], held_by_all: Bool[Array, "W"]) -> Lift:
+        """After another step."""
+        leaves = off_floor & ~self.off_floor
+        return Lift(off_floor, (leaves & held_by_all) | (~leaves & self.by_all))
 
 
 @struct.dataclass
@@ -35,12 +52,14 @@ class Measures:
     Attributes:
       literals: of the goal that hold (their share, where the weights say so). distances: m.
       held: the first object is in an acting hand. stains: that are left.
+      lift: of the first object, where two hands act; else None.
     """
 
     literals: Float[Array, "W"]
     distances: Float[Array, "W D"]
     held: Bool[Array, "W"]
     stains: Float[Array, "W"]
+    lift: Lift | None = None
 
 
 class Reward:
@@ -54,6 +73,7 @@ class Reward:
         own = np.flatnonzero(scene.tables.hand_agent == 0)
         self.hands = own[np.array(acts.hands, int)]
         self._first = scene.object_index(task.objects_of_interest[0])
+        self._ground = np.flatnonzero(np.isin(np.array(scene.tables.object_categories), GROUND))
         self._stain_row = None if task.stains_of is None else stain.row_of(model, scene.object_index(task.stains_of))
 
     def measure(
@@ -74,7 +94,18 @@ class Reward:
         stains = jnp.zeros(share.shape[0], jnp.float32)
         if self._stain_row is not None:
             stains = jnp.asarray(states.stain.alive)[:, self._stain_row].sum(-1).astype(jnp.float32)
-        return Measures(share * count, jnp.stack(distances, axis=-1), jnp.any(self.holding(view), axis=1), stains)
+        held = self.holding(view)
+        lift = None if len(self.hands) < 2 else self._lift(view, held, None if before is None else before.lift)
+        return Measures(share * count, jnp.stack(distances, axis=-1), jnp.any(held, axis=1), stains, lift)
+
+    def _lift(self, view: PhysicsView, held: Bool[Array, "W H"], before: Lift | None) -> Lift:
+        """How the first object left the floor; `before` is of the step before, None at the start of episodes."""
+        off_floor = ~jnp.asarray(view.touching)[:, self._first][:, self._ground].any(1)
+        return (
+            Lift(off_floor, jnp.zeros_like(off_floor))
+            if before is None
+            else before.after(off_floor, jnp.all(held, axis=1))
+        )
 
     def holding(self, view: PhysicsView) -> Bool[Array, "W H"]:
         """Which acting hands hold the first object."""

@@ -170,6 +170,8 @@ class Task:
     # Not in the text that recordings know a task by: where it applies, it shows in `objects` and `near`.
     physical: Physical | None = dataclasses.field(default=None, repr=False)
     expert: Plan | None = dataclasses.field(default=None, repr=False)
+    depth_range: ClassVar[float] = 3.0
+    """m from the camera within which everything lies that matters: an arm's reach and the furniture around it."""
 
     def acts(self, robot: str) -> Acts:
         """How a robot takes part. Raises UnknownNameError."""

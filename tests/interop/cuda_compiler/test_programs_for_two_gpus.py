@@ -45,7 +45,7 @@ from ig2mj.learn.collect import Seen, Transition
 from ig2mj.learn.iteration import AXIS, ManyDevices
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.sac import SAC, SACConfig
-from ig2mj.learn.solid import solid, solid_specs
+from ig2mj.learn.nonempty_leaves import solid, nonempty_specs
 
 @dataclasses.dataclass
 class Space:
@@ -58,12 +58,12 @@ class Env:
 
 vectors = {"proprioception": Space((8,)), "privileged_state": Space((5,))}
 pictures = {"rgb": Space((64, 64, 3), np.uint8), "depth": Space((64, 64, 1))} if MODE == "rgbd" else {}
-config = SACConfig(updates=4, batch=64, capacity=4000, actor=(32,), critic=(32,), atoms=21)
+config = SACConfig(utd_ratio=4, batch_size=64, buffer_size=4000, actor_layers=(32,), critic_layers=(32,), num_atoms=21)
 sac = SAC(Perception({**vectors, **pictures}, MODE), 2, config, AXIS)
 many = ManyDevices(Env(), sac, devices)
-memory, learner = jax.eval_shape(lambda: sac.memory(64)), jax.eval_shape(lambda: sac.init(jax.random.PRNGKey(0)))
+memory, learner = jax.eval_shape(lambda: sac.buffer(64)), jax.eval_shape(lambda: sac.init(jax.random.PRNGKey(0)))
 shape = lambda *s, dtype=jnp.float32: jax.ShapeDtypeStruct((sac.length, 64, *s), dtype)
-pixels = 0 if sac.perception.picture_shape is None else int(np.prod(sac.perception.picture_shape))
+pixels = 0 if sac.perception.image_shape is None else int(np.prod(sac.perception.image_shape))
 seen = Seen(shape(sac.perception.vector_size), shape(pixels, dtype=jnp.uint8))
 over = shape(dtype=jnp.bool_)
 rollout = Transition(seen, shape(2), {}, shape(), over, over, seen)
@@ -72,7 +72,7 @@ mesh, whole, each = many._mesh, P(), P(AXIS)
 program = many._program(learner, memory, rollout, sums)
 leaves = []
 for tree, specs in ((learner, whole), (memory, many._memory_specs), (rollout, P(None, AXIS)), (sums, each)):
-    leaves.append([placed(a, spec, mesh) for a, spec in zip(solid(tree), solid_specs(tree, specs))])
+    leaves.append([placed(a, spec, mesh) for a, spec in zip(solid(tree), nonempty_specs(tree, specs))])
 rest = [placed(jax.ShapeDtypeStruct(s, t), spec, mesh) for s, t, spec in
         (((2, 2), jnp.float32, each), ((2,), jnp.uint32, whole), ((), jnp.bool_, whole))]
 program.lower(*leaves, *rest).compile()
@@ -107,5 +107,5 @@ def test_learning_on_two_gpus_compiles(mode):
 
 
 def test_an_array_without_elements_is_still_too_much_for_the_compiler():
-    """When this fails, XLA is repaired, and `ig2mj.learn.solid` is needed no longer."""
+    """When this fails, XLA is repaired, and `ig2mj.learn.nonempty_leaves` is needed no longer."""
     assert not compiled(EMPTY)

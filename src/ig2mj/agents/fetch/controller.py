@@ -22,6 +22,7 @@ import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float
 
+from ig2mj.agents.base import HandReading
 from ig2mj.agents.controllers import (
     differential_drive,
     drive_limits,
@@ -40,7 +41,7 @@ from ig2mj.agents.fetch.figures import (
     VELOCITY,
     WHEEL_RADIUS,
 )
-from ig2mj.agents.fetch.proprioception import JOINT_NAMES, LISTS, feel
+from ig2mj.agents.fetch.proprioception import HAND_READINGS, JOINT_NAMES, LISTS, feel
 from ig2mj.agents.kinematics import forward, inverse
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.geometry.poses import length, quat_multiply, rotation_vector_to_quat
@@ -105,6 +106,7 @@ class FetchController:
         """Args: start: positions of the joints. proprioception: one of `ig2mj.agents.fetch.proprioception.LISTS`."""
         self.agent, self._period, self._start = agent, period, np.asarray(start)
         self._list, self.proprioception_names = proprioception, LISTS[proprioception]
+        self.hand_readings: tuple[HandReading, ...] = HAND_READINGS[proprioception]
         name = tables.agent_names[agent]
         self._joints = np.array([tables.agent_joint_names.index(f"{name}_{n}_joint") for n in JOINT_NAMES])
         self._hand = np.flatnonzero(tables.hand_agent == agent)

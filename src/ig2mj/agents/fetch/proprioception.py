@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
+from ig2mj.agents.base import HandReading
 from ig2mj.agents.controllers import sines_and_cosines, wheel_odometry
 from ig2mj.agents.fetch.figures import (
     ARM,
@@ -56,6 +57,12 @@ EXPERIMENTS = (
 """That of the experiments with activities."""
 
 LISTS = {"default": DEFAULT, "experiments": EXPERIMENTS}
+
+HAND_READINGS = {
+    "default": (HandReading(DEFAULT.index("grasp_0")),),  # its orientation is a quaternion there
+    "experiments": (HandReading(EXPERIMENTS.index("has_grasped"), EXPERIMENTS.index("eef_0_pos_x")),),
+}
+"""Where the gripper stands in each of the `LISTS`."""
 
 
 def feel(

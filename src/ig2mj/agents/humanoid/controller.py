@@ -22,6 +22,7 @@ import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float
 
+from ig2mj.agents.base import HandReading
 from ig2mj.agents.humanoid.frames import (
     BODY_Z,
     CAMERA_QUAT,
@@ -122,6 +123,10 @@ class HumanoidController:
             *(f"{hand}_{n}" for hand in HANDS for n in _POSE),
             *(f"eye_{n}" for n in _POSE),
             *(f"{hand}_{n}" for hand in HANDS for n in ("trigger_fraction", *flag)),
+        )
+        names = self.proprioception_names
+        self.hand_readings: tuple[HandReading, ...] = tuple(
+            HandReading(names.index(f"{hand}_is_grasping"), names.index(f"{hand}_x")) for hand in HANDS if grasp_flags
         )
 
     @property

@@ -20,6 +20,7 @@ import numpy as np
 from flax import struct
 from jaxtyping import Bool, Float
 
+from ig2mj.agents.base import HandReading
 from ig2mj.agents.controllers import differential_drive, drive_limits, wheel_odometry
 from ig2mj.agents.kinematics import forward
 from ig2mj.agents.urdf.body import RobotBody
@@ -109,6 +110,8 @@ class UrdfController:
             *(f"{name}_qvel" for name in moving),
             *("is_grasping" if len(hands) == 1 else f"{link}_is_grasping" for link in hands),
         )
+        first = len(self.proprioception_names) - len(hands)
+        self.hand_readings: tuple[HandReading, ...] = tuple(HandReading(first + k) for k in range(len(hands)))
 
     @property
     def action_size(self) -> int:

@@ -28,6 +28,7 @@ class BddlObjective:
     """See `ig2mj.tasks.objective.Objective`."""
 
     terms = ("goal",)
+    outcomes: tuple[str, ...] = ()
 
     def __init__(self, objects: tuple[str, ...], goal: CompiledExpression, scene: Scene):
         """`objects`: that the activity is about. `goal`: of the same scene."""

@@ -79,6 +79,7 @@ class NavigationObjective:
         self._furniture = tables.openable_object[self._joints]
         self._names = [f"{scene.object_names[o]}_{n}" for n, o in enumerate(self._furniture)]
         closing = task.goal == "close"
+        self.outcomes: tuple[str, ...] = ()
         self.terms: tuple[str, ...] = ("potential",) if closing else ("potential", "collision", "success")
         privileged = (
             *(() if closing else ("goal_x", "goal_y", "goal_z", "way_left", "ahead_x", "ahead_y")),

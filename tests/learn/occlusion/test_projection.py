@@ -1,4 +1,4 @@
-"""Where in the picture a place is (`ig2mj.learn.projection`)."""
+"""Where in the picture a place is (`ig2mj.learn.occlusion.projection`)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import ig2mj
-from ig2mj.learn.projection import lens_of
+from ig2mj.learn.occlusion.projection import camera_projection
+from ig2mj.learn.perception import Perception
 
 NAMES = ("privileged_state", "depth")
 
@@ -15,7 +16,7 @@ NAMES = ("privileged_state", "depth")
 @pytest.mark.parametrize("robot", ["humanoid", "fetch"])
 def test_objects_are_seen_where_the_lens_says(robot):
     env = ig2mj.make("SlicingFruit", robot, 8, "native", pool_size=4, observations=NAMES)
-    state, lens = env.reset(3), lens_of(env, 64, (10, 64))
+    state, lens = env.reset(3), camera_projection(env, Perception(env.observation_spaces, "rgbd", 64, (10, 64)))
     first = env.privileged_names.index("apple_0_pos_x")
     places = np.asarray(state.obs["privileged_state"])[:, first : first + 3]
     found = np.asarray(jax.jit(lens)(places[:, None]))[:, 0]

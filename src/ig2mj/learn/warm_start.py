@@ -1,7 +1,7 @@
-"""Beginning with a policy's networks instead of untrained ones: `ig2mj train --begin-with`.
+"""Training that starts from a policy's networks instead of untrained ones: `ig2mj train --init-from`.
 
-A policy's file holds what acts: the actor and the scales of what it sees and guesses. What else an algorithm keeps,
-such as the optimiser's state and labels, begins anew.
+A policy's file holds what acts: the actor and the scales of what it sees and predicts. All else that an algorithm
+keeps, such as the optimizer's state and labels, starts from nothing.
 """
 
 from __future__ import annotations
@@ -14,17 +14,17 @@ import jax.numpy as jnp
 import numpy as np
 
 from ig2mj.errors import InputError
-from ig2mj.learn.moments import Moments
 from ig2mj.learn.policies import Policy, flat, nested
+from ig2mj.learn.running_stats import RunningStats
 
 KNOWN = 1e6
-"""Samples that a policy's scales count for: what follows hardly moves them, since its networks are made for them."""
+"""Samples that a policy's scales count for, so that new ones hardly move them: its networks are trained on them."""
 
 GROWS = "trunk/Dense_0/kernel"
-"""The layer that may take more than it did: what the actor remembers comes last among its inputs, with weights of 0."""
+"""The layer that may have more inputs than the policy's: those of a memory come last, with weights of 0."""
 
 
-def further(algorithm: Any, policy: Policy, seed: int, file: object = "the policy") -> Any:
+def init_from_policy(algorithm: Any, policy: Policy, seed: int, file: object = "the policy") -> Any:
     """An algorithm's learner with a policy's actor.
 
     Args:
@@ -52,20 +52,27 @@ def further(algorithm: Any, policy: Policy, seed: int, file: object = "the polic
     mean, deviation = policy.mean, policy.deviation
     if hidden:
         unseen = policy.hidden
-        if unseen is None and algorithm.actor.uses_guess:
-            fix = "policies of now do: train it anew"
-            raise InputError(file, "does not say in which scales it guesses what is hidden", fix=fix)
-        unseen = unseen or (np.zeros(hidden, np.float32), np.ones(hidden, np.float32))  # whoever guesses nothing
+        if unseen is None and algorithm.actor.acts_on_prediction:
+            fix = "train it again"
+            raise InputError(file, "lacks the scales of its prediction", fix=fix)
+        unseen = unseen or (
+            np.zeros(hidden, np.float32),
+            np.ones(hidden, np.float32),
+        )  # of an actor that predicts nothing
         mean, deviation = (np.concatenate(pair) for pair in zip((mean, deviation), unseen, strict=True))
     # One update lies behind it, so that it acts at once.
-    scales = Moments.of(mean, deviation, KNOWN)
-    return algorithm.begun(dataclasses.replace(learner, actor=nested(new), moments=scales, updates=jnp.int32(1)))
+    scales = RunningStats.of(mean, deviation, KNOWN)
+    return algorithm.with_fresh_average(
+        dataclasses.replace(learner, actor=nested(new), moments=scales, updates=jnp.int32(1))
+    )
 
 
 def _settings(policy: Policy) -> str:
     """What to train with."""
     net = policy.card["net"]
-    found = {"net": net["net"], "actor": ",".join(map(str, net["sizes"])), "choices": net.get("choices", 0)}
+    layers = ",".join(map(str, net["sizes"]))
+    found = {"encoder": net["net"], "actor_layers": layers, "action_bins": net.get("choices", 0)}
     if "recall" in net:
-        found["recall"] = 2 if net["recall"].get("hands") and net["recall"].get("whole", True) else 1
+        full = net["recall"].get("hands") and net["recall"].get("whole", True)
+        found["object_memory"] = "full" if full else "poses"
     return "its settings: --set " + " ".join(f"{name}={value}" for name, value in found.items())

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from ig2mj.learn.heads import drawn, drawn_with_density, label_loss, likeliest
+from ig2mj.learn.action_distributions import drawn, label_loss, mode, sample_with_log_prob
 
 
 def learnt(labels, choices: int):
@@ -26,13 +26,13 @@ def learnt(labels, choices: int):
 
 def test_of_labels_that_switch_a_choice_does_one_and_a_mean_does_nothing():
     labels = [-1.0] * 6 + [1.0] * 4
-    assert abs(float(likeliest(learnt(labels, 0))[0, 0]) + 0.2) < 0.01
-    assert float(likeliest(learnt(labels, 21))[0, 0]) < -0.95
+    assert abs(float(mode(learnt(labels, 0))[0, 0]) + 0.2) < 0.01
+    assert float(mode(learnt(labels, 21))[0, 0]) < -0.95
 
 
 @pytest.mark.parametrize("label", [-1.0, -0.97, -0.333, 0.0, 0.05, 0.4, 1.0])
 def test_a_choice_learns_what_lies_between_its_values(label):
-    np.testing.assert_allclose(likeliest(learnt([label], 21)), label, atol=0.02)
+    np.testing.assert_allclose(mode(learnt([label], 21)), label, atol=0.02)
 
 
 def test_a_choice_is_drawn_as_often_as_it_is_likely():
@@ -46,13 +46,13 @@ def test_a_gaussian_is_drawn_around_its_middle():
     head, log_std = jnp.full((20_000, 1), 0.3), jnp.full((20_000, 1), jnp.log(0.1))
     found = np.arctanh(np.asarray(drawn(head, log_std, jax.random.PRNGKey(0)), float))
     assert abs(found.mean() - 0.3) < 0.005 and abs(found.std() - 0.1) < 0.005
-    np.testing.assert_allclose(likeliest(head), np.tanh(0.3), rtol=1e-5)
+    np.testing.assert_allclose(mode(head), np.tanh(0.3), rtol=1e-5)
 
 
 def test_the_density_of_an_action_is_how_often_actions_near_it_are_drawn():
     count = 200_000
     mean, log_std = jnp.full((count, 1), 0.3), jnp.full((count, 1), -0.5)
-    action, density = map(np.asarray, drawn_with_density(mean, log_std, jax.random.PRNGKey(0)))
+    action, density = map(np.asarray, sample_with_log_prob(mean, log_std, jax.random.PRNGKey(0)))
     for middle in (-0.8, 0.0, 0.5, 0.9):
         near = np.abs(action[:, 0] - middle) < 0.02
         np.testing.assert_allclose(near.mean() / 0.04, np.exp(density[near]).mean(), rtol=0.06)

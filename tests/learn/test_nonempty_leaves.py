@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.sharding import PartitionSpec as P
 
-from ig2mj.learn.solid import parts_of, restored, solid, solid_specs
+from ig2mj.learn.nonempty_leaves import nonempty_specs, restored, shards_of, solid
 
 TREE = {"a": jnp.ones((4, 3)), "b": (jnp.zeros((4, 0)), jnp.arange(2)), "c": jnp.zeros((0,), jnp.uint8)}
 SPECS = {"a": P("d"), "b": (P("d"), P()), "c": P()}
@@ -23,12 +23,12 @@ def test_a_tree_comes_back_whole():
 
 
 def test_a_device_gets_its_part_and_makes_what_has_no_elements_itself():
-    parts = parts_of(TREE, SPECS, 2)
+    parts = shards_of(TREE, SPECS, 2)
     assert jax.tree.map(lambda a: a.shape, parts) == {"a": (2, 3), "b": ((2, 0), (2,)), "c": (0,)}
     made = restored(parts, [jnp.ones((2, 3)), jnp.arange(2)])
     assert made["b"][0].shape == (2, 0) and made["c"].dtype == jnp.uint8
 
 
 def test_specs_are_those_of_what_is_handed_over():
-    assert solid_specs(TREE, SPECS) == [P("d"), P()]
-    assert solid_specs(TREE, P("d")) == [P("d"), P("d")]
+    assert nonempty_specs(TREE, SPECS) == [P("d"), P()]
+    assert nonempty_specs(TREE, P("d")) == [P("d"), P("d")]

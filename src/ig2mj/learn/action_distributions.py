@@ -1,9 +1,9 @@
-"""What an actor's last layer says, as actions: the tanh of a Gaussian, or for each number a choice among even values.
+"""Actions from an actor's output: the tanh of a Gaussian, or a categorical distribution over bins for each number.
 
-An expert presses down here and rises there; who cannot tell the two places apart sees labels of -1 and 1 for what looks
-the same, and the mean of those is to hover. A choice learns how likely each is, and does one of them.
+Where an expert presses down here and rises there, a policy that cannot tell the two apart sees labels of -1 and 1 for
+the same observation, and their mean is to hover. A categorical distribution keeps both modes.
 
-Axes: B samples, n numbers of an action, K values.
+Axes: B samples, n numbers of an action, K bins.
 """
 
 from __future__ import annotations
@@ -17,14 +17,14 @@ from jaxtyping import Float
 from ig2mj.engine.view import Array
 
 
-def values(count: int) -> Float[Array, "K"]:
-    """What is chosen from: from -1 to 1."""
+def bin_values(count: int) -> Float[Array, "K"]:
+    """The values that stand for so many bins: evenly from -1 to 1."""
     return jnp.linspace(-1.0, 1.0, count)
 
 
-def likeliest(head: Float[Array, "B n *K"]) -> Float[Array, "B n"]:
-    """The middle of a Gaussian; of a choice the mean of the three neighbouring values that are likeliest together,
-    which can lie between two of them."""
+def mode(head: Float[Array, "B n *K"]) -> Float[Array, "B n"]:
+    """The deterministic action: tanh of a Gaussian's mean; of bins the mean of the three neighbours that are most
+    likely together, which can lie between two of them."""
     if head.ndim == 2:
         return jnp.tanh(head)
     chance = jax.nn.softmax(head)
@@ -33,22 +33,22 @@ def likeliest(head: Float[Array, "B n *K"]) -> Float[Array, "B n"]:
         around = jnp.pad(a, ((0, 0), (0, 0), (1, 1)))
         return around[..., :-2] + a + around[..., 2:]
 
-    share, total = of_three(chance), of_three(chance * values(head.shape[-1]))
+    share, total = of_three(chance), of_three(chance * bin_values(head.shape[-1]))
     best = jnp.argmax(share, axis=-1, keepdims=True)
     return jnp.take_along_axis(total / share, best, axis=-1)[..., 0]
 
 
-def drawn(head: Float[Array, "B n *K"], log_std: Float[Array, "B n"], key: Array) -> Float[Array, "B n"]:
-    """An action from the distribution. `log_std`: of a Gaussian."""
+def sample(head: Float[Array, "B n *K"], log_std: Float[Array, "B n"], key: Array) -> Float[Array, "B n"]:
+    """A sampled action. `log_std`: of a Gaussian."""
     if head.ndim == 2:
         return jnp.tanh(head + jnp.exp(log_std) * jax.random.normal(key, head.shape))
-    return values(head.shape[-1])[jax.random.categorical(key, head)]
+    return bin_values(head.shape[-1])[jax.random.categorical(key, head)]
 
 
-def drawn_with_density(
+def sample_with_log_prob(
     mean: Float[Array, "B n"], log_std: Float[Array, "B n"], key: Array
 ) -> tuple[Float[Array, "B n"], Float[Array, "B"]]:
-    """An action from the tanh of a Gaussian, and the logarithm of its density there."""
+    """A sample of the tanh of a Gaussian, and the logarithm of its density."""
     eps = jax.random.normal(key, mean.shape)
     raw = mean + jnp.exp(log_std) * eps
     density = -0.5 * jnp.square(eps) - log_std - 0.5 * math.log(2 * math.pi)
@@ -57,10 +57,10 @@ def drawn_with_density(
 
 
 def label_loss(head: Float[Array, "B n *K"], label: Float[Array, "B n"]) -> Float[Array, ""]:
-    """Mean squared difference of a Gaussian's middle from the label; of a choice the cross entropy from the two values
-    that the label lies between."""
+    """Mean squared difference of a Gaussian's mean from the label; of bins the cross entropy from the two bins that
+    the label lies between."""
     if head.ndim == 2:
         return jnp.square(jnp.tanh(head) - label).mean()
     count = head.shape[-1]
-    apart = jnp.abs(jnp.clip(label, -1.0, 1.0)[..., None] - values(count)) * (0.5 * (count - 1))
+    apart = jnp.abs(jnp.clip(label, -1.0, 1.0)[..., None] - bin_values(count)) * (0.5 * (count - 1))
     return -(jnp.maximum(1.0 - apart, 0.0) * jax.nn.log_softmax(head)).sum(-1).mean()

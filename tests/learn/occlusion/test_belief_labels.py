@@ -10,23 +10,23 @@ from scipy.spatial.transform import Rotation
 
 import ig2mj
 from ig2mj.envs.experts import expert_of
-from ig2mj.learn.belief import NEAR, SAME, beliefs_of, errors_of, nothing, true_at
-from ig2mj.learn.hidden import Hidden
-from ig2mj.learn.recall import Recall
+from ig2mj.learn.occlusion.belief_labels import NEAR, SAME, BeliefAdviser, beliefs_of, errors_of, no_error, true_at
+from ig2mj.learn.occlusion.object_memory import ObjectMemory
+from ig2mj.learn.privileged_targets import PrivilegedTargets
 from ig2mj.tasks.experts.sight import Belief
 
 NAMES = [f"{o}_{n}" for o in ("knife", "apple") for n in ("pos_x", "pos_y", "pos_z", *(f"quat_{c}" for c in "wxyz"))]
 WORLDS, OWN = 6, 7  # an actor sees a hand's place and how it is turned, and whether that holds something
 
 
-def setting() -> tuple[Hidden, Recall, tuple[np.ndarray, np.ndarray]]:
+def setting() -> tuple[PrivilegedTargets, ObjectMemory, tuple[np.ndarray, np.ndarray]]:
     """Two objects and a hand; mean and deviation of the vector."""
-    hidden = Hidden(OWN, len(NAMES), NAMES)
+    hidden = PrivilegedTargets(OWN, len(NAMES), NAMES)
     poses = [k for place, turned in hidden.poses.values() for k in (*place, *turned)]
     places = [[int(hidden.plain[k]) for k in place] for place, _ in hidden.poses.values()]
     rng = np.random.default_rng(1)
     scales = rng.normal(size=OWN + 14).astype(np.float32), rng.uniform(0.5, 2, OWN + 14).astype(np.float32)
-    return hidden, Recall(OWN, poses, (6,), (0,), places), scales
+    return hidden, ObjectMemory(OWN, poses, (6,), (0,), places), scales
 
 
 def lying(place: np.ndarray, turn: Rotation) -> np.ndarray:
@@ -34,7 +34,7 @@ def lying(place: np.ndarray, turn: Rotation) -> np.ndarray:
     return np.concatenate([place, turn.as_quat()[:, [3, 0, 1, 2]]], axis=1).astype(np.float32)
 
 
-def told(hidden: Hidden, scales: Any, vector: np.ndarray) -> np.ndarray:
+def told(hidden: PrivilegedTargets, scales: Any, vector: np.ndarray) -> np.ndarray:
     """The guess of somebody who knows."""
     return np.asarray(hidden(jnp.asarray(vector), jnp.asarray((vector - scales[0]) / scales[1])))
 
@@ -143,6 +143,29 @@ def test_an_expert_goes_where_an_object_is_believed_to_be(fruit):
     beliefs = {"carving_knife_0": Belief(base.inv().apply(off).astype(np.float32), np.tile([1.0, 0, 0, 0], (2, 1)))}
     np.testing.assert_allclose(expert(state, beliefs), wanted, atol=1e-5)
     assert np.abs(np.asarray(expert(state)) - np.asarray(wanted)).max() > 0.02
-    right = nothing(Hidden(0, len(NAMES), [n.replace("knife", "carving_knife_0") for n in NAMES]), 2)
+    right = no_error(PrivilegedTargets(0, len(NAMES), [n.replace("knife", "carving_knife_0") for n in NAMES]), 2)
     only = {"carving_knife_0": right["carving_knife_0"]}
     np.testing.assert_allclose(expert(state, only), expert(state), atol=1e-6)
+
+
+def test_an_adviser_labels_for_what_the_actor_believes_and_for_the_truth_in_the_first_step():
+    targets, memory, scales = setting()
+    asked = []
+
+    def expert(state, beliefs):
+        asked.append(beliefs)
+        return state
+
+    adviser = BeliefAdviser(expert, memory, targets)
+    notes, own = adviser.begin(WORLDS), np.zeros((WORLDS, OWN), np.float32)
+    still = Rotation.identity(WORLDS)
+    true = np.concatenate([own, lying(np.zeros((WORLDS, 3)), still), lying(np.zeros((WORLDS, 3)), still)], axis=1)
+    off = np.array([0.01, 0.0, 0.0])
+    seen = np.concatenate([own, lying(np.tile(off, (WORLDS, 1)), still), true[:, OWN + 7 :]], axis=1)
+    prediction, begins = told(targets, scales, seen), np.ones(WORLDS, bool)
+    kept = memory.after(memory.blank(WORLDS), begins, own, prediction)
+    notes = adviser.observe(notes, begins, scales, true, kept, prediction)
+    adviser.label(jnp.zeros((WORLDS, 2)), notes, ~begins)
+    adviser.label(jnp.zeros((WORLDS, 2)), notes, begins)
+    np.testing.assert_allclose(asked[0]["knife"].move, np.tile(off, (WORLDS, 1)), atol=1e-5)
+    np.testing.assert_array_equal(asked[1]["knife"].move, 0.0)

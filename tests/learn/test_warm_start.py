@@ -1,4 +1,4 @@
-"""Training that begins with a policy's networks (`ig2mj.learn.going_on`)."""
+"""Training that begins with a policy's networks (`ig2mj.learn.warm_start`)."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
+from occlusion.test_object_memory import depends, made
 from small_envs import SeenPointMass
-from test_recall import depends, made
 
 from ig2mj.errors import InputError
-from ig2mj.learn.going_on import further
-from ig2mj.learn.moments import Moments
 from ig2mj.learn.policies import Policy
+from ig2mj.learn.running_stats import RunningStats
+from ig2mj.learn.warm_start import init_from_policy
 
 
 @pytest.fixture(scope="module")
 def policy(tmp_path_factory):
     """Of an actor that remembers nothing, as a file of it has it."""
-    algorithm = made(recall=0)
+    algorithm = made("none")
     rng = np.random.default_rng(0)
     samples = rng.normal(rng.normal(size=9), rng.uniform(0.5, 2.0, 9), (500, 9)).astype(np.float32)
     learner = jax.jit(algorithm.init)(jax.random.PRNGKey(7))
-    learner = dataclasses.replace(learner, moments=Moments.initial(9).update(jnp.asarray(samples)))
+    learner = dataclasses.replace(learner, moments=RunningStats.initial(9).update(jnp.asarray(samples)))
     file = tmp_path_factory.mktemp("policy") / "policy.npz"
     Policy.of(algorithm, learner, depends(algorithm), {}).save(file)
     return algorithm, learner, Policy.load(file)
@@ -36,15 +36,15 @@ def policy(tmp_path_factory):
 
 def test_an_actor_with_a_memory_first_does_what_the_policy_does(policy):
     algorithm, learner, loaded = policy
-    remembers = made(recall=1)
-    begun = further(remembers, loaded, 0)
+    remembers = made("poses")
+    begun = init_from_policy(remembers, loaded, 0)
     np.testing.assert_allclose(begun.moments.mean, learner.moments.mean, atol=1e-6)
     np.testing.assert_allclose(begun.moments.var, learner.moments.var, rtol=1e-3)
     seen = algorithm.perception({**SeenPointMass(4).reset(1).obs, "privileged_state": jnp.ones((4, 7))})
     begins = np.ones(4, bool)
-    before, _, _ = jax.jit(algorithm._imitation.choose)(learner.actor, learner.moments, seen, jnp.zeros((4, 0)), begins)
-    kept = remembers.recall.blank(4)
-    after, kept, _ = jax.jit(remembers._imitation.choose)(begun.actor, begun.moments, seen, kept, begins)
+    before, _, _ = jax.jit(algorithm.imitation.choose)(learner.actor, learner.moments, seen, jnp.zeros((4, 0)), begins)
+    kept = remembers.memory.blank(4)
+    after, kept, _ = jax.jit(remembers.imitation.choose)(begun.actor, begun.moments, seen, kept, begins)
     assert np.abs(np.asarray(kept)).max() > 0.01, "it remembers something"
     np.testing.assert_allclose(after, before, atol=0.01, err_msg="half precision")
     assert int(begun.updates) > 0, "it acts at once"
@@ -52,26 +52,27 @@ def test_an_actor_with_a_memory_first_does_what_the_policy_does(policy):
 
 def test_other_networks_and_files_without_scales_are_refused(policy):
     _, _, loaded = policy
-    for settings, element in (({"actor": (16,)}, "trunk"), ({"choices": 0}, "choice"), ({"actor": (32, 32)}, "trunk")):
-        with pytest.raises(InputError, match="actor=32 choices=21") as found:
-            further(made(**settings), loaded, 0, "fruit.npz")
+    others = {"actor_layers": (16,)}, {"action_bins": 0}, {"actor_layers": (32, 32)}
+    for settings, element in zip(others, ("trunk", "choice", "trunk"), strict=True):
+        with pytest.raises(InputError, match="actor_layers=32 action_bins=21") as found:
+            init_from_policy(made(**settings), loaded, 0, "fruit.npz")
         assert element in str(found.value) and "fruit.npz" in str(found.value)
     with pytest.raises(InputError, match="scales"):
-        further(made(), dataclasses.replace(loaded, hidden=None), 0)
+        init_from_policy(made(), dataclasses.replace(loaded, hidden=None), 0)
     recall = {"poses": [0], "grips": [0], "hands": [0], "places": [[0, 1, 2]]}  # of a file from before `whole` was said
-    for more, setting in (({}, 2), ({"whole": True}, 2), ({"whole": False}, 1)):
+    for more, setting in (({}, "full"), ({"whole": True}, "full"), ({"whole": False}, "poses")):
         net = {**loaded.card["net"], "recall": {**recall, **more}}
-        with pytest.raises(InputError, match=f"choices=21 recall={setting}"):
-            further(made(actor=(16,)), dataclasses.replace(loaded, card={**loaded.card, "net": net}), 0)
+        with pytest.raises(InputError, match=f"action_bins=21 object_memory={setting}"):
+            init_from_policy(made(actor_layers=(16,)), dataclasses.replace(loaded, card={**loaded.card, "net": net}), 0)
 
 
 def test_who_guesses_nothing_needs_no_scales_of_what_is_hidden(tmp_path):
-    algorithm = made(net="small", guess=0.0, recall=0)
+    algorithm = made("none", encoder="small", aux_coef=0.0)
     learner = jax.jit(algorithm.init)(jax.random.PRNGKey(7))
     Policy.of(algorithm, learner, depends(algorithm), {}).save(tmp_path / "policy.npz")
     loaded = Policy.load(tmp_path / "policy.npz")
     assert loaded.hidden is None
-    begun = further(algorithm, loaded, 0)
+    begun = init_from_policy(algorithm, loaded, 0)
     assert begun.moments.mean.shape == learner.moments.mean.shape and np.isfinite(begun.moments.mean).all()
     for ours, theirs in zip(jax.tree.leaves(begun.actor), jax.tree.leaves(learner.actor), strict=True):
         np.testing.assert_allclose(ours, theirs, atol=2e-3, err_msg="half precision")

@@ -2,7 +2,7 @@
 
 XLA for GPUs ends with a segmentation fault while it compiles a `jax.shard_map` that is handed an array without elements
 and does anything with it (JAX 0.11.2, not 0.10.2: Shardy's `ManualComputationUnusedInputsPattern`; a program
-for CPUs compiles). Ours have some: pictures where nobody looks, labels where nobody teaches.
+for CPUs compiles). Ours have some, e.g. the image and label arrays of runs that have none.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import jax.numpy as jnp
 from jax.sharding import PartitionSpec
 
 
-def solid(tree: Any) -> list[Any]:
-    """The leaves that have elements: arrays, or what `jax.eval_shape` tells of them."""
+def nonempty(tree: Any) -> list[Any]:
+    """The leaves that have elements: arrays, or shapes of `jax.eval_shape`."""
     return [a for a in jax.tree.leaves(tree) if a.size]
 
 
@@ -25,13 +25,13 @@ def specs_of(tree: Any, specs: Any) -> Any:
     return jax.tree.map(lambda _: specs, tree) if isinstance(specs, PartitionSpec) else specs
 
 
-def solid_specs(tree: Any, specs: Any) -> list[PartitionSpec]:
-    """The partition specs of the leaves of `solid`."""
+def nonempty_specs(tree: Any, specs: Any) -> list[PartitionSpec]:
+    """The partition specs of the leaves of `nonempty`."""
     each = jax.tree.leaves(specs_of(tree, specs), is_leaf=_is_spec)
     return [spec for a, spec in zip(jax.tree.leaves(tree), each, strict=True) if a.size]
 
 
-def parts_of(tree: Any, specs: Any, count: int) -> Any:
+def shards_of(tree: Any, specs: Any, count: int) -> Any:
     """Shapes and types of what one of `count` devices has of each leaf."""
 
     def part(spec: PartitionSpec, a: Any) -> jax.ShapeDtypeStruct:
@@ -47,7 +47,7 @@ def restored(tree: Any, leaves: Sequence[Any]) -> Any:
 
     Args:
       tree: of the same structure; of its leaves without elements, arrays are kept and shapes become arrays. leaves:
-        those of `solid`.
+        those of `nonempty`.
     """
     rest = iter(leaves)
 

@@ -1,4 +1,4 @@
-"""Films of a policy while it is trained (`ig2mj train --videos`): `ig2mj rollout` in a process of its own."""
+"""TrainingVideos of a policy while it is trained (`ig2mj train --videos`): `ig2mj rollout` in a process of its own."""
 
 from __future__ import annotations
 
@@ -14,32 +14,32 @@ if TYPE_CHECKING:
     from ig2mj.envs.environment import Environment
 
 LONGEST = 300.0
-"""s that the end of a training waits for its last film."""
+"""Seconds that the end of a training waits for its last video."""
 
 
-class Films:
-    """Films of one held-out episode, the same start state each time, on the native engine of the processor.
+class TrainingVideos:
+    """TrainingVideos of one held-out episode, the same start state each time, on the native engine of the processor.
 
-    One at a time: while a film is being made, none is begun. What went wrong is in the film's log; training goes on.
+    One at a time: while a video is being made, no other is started. Errors are in the video's log; training continues.
     """
 
     def __init__(self, run: pathlib.Path, every: float, rollout: Sequence[str]):
         """
         Args:
-          run: the run's folder; films go to its folder `videos`. every: seconds of training between two films.
+          run: the run's folder; videos go to its folder `videos`. every: seconds of training between two videos.
           rollout: the arguments of `ig2mj rollout` without agent and video.
         """
         self._folder, self._every, self._rollout = run / "videos", every, list(rollout)
         self._next, self._process = every, None
 
     @classmethod
-    def of(cls, env: Environment, run: pathlib.Path, every: float, paper_rl: bool) -> Films:
+    def of(cls, env: Environment, run: pathlib.Path, every: float, paper_rl: bool) -> TrainingVideos:
         """Of an environment in which a policy is trained; none where `every` is 0."""
         chosen = [env.task.name, "--robot", env.robot, "--grasping", env.grasping]
         return cls(run, every, chosen + ["--paper-rl"] * paper_rl)
 
     def offer(self, policy: pathlib.Path, seconds: float, last: bool = False) -> None:
-        """Begins a film of this policy file, if it is time for one; `last`: in any case, and waits for it."""
+        """Starts a video of this policy file, if it is time for one; `last`: in any case, and waits for it."""
         if not self._every:
             return
         if last:
@@ -51,7 +51,7 @@ class Films:
         stem = self._folder / f"{round(seconds):05d}"
         copy = stem.with_suffix(".npz")  # the next checkpoint replaces the policy itself
         copy.write_bytes(policy.read_bytes())
-        command = ["nice", "-n", "10"] if shutil.which("nice") else []  # a film is worth less than the training
+        command = ["nice", "-n", "10"] if shutil.which("nice") else []  # training goes first
         command += [sys.executable, "-m", "ig2mj", "rollout", *self._rollout, "--agent", str(copy)]
         command += ["--engine", "native", "--held-out", "--video", str(stem.with_suffix(".mp4"))]
         with stem.with_suffix(".log").open("wb") as log:

@@ -17,9 +17,8 @@ from ig2mj.engine.view import Array
 LIMIT = 10.0
 """Normalized numbers are clipped to this."""
 
-
 FLOOR = 1e-4
-"""Added to variances, so that a number which never changes is not blown up."""
+"""Added to variances, so that the noise of a constant number is not amplified."""
 
 
 def normal(values: Float[Array, "*b x"], mean: Float[Array, "x"], deviation: Float[Array, "x"]) -> Float[Array, "*b x"]:
@@ -28,7 +27,7 @@ def normal(values: Float[Array, "*b x"], mean: Float[Array, "x"], deviation: Flo
 
 
 @struct.dataclass
-class Moments:
+class RunningStats:
     """Mean and variance of every number of a vector. `count`: how many samples they are of."""
 
     mean: Float[Array, "v"]
@@ -36,11 +35,11 @@ class Moments:
     count: Float[Array, ""]
 
     @classmethod
-    def initial(cls, size: int) -> Moments:
+    def initial(cls, size: int) -> RunningStats:
         """Of nothing yet: `normal` changes nothing."""
         return cls(jnp.zeros(size), jnp.ones(size), jnp.float32(0))
 
-    def update(self, values: Float[Array, "*b v"], axis: str | None = None) -> Moments:
+    def update(self, values: Float[Array, "*b v"], axis: str | None = None) -> RunningStats:
         """With more samples."""
         flat = values.reshape(-1, values.shape[-1])
         mean, square, count = flat.mean(0), jnp.square(flat - self.mean).mean(0), jnp.float32(flat.shape[0])
@@ -50,7 +49,7 @@ class Moments:
         total = self.count + count
         change = mean - self.mean
         new = (self.var * self.count + square * count) / total - jnp.square(change * count / total)
-        return Moments(self.mean + change * count / total, jnp.maximum(new, 0.0), total)
+        return RunningStats(self.mean + change * count / total, jnp.maximum(new, 0.0), total)
 
     def normal(self, values: Float[Array, "*b x"]) -> Float[Array, "*b x"]:
         """The first x numbers of a vector with mean 0 and deviation 1; those that never change are 0."""
@@ -61,14 +60,14 @@ class Moments:
         return self.mean[:size], jnp.sqrt(self.var[:size] + FLOOR)
 
     @classmethod
-    def of(cls, mean: Float[Array, "v"], deviation: Float[Array, "v"], count: float) -> Moments:
+    def of(cls, mean: Float[Array, "v"], deviation: Float[Array, "v"], count: float) -> RunningStats:
         """With these `scales`, as of so many samples."""
         var = jnp.maximum(jnp.square(jnp.asarray(deviation, jnp.float32)) - FLOOR, 0.0)
         return cls(jnp.asarray(mean, jnp.float32), var, jnp.float32(count))
 
 
 RARE = 500
-"""Worlds of which one may have a return of any size before it counts."""
+"""Of so many worlds one may have an outlier as its return without any effect."""
 
 
 @struct.dataclass
@@ -77,8 +76,8 @@ class RewardScale:
 
     Attributes:
       running: return of each world so far, discounted forwards. var: of it.
-      largest: its largest absolute value, of all but one world in `RARE`: a thing that physics throws across the house
-        would otherwise make all other rewards too small to tell apart, for the rest of the run.
+      largest: its largest absolute value, without one world in `RARE`: an object that physics throws across the house
+        would otherwise scale all other rewards down for the rest of the run.
     """
 
     running: Float[Array, "W"]

@@ -1,0 +1,108 @@
+"""`ImitationBuffer`: what was seen in the last steps of all worlds, and what should have been done there.
+
+Axes: T steps, W worlds, B samples, n numbers of an action, v of a vector, q bytes of an image, m numbers that are
+remembered, g of a prediction.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+from flax import struct
+from jaxtyping import Float, Int, UInt8
+
+from ig2mj.engine.view import Array
+from ig2mj.learn.perception import Perception, Seen
+
+ImagelessBatch = tuple[Float[Array, "B v"], Float[Array, "B n"], Float[Array, "B m"], Float[Array, "B g"]]
+"""Steps without their images (`ImitationBuffer.sample_imageless`)."""
+
+
+@struct.dataclass
+class ImitationBuffer:
+    """The last T steps of W worlds.
+
+    Attributes:
+      head: row that is written next. size: rows that are full.
+      remembered: what the actor remembered (`protocols.Memory`). prediction: what it predicted as it acted.
+      unlabelled: samples that have no labels; None: there are none.
+    """
+
+    vector: Float[Array, "T W v"]
+    image: UInt8[Array, "T W q"]
+    label: Float[Array, "T W n"]
+    head: Int[Array, ""]
+    size: Int[Array, ""]
+    remembered: Float[Array, "T W m"]
+    prediction: Float[Array, "T W g"]
+    unlabelled: Seen | None = None
+
+    @classmethod
+    def empty(
+        cls,
+        steps: int,
+        worlds: int,
+        perception: Perception,
+        action_size: int,
+        unlabelled: Seen | None = None,
+        remembered: int = 0,
+        predictions: int = 0,
+    ) -> ImitationBuffer:
+        """Room for so many steps of so many worlds.
+
+        Args:
+          remembered: m. predictions: g; 0 where predictions are not kept.
+        """
+        return cls(
+            vector=jnp.zeros((steps, worlds, perception.vector_size)),
+            image=jnp.zeros((steps, worlds, perception.image_bytes), jnp.uint8),
+            label=jnp.zeros((steps, worlds, action_size)),
+            head=jnp.int32(0),
+            size=jnp.int32(0),
+            remembered=jnp.zeros((steps, worlds, remembered)),
+            prediction=jnp.zeros((steps, worlds, predictions)),
+            unlabelled=unlabelled,
+        )
+
+    def insert(
+        self,
+        seen: Seen,
+        label: Float[Array, "t W n"],
+        remembered: Float[Array, "t W m"] | None = None,
+        prediction: Float[Array, "t W g"] | None = None,
+    ) -> ImitationBuffer:
+        """With more steps in place of the oldest; their number must divide T."""
+        count, capacity = label.shape[0], self.label.shape[0]
+        assert capacity % count == 0, "steps are written without a seam"
+
+        def put(ring: Array, new: Array) -> Array:
+            return jax.lax.dynamic_update_slice_in_dim(ring, new.astype(ring.dtype), self.head, 0)
+
+        return dataclasses.replace(
+            self,
+            vector=put(self.vector, seen.vector),
+            image=put(self.image, seen.image),
+            label=put(self.label, label),
+            remembered=self.remembered if remembered is None else put(self.remembered, remembered),
+            prediction=self.prediction if prediction is None else put(self.prediction, prediction),
+            head=(self.head + count) % capacity,
+            size=jnp.minimum(self.size + count, capacity),
+        )
+
+    def sample(self, key: Array, count: int) -> tuple[Seen, Float[Array, "B n"], Float[Array, "B m"]]:
+        """So many steps, all equally likely: what was seen, the label, and what was remembered."""
+        row, world = self._random(key, count)
+        seen = Seen(self.vector[row, world], self.image[row, world])
+        return seen, self.label[row, world], self.remembered[row, world]
+
+    def sample_imageless(self, key: Array, count: int) -> ImagelessBatch:
+        """So many steps without their images: vector, label, what was remembered, and the prediction."""
+        row, world = self._random(key, count)
+        return tuple(a[row, world] for a in (self.vector, self.label, self.remembered, self.prediction))  # pyright: ignore
+
+    def _random(self, key: Array, count: int) -> tuple[Int[Array, "B"], Int[Array, "B"]]:
+        row_key, world_key = jax.random.split(key)
+        row = jax.random.randint(row_key, (count,), 0, jnp.maximum(self.size, 1))
+        return row, jax.random.randint(world_key, (count,), 0, self.label.shape[1])

@@ -1,0 +1,159 @@
+"""A run of `ig2mj train` as a file: TOML that names the environment, the algorithm and every setting.
+
+    env = "CookingMeat"
+    robot = "fetch"
+    obs = "rgbd"
+    worlds = 1024
+
+    [settings]
+    engine = "warp"
+    gamma = 0.98
+
+The keys at the top are options of the command (`RunOptions`). `[settings]` holds those of `RunSettings`, of the
+algorithm and of `ig2mj.learn.occlusion.OcclusionConfig`; `--set name=value` changes each of them. What a file leaves
+out has its default. `policies/*.toml` are the runs that the policies that ship come from.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import pathlib
+import tomllib
+from typing import Any
+
+import msgspec
+
+from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
+from ig2mj.learn.algorithms import config_of
+from ig2mj.learn.bc import BCConfig
+from ig2mj.learn.occlusion import OcclusionConfig
+from ig2mj.learn.settings import configure_all, written
+from ig2mj.learn.shipped import CHECKOUT, INSTALLED
+
+
+@dataclasses.dataclass(frozen=True)
+class RunOptions:
+    """Options of a run that the command has, too; `ig2mj train --help` says what they mean."""
+
+    env: str = ""
+    algo: str = "sac"
+    robot: str | None = None
+    grasping: str | None = None
+    obs: str = "state"
+    worlds: int = 0
+    minutes: float = 10.0
+    seed: int = 0
+    devices: str = "1"
+    demos: str | None = None
+    init_from: str | None = None
+    stop_at_success: float | None = None
+    videos: float = 0.0
+
+
+ALGORITHMS = ("sac", "ppo", "bc", "dagger")
+
+_FIX = "policies/CookingMeat.toml of the project is such a file"
+
+
+@dataclasses.dataclass(frozen=True)
+class RunSettings:
+    """Settings of a run that belong to no algorithm.
+
+    Attributes:
+      engine: native, warp or jax; "": warp on a GPU, else native.
+      image_size: height and width that the 128x128 images are averaged down to.
+      image_rows: of these the first that the networks see and the first below those, e.g. 80,128; (): all.
+      depth_range: m, that a byte of depth covers; 0: as the environment says.
+      pool_size: number of start states; 0: all of the split.
+      augment_starts: train on this many start states made of those: every object lies where it does in one, turned as
+        in another; 0: on those themselves.
+      relaxed_thresholds: the success thresholds of the paper's experiments.
+      expert: for SAC: the task's scripted expert begins episodes and labels states.
+      save_buffer: checkpoints hold the replay buffer; without it a resumed run first refills it.
+      programs: compiled programs of an iteration: 1, or 2 to time simulation and learning separately.
+    """
+
+    engine: str = ""
+    image_size: int = 32
+    image_rows: tuple[int, ...] = ()
+    depth_range: float = 0.0
+    pool_size: int = 0
+    augment_starts: int = 0
+    relaxed_thresholds: bool = False
+    expert: bool = False
+    save_buffer: bool = False
+    programs: int = 1
+
+    @property
+    def rows(self) -> tuple[int, int] | None:
+        """`image_rows` as `Perception` takes them. Raises Ig2mjError."""
+        if not self.image_rows:
+            return None
+        if len(self.image_rows) != 2 or not self.image_rows[0] < self.image_rows[1] <= self.image_size:
+            words = f"two numbers such as 80,128, of at most {self.image_size} rows (image_size)"
+            raise Ig2mjError(f"image_rows={written(self.image_rows)}: {words}")
+        return self.image_rows[0], self.image_rows[1]
+
+
+def read_run_file(file: str | os.PathLike) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Reads a file; see the module's text. The name of a policy that ships stands for its file.
+
+    Returns:
+      Options by the names of `RunOptions`, and settings as "name=value".
+
+    Raises:
+      InputError: no such file, no TOML, or a value of another type. UnknownNameError: an option that does not exist.
+    """
+    path = pathlib.Path(file)
+    if not path.exists() and len(path.parts) == 1:
+        path = next((f for folder in (CHECKOUT, INSTALLED) if (f := folder / f"{path.stem}.toml").is_file()), path)
+    try:
+        found = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError as e:
+        raise InputError(file, "there is no such file", fix=_FIX) from e
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as e:
+        raise InputError(file, f"is not TOML ({e})", fix=_FIX) from e
+    settings = found.pop("settings", {})
+    if not isinstance(settings, dict):
+        raise InputError(file, "is not a table", element="settings", fix=_FIX)
+    for name, value in settings.items():
+        if not isinstance(value, str | int | float | list) or any(isinstance(v, dict | list) for v in _items(value)):
+            raise InputError(file, f"has a value of type {type(value).__name__}", element=f"settings.{name}", fix=_FIX)
+    known = {field.name for field in dataclasses.fields(RunOptions)}
+    for name in found:
+        if name not in known:
+            raise UnknownNameError("option of a training file", name, (*known, "settings"))
+    try:
+        options = msgspec.convert(found, RunOptions)
+    except msgspec.ValidationError as e:
+        raise InputError(file, str(e), fix=_FIX) from e
+    return {name: getattr(options, name) for name in found}, tuple(f"{n}={written(v)}" for n, v in settings.items())
+
+
+def _items(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else []
+
+
+def settings_of(algo: str, changes: tuple[str, ...], on_gpu: bool = False) -> tuple[RunSettings, Any, OcclusionConfig]:
+    """The settings of a run.
+
+    Args:
+      algo: name of the algorithm. changes: "name=value", the last of a name counts. on_gpu: the default engine is warp.
+
+    Returns:
+      Those of the run, of the algorithm (defaults for its engine), and of learning under occlusion.
+
+    Raises:
+      UnknownNameError: no such algorithm or setting, with near matches. Ig2mjError: a value that cannot be.
+    """
+    if algo not in ALGORITHMS:
+        raise UnknownNameError("algorithm", algo, ALGORITHMS)
+    run = RunSettings(engine="warp" if on_gpu else "native")
+    own = [c for c in changes if c.partition("=")[0] == "engine"]
+    small = configure_all([run], own)[0].engine == "native"
+    algorithm = BCConfig() if algo == "bc" else config_of(algo, small=small)
+    run, algorithm, occlusion = configure_all([run, algorithm, OcclusionConfig()], changes)
+    if run.programs not in (1, 2):
+        raise Ig2mjError(f"programs={run.programs}: 1 or 2 are possible")
+    return run, algorithm, occlusion
