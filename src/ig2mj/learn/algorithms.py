@@ -99,7 +99,8 @@ def make_algorithm(
     """The algorithm of these settings for an environment.
 
     Args:
-      env: an `ig2mj.envs.environment.Environment`. demos: for SAC. axis: of several devices. expert: the task's expert helps SAC; DAgger always has it.
+      env: an `ig2mj.envs.environment.Environment`. demos: for SAC. axis: of several devices.
+      expert: the task's expert helps SAC; DAgger always has it. occlusion: for DAgger.
 
     Raises:
       UnknownNameError: the task has no expert, and one is needed; see also `check_settings`.

@@ -48,7 +48,7 @@ step, so that on the fruit it presses with all force; the gripper of an arm woul
 
 SLOWLY, WITHIN = 0.012, 0.11
 """m that an arm comes down onto the handle in a step, and from it within which it is so slow. What it holds is reckoned
-from where its hand was at the end of the step that took it (`ig2mj.learn.recall`): at full speed 0.5 cm off in the
+from where its hand was at the end of the step that took it (`ig2mj.learn.occlusion`): at full speed 0.5 cm off in the
 median and 1.7 cm in a tenth of the episodes."""
 
 GENTLY = 1 / 3
