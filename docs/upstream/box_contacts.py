@@ -36,7 +36,7 @@ def poses(tilt: float) -> np.ndarray:
 
 
 def main() -> None:
-    wp.config.quiet = True
+    wp.config.log_level = wp.LOG_WARNING
     model = mujoco.MjModel.from_xml_string(SCENE)
     put = mujoco_warp.put_model(model)
     room = 16 * WORLDS

@@ -21,7 +21,7 @@ ROOM = 8
 
 
 def main() -> None:
-    wp.config.quiet = True
+    wp.config.log_level = wp.LOG_WARNING
     for sleep in ("disable", "enable"):
         model = mujoco.MjModel.from_xml_string(SCENE.replace("SLEEP", sleep).replace("BALLS", BALLS))
         put = mujoco_warp.put_model(model)

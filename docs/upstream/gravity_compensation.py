@@ -20,7 +20,7 @@ WORLDS, TIMES = 64, 20
 
 
 def main() -> None:
-    wp.config.quiet = True
+    wp.config.log_level = wp.LOG_WARNING
     for objects in (10, 40, 160):
         things = "".join(f'<body pos="{k} 0 1"><freejoint/><geom size="0.05"/></body>' for k in range(objects))
         model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{ARM}{things}</worldbody></mujoco>")

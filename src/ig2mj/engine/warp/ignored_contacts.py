@@ -11,7 +11,6 @@ ignore. In models without them the filter does nothing, so that other users of M
 # pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
 # pyright: reportGeneralTypeIssues=false, reportOperatorIssue=false, reportReturnType=false, reportPrivateUsage=false
 
-import functools
 from typing import Any, no_type_check
 
 import numpy as np
@@ -69,15 +68,17 @@ def _drop_ignored(m: Any, d: Any) -> None:
     )
 
 
-@functools.cache
 def filter_contacts() -> None:
     """Lets the steps of MJX in this process drop ignored contacts. A filter that is there already runs first."""
     callback = forward._cb
     before = callback.contactfilter
+    if getattr(before, "_drops_ignored", False):
+        return
 
     def contactfilter(m: Any, d: Any) -> None:
         if before is not None:
             before(m, d)
         _drop_ignored(m, d)
 
+    setattr(contactfilter, "_drops_ignored", True)  # noqa: B010
     callback.contactfilter = contactfilter
