@@ -1,15 +1,15 @@
-"""Repairs of Warp 1.18 as JAX uses it. Each concerns the whole process; other users of Warp lose nothing by them.
+"""Repairs of Warp 1.18 as JAX uses it. Each applies to the whole process and does not affect other users of Warp.
 
 CUDA streams that belong to JAX stay known to Warp. Warp wraps JAX's stream in an object for each call and forgets the
 stream when the object goes away. Two calls that overlap on one stream, as they do when JAX dispatches ahead, then fail
-with "unknown stream": the first to end takes the stream from the other. Nothing is lost by never forgetting: JAX has a
-handful of streams, and they live as long as it.
+with "unknown stream": the first to end takes the stream from the other. Keeping them costs nothing: JAX has a handful
+of streams, which live as long as it.
 
-Python's garbage collector rests while Warp captures a CUDA graph. A capture runs Python code for up to seconds, so that
-the collector runs in it, in the capturing thread. Compiled programs of JAX in reference cycles (an engine that was
+Python's garbage collector is off while Warp captures a CUDA graph. A capture runs Python code for up to seconds, so
+that the collector runs in it, in the capturing thread. Compiled programs of JAX in reference cycles (an engine that was
 dropped is one) are destroyed then, and XLA unloads their CUDA modules, which CUDA forbids while the thread captures:
 "CUDA_ERROR_STREAM_CAPTURE_UNSUPPORTED: Failed to unload module", and the next launch fails with error 901, since the
-capture is lost. (Warp puts off unloading its own modules; it cannot know of XLA's.)
+capture is lost. (Warp delays unloading its own modules; it cannot know of XLA's.)
 
 JAX's devices are found by their number in this process. Warp takes their number among the devices of all processes of
 `jax.distributed`, finds no such GPU in the second process, and so loads no kernels beforehand there: the first call

@@ -71,11 +71,11 @@ class WarpEngine(MjxEngine):
         Args:
           scene, num_worlds, initial, options: see `MjxEngine`. Where `initial` is None and the profile does not hold
             everything awake, the scene is settled first with the native engine.
-          profile: buffer sizes; None: the file beside the manifest for the scene's agents, else safe sizes.
-          iterations, ls_iterations: limits of the solver and of its line search; None: the scene's. Lower limits buy
+          profile: buffer sizes; None: the file next to the manifest for the scene's agents, else safe sizes.
+          iterations, ls_iterations: limits of the solver and of its line search; None: the scene's. Lower limits gain
             little: of 16,384 disturbed worlds nearly all converge at once, and 5 against 100 saved 9 % of a step.
           graph_mode: how CUDA graphs of a step are kept, a name of `warp.JaxCallableGraphMode`: "WARP" captures a step
-            anew wherever its buffers have other addresses, "WARP_STAGED" copies them to addresses that stay. None:
+            again wherever its buffers have other addresses, "WARP_STAGED" copies them to addresses that stay. None:
             MJX's choice, which is "WARP" on a GPU.
           compile_beforehand: on a GPU all kernels of a step are compiled and loaded, side by side. "meanwhile": this
             begins now, and `reset` waits for the end, so that programs can be compiled in the same time (`awaited`);
@@ -243,8 +243,8 @@ class WarpEngine(MjxEngine):
 
 
 _ZEROED = ScopedReplacement()
-"""Data begins as zeros where MuJoCo Warp leaves memory as it was, which nothing reads before it is written. In programs
-that hold data as constants such memory would be other numbers each time, and no cache of programs would know them."""
+"""Data starts as zeros where MuJoCo Warp leaves memory uninitialised. Programs that hold data as constants would
+contain other numbers each time, and no cache of programs would recognise them."""
 _ZEROED.add({(wp, "empty"): wp.zeros})
 
 

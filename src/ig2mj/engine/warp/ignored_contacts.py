@@ -7,7 +7,7 @@ geom is part of, as `encode` writes it; `pair_adhesion`, which is empty without 
 ignore. In models without them the filter does nothing, so that other users of MJX in the process notice none of it.
 """
 
-# Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
+# Warp's kernels only look like Python, so that type checkers must leave them alone:
 # pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
 # pyright: reportGeneralTypeIssues=false, reportOperatorIssue=false, reportReturnType=false, reportPrivateUsage=false
 

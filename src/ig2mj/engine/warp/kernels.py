@@ -2,9 +2,9 @@
 
 MuJoCo Warp has a module for nearly every kernel, and Warp compiles a module when one of its kernels is first launched:
 one after the other, on one processor. Here a step is made of which only the launches are written down (`launches_of`);
-what they need is then compiled and loaded by as many threads as there are processors (`load`), while the caller goes on
-where it wants to (`load_meanwhile`): XLA's programs are compiled in the same time. The caller asks for the end, and is
-told of an error, before it runs anything on the device (`loaded`).
+what they need is then compiled and loaded by as many threads as there are processors (`load`), while the caller
+continues (`load_meanwhile`): XLA's programs are compiled in the same time. The caller waits for the end, and gets any
+error, before it runs anything on the device (`loaded`).
 """
 
 from __future__ import annotations
@@ -100,8 +100,8 @@ def launches_of_step(
     Args:
       profile: buffer sizes; some kernels are compiled for them. own: with our functions in place of some of MuJoCo
         Warp's (`ig2mj.engine.warp.patches`). warns: the engine's `opt.warn_overflow`.
-      counter: of the memory that they need besides, on a CUDA device, the present one.
-      put: MuJoCo Warp's model, on whatever device, where it was made before (`models_put`); its options are changed.
+      counter: of the temporary memory that they need on the present device, which must be a CUDA device.
+      put: MuJoCo Warp's model, on any device, where it was made before (`models_put`); its options are changed.
     """
     with patches.counted_quickly(own):
         act = _step_of_one_world(model, profile, warns, put)
@@ -162,8 +162,8 @@ def load_meanwhile(
     """As `load`, and returns at once. Nothing that needs these kernels may run before `loaded` has returned; a CUDA
     graph that is captured all the same waits for the end.
 
-    Begins when what was begun before has ended (`wait_for_others`). Python's collector rests until the end: it would
-    look through all that was just imported and made, while programs are still to be traced.
+    Begins when what was begun before has ended (`wait_for_others`). Python's garbage collector is off until the end: it
+    would visit everything that was just imported and made, while programs are still to be traced.
     """
     on = wp.get_device(device)
     with _TURN:
@@ -227,7 +227,7 @@ def side_by_side(
     """Calls `act` for each module with its sizes of blocks, in so many threads (None: one for each processor).
 
     The longest come first: kernels of convex pairs, which take half a minute each. Modules with blocks of their own
-    size (factorisations) come last, when `first` has ended, which is called beside the others.
+    size (factorisations) come last, when `first` has ended, which is called alongside the others.
     """
     sizes: dict[wp.Module, list[int]] = {}
     for size, modules in by_size.items():
@@ -245,7 +245,7 @@ def side_by_side(
 
 
 def not_made(launches: list[Launch]) -> list[Launch]:
-    """Those whose module is not in Warp's cache, for whatever GPU; after `modules_of`."""
+    """Those whose module is not in Warp's cache, for any GPU; after `modules_of`."""
     folder = pathlib.Path(wp.config.kernel_cache_dir or "")
     return [launch for launch in launches if not (folder / launch[0].module.get_module_identifier(launch[1])).is_dir()]
 

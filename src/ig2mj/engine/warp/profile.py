@@ -2,7 +2,7 @@
 
 MJX-Warp allocates per world for the most degrees of freedom awake at once, the most constraint rows and the most
 contacts. What does not fit is lost, and the world is flagged (`ig2mj.worlds.guards`). Sizes that hold everything would
-take far more memory than homes ever use, so they are measured per scene and robot and kept beside its manifest:
+take far more memory than homes ever use, so they are measured per scene and robot and kept next to its manifest:
 `engine_profile.json` for the scene with the floating hand that calibration disturbs it with (which holds it bare, too),
 `engine_profile.humanoid.json` and so on for robots. Where a robot has none, the scene's sizes are widened by the most
 that the robot's own bodies could need. Objects that were added to the scene from the library are in no file: for them
@@ -69,7 +69,7 @@ class EngineProfile(msgspec.Struct, omit_defaults=True):
 
 
 def default_profile(model: mujoco.MjModel) -> EngineProfile:
-    """Sizes that hold whatever a household scene does: everything awake, every geom in contact with several others."""
+    """Sizes that hold anything a household scene does: everything awake, every geom in contact with several others."""
     geoms = int(((model.geom_contype != 0) | (model.geom_conaffinity != 0)).sum())
     moving = int((model.body_treeid[model.geom_bodyid] >= 0).sum())
     contacts = max(64, 8 * min(moving, geoms))
@@ -141,7 +141,7 @@ def _with_additions(profile: EngineProfile, scene: Scene) -> EngineProfile:
 
 
 def _wider(profile: EngineProfile, dofs: int, rows: int, contacts: int, convex_contacts: int) -> EngineProfile:
-    """Sizes with room for more: degrees of freedom, constraint rows beside those of contacts, contacts."""
+    """Sizes with room for more: degrees of freedom, constraint rows in addition to those of contacts, contacts."""
     return msgspec.structs.replace(
         profile,
         awake_dofs=profile.awake_dofs + dofs,
@@ -161,7 +161,7 @@ def _equalities(model: mujoco.MjModel, agents: np.ndarray) -> int:
 
 
 def load_profile(folder: str | os.PathLike, model: mujoco.MjModel, name: str = PROFILE_FILE) -> EngineProfile:
-    """The profile beside a scene's manifest, or the safe default where there is none.
+    """The profile next to a scene's manifest, or the safe default where there is none.
 
     Args:
       name: of the file.
@@ -189,7 +189,7 @@ def fit(profile: EngineProfile, model: mujoco.MjModel) -> EngineProfile:
 
 
 def save_profile(profile: EngineProfile, folder: str | os.PathLike, name: str = PROFILE_FILE) -> pathlib.Path:
-    """Writes the profile beside the manifest, under a name (`profile_file`), and says where."""
+    """Writes the profile next to the manifest, under a name (`profile_file`), and says where."""
     file = pathlib.Path(folder) / name
     file.write_bytes(msgspec.json.format(msgspec.json.encode(profile), indent=1) + b"\n")
     return file

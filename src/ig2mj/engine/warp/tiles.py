@@ -2,8 +2,8 @@
 
 A kernel that factorises a tile calls functions that Warp takes from NVIDIA's cuSOLVERDx. Each takes about two seconds,
 `birch` needs ten, and Warp makes them while it writes the first kernel that calls them, when no other kernel can be
-written. It keeps them in files of their own. So they are made first, beside the kernels that call none, and are found
-there. The library makes one at a time in a process, whatever threads there are, so that each is made in its own.
+written. It keeps them in files of their own. So they are made first, alongside the kernels that call none, and are
+found there. The library makes one at a time in a process, regardless of threads, so that each has its own process.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ run these functions instead; results are the same up to rounding. Without them t
 explains its own. `docs/notes/gpu.md` says what each gains on a GPU.
 
 Who gets them: programs of our own engines (`traced_with`), and direct calls inside `awake_kernels()`. Everybody else in
-the process, in whatever thread, gets MuJoCo Warp's own functions. An engine made inside `upstream_kernels()` gets
+the process, in any thread, gets MuJoCo Warp's own functions. An engine made inside `upstream_kernels()` gets
 those, too. The functions replaced are private, so version and sources are pinned (`pins`). With others every engine
 runs upstream's functions, and one warning says so; `IG2MJ_TRY_KERNELS=1` runs ours in spite of the pins.
 """

@@ -1,9 +1,9 @@
-"""The kinds of convex pairs side by side: each kind's kernel in a branch of the CUDA graph of its own.
+"""The convex kernels of all kinds side by side: each in a branch of its own of the CUDA graph.
 
-MuJoCo Warp launches a kernel for each pair of types of geoms, one after the other, and each takes as long as its
-slowest pair, 100 to 250 us, while most of the GPU has nothing to do. Here they are launched on streams of their own
-that begin where the broad phase ends; collision detection goes on when all have ended. They share buffers: places in
-them come from one counter for all kinds (upstream has one for each, and uses the same places again).
+MuJoCo Warp launches a kernel for each pair of geom types, one after the other, and each takes as long as its slowest
+pair, 100 to 250 us, while most of the GPU is idle. Here they are launched on streams of their own that begin where the
+broad phase ends; collision detection continues when all have ended. They share buffers: places in them come from one
+counter for all kinds (upstream has one for each, and uses the same places again).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ MOST = 8
 """Streams of a device; further kernels follow the first ones."""
 
 ON_PROCESSORS = False
-"""Whether all this is done without a GPU, too, where nothing is gained: tests compare contacts."""
+"""Whether the same is done on a CPU, where nothing is gained: tests compare contacts."""
 
 _here = threading.local()
 _streams: dict[str, list[wp.Stream]] = {}
@@ -69,7 +69,7 @@ def convex_narrowphase(m: Any, d: Any, ctx: Any, collision_table: Any) -> None:
 
 
 def narrowphase(m: Any, d: Any, ctx: Any) -> None:
-    """As upstream; other pairs are looked at beside the convex ones, on the stream that was there."""
+    """As upstream; other pairs are processed alongside the convex ones, on the stream that was current before."""
     _here.kept, _here.used, _here.calls = [], [], []
     try:
         original(collision_driver, "_narrowphase")(m, d, ctx)

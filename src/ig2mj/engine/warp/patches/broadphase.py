@@ -8,7 +8,7 @@ against each other, spheres first, then by MuJoCo Warp's own filter (`_pairs_ker
 another order.
 """
 
-# Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
+# Warp's kernels only look like Python, so that type checkers must leave them alone:
 # pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
 # pyright: reportGeneralTypeIssues=false, reportOperatorIssue=false, reportPrivateUsage=false, reportReturnType=false
 # pyright: reportAssignmentType=false

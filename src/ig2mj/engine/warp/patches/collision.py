@@ -4,7 +4,7 @@ MuJoCo Warp counts pairs again in the second pass of a step, which looks for pai
 compares only that number with the size of the buffer. Too many pairs in the first pass are not flagged.
 """
 
-# Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
+# Warp's kernels only look like Python, so that type checkers must leave them alone:
 # pyright: reportIndexIssue=false, reportArgumentType=false, reportCallIssue=false
 
 from typing import Any, no_type_check

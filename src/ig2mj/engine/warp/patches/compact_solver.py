@@ -4,7 +4,7 @@ Awake degrees of freedom come first and are `ncdof`; the rest of the matrix is i
 as upstream keeps one: the factorisation borders the matrix with the right-hand side there.
 """
 
-# Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
+# Warp's kernels only look like Python, so that type checkers must leave them alone:
 # pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
 # pyright: reportGeneralTypeIssues=false, reportAssignmentType=false, reportReturnType=false, reportOperatorIssue=false
 # pyright: reportPrivateUsage=false

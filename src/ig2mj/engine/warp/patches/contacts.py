@@ -1,17 +1,17 @@
-"""Contacts of MuJoCo Warp are checked against their geoms: strays are dropped, slanted normals on faces set upright.
+"""Contacts of MuJoCo Warp are checked against their geoms: strays are dropped, slanted normals on faces corrected.
 
-Its convex collision works in single precision. Where a small object rests on a wide box, as everything does on a floor,
-by a hundredth of a millimetre, it gives
+Its convex collision works in single precision. Where a small object rests on a wide box by a hundredth of a millimetre,
+as everything does on a floor, it has two faults:
 
-- now and then a contact metres away from the object. Such a lever makes the solver's matrix
-  singular, and the world is lost (not finite) or the object flies off. A contact belongs within the bounding boxes of
-  both geoms; what lies outside by more than its own depth is dropped, and the pair's next step gives a sound one;
-- in up to one of twenty steps (floor of 12 m, object nearly flat) a normal that is not the floor's. Where a shallow
+- Rarely a contact lies metres away from the object. Such a lever makes the solver's matrix singular, and the world
+  is lost (not finite) or the object flies off. A contact belongs within the bounding boxes of both geoms; one that
+  lies outside by more than its own depth is dropped, and the pair's next step gives a sound one.
+- In up to one of twenty steps (floor of 12 m, object nearly flat) a normal is not the floor's. Where a shallow
   contact lies on a box's face, further from its edges than it is deep, the shortest way out is across that face: the
   normal is set to the face's.
 """
 
-# Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
+# Warp's kernels only look like Python, so that type checkers must leave them alone:
 # pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
 # pyright: reportGeneralTypeIssues=false, reportOperatorIssue=false
 
@@ -21,14 +21,14 @@ import mujoco
 import warp as wp
 
 TOLERANCE = 0.002
-"""Metres that a contact may lie outside a geom's bounding box, besides half its distance."""
+"""Metres that a contact may lie outside a geom's bounding box, in addition to half its distance."""
 
 SHALLOW, ON_FACE, FROM_EDGE = 0.001, 0.002, 0.005
 """Metres: normals are looked at where a contact is less deep (or less far) than the first, lies closer to a face of a
 box than the second, and further from its edges than the third."""
 
 UPRIGHT = 0.999
-"""Cosine between a contact's normal and the face's from which on nothing is changed."""
+"""Cosine between a contact's normal and the face's above which the normal is kept."""
 
 FAR = 1000.0
 """Metres: the distance written into a dropped contact, so that it gives neither force nor touch."""

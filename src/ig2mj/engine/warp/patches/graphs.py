@@ -1,10 +1,10 @@
 """How Warp finds the CUDA graph that it captured of a call, and how many it keeps.
 
 A step of MuJoCo, or its cameras, is one call that JAX makes from within a compiled program. Warp captures it as a CUDA
-graph, 65 ms of a processor for a step of a home, and replays that graph wherever all arrays of the call lie where they
-lay at the capture. Arrays without elements count, too, and XLA gives them whatever place comes to hand, another one in
-most calls. A step has dozens of them (of flexes, tendons and sensors that a scene does not have), and where an
-iteration of a training is two programs, captures therefore did not end. Here only arrays with elements count.
+graph, which takes 65 ms for a step of a home, and replays that graph whenever all arrays of the call are at the
+addresses of the capture. Arrays without elements count, too, and XLA gives them another address in most calls. A step
+has dozens of them (of flexes, tendons and sensors that a scene does not have), so that captures may never end where an
+iteration of a training is two programs. Here only arrays with elements count.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.engine.warp.patches.table import runs
 
 GRAPHS = 128
-"""CUDA graphs of a call that are kept. Warp keeps 32; an environment that is stepped from Python may need more in turn,
-as JAX gives it other buffers, and would capture each anew in every step."""
+"""CUDA graphs of a call that are kept. Warp keeps 32. An environment that is stepped from Python may alternate between
+more, as JAX gives it other buffers, and would capture one in every step."""
 
 _callables = ScopedReplacement()
 
@@ -30,7 +30,7 @@ class Filled:
     """A function of Warp that JAX calls, whose graphs are found by where its arrays with elements lie."""
 
     def __init__(self, call: Any):
-        """`call`: what `wp.jax_callable` gives; it reads its `array_input_indices` for nothing else."""
+        """`call`: what `wp.jax_callable` gives; it reads its `array_input_indices` only to find graphs."""
         self._call, self._indices = call, tuple(call.array_input_indices)
         self._seen, self._lock = set[int](), threading.Lock()
 
@@ -54,8 +54,8 @@ _callables.add({(wp, "jax_callable"): _callable})
 def graphs_kept() -> Iterator[None]:
     """Calls of Warp that this thread traces inside the block find their graphs by arrays with elements alone.
 
-    MJX keeps what it registered of a function. Its cameras are the same functions for everybody: theirs find graphs so
-    for all users in the process, or for none where another one drew first.
+    MJX registers a function once. Its cameras are the same functions for all users in the process: whether they find
+    graphs in this way is decided by the first user.
     """
     with _callables.entered(runs("graphs")):
         yield

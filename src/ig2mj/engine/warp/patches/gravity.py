@@ -1,10 +1,10 @@
-"""Gravity compensation, launched for every (world, body) and not for every degree of freedom of the scene besides.
+"""Gravity compensation, launched for every (world, body) instead of every (world, body, degree of freedom).
 
 A body's force acts on the degrees of freedom that move it: its own and those of its ancestors, each naming the one
 before it.
 """
 
-# Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
+# Warp's kernels only look like Python, so that type checkers must leave them alone:
 # pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
 # pyright: reportGeneralTypeIssues=false, reportAssignmentType=false, reportReturnType=false, reportOperatorIssue=false
 # pyright: reportPrivateUsage=false

@@ -5,7 +5,7 @@ some hundred rows a few dozen are used, and next to none when most worlds have c
 thread costs as much. Here each world has `LANES` threads for its rows and `ENTRIES` for its Hessian.
 """
 
-# Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
+# Warp's kernels only look like Python, so that type checkers must leave them alone:
 # pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
 # pyright: reportGeneralTypeIssues=false, reportOperatorIssue=false, reportPrivateUsage=false, reportAssignmentType=false
 # pyright: reportReturnType=false

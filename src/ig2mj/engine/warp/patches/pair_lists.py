@@ -1,15 +1,12 @@
 """The pairs of convex collision, listed by kind and within a kind by geoms.
 
-MuJoCo Warp has a kernel for each kind (pair of types of geoms), and each goes through the pairs of all kinds: of the
-32 threads of a warp a few find a pair of theirs, and the warp takes as long as with 32. Here each kernel gets a list of
+MuJoCo Warp has a kernel for each kind (pair of geom types), and each goes through the pairs of all kinds: of the 32
+threads of a warp a few find a pair of theirs, and the warp takes as long as with 32. Here each kernel gets a list of
 its own pairs. The same two geoms in many worlds follow each other in it, since they read the same hulls and take about
-as many iterations. Counting, adding up and placing are three short launches.
-
-On an H200 `birch` gains 17 %. Before kinds ran side by side (`branches`) lists gained nothing: each launch waited for
-the slowest pair of the one before, and the number of warps hardly mattered.
+as many iterations. Three short launches count, add up and place.
 """
 
-# Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
+# Warp's kernels only look like Python, so that type checkers must leave them alone:
 # pyright: reportIndexIssue=false, reportArgumentType=false, reportCallIssue=false, reportAttributeAccessIssue=false
 # pyright: reportOperatorIssue=false, reportGeneralTypeIssues=false
 

@@ -1,15 +1,13 @@
-"""Convex collision in two phases: all pairs' distances first, then depths and several contacts of those that touch.
+"""Convex collision in two phases: distances of all pairs first, then depths and multiple contacts of touching pairs.
 
 MuJoCo Warp's kernel of a kind does everything for a pair in one thread: GJK, for one pair in four the expanding
-polytope (EPA), and for as many clipped faces. A warp goes through all that any of its 32 pairs needs, and a kernel
-holds half a megabyte of code. Here one kernel measures distances, writes the contacts of pairs that are near but
-apart, and lists the others with what it found; a second kernel goes on with those. Both are made of upstream's source,
-and contacts are the same.
-
-On an H200 `birch` gains 6 % beside sorted lists, and a cold start half of what convex kernels take to compile.
+polytope (EPA), and for as many clipped faces. A warp takes as long as the slowest of its 32 pairs, and a kernel holds
+half a megabyte of code. Here one kernel measures distances, writes the contacts of pairs that are near but apart, and
+lists the others with what it found. A second kernel continues with those. Both are made of upstream's source, and
+contacts are the same.
 """
 
-# Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
+# Warp's kernels only look like Python, so that type checkers must leave them alone:
 # pyright: reportGeneralTypeIssues=false, reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""MuJoCo Warp's functions, replaced for whoever is inside a block of `KERNELS`."""
+"""MuJoCo Warp's functions, replaced for threads inside a block of `KERNELS`."""
 
 from __future__ import annotations
 

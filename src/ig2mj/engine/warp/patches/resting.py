@@ -1,18 +1,18 @@
-"""Positions and velocities of what rests are not computed anew.
+"""Positions and velocities of resting bodies are not recomputed.
 
 MuJoCo Warp computes the pose of every body and geom, inertias, velocities and bias forces of every world in every step,
-though nearly everything sleeps. What depends on positions and velocities alone stays as it is while a tree sleeps, and
-lies in the same arrays in the next step. So the kernels that compute it (`GUARDED`) pass over bodies whose kinematic
-root has no tree that is live, in `live` [world, body].
+though nearly everything sleeps. What depends on positions and velocities alone does not change while a tree sleeps, and
+is still in the same arrays in the next step. So the kernels that compute it (`GUARDED`) skip bodies whose kinematic
+root has no live tree, by `live` [world, body].
 
 A tree is live when a step begins if it is awake, or if it fell asleep in the last step: then its velocity became zero
-and its position changed after the last step's kinematics. `tree_awake` says so from one step to the next:
-`FELL_ASLEEP`, or `REPLACED` where the engine put other positions in place of a world's (`WarpEngine._replaced`), in
-which case everything of that world is computed. Within a step it is 0 or 1, as upstream. A tree that wakes in the
-course of a step has not moved.
+and its position changed after the last step's kinematics. `tree_awake` carries this from one step to the next:
+`FELL_ASLEEP`, or `REPLACED` where the engine replaced a world's positions (`WarpEngine._replaced`), in which case
+everything of that world is computed. Within a step it is 0 or 1, as upstream. A tree that wakes in the course of a step
+has not moved.
 """
 
-# Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
+# Warp's kernels only look like Python, so that type checkers must leave them alone:
 # pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
 # pyright: reportGeneralTypeIssues=false, reportOperatorIssue=false, reportPrivateUsage=false
 
@@ -49,7 +49,7 @@ def _rests(live: wp.array2d[int], world: int, root: int) -> bool:
 @wp.func
 @no_type_check
 def _rests_or_ends(live: wp.array2d[int], world: int, root: int, parent: int) -> bool:
-    """Likewise; and what goes from roots to the world is not added up, where the world's own sum is not begun anew."""
+    """Likewise; and sums from roots to the world are left out unless the world's own sum starts from zero."""
     return live[world, 0] == 0 and (live[world, root] == 0 or parent == 0)
 
 
@@ -78,7 +78,7 @@ GUARDED = {
     "_cfrc_backward": UPWARD,
     "_qfrc_bias": _body("dof_bodyid[dofid]"),
 }
-"""Kernels of `smooth`, and where each has nothing to do."""
+"""Kernels of `smooth`, and where each may return at once."""
 
 
 @functools.cache
@@ -93,7 +93,7 @@ def _guarded_by_kernel() -> dict[wp.Kernel, wp.Kernel]:
 
 
 def substitute(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any]) -> Launch | None:
-    """The guarded kernel with its inputs, in a step that passes over what rests."""
+    """The guarded kernel with its inputs, in a step that skips resting bodies."""
     flags, awake = getattr(_here, "flags", None), getattr(_here, "awake", None)
     if awake and kernel.key.startswith(SOLVE):
         return _guarded_solve(kernel), dim, [*awake, *inputs]
@@ -125,7 +125,7 @@ def _guarded_solve(kernel: wp.Kernel) -> wp.Kernel:
 
 
 def factor_solve_i(m: Any, d: Any, *arguments: Any) -> None:
-    """As upstream; trees that sleep are passed over, and do not accelerate."""
+    """As upstream; sleeping trees are skipped and do not accelerate."""
     _here.awake = [d.tree_awake, m.dof_treeid] if m.opt.enableflags & types.EnableBit.SLEEP else None
     try:
         original(smooth, "factor_solve_i")(m, d, *arguments)
@@ -294,8 +294,8 @@ def wake(m: Any, d: Any) -> None:
 
 @contextlib.contextmanager
 def noted() -> Iterator[None]:
-    """Inside the block this thread's steps pass over what rests. Their data's `tree_awake` must say `REPLACED` where
-    the arrays that depend on positions and velocities were not computed by a step or a forward pass."""
+    """Inside the block this thread's steps skip resting bodies. Their data's `tree_awake` must be `REPLACED` where the
+    arrays that depend on positions and velocities were not computed by a step or a forward pass."""
     before = getattr(_here, "noted", False)
     _here.noted = True
     try:
@@ -305,7 +305,7 @@ def noted() -> Iterator[None]:
 
 
 def forward(m: Any, d: Any) -> None:
-    """The forward pass of a step. (One by itself, after something was changed, computes everything.)"""
+    """The forward pass of a step. A forward pass outside of a step computes everything."""
     _here.steps = getattr(_here, "noted", False)
     try:
         original(forward_module, "forward")(m, d)

@@ -1,8 +1,8 @@
 """Functions of another library replaced for some of its callers only.
 
 While at least one block of a `ScopedReplacement` is entered, a function that chooses stands in place of each replaced
-one: in threads that are inside a block it calls ours, in all others the original. Outside all blocks the library is as
-it came. Who enters and leaves in several threads at a time is counted under a lock.
+one: in threads that are inside a block it calls ours, in all others the original. Outside all blocks the library is
+unchanged. Entries and exits of several threads are counted under a lock.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class ScopedReplacement:
             if self._entered:
                 return
             for place in list(self._chosen):
-                # Where somebody put another function over ours meanwhile, both stay: theirs may call ours.
+                # Where another function was put over ours in the meantime, both stay: theirs may call ours.
                 if getattr(*place) is self._chosen[place]:
                     setattr(*place, self._originals.pop(place))
                     del self._chosen[place]

@@ -1,11 +1,10 @@
-"""Putting trees to sleep with a thread for each tree, where MuJoCo Warp has one for each world.
+"""Trees are put to sleep with a thread for each tree, where MuJoCo Warp has one for each world.
 
-Its last kernel goes through all trees of a world, once for each island that may sleep, in a single thread: 5 % of a
-step in a home of 64 objects, 12 % with 123. The trees of an island that falls asleep form a ring, each naming the next;
-a tree finds its next one by itself.
+Its last kernel goes through all trees of a world, once for each island that may sleep, in a single thread. The trees of
+an island that falls asleep form a ring, each naming the next; here each tree finds its next one by itself.
 """
 
-# Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
+# Warp's kernels only look like Python, so that type checkers must leave them alone:
 # pyright: reportIndexIssue=false, reportArgumentType=false, reportCallIssue=false, reportGeneralTypeIssues=false
 # pyright: reportPrivateUsage=false
 

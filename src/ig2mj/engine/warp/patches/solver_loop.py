@@ -11,7 +11,7 @@ The line search is MuJoCo Warp's source, made into a function; the factorisation
 written here for what households use: Newton, pyramidal cones, degrees of freedom compacted to those awake.
 """
 
-# Warp's kernels are not Python, whatever they look like, so nothing may check or wrap them:
+# Warp's kernels only look like Python, so that type checkers must leave them alone:
 # pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
 # pyright: reportGeneralTypeIssues=false, reportOperatorIssue=false, reportPrivateUsage=false, reportAssignmentType=false
 # pyright: reportReturnType=false

@@ -14,7 +14,7 @@ _numbers = itertools.count()
 def defined(name: str, text: str, space: Mapping[str, Any]) -> Any:
     """What a source text defines under a name.
 
-    Tracebacks, Warp and whoever copies the function once more find its text as that of any other.
+    Tracebacks, Warp and later copies of the function find its text as that of any other function.
 
     Args:
       space: names that the text uses; "__name__" is the module that it becomes a part of.
