@@ -23,7 +23,7 @@ from .height_maps import write_height_maps
 
 
 def write_model(model: HouseholdObject, objects: pathlib.Path) -> pathlib.Path:
-    """Writes `objects/<category>/<model>/` and, beside it, the halves of a sliceable. Returns the model's folder."""
+    """Writes `objects/<category>/<model>/` and, next to it, the halves of a sliceable. Returns the model's folder."""
     folder = objects / model.category / model.model
     for part in ("shape/visual", "shape/collision", "material", "misc"):
         (folder / part).mkdir(parents=True, exist_ok=True)

@@ -54,7 +54,7 @@ def furnish_home(
 
     Args:
       objects: how many objects in all, doors and windows included; fewer where nothing more fits.
-      pieces: room kind -> furniture beside what rooms of that kind have anyway.
+      pieces: room kind -> furniture in addition to that of the room kind.
     """
     home = start_home(plan, random.Random(f"{seed}/{plan.name}/things"), seed=seed, limit=objects)
     openings = len(home.things.things)

@@ -1,4 +1,4 @@
-"""The placing of furniture in one room: against a wall, beside something, before it, on a carpet.
+"""The placing of furniture in one room: against a wall, next to something, before it, on a carpet.
 
 A method gives the object it put, or None where there was no room for it; it never makes two overlap, never blocks
 a way or what opens, and draws every choice from the home's random generator.

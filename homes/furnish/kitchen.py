@@ -13,7 +13,7 @@ BEFORE = 0.55  # m, kept free before what has doors
 RUN = ("sink", "bottom_cabinet", "stove", "bottom_cabinet", "dishwasher", "bottom_cabinet")
 """From the fridge on; what does not fit is tried at another wall."""
 SHORT_RUN = ("sink", "stove", "bottom_cabinet", "bottom_cabinet", "dishwasher", "bottom_cabinet")
-"""Where no wall is longer than SHORT m: the stove stays beside the sink, and a cupboard goes to another wall."""
+"""Where no wall is longer than SHORT m: the stove stays next to the sink, and a cupboard goes to another wall."""
 SHORT = 3.3
 ISLAND = 11.5  # m2 of kitchen from which a counter with stools stands in its middle
 OVER = {"stove": ("range_hood", 1.62), "bottom_cabinet": ("top_cabinet", 1.45)}
@@ -21,7 +21,7 @@ OVER = {"stove": ("range_hood", 1.62), "bottom_cabinet": ("top_cabinet", 1.45)}
 
 
 def kitchen(kit: RoomKit) -> Iterator[Placed | None]:
-    """The fridge in a corner, the run beside it, wall cupboards over it, a microwave, a table where there is room."""
+    """The fridge in a corner, the run next to it, wall cupboards over it, a microwave, a table where there is room."""
     sides = sorted(SIDES, key=lambda side: (-_longest(kit, side), side))
     fridge = kit.at_wall("fridge", side=sides, place="corner", room_before=BEFORE)
     yield fridge

@@ -15,7 +15,7 @@ OPPOSITE = {"south": "north", "north": "south", "east": "west", "west": "east"}
 NEAREST, FARTHEST = 1.4, 3.4
 """m of floor between a sofa's front and what the television stands on."""
 ASIDE = 0.45
-"""m by which the middle of the sofa may be beside the middle of the television."""
+"""m by which the middle of the sofa may be off the middle of the television, sideways."""
 FREE_STANDING = (2.2, 1.95, 2.45, 1.7, 2.7, 1.5, 3.0)
 """m: distances that are tried for a sofa that has no wall behind it."""
 TV_HEIGHT = 0.95  # m, of a wall-mounted television's lower edge

@@ -31,7 +31,7 @@ class Drawing:
       objects: that it holds in all, doors and windows included, walls, floors and ceilings not.
       columns, rows, cells: see the module.
       open_plan, passages: pairs of letters with no wall, and with a wide opening, between them.
-      pieces: room kind -> furniture that its rooms get beside what their kind has (`furnish_home`).
+      pieces: room kind -> furniture that its rooms get in addition to that of their kind (`furnish_home`).
     """
 
     objects: int

@@ -55,7 +55,7 @@ def _label(name: str | RGB) -> str:
 
 
 def tint(name: str | RGB, rng: random.Random, spread: float = 0.08) -> RGB:
-    """A colour a little beside the named one: brightness and each channel moved by up to `spread`, relatively."""
+    """A colour near the named one: brightness and each channel moved by up to `spread`, relatively."""
     shade = rng.uniform(1 - spread, 1 + spread)
     r, g, b = (min(1.0, max(0.0, c * shade * rng.uniform(1 - spread / 2, 1 + spread / 2))) for c in colour(name))
     return (round(r, 4), round(g, 4), round(b, 4))

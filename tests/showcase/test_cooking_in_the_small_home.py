@@ -110,7 +110,7 @@ def test_the_plot_is_a_picture(cooked, tmp_path):
 
 
 def test_the_film_shows_stove_and_milk_and_has_the_frames_it_was_given(cooked, tmp_path):
-    from ig2mj.showcase import cooking_film
+    from ig2mj.showcase import cooking_video
     from ig2mj.showcase.cooking_pictures import KitchenCameras
     from ig2mj.viewer import offscreen
 
@@ -126,24 +126,24 @@ def test_the_film_shows_stove_and_milk_and_has_the_frames_it_was_given(cooked, t
     assert (world.model.geom_rgba == colours).all()
 
     short = TemperatureLog(log.objects, log.predicates)
-    film = cooking_film.CookingFilm(tmp_path / "film.mp4", cameras, kitchen)
-    for _ in range(cooking_film.STRIDE + 1):
+    video = cooking_video.CookingVideo(tmp_path / "video.mp4", cameras, kitchen)
+    for _ in range(cooking_video.STRIDE + 1):
         short.record(world)
-        film.see(short)
-    film.close()
-    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "film.mp4"))
-    assert frames == 2 and seconds == pytest.approx(2 / cooking_film.FRAMES_PER_SECOND, abs=0.01)
+        video.see(short)
+    video.close()
+    frames, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "video.mp4"))
+    assert frames == 2 and seconds == pytest.approx(2 / cooking_video.FRAMES_PER_SECOND, abs=0.01)
 
 
 def test_a_film_that_cannot_be_written_is_one_error(cooked, tmp_path):
-    from ig2mj.showcase.cooking_film import CookingFilm
     from ig2mj.showcase.cooking_pictures import KitchenCameras
+    from ig2mj.showcase.cooking_video import CookingVideo
 
     world, kitchen, _ = cooked
-    film = CookingFilm(tmp_path / "no_such_folder" / "film.mp4", KitchenCameras(world, kitchen), kitchen)
-    with pytest.raises(EngineError, match=r"ffmpeg wrote no film: .*No such file"):
-        film.close()
-    film.close()
+    video = CookingVideo(tmp_path / "no_such_folder" / "video.mp4", KitchenCameras(world, kitchen), kitchen)
+    with pytest.raises(EngineError, match=r"ffmpeg wrote no video: .*No such file"):
+        video.close()
+    video.close()
 
 
 def test_the_hand_stays_long_enough_within_reach_and_comes_back():

@@ -34,7 +34,7 @@ from ig2mj.scene.scene import Scene
 from ig2mj.worlds.random_streams import episode_keys
 
 SAFETY = {"warp": 1.0, "native": 1.4}
-"""Factor on all sizes, by what was measured (see `ig2mj.engine.warp.buffer_sizes` for what is reckoned with anyway)."""
+"""Factor on all measured sizes (`ig2mj.engine.warp.buffer_sizes` has the sizes without a measurement)."""
 
 WORLDS = {"warp": 1024, "native": 16}
 

@@ -70,7 +70,7 @@ class Pusher:
 
 
 def start_pushing(reach: Reach, num_worlds: int, num_controls: int) -> Pusher:
-    """Hands at the start, about to go to the object beside it. No two arrays are the same: they may be donated."""
+    """Hands at the start, about to go to the object next to it. No two arrays are the same: they may be donated."""
     return Pusher(
         ctrl=jnp.zeros((num_worlds, num_controls), jnp.float32),
         goal=jnp.full(num_worlds, reach.first, jnp.int32),

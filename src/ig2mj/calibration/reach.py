@@ -4,7 +4,7 @@ Worked out on the host from a settled scene, before the hand is added to it, and
 detection: a box around the hand's geoms is moved along each way. Everything that is fixed is in the way (walls, closed
 cabinets, table tops), and so is what is too heavy to be shoved aside.
 
-The map's nodes are the palm's places at the objects, a station beside each of them, and a grid of free places in the
+The map's nodes are the palm's places at the objects, a station next to each of them, and a grid of free places in the
 rooms; its ways are straight and free. What lies behind a closed door is not on it.
 
 Axes: M loose objects, N reachable ones, K nodes: first the N places at them, then the rest.
@@ -54,7 +54,7 @@ FINGER_DEPTH, OVER_SUPPORT = 0.03, 0.01
 """Metres: the fingertips sweep this far under an object's centre, but no closer than this to what it lies on."""
 
 ASIDE, LIFT, ABOVE = (0.3, 0.5), 0.15, 0.4
-"""Metres: stations lie this far beside an object and this much over the palm's place there, in one of eight directions;
+"""Metres: stations lie this far from an object and this much above the palm's place there, in one of eight directions;
 where none of these is free, straight above it."""
 
 BEYOND = 0.2
@@ -205,7 +205,7 @@ class _Search:
 
 
 def _station(search: _Search, thing: int, place: np.ndarray) -> np.ndarray | None:
-    """A free place beside an object from which it can be reached, or None."""
+    """A free place next to an object from which it can be reached, or None."""
     found = None
     for aside in ASIDE:
         for angle in np.linspace(0, 2 * np.pi, 8, endpoint=False):

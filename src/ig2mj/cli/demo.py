@@ -26,7 +26,7 @@ def run(
     """Convert a small home, simulate it, cook a fish and freeze milk in it, and let a robot cook a steak.
 
     Leaves DIR/dataset (the source), DIR/small_home (the scene and report.html), DIR/pictures and DIR/cooking
-    (temperatures as CSV, JSON and a plot, pictures, a film), and DIR/expert.mp4: in the shipped home birch a scripted
+    (temperatures as CSV, JSON and a plot, pictures, a video), and DIR/expert.mp4: in the shipped home birch a scripted
     expert brings a steak to the stove until it is cooked.
 
     Args:
@@ -103,12 +103,12 @@ def _look(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
 
 
 def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Path) -> int:
-    """Cooks; leaves table, plot, pictures and film; number of objects that were to happen and did not."""
+    """Cooks; leaves table, plot, pictures and video; number of objects that were to happen and did not."""
     from ig2mj.process.settings import GL_INSTALL_HINT
     from ig2mj.showcase import cooking
-    from ig2mj.showcase.cooking_film import CookingFilm
     from ig2mj.showcase.cooking_pictures import KitchenCameras, MomentSheet
     from ig2mj.showcase.cooking_plot import plot
+    from ig2mj.showcase.cooking_video import CookingVideo
     from ig2mj.showcase.kitchen import enter_kitchen
     from ig2mj.viewer.offscreen import default_backend
 
@@ -118,12 +118,12 @@ def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
     folder.mkdir(parents=True, exist_ok=True)
     cameras = KitchenCameras(world, kitchen)
     sheet = MomentSheet(cameras, kitchen)
-    filming = default_backend() != "warp"  # its pictures take seconds
-    film = CookingFilm(folder / "cooking.mp4", cameras, kitchen) if filming else None
+    recording_video = default_backend() != "warp"  # its pictures take seconds
+    video = CookingVideo(folder / "cooking.mp4", cameras, kitchen) if recording_video else None
 
     def watch(log: Any, changed: Any) -> None:
-        if film:
-            film.see(log)
+        if video:
+            video.see(log)
         sheet.see(f"{log.times[-1]:.1f} s", changed if log.steps else None)
         report(log.steps, None, f"{log.times[-1]:.0f} s" + (f", {changed[-1]}" if changed else ""))
 
@@ -131,8 +131,8 @@ def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
     try:
         log = cooking.cook(world, kitchen, watch)
     finally:
-        if film:
-            film.close()
+        if video:
+            video.close()
     log.write_csv(folder / "temperatures.csv")
     log.write_json(folder / "temperatures.json")
     plot(log, kitchen, folder / "temperatures.png")
@@ -143,10 +143,10 @@ def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
         f"[bold]cooked[/]     {log.times[-1] - log.times[0]:.1f} s of the kitchen in {seconds:.1f} s, pictures included"
     )
     for word, name in (("numbers", "temperatures.csv"), ("numbers", "temperatures.json"), ("plot", "temperatures.png"),
-                       ("pictures", "moments.png"), *([("film", "cooking.mp4")] if filming else [])):  # fmt: skip
+                       ("pictures", "moments.png"), *([("video", "cooking.mp4")] if recording_video else [])):  # fmt: skip
         console.print(f"[bold]{word:<10}[/] {folder / name}")
-    if not filming:
-        console.print(f"[bold]film[/]       none: it needs OpenGL ({GL_INSTALL_HINT})")
+    if not recording_video:
+        console.print(f"[bold]video[/]      none: it needs OpenGL ({GL_INSTALL_HINT})")
     absent = cooking.missing(log, kitchen)
     for what in absent:
         console.print(f"           did not happen: {what}")
@@ -154,33 +154,33 @@ def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
 
 
 def _watch_expert(console: Console, step: Step, file: pathlib.Path) -> int:
-    """A film of the scripted expert of CookingMeat; 1 if the steak is not cooked in the end."""
+    """A video of the scripted expert of CookingMeat; 1 if the steak is not cooked in the end."""
     from ig2mj.envs.experts import expert_of
     from ig2mj.envs.registry import make
     from ig2mj.envs.rollout import play
     from ig2mj.process.settings import GL_INSTALL_HINT
-    from ig2mj.showcase.episode_film import EpisodeFilm
+    from ig2mj.showcase.episode_video import EpisodeVideo
     from ig2mj.viewer.offscreen import default_backend
 
     report = step("a robot cooks")
     report(0, None, "sampling where the steak lies")
     env = make("CookingMeat", robot="humanoid", engine="native", split="held_out", pool_size=1)
-    filming = default_backend() != "warp"  # its pictures take seconds
-    film = EpisodeFilm(file, env) if filming else None
+    recording_video = default_backend() != "warp"  # its pictures take seconds
+    video = EpisodeVideo(file, env) if recording_video else None
 
     def watch(state: Any) -> None:
-        if film is not None:
-            film.see(state)
+        if video is not None:
+            video.see(state)
         seconds = int(state.info["steps"][0]) * env.period
         report(int(state.info["steps"][0]), None, f"{seconds:.1f} s")
 
     try:
         played = play(env, expert_of(env), 1, in_order=True, watch=watch)
     finally:
-        if film is not None:
-            film.close()
+        if video is not None:
+            video.close()
     cooked = played.success[0]
     ending = "cooks the steak" if cooked else "does not cook the steak"
     console.print(f"[bold]expert[/]     the humanoid {ending} in {played.steps * env.period:.1f} s")
-    console.print(f"[bold]film[/]       {file if filming else f'none: it needs OpenGL ({GL_INSTALL_HINT})'}")
+    console.print(f"[bold]video[/]      {file if recording_video else f'none: it needs OpenGL ({GL_INSTALL_HINT})'}")
     return 0 if cooked else 1

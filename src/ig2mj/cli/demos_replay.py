@@ -178,9 +178,9 @@ class _Filming:
     """A film of the first run of the first world that is replayed."""
 
     def __init__(self, file: pathlib.Path, env: Any):
-        from ig2mj.showcase.episode_film import EpisodeFilm
+        from ig2mj.showcase.episode_video import EpisodeVideo
 
-        self._film, self._run = EpisodeFilm(file, env), ""
+        self._film, self._run = EpisodeVideo(file, env), ""
 
     def see(self, state: EnvState, runs: dict[int, Run], frame: int) -> None:
         if 0 in runs and self._run in ("", runs[0].name):

@@ -112,9 +112,9 @@ def run(
         played = recorded(played, record)
     film = None
     if video is not None:
-        from ig2mj.showcase.episode_film import EpisodeFilm
+        from ig2mj.showcase.episode_video import EpisodeVideo
 
-        film = EpisodeFilm(video, played)
+        film = EpisodeVideo(video, played)
     try:
         act = who_acts(agent, policy, played, seed)
         with progress(f"playing {played.task.name}") as report:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Vec3 = tuple[float, float, float]
 
 VIDEOS = (".mp4", ".gif")
-"""As `ig2mj.viewer.film.FORMATS`."""
+"""As `ig2mj.viewer.video.FORMATS`."""
 
 
 @renamed_options({"--picture": "--image"})

@@ -55,9 +55,9 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
     )
     act = acting(policy, env, file)
     if video is not None:
-        from ig2mj.showcase.episode_film import EpisodeFilm
+        from ig2mj.showcase.episode_video import EpisodeVideo
 
-        film, state = EpisodeFilm(video, env), env.start_from(np.array([row]))
+        film, state = EpisodeVideo(video, env), env.start_from(np.array([row]))
         try:
             film.see(state)
             while not bool(np.asarray(state.done)[0]):

@@ -179,7 +179,7 @@ def accelerator_checks(jax: dict[str, Any], warp: dict[str, Any], nvidia: tuple[
 
 
 def picture_checks(backends: dict[str, str | None]) -> list[Check]:
-    """Rendering backends that really drew a picture. None is required alone: one that works is enough."""
+    """Rendering backends that rendered an image. One that works is enough."""
     any_works = None in backends.values()
     checks = []
     for name, error in backends.items():
@@ -194,10 +194,10 @@ def picture_checks(backends: dict[str, str | None]) -> list[Check]:
 
 
 def tool_checks() -> list[Check]:
-    """Programs beside Python, and the data that must come with the packages."""
+    """Programs outside of Python, and the data that must come with the packages."""
     from ig2mj.errors import Ig2mjError
     from ig2mj.knowledge import categories
-    from ig2mj.viewer.film import ffmpeg_program
+    from ig2mj.viewer.video import ffmpeg_program
 
     try:
         found, ok = f"{len(categories())} categories", True

@@ -1,6 +1,6 @@
 """What the checks try in a process of its own: `python -m ig2mj.diagnosis.probes NAME` prints one JSON line.
 
-A process of its own, because a broken driver may hang or kill whoever touches it.
+A process of its own, because a broken driver may hang or kill the process that uses it.
 """
 
 from __future__ import annotations

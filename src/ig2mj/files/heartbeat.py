@@ -1,4 +1,4 @@
-"""Signs of life: whether whoever makes a folder, or holds an output, still works on it, on this machine or another.
+"""Signs of life: whether the process that makes a folder, or holds an output, still runs, here or on another machine.
 
 A sign is a small file that says who works (machine, process) and is touched every `BEAT` seconds. Of a process of this
 machine and of this process namespace the kernel knows whether it lives. Any other, in another container or on another

@@ -30,7 +30,7 @@ def cook(world: Simulation, kitchen: Kitchen, watch: Watcher | None = None) -> T
 
     Args:
       world: with the hand of `enter_kitchen`.
-      watch: takes pictures, reports progress.
+      watch: takes images, reports progress.
     """
     fish, milk, stove = kitchen.fish, kitchen.milk, kitchen.stove
     log = TemperatureLog(

@@ -1,4 +1,4 @@
-"""Pictures of the cooking demo: the stove from the front, and the milk behind the fridge's doors, drawn as glass."""
+"""Images of the cooking demo: the stove from the front, and the milk behind the fridge's doors, drawn as glass."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from PIL import Image, ImageDraw, ImageFont
 
 GLASS = 0.15
-"""Opacity of the fridge's doors in these pictures."""
+"""Opacity of the fridge's doors in these images."""
 
 
 class KitchenCameras:
@@ -58,7 +58,7 @@ class KitchenCameras:
 
 
 class MomentSheet:
-    """Four pictures on one sheet: the start, and the fish cooked, burnt, the milk frozen."""
+    """Four images on one sheet: the start, and the fish cooked, burnt, the milk frozen."""
 
     SIZE = (640, 480)
 
@@ -67,7 +67,7 @@ class MomentSheet:
         self._tiles: list[Image.Image] = []
 
     def see(self, caption: str, changed: list[Moment] | None = None) -> None:
-        """Takes a picture at the start (`changed` None), or where something changed that belongs on the sheet."""
+        """Takes an image at the start (`changed` None), or where something changed that belongs on the sheet."""
         kitchen = self._kitchen
         for moment in changed or []:
             if moment.value and moment.object in (kitchen.fish, kitchen.milk):
@@ -83,7 +83,7 @@ class MomentSheet:
         self._tiles.append(image)
 
     def write(self, file: pathlib.Path) -> None:
-        """Two pictures a row."""
+        """Two images a row."""
         from PIL import Image
 
         width, height = self.SIZE
@@ -102,7 +102,7 @@ def font(size: int) -> ImageFont.FreeTypeFont:
 
 
 def caption_at(draw: ImageDraw.ImageDraw, at: tuple[int, int], text: str, face: ImageFont.FreeTypeFont) -> None:
-    """Dark letters with a light rim, legible on any picture."""
+    """Dark letters with a light rim, legible on any image."""
     draw.text(at, text, fill=(25, 25, 25), font=face, stroke_width=2, stroke_fill=(255, 255, 255))
 
 

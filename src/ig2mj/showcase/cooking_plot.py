@@ -11,7 +11,7 @@ FISH_COLOUR, MILK_COLOUR, STOVE_COLOUR = "#c8502d", "#2d6fa8", "#e8a33d"
 
 
 def plot(log: TemperatureLog, kitchen: Kitchen, file: pathlib.Path) -> None:
-    """Writes a picture; its kind is the file's ending."""
+    """Writes an image; its kind is the file's ending."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -1,4 +1,4 @@
-"""A film strip: a few frames of a film side by side in one picture, for a page."""
+"""A video strip: a few frames of a video side by side in one image, for a page."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ENDINGS = (".png", ".jpg")
 
 
 class FilmStrip:
-    """Takes frames as `viewer.film.Film` does; written when it is closed."""
+    """Takes frames as `viewer.video.VideoWriter` does; written when it is closed."""
 
     def __init__(self, file: str | os.PathLike, frames: int = FRAMES):
         """`frames`: how many of all that are added are shown, evenly spaced, the first and the last among them."""
@@ -26,7 +26,7 @@ class FilmStrip:
         self._added.append(np.array(frame))
 
     def close(self) -> None:
-        """Writes the picture; without a frame there is none. Raises OSError."""
+        """Writes the image; without a frame there is none. Raises OSError."""
         from PIL import Image
 
         if not self._added:

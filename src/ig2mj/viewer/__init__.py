@@ -1,4 +1,4 @@
-"""Looking at worlds: pictures without a display, films, and MuJoCo's window with overlays."""
+"""Looking at worlds: images without a display, videos, and MuJoCo's window with overlays."""
 
 from ig2mj.process.public_names import offer_modules
 from ig2mj.viewer.offscreen import FreeView, render

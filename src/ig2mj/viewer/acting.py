@@ -15,7 +15,7 @@ from ig2mj.errors import EngineError
 from ig2mj.process import entry_point
 
 BETWEEN = 3
-"""Pictures of an agent step."""
+"""Images of an agent step."""
 
 PAUSE = 10
 """The viewer's steps for which the end of an episode is shown."""

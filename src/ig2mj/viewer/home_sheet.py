@@ -21,7 +21,7 @@ INK, PAPER = (25, 30, 38), (255, 255, 255)
 
 
 def from_above(scenes: Sequence[Scene], columns: int = 4) -> Image.Image:
-    """One RGB picture with a labelled tile per home, seen from above and a little from the south."""
+    """One RGB image with a labelled tile per home, seen from above and a little from the south."""
     tiles = []
     for scene in scenes:
         data = scene.start_data()
@@ -34,7 +34,7 @@ def from_above(scenes: Sequence[Scene], columns: int = 4) -> Image.Image:
 
 
 def rooms_inside(scenes: Sequence[Scene], columns: int = 4) -> Image.Image:
-    """One RGB picture with a labelled tile per room of the homes, from the room's own camera."""
+    """One RGB image with a labelled tile per room of the homes, from the room's own camera."""
     tiles = []
     for scene in scenes:
         data = scene.start_data()

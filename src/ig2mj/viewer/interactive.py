@@ -201,7 +201,7 @@ def open_viewer(
       scene: what is shown.
       data: the state that is drawn; `step` changes it in place.
       step: does one control step. reset: brings back the start (key Backspace).
-      overlays: what is written over the picture; None: `default_overlays(scene)`.
+      overlays: what is written over the image; None: `default_overlays(scene)`.
       step_time: simulated seconds of one control step; steps are paced to real time.
       paused: begin paused.
       key_callback: called with every key (GLFW code) that is pressed, in this thread.

@@ -35,7 +35,7 @@ def spring(
 
     Args:
       anchor, velocity: of the point, world frame, m and m/s. target: where the mouse is.
-      mass: kg of what is dragged. weight: N that the spring carries besides.
+      mass: kg of what is dragged. weight: N that the spring carries in addition.
     """
     offset = np.asarray(target, float) - anchor
     if np.linalg.norm(offset) > LET_GO:

@@ -1,10 +1,10 @@
-"""Pictures of a model without a display: EGL, else OSMesa, else Warp's ray caster.
+"""Images of a model without a display: EGL, else OSMesa, else Warp's ray caster.
 
     image = render(model, data, "kitchen_camera", width=640, height=480)
     image = render(model, data, FreeView.around(model, azimuth=120))
 
-A backend is used only after it has really drawn a picture in a process of its own (`probe`), because a
-broken OpenGL driver may abort the process that tries it. OpenGL pictures take about 10 ms; the ray caster needs no
+A backend is used only after it has rendered an image in a process of its own (`probe`), because a
+broken OpenGL driver may abort the process that tries it. OpenGL images take about 10 ms; the ray caster needs no
 OpenGL at all and takes seconds. One process can use only one of EGL and OSMesa: the first that was used stays.
 """
 
@@ -38,11 +38,11 @@ class FreeView:
     """A camera that stands anywhere.
 
     Attributes:
-      lookat: the point in the middle of the picture, world frame, metres.
+      lookat: the point in the middle of the image, world frame, metres.
       distance: from the camera to that point, metres.
       azimuth: direction of view about +z, degrees; 0 looks along +x, 90 along +y.
       elevation: of the direction of view above the horizon, degrees; -90 looks straight down.
-      height: None for a perspective picture; metres of world from the lower to the upper edge for an orthographic one.
+      height: None for a perspective image; metres of world from the lower to the upper edge for an orthographic one.
     """
 
     lookat: Sequence[float | int]
@@ -70,7 +70,7 @@ def render(
     backend: str | None = None,
     decorate: Callable[[mujoco.MjvScene], None] | None = None,
 ) -> np.ndarray:
-    """Draws one picture of the state in `data` (positions must be up to date: mj_forward or mj_kinematics was called).
+    """Draws one image of the state in `data` (positions must be up to date: mj_forward or mj_kinematics was called).
 
     Args:
       camera: name or number of a camera of the model, a FreeView, or None for the model's default free view.
@@ -110,19 +110,19 @@ def default_backend() -> str:
     for name in order:
         if probe(name) is None:
             return name
-    raise MissingDependencyError(f"no way to draw pictures works here; for OpenGL without a display: {GL_INSTALL_HINT}")
+    raise MissingDependencyError(f"no renderer works here; for OpenGL without a display: {GL_INSTALL_HINT}")
 
 
 @functools.cache
 def probe(backend: str, timeout_s: float = 120.0) -> str | None:
-    """None if `backend` draws a small picture in a fresh process; else the reason. Remembered for this process."""
+    """None if `backend` draws a small image in a fresh process; else the reason. Remembered for this process."""
     if backend not in BACKENDS:
         raise UnknownNameError("rendering backend", backend, BACKENDS)
     return probe_gl(backend, timeout_s) if backend in GL_BACKENDS else run_probe(_WARP_PROBE, backend, timeout_s)
 
 
 def draw_warp_probe() -> None:
-    """What the process of `probe("warp")` does; exits with 0 only if the box really is in the picture."""
+    """What the process of `probe("warp")` does; exits with 0 only if the box is in the image."""
     model = mujoco.MjModel.from_xml_string(PROBE_XML)
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
@@ -217,7 +217,7 @@ def _close_at_exit() -> None:
 
 
 def close() -> None:
-    """Frees all OpenGL contexts; the next picture makes new ones."""
+    """Frees all OpenGL contexts; the next image makes new ones."""
     while _renderers:
         _free(_renderers.popitem()[1])
 

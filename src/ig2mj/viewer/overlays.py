@@ -1,7 +1,7 @@
-"""What can be written over the picture of the interactive viewer: object names, rooms, the clock.
+"""What can be written over the image of the interactive viewer: object names, rooms, the clock.
 
 An overlay is anything with a `title` and the methods `labels` (texts that hang at points of the world) and `lines`
-(rows of two texts in a corner of the window). The viewer asks every overlay that is switched on once a picture. A new
+(rows of two texts in a corner of the window). The viewer asks every overlay that is on once per frame. A new
 one, say for states, is a class like those below, handed to `interactive.open_viewer(..., overlays=[...])`.
 """
 

@@ -8,8 +8,8 @@ import numpy as np
 from ig2mj.scene.scene import Scene
 from ig2mj.viewer.offscreen import FreeView
 
-#: Distance of the camera in radii of the home: what just fills a picture with MuJoCo's vertical field of view of 45
-#: degrees is 2.6; a home is flat and wider than high, and fills a picture that is so too from nearer.
+#: Distance of the camera in radii of the home: what just fills an image with MuJoCo's vertical field of view of 45
+#: degrees is 2.6; a home is flat and wider than high, and fills a wide image from nearer.
 DISTANCE_IN_RADII = 1.8
 
 

@@ -1,4 +1,4 @@
-"""The rows of a pool, one page each: in the viewer, or one of them as a picture. Nothing is simulated."""
+"""The rows of a pool, one page each: in the viewer, or one of them as an image. Nothing is simulated."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ class PoolPages:
     def picture(
         self, file: str | os.PathLike, camera: Any = None, *, size: tuple[int, int] = (1280, 960), **options: Any
     ) -> None:
-        """Writes the row as a picture.
+        """Writes the row as an image.
 
         Args:
           camera, options: as of `ig2mj.viewer.offscreen.render`; None: an overview of the home.

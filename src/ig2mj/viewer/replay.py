@@ -1,4 +1,4 @@
-"""Replaying a dump: the last steps of a world that went wrong, in the viewer, as a picture or as a video.
+"""Replaying a dump: the last steps of a world that went wrong, in the viewer, as an image or as a video.
 
 Nothing is simulated: every recorded step is shown as it was. `ig2mj.worlds.debug` writes dumps.
 
@@ -94,15 +94,15 @@ class Replay:
           MissingDependencyError: there is nothing to draw with, or no ffmpeg. InputError: no such format.
           EngineError: ffmpeg cannot write the file.
         """
-        from ig2mj.viewer.film import Film
         from ig2mj.viewer.offscreen import render
+        from ig2mj.viewer.video import VideoWriter
 
         good = self._finite_steps()
-        with Film(file, width, height, FRAMES_PER_SECOND) as film:
+        with VideoWriter(file, width, height, FRAMES_PER_SECOND) as video:
             for step in good:
                 self.show(int(step))
                 view = home_overview(self.scene, self.data) if camera is None else camera
-                film.add(render(self.scene.model, self.data, view, width=width, height=height))
+                video.add(render(self.scene.model, self.data, view, width=width, height=height))
         return len(good)
 
     def _finite_steps(self) -> Int[np.ndarray, "N"]:

@@ -1,4 +1,4 @@
-"""Contact sheets of sensors' readings: each as a picture, in false colours where it is none.
+"""Contact sheets of sensors' readings: each as an image, in false colours where it is not one.
 
 sensor_sheet(readings, sensors.spaces).save("sensors.png")
 """
@@ -25,7 +25,7 @@ INK, PAPER = (25, 30, 38), (255, 255, 255)
 def sensor_sheet(
     readings: Mapping[str, Array], spaces: Mapping[str, Space], world: int = 0, columns: int = 4
 ) -> Image.Image:
-    """One RGB picture with a labelled tile for each reading of one world.
+    """One RGB image with a labelled tile for each reading of one world.
 
     Args:
       readings, spaces: by name, as of `SensorSuite`; readings have the world axis.
@@ -42,7 +42,7 @@ def sensor_sheet(
 
 
 def false_colours(name: str, reading: np.ndarray, space: Space) -> Image.Image:
-    """A square picture of one reading: an image in its place, points and rays from above, numbers as bars."""
+    """A square tile of one reading: images as they are, points and rays from above, numbers as bars."""
     if name == "scan":
         return _rays_from_above(1.0 - reading[:, 0])
     if reading.ndim == 2 and reading.shape[1] == 3:

@@ -38,7 +38,7 @@ class StatefulWorld(Protocol):
 
 
 class StatesOverlay:
-    """Temperature, wetness, dirt and switches beside every object for which they are not as at the start."""
+    """Temperature, wetness, dirt and switches next to every object whose states differ from the start."""
 
     title = "states"
 

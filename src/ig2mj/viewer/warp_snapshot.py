@@ -1,7 +1,7 @@
-"""A picture without OpenGL: the present state, rebuilt as a model of static geoms, seen by Warp's ray caster.
+"""An image without OpenGL: the present state, rebuilt as a model of static geoms, seen by Warp's ray caster.
 
 The ray caster sees only cameras that are compiled into a model, hence the rebuilding. Textures are replaced by their
-mean colour. The first picture on a machine compiles the kernels (about 10 s); later ones take about 0.5 s on a CPU.
+mean colour. The first image on a machine compiles the kernels (about 10 s); later ones take about 0.5 s on a CPU.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def _snapshot(
 
 
 def _place(eye, view: FreeView) -> None:
-    """The camera of a free view: it looks along its -z, y is up in the picture."""
+    """The camera of a free view: it looks along its -z, y is up in the image."""
     azimuth, elevation = np.radians([view.azimuth, view.elevation])
     ahead = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
     right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])

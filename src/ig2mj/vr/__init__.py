@@ -1,4 +1,4 @@
-"""People in the home: devices, the humanoid that they drive, and pictures for both eyes (docs/guide/vr.md)."""
+"""People in the home: devices, the humanoid that they drive, and images for both eyes (docs/guide/vr.md)."""
 
 from ig2mj.process.public_names import offer_modules
 from ig2mj.vr.frames import Hand, PlayArea, Pose, PoseFrame

@@ -1,4 +1,4 @@
-"""`Looks`: how states look in a home, for whoever draws it: particles, tints, what is hidden, and the goal."""
+"""`Looks`: how states look in a home, for any renderer: particles, tints, what is hidden, and the goal."""
 
 from __future__ import annotations
 

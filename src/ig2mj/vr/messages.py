@@ -4,7 +4,7 @@ From the page: text, one JSON object, checked to the last number (`decode`).
 
 - `{"type": "devices", ...}`: head and hands in XR's axes, in the page's reference space; up to 90 times a second;
 - `{"type": "desktop", ...}`: keys and mouse, of a page without a headset;
-- `{"type": "rate", ...}`: pictures a second that the page draws.
+- `{"type": "rate", ...}`: frames a second that the page renders.
 
 To the page: text for what happens now and then (`welcome`, `looks`, `pulse`), and binary for poses (`pose_message`).
 """
@@ -71,7 +71,7 @@ class Desktop(msgspec.Struct, forbid_unknown_fields=True, tag="desktop"):
 
 
 class Rate(msgspec.Struct, forbid_unknown_fields=True, tag="rate"):
-    """Pictures a second, and how long the slowest one took, ms."""
+    """Frames a second, and how long the slowest one took, ms."""
 
     pictures: Annotated[float, msgspec.Meta(ge=0.0, le=1e5)]
     slowest: Annotated[float, msgspec.Meta(ge=0.0, le=1e7)]

@@ -1,4 +1,4 @@
-"""`PagePoses`: the devices of whoever looks at the page first, headset or mouse and keyboard."""
+"""`PagePoses`: the devices of the first page that is open: headset, or mouse and keyboard."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class PagePoses(FedPoses):
         self.advance(now)
 
     def advance(self, now: float | None = None) -> None:
-        """Lets time pass for what sticks and keys do; to be called at the rate of pictures."""
+        """Lets time pass for what sticks and keys do; call it at the frame rate."""
         now = time.monotonic() if now is None else now
         with self._lock:
             seconds = max(now - self._advanced, 0.0)

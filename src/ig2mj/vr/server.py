@@ -30,7 +30,7 @@ from ig2mj.web.serving import Access, Pages, PageServer
 
 PAGE = pathlib.Path(__file__).with_name("page")
 THREE = "vendor/three.module.js"
-"""What `make web` puts beside the page."""
+"""What `make web` puts next to the page."""
 
 RATE = 60.0
 """Messages with poses a second."""
@@ -43,7 +43,7 @@ MOVED = 1e-5
 
 
 class HomePage:
-    """Serves a session to pages; a context manager. Attributes: server, source. rates: pictures a second of pages."""
+    """Serves a session to pages; a context manager. Attributes: server, source. rates: frames a second of pages."""
 
     def __init__(self, session: Session, source: PagePoses, access: Access, timed: bool = False):
         """Binds the port. `timed`: pages show where the time of a frame goes.

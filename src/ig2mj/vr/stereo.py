@@ -1,10 +1,10 @@
 """`StereoPictures`: a home drawn for both eyes with OpenGL, without a display and without physics.
 
-    pictures = StereoPictures(scene, 1296, 1440)
-    pictures.draw(track.at(), eyes)
-    left, right = pictures.read()
+    images = StereoPictures(scene, 1296, 1440)
+    images.draw(track.at(), eyes)
+    left, right = images.read()
 
-Poses of bodies come from whoever has them (`vr.track`); nothing is simulated here. One thread makes, uses and closes
+Poses of bodies come from `vr.track` or another source; nothing is simulated here. One thread makes, uses and closes
 it: OpenGL belongs to that thread.
 """
 
@@ -99,7 +99,7 @@ class StereoPictures:
         self._whole = mujoco.MjrRect(0, 0, 2 * width, height)
 
     def resize(self, width: int, height: int) -> None:
-        """Another size of each eye's picture."""
+        """Another size of each eye's image."""
         self.width, self.height = width, height
         mujoco.mjr_resizeOffscreen(2 * width, height, self.renderer)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self.renderer)
@@ -123,14 +123,14 @@ class StereoPictures:
         mujoco.mjr_render(self._whole, scene, self.renderer)
 
     def read(self) -> UInt8[np.ndarray, "2 h w 3"]:
-        """The pictures drawn last, left and right."""
+        """The images drawn last, left and right."""
         pixels = np.empty((self.height, 2 * self.width, 3), np.uint8)
         mujoco.mjr_readPixels(pixels, None, self._whole, self.renderer)
         pixels = pixels[::-1]
         return np.stack([pixels[:, : self.width], pixels[:, self.width :]])
 
     def copy_to(self, texture: int, eye: int) -> None:
-        """Copies the picture of eye 0 or 1 into a texture of OpenGL of the same size, which the context owns."""
+        """Copies the image of eye 0 or 1 into a texture of OpenGL of the same size, which the context owns."""
         from OpenGL import GL
 
         assert self.renderer is not None

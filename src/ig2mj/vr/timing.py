@@ -10,7 +10,7 @@ from collections.abc import Iterator
 import numpy as np
 
 PARTS = ("physics", "states", "rendering", "waiting")
-"""Of a frame: MuJoCo's steps; all else that a control step and its recording need; pictures or poses for whoever looks;
+"""Of a frame: MuJoCo's steps; all else that a control step and its recording need; images or poses for viewers;
 the rest until the next frame is due."""
 
 WINDOW = 300

@@ -1,4 +1,4 @@
-"""`PoseTrack`: where all bodies were at the last two control steps, for whoever draws at another rate.
+"""`PoseTrack`: where all bodies were at the last two control steps, for renderers at another rate.
 
 The thread that steps physics adds to it; threads that draw ask for an instant and get poses between the last two
 steps. Nobody waits for anybody: what was added is replaced as a whole.

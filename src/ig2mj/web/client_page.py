@@ -1,7 +1,7 @@
 """viser's page in the form in which a browser opens it soonest.
 
 viser keeps its page in one file: style sheet and program are compressed, written as text, unpacked by a program in the
-page, and so compiled anew each time that the page is opened. Here they are files of their own, which a browser compiles
+page, and compiled each time that the page is opened. Here they are files of their own, which a browser compiles
 while it loads them and keeps compiled; they are named by their content, so that it may keep them for good. The program
 begins without the lights and the environment map that it would otherwise prepare before it hears which lights the home
 has: where a browser draws in software, those alone take a second.

@@ -1,4 +1,4 @@
-"""The panel beside the picture: play, pause, step, reset, rows, worlds, time line, colours; object and goal.
+"""The panel next to the view: play, pause, step, reset, rows, worlds, time line, colours; object and goal.
 
 Callbacks run in viser's thread: they leave a command for the thread that simulates, and return.
 """

@@ -58,7 +58,7 @@ def shot_of(view: PhysicsView, states: ExtendedStates, world: int, time: float, 
 
 
 class Mailbox:
-    """The newest shot; one that was not fetched in time is forgotten, so that whoever puts one in never waits."""
+    """The newest shot; one that was not fetched in time is dropped, so that the producer never waits."""
 
     def __init__(self):
         self._lock = threading.Condition()

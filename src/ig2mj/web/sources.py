@@ -137,7 +137,7 @@ class Home:
 
 
 class Acting:
-    """An environment in which someone acts; episodes begin anew when they are over. See `Source`."""
+    """An environment with an agent; a new episode begins after each end. See `Source`."""
 
     def __init__(self, env: Environment, act: Callable[[EnvState], Any], seed: int = 0):
         """`act`: actions [W, n] of a state."""

@@ -119,7 +119,7 @@ class Stage:
         return node
 
     def _draw(self, body: int, look: Look) -> None:
-        """Sends a body's geometry anew, with another look."""
+        """Sends a body's geometry again, with other materials."""
         plain, geoms = self._plain[body], self._geoms[body]
         self._nodes[body].glb_data = plain if look == PLAIN else glb_of_geoms(self._model, geoms, look)
         self.sent["geometries"] += 1

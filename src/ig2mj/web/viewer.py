@@ -32,7 +32,7 @@ TABLES_PER_SECOND = 4.0
 
 
 class WebViewer:
-    """A source in the browser. Attributes: runner, stage, controls, gate: its parts. frames: pictures sent so far."""
+    """A source in the browser. Attributes: runner, stage, controls, gate: its parts. frames: frames sent so far."""
 
     def __init__(self, source: Source, access: Access, *, playing: bool = True, title: str = ""):
         """Opens the port and sends the home; nothing moves before `start`.
@@ -126,7 +126,7 @@ class WebViewer:
                 looked = now
 
     def _show(self, shot: Shot) -> None:
-        """Poses at once; of steps that are longer than a picture also those between."""
+        """Poses at once; for steps longer than a frame, also the poses between."""
         before, count = self._last, 1
         if before is not None and not shot.jump and shot.period > 1.5 / SHOTS_PER_SECOND and self.runner.playing:
             count = min(round(shot.period * SHOTS_PER_SECOND / self.runner.speed), 10)

@@ -46,7 +46,7 @@ _FROM_PAGES: dict[str, type] = {
         wire.GuiFormDirtyMessage,
     )
 }
-"""What our pages send. Left out: uploads, pictures of the page, commands, and what publishes the server by a tunnel."""
+"""What our pages send. Left out: uploads, images of the page, commands, and what publishes the server by a tunnel."""
 
 _IGNORED = frozenset({"ShareUrlRequest", "ShareUrlDisconnect", "LocalStorageGetItemResponseMessage"})
 """What a page can send although it is not wanted; it is dropped, and the page stays."""

@@ -29,7 +29,7 @@ def check_image(file: pathlib.Path, others: Iterable[str] = ()) -> None:
 
 def check_video(file: pathlib.Path, others: Iterable[str] = ()) -> None:
     """The ending must be that of a film, or of `others`, and the folder must be there. Raises InputError."""
-    from ig2mj.viewer.film import FORMATS
+    from ig2mj.viewer.video import FORMATS
 
     if file.suffix.lower() not in {*FORMATS, *others}:
         raise InputError(file, "is not a video format that can be written", fix=f"use {' or '.join(FORMATS)}")

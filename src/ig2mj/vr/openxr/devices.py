@@ -1,4 +1,4 @@
-"""`Headset`: an OpenXR session: its frames, its devices' poses, pulses, and pictures for both eyes.
+"""`Headset`: an OpenXR session: its frames, its devices' poses, pulses, and images for both eyes.
 
     with Headset(graphics=None) as headset:           # without pictures: XR_MND_headless
         while headset.running:
@@ -48,11 +48,11 @@ class Graphics(Protocol):
         ...
 
     def begin(self, session: Any, sizes: list[tuple[int, int]]) -> None:
-        """Makes what pictures are handed over in."""
+        """Creates the swapchains of the images."""
         ...
 
     def layers(self, space: Any, views: Any) -> list[Any]:
-        """Hands over the pictures that were drawn, for these views."""
+        """Submits the rendered images of these views."""
         ...
 
     def close(self) -> None: ...
@@ -60,7 +60,7 @@ class Graphics(Protocol):
 
 @dataclasses.dataclass(frozen=True)
 class Frame:
-    """Of the runtime. `time`: ns, when it will be seen. `draw`: pictures are wanted."""
+    """Of the runtime. `time`: ns, when it will be seen. `draw`: images are needed."""
 
     time: int
     draw: bool
@@ -229,7 +229,7 @@ class Headset:
         return found, (self._eye(self._views[0]), self._eye(self._views[1]))
 
     def end(self, frame: Frame, drawn: bool = False) -> None:
-        """Hands a frame over. `drawn`: pictures of the views located last belong to it."""
+        """Hands a frame over. `drawn`: images of the views located last belong to it."""
         xr = self._xr
         layers = []
         if drawn and self._graphics is not None and self._views is not None:

@@ -1,4 +1,4 @@
-"""`EglGraphics`: pictures of a home for an OpenXR runtime that takes OpenGL from EGL (XR_MNDX_egl_enable: Monado)."""
+"""`EglGraphics`: images of a home for an OpenXR runtime that takes OpenGL from EGL (XR_MNDX_egl_enable: Monado)."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ig2mj.vr.openxr.devices import load_xr
 from ig2mj.vr.stereo import Eye, StereoPictures
 
 SRGB8_ALPHA8, RGBA8 = 0x8C43, 0x8058
-"""OpenGL's formats. MuJoCo's pictures are as they shall be shown, which is what the first says; they are copied, so
+"""OpenGL's formats. MuJoCo's images are already in display encoding, as the first format says; they are copied, so
 that nothing converts them."""
 
 
@@ -24,7 +24,7 @@ class EglGraphics:
     extension = "XR_MNDX_egl_enable"
 
     def __init__(self, scene: Scene):
-        """Nothing is drawn before a session tells the size of its pictures."""
+        """Nothing is rendered before a session reports the size of its images."""
         self._scene, self._pictures, self._chains = scene, None, []
 
     def check(self, instance: Any, system: Any) -> None:
@@ -46,7 +46,7 @@ class EglGraphics:
 
         found = EGL.eglGetCurrentContext()
         if not found:
-            raise EngineError("pictures for a headset need EGL (MUJOCO_GL=egl)")
+            raise EngineError("images for a headset need EGL (MUJOCO_GL=egl)")
         library = ctypes.CDLL("libEGL.so.1")
         address = ctypes.cast(library.eglGetProcAddress, ctypes.c_void_p)
         made = xr.GraphicsBindingEGLMNDX()
@@ -64,7 +64,7 @@ class EglGraphics:
         offered = [int(f) for f in xr.enumerate_swapchain_formats(session)]
         chosen = next((f for f in (SRGB8_ALPHA8, RGBA8) if f in offered), None)
         if chosen is None:
-            raise EngineError(f"the OpenXR runtime takes none of our formats of pictures; it takes {offered}")
+            raise EngineError(f"the OpenXR runtime supports none of our image formats; it takes {offered}")
         for _ in range(2):
             info = xr.SwapchainCreateInfo(
                 usage_flags=xr.SwapchainUsageFlags.COLOR_ATTACHMENT_BIT | xr.SwapchainUsageFlags.TRANSFER_DST_BIT,

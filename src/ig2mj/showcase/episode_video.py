@@ -14,7 +14,7 @@ from ig2mj.showcase.cooking_pictures import caption_at, font
 from ig2mj.showcase.film_strip import ENDINGS, FilmStrip
 from ig2mj.tasks.task import Task
 from ig2mj.viewer.episode_view import HEIGHT, WIDTH, EpisodeView
-from ig2mj.viewer.film import Film
+from ig2mj.viewer.video import VideoWriter
 
 BETWEEN = 2
 """Frames of an agent step; positions between two steps are interpolated."""
@@ -26,7 +26,7 @@ LAST = 15
 """Frames for which the end of an episode stays."""
 
 
-class EpisodeFilm:
+class EpisodeVideo:
     """Writes one world of an environment to a video file; `see` is called with every state (`envs.rollout.Watch`)."""
 
     def __init__(self, file: str | os.PathLike, env: Environment, world: int = 0):
@@ -41,7 +41,7 @@ class EpisodeFilm:
         self._env, self._world, self._model_of_states = env, world, env.core.rules.model
         self._objects = env.task.objects_of_interest if isinstance(env.task, Task) else ()
         strip = pathlib.Path(file).suffix.lower() in ENDINGS
-        self._film = FilmStrip(file) if strip else Film(file, WIDTH, HEIGHT, BETWEEN / env.period)
+        self._video = FilmStrip(file) if strip else VideoWriter(file, WIDTH, HEIGHT, BETWEEN / env.period)
         self._view = EpisodeView(env, world)
         self._before: np.ndarray | None = None
         self._over = False
@@ -68,22 +68,22 @@ class EpisodeFilm:
             if smooth and part < BETWEEN:
                 pose = before.copy()
                 mujoco.mj_integratePos(model, pose, change, part / BETWEEN)
-            self._film.add(self._frame(pose, state))
+            self._video.add(self._frame(pose, state))
         self._before = now
         if self._over:
             self._end(state)
 
     def _end(self, state: EnvState) -> None:
-        """The last picture stays for a while, with how it ended."""
+        """The last image stays for a while, with how it ended."""
         if self._last is not None:
             won = np.asarray(state.info["success"])[self._world]
             frame = self._captioned(self._last, f"{self._told}   {'done' if won else 'not done'}")
             for _ in range(LAST):
-                self._film.add(frame)
+                self._video.add(frame)
 
     def close(self) -> None:
         """Ends the file. Raises EngineError if ffmpeg could not write it."""
-        self._film.close()
+        self._video.close()
 
     def _frame(self, qpos: np.ndarray, state: EnvState) -> UInt8[np.ndarray, "Y X 3"]:
         self._last = pixels = self._view(state, qpos)

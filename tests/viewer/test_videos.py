@@ -1,4 +1,4 @@
-"""Films: both formats, and what goes wrong."""
+"""Videos: both formats, and what goes wrong."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from ig2mj.errors import EngineError, InputError, MissingDependencyError
-from ig2mj.viewer.film import FORMATS, Film, ffmpeg_program
+from ig2mj.viewer.video import FORMATS, VideoWriter, ffmpeg_program
 
 
 def frames(count: int, height: int = 48, width: int = 64) -> list[np.ndarray]:
@@ -19,17 +19,17 @@ def frames(count: int, height: int = 48, width: int = 64) -> list[np.ndarray]:
 
 def test_an_mp4_has_its_frames_and_its_speed(tmp_path):
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg", reason="counts the frames")
-    with Film(tmp_path / "a.mp4", 64, 48, 5) as film:
+    with VideoWriter(tmp_path / "a.mp4", 64, 48, 5) as video:
         for frame in frames(6):
-            film.add(frame)
+            video.add(frame)
     count, seconds = imageio_ffmpeg.count_frames_and_secs(str(tmp_path / "a.mp4"))
     assert count == 6 and seconds == pytest.approx(6 / 5, abs=0.01)
 
 
 def test_a_gif_keeps_the_colours(tmp_path):
-    with Film(tmp_path / "a.GIF", 64, 48, 10) as film:
+    with VideoWriter(tmp_path / "a.GIF", 64, 48, 10) as video:
         for frame in frames(4):
-            film.add(frame)
+            video.add(frame)
     with Image.open(tmp_path / "a.GIF") as gif:
         assert (gif.size, gif.n_frames, gif.info["duration"]) == ((64, 48), 4, 100)
         gif.seek(3)
@@ -37,24 +37,24 @@ def test_a_gif_keeps_the_colours(tmp_path):
 
 
 def test_odd_sizes_are_no_error(tmp_path):
-    with Film(tmp_path / "a.mp4", 33, 21, 5) as film:
-        film.add(frames(1, 21, 33)[0])
+    with VideoWriter(tmp_path / "a.mp4", 33, 21, 5) as video:
+        video.add(frames(1, 21, 33)[0])
     assert (tmp_path / "a.mp4").stat().st_size > 0
 
 
 def test_what_cannot_be_written_is_one_error(tmp_path):
     with pytest.raises(InputError, match=r"a.avi: is not a video format that can be written \(use .mp4 or .gif\)"):
-        Film(tmp_path / "a.avi", 64, 48, 5)
-    film = Film(tmp_path / "absent" / "a.mp4", 64, 48, 5)
-    with pytest.raises(EngineError, match=r"a.mp4: ffmpeg wrote no film: .*No such file"):
-        film.close()
-    film.close()
+        VideoWriter(tmp_path / "a.avi", 64, 48, 5)
+    video = VideoWriter(tmp_path / "absent" / "a.mp4", 64, 48, 5)
+    with pytest.raises(EngineError, match=r"a.mp4: ffmpeg wrote no video: .*No such file"):
+        video.close()
+    video.close()
 
 
 def test_without_ffmpeg_the_extra_that_brings_it_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    with pytest.raises(MissingDependencyError, match=r"no film without ffmpeg .*\[demo\]"):
+    with pytest.raises(MissingDependencyError, match=r"no video without ffmpeg .*\[demo\]"):
         ffmpeg_program()
 
 

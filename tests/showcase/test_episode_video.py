@@ -1,4 +1,4 @@
-"""The film of an episode."""
+"""The video of an episode."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ import pytest
 
 import ig2mj
 from ig2mj.envs.rollout import play
-from ig2mj.showcase.episode_film import BETWEEN, LAST, EpisodeFilm
+from ig2mj.showcase.episode_video import BETWEEN, LAST, EpisodeVideo
 from ig2mj.viewer import episode_view
-from ig2mj.viewer.film import ffmpeg_program
 from ig2mj.viewer.offscreen import default_backend
+from ig2mj.viewer.video import ffmpeg_program
 
 
 @pytest.mark.slow
@@ -20,9 +20,9 @@ def test_a_film_shows_one_episode_and_its_end(tmp_path):
     import subprocess
 
     env = ig2mj.make("GraspingBook", engine="native", split="held_out", pool_size=4).with_horizon(2)
-    film = EpisodeFilm(tmp_path / "book.mp4", env)
-    played = play(env, lambda state: np.zeros((1, 6), np.float32), 2, watch=film.see)
-    film.close()
+    video = EpisodeVideo(tmp_path / "book.mp4", env)
+    played = play(env, lambda state: np.zeros((1, 6), np.float32), 2, watch=video.see)
+    video.close()
     assert played.success == [False, False] and played.steps == 4
     # The start, one step, and the last picture for a while; the second episode is not shown.
     counted = subprocess.run(
@@ -46,14 +46,14 @@ def test_where_a_robot_drives_the_camera_goes_along_and_the_goal_is_marked(tmp_p
         return np.zeros((height, width, 3), np.uint8)
 
     monkeypatch.setattr(episode_view, "render", render)
-    film, bases = EpisodeFilm(tmp_path / "way.png", env), []
+    video, bases = EpisodeVideo(tmp_path / "way.png", env), []
 
     def see(state):
         bases.append(np.asarray(state.batch.world.view.agent.base_pos)[0, 0, :2].copy())
-        film.see(state)
+        video.see(state)
 
     played = play(env, lambda state: np.ones((1, 2), np.float32), 1, in_order=True, watch=see)
-    film.close()
+    video.close()
     looks, marked = np.array([look[:2] for look, _ in seen]), [goals for _, goals in seen]
     np.testing.assert_allclose(looks[BETWEEN - 1 :: BETWEEN], bases, atol=0.02)
     assert np.linalg.norm(bases[-1] - bases[0]) > 0.1, "it drove"

@@ -1,4 +1,4 @@
-"""The cooking demo's film: stove and fridge side by side, the temperatures growing below, faster than real time."""
+"""The cooking demo's video: stove and fridge side by side, the temperatures growing below, faster than real time."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ig2mj.showcase.cooking_pictures import KitchenCameras, caption_at, font
 from ig2mj.showcase.cooking_plot import FISH_COLOUR, MILK_COLOUR
 from ig2mj.showcase.kitchen import Kitchen
 from ig2mj.showcase.temperature_log import TemperatureLog
-from ig2mj.viewer.film import Film
+from ig2mj.viewer.video import VideoWriter
 
 WIDTH, HEIGHT, STRIP = 640, 480, 160
 """Pixels; the strip with the temperatures is part of the height."""
@@ -22,18 +22,18 @@ COLDEST, HOTTEST = -35.0, 250.0
 """Celsius at the lower and upper edge of the strip."""
 
 
-class CookingFilm:
+class CookingVideo:
     """Writes an mp4 file frame by frame."""
 
     def __init__(self, file: pathlib.Path, cameras: KitchenCameras, kitchen: Kitchen):
         self._cameras, self._kitchen = cameras, kitchen
         self._words, self._small = font(20), font(13)
-        self._film = Film(file, WIDTH, HEIGHT, FRAMES_PER_SECOND)
+        self._video = VideoWriter(file, WIDTH, HEIGHT, FRAMES_PER_SECOND)
 
     def see(self, log: TemperatureLog) -> None:
         """Adds a frame if one is due. Raises EngineError if ffmpeg does not take it."""
         if log.steps % STRIDE == 0:
-            self._film.add(self.frame(log))
+            self._video.add(self.frame(log))
 
     def frame(self, log: TemperatureLog) -> np.ndarray:
         """uint8 [HEIGHT, WIDTH, 3]: the world and its past."""
@@ -91,4 +91,4 @@ class CookingFilm:
 
     def close(self) -> None:
         """Ends the file, once. Raises EngineError if ffmpeg could not write it."""
-        self._film.close()
+        self._video.close()

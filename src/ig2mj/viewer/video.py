@@ -1,4 +1,4 @@
-"""Writing films: frames go to an ffmpeg process, which makes a file of them."""
+"""Writing videos: frames go to an ffmpeg process, which makes a file of them."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ FORMATS = {".mp4": H264, ".gif": GIF}
 """ffmpeg's options, by the file's ending."""
 
 
-class Film:
-    """A film file that is written frame by frame; a context manager, or to be closed."""
+class VideoWriter:
+    """A video file that is written frame by frame; a context manager, or to be closed."""
 
     def __init__(self, file: str | os.PathLike, width: int, height: int, frames_per_second: float | int):
         """Starts ffmpeg.
@@ -64,9 +64,9 @@ class Film:
         _, complaint = self._ffmpeg.communicate()
         if self._ffmpeg.returncode:
             lines = complaint.decode(errors="replace").strip().splitlines() or ["no reason given"]
-            raise EngineError(f"{self._file}: ffmpeg wrote no film: {lines[-1]}")
+            raise EngineError(f"{self._file}: ffmpeg wrote no video: {lines[-1]}")
 
-    def __enter__(self) -> Film:
+    def __enter__(self) -> VideoWriter:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
@@ -86,5 +86,5 @@ def ffmpeg_program() -> str:
     except (ImportError, RuntimeError):
         found = shutil.which("ffmpeg")
     if found is None:
-        raise MissingDependencyError(f"no film without ffmpeg ({pip_install_extra('demo')})")
+        raise MissingDependencyError(f"no video without ffmpeg ({pip_install_extra('demo')})")
     return found
