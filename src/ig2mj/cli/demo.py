@@ -118,8 +118,8 @@ def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
     folder.mkdir(parents=True, exist_ok=True)
     cameras = KitchenCameras(world, kitchen)
     sheet = MomentSheet(cameras, kitchen)
-    recording_video = default_backend() != "warp"  # its pictures take seconds
-    video = CookingVideo(folder / "cooking.mp4", cameras, kitchen) if recording_video else None
+    filmed = default_backend() != "warp"  # its pictures take seconds
+    video = CookingVideo(folder / "cooking.mp4", cameras, kitchen) if filmed else None
 
     def watch(log: Any, changed: Any) -> None:
         if video:
@@ -143,9 +143,9 @@ def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
         f"[bold]cooked[/]     {log.times[-1] - log.times[0]:.1f} s of the kitchen in {seconds:.1f} s, pictures included"
     )
     for word, name in (("numbers", "temperatures.csv"), ("numbers", "temperatures.json"), ("plot", "temperatures.png"),
-                       ("pictures", "moments.png"), *([("video", "cooking.mp4")] if recording_video else [])):  # fmt: skip
+                       ("pictures", "moments.png"), *([("video", "cooking.mp4")] if filmed else [])):  # fmt: skip
         console.print(f"[bold]{word:<10}[/] {folder / name}")
-    if not recording_video:
+    if not filmed:
         console.print(f"[bold]video[/]      none: it needs OpenGL ({GL_INSTALL_HINT})")
     absent = cooking.missing(log, kitchen)
     for what in absent:
@@ -165,8 +165,8 @@ def _watch_expert(console: Console, step: Step, file: pathlib.Path) -> int:
     report = step("a robot cooks")
     report(0, None, "sampling where the steak lies")
     env = make("CookingMeat", robot="humanoid", engine="native", split="held_out", pool_size=1)
-    recording_video = default_backend() != "warp"  # its pictures take seconds
-    video = EpisodeVideo(file, env) if recording_video else None
+    filmed = default_backend() != "warp"  # its pictures take seconds
+    video = EpisodeVideo(file, env) if filmed else None
 
     def watch(state: Any) -> None:
         if video is not None:
@@ -182,5 +182,5 @@ def _watch_expert(console: Console, step: Step, file: pathlib.Path) -> int:
     cooked = played.success[0]
     ending = "cooks the steak" if cooked else "does not cook the steak"
     console.print(f"[bold]expert[/]     the humanoid {ending} in {played.steps * env.period:.1f} s")
-    console.print(f"[bold]video[/]      {file if recording_video else f'none: it needs OpenGL ({GL_INSTALL_HINT})'}")
+    console.print(f"[bold]video[/]      {file if filmed else f'none: it needs OpenGL ({GL_INSTALL_HINT})'}")
     return 0 if cooked else 1
