@@ -5,9 +5,9 @@
     python -m benchmarks.speed.cloth flex                      a 225-vertex flex of MuJoCo Warp for comparison
     python -m benchmarks.speed.cloth images                    the ray caster with and without refitting moving vertices
 
-A cloth of n x n vertices falls onto a table and a sphere. A control step is 1/30 s: `SUBSTEPS` substeps of one pass over
-all constraints each (small-step XPBD, Macklin et al. 2019), contacts with convex pieces, friction and thickness. Nothing
-of ig2mj is used: this program decides whether cloth is worth adding to it.
+A cloth of n x n vertices falls onto a table and a sphere. A control step is 1/30 s: `SUBSTEPS` substeps of one pass
+over all constraints each (small-step XPBD, Macklin et al. 2019), contacts with convex pieces, friction and thickness.
+Nothing of ig2mj is used: this program decides whether cloth is worth adding to it.
 
 Frames and units: world frame, m, s, kg. Positions and velocities are `[W, V]` vectors. A convex piece is a sphere or an
 intersection of half-spaces, with a pose `[W, K]` in each world.
@@ -16,6 +16,7 @@ intersection of half-spaces, with a pose `[W, K]` in each world.
 # Warp's kernels are not Python, so nothing may check them:
 # pyright: reportIndexIssue=false, reportAttributeAccessIssue=false, reportArgumentType=false, reportCallIssue=false
 # pyright: reportOperatorIssue=false, reportInvalidTypeForm=false, reportGeneralTypeIssues=false
+# pyright: reportReturnType=false, reportAssignmentType=false
 
 from __future__ import annotations
 
@@ -420,8 +421,8 @@ def kernel_of(vertices: int, colours: int, thickness: bool, substeps: int, cpu: 
     ):
         world, _thread = wp.tid()
         step_cloth(
-            world, pos, vel, inverse_mass, elements, rest, compliance, colours, columns, num_pieces, planes, piece_start,
-            piece_radius, piece_reach, piece_pos, piece_quat, piece_vel, dt, gravity, damping, friction, thickness,
+            world, pos, vel, inverse_mass, elements, rest, compliance, colours, columns, num_pieces, planes,
+            piece_start, piece_radius, piece_reach, piece_pos, piece_quat, piece_vel, dt, gravity, damping, friction, thickness,
             piece_impulse, touches,
         )  # fmt: skip
 
@@ -540,7 +541,7 @@ TABLE, BALL, MUG = box((0.4, 0.4, 0.02)), sphere(0.1), prism(0.04, 0.05, 22)
 
 
 def table_scene(cloth: Cloth, worlds: int, seed: int = 0, **options: Any) -> Sheets:
-    """A cloth above a table with a ball and a mug, at another place and angle in each world. The table's top is z = 0."""
+    """A cloth above a table with a ball and a mug, at another place and angle in each world. z = 0 is the table's top."""
     draw = np.random.default_rng(seed)
     angle, shift = draw.uniform(0, 2 * np.pi, worlds), draw.uniform(-0.08, 0.08, (worlds, 2))
     flat = cloth.vertices - cloth.vertices.mean(0)
@@ -620,7 +621,7 @@ def solver_row(n: int, worlds: int, without: str = "", coupled: bool = False) ->
 
 FLEX = """
 <mujoco>
-  <option timestep="{timestep}" solver="CG" iterations="20" tolerance="1e-6"/>
+  <option timestep="{timestep}" solver="CG" iterations="50" tolerance="1e-6"/>
   <size memory="64M"/>
   <visual><global offwidth="128" offheight="128"/></visual>
   <worldbody>

@@ -27,7 +27,6 @@ def test_no_two_elements_of_a_colour_share_a_vertex():
     assert len(sheet.elements) == 6 * 6 + 5 * 7 + 2 * 5 * 6 + 6 * 5 + 4 * 7
 
 
-@pytest.mark.slow
 def test_a_strip_between_two_points_hangs_as_a_catenary():
     columns, span = 15, 0.4
     sheet = make_cloth(2, columns, width=0.5, height=0.02, shear=1e-6, bending=None)
@@ -40,7 +39,6 @@ def test_a_strip_between_two_points_hangs_as_a_catenary():
     a = optimize.brentq(lambda a: 2 * a * math.sinh(span / (2 * a)) - 0.5, 0.05, 5.0)
     sag = a * (math.cosh(span / (2 * a)) - 1)
     found = -sheets.positions[0, :, 2].min()
-    print(found, sag)
     assert found == pytest.approx(sag, rel=0.03)
     middle = sheets.positions[0, :columns]
     assert middle[:, 2] == pytest.approx(a * np.cosh((middle[:, 0] - span / 2) / a) - a - sag, abs=0.006)
@@ -67,11 +65,11 @@ def test_a_clamped_strip_bends_as_an_elastica_does_under_its_weight(stiffness):
     gap = length / (columns - 1)
     sheet = make_cloth(2, columns, width=length, height=width, bending=stiffness)
     pinned = np.array([0, 1, columns, columns + 1])
-    sheets = Sheets(sheet, sheet.vertices[None], [], pinned=pinned, thickness=0.0, damping=3.0, substeps=40, device="cpu")
+    options = {"pinned": pinned, "thickness": 0.0, "damping": 3.0, "substeps": 40, "device": "cpu"}
+    sheets = Sheets(sheet, sheet.vertices[None], [], **options)
     settle(sheets, 5.0)
     end = elastica(stiffness, cloth.DENSITY * -GRAVITY, length - gap / 2)  # the first hinge is that of a whole gap
     found = sheets.positions[0, [columns - 1, 2 * columns - 1]].mean(0) - [gap / 2, 0, 0]
-    print(end, found)
     assert found[[0, 2]] == pytest.approx(end * [1, -1], abs=0.05 * length)
 
 
@@ -91,7 +89,6 @@ def test_a_cloth_slides_where_the_slope_is_steeper_than_its_friction(degrees, sl
     assert (moved > 0.1) if slides else (moved < 0.004)
 
 
-@pytest.mark.slow
 def test_energy_does_not_grow_at_rest_and_nothing_goes_through_the_table():
     sheets = cloth.table_scene(make_cloth(10, 10), 2, device="cpu")
     settle(sheets, 4.0)
