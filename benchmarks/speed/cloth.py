@@ -422,7 +422,8 @@ def kernel_of(vertices: int, colours: int, thickness: bool, substeps: int, cpu: 
         world, _thread = wp.tid()
         step_cloth(
             world, pos, vel, inverse_mass, elements, rest, compliance, colours, columns, num_pieces, planes,
-            piece_start, piece_radius, piece_reach, piece_pos, piece_quat, piece_vel, dt, gravity, damping, friction, thickness,
+            piece_start,
+            piece_radius, piece_reach, piece_pos, piece_quat, piece_vel, dt, gravity, damping, friction, thickness,
             piece_impulse, touches,
         )  # fmt: skip
 
@@ -541,7 +542,7 @@ TABLE, BALL, MUG = box((0.4, 0.4, 0.02)), sphere(0.1), prism(0.04, 0.05, 22)
 
 
 def table_scene(cloth: Cloth, worlds: int, seed: int = 0, **options: Any) -> Sheets:
-    """A cloth above a table with a ball and a mug, at another place and angle in each world. z = 0 is the table's top."""
+    """A cloth above a table with a ball and a mug, at another place in each world. z = 0 is the table's top."""
     draw = np.random.default_rng(seed)
     angle, shift = draw.uniform(0, 2 * np.pi, worlds), draw.uniform(-0.08, 0.08, (worlds, 2))
     flat = cloth.vertices - cloth.vertices.mean(0)
