@@ -117,7 +117,7 @@ def _read(
     elif knowledge.synset(category) is None:
         near = difflib.get_close_matches(category, knowledge.categories(), n=3, cutoff=0.6)
         hint = f"; near matches: {', '.join(near)}" if near else ""
-        source.warnings.append(f"--category {shortened(category)} is not known, so the object can do nothing{hint}")
+        source.warnings.append(f"--category {shortened(category)} is not known, so the object gets no abilities{hint}")
     prepared = inputs.is_folder(file.parent / "misc")
     source.metadata = read_metadata(file.parent, source.warnings if prepared else [])
     return source, None if root is None else Dataset(root)

@@ -74,7 +74,7 @@ def finish(
     said.sort(key=lambda line: HOVERS in line)  # common, and harmless: after everything that was lost
     if options.strict and said:
         more = f" (and {len(said) - 1} more warnings)" if len(said) > 1 else ""
-        raise InputError(manifest.name, f"{said[0]}{more}", fix="--strict takes warnings for errors")
+        raise InputError(manifest.name, f"{said[0]}{more}", fix="--strict treats warnings as errors")
     save_manifest(manifest, folder / "manifest.json")
     provisional = [
         f"'{name}': the decomposition of link '{link}' was stopped"

@@ -65,7 +65,9 @@ class ReadLimits:
                 fix = f"use {', '.join(k.replace('_', '-') for k in known)}"
                 raise InputError("command line", f"there is no limit '{name}'", element="--limit", fix=fix)
             if not (value.isascii() and value.isdigit() and len(value) < 16 and int(value) > 0):
-                raise InputError("command line", f"'{word}' gives no positive whole number", element="--limit")
+                raise InputError(
+                    "command line", f"'{word}' is not NAME=N with a positive whole number N", element="--limit"
+                )
             values[key] = int(value)
         return cls(**values)
 

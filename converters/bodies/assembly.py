@@ -177,7 +177,7 @@ class _Planner:
                 if joint.type == "fixed":
                     open_links.append((joint.child, pose @ joint.origin))
                 elif joint.type != "floating" and is_locked(joint):
-                    self.warnings.append(f"joint '{joint.name}' has no room between its limits: kept rigid")
+                    self.warnings.append(f"joint '{joint.name}' has equal limits; treated as fixed")
                     open_links.append((joint.child, pose @ joint.origin @ motion(joint, clamp(joint, 0.0))))
                 elif joint.type != "floating":
                     moving.append((joint, pose))
@@ -213,7 +213,7 @@ class _Planner:
         if inertial.mass < MIN_MASS:
             if inertial.mass <= 0 and body.parent is None and body.name == self._model.base:
                 self.warnings.append(
-                    f"base link '{body.name}' has no mass: Bullet would make the object static; given {MIN_MASS} kg"
+                    f"base link '{body.name}' has no mass (Bullet would make the object static); {MIN_MASS} kg assigned"
                 )
             inertial.mass = MIN_MASS
         floor = inertial.mass * MIN_GYRATION_RADIUS**2

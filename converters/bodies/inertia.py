@@ -96,17 +96,17 @@ def _warn_of_density(
     if discarded:
         if stated > 0:
             model.warnings.append(
-                f"its inertials ({stated:.3g} kg) are not used, as in iGibson's datasets: {total:.3g} kg, the "
-                "category's density times the bounding box"
+                f"the URDF's mass of {stated:.3g} kg is replaced by {total:.3g} kg (density of the category times the "
+                "bounding box), as in iGibson's datasets"
             )
     elif stated <= 0 and (own or density is None):
-        lacks = "its inertials have no mass" if own else "has no inertials"
+        lacks = "the URDF's inertials have no mass" if own else "the URDF has no inertials"
         used = DEFAULT_DENSITY if density is None else density
-        model.warnings.append(f"{lacks}: {total:.3g} kg, {used:g} kg/m3 of its box, split by volume")
+        model.warnings.append(f"{lacks}; {total:.3g} kg assigned ({used:g} kg/m3 of the bounding box), split by volume")
     elif stated > 0:
         for name, mass in shares.items():
             if mass > 0:
-                model.warnings.append(f"link '{name}' has no mass: {mass:.3g} kg, its share of the object's size")
+                model.warnings.append(f"link '{name}' has no mass; {mass:.3g} kg assigned in proportion to its size")
 
 
 def _rigid_bodies(model: ObjectModel) -> dict[str, list[str]]:
@@ -212,13 +212,13 @@ def _kept(link: Link, given: Inertial, members: Sequence[str], model: ObjectMode
     """
     if given.mass == 0:
         return Inertial(0.0, np.zeros((3, 3)), given.pose.copy())
-    problem = "no rigid body has its inertia"
+    problem = "impossible inertia in the URDF"
     if is_possible(given.inertia):
         problem = _too_wide(link, given, members, model)
     if not bullet and not problem:
         return given
     if not bullet and np.any(given.inertia):
-        model.warnings.append(f"link '{link.name}': {problem}; it is computed from its shape")
+        model.warnings.append(f"link '{link.name}': {problem}; recomputed from its geometry")
     return Inertial(given.mass, _tensor(link, given.mass, given.pose, bullet), given.pose.copy())
 
 
@@ -239,9 +239,9 @@ def _too_wide(link: Link, given: Inertial, members: Sequence[str], model: Object
     size = np.max([b[1] for b in boxes], axis=0) - np.min([b[0] for b in boxes], axis=0)
     half = 0.5 * float(np.linalg.norm(size))
     radius = float(np.sqrt(np.linalg.eigvalsh(given.inertia)[2] / given.mass))
-    return (
-        f"its inertia is that of a mass {radius:.2g} m away, and it is {2 * half:.2g} m across" if radius > half else ""
-    )
+    if radius <= half:
+        return ""
+    return f"implausible inertia in the URDF (radius of gyration {radius:.2g} m for a {2 * half:.2g} m link)"
 
 
 def is_possible(inertia: np.ndarray) -> bool:
@@ -289,4 +289,4 @@ def _give_least_mass(model: ObjectModel, bodies: Mapping[str, Sequence[str]], in
         given = inertials[root]
         inertials[root] = Inertial(MIN_MASS, _tensor(model.links[root], MIN_MASS, given.pose, False), given.pose)
         what = "the base has no mass (Bullet would make it static)" if root == model.base else f"'{root}' has no mass"
-        model.warnings.append(f"{what}: it is given {MIN_MASS:g} kg")
+        model.warnings.append(f"{what}; {MIN_MASS:g} kg assigned")

@@ -64,7 +64,7 @@ def openable_ends(assembly: Assembly) -> tuple[list[tuple[str, float, float]], l
         limits = joint_range(joints[name]) if name in joints else None
         if limits is None or is_locked(joints[name]):
             why = "has no limits" if name in joints else "is not a moving joint"
-            warnings.append(f"openable joint '{name}' {why}: it cannot tell whether the object is open")
+            warnings.append(f"openable joint '{name}' {why}; ignored when deciding whether the object is open")
             continue
         lower, upper = limits
         ends.append((name, lower, upper) if direction >= 0 else (name, upper, lower))

@@ -237,7 +237,7 @@ def _ladder(part: Part, task: CutTask, effort: int) -> Cut:
             except coacd_process.DecompositionError:
                 pass  # what there is will do
         return Cut(hulls, "coacd", warnings, stopped)
-    warnings.append(f"one hull stands for a shape that is not convex ({_times(part)})")
+    warnings.append(f"a single hull approximates a concave shape ({_times(part)})")
     return Cut([part.hull], "fallback", warnings, stopped)
 
 
@@ -277,7 +277,7 @@ def _try(
     solid = (solid_hull(p, options.min_thickness)[0] for p in points)
     hulls = [h for s in solid if s is not None and (h := clip_to(s, part.hull)) is not None]
     if not hulls:
-        raise coacd_process.DecompositionError("gave nothing solid")
+        raise coacd_process.DecompositionError("produced no solid piece")
     return hulls
 
 

@@ -134,7 +134,7 @@ def _take_group(mesh: Mesh, name: str, options: HullOptions, out: ShapeParts) ->
         if len(mesh.vertices):
             out.warnings.append(f"{name} {note}, left out")
     elif not note and _is_no_convex_group(mesh, hull):
-        out.warnings.append(f"{name} is not convex although it is a group: cut up")
+        out.warnings.append(f"{name} is a group but not convex; decomposed")
         _take_soup([mesh], name, options, out)
     else:
         if note:
@@ -168,7 +168,7 @@ def _take_soup(meshes: list[Mesh], label: str, options: HullOptions, out: ShapeP
         out.items.append(Convex(whole, "hull", everything))
         return
     if len(faces) > MOST_FACES:
-        out.warnings.append(f"{label} has {len(faces)} faces: made coarser before its convex parts are sought")
+        out.warnings.append(f"{label} has {len(faces)} faces; simplified before convex decomposition")
         vertices, faces = decimate(vertices, faces, MOST_FACES)
     vertices, faces = clean(vertices, faces)
     if is_thin_shell(whole, vertices[faces]):
@@ -177,7 +177,7 @@ def _take_soup(meshes: list[Mesh], label: str, options: HullOptions, out: ShapeP
         return
     solid = parts(vertices, faces)
     if not solid:
-        out.warnings.append(f"{label} consists of flat sheets: its hull stands for it")
+        out.warnings.append(f"{label} consists of flat sheets; its convex hull is used")
         out.items.append(Convex(whole, "hull"))
         return
     volume = enclosed_volume(solid, whole)

@@ -68,7 +68,7 @@ def read_specs(root: pathlib.Path, warnings: list[str]) -> dict[str, CategorySpe
     """
     file = root / "metadata" / "avg_category_specs.json"
     if not inputs.is_file(file):
-        warnings.append("metadata/avg_category_specs.json is missing: every category weighs as the default")
+        warnings.append("metadata/avg_category_specs.json is missing; every category gets the default density")
         return {}
     return {name: _spec(entry, file, f"category '{name}'") for name, entry in read_json(file, dict).items()}
 

@@ -30,7 +30,7 @@ def read_metadata(folder: pathlib.Path, warnings: list[str]) -> Metadata:
         high, low = (vector(raw.get(key), 3, old, f"'{key}'") for key in ("max", "min"))
         size = _positive(high - low, old, "'max' - 'min'")
         return Metadata(bbox_size=size, base_link_offset=(high + low) / 2, raw=raw)
-    warnings.append("no misc/metadata.json: nothing is known about its size, so scales are taken as they are")
+    warnings.append("no misc/metadata.json: size unknown, so scales are used as given")
     return Metadata()
 
 
@@ -41,7 +41,7 @@ def _parse(raw: dict[str, Any], file: pathlib.Path, warnings: list[str]) -> Meta
         offset = raw.get("base_link_offset")
         data.base_link_offset = np.zeros(3) if offset is None else vector(offset, 3, file, "'base_link_offset'")
     else:
-        warnings.append("metadata.json has no bbox_size, so scales are taken as they are")
+        warnings.append("metadata.json has no bbox_size, so scales are used as given")
     for i, item in enumerate(_list(raw, "orientations", file)):
         at = f"orientation {i}"
         _expect(item, dict, file, at)

@@ -195,9 +195,7 @@ def _drop_broken_mimics(joints: dict[str, Joint], warnings: list[str]) -> None:
         while target is not None:
             goal = joints.get(target.joint)
             if goal is None or goal.type not in MOVING or goal.name in seen:
-                warnings.append(
-                    f"joint '{joint.name}': its mimic of '{target.joint}' leads to no joint and is left out"
-                )
+                warnings.append(f"joint '{joint.name}': mimics '{target.joint}', which is no movable joint; ignored")
                 joint.mimic = None
                 break
             seen.add(goal.name)

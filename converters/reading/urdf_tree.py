@@ -75,7 +75,7 @@ def find_tree(
     check_limit("link_depth", max(depth.values()), file, "moving joints in a row")
     reached = depth.keys()
     if lost := [name for name in links if name not in reached]:
-        warnings.append(f"links that hang on nothing are left out: {', '.join(lost[:10])}")
+        warnings.append(f"links without a parent joint are left out: {', '.join(lost[:10])}")
     kept = {name: link for name, link in links.items() if name in reached}
     return base, kept, {name: joint for name, joint in joints.items() if joint.parent in reached}
 

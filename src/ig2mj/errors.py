@@ -87,13 +87,13 @@ class LostWorldError(EngineError):
 
 
 class StaleStateError(Ig2mjError):
-    """A state of worlds that a later step, reset, write or load used up: its worlds have gone on, or its arrays were
-    given back to the device."""
+    """A state of worlds that a later step, reset, write or load reused: its worlds have moved on, or its buffers were
+    donated to a compiled program."""
 
     def __init__(self, what: str = "this state"):
         super().__init__(
-            f"{what} was used up by a later step, reset, write or load: go on with the state that the last call "
-            "returned, or take a copy before that call with fork(state)"
+            f"{what} is stale: a later step, reset, write or load reused its buffers; continue with the state that the "
+            "last call returned, or copy it before that call with fork(state)"
         )
 
 

@@ -49,7 +49,7 @@ def api_test(
     - `final_obs` is what was seen before the reset;
     - numbers of an action that are not finite are refused on the host, on a device counted and taken for 0; a wrong
       shape is refused;
-    - a state that was used up is refused by everything that takes a state; a fork of a state and a state from a file go
+    - a stale state is refused by everything that takes a state; a fork of a state and a state from a file go
       on as the state itself, whatever was done to the others in between;
     - nothing is compiled again at the second reset and the second step; closing twice is harmless.
 
@@ -238,7 +238,7 @@ def _copies(env: Environment, seed: int, actions: list[np.ndarray], like: Likene
                 take()
             except StaleStateError:
                 continue
-            raise AssertionError(f"{name} took a state that was used up")
+            raise AssertionError(f"{name} took a stale state")
         env.save(state, file)
         copies = {"a fork": env.fork(state), "a state from a file": env.load(file)}
     _same(_host(state), _host(copies["a state from a file"]), "a state from a file", Likeness())

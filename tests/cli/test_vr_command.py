@@ -12,8 +12,8 @@ from ig2mj.vr import server
     ("arguments", "message"),
     [
         (["--device", "glove"], "no device is named 'glove'"),
-        (["--device", "recorded"], "--poses FILE belongs to --device recorded"),
-        (["--poses", "visit.h5"], "--poses FILE belongs to --device recorded"),
+        (["--device", "recorded"], "--poses FILE needs --device recorded"),
+        (["--poses", "visit.h5"], "--poses FILE needs --device recorded"),
         (["--seconds", "nan"], "--seconds must be finite"),
         (["--row", "-2"], "not negative"),
         (["--device", "openxr", "--token", "auto"], "belong to --device page"),

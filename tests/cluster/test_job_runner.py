@@ -120,9 +120,9 @@ def test_a_killed_run_goes_on_where_it_stopped(tmp_path):
         map_jobs(wanted, Where(), journal, die_after_three)
     with (tmp_path / "pool.npz.jobs" / "done.jsonl").open("a") as lines:
         lines.write('{"name": "job_4", "sha2')  # half a line, as a kill leaves it
-    with pytest.raises(InputError, match=r"an earlier run of this was interrupted \(--resume continues it"):
+    with pytest.raises(InputError, match=r"an earlier run was interrupted \(--resume continues it"):
         Journal(out, {"rows": 5})
-    with pytest.raises(InputError, match="the interrupted run had rows = 5, and here it is 6"):
+    with pytest.raises(InputError, match="the interrupted run had rows = 5; this one has 6"):
         Journal(out, {"rows": 6}, resume=True)
     before = set(tmp_path.glob("*-*"))
     with Journal(out, {"rows": 5}, resume=True) as journal:
@@ -201,5 +201,5 @@ def test_results_can_be_delivered_at_once(tmp_path):
 def test_versions_are_compared_by_name():
     own = versions()
     assert difference(own, dict(own)) is None
-    assert difference(own, {**own, "numpy": "1.0"}) == f"numpy 1.0, and here it is {own['numpy']}"
-    assert difference(own, {**own, "ig2mj": "0.0.9"}).startswith("ig2mj 0.0.9, and here it is 0.")
+    assert difference(own, {**own, "numpy": "1.0"}) == f"numpy 1.0, not {own['numpy']} as here"
+    assert difference(own, {**own, "ig2mj": "0.0.9"}).startswith("ig2mj 0.0.9, not 0.")

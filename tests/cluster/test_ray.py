@@ -158,7 +158,7 @@ def test_a_node_without_the_files_or_with_another_version_is_told_before_any_wor
             run(gone, Where(cluster=joined.address))
         monkeypatch.undo()
         monkeypatch.setattr(ray_nodes, "versions", lambda: {"ig2mj": "9.9 (abc)"})
-        with pytest.raises(ClusterError, match=r"node .* has ig2mj .*, and here it is 9.9"):
+        with pytest.raises(ClusterError, match=r"node .* has ig2mj .*, not 9.9"):
             map_jobs(wanted, Where(cluster=joined.address))
         assert not list(note.iterdir()), "no job was begun"
     finally:

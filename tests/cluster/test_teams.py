@@ -133,7 +133,7 @@ def test_who_does_not_come_is_named():
 
 
 def test_nobody_there():
-    with pytest.raises(ClusterError, match=r"process 0 is not to be reached at 127.0.0.1:\d+: Connection refused"):
+    with pytest.raises(ClusterError, match=r"process 0 cannot be reached at 127.0.0.1:\d+: Connection refused"):
         Team.join(ProcessTopology("127.0.0.1", free_port(), 1, 2), patience=0.5)
 
 

@@ -48,7 +48,7 @@ def test_the_first_warnings_are_told_at_the_shell_and_strict_makes_them_errors(t
     lost = LINK.format("body", a_box(tmp_path), "") + LINK.format("alone", "a.obj", "")
     file = urdf(tmp_path, lost)
     assert convert(file, tmp_path / "out") == 0
-    assert "warning: thing: links that hang on nothing are left out: alone" in capsys.readouterr().out
+    assert "warning: thing: links without a parent joint are left out: alone" in capsys.readouterr().out
     assert convert(file, tmp_path / "strict", "--strict") == 2
     assert "alone" in capsys.readouterr().err and not (tmp_path / "strict").exists()
 

@@ -43,7 +43,7 @@ def test_an_implausible_object_is_a_warning_and_an_error_under_strict(tmp_path, 
     inside, message = ODD[what]
     outcome = convert(tmp_path, inside, report=False)
     assert any(message in line for line in outcome.first_warnings), outcome.first_warnings
-    with pytest.raises(InputError, match="--strict takes warnings for errors"):
+    with pytest.raises(InputError, match="--strict treats warnings as errors"):
         convert(tmp_path, inside, report=False, strict=True)
 
 

@@ -230,7 +230,7 @@ def test_images_and_noise_are_exported_as_they_were_recorded(tmp_path):
     with h5py.File(tmp_path / "runs.h5", "a") as opened:
         opened.attrs["appearance_hash"] = "another"
     with Recording(tmp_path / "runs.h5") as recording:
-        with pytest.raises(InputError, match="the home looked otherwise in rgb, depth"):
+        with pytest.raises(InputError, match="the home's appearance differs in rgb, depth"):
             export_robomimic(Replayer(recording, env=env), tmp_path / "other.h5")
         vectors = make(observations=("proprioception",)).with_horizon(3)
         export_robomimic(Replayer(recording, env=vectors), tmp_path / "vectors.h5")

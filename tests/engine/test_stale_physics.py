@@ -67,7 +67,7 @@ def test_every_method_refuses_used_physics_and_names_the_remedy(small):
         "saved": engine.saved,
     }
     for call in calls.values():
-        with pytest.raises(StaleStateError, match=r"used up.*fork\(state\)"):
+        with pytest.raises(StaleStateError, match=r"is stale.*fork\(state\)"):
             call(old)
     assert "stale" in repr(old) and "stale" not in repr(now)
     assert engine.time(engine.current(now))[0] == pytest.approx(1 / 30)

@@ -63,12 +63,12 @@ def test_the_same_step_from_a_used_state_is_refused_on_the_native_engine(env, ac
     state = env.reset(0)
     env.step(state, actions[0])
     for again in (env.step, env.step_autoreset):
-        with pytest.raises(StaleStateError, match=r"used up.*fork\(state\)"):
+        with pytest.raises(StaleStateError, match=r"is stale.*fork\(state\)"):
             again(state, actions[0])
     for use in (env.reset, env.fork, copy.deepcopy, pickle.dumps, lambda s: env.save(s, "never.npz")):
         with pytest.raises(StaleStateError):
             use(state)
-    assert "used up" in repr(state)
+    assert "stale" in repr(state)
 
 
 def test_copies_go_on_to_the_last_bit(env, state, actions, file):

@@ -32,7 +32,7 @@ def test_a_recorded_expert_is_cloned_and_judged(tmp_path, capsys):
     assert played["success_rate"] >= 0.75 and set(played) <= set(found), "evaluate has the keys of rollout"
     assert call(["evaluate", str(run), "--worlds", "1", "--episodes", "5", *POOL, "--robot", "fetch"]) == 2
     assert "there are 4 start states, so some are played and counted again" in (refused := capsys.readouterr().err)
-    assert 'is for robot = "humanoid", and here it is "fetch"' in refused
+    assert "was made for robot = humanoid; you asked for fetch" in refused
 
 
 def test_wrong_options_name_what_is_near(tmp_path, capsys):

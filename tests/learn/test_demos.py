@@ -78,7 +78,7 @@ def test_demonstrations_without_pictures_are_refused_where_pictures_are_seen(rec
 def test_broken_and_foreign_files_are_refused_with_run_and_field(recorded, tmp_path):
     env, file = recorded
     perception = Perception(env.observation_spaces)
-    with pytest.raises(InputError, match=r'is for robot = "", and here it is "fetch"'):
+    with pytest.raises(InputError, match='was made for robot = ""; you asked for fetch'):
         load_demos(file, perception, {**world_of(env), "robot": "fetch"})
     (tmp_path / "no.h5").write_bytes(b"nothing")
     with pytest.raises(InputError, match="is not an HDF5 file"):

@@ -223,7 +223,7 @@ def test_a_policy_for_something_else_is_refused_with_the_pair_that_differs(done,
     trained = algorithm(env)
     depends = {**depends_on(env, trained.perception), "grasping": "sticky"}
     policy = Policy.of(trained, result.learner, depends, {})
-    with pytest.raises(InputError, match='grasping = "sticky", and here it is ""'):
+    with pytest.raises(InputError, match='grasping = sticky; you asked for ""'):
         policy.check(env, trained.perception)
     (tmp_path / "broken.npz").write_bytes(b"PK\x03\x04nothing")
     with pytest.raises(InputError, match="is not an npz archive"):

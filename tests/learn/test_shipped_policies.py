@@ -124,7 +124,7 @@ def test_what_ships_is_within_its_sizes_and_evaluated_on_a_thousand_held_out_epi
 
 def test_a_policy_for_another_robot_is_a_mismatch_that_names_the_pair():
     env = PointMass(2)
-    with pytest.raises(PolicyMismatch, match='is for task = "CookingMeat", and here it is "PointMass"'):
+    with pytest.raises(PolicyMismatch, match="was made for task = CookingMeat; you asked for PointMass"):
         made().check(env, Perception(env.observation_spaces))
 
 

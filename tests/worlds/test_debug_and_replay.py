@@ -149,7 +149,7 @@ def test_the_command_writes_a_picture_and_a_video(can_draw, dump, bare, tmp_path
     ("options", "says"),
     [
         (["--dump", "absent.npz", "--image", "a.png"], "there is no such file"),
-        (["--video", "a.mp4"], "--video belongs to --dump"),
+        (["--video", "a.mp4"], "--video needs --dump or --policy"),
         (["--dump", "{dump}", "--video", "a.txt"], "is not an image format"),
         (["--dump", "{dump}", "--video", "a.png"], "is not a video format"),
         (["--dump", "{dump}", "--video", "a.gif", "--image", "a.png"], "goes with one of"),

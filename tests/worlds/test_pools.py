@@ -157,7 +157,7 @@ def broken(pool: Pool, file, kind: str, scene: ig2mj.Scene) -> str:
     if kind == "digest":
         tables = dataclasses.replace(scene.tables, object_names=(*scene.object_names[:-1], "vase"))
         save_pool(pool, file, dataclasses.replace(scene, tables=tables))
-        return "was made when the physics of 'tiny_home' differed from now"
+        return "was made with another version of the physics of 'tiny_home'"
     if kind == "lengths":
         short = jax.tree.map(lambda a: np.asarray(a)[:-1], pool.states)
         save_pool(dataclasses.replace(pool, states=short), file, scene)

@@ -106,7 +106,7 @@ def show(
         show_row(found[0], pool, row, image, scene, json)
         return 0
     if image is not None or row:
-        raise Ig2mjError("--row and --image belong to --pool")
+        raise Ig2mjError("--row and --image need --pool")
     bound, errors = fitting(activity, find_homes(scene))
     best = bound[0] if bound else None
     if json:

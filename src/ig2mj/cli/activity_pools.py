@@ -111,7 +111,7 @@ def _tell(done: SampledStart, binding: Binding, file: pathlib.Path, as_json: boo
             f"look: {show} --row 0 --image row.png"
         )
     if done.reached:
-        print(f"the goal holds already in rows {', '.join(map(str, done.reached))}", file=sys.stderr)
+        print(f"the goal already holds in rows {', '.join(map(str, done.reached))}", file=sys.stderr)
     lacking = sampled.requested - len(sampled.rows) - len(sampled.failed)
     if lacking:
         print(f"{lacking} of {sampled.requested} rows could not be sampled in {binding.home}", file=sys.stderr)

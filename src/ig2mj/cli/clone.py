@@ -67,5 +67,5 @@ def train_from_demos(
     file = folder / "policy.npz"
     Policy.of(algorithm, learner, depends, made).save(file)
     print(file)
-    print(f"to measure it on states it has not seen: ig2mj evaluate {file}", file=sys.stderr)
+    print(f"to evaluate it on held-out start states: ig2mj evaluate {file}", file=sys.stderr)
     return 0

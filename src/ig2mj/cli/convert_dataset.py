@@ -114,7 +114,7 @@ def digest_of(root: str) -> str:
 
     names = names_of(root)
     if not names:
-        raise InputError(root, "this dataset is not there, or empty")
+        raise InputError(root, "this dataset is missing or empty")
     files = sorted(f for name in names for f in (pathlib.Path(root) / name).rglob("*.urdf"))
     listing = "\n".join([*names, *(f"{f.relative_to(root)} {f.stat().st_size}" for f in files)])
     return hashlib.blake2b(listing.encode(), digest_size=12).hexdigest()

@@ -77,8 +77,8 @@ def _line(file: pathlib.Path, run: dict[str, Any]) -> str:
     return (
         f"{file} {run['run']}: goal {goal['start']:.2f} to {goal['end']:.2f}; "
         f"moved {run['kinematic_disarrangement']['total']:.2f} m, "
-        f"{run['logical_disarrangement']['total']} facts changed; "
-        f"ways (m): {ways}; holding: {held}; looked most at {looked}"
+        f"{run['logical_disarrangement']['total']} predicates changed; "
+        f"distance travelled (m): {ways}; holding: {held}; looked most at {looked}"
     )
 
 

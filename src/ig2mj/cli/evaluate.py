@@ -73,7 +73,7 @@ def run(
             f"--episodes {episodes}, --jobs {jobs}, --worlds {worlds}: at least one episode, and none below 0"
         )
     if resume and out is None:
-        raise Ig2mjError("--resume needs --out, the file beside which the finished jobs are")
+        raise Ig2mjError("--resume needs --out FILE: finished jobs are stored next to it")
     if out is not None:
         check_output(out)
     file = find_policy(policy)

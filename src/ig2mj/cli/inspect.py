@@ -101,8 +101,8 @@ def _print_tables(manifest: Manifest, objects: list[ObjectEntry], show: tuple[Ki
     console.print(
         f"{manifest.name}: {len(household)} objects ({len(movable)} movable, {sum(o.mass for o in movable):.1f} kg), "
         f"{joints} joints, {len(manifest.rooms.instances)} rooms"
-        + (f"; beside them {parked} parked" * (parked > 0))
-        + (f"{' and' if parked else '; beside them'} {building} of the building" * (building > 0)),
+        + (f"; plus {parked} parked" * (parked > 0))
+        + (f"{' and' if parked else '; plus'} {building} of the building" * (building > 0)),
         markup=False,
     )
     makers = {"rooms": _room_rows, "objects": _object_rows, "joints": _joint_rows, "abilities": _ability_rows}

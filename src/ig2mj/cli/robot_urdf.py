@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 def check_layout(urdf: pathlib.Path | None, layout: pathlib.Path | None) -> None:
     """Raises Ig2mjError for a layout without a robot."""
     if layout is not None and urdf is None:
-        raise Ig2mjError("--robot-layout belongs to --robot-urdf")
+        raise Ig2mjError("--robot-layout needs --robot-urdf")
 
 
 def own_robot(urdf: pathlib.Path, layout: pathlib.Path | None, robot: str | None = None) -> UrdfRobot:

@@ -80,7 +80,7 @@ def run(
     if format not in FORMATS:
         raise UnknownNameError("format", format, FORMATS)
     if record is None and format != FORMATS[0]:
-        raise Ig2mjError(f"--format {format} is that of --record FILE, which is missing")
+        raise Ig2mjError(f"--format {format} needs --record FILE")
     check_layout(robot_urdf, robot_layout)
     policy = None if agent in AGENTS else policy_named(agent)
     if episodes < 1 or worlds < 1:
@@ -145,7 +145,7 @@ def run(
         "non_finite": outcome.metrics["not_finite"],
     }
     if film is not None and not json:
-        print(f"film: {video}")
+        print(f"video: {video}")
     if json:
         print(form.dumps(result))
     else:

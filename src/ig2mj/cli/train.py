@@ -153,7 +153,7 @@ def _train(
         shared = _devices(devices, team.count)
         if count % max(len(shared), 1):
             raise Ig2mjError(
-                f"--devices {devices} --worlds {count}: worlds are shared evenly over {len(shared)} devices"
+                f"--devices {devices} --worlds {count}: worlds must divide evenly over {len(shared)} devices"
             )
         with team.turns():  # the first one samples start states where there are none, the others read them
             world = make(
@@ -226,7 +226,7 @@ def _train(
             return 0
         videos.offer(best.file, result.row["seconds"], last=True)
         print(best.file)
-        print(f"to measure it on states it has not seen: ig2mj evaluate {best.file}", file=sys.stderr)
+        print(f"to evaluate it on held-out start states: ig2mj evaluate {best.file}", file=sys.stderr)
         return 0
 
 

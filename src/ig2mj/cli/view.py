@@ -79,20 +79,20 @@ def run(
 
     check_layout(robot_urdf, robot_layout)
     if robot_urdf is not None and (dump is not None or pool is not None):
-        raise Ig2mjError("--robot-urdf goes neither with --dump nor with --pool")
+        raise Ig2mjError("--robot-urdf cannot be combined with --dump or --pool")
     _check(image or video, camera, eye, target, size, seconds)
     if dump is not None:
         _replay(scene, dump, image, video, camera, eye, target, size, seconds, collision, paused)
         return
     if video is not None:
-        raise Ig2mjError("--video belongs to --dump")
+        raise Ig2mjError("--video needs --dump or --policy")
     if pool is not None:
         if seconds > 0:
-            raise Ig2mjError("--pool shows rows as they are: without --seconds")
+            raise Ig2mjError("--pool cannot be combined with --seconds")
         _page_through(scene, pool, row, image, camera, eye, target, size, collision)
         return
     if row:
-        raise Ig2mjError("--row belongs to --pool")
+        raise Ig2mjError("--row needs --pool or --policy")
     if image is not None:
         home = _with_robot(scene, robot_urdf, robot_layout, robot_at)
         _write_image(home, image, camera, eye, target, size, seconds, collision)
@@ -115,9 +115,9 @@ def run(
 
 def _only_policy(scene, *others) -> None:
     if scene is not None:
-        raise Ig2mjError("--policy shows its own task's home: name no scene")
+        raise Ig2mjError("--policy shows the home of its task; leave SCENE out")
     if any(others):
-        raise Ig2mjError("with --policy go --video, --row and --paused alone")
+        raise Ig2mjError("--policy can be combined only with --video, --row and --paused")
 
 
 def _check(image, camera, eye, target, size, seconds) -> None:
@@ -127,7 +127,7 @@ def _check(image, camera, eye, target, size, seconds) -> None:
     if camera is not None and (eye or target):
         raise Ig2mjError("give either --camera or --from and --at")
     if (eye is None) != (target is None):
-        raise Ig2mjError("--from and --at belong together")
+        raise Ig2mjError("--from and --at must be given together")
     if eye is not None and eye == target:
         raise Ig2mjError("--from and --at are the same point")
     if not all(math.isfinite(n) for n in numbers) or seconds < 0:
@@ -174,7 +174,7 @@ def _replay(scene, dump, image, video, camera, eye, target, size, seconds, colli
     from ig2mj.viewer.replay import Replay
 
     if (image is not None and video is not None) or seconds > 0:
-        raise Ig2mjError("--dump goes with one of --image and --video, and without --seconds")
+        raise Ig2mjError("--dump takes one of --image and --video, and no --seconds")
     if video is not None and video.suffix.lower() not in VIDEOS:
         raise Ig2mjError(f"{video}: is not a video format that can be written (use {' or '.join(VIDEOS)})")
     replay = Replay(load_scene(scene), dump)

@@ -58,11 +58,11 @@ def run(
     if device not in DEVICES:
         raise UnknownNameError("device", device, DEVICES)
     if (poses is not None) != (device == "recorded"):
-        raise Ig2mjError("--poses FILE belongs to --device recorded")
+        raise Ig2mjError("--poses FILE needs --device recorded")
     if not math.isfinite(seconds) or seconds < 0 or row < -1 or pool_size < 0:
         raise Ig2mjError("--seconds must be finite, --seconds, --row and --pool-size not negative")
     if device != "page" and any(value is not None for value in (host, token, certificate, key)):
-        raise Ig2mjError("--host, --token, --certificate and --key belong to --device page")
+        raise Ig2mjError("--host, --token, --certificate and --key need --device page")
     common = {"record_to": record, "seed": seed, "row": None if row < 0 else row}
     if device == "page":
         from ig2mj.vr.server import check_page

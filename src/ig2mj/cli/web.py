@@ -149,7 +149,7 @@ def _home(
     from ig2mj.worlds.rules import Rules
 
     if pool is not None and set:
-        raise Ig2mjError("--set belongs to a scene's own start: give it without --pool")
+        raise Ig2mjError("--set cannot be combined with --pool")
     wanted = None if goal is None else parse(goal, "--goal")
     scene = load_scene(name) if pool is None else load_pool_scene(pool, name)
     rules = Rules.of_scene(scene)

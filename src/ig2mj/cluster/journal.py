@@ -96,7 +96,7 @@ class Journal:
         if (self.folder / DONE).exists():  # else nothing was finished
             if not resume:
                 fix = f"--resume continues it; to start over, remove {self.folder}"
-                raise InputError(self.out, "an earlier run of this was interrupted", fix=fix)
+                raise InputError(self.out, "an earlier run was interrupted", fix=fix)
             self._compare(file)
             self._read()
             self._mend()
@@ -112,7 +112,7 @@ class Journal:
             if known.get(name) != wanted.get(name):
                 was, now = (json.dumps(r.get(name))[:80] for r in (known, wanted))
                 fix = f"to start over, remove {self.folder}"
-                problem = f"the interrupted run had {name} = {was}, and here it is {now}"
+                problem = f"the interrupted run had {name} = {was}; this one has {now}"
                 raise InputError(self.out, problem, fix=fix)
 
     def _read(self) -> None:

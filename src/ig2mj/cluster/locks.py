@@ -73,15 +73,15 @@ def hold(file: pathlib.Path, out: object) -> Hold:
         if e.errno not in _NO_LOCKS:
             who = _named(_holder(opened))
             opened.close()
-            raise ClusterError(f"{out}: {who} is writing there; wait for it, or choose another place") from None
+            raise ClusterError(f"{out}: {who} is writing there; wait for it, or choose another path") from None
     who = _holder(opened)
     if who is not None and not (locks and is_of_this_machine(who)):
         since = age(file)
         if lives(who) or (lives(who) is None and since < DEAD):
             opened.close()
             raise ClusterError(
-                f"{out}: {_named(who)} was writing there {since:.0f} s ago; without a sign of life for {DEAD:.0f} s it "
-                "counts as dead, and the output can be had"
+                f"{out}: {_named(who)} was writing there {since:.0f} s ago; the output becomes available after {DEAD:.0f} s "
+                "without a heartbeat"
             )
     return Hold(file, opened)
 

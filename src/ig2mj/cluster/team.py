@@ -228,7 +228,7 @@ class Team:
             self._links[0], link.rank = link, 0
             self.names |= {int(rank): name for rank, name in answer["names"].items()}
             return answer["go"]
-        raise ClusterError(f"process 0 is not to be reached at {place.host}:{place.port}: {why}")
+        raise ClusterError(f"process 0 cannot be reached at {place.host}:{place.port}: {why}")
 
     # Staying together.
 

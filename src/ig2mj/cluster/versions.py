@@ -19,10 +19,10 @@ def versions() -> dict[str, str]:
 
 
 def difference(own: dict[str, str], other: dict[str, str]) -> str | None:
-    """The first version that differs, as "numpy 2.1, and here it is 2.2"; None where all are the same."""
+    """The first version that differs, as "numpy 2.1, not 2.2 as here"; None where all are the same."""
     for name, value in own.items():
         if other.get(name) != value:
-            return f"{name} {other.get(name)}, and here it is {value}"
+            return f"{name} {other.get(name)}, not {value} as here"
     return None
 
 

@@ -91,7 +91,7 @@ def check_observations(replayer: Replayer) -> None:
         if seen:
             found += _other_settings(replayer)
             if recording.header.get("appearance_hash") != here["appearance_hash"]:
-                found.append(f"the home looked otherwise in {', '.join(seen)}")
+                found.append(f"the home's appearance differs in {', '.join(seen)}")
     if found:
         fix = "`ig2mj demos replay --by state --sensors NAMES` makes observations of what is here now"
         raise InputError(recording.file, f"cannot be exported as it was recorded: {'; '.join(found)}", fix=fix)

@@ -124,7 +124,7 @@ class Replayer:
             )
         self.warnings, self.here = bound + differences(recording.header, here, loose), here
         if recording.header.get("engine") != "native" and by == "action":
-            self.warnings.append(f"engine {recording.header.get('engine')} does not promise the same bytes")
+            self.warnings.append(f"engine {recording.header.get('engine')} is not bit-exact")
         worlds = recording.value("worlds", int)
         if worlds != self.env.num_worlds:
             raise EngineError(f"the recording is of {worlds} worlds, the environment has {self.env.num_worlds}")

@@ -22,7 +22,7 @@ class StateCopies:
     core: Core
 
     def check(self, state: EnvState) -> None:
-        """Raises StaleStateError: the state was used up. Nothing while tracing."""
+        """Raises StaleStateError: the state is stale. Nothing while tracing."""
         self.core.check(state.batch)
 
     def fork(self, state: EnvState) -> EnvState:
@@ -30,7 +30,7 @@ class StateCopies:
         they are given the same actions. Not for compiled programs, in which states are values anyway.
 
         Raises:
-          StaleStateError: the state was used up.
+          StaleStateError: the state is stale.
         """
         if self.core.engine.pure:
             self.check(state)
@@ -43,7 +43,7 @@ class StateCopies:
         """Writes all worlds of a state to an `.npz` file (arrays only, no pickle), for `load`.
 
         Raises:
-          StaleStateError: the state was used up. InputError: the file cannot be written.
+          StaleStateError: the state is stale. InputError: the file cannot be written.
         """
         save_state(typing.cast(Any, self), state, file)
 

@@ -7,7 +7,7 @@
 
 An agent step is 1/10 s unless `make` is given another period: three control steps of the core, the action held in
 all of them. What the core can compile is compiled, and so is this: on a pure engine `step_fn` and `reset_fn` may be
-part of a program of your own. A state that was passed to `step` or `reset` is used up: continue with the one that is
+part of a program of your own. Do not reuse a state that was passed to `step` or `reset`: continue with the one that is
 returned. Using it again raises StaleStateError, on every engine; `fork` copies a state first, to branch. Inside a
 compiled program of your own states are values, and may be used again; one that your program donates is gone.
 

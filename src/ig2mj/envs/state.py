@@ -56,9 +56,9 @@ class EnvState:
         return {name: array for name, array in self.info.items() if name.startswith("reward/") or name == "success"}
 
     def __repr__(self) -> str:
-        """Shapes only: nothing is read, so that it is quick and works for a state that was used up."""
+        """Shapes only: nothing is read, so that it is quick and works for a stale state."""
         physics = getattr(getattr(self.batch, "world", None), "physics", None)
-        stale = ", used up" if getattr(physics, "is_stale", bool)() else ""
+        stale = ", stale" if getattr(physics, "is_stale", bool)() else ""
         obs = self.obs.items() if isinstance(self.obs, dict) else ()
         shapes = (f"{name} {getattr(a, 'dtype', '?')}{list(getattr(a, 'shape', ()))}" for name, a in obs)
         return f"EnvState({length(self.reward)} worlds{stale}; obs: {', '.join(shapes)})"

@@ -72,7 +72,7 @@ def save_state(env: Environment, state: EnvState, file: str | os.PathLike) -> No
     """Writes a state of the environment.
 
     Raises:
-      StaleStateError: the state was used up. InputError: it cannot be written there.
+      StaleStateError: the state is stale. InputError: it cannot be written there.
     """
     env.check(state)
     save_tree(file, _saved(env, state), {"kind": KIND, "version": FORMAT_VERSION, **_fit(env)})

@@ -232,9 +232,11 @@ def refuse_difference(
     as_read = json.loads(json.dumps(dict(wanted)))
     for name in [*as_read, *(n for n in found if n not in as_read)]:
         if found.get(name) != as_read.get(name):
-            raise error(file, f"is for {name} = {_short(found.get(name))}, and here it is {_short(as_read.get(name))}")
+            raise error(
+                file, f"was made for {name} = {_short(found.get(name))}; you asked for {_short(as_read.get(name))}"
+            )
 
 
 def _short(value: Any) -> str:
-    text = json.dumps(value)
+    text = value if isinstance(value, str) and value else json.dumps(value)
     return text if len(text) < 100 else f"{text[:90]} ..."

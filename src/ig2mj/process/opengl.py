@@ -38,7 +38,7 @@ def use_opengl() -> str:
         if probe_gl(name) is None:
             use_gl(name)
             return name
-    raise MissingDependencyError(f"no OpenGL without a display works here; try: {GL_INSTALL_HINT}")
+    raise MissingDependencyError(f"OpenGL without a display does not work on this machine; try: {GL_INSTALL_HINT}")
 
 
 @functools.cache

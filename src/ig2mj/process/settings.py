@@ -138,13 +138,13 @@ def use_gl(backend: str) -> None:
       backend: "egl", "osmesa" or "glfw".
 
     Raises:
-      EngineError: this process already draws with another one. MissingDependencyError: it does not load.
+      EngineError: this process already renders with another one. MissingDependencyError: it does not load.
     """
     global _gl
     if _gl == backend:
         return
     if _gl is not None:
-        raise EngineError(f"this process already draws with {_gl}; {backend} needs a process of its own")
+        raise EngineError(f"this process already renders with {_gl}; {backend} needs a process of its own")
     from mujoco.rendering.classic import gl_context
 
     try:

@@ -166,7 +166,7 @@ def _open(t: _Task, value: bool) -> Change:
 def _sliced(t: _Task, value: bool) -> Change:
     if not value:
         if bool(np.any(t.states.sliced[:, t.objects[0]])):
-            raise StateError(f"'{t.object_name}' is sliced, and that is for good")
+            raise StateError(f"'{t.object_name}' is sliced, which cannot be undone")
         return Change(t.states)
     only = np.isin(np.arange(t.model.tables.num_objects), t.objects[:1])[None]
     return Change(*sliced.set_sliced(t.model, t.states, only, t.view))

@@ -70,9 +70,7 @@ def place_of(wanted: str) -> tuple[str, Place | None]:
     try:
         x, y, z, yaw = map(float, place.split(","))
     except ValueError:
-        raise Ig2mjError(
-            f"'{wanted}': a fixed object's place is x,y,z,yaw, four numbers in metres and degrees"
-        ) from None
+        raise Ig2mjError(f"'{wanted}': the pose of a fixed object is x,y,z,yaw in metres and degrees") from None
     return name, (x, y, z, yaw)
 
 
@@ -121,7 +119,7 @@ def add_objects(file: pathlib.Path, manifest: Manifest, wanted: Sequence[str]) -
     for (_, model), at in zip(named, places, strict=True):
         if model.entry.fixed and at is None:
             raise Ig2mjError(
-                f"'{model.category}/{model.model}' is fixed: say where, as in '{model.category}@1,2,0.9,-90'"
+                f"'{model.category}/{model.model}' is fixed: give its pose, as in '{model.category}@1,2,0.9,-90'"
             )
     loose = [o for (_, model), at in zip(named, places, strict=True) if at is None for o in model.manifest.objects]
     cells = _add_slab(root, loose) if loose else []

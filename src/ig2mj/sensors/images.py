@@ -86,8 +86,8 @@ def check_request(
     height: int,
     rows: tuple[int, int] | None = None,
 ) -> None:
-    """Raises EngineError where there is nothing to make pictures of, or with."""
+    """Raises EngineError where there is nothing to make images of, or with."""
     if rows is not None and not 0 <= rows[0] < rows[1] <= height:
-        raise EngineError(f"rows {rows[0]} to {rows[1]} of pictures of {height} rows: there are none")
+        raise EngineError(f"rows {rows[0]} to {rows[1]} are empty for images of {height} rows")
     if (cameras and (not any(wanted) or min(width, height) < 1)) or not (cameras or rays):
-        raise EngineError("a camera must have pixels and make at least one of rgb, depth and segmentation")
+        raise EngineError("a camera must have pixels and produce at least one of rgb, depth and segmentation")

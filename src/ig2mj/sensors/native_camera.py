@@ -58,7 +58,7 @@ class NativeCamera:
           EngineError: not the native engine, or nothing is to be made. UnknownNameError: no such camera.
         """
         if not isinstance(engine, NativeEngine):
-            raise EngineError(f"the {engine.name} engine's worlds are not drawn by MuJoCo's renderer")
+            raise EngineError(f"the {engine.name} engine's worlds are not rendered by MuJoCo")
         check_request(cameras, rays, (rgb, depth, segmentation), width, height, rows)
         self._rows = slice(*rows) if rows is not None else slice(None)
         self.engine, self.model = engine, model

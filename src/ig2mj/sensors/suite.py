@@ -103,7 +103,7 @@ class SensorSuite:
             from ig2mj.sensors.batch_camera import BatchCamera  # MJX-Warp is only loaded where pictures are made
 
             return BatchCamera(engine, self._setup.model, cameras, **settings)
-        raise EngineError(f"the {engine.name} engine makes no pictures and casts no rays (take 'native' or 'warp')")
+        raise EngineError(f"the {engine.name} engine neither renders images nor casts rays (take 'native' or 'warp')")
 
     def serve(self, devices: Sequence[Any]) -> None:
         """Makes ready for programs on other devices of this process, before they are compiled (`BatchCamera.serve`)."""

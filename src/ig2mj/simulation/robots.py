@@ -67,7 +67,7 @@ class RobotsOfWorld:
         """
         names = self.action_names
         if not self._core.controllers:
-            raise EngineError("the scene was loaded without robots: load_scene(..., agents=[...]) adds them")
+            raise EngineError("the scene was loaded without robots (add them with load_scene(..., agents=[...]))")
         try:
             row = np.zeros(len(names)) if action is None else np.array(action, np.float64)
         except (TypeError, ValueError):

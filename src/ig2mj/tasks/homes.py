@@ -61,14 +61,14 @@ def _check_furniture(task: Task, folder: pathlib.Path) -> None:
     missing = [name for name in named if name not in other.object_names]
     hint = 'ig2mj.make("activity/...", home=...) goes into any home that has what it needs'
     if missing:
-        raise EngineError(f"{task.name} cannot take place in '{other.name}': it has no {', '.join(missing)} ({hint})")
+        raise EngineError(f"{task.name} cannot be done in '{other.name}': it has no {', '.join(missing)} ({hint})")
     both = [(scene, scene.start_data()) for scene in (own, other)]
     for name in named:
         here, there = (data.xpos[scene.tables.object_root[scene.object_index(name)]] for scene, data in both)
         apart = float(np.linalg.norm(here - there))
         if apart > ELSEWHERE:
             raise EngineError(
-                f"{task.name} cannot take place in '{other.name}': its {name} stands {apart:.1f} m from where it is in "
+                f"{task.name} cannot be done in '{other.name}': its {name} stands {apart:.1f} m from where it is in "
                 f"'{own.name}', for which the activity's positions are made ({hint})"
             )
 

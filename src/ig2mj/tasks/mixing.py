@@ -72,7 +72,9 @@ def mixed_pool(task: Task, scene: Scene, pool: Pool, count: int, seed: int = 0) 
     said = [condition.strip("()").split() for condition in task.start]
     names = [words[1] for words in said]
     if any(len(words) != 3 or words[0] != "on_top" or words[2] != said[0][2] for words in said):
-        raise EngineError(f"{task.name}: its start states cannot be mixed, as its objects do not all lie on one thing")
+        raise EngineError(
+            f"{task.name}: its start states cannot be augmented: its objects do not all lie on the same surface"
+        )
     addresses = [_free_address(scene, name) for name in names]
     columns = tuple(a + k for a in addresses for k in range(7))
     qpos, rng = np.asarray(pool.physics.scene.qpos, np.float64), np.random.default_rng(seed)
@@ -109,7 +111,7 @@ def mixed_pool(task: Task, scene: Scene, pool: Pool, count: int, seed: int = 0) 
             coordinates = np.concatenate(found)[:count].reshape(count, -1)
             first = pool.rows(np.zeros(1, int))
             return MixedPool(first.physics, first.states, pool.digest, coordinates, columns)
-    raise EngineError(f"{task.name}: of {MOST_TRIES * count} mixed start states only {made} of {count} are possible")
+    raise EngineError(f"{task.name}: {MOST_TRIES * count} tries gave only {made} of {count} augmented start states")
 
 
 def _free_address(scene: Scene, name: str) -> int:

@@ -31,7 +31,7 @@ class RecordedPoses:
             count = max(one.frames - 1, 0)
             missing = [name for name in SHAPES if f"devices/{name}" not in one.step_names]
             if missing:
-                raise one.broken(f"steps/devices/{missing[0]}", "is missing: nobody drove this run")
+                raise one.broken(f"steps/devices/{missing[0]}", "is missing: this run was not driven by a person")
             for start in range(0, count, FLUSH):
                 stop = min(start + FLUSH, count)
                 rows = {

@@ -88,7 +88,7 @@ def access_for(
             f"--token: at least {SHORTEST_TOKEN} letters, digits, '-' and '_' are needed (--token auto draws one)"
         )
     if certificate is None and key is not None:
-        raise Ig2mjError("--key belongs to --certificate")
+        raise Ig2mjError("--key needs --certificate")
     return Access(where, port, token, None if certificate is None else _tls(certificate, key))
 
 

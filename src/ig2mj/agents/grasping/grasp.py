@@ -102,7 +102,7 @@ class Grasping:
         if mode not in MODES:
             raise UnknownNameError("grasping mode", mode, MODES)
         if mode == "mitten" and not targets:
-            raise EngineError("mittens stick to objects that are named: Grasping(scene, 'mitten', targets=[...])")
+            raise EngineError("mitten grasping needs target objects: Grasping(scene, 'mitten', targets=[...])")
         targets = (targets,) if isinstance(targets, str) else targets
         self.mode, self.scene = mode, scene
         tables, model = scene.tables, scene.model

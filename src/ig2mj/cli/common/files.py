@@ -11,7 +11,7 @@ from ig2mj.errors import InputError
 def check_output(file: pathlib.Path) -> None:
     """The folder must be there, and no folder in the file's place. Raises InputError."""
     if not file.parent.is_dir():
-        raise InputError(file, f"the folder {file.parent} does not exist", fix="make it, or choose another place")
+        raise InputError(file, f"the folder {file.parent} does not exist", fix="create it, or choose another path")
     if file.is_dir():
         raise InputError(file, "is a folder", fix="name a file")
 

@@ -117,7 +117,7 @@ def activity_pool(task: BddlTask, split: str = "train", count: int | None = None
             yield tried, drawn.rows(good) if drawn is not None and len(good) else None
         if not made and tried == last and rows == wanted:
             if reached:
-                raise EngineError(f"{task.name} is done in all of its sampled start states")
+                raise EngineError(f"{task.name} is already done in every start state that was sampled")
             raise EngineError(f"no start of {task.name} could be sampled: {dict(reasons.most_common(3))}")
 
     return states.pool(wanted, sample_rows)

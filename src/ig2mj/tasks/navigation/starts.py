@@ -114,7 +114,9 @@ def make_starts(
             if household is None or places.stand_in(_with_household(base, household), robots):
                 break
         else:
-            raise EngineError(f"in {TRIES} households of '{scene.name}' what was opened or put down hits a robot")
+            raise EngineError(
+                f"no start without collisions: in {TRIES} arrangements of '{scene.name}' an object hits a robot"
+            )
         rows.append((household, robots))
     physics = _snapshots(base, rows, places, engine)
     one = jax.tree.map(np.asarray, states)
@@ -145,7 +147,9 @@ def _place(
             continue
         if places.stands(len(others), pose):
             return _Placed(cell, pose)
-    raise EngineError(f"in {TRIES} places of '{places.scene.name}' a robot of the task collides with something")
+    raise EngineError(
+        f"no start without collisions: a robot of the task collides at {TRIES} positions of '{places.scene.name}'"
+    )
 
 
 def _snapshots(base: Snapshot, rows: list, places: Places, engine: NativeEngine) -> Snapshot:
@@ -252,7 +256,7 @@ class Places:
         try:
             return FloorMap.of_cells(free, resolution)
         except ValueError:
-            raise EngineError(f"the robot can stand nowhere in '{self.scene.name}'") from None
+            raise EngineError(f"there is no free floor for the robot in '{self.scene.name}'") from None
 
 
 class _Households:
@@ -291,7 +295,9 @@ class _Households:
             found = self._put_down(self._opened(opened, rng), spots)
             if found is not None:
                 return found
-        raise EngineError(f"{task.name}: whatever is opened, what is put on the floor moves something")
+        raise EngineError(
+            f"{task.name}: every arrangement of opened furniture and objects on the floor moves something"
+        )
 
     def _opened(self, joints: Int[np.ndarray, "n"], rng: np.random.Generator) -> Snapshot:
         """The still household with joints at random places of their range, one object after another, at rest."""
