@@ -80,8 +80,8 @@ def hold(file: pathlib.Path, out: object) -> Hold:
         if lives(who) or (lives(who) is None and since < DEAD):
             opened.close()
             raise ClusterError(
-                f"{out}: {_named(who)} was writing there {since:.0f} s ago; the output becomes available after {DEAD:.0f} s "
-                "without a heartbeat"
+                f"{out}: {_named(who)} was writing there {since:.0f} s ago; the output becomes available after "
+                f"{DEAD:.0f} s without a heartbeat"
             )
     return Hold(file, opened)
 

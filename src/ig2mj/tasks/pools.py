@@ -173,7 +173,7 @@ def _pool(
                     break
         if made < rows:
             raise EngineError(
-                f"{task.name}: {tried - first} tries gave only {made} of {rows} start states with all objects within reach"
+                f"{task.name}: {tried - first} tries gave only {made} of {rows} start states within reach"
             )
 
     return states.pool(wanted, sample_rows, file)
