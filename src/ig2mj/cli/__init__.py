@@ -21,8 +21,8 @@ or, where it has sub-commands itself (`ig2mj convert scene`), a table of such fu
 Rules for such a file:
   - Heavy imports (jax, mujoco, coacd) stand inside the functions, so that `--help` stays fast.
   - A function returns its exit status; None means 0.
-  - What the user did wrong is raised as `ig2mj.errors.Ig2mjError`: printed as one line on stderr, status 2. A package
-    that is absent (ModuleNotFoundError) and an OSError are treated the same way.
+  - Errors of the user are raised as `ig2mj.errors.Ig2mjError` and printed as one line on stderr, with status 2. So are
+    missing packages (ModuleNotFoundError) and OSErrors.
   - Results go to stdout, progress and remarks to stderr, so that `--json` can be piped.
   - The name of a parameter that is a Python keyword: `Annotated[Vec3, tyro.conf.arg(name="from")]`.
   - Old names of options and sub-commands keep working for one release: see `ig2mj.cli.common.deprecated`.
@@ -57,25 +57,25 @@ from ig2mj.process.variables import error_of_variable
 COMMANDS: dict[str, str] = {
     "demo": "convert a small home, simulate it, cook a fish in it; let a robot cook",
     "convert": "convert iGibson scenes and URDF objects and robots to MJCF",
-    "view": "open a scene in MuJoCo's viewer, or write a picture of it",
+    "view": "open a scene in MuJoCo's viewer, or write an image of it",
     "web": "show a scene, an environment or a recording in the browser",
     "inspect": "list a scene's objects, joints, abilities and rooms",
     "states": "list the extended states of a scene's objects",
-    "predicates": "show which predicates are true of a scene, or what an expression still lacks",
+    "predicates": "show which predicates are true in a scene, or why an expression is false",
     "calibrate": "measure the batched engine's buffers for a scene",
-    "warm-up": "compile everything a batch of worlds needs, for this or other machines",
+    "warm-up": "compile ahead of time what a batch of worlds needs, for this or other machines",
     "sample": "sample initial states in which conditions hold, as a pool for batched resets",
     "activity": "list BEHAVIOR's activities, show what each requires, sample its start states",
     "list-envs": "list the environments and the robots that can do them",
     "play": "drive a robot in an environment by keyboard and mouse",
     "rollout": "play episodes of an environment and report how they ended",
     "train": "train a policy in an environment",
-    "evaluate": "measure how often a policy succeeds from start states it has not seen",
+    "evaluate": "measure how often a policy succeeds from held-out start states",
     "policies": "list the trained policies that ship, show their model cards, add one",
     "vr": "do a task yourself, in a headset or with mouse and keyboard",
     "demos": "collect demonstrations of scripted experts; replay, export and measure recordings",
     "sample-task": "sample an environment's start states and store them in the cache",
-    "homes": "list, build, convert and draw the homes that come with ig2mj",
+    "homes": "list, build, convert and render the homes that come with ig2mj",
     "doctor": "show what this machine can run, and how to fix what it cannot",
 }
 
@@ -89,10 +89,10 @@ def main(argv: Sequence[str] | None = None) -> None:
     """Console script: runs the sub-command named in `argv` (default: the process's arguments) and exits."""
     status = call(sys.argv[1:] if argv is None else argv)
     if status == INTERRUPTED:
-        # What had to be closed is closed. Libraries are not torn down: XLA crashes where it was compiling.
+        # Files are closed by now. Libraries are not unloaded: XLA crashes if it was compiling.
         for process in multiprocessing.active_children():
             process.terminate()
-        # Semaphores, of which Python would say that they leaked.
+        # Releases semaphores, which Python would otherwise report as leaked.
         multiprocessing.util._run_finalizers(0)  # pyright: ignore[reportAttributeAccessIssue]
         sys.stdout.flush()
         sys.stderr.flush()
@@ -127,7 +127,7 @@ def call(argv: Sequence[str]) -> int:
 
 
 def describe_error(error: Exception) -> tuple[str, int]:
-    """One line for an error, and the exit status it leads to."""
+    """One line for an error, and its exit status."""
     if isinstance(error, Ig2mjError):
         return " ".join(str(error).split()), 2
     if isinstance(error, ModuleNotFoundError) and error.name and not error.name.startswith("ig2mj"):
@@ -143,7 +143,7 @@ def describe_error(error: Exception) -> tuple[str, int]:
 
 
 def _written(error: OSError) -> pathlib.Path | None:
-    """The file whose writing failed: an error of a write (a full disk) does not name it, but whoever wrote knows it."""
+    """The file that could not be written: the OSError of a full disk has no file name, but a caller's frame does."""
     if error.errno not in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO):
         return None
     frames = [frame for frame, _ in traceback.walk_tb(error.__traceback__)]
@@ -152,7 +152,7 @@ def _written(error: OSError) -> pathlib.Path | None:
             return None  # the terminal, or where standard output goes
         found = [value for value in frame.f_locals.values() if isinstance(value, pathlib.Path)]
         if found:
-            return found[-1]  # the last that it dealt with
+            return found[-1]
     return None
 
 

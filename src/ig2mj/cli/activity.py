@@ -74,15 +74,15 @@ def show(
     image: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     json: Flag = False,
 ) -> int:
-    """Show what an activity requires and which objects of a home it uses; or what is still false in a row of a pool.
+    """Show what an activity requires and which objects of a home it uses; or what is false in a row of a pool.
 
-    Exit status 1 when it cannot be bound in the home (without --scene: in any that ships).
+    The exit status is 1 if the home lacks what the activity needs (without --scene: if every shipped home does).
 
     Args:
       name: the activity's name, or a BDDL file of your own.
       scene: the home; default: the shipped home that needs the fewest additional objects.
       behavior1k: look the name up in BEHAVIOR-1K instead of BEHAVIOR-100; some names occur in both.
-      pool: a pool made by `ig2mj activity sample`; show which goal conditions are still false in one of its rows.
+      pool: a pool made by `ig2mj activity sample`; show which goal conditions are false in one of its rows.
       row: which row of the pool.
       image: also write an image of that row.
       json: print JSON instead of text.

@@ -1,4 +1,4 @@
-"""`ig2mj calibrate SCENE...`: measures the Warp engine's buffers for scenes and writes them beside their manifests."""
+"""`ig2mj calibrate SCENE...`: measures the Warp engine's buffers for scenes and writes them next to their manifests."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ def run(
     out: pathlib.Path | None = None,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> None:
-    """Measure how large the batched engine's buffers must be for scenes.
+    """Measure the buffer sizes that the Warp engine needs for scenes.
 
     Args:
       scenes: folders of converted scenes, or names of homes that come with ig2mj.
       engine: engine to measure with; auto: warp where JAX has a GPU, else native.
-      worlds: number of worlds measured side by side; 0: 1,024 on warp, 16 on native.
+      worlds: number of worlds measured in parallel; 0: 1,024 on warp, 16 on native.
       rounds: number of rounds, two simulated seconds each.
       seed: random seed of the disturbance.
       safety: factor applied to all sizes; 0: 1 for warp, 1.4 for native.
       hand: let a floating hand push objects around.
       robot: what disturbs the scene: a pushing hand, or a robot that acts at random (the profile is named after it).
-      out: write profiles to OUT/<scene's name>/ instead of beside the manifests.
+      out: write profiles to OUT/<scene's name>/ instead of next to the manifests.
       json: print the profiles as JSON, by scene.
     """
     from ig2mj.errors import Ig2mjError

@@ -1,4 +1,4 @@
-"""`ig2mj evaluate POLICY`: how often a policy succeeds from states it has not seen."""
+"""`ig2mj evaluate POLICY`: success rate of a policy on held-out start states."""
 
 from __future__ import annotations
 
@@ -33,12 +33,14 @@ def run(
     resume: Resume = False,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
-    """Measure how often a policy succeeds; each start state is played once, where there are enough of them.
+    """Measure how often a policy succeeds, on start states that it was not trained on.
+
+    Each start state is played once; with more episodes than start states they are played again.
 
     Args:
       policy: a file that `ig2mj train` wrote, or the name of one that ships.
       episodes: number of episodes; the start states of the split are played in order.
-      split: which start states: held_out or train.
+      split: set of start states: held_out or train.
       engine: native, warp or jax; default: warp on a GPU, else native.
       worlds: number of worlds stepped at once; 0: one per episode, at most 1000 (native: 8).
       robot: refuse a policy of another robot (the policy's card says which it is for).

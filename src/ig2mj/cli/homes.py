@@ -1,4 +1,4 @@
-"""`ig2mj homes`: the homes and objects that come with ig2mj: list, build, convert and draw them."""
+"""`ig2mj homes`: list, build, convert and render the homes and objects that come with ig2mj."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
 
 
 MAX_HULLS = 16
-"""Most pieces of a link: our models are drawn with few, and so many keep the error of every link's volume under 6 %."""
+"""Convex pieces per link, at most. With 16 the volume error of every link is below 6 %."""
 
 
 def build(
@@ -79,10 +79,10 @@ def convert(
 
     Args:
       dataset: dataset root written by `ig2mj homes build`.
-      out: output folder; meshes there that nothing uses any more are removed.
+      out: output folder; unused meshes there are removed.
       home: convert only these homes, and no objects.
       jobs: number of processes.
-      no_cache: convert even what has not changed, and write nothing to the cache.
+      no_cache: convert again what has not changed, and write nothing to the cache.
     """
     from ig2mj_converters.base.options import ConvertOptions
     from ig2mj_converters.conversion import convert_scene
@@ -104,7 +104,7 @@ def convert(
             bar.remove_task(bar.task_ids[-1])
         added = 0 if home else _convert_objects(dataset, out, not no_cache, add_bar(bar, "objects"), failed)
     remove_unused(out)
-    kept = f" ({cached} have not changed: taken from the cache)" if cached else ""
+    kept = f" ({cached} unchanged, taken from the cache)" if cached else ""
     megabytes = total_bytes(out) / 1e6
     print(f"{out}: {len(names)} homes, {added} objects, {megabytes:.1f} MB, {len(failed)} checks failed{kept}")
     for line in failed:
@@ -207,15 +207,15 @@ def sheet(
     opened: Flag = False,
     collision: Flag = False,
 ) -> None:
-    """Draw a contact sheet of models; needs OpenGL (see `ig2mj doctor`).
+    """Render a contact sheet of models; needs OpenGL (see `ig2mj doctor`).
 
     Args:
       out: output image.
-      only: draw only these categories; default: all.
+      only: only these categories; default: all.
       models: number of models of each category.
       seed: random seed of all variation.
-      opened: draw doors, drawers and lids open.
-      collision: draw the collision hulls instead of the visual meshes.
+      opened: show doors, drawers and lids open.
+      collision: show the collision hulls instead of the visual meshes.
     """
     from ig2mj_homes.objects.catalogue import build_model
     from ig2mj_homes.sheet import contact_sheet
@@ -239,12 +239,12 @@ def images(
     home: tuple[str, ...] = (),
     rooms: Flag = False,
 ) -> None:
-    """Draw contact sheets of the homes: DIR/homes.jpg, all from above, and DIR/rooms_HOME.jpg, their rooms from inside.
+    """Render contact sheets of the homes: DIR/homes.jpg from above, and DIR/rooms_HOME.jpg of the rooms from inside.
 
     Args:
       out: output folder.
       home: names or folders of homes; default: all that ship with ig2mj.
-      rooms: also draw the rooms, one sheet per home.
+      rooms: also render the rooms, one sheet per home.
     """
     from ig2mj.scene.scene import load_scene
     from ig2mj.viewer.home_sheet import from_above, rooms_inside

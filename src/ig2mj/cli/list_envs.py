@@ -1,4 +1,4 @@
-"""`ig2mj list-envs`: the environments, and which robots can do what in them."""
+"""`ig2mj list-envs`: the environments and their robots."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import tyro
 
 
 def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
-    """List the environments: what is to be done, in which home, by which robots.
+    """List the environments with their tasks, homes and robots.
 
     Args:
       json: print JSON instead of a table.
@@ -34,5 +34,5 @@ def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
         print(form.dumps(rows))
         return 0
     rows = [(t.name, t.home, ", ".join(t.robots), t.summary) for t in TASKS.values()]
-    stdout_console().print(make_table("environments", ("name", "home", "robots", "what is to be done"), rows))
+    stdout_console().print(make_table("environments", ("name", "home", "robots", "task"), rows))
     return 0

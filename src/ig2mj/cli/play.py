@@ -35,7 +35,8 @@ def run(
       robot_urdf: URDF of a robot of your own to use instead.
       robot_layout: TOML or JSON file that assigns its joints to base, arm and gripper; default: guessed from their
         names.
-      grasping: assisted, sticky, physical or mitten; default: assisted where there are hands.
+      grasping: assisted, sticky, physical or mitten (docs/guide/environments.md); default: assisted, for robots with
+        hands.
       seed: random seed of the start states.
       pool_size: number of start states; an activity's are sampled first, which takes a while.
       record: HDF5 file to record all runs to, for `ig2mj demos replay`; it lacks what the mouse does to objects.

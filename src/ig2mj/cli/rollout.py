@@ -48,16 +48,17 @@ def run(
       robot_urdf: URDF of a robot of your own to use instead (docs/guide/environments.md).
       robot_layout: TOML or JSON file that assigns its joints to base, arm and gripper; default: guessed from their
         names.
-      grasping: mitten, assisted, sticky or physical; default: the task's.
+      grasping: mitten (a hand holds the task's first object from the first touch on), assisted, sticky or physical
+        (docs/guide/environments.md); default: the task's.
       engine: native, warp or jax; default: warp on a GPU, else native.
       worlds: number of worlds stepped at once.
       episodes: number of episodes, over all worlds.
       seed: random seed of start states and actions.
-      split: which start states: train or held_out.
+      split: set of start states: train or held_out.
       held_out: play the first EPISODES held-out start states, each once.
       pool_size: number of start states; 0: all of the split.
       variant: variant of the activity's objects: 1 and 2 use other models of the same categories.
-      video: film of the first episode of the first world (.mp4, .gif), or five of its frames side by side (.png,
+      video: video of the first episode of the first world (.mp4, .gif), or five of its frames in a row (.png,
         .jpg); needs OpenGL. With it the default engine is native on a GPU, too.
       record: HDF5 file to record all worlds to, for `ig2mj demos replay`.
       format: format of --record: ig2mj; or igibson, which also writes one iGibson log per run to a folder named after

@@ -26,19 +26,19 @@ def run(
 ) -> int:
     """Sample the start states of an environment and store them where `ig2mj.make` finds them.
 
-    The pools of the paper's activities ship, so that success rates are of the same start states on every machine; of
-    these the command says so and samples nothing. With --out they are sampled into a folder all the same and compared
-    with what ships. Rows do not depend on the number of processes, but on the kind of processor: contacts round
-    differently. The exit status is 1 if rows differ from those that ship.
+    Start states of the paper's activities ship with ig2mj, so that success rates are comparable between machines;
+    nothing is sampled for them. With --out they are sampled into a folder and compared with those that ship; the exit
+    status is 1 if rows differ. Rows do not depend on the number of processes, but they do on the kind of processor,
+    which rounds contacts differently.
 
     Args:
       task: e.g. CookingMeat or ig2mj/CookingMeat-v0; all: both splits of every activity.
       split: train, or held_out for evaluation (other seeds).
-      count: number of rows; 0: 512 for training, 1000 held out. Fewer are the first rows of more.
+      count: number of rows; 0: 512 for train, 1000 for held_out. A smaller number gives the first rows of a larger one.
       jobs: number of processes; 0: one per processor.
       force: sample again even if the cache has the pool.
       variant: variant of the activity's objects: 1 and 2 use other models of the same categories.
-      grasping: physical: objects that fit between two fingers, for activities that have them (TASK all: both).
+      grasping: physical: with objects that fit between two fingers, for activities that have some (TASK all: both).
       out: folder for the pools, instead of the cache.
     """
     from ig2mj.agents.grasping import MODES

@@ -24,9 +24,9 @@ def run(
     out: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FOLDER")] = None,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
-    """Compile all that a batch of worlds needs, before it is needed.
+    """Compile ahead of time what a batch of worlds needs.
 
-    Creates the worlds, starts them and steps them once, so that all kernels and programs are in the cache. With --out
+    Creates the worlds, resets them and steps them once, so that all kernels and programs are in the cache. With --out
     they go to a separate folder for other machines with the same GPU, driver and versions: set IG2MJ_CACHE_DIR to it
     there.
 
@@ -34,11 +34,11 @@ def run(
       what: a home or the folder of a scene, or an environment (`ig2mj list-envs`).
       worlds: number of worlds; programs are compiled for this number.
       robot: for an environment: its robot; default: the task's first.
-      grasping: for an environment: mitten, assisted, sticky or physical, for which some tasks have other objects.
-      observations: for an environment: observations besides its vectors, e.g. rgb depth.
+      grasping: for an environment: mitten, assisted, sticky or physical.
+      observations: for an environment: additional observations, e.g. rgb depth.
       engine: native, warp or jax; default: warp on a GPU, else native.
       arch: compile the kernels of a physics step for GPUs of this architecture (compute capability times ten: 90 is
-        an H100 or H200); this machine needs none. JAX's programs and pictures are left to the machine with the GPU.
+        an H100 or H200); this machine needs none. JAX's programs and rendering are compiled where the GPU is.
       out: folder of the cache; default: IG2MJ_CACHE_DIR, or the user's own.
       json: print one JSON object.
     """

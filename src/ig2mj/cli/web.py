@@ -40,11 +40,11 @@ def run(
       what: folder of a converted scene, its scene.xml, or the name of a home that comes with ig2mj; or an environment
         (`ig2mj list-envs`); or a recording (`ig2mj rollout --record FILE`).
       port: port of the page; 0: any free port.
-      host: address to listen on besides this machine's own, e.g. 0.0.0.0; needs --token.
+      host: additional address to listen on, e.g. 0.0.0.0; needs --token.
       token: secret that the page asks for, at least 16 letters and digits; auto: a random one.
       certificate: PEM file with your certificate, to serve the page by HTTPS.
       key: PEM file with the certificate's private key, if it is a separate file.
-      goal: for a scene: expression to show, with what it still lacks, e.g. '(cooked fish_0)'.
+      goal: for a scene: expression to evaluate and explain, e.g. '(cooked fish_0)'.
       set: for a scene: set states first, e.g. toggled_on=stove or temperature=fish=80.
       pool: for a scene: pool of start states (`ig2mj sample`).
       worlds: number of worlds; the page shows one of them.
@@ -72,7 +72,7 @@ def run(
     if goal is not None:
         parse(goal, "--goal")
     access.listen().close()  # a port that is taken is no news for after a minute of loading
-    print(f"loading {what}; the address of the page comes when it is ready", file=sys.stderr, flush=True)
+    print(f"loading {what}; the address of the page follows", file=sys.stderr, flush=True)
     from ig2mj.web.viewer import WebViewer
 
     source = _source(what, goal, set, pool, worlds, engine, agent, robot, seed)

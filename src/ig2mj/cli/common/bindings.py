@@ -1,4 +1,4 @@
-"""In which home an activity is bound: which are looked at, and what came of it in words."""
+"""Homes in which an activity can be bound, and the result as text."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What all conversions take: their common options."""
+"""Options of all conversions."""
 
 from __future__ import annotations
 
@@ -20,23 +20,23 @@ class Common:
     """Options of every conversion.
 
     Attributes:
-      jobs: number of processes; they share the models of a scene, or the links of a single object. Default: one, and
-        for a single object or robot one per processor, used where links take long.
+      jobs: number of processes, over which the models of a scene or the links of an object are distributed; default:
+        1, for a single object or robot one per processor.
       seed: random seed of convex decomposition and of models that a scene names "random".
-      max_hulls: largest number of convex pieces per link. Above 16, a link gets the fewest that keep the error of its
-        volume under 15 % and its openings open.
+      max_hulls: largest number of convex pieces per link. A link gets more than 16 only as far as it needs them to keep
+        its volume error under 15 % and its openings open.
       max_hull_vertices: largest number of vertices per piece.
       bullet_inertia: use the inertia of each link's bounding box, as Bullet does, instead of that of its hulls.
       colours: colours of untextured visuals: the source's, or household colours by category; auto prefers the
         source's, unless every object of a scene is of one flat colour.
-      no_cache: convert even if nothing has changed, and write nothing to the cache.
+      no_cache: convert again what has not changed, and write nothing to the cache.
       strict: treat warnings as errors: exit status 2, no output.
       no_report: skip the checks, report.json and report.html.
       limit: raise or lower limits of the readers, e.g. mesh-faces=3000000 (see docs/guide/untrusted_input.md).
       json: print what was done as JSON.
     """
 
-    jobs: int | None = None
+    jobs: Annotated[int | None, tyro.conf.arg(help_behavior_hint="")] = None
     seed: int = 0
     max_hulls: int = 64
     max_hull_vertices: int = 32
@@ -45,7 +45,7 @@ class Common:
     no_cache: Flag = False
     strict: Flag = False
     no_report: Flag = False
-    limit: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=N")] = ()
+    limit: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME=N", help_behavior_hint="")] = ()
     json: Flag = False
 
 
@@ -53,7 +53,7 @@ DEFAULTS = Common()
 
 
 def options_of(common: Common, *, default_jobs: int = 1, **of_command: Any) -> ConvertOptions:
-    """Conversion options from the command line, and the renderer for the report's pictures.
+    """Conversion options from the command line, and the renderer for the report's images.
 
     default_jobs: processes where `--jobs` does not say how many.
     """

@@ -1,4 +1,4 @@
-"""A scene's floating hand, put where the commands that need one all put it."""
+"""A floating hand, at the position where it reaches most objects of a scene."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ if TYPE_CHECKING:
 
 
 def with_hand(scene: Scene, folder: str | os.PathLike) -> tuple[Scene, Reach]:
-    """The scene loaded again, with a floating hand in the free place from which it reaches most, and what it reaches.
+    """The scene loaded again, with a floating hand where it reaches most objects, and what it reaches.
 
     Args:
       scene: as loaded, without agents. folder: what it was loaded from.
 
     Raises:
-      EngineError: a hand can get at none of its loose objects.
+      EngineError: a hand reaches none of its loose objects.
     """
     from ig2mj.agents.floating_hand import FloatingHand
     from ig2mj.calibration.reach import find_reach

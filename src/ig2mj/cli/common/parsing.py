@@ -14,7 +14,7 @@ from ig2mj.errors import Ig2mjError
 
 
 def parse_and_call(function: Callable[..., Any], prog: str, args: Sequence[str]) -> Any:
-    """Calls the function with what the command line says, and returns its answer. Raises SystemExit, as tyro does."""
+    """The function's result for the arguments of the command line. Raises SystemExit, as tyro does."""
     args = with_new_names(function, prog, args)
     return tyro.cli(_with_quiet_defaults(function), prog=prog, args=args, config=(tyro.conf.DisallowNone,))
 

@@ -1,4 +1,4 @@
-"""Printing for the commands: tables that stay readable in narrow terminals and in files, JSON, progress bars."""
+"""Output of commands: tables for narrow terminals and for files, JSON, progress bars."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One world for the commands that look at states: loaded, set up, run for a while."""
+"""One world for the commands that show states: loaded, set up, and simulated for some seconds."""
 
 from __future__ import annotations
 
