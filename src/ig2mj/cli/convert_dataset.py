@@ -156,7 +156,7 @@ def packed_folder(folder: pathlib.Path) -> bytes:
 
 
 def put_folder(target: pathlib.Path, packed: bytes) -> None:
-    """Unpacks a folder beside its place, and puts it there when it is complete. Raises OSError."""
+    """Unpacks a folder next to its place, and puts it there when it is complete. Raises OSError."""
     target.parent.mkdir(parents=True, exist_ok=True)
     beside = unfinished(target)
     try:

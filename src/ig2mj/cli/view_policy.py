@@ -1,4 +1,4 @@
-"""`ig2mj view --policy NAME`: a trained policy at work, in MuJoCo's window or as a film."""
+"""`ig2mj view --policy NAME`: a trained policy at work, in MuJoCo's window or as a video."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ def view_policy(name: str, video: pathlib.Path | None, row: int, paused: bool) -
     """Shows a policy in one native world, at held-out start states.
 
     Args:
-      name: of a shipped policy, or a run's folder or file. video: film or film strip of one episode, without a window.
+      name: of a shipped policy, or a run's folder or file. video: video or film strip of one episode, without a window.
       row: of the held-out start states, to begin with.
 
     Raises:

@@ -297,7 +297,7 @@ class Environment(StateCopies, StateImages, Configured):
     def _state(
         self, batch: Batch, seen: Seen, bad: Int[Array, "W"], before: EnvState | None, begun: Array | None = None
     ) -> EnvState:
-        """A state with its pictures. `begun`: worlds that were reset since `before`; the others keep its pictures."""
+        """A state with its images. `begun`: worlds that were reset since `before`; the others keep its images."""
         last = None if before is None else (before.obs, before.memory)
         pictures, memory = self._observer.pictures(batch.world, batch.controllers[0], last, begun)
         obs = {name: {**seen.obs, **pictures}[name] for name in self.observation_spaces}

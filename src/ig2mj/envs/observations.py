@@ -72,7 +72,7 @@ class Observer:
         status: GoalStatus,
         time_left: Float[Array, "W"],
     ) -> dict[str, Array]:
-        """The observations that need neither pictures nor rays; numbers that are not finite are 0. Pure. See
+        """The observations that need neither images nor rays; numbers that are not finite are 0. Pure. See
         `Objective.observe`."""
         found = self._sensors.feel_fn(view, states, controller_state)
         made = self._objective.observe(view, states, measures, status, time_left)

@@ -1,4 +1,4 @@
-"""Pictures and windows of a `Simulation`."""
+"""Images and windows of a `Simulation`."""
 
 from __future__ import annotations
 

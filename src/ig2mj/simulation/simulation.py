@@ -376,10 +376,10 @@ class Simulation(OwnWorld, Recorded):
         """Goes back to a world that `save` wrote, of this scene. Raises InputError."""
         return put_world(self, load_world(path, everything(self), self.scene))
 
-    # Pictures.
+    # Images.
 
     def render(self, camera: Any = None, *, width: int = 640, height: int = 480, **options: Any) -> np.ndarray:
-        """A picture, uint8 [height, width, 3]; objects are tinted by state, dust, stains and water are drawn.
+        """An image, uint8 [height, width, 3]; objects are tinted by state, dust, stains and water are drawn.
 
         Args:
           camera: a camera's name or number, an `ig2mj.viewer.offscreen.FreeView`, or None for an overview.

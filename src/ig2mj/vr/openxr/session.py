@@ -48,7 +48,7 @@ class OpenXRPoses(FedPoses):
 
 
 class HeadsetLoop:
-    """The headset's side of a session. Attributes: pictures: drawn so far. rate: of them a second, lately."""
+    """The headset's side of a session. Attributes: images: drawn so far. rate: of them a second, lately."""
 
     def __init__(self, headset: Headset, source: OpenXRPoses, session: Session, graphics: EglGraphics | None):
         """`graphics`: None where nothing is drawn."""
