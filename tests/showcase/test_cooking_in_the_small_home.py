@@ -111,7 +111,7 @@ def test_the_plot_is_a_picture(cooked, tmp_path):
 
 def test_the_film_shows_stove_and_milk_and_has_the_frames_it_was_given(cooked, tmp_path):
     from ig2mj.showcase import cooking_video
-    from ig2mj.showcase.cooking_pictures import KitchenCameras
+    from ig2mj.showcase.cooking_images import KitchenCameras
     from ig2mj.viewer import offscreen
 
     if all(offscreen.probe(b) is not None for b in ("egl", "osmesa")):
@@ -136,7 +136,7 @@ def test_the_film_shows_stove_and_milk_and_has_the_frames_it_was_given(cooked, t
 
 
 def test_a_film_that_cannot_be_written_is_one_error(cooked, tmp_path):
-    from ig2mj.showcase.cooking_pictures import KitchenCameras
+    from ig2mj.showcase.cooking_images import KitchenCameras
     from ig2mj.showcase.cooking_video import CookingVideo
 
     world, kitchen, _ = cooked

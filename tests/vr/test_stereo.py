@@ -11,7 +11,7 @@ import ig2mj
 from ig2mj.agents import Humanoid
 from ig2mj.process.opengl import GL_BACKENDS, probe_gl
 from ig2mj.vr.frames import Pose
-from ig2mj.vr.stereo import StereoPictures, eyes_of
+from ig2mj.vr.stereo import StereoImages, eyes_of
 
 pytestmark = pytest.mark.skipif(all(probe_gl(b) for b in GL_BACKENDS), reason="no OpenGL draws on this machine")
 
@@ -30,7 +30,7 @@ def poses(home):
 
 @pytest.fixture(scope="module")
 def pictures(home):
-    made = StereoPictures(home, 64, 72, 0)
+    made = StereoImages(home, 64, 72, 0)
     yield made
     made.close()
 

@@ -25,8 +25,8 @@ def run(
 ) -> int:
     """Convert a small home, simulate it, cook a fish and freeze milk in it, and let a robot cook a steak.
 
-    Leaves DIR/dataset (the source), DIR/small_home (the scene and report.html), DIR/pictures and DIR/cooking
-    (temperatures as CSV, JSON and a plot, pictures, a video), and DIR/expert.mp4: in the shipped home birch a scripted
+    Leaves DIR/dataset (the source), DIR/small_home (the scene and report.html), DIR/images and DIR/cooking
+    (temperatures as CSV, JSON and a plot, images, a video), and DIR/expert.mp4: in the shipped home birch a scripted
     expert brings a steak to the stove until it is cooked.
 
     Args:
@@ -49,7 +49,7 @@ def run(
     with progress_bar() as bar:
         step = functools.partial(add_bar, bar)
         failed = _convert(console, step, small_home.NAME, out / "dataset", scene, jobs)
-        _look(console, step, scene, out / "pictures")
+        _look(console, step, scene, out / "images")
         failed += _cook(console, step, scene, out / "cooking")
         failed += _watch_expert(console, step, out / "expert.mp4")
     console.print(f"{time.perf_counter() - start:.0f} s. Look around in it: [bold]ig2mj view {scene}[/]")
@@ -83,7 +83,7 @@ def _convert(console: Console, step: Step, name: str, dataset: pathlib.Path, sce
 
 
 def _look(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Path) -> None:
-    """Runs the home for two seconds, tells what stands where, takes pictures."""
+    """Runs the home for two seconds, tells what stands where, takes images."""
     from ig2mj.cli.common.printing import make_table
     from ig2mj.showcase import first_home
 
@@ -94,19 +94,19 @@ def _look(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
                   f"nothing moved more than {moved * 1000:.1f} mm")  # fmt: skip
     step("asking the predicates")(0, None, "what stands where (the first time compiles)")
     places = first_home.what_stands_where(world)
-    step("taking pictures")(0, None, "")
-    pictures = first_home.take_pictures(world, folder)
+    step("taking images")(0, None, "")
+    images = first_home.take_images(world, folder)
     rows = [(place.object, place.relation, place.support, place.room) for place in places]
     console.print(make_table("what stands where", ("object", "is", "what", "room"), rows))
-    for file in pictures:
-        console.print(f"[bold]picture[/]    {file}")
+    for file in images:
+        console.print(f"[bold]image[/]    {file}")
 
 
 def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Path) -> int:
-    """Cooks; leaves table, plot, pictures and video; number of objects that were to happen and did not."""
+    """Cooks; leaves table, plot, images and video; number of objects that were to happen and did not."""
     from ig2mj.process.settings import GL_INSTALL_HINT
     from ig2mj.showcase import cooking
-    from ig2mj.showcase.cooking_pictures import KitchenCameras, MomentSheet
+    from ig2mj.showcase.cooking_images import KitchenCameras, MomentSheet
     from ig2mj.showcase.cooking_plot import plot
     from ig2mj.showcase.cooking_video import CookingVideo
     from ig2mj.showcase.kitchen import enter_kitchen
@@ -118,7 +118,7 @@ def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
     folder.mkdir(parents=True, exist_ok=True)
     cameras = KitchenCameras(world, kitchen)
     sheet = MomentSheet(cameras, kitchen)
-    filmed = default_backend() != "warp"  # its pictures take seconds
+    filmed = default_backend() != "warp"  # its images take seconds
     video = CookingVideo(folder / "cooking.mp4", cameras, kitchen) if filmed else None
 
     def watch(log: Any, changed: Any) -> None:
@@ -140,10 +140,10 @@ def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
     seconds = time.perf_counter() - began
     console.print(log.table())
     console.print(
-        f"[bold]cooked[/]     {log.times[-1] - log.times[0]:.1f} s of the kitchen in {seconds:.1f} s, pictures included"
+        f"[bold]cooked[/]     {log.times[-1] - log.times[0]:.1f} s of the kitchen in {seconds:.1f} s, images included"
     )
     for word, name in (("numbers", "temperatures.csv"), ("numbers", "temperatures.json"), ("plot", "temperatures.png"),
-                       ("pictures", "moments.png"), *([("video", "cooking.mp4")] if filmed else [])):  # fmt: skip
+                       ("images", "moments.png"), *([("video", "cooking.mp4")] if filmed else [])):  # fmt: skip
         console.print(f"[bold]{word:<10}[/] {folder / name}")
     if not filmed:
         console.print(f"[bold]video[/]      none: it needs OpenGL ({GL_INSTALL_HINT})")
@@ -165,7 +165,7 @@ def _watch_expert(console: Console, step: Step, file: pathlib.Path) -> int:
     report = step("a robot cooks")
     report(0, None, "sampling where the steak lies")
     env = make("CookingMeat", robot="humanoid", engine="native", split="held_out", pool_size=1)
-    filmed = default_backend() != "warp"  # its pictures take seconds
+    filmed = default_backend() != "warp"  # its images take seconds
     video = EpisodeVideo(file, env) if filmed else None
 
     def watch(state: Any) -> None:

@@ -6,7 +6,7 @@
 
 It needs no Brax: trainers only look at the members. It is a batch already and begins new episodes by itself, so nothing
 of Brax's may be wrapped around it (`wrap_env=False`). The wrappers of Brax and Playground would go back to each world's
-first state for ever; here every episode begins with a row of the pool drawn again, by a key of seed, world and episode.
+first state for ever; here every episode begins with a row of the pool, chosen by a key of seed, world and episode.
 
 Observations are `state` (all vectors but the privileged one), `privileged_state`, and `pixels/NAME` for images.
 

@@ -7,7 +7,7 @@ import pathlib
 import numpy as np
 
 from ig2mj.showcase.cooking import LONGEST
-from ig2mj.showcase.cooking_pictures import KitchenCameras, caption_at, font
+from ig2mj.showcase.cooking_images import KitchenCameras, caption_at, font
 from ig2mj.showcase.cooking_plot import FISH_COLOUR, MILK_COLOUR
 from ig2mj.showcase.kitchen import Kitchen
 from ig2mj.showcase.temperature_log import TemperatureLog

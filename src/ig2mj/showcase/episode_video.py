@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from ig2mj.envs.environment import Environment, EnvState
-from ig2mj.showcase.cooking_pictures import caption_at, font
+from ig2mj.showcase.cooking_images import caption_at, font
 from ig2mj.showcase.film_strip import ENDINGS, FilmStrip
 from ig2mj.tasks.task import Task
 from ig2mj.viewer.episode_view import HEIGHT, WIDTH, EpisodeView

@@ -2,7 +2,7 @@
 
     1. `load_and_run`  loads it and lets it stand for two seconds
     2. `what_stands_where`  asks the predicates on_top and inside
-    3. `take_pictures`
+    3. `take_images`
 
 Each is a function of its own; `ig2mj.cli.demo` converts the home, calls them one after the other and talks.
 """
@@ -90,7 +90,7 @@ def _near_pairs(world: Simulation) -> list[tuple[str, str]]:
     ]
 
 
-def take_pictures(world: Simulation, folder: pathlib.Path) -> list[pathlib.Path]:
+def take_images(world: Simulation, folder: pathlib.Path) -> list[pathlib.Path]:
     """The home from outside, from above, and from each room's camera, as PNG files in `folder`."""
     from PIL import Image
 

@@ -1,6 +1,6 @@
-"""`StereoPictures`: a home drawn for both eyes with OpenGL, without a display and without physics.
+"""`StereoImages`: a home drawn for both eyes with OpenGL, without a display and without physics.
 
-    images = StereoPictures(scene, 1296, 1440)
+    images = StereoImages(scene, 1296, 1440)
     images.draw(track.at(), eyes)
     left, right = images.read()
 
@@ -64,7 +64,7 @@ def eyes_of(head: Pose, apart: float = 0.063, across: float = math.radians(98)) 
     return Eye(left, -half, half, high, -high), Eye(right, -half, half, high, -high)
 
 
-class StereoPictures:
+class StereoImages:
     """See the module's text. Attributes: width, height: pixels of one eye. context: MuJoCo's OpenGL context."""
 
     def __init__(self, scene: Scene, width: int = WIDTH, height: int = HEIGHT, samples: int = SAMPLES):

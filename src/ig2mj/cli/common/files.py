@@ -1,4 +1,4 @@
-"""Checks of the files that a command is to write, before it works for minutes."""
+"""Checks of output files, before a command starts its work."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ig2mj.errors import InputError
 
 
 def check_output(file: pathlib.Path) -> None:
-    """The folder must be there, and no folder in the file's place. Raises InputError."""
+    """Raises InputError: the folder does not exist, or the file is a folder."""
     if not file.parent.is_dir():
         raise InputError(file, f"the folder {file.parent} does not exist", fix="create it, or choose another path")
     if file.is_dir():
@@ -17,7 +17,7 @@ def check_output(file: pathlib.Path) -> None:
 
 
 def check_image(file: pathlib.Path, others: Iterable[str] = ()) -> None:
-    """The ending must be one that Pillow writes, or of `others`, and the folder must be there. Raises InputError."""
+    """Raises InputError: Pillow does not write this format and it is none of `others`, or see `check_output`."""
     from PIL import Image
 
     Image.init()
@@ -28,7 +28,7 @@ def check_image(file: pathlib.Path, others: Iterable[str] = ()) -> None:
 
 
 def check_video(file: pathlib.Path, others: Iterable[str] = ()) -> None:
-    """The ending must be that of a film, or of `others`, and the folder must be there. Raises InputError."""
+    """Raises InputError: this is no video format and none of `others`, or see `check_output`."""
     from ig2mj.viewer.video import FORMATS
 
     if file.suffix.lower() not in {*FORMATS, *others}:

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from ig2mj.errors import EngineError
 from ig2mj.scene.scene import Scene
 from ig2mj.vr.openxr.devices import load_xr
-from ig2mj.vr.stereo import Eye, StereoPictures
+from ig2mj.vr.stereo import Eye, StereoImages
 
 SRGB8_ALPHA8, RGBA8 = 0x8C43, 0x8058
 """OpenGL's formats. MuJoCo's images are already in display encoding, as the first format says; they are copied, so
@@ -37,7 +37,7 @@ class EglGraphics:
         result = xr.check_result(xr.Result(call(instance, system, ctypes.byref(xr.GraphicsRequirementsOpenGLKHR()))))
         if result.is_exception():
             raise result
-        self._pictures = StereoPictures(self._scene)  # with the context that the session will be of
+        self._pictures = StereoImages(self._scene)  # with the context that the session will be of
 
     def binding(self) -> Any:
         """Of the context that is current."""
