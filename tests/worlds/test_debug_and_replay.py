@@ -152,8 +152,8 @@ def test_the_command_writes_a_picture_and_a_video(can_draw, dump, bare, tmp_path
         (["--video", "a.mp4"], "--video needs --dump or --policy"),
         (["--dump", "{dump}", "--video", "a.txt"], "is not an image format"),
         (["--dump", "{dump}", "--video", "a.png"], "is not a video format"),
-        (["--dump", "{dump}", "--video", "a.gif", "--image", "a.png"], "goes with one of"),
-        (["--dump", "{dump}", "--image", "a.png", "--seconds", "1"], "without --seconds"),
+        (["--dump", "{dump}", "--video", "a.gif", "--image", "a.png"], "takes one of"),
+        (["--dump", "{dump}", "--image", "a.png", "--seconds", "1"], "no --seconds"),
     ],
 )
 def test_the_command_refuses(dump, bare, tmp_path, monkeypatch, capsys, options, says):
