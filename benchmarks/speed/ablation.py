@@ -278,15 +278,20 @@ def table(rows: list[dict[str, Any]]) -> str:
     from ig2mj.engine.warp.patches.table import GROUPS
 
     names = list(ROWS)
-    cost = {(r["row"], r["without"]): r["cost_percent"] for r in rows if "cost_percent" in r}
+    cost = {(r["row"], r["without"]): _cell(r) for r in rows if "cost_percent" in r}
     lines = [f"| left out | lines | {' | '.join(names)} | what it does |", "|---|--:|" + "--:|" * len(names) + "---|"]
     others = {UNPATCHED: "MuJoCo Warp as it comes", BASELINE: "nothing: a second baseline, which shows the noise"}
     reasons = {name: ("repair: " if g.repair else "") + g.reason for name, g in GROUPS.items()} | others
     for name, reason in reasons.items():
-        cells = [f"{cost[row, name]:+.1f} %" if (row, name) in cost else "" for row in names]
+        cells = [cost.get((row, name), "") for row in names]
         size = str(GROUPS[name].lines) if name in GROUPS else ""
         lines.append(f"| `{name}` | {size} | {' | '.join(cells)} | {reason} |")
     return "\n".join(lines) + "\n"
+
+
+def _cell(row: dict[str, Any]) -> str:
+    calls = len(row["ms_of_calls"])
+    return f"{row['cost_percent']:+.1f} %" + (" (1 call)" if calls == 1 else "")
 
 
 def write(files: list[pathlib.Path]) -> None:

@@ -15,6 +15,7 @@ from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import Grasping
 from ig2mj.engine.base import Write
 from ig2mj.engine.registry import make_engine
+from ig2mj.engine.warp.patches import upstream_kernels
 from ig2mj.states.initial import states_of_manifest
 from ig2mj.states.model import StateModel
 from ig2mj.worlds.core import Core
@@ -94,6 +95,22 @@ def test_a_write_ends_the_grasp_of_its_world(apple_in_hand, engine):
     assert holds(batch) == [True, False]
     found = speeds(batch, scene, "apple")
     assert found[0] < 0.1 and found[1] == pytest.approx(9.8 / 10, abs=0.1)
+    assert not np.asarray(batch.flags).any()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("mode", ["sticky", "mitten"])
+def test_on_unpatched_mujoco_warp_a_hand_holds_what_it_surrounds(apple_in_hand, mode):
+    """Its contacts with the hand are ignored there, too: they would push the apple off."""
+    scene, row, controllers = apple_in_hand
+    with upstream_kernels():
+        core = core_of.__wrapped__(scene, "warp", mode)
+    assert not core.engine.own_kernels
+    batch = both_hold(core, row, controllers)
+    for _ in range(4):
+        batch, _ = core.step(batch, np.zeros((2, 28), np.float32))
+    assert holds(batch) == [True, True]
+    assert speeds(batch, scene, "apple").max() < 0.1
     assert not np.asarray(batch.flags).any()
 
 
