@@ -60,7 +60,8 @@ def test_a_variant_that_is_late_is_ended(tmp_path, monkeypatch):
 
 
 def test_the_table_has_a_line_for_each_group_and_empty_cells_where_nothing_was_measured():
-    rows = [{"row": "cooking", "without": "gravity", "cost_percent": -0.5, "ms_of_calls": [1.0, 2.0]}, {"row": "cooking", "without": ""}]
+    measured = {"row": "cooking", "without": "gravity", "cost_percent": -0.5, "ms_of_calls": [1.0, 2.0]}
+    rows = [measured, {"row": "cooking", "without": ""}]
     lines = ablation.table(rows).splitlines()
     line = next(line for line in lines if line.startswith("| `gravity`"))
     assert [cell.strip() for cell in line.split("|")][3:8] == ["", "", "", "", "-0.5 %"]
