@@ -368,7 +368,7 @@ def journals(folder: pathlib.Path) -> Reader:
     with Journal(out, request) as journal:
         for name in ("a/0", "a/1", "a/2"):
             journal.put(name, name.encode())
-    pieces = folder / "out.npz.pieces"
+    pieces = folder / "out.npz.jobs"
 
     def mutate(valid: dict[str, bytes], seed: int) -> dict[str, bytes]:
         name = "done.jsonl" if seed % 3 else "request.json"
