@@ -17,7 +17,7 @@ def demonstrations(name):  # observations and actions of all steps, and the envi
     seen, actions = [], []
 
     def keep(_number, run, obs):
-        label = "steps/devices/expert" if "devices/expert" in run.step_names else "steps/action"
+        label = "steps/label" if "label" in run.step_names else "steps/action"
         seen.append(np.concatenate([rows[:-1] for rows in obs.values()], axis=1))
         actions.append(run.all_rows(label))
 

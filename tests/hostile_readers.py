@@ -428,22 +428,32 @@ def _spaces(depends: dict[str, Any]) -> dict[str, Any]:
 
 
 def demonstrations(folder: pathlib.Path) -> Reader:
-    from ig2mj.learn.demos import FORMAT, FORMAT_VERSION, about, load_demos
+    from ig2mj.demos.reader import ATTRIBUTES
+    from ig2mj.demos.writer import FORMAT, FORMAT_VERSION
+    from ig2mj.learn.demos import about, load_demos
     from ig2mj.learn.perception import Perception
 
     file = folder / "demos.h5"
     world = {"task": "reach", "robot": "", "grasping": "", "actions": ["x", "y"], "privileged": []}
+    arrays = {f"steps/{name}": np.zeros((4, 2), np.float32) for name in ("action", "label")}
+    arrays |= {"steps/reward/total": np.zeros(4, np.float32), "obs/proprioception": np.zeros((5, 3), np.float32)}
+    arrays |= {"steps/terminated": np.array([False] * 3 + [True]), "steps/truncated": np.zeros(4, bool)}
     with h5py.File(file, "w") as out:
         out.attrs["format"], out.attrs["version"] = FORMAT, FORMAT_VERSION
-        out.attrs["world"] = json.dumps(world)
+        for name in ATTRIBUTES:
+            out.attrs[name] = "text"
+        out.attrs["task"], out.attrs["robot"], out.attrs["grasping"] = "reach", "", ""
+        out.attrs["action_names"], out.attrs["privileged_names"] = '["x", "y"]', "[]"
         out.attrs["spaces"] = json.dumps({"proprioception": [[3], "float32"]})
-        for run in ("run_000000", "run_000001"):
-            for name in ("action", "label"):
-                out[f"{run}/{name}"] = np.zeros((4, 2), np.float32)
-            out[f"{run}/reward"] = np.zeros(4, np.float32)
-            out[f"{run}/terminated"], out[f"{run}/truncated"] = np.zeros(4, bool), np.zeros(4, bool)
-            out[f"{run}/obs/proprioception"] = np.zeros((5, 3), np.float32)
-            out[run].attrs["success"] = True
+        out.attrs["columns"], out.attrs["worlds"] = json.dumps(list(arrays)), 1
+        rows = [[k if name.startswith("obs/") else k - 1 for name in arrays] for k in range(5)]
+        out["index"] = np.array(rows * 2, np.int32)
+        for name, values in arrays.items():
+            out[name] = values
+        for number in range(2):
+            run = out.create_group(f"run_{number:06d}")
+            run.attrs["frames"], run.attrs["world"], run.attrs["success"] = 5, 0, True
+            run.attrs["parts"] = np.array([[5 * number, 5]])
 
     def read(file: pathlib.Path) -> None:
         _, spaces = about(file)

@@ -32,7 +32,7 @@ def test_there_are_32_successes_of_each_activity_in_ten_megabytes():
                 assert run.attributes["success"] and run.attributes["terminated"]
                 action = run.all_rows("steps/action")
                 assert len(action) == run.frames - 1 and np.abs(action).max() <= 1
-                label = run.all_rows("steps/devices/expert")
+                label = run.all_rows("steps/label")
                 assert label.shape == action.shape and np.abs(label).max() <= 1
                 assert 0.01 < np.abs(label - action).mean() < 0.5  # disturbed, and mostly the expert's
                 assert run.all_rows("steps/success").tolist() == [False] * (len(action) - 1) + [True]

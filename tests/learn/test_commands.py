@@ -20,6 +20,7 @@ def test_a_recorded_expert_is_cloned_and_judged(tmp_path, capsys):
     assert call([*train, "--set", "num_updates=1500", "batch_size=128", "actor_layers=64,64"]) == 0
     assert call([*train[:-1], str(tmp_path / "other"), "--obs", "rgbd"]) == 2
     assert "holds no images" in capsys.readouterr().err
+    assert call(["demos", "replay", str(demos), "--check"]) == 0 and "all the same" in capsys.readouterr().out
     episodes = ["--episodes", "4", *POOL, "--split", "train", "--json"]
     assert call(["evaluate", str(run), "--worlds", "4", *episodes]) == 0
     found = json.loads(capsys.readouterr().out)

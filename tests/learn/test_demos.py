@@ -1,8 +1,9 @@
-"""Demonstrations: written as they end, read as networks see them, cloned; what is broken is refused."""
+"""Demonstrations: read from recordings as networks see them, cloned; broken files are refused."""
 
 from __future__ import annotations
 
 import dataclasses
+import json
 import sys
 from pathlib import Path
 
@@ -13,10 +14,12 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from small_envs import PointMass, SeenPointMass
+from small_recordings import write_recording
 
+from ig2mj.demos import Recording
 from ig2mj.errors import InputError
 from ig2mj.learn.bc import BC, BCConfig, begin_as_clone, clone
-from ig2mj.learn.demos import DemoWriter, about, collect_demos, load_demos
+from ig2mj.learn.demos import about, load_demos
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy, depends_of, world_of
 from ig2mj.learn.sac import SAC, SACConfig
@@ -30,18 +33,18 @@ def expert(state):
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     env, file = PointMass(8, pure=False), tmp_path_factory.mktemp("demos") / "runs.h5"
-    with DemoWriter(file, env) as writer:
-        found = collect_demos(env, expert, writer, 30, noise=0.1, disturbed=0.02)
-    assert found["kept"] == 30
+    write_recording(env, expert, file, episodes=30)
     return env, file
 
 
-def test_runs_are_whole_episodes_that_end_with_success(recorded):
+def test_complete_runs_are_read_one_after_the_other(recorded):
     env, file = recorded
     demos = load_demos(file, Perception(env.observation_spaces), world_of(env))
-    assert int(demos.terminated.sum()) == 30
-    assert not np.asarray(demos.truncated).any()
-    inside = ~np.asarray(demos.terminated)[:-1]
+    with Recording(file) as recording:
+        complete = sum(run.complete for run in recording.runs)
+    assert complete < len(recording.runs), "runs that were cut off are left out"
+    assert int((demos.terminated | demos.truncated).sum()) == complete >= 30
+    inside = ~np.asarray(demos.terminated | demos.truncated)[:-1]
     before, after = np.asarray(demos.seen.vector)[1:], np.asarray(demos.after.vector)[:-1]
     assert np.array_equal(before[inside], after[inside])
     assert not np.array_equal(before[~inside], after[~inside])  # a new episode begins
@@ -69,10 +72,28 @@ def test_a_clone_does_what_the_expert_does(recorded):
     assert success > 0.9 * episodes > 10
 
 
-def test_demonstrations_without_pictures_are_refused_where_pictures_are_seen(recorded):
-    _, file = recorded
-    with pytest.raises(InputError, match=r"holds no rgb and no depth.*--obs rgbd"):
-        load_demos(file, Perception(SeenPointMass.observation_spaces, "rgbd"))
+def test_images_are_read_as_they_were_recorded(tmp_path):
+    env = SeenPointMass(2, pure=False)
+    write_recording(env, expert, tmp_path / "seen.h5", episodes=2)
+    perception = Perception(about(tmp_path / "seen.h5")[1], "rgbd")
+    demos = load_demos(tmp_path / "seen.h5", perception)
+    goal = np.asarray(demos.seen.vector)[:, 2:]
+    red = np.asarray(demos.seen.image).reshape(-1, 32, 32, 4)[..., 0]
+    row, column = np.unravel_index(red.reshape(len(red), -1).argmax(1), (32, 32))
+    inside = np.abs(goal).max(1) < 0.9
+    assert np.stack([column, row], 1)[inside] / 15.5 - 1 == pytest.approx(goal[inside], abs=0.06)
+
+
+def test_the_actions_are_the_labels_of_a_recording_without_labels(recorded, tmp_path):
+    env, file = recorded
+    copy = tmp_path / "unlabelled.h5"
+    copy.write_bytes(file.read_bytes())
+    with h5py.File(copy, "a") as opened:
+        columns = json.loads(opened.attrs["columns"])
+        opened.attrs["columns"] = json.dumps([c.replace("steps/label", "steps/other") for c in columns])
+        opened.move("steps/label", "steps/other")
+    demos = load_demos(copy, Perception(env.observation_spaces))
+    assert np.array_equal(demos.label, demos.action)
 
 
 def test_broken_and_foreign_files_are_refused_with_run_and_field(recorded, tmp_path):
@@ -86,15 +107,14 @@ def test_broken_and_foreign_files_are_refused_with_run_and_field(recorded, tmp_p
     copy = tmp_path / "cut.h5"
     copy.write_bytes(file.read_bytes())
     with h5py.File(copy, "a") as opened:
-        values = np.asarray(opened["run_000003/reward"])[:-1]
-        del opened["run_000003/reward"]
-        opened["run_000003/reward"] = values
-    with pytest.raises(InputError, match=r"run_000003/reward: has shape \(\d+,\), and must have \(\d+\)"):
+        del opened["steps/reward/total"]
+        opened["steps/reward/total"] = np.zeros((3, 2), np.float32)
+    with pytest.raises(InputError, match=r"run_000000/steps/reward/total: is float32\[2\], must be float32\[\]"):
         load_demos(copy, perception)
     with h5py.File(copy, "a") as opened:
-        del opened["run_000000/action"]
-        opened.create_dataset("run_000000/action", (10**9, 2), np.float32)  # claimed, and not there
-    with pytest.raises(InputError, match=r"cut.h5: has \d+ bytes and claims arrays of 8\d{9} bytes"):
+        del opened["steps/reward/total"]
+        opened.create_dataset("steps/reward/total", (10**9,), np.float32)  # claimed, and not there
+    with pytest.raises(InputError, match="claims 1000000000 rows that are not there"):
         load_demos(copy, perception)
 
 

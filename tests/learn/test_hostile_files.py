@@ -12,8 +12,8 @@ import pytest
 from hostile_readers import demonstrations, policies
 from limits import run_limited
 
+from ig2mj.demos.collection import FAILED, join_recordings
 from ig2mj.errors import InputError
-from ig2mj.learn.demo_jobs import FAILED, join_demos
 from ig2mj.learn.demos import about, load_demos
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy
@@ -41,49 +41,46 @@ def test_rewards_out_of_another_file_are_not_read(demos, tmp_path):
         secret["reward"] = np.ones(4, np.float32)
     raw = tmp_path / "secret.raw"
     raw.write_bytes(np.ones(4, np.float32).tobytes())
-    replaced(demos, "run_000000/reward", h5py.ExternalLink(str(tmp_path / "secret.h5"), "/reward"))
-    with pytest.raises(InputError, match="run_000000/reward: is missing, or no array of this file"):
+    replaced(demos, "steps/reward/total", h5py.ExternalLink(str(tmp_path / "secret.h5"), "/reward"))
+    with pytest.raises(InputError, match="steps/reward/total: is missing, or no array of this file"):
         read_demos(demos)
     with h5py.File(demos, "a") as opened:
-        del opened["run_000000/reward"]
-        opened.create_dataset("run_000000/reward", (4,), "f4", external=[(str(raw), 0, 16)])
-    with pytest.raises(InputError, match="run_000000/reward: lies in another file"):
+        del opened["steps/reward/total"]
+        opened.create_dataset("steps/reward/total", (4,), "f4", external=[(str(raw), 0, 16)])
+    with pytest.raises(InputError, match="steps/reward/total: lies in another file"):
         read_demos(demos)
 
 
 def test_a_few_bytes_that_claim_gigabytes_are_refused(demos):
+    """One row of four megabytes that the index names for every frame of 60 runs."""
+    replaced(demos, "obs/proprioception", np.zeros((1, 2**18), np.float32))
     with h5py.File(demos, "a") as opened:
-        opened.attrs["spaces"] = json.dumps({"proprioception": [[2**20], "float32"]})
-        for run in ("run_000000", "run_000001"):
-            del opened[f"{run}/obs/proprioception"]
-            opened.create_dataset(
-                f"{run}/obs/proprioception",
-                data=np.zeros((5, 2**20), np.float32),
-                compression="gzip",
-                chunks=(1, 2**20),
-            )
+        opened.attrs["spaces"] = json.dumps({"proprioception": [[2**18], "float32"]})
+        opened["index"][:, -1] = 0
+        column = json.loads(opened.attrs["columns"]).index("obs/proprioception")
+        opened["index"][:, column] = 0
         for k in range(2, 60):
             opened[f"run_{k:06d}"] = opened["run_000000"]
-    assert demos.stat().st_size < 2**20
+    assert demos.stat().st_size < 2**21
     run_limited(read_demos, demos).check(InputError, "claims arrays of .* bytes .*UNPACKED_RATIO")
 
 
 @pytest.mark.parametrize(
     ("name", "value", "says"),
     [
-        ("action", np.full((4, 2), np.nan, np.float32), "holds numbers that are not finite"),
-        ("reward", np.full(4, np.inf, np.float32), "holds numbers that are not finite"),
+        ("steps/action", np.full((4, 2), np.nan, np.float32), "holds numbers that are not finite"),
+        ("steps/reward/total", np.full(4, np.inf, np.float32), "holds numbers that are not finite"),
         ("obs/proprioception", np.full((5, 3), np.nan, np.float32), "holds numbers that are not finite"),
-        ("action", np.zeros((4, 3), np.float32), r"has shape \(4, 3\), and must have \(any, 2\)"),
-        ("label", np.zeros((4, 3), np.float32), "has shape"),
-        ("obs/proprioception", np.zeros((5, 4), np.float32), "has shape"),
-        ("terminated", np.zeros(4), "is of type float64"),
-        ("action", np.array([[b"a", b"b"]] * 4), "is of type"),
+        ("steps/action", np.zeros((4, 3), np.float32), r"is float32\[3\], must be float32\[2\]"),
+        ("steps/label", np.zeros((4, 3), np.float32), r"is float32\[3\], must be float32\[2\]"),
+        ("obs/proprioception", np.zeros((5, 4), np.float32), r"is float32\[4\], must be float32\[3\]"),
+        ("steps/truncated", np.zeros(4), r"is float64\[\], must be bool\[\]"),
+        ("steps/action", np.array([[b"a", b"b"]] * 4), "is of type"),
     ],
 )
 def test_numbers_that_cannot_be_learned_from_are_refused(demos, name, value, says):
-    replaced(demos, f"run_000001/{name}", value)
-    with pytest.raises(InputError, match=f"run_000001/{name}: {says}"):
+    replaced(demos, name, value)
+    with pytest.raises(InputError, match=f"{name}: {says}"):
         read_demos(demos)
 
 
@@ -125,14 +122,14 @@ def test_parts_of_demonstrations_are_joined_only_from_their_own_content(demos, t
     with h5py.File(demos, "a") as opened:
         opened.attrs[FAILED] = 2
     good = demos.read_bytes()
-    assert join_demos([good, good], tmp_path / "whole.h5") == (4, 4)
-    load_demos(tmp_path / "whole.h5", Perception(about(tmp_path / "whole.h5")[1]))
-    with h5py.File(demos, "a") as opened:
-        opened["run_000000/obs/more"] = h5py.ExternalLink("secret.h5", "/a")
-    with pytest.raises(InputError, match="run_000000/obs/more: is missing, or no array of this file"):
-        join_demos([demos.read_bytes()], tmp_path / "whole.h5")
+    assert join_recordings([good, good], tmp_path / "whole.h5") == (4, 4)
+    whole = load_demos(tmp_path / "whole.h5", Perception(about(tmp_path / "whole.h5")[1]))
+    assert whole.action.shape == (16, 2) and int(whole.terminated.sum()) == 4
+    replaced(demos, "steps/action", h5py.ExternalLink("secret.h5", "/a"))
+    with pytest.raises(InputError, match="steps/action: is missing, or no array of this file"):
+        join_recordings([demos.read_bytes()], tmp_path / "whole.h5")
     with pytest.raises(InputError, match="is not an HDF5 file"):
-        join_demos([good[:500]], tmp_path / "whole.h5")
+        join_recordings([good[:500]], tmp_path / "whole.h5")
 
 
 def changed_policy(folder: pathlib.Path, name: str, change) -> pathlib.Path:

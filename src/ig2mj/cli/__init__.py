@@ -73,7 +73,7 @@ COMMANDS: dict[str, str] = {
     "evaluate": "measure how often a policy succeeds from held-out start states",
     "policies": "list the trained policies that ship, show their model cards, add one",
     "vr": "do a task yourself, in a headset or with mouse and keyboard",
-    "demos": "collect demonstrations of scripted experts; replay, export and measure recordings",
+    "demos": "record demonstrations of scripted experts; replay, export, measure and convert recordings",
     "sample-task": "sample an environment's start states and store them in the cache",
     "homes": "list, build, convert and render the homes that come with ig2mj",
     "doctor": "show what this machine can run, and how to fix what it cannot",

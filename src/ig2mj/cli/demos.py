@@ -1,4 +1,4 @@
-"""`ig2mj demos`: collect demonstrations of scripted experts; replay, export and measure recordings."""
+"""`ig2mj demos`: record demonstrations of scripted experts; replay, export, measure and convert recordings."""
 
 from __future__ import annotations
 
@@ -30,7 +30,9 @@ def collect(
     cluster: Cluster = None,
     resume: Resume = False,
 ) -> int:
-    """Play a scripted expert, and write its successful episodes as HDF5, for `ig2mj train --demos`.
+    """Play a scripted expert and record its successful episodes, with its labels and observations.
+
+    `ig2mj train --demos` learns from the recording; `ig2mj demos replay`, `metrics`, `export` and `ig2mj web` read it.
 
     Args:
       env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them).
@@ -38,7 +40,7 @@ def collect(
       episodes: number of successful episodes to collect.
       robot: humanoid or fetch; default: the task's first robot.
       grasping: mitten, assisted, sticky or physical; default: the task's.
-      obs: state, or rgbd with pictures as well.
+      obs: observations to record: state, or rgbd for images as well. Others can be computed by a replay.
       engine: native, warp or jax.
       worlds: number of worlds stepped at once.
       noise: standard deviation of the noise added to the expert's actions; the labels stay noise-free.
@@ -53,12 +55,12 @@ def collect(
     from ig2mj.cli.common.files import check_output
     from ig2mj.cluster.job_runner import map_jobs
     from ig2mj.cluster.jobs import JobSet
+    from ig2mj.demos.collection import collection_jobs, join_recordings
     from ig2mj.envs.experts import expert_of
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.envs.shared_starts import shared_pool
     from ig2mj.errors import Ig2mjError, UnknownNameError
     from ig2mj.install_hint import require_module
-    from ig2mj.learn.demo_jobs import collection_jobs, join_demos
     from ig2mj.learn.perception import MODES
 
     if obs not in MODES:
@@ -91,7 +93,7 @@ def collect(
     title = f"demonstrations of {env}"
     starts = {"task": env, "split": split, "count": pool_size or None}
     work = JobSet(
-        "ig2mj.learn.demo_jobs:collect_job",
+        "ig2mj.demos.collection:collect_job",
         title,
         collection_jobs(settings, episodes, seed),
         shared_pool(**starts) if cluster is not None else {},
@@ -102,7 +104,7 @@ def collect(
     with opened(out, request, where) as journal, follow(title) as report:
         store, failed = map_jobs(work, where, journal, report)
         parts = (store.get(job.name) for job in work.jobs if job.name not in failed)
-        kept, lost = join_demos(parts, out) if len(failed) < len(work.jobs) else (0, 0)
+        kept, lost = join_recordings(parts, out) if len(failed) < len(work.jobs) else (0, 0)
         if not failed:
             journal.finish()
     tell_failures(failed, len(work.jobs))
@@ -111,4 +113,26 @@ def collect(
     return 1 if failed else 0
 
 
-SUBCOMMANDS = {"collect": collect, "replay": replay, "export": export, "metrics": metrics}
+def convert(
+    old: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="OLD")],
+    new: Annotated[pathlib.Path, tyro.conf.Positional, tyro.conf.arg(metavar="NEW")],
+) -> int:
+    """Convert a demonstrations file of ig2mj 0.1.0 to a recording.
+
+    The old file holds no states of the world. `ig2mj train --demos` learns from the result; it cannot be replayed,
+    measured or exported. Recordings of 0.1.0 need no conversion.
+
+    Args:
+      old: file that `ig2mj demos collect` of ig2mj 0.1.0 wrote.
+      new: output file.
+    """
+    from ig2mj.cli.common.files import check_output
+    from ig2mj.demos.convert import convert as convert_file
+
+    check_output(new)
+    runs = convert_file(old, new)
+    print(f"{new}: {runs} runs to learn from (`ig2mj train --demos`); without states of the world, not for replays")
+    return 0
+
+
+SUBCOMMANDS = {"collect": collect, "replay": replay, "export": export, "metrics": metrics, "convert": convert}

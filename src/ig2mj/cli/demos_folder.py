@@ -1,4 +1,4 @@
-"""`ig2mj demos metrics`, and what is done to every recording of a folder in several processes."""
+"""`ig2mj demos metrics`, and commands on all recordings of a folder in several processes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def metrics(
     include_incomplete: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
-    """Compute iGibson's metrics of recordings: goal score, disarrangement, travel of base and hands, grasping, gaze.
+    """Compute iGibson's metrics of recordings: goal score, disarrangement, distance travelled, grasping, gaze.
 
     Episodes that were cut off, by the end of a rollout or Ctrl-C, are left out.
 
@@ -71,14 +71,14 @@ def _others(file: pathlib.Path, success_only: bool, incomplete: bool) -> str:
 
 
 def _line(file: pathlib.Path, run: dict[str, Any]) -> str:
-    goal, ways = run["goal"], ", ".join(f"{name} {m:.2f}" for name, m in run["path_length"].items())
+    goal, paths = run["goal"], ", ".join(f"{name} {m:.2f}" for name, m in run["path_length"].items())
     held = ", ".join(f"{name} {share:.0%}" for name, share in run["grasping"].items())
     looked = next(iter(run["gaze"]["objects"]), "") or "nothing"
     return (
         f"{file} {run['run']}: goal {goal['start']:.2f} to {goal['end']:.2f}; "
         f"moved {run['kinematic_disarrangement']['total']:.2f} m, "
         f"{run['logical_disarrangement']['total']} predicates changed; "
-        f"distance travelled (m): {ways}; holding: {held}; looked most at {looked}"
+        f"distance travelled (m): {paths}; holding: {held}; looked most at {looked}"
     )
 
 

@@ -1,13 +1,13 @@
-"""`record`: an environment that writes down everything it does.
+"""`record`: an environment that records its episodes to a file.
 
     env = record(ig2mj.make("CookingMeat", engine="native"), "runs.h5")
     state = env.reset(0)
     state = env.step(state, action)
     env.close()
 
-It takes the place of the environment everywhere: for `play`, for Gymnasium's face (`gym_env.unwrapped.env = record(
-gym_env.unwrapped.env, file)`), for experts. What is called as a part of a compiled program (`step_fn`, `reset_fn`) is
-not recorded.
+The recorded environment replaces the original everywhere: in `play`, inside the Gymnasium wrapper
+(`gym_env.unwrapped.env = record(gym_env.unwrapped.env, file)`), for experts. Calls of `step_fn` and `reset_fn` inside a
+compiled program are not recorded.
 
 Axes: W worlds, n numbers of an action.
 """
@@ -18,6 +18,7 @@ import dataclasses
 import os
 import weakref
 from collections.abc import Collection, Mapping
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -40,7 +41,8 @@ class RecordedEnvironment(Environment):
 
     Attributes:
       writer: of the file.
-      devices: what a person's devices say now, [W, ...] by name; written with the next step as `devices/<name>`.
+      devices: readings of a person's devices, [W, ...] by name; written with the next step as `devices/<name>`.
+      label: action that an expert would take, [W, n]; written with the next step where labels are recorded.
     """
 
     def __init__(
@@ -50,6 +52,8 @@ class RecordedEnvironment(Environment):
         worlds: Collection[int] | None = None,
         devices: Mapping[str, np.ndarray] | None = None,
         past_success: bool = False,
+        labels: bool = False,
+        observations: bool = False,
     ):
         """See `record`."""
         self.__dict__.update(env.__dict__)
@@ -61,6 +65,9 @@ class RecordedEnvironment(Environment):
         self.writer: RunWriter | None = None
         self.devices: dict[str, np.ndarray] = dict(devices or {})
         self._device_names, self._past_success = list(self.devices), past_success
+        size = (env.num_worlds, *env.action_space.shape)
+        self.label: np.ndarray | None = np.zeros(size, np.float32) if labels else None
+        self._observed = list(env.observation_spaces) if observations else []
         self._succeeded, self._completed = np.zeros((2, env.num_worlds), bool)
 
     def step(self, state: EnvState, action: Array) -> EnvState:
@@ -77,7 +84,7 @@ class RecordedEnvironment(Environment):
         after = self.step(state, action)
         kept = {name: getattr(after, name) for name in ("obs", "reward", "terminated", "truncated", "info")}
         if self.pure:
-            kept = jax.tree.map(jnp.copy, kept)  # the reset uses the state up
+            kept = jax.tree.map(jnp.copy, kept)  # the reset donates its buffers
         done = np.asarray(after.done)
         new = self.reset(after, done) if done.any() else after
         info = {**kept.pop("info"), "final_obs": kept.pop("obs")}
@@ -120,11 +127,12 @@ class RecordedEnvironment(Environment):
         """New runs in the masked worlds."""
         if self.writer is None:
             self._rows = FrameRows(self.core.engine, self._worlds, state)
-            steps = ["action", "reward/total", "terminated", "truncated", "success"]
+            steps = ["action", *([] if self.label is None else ["label"])]
+            steps += ["reward/total", "terminated", "truncated", "success"]
             steps += [f"reward/{name}" for name in self.objective.terms]
             steps += [f"devices/{name}" for name in self._device_names]
             names = (self._rows.own, self._rows.batched, steps)
-            self.writer = RunWriter(self._file, origin_of(self._inner), *names, self._worlds)
+            self.writer = RunWriter(self._file, origin_of(self._inner), *names, self._worlds, self._observed)
             weakref.finalize(self, self.writer.close)
         begun = [world for world in self._worlds if mask[world]]
         self._last = state
@@ -136,8 +144,13 @@ class RecordedEnvironment(Environment):
         self._succeeded[begun] = self._completed[begun] = False
         about = {"episode": episode, "row": rows, **about}
         runs = {w: {name: int(of_worlds[w]) for name, of_worlds in about.items()} for w in begun}
-        self.writer.begin(runs, *self._rows(state))
+        self.writer.begin(runs, *self._frame(state))
         return state
+
+    def _frame(self, state: EnvState) -> tuple[list[list[np.ndarray]], list[Any]]:
+        """Blocks of each recorded world, and arrays of all worlds, with the recorded observations last."""
+        own, batched = self._rows(state)
+        return own, [*batched, *(np.array(state.obs[name]) for name in self._observed)]
 
     def _seeds(self, seed: Seed) -> dict[str, np.ndarray]:
         return {"seed": np.broadcast_to(np.asarray(as_seed(seed, self.num_worlds)), (self.num_worlds,))}
@@ -148,9 +161,10 @@ class RecordedEnvironment(Environment):
         terms = (state.info[f"reward/{name}"] for name in self.objective.terms)
         said = (self.devices[name] for name in self._device_names)
         steps = [state.reward, state.terminated, state.truncated, state.info["success"], *terms, *said]
+        label = [] if self.label is None else [np.array(self.label, np.float32)]
         if self.pure:
             steps = [np.array(array) for array in steps]
-        self.writer.add(*self._rows(state), [action, *steps])
+        self.writer.add(*self._frame(state), [action, *label, *steps])
         terminated, truncated = np.asarray(state.terminated), np.asarray(state.truncated)
         if self._past_success:
             self._succeeded |= np.asarray(state.info["success"])
@@ -171,17 +185,21 @@ def record(
     worlds: Collection[int] | None = None,
     devices: Mapping[str, np.ndarray] | None = None,
     past_success: bool = False,
+    labels: bool = False,
+    observations: bool = False,
 ) -> RecordedEnvironment:
-    """An environment that records itself, from its next reset on.
+    """An environment that records its episodes, from its next reset on.
 
     Args:
-      file: HDF5, replaced if it is there. What is not written yet is at most `writer.FLUSH` frames of each world.
-      worlds: which ones; None: all.
-      devices: arrays [W, ...] with the names, shapes and types of what a person's devices say
-        (`RecordedEnvironment.devices`); None: nobody's.
-      past_success: a run goes on past success and failure of the episode, until a reset or `close`.
+      file: HDF5; an existing file is replaced. At most `writer.FLUSH` frames of each world are buffered.
+      worlds: indices of the recorded worlds; None: all.
+      devices: arrays [W, ...] with the names, shapes and types of the readings of a person's devices
+        (`RecordedEnvironment.devices`); None: no devices.
+      past_success: a run continues past success and failure of the episode, until a reset or `close`.
+      labels: record an expert's action for every step (`RecordedEnvironment.label`).
+      observations: record the observations of every frame, so that learning needs no replay.
 
     Raises:
-      EngineError: there are no such worlds. InputError, at the first reset: the file cannot be written.
+      EngineError: no such worlds. InputError, at the first reset: the file cannot be written.
     """
-    return RecordedEnvironment(env, file, worlds, devices, past_success)
+    return RecordedEnvironment(env, file, worlds, devices, past_success, labels, observations)

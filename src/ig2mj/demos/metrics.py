@@ -1,15 +1,17 @@
-"""Metrics of recordings, those of iGibson's: goal, disarrangement, ways, grasping, gaze.
+"""iGibson's metrics of recordings: goal, disarrangement, distance travelled, grasping, gaze.
 
     goal                score (share of the goal's literals) at the start, at the end, the best; and at every frame
     kinematic           metres by which bodies of objects moved between start and end, both settled; by object
-    logical             predicates that hold at one of the two and not at the other
-    ways                metres that base and hands travelled, and the box in the base's frame that hands reached
+    logical             predicates whose values at start and end differ
+    path length         metres that base and hands travelled, and the box in the base's frame that hands reached
     grasping            share of frames in which each hand holds something
-    gaze                what the gaze meets: share of frames by object, fixations, mean turn (rad/s)
+    gaze                gazed-at objects: share of frames by object, fixations, mean turn (rad/s)
 
-Where an eye tracker was there (`devices/gaze`), its gaze is taken, and `measured` is true; else the axis of the robot's
-eye stands for it. Source: iGibson 2.0's `igibson/metrics`, which lets the world settle before it compares; a settled
-world here has stood still for `SETTLE` control steps.
+The gaze is that of an eye tracker (`devices/gaze`; `measured` is true), else the axis of the robot's camera. Source:
+iGibson 2.0's `igibson/metrics`, which lets the world settle before it compares: here, `SETTLE` control steps without
+action.
+
+The frames that a compact recording (`ig2mj.demos.compact`) omits are computed by a replay by action.
 
 Axes: T steps of a run, H hands.
 """
@@ -66,7 +68,8 @@ def metrics_of(
         runs = chosen_runs(recording, success_only, incomplete)
         if not runs:
             return []
-        replayer = Replayer(recording, "state", env=env)
+        whole = all(run.kept(1, min(3, run.frames)).all() for run in runs)
+        replayer = Replayer(recording, "state" if whole else "action", env=env)
         measured = _Measuring(replayer.env, settle)
         watched = {run.name: _Watched(measured_rays(run)) for run in runs}
 

@@ -61,6 +61,8 @@ def origin_of(env: Environment, version: int = FORMAT_VERSION) -> dict[str, Any]
         "period": env.period,
         "observations": json.dumps(list(env.observation_spaces)),
         "sensors": json.dumps(dataclasses.asdict(env.sensor_options)),
+        "spaces": json.dumps({n: [list(s.shape), np.dtype(s.dtype).name] for n, s in env.observation_spaces.items()}),
+        "privileged_names": json.dumps(list(env.privileged_names)),
         "action_names": json.dumps(list(env.action_names)),
         "made_with": json.dumps({k: v for k, v in made.items() if is_plain(v)}),
         "not_made_with": json.dumps([k for k, v in made.items() if not is_plain(v)]),

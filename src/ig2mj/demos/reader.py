@@ -1,7 +1,7 @@
-"""`Recording`: reading files that `RunWriter` wrote, and refusing all others.
+"""`Recording`: reads files of `RunWriter`, and refuses all others.
 
-Nothing is believed: no array is read before its shape, type and place are what they must be, and no more is read at a
-time than some hundred rows. No pickle, no links out of the file.
+Files are untrusted: no array is read before its shape, type and place are checked, and at most some hundred rows are
+read at a time. No pickle, no links out of the file.
 """
 
 from __future__ import annotations
@@ -14,19 +14,22 @@ from typing import Any
 
 import numpy as np
 
-from ig2mj.demos.writer import FLUSH, FORMAT, READABLE_VERSIONS
+from ig2mj.demos.writer import COLUMN_GROUPS, FLUSH, FORMAT, OBSERVED, READABLE_VERSIONS
 from ig2mj.envs.names import refuse_path
 from ig2mj.errors import InputError
 from ig2mj.files.content import decode_json
 from ig2mj.files.hdf5 import Hdf5File
 
-FIX = "`ig2mj rollout --record FILE` and `ig2mj.demos.record` write such files"
+FIX = "`ig2mj demos collect`, `ig2mj rollout --record FILE` and `ig2mj.demos.record` write recordings"
+
+DEMONSTRATIONS = "ig2mj demonstrations"
+"""Format of the files of `ig2mj demos collect` in version 0.1.0, which `ig2mj demos convert` reads."""
 
 ATTRIBUTES = ("mujoco", "scene", "scene_hash", "model_hash")
-"""What every recording says of itself."""
+"""Attributes that every recording has."""
 
 LARGEST_ROWS = 2**28
-"""Bytes of the rows that are read at a time."""
+"""Largest number of bytes that are read at a time."""
 
 
 class Run:
@@ -34,18 +37,19 @@ class Run:
 
     Attributes:
       name: "run_000000". attributes: of the run. world: of the batch. row: of the pool. frames: T + 1.
-      names, step_names: of its arrays, without "frames/" and "steps/".
+      names, obs_names, step_names: of its arrays, without "frames/", "obs/" and "steps/".
       complete: the episode terminated or was truncated; else it was cut off, by a reset or by the end of the recording.
-      success: the goal held at its end (where it went on past success: at any time).
+      success: the goal held at its end (for a run that continues past success: at any time).
     """
 
     def __init__(self, recording: Recording, name: str, attributes: dict[str, Any]):
-        """Looks at what it claims to be, and reads no array. Raises InputError."""
+        """Reads the attributes and no array. Raises InputError."""
         self.file, self.name, self._recording = recording.file, name, recording
         self.attributes = attributes
         self.frames = self._whole_number("frames")
         self.world, self.row = self._whole_number("world"), self._whole_number("row", 0)
         self.names = [name[7:] for name in recording.columns if name.startswith("frames/")]
+        self.obs_names = [name[len(OBSERVED) :] for name in recording.columns if name.startswith(OBSERVED)]
         self.step_names = [name[6:] for name in recording.columns if name.startswith("steps/")]
         self._parts = self._read_parts(self.attributes.pop("parts", None))
 
@@ -84,10 +88,10 @@ class Run:
         later = int(name.startswith("steps/"))
         return self._rows(name, self.index(start + later, stop + later), like)
 
-    def all_rows(self, name: str) -> np.ndarray:
-        """All rows of one array. Raises InputError."""
+    def all_rows(self, name: str, like: Any = None) -> np.ndarray:
+        """All rows of one array. Raises InputError: it is missing, or another than `like`."""
         count = self.frames - int(name.startswith("steps/"))
-        parts = [self.rows(name, k, min(k + FLUSH, count)) for k in range(0, max(count, 1), FLUSH)]
+        parts = [self.rows(name, k, min(k + FLUSH, count), like) for k in range(0, max(count, 1), FLUSH)]
         return np.concatenate(parts)
 
     def broken(self, name: str, problem: str) -> InputError:
@@ -170,6 +174,9 @@ class Recording:
 
     def _read(self) -> None:
         self.header: dict[str, Any] = self._opened.attributes()
+        if self.header.get("format") == DEMONSTRATIONS:
+            fix = f"`ig2mj demos convert {self.file} NEW` converts it"
+            raise InputError(self.file, "is a demonstrations file of ig2mj 0.1.0", element="format", fix=fix)
         if self.header.get("format") != FORMAT:
             raise InputError(self.file, f"is not {FORMAT}", element="format", fix=FIX)
         version: Any = self.header.get("version")
@@ -183,7 +190,7 @@ class Recording:
                 raise InputError(self.file, "is missing", element=f"attribute {name}", fix=FIX)
         refuse_path(str(self.header.get("task", "")), self.file, "attribute task")
         columns = self.value("columns", list)
-        if not all(isinstance(name, str) and name.startswith(("frames/", "steps/")) for name in columns):
+        if not all(isinstance(name, str) and name.startswith(COLUMN_GROUPS) for name in columns):
             raise InputError(self.file, "must be names of arrays", element="attribute columns", fix=FIX)
         self.columns: dict[str, int] = {name: k for k, name in enumerate(columns)}
         if len(self.columns) < len(columns):
@@ -196,7 +203,7 @@ class Recording:
         self.arrays: dict[str, Any] = {name: array for name, array in there.items() if array is not None}
         self.runs: list[Run] = []
         for name in self._opened.names():
-            if name not in ("index", "frames", "steps"):
+            if name not in ("index", *(group[:-1] for group in COLUMN_GROUPS)):
                 self.runs.append(Run(self, name, self._opened.attributes(name)))
 
     def _array(self, name: str, kinds: str = "biuf", ndim: int | None = None) -> Any:

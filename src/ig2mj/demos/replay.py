@@ -109,6 +109,9 @@ class Replayer:
           InputError: the file is broken; or, by action, something that the outcome hangs on is another here.
         """
         self.recording, self.by = recording, by
+        if not any(name.startswith("frames/") for name in recording.columns):
+            fix = "`ig2mj train --demos` learns from it; `ig2mj demos collect` records the world, too"
+            raise InputError(recording.file, "holds no frames of the world: it was converted", fix=fix)
         self.env = env if env is not None else _environment(recording, observations, options)
         here = origin_of(self.env, recording.version)
         if recording.version == WHOLE_HASHES:  # a task's text has names of classes, which mean nothing

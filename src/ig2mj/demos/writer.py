@@ -1,15 +1,15 @@
-"""`RunWriter`: runs of worlds to HDF5, as they go on.
+"""`RunWriter`: writes runs of worlds to HDF5 while they are played.
 
-    /                    attributes: format, version, columns, and what the file is of (`ig2mj.demos.origin`)
+    /                    attributes: format, version, columns, and the origin of the file (`ig2mj.demos.origin`)
     /run_000000          one run of one world; attributes: world, seed, episode, row, frames, ended, complete, success,
                          terminated, truncated, parts
     /frames/<name>       [U, ...] rows of an array of the world (`ig2mj.demos.frames.Frame`)
-    /steps/<name>        [U, ...] rows of the step that led to a frame: action, reward and its terms, ends
-    /index               [N, C] of each frame of the file: its row of each of the C columns; -1: none
+    /obs/<name>          [U, ...] rows of an observation, where observations are recorded
+    /steps/<name>        [U, ...] rows of the step that led to a frame: action, label, reward and its terms, ends
+    /index               [N, C] for each frame of the file, its row in each of the C columns; -1: none
 
-`parts` of a run are pairs (first, count) of rows of the index. An array's row is in the file once, for as long as it
-stays the same, and where runs begin alike. What is not written yet is at most `FLUSH` frames of each world: that much a
-killed process loses.
+`parts` of a run are pairs (first, count) of rows of the index. A row is stored once for as long as it stays the same,
+and once where runs start alike. At most `FLUSH` frames of each world are buffered; a killed process loses those.
 """
 
 from __future__ import annotations
@@ -28,32 +28,41 @@ from ig2mj.engine.native.recorded import Cut
 from ig2mj.errors import InputError
 
 FORMAT, FORMAT_VERSION = "ig2mj recording", 3
-"""Raise the version when frames, or what a step makes of them, change: recordings are bound to it and not to the
-package's version. 2: hashes were of every byte (`ig2mj.demos.origin`); sensors and period were not written."""
+"""Raise the version when frames, or the effect of a step on them, change: recordings are bound to it and not to the
+package's version. Version 2 has hashes of every byte (`ig2mj.demos.origin`), and neither sensors nor period."""
 
 READABLE_VERSIONS = (2, 3)
 
+OBSERVED = "obs/"
+"""Group of the observations."""
+
+COLUMN_GROUPS = ("frames/", OBSERVED, "steps/")
+"""Groups of the arrays of a file."""
+
+OBSERVATION_PACKING: dict[str, Any] = {"compression": "gzip", "compression_opts": 1}
+"""Of images."""
+
 FLUSH = 200
-"""Frames of a world that are kept in memory at most (iGibson's figure)."""
+"""Largest number of buffered frames of a world (iGibson's value)."""
 
 FLUSH_BYTES = 2**28
-"""Bytes of frames that are kept in memory at most."""
+"""Largest number of buffered bytes."""
 
 CHUNK_BYTES = 2**17
-"""Of an array in the file; a chunk has at least one row."""
+"""Bytes of a chunk of an array, of at least one row."""
 
 INDEX = 8192
-"""Bytes below which a single row is not worth the index of a packed array."""
+"""Bytes below which a single row is stored without chunks, whose index would take more."""
 
 MOSTLY = 0.5
-"""Numbers more of which change from row to row are not packed: their last digits are noise."""
+"""Share of numbers that change from row to row above which an array is not packed: their last digits are noise."""
 
 PACKED: dict[str, Any] = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
 
 
 @dataclasses.dataclass(eq=False)
 class _Frame:
-    """Of all worlds at once, until it is written. `worlds`: those of whose runs it is one."""
+    """A buffered frame of all worlds. `worlds`: those whose runs it belongs to."""
 
     own: Sequence[Sequence[Any]]
     batched: list[Any]
@@ -66,12 +75,12 @@ class _Run:
     group: Any
     attributes: dict[str, Any]
     parts: list[tuple[int, int]]
-    starts: int  # frame that is not written yet and begins it; -1: it goes on
-    stops: int = -1  # frame behind its last one
+    starts: int  # buffered frame that starts it; -1: it started earlier
+    stops: int = -1  # frame after its last one
 
 
 class RunWriter:
-    """Writes runs to a file; a context manager. `runs`: how many were begun."""
+    """Writes runs to a file; a context manager. `runs`: number of runs so far."""
 
     def __init__(
         self,
@@ -81,21 +90,23 @@ class RunWriter:
         batched: Sequence[str],
         steps: Sequence[str],
         worlds: Sequence[int] = (0,),
+        observed: Sequence[str] = (),
     ):
         """Makes the file.
 
         Args:
-          own: arrays that each world hands in for itself, by name, and their places in its pieces. batched: names of
-            those that come with a world axis. steps: of what led to a frame, with a world axis. worlds: places of the
-            recorded worlds on that axis.
+          own: arrays that each world hands in separately, by name, and their places in its blocks. batched: names of
+            those with a world axis. steps: names of a step's arrays, with a world axis. worlds: indices of the
+            recorded worlds on that axis. observed: names of observations, which follow the batched arrays of a frame.
 
         Raises:
           InputError: it cannot be written there.
         """
         self.file = pathlib.Path(file)
         self._opened = _created(self.file)
-        self._worlds, self._cuts, self._num_batched = list(worlds), list(own.values()), len(batched)
-        names = [f"frames/{name}" for name in (*own, *batched)] + [f"steps/{name}" for name in steps]
+        self._worlds, self._cuts, self._num_batched = list(worlds), list(own.values()), len(batched) + len(observed)
+        names = [f"frames/{name}" for name in (*own, *batched)] + [f"{OBSERVED}{name}" for name in observed]
+        names += [f"steps/{name}" for name in steps]
         own_attributes = {"format": FORMAT, "version": FORMAT_VERSION, "columns": json.dumps(names)}
         for name, value in (own_attributes | dict(attributes)).items():
             self._opened.attrs[name] = value
@@ -108,11 +119,11 @@ class RunWriter:
         self._opened.flush()
 
     def begin(self, worlds: Mapping[int, Mapping[str, Any]], own: Sequence[Sequence[Any]], batched: Sequence) -> None:
-        """New runs of some worlds, from this frame on; runs of them that go on end.
+        """Starts runs of some worlds at this frame, and ends their current runs.
 
         Args:
-          worlds: attributes of the run of each. own: pieces of each recorded world, in their order. batched: [W, ...].
-            Nobody may change any of the arrays afterwards.
+          worlds: attributes of the run of each. own: blocks of each recorded world, in their order. batched: [W, ...].
+            The arrays must not be changed afterwards.
         """
         for world, attributes in worlds.items():
             self.end(world)
@@ -123,13 +134,13 @@ class RunWriter:
         self._put(_Frame(own, held(batched), None, set(worlds)))
 
     def add(self, own: Sequence[Sequence[Any]], batched: Sequence[Any], step: Sequence[Any]) -> None:
-        """The next frame of all runs that go on, and the step [W, ...] that led to it."""
+        """Adds a frame to all current runs, and the step [W, ...] that led to it."""
         going = {world for world, runs in self._open.items() if runs and runs[-1].stops < 0}
         if going:
             self._put(_Frame(own, held(batched), held(step), going))
 
     def end(self, world: int, **attributes: Any) -> None:
-        """Ends the run of a world, if there is one."""
+        """Ends the current run of a world, if there is one."""
         runs = self._open[world]
         if runs and runs[-1].stops < 0:
             runs[-1].stops = len(self._pending)
@@ -160,7 +171,7 @@ class RunWriter:
             self.flush()
 
     def flush(self) -> None:
-        """Writes what is not written yet."""
+        """Writes the buffered frames."""
         frames, self._pending = self._pending, []
         if frames:
             self._write(frames)
@@ -188,9 +199,9 @@ class RunWriter:
                 continue
             at = slice(offsets[world], offsets[world] + len(taken[world]))
             own = [frames[k].own[number] for k in taken[world]] if self._cuts else []
-            pieces = [gathered(p) for p in zip(*own, strict=True)]
+            blocks = [gathered(p) for p in zip(*own, strict=True)]
             for c, cut in enumerate(self._cuts):
-                rows = pieces[cut.piece]
+                rows = blocks[cut.piece]
                 rows = Rows(cut(rows.values), rows.which, rows.source)
                 index[at, c] = self._place(c, world, rows, np.arange(len(taken[world])), begins[world], None)
             for c, rows in enumerate(everywhere):
@@ -206,7 +217,7 @@ class RunWriter:
         self._written += len(index)
 
     def _note_parts(self, world: int, taken: np.ndarray, offset: int) -> None:
-        """Which of the rows that are about to be written are each run's."""
+        """Adds the index rows that are about to be written to the `parts` of their runs."""
         for run in self._open[world]:
             first = np.searchsorted(taken, max(run.starts, 0))
             stop = np.searchsorted(taken, run.stops) if run.stops >= 0 else len(taken)
@@ -223,10 +234,9 @@ class RunWriter:
 
 
 def _with_rows(file: Any, name: str, array: Any, before: int, rows: np.ndarray) -> Any:
-    """The array of the file with more rows; it is made or made anew where it must be.
+    """Appends rows to an array of the file, which is created, or converted to chunks, where necessary.
 
-    A single row has no index of chunks, which would take more room. Rows without numbers are one, however many are
-    written.
+    A single row is stored without chunks. Rows without numbers count as one row.
     """
     if array is None and len(rows) == 1 and rows.nbytes < INDEX:
         return file.create_dataset(name, data=rows)
@@ -235,12 +245,20 @@ def _with_rows(file: Any, name: str, array: Any, before: int, rows: np.ndarray) 
             rows, before = np.concatenate([array[:], rows]), 0
             del file[name]
         row = rows.shape[1:]
-        noise = rows.dtype.kind == "f" and len(rows) > 1 and (rows[1:] != rows[:-1]).mean() > MOSTLY
+        noise = rows.dtype.kind == "f" and len(rows) > 1 and bool((rows[1:] != rows[:-1]).mean() > MOSTLY)
+        packing = packing_of(name, row, noise)
         count = min(max(CHUNK_BYTES // rows[0].nbytes, 1), FLUSH)
         shapes = {"shape": (0, *row), "maxshape": (None, *row), "chunks": (count, *row)}
-        array = file.create_dataset(name, dtype=rows.dtype, **shapes, **({} if noise else PACKED))
+        array = file.create_dataset(name, dtype=rows.dtype, **shapes, **packing)
     _extend(array, before, rows)
     return array
+
+
+def packing_of(name: str, row: tuple[int, ...], noise: bool) -> dict[str, Any]:
+    """Options of an array in the file. `row`: shape of a row. `noise`: most numbers change from row to row."""
+    if name.startswith(OBSERVED) and len(row) > 1:
+        return OBSERVATION_PACKING
+    return {} if noise else PACKED
 
 
 def _extend(array: Any, before: int, rows: np.ndarray) -> None:
@@ -253,7 +271,7 @@ def _extend(array: Any, before: int, rows: np.ndarray) -> None:
 
 
 def _created(file: pathlib.Path) -> Any:
-    """A new file, of the newest form that can be read after its writer was killed; later ones are marked as open."""
+    """Creates a file in the newest form that stays readable if its writer is killed; later forms are marked as open."""
     import h5py
 
     try:
