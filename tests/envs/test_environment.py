@@ -149,7 +149,7 @@ def test_the_paper_s_runs_had_easier_thresholds():
     task = ACTIVITIES["SlicingFruit"]
     scene = load_scene(task.home, objects=task.objects)
     apple = scene.object_index("apple_0")
-    stated, eased = (rules_of(task, scene, paper_rl=p).model.parameters for p in (False, True))
+    stated, eased = (rules_of(task, scene, relaxed_thresholds=p).model.parameters for p in (False, True))
     assert (stated.slice_force[apple], eased.slice_force[apple]) == (10.0, 0.0)
     stainable = np.isfinite(stated.stained_threshold)
     assert set(eased.stained_threshold[stainable].tolist()) == {0.75}

@@ -31,7 +31,8 @@ def run(
       seed: random seed of the disturbance.
       safety: factor applied to all sizes; 0: 1 for warp, 1.4 for native.
       hand: let a floating hand push objects around.
-      robot: what disturbs the scene: a pushing hand, or a robot that acts at random (the profile is named after it).
+      robot: what disturbs the scene: hand (it pushes objects), or a robot that acts at random: {robots}. The profile
+        is named after it.
       out: write profiles to OUT/<scene's name>/ instead of next to the manifests.
       json: print the profiles as JSON, by scene.
     """

@@ -38,7 +38,7 @@ def collect(
       env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them).
       out: output file.
       episodes: number of successful episodes to collect.
-      robot: humanoid or fetch; default: the task's first robot.
+      robot: {robots}; default: the task's first robot.
       grasping: mitten, assisted, sticky or physical; default: the task's.
       obs: observations to record: state, or rgbd for images as well. Others can be computed by a replay.
       engine: native, warp or jax.

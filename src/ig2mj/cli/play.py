@@ -31,7 +31,7 @@ def run(
 
     Args:
       env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them).
-      robot: humanoid, fetch or turtlebot; default: the task's first robot.
+      robot: {robots}; default: the task's first robot.
       robot_urdf: URDF of a robot of your own to use instead.
       robot_layout: TOML or JSON file that assigns its joints to base, arm and gripper; default: guessed from their
         names.

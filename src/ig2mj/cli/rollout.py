@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import tyro
 
+from ig2mj.cli.common.deprecated import renamed_options
+
 if TYPE_CHECKING:
     from ig2mj.envs.environment import Environment
     from ig2mj.envs.rollout import Act
@@ -17,6 +19,7 @@ AGENTS = ("zero", "random", "expert")
 FORMATS = ("ig2mj", "igibson")
 
 
+@renamed_options({"--paper-rl": "--relaxed-thresholds"})
 def run(
     env: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="ENV")],
     agent: str = "random",
@@ -35,7 +38,7 @@ def run(
     video: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     record: Annotated[pathlib.Path | None, tyro.conf.arg(metavar="FILE")] = None,
     format: str = "ig2mj",
-    paper_rl: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
+    relaxed_thresholds: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
     """Play episodes of an environment and report how they ended.
@@ -44,7 +47,7 @@ def run(
       env: environment, e.g. CookingMeat or ig2mj/CookingMeat-v0 (`ig2mj list-envs` names them).
       agent: zero (no motion), random, expert (scripted; the six activities have one), or a policy: a file written by
         `ig2mj train`, or the name of one that ships.
-      robot: humanoid, fetch or turtlebot; default: the task's first robot.
+      robot: {robots}; default: the task's first robot.
       robot_urdf: URDF of a robot of your own to use instead (docs/guide/environments.md).
       robot_layout: TOML or JSON file that assigns its joints to base, arm and gripper; default: guessed from their
         names.
@@ -63,7 +66,7 @@ def run(
       record: HDF5 file to record all worlds to, for `ig2mj demos replay`.
       format: format of --record: ig2mj; or igibson, which also writes one iGibson log per run to a folder named after
         FILE.
-      paper_rl: use the success thresholds of the paper's experiments.
+      relaxed_thresholds: use the success thresholds of the paper's experiments.
       json: print one JSON object as the last line.
     """
     import json as form
@@ -102,7 +105,7 @@ def run(
         engine,
         grasping,
         observations=VECTORS if policy is None else policy.observations,
-        relaxed_thresholds=paper_rl,
+        relaxed_thresholds=relaxed_thresholds,
         split=split,
         pool_size=pool_size or None,
         variant=variant,
@@ -133,7 +136,7 @@ def run(
         "robot": played.robot,
         "grasping": played.grasping,
         "agent": agent,
-        "paper_rl": paper_rl,
+        "paper_rl": relaxed_thresholds,
         "variant": variant,
         "engine": played.core.engine.name,
         "worlds": worlds,

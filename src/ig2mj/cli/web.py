@@ -51,7 +51,7 @@ def run(
       engine: native, warp or jax. Only on native can objects be dragged.
       agent: for an environment: zero (no motion), random, expert, or a policy: a file written by `ig2mj train`, or the
         name of one that ships.
-      robot: for an environment: humanoid, fetch or turtlebot; default: the task's first robot.
+      robot: for an environment: {robots}; default: the task's first robot.
       seed: for an environment: random seed of start states and actions.
       paused: start paused.
     """

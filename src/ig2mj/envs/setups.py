@@ -30,8 +30,8 @@ from ig2mj.tasks.task import Task, place_robot
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.rules import Rules
 
-PAPER_RL_STAINS = 0.75
-"""Share of the stains that may stay in the paper's runs (appendix of the paper)."""
+RELAXED_STAINS = 0.75
+"""Fraction of the stains that may stay with relaxed thresholds (appendix of the paper)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,7 +81,7 @@ def setup_activity(
     pool: Pool | None,
     split: str,
     count: int | None,
-    paper_rl: bool,
+    relaxed_thresholds: bool,
     control: Control,
 ) -> Setup:
     """Of an activity. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
@@ -89,7 +89,7 @@ def setup_activity(
     name, control = robot if isinstance(robot, str) else robot.name, control.of(body)
     scene = load_scene(task.home, agents=[body], objects=task.objects)
     check_inside(task.name, scene)
-    rules = rules_of(task, scene, paper_rl)
+    rules = rules_of(task, scene, relaxed_thresholds)
     controller = control.controller(body, scene)
     return Setup(
         scene,
@@ -168,13 +168,13 @@ def setup_bddl(
     return Setup(scene, rules.with_goal(goal), lambda: rows, (controller,), objective, actions)
 
 
-def rules_of(task: Task, scene: Scene, paper_rl: bool = False) -> Rules:
-    """The states' rules with the task's goal; `paper_rl`: see `ig2mj.make`."""
+def rules_of(task: Task, scene: Scene, relaxed_thresholds: bool = False) -> Rules:
+    """The states' rules with the task's goal; `relaxed_thresholds`: see `ig2mj.make`."""
     rules = Rules.of_scene(scene)
-    if paper_rl:
+    if relaxed_thresholds:
         p = rules.model.parameters
         force = np.where(np.isfinite(p.slice_force), 0.0, p.slice_force).astype(p.slice_force.dtype)
-        stains = np.where(np.isfinite(p.stained_threshold), PAPER_RL_STAINS, p.stained_threshold)
+        stains = np.where(np.isfinite(p.stained_threshold), RELAXED_STAINS, p.stained_threshold)
         eased = dataclasses.replace(p, slice_force=force, stained_threshold=stains.astype(p.stained_threshold.dtype))
         rules = Rules(dataclasses.replace(rules.model, parameters=eased), initial=rules.initial)
     return rules.with_goal(task.goal)

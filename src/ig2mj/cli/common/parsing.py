@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 import tyro
 
+from ig2mj.agents.registry import ROBOTS
 from ig2mj.cli.common.deprecated import with_new_names
 from ig2mj.errors import Ig2mjError
 
@@ -32,7 +33,11 @@ def _with_quiet_defaults(function: Callable[..., Any]) -> Callable[..., Any]:
 
     # (A def would be wrapped where types are checked.)
     call = lambda *args, **given: function(*args, **_with_a_usable_seed(given))  # noqa: E731
-    call.__name__, call.__doc__, call.__annotations__ = function.__name__, _unfolded(function.__doc__ or ""), hints
+    call.__name__, call.__doc__, call.__annotations__ = (
+        function.__name__,
+        _unfolded(_with_robots(function.__doc__ or "")),
+        hints,
+    )
     parameters = [p.replace(annotation=hints.get(n, p.annotation)) for n, p in signature.parameters.items()]
     call.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
     return call
@@ -43,6 +48,12 @@ def _with_a_usable_seed(given: dict[str, Any]) -> dict[str, Any]:
     if isinstance(seed := given.get("seed"), int) and seed < 0:
         raise Ig2mjError(f"--seed {seed}: a seed is at least 0")
     return given
+
+
+def _with_robots(doc: str) -> str:
+    """A docstring in which `{robots}` stands for the names of robots."""
+    *names, last = ROBOTS
+    return doc.replace("{robots}", f"{', '.join(names)} or {last}")
 
 
 def _unfolded(doc: str) -> str:
