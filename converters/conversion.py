@@ -12,18 +12,18 @@ from typing import Any
 
 from .base import inputs, output_cache
 from .base.options import ConvertOptions
-from .base.outcome import Outcome
+from .base.outcome import ConversionOutcome
 
 Path = str | os.PathLike
 
 
 def convert_scene(
     dataset_root: Path, name: str, out: Path, *, urdf: Path | None = None, options: ConvertOptions | None = None
-) -> Outcome:
+) -> ConversionOutcome:
     """As `convert_scene.convert_scene`, with the cache of finished outputs before it."""
     options = options or ConvertOptions()
 
-    def work() -> Outcome:
+    def work() -> ConversionOutcome:
         from .convert_scene import convert_scene as convert
 
         return convert(dataset_root, name, out, urdf=urdf, options=options)
@@ -43,11 +43,11 @@ def convert_object(
     bounding_box: tuple[float, float, float] | None = None,
     fixed: bool = False,
     options: ConvertOptions | None = None,
-) -> Outcome:
+) -> ConversionOutcome:
     """As `convert_object.convert_object`, with the cache of finished outputs before it."""
     options = options or ConvertOptions()
 
-    def work() -> Outcome:
+    def work() -> ConversionOutcome:
         from .convert_object import convert_object as convert
 
         return convert(urdf, category, out, model=model, bounding_box=bounding_box, fixed=fixed, options=options)
@@ -59,7 +59,9 @@ def convert_object(
     return _done(request, out, options, work)
 
 
-def _done(request: dict[str, Any], out: Path, options: ConvertOptions, work: Callable[[], Outcome]) -> Outcome:
+def _done(
+    request: dict[str, Any], out: Path, options: ConvertOptions, work: Callable[[], ConversionOutcome]
+) -> ConversionOutcome:
     if not options.cache:
         return work()
     start = time.perf_counter()

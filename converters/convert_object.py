@@ -27,7 +27,7 @@ from .bodies.joint_limits import start_positions
 from .bodies.kinematics import model_bounds
 from .bodies.placements import Placement, make_halves
 from .bodies.robot_description import ROBOT_FILE, put_on_floating_base, robot_json
-from .finish import Outcome, finish, version_record
+from .finish import ConversionOutcome, finish, version_record
 from .hulls.pieces import HullOptions
 from .mjcf.appearance import add_ground, add_setting
 from .mjcf.manifest_entries import object_entry
@@ -52,10 +52,10 @@ def convert_object(
     bounding_box: tuple[float, float, float] | None = None,
     fixed: bool = False,
     options: ConvertOptions | None = None,
-) -> Outcome:
+) -> ConversionOutcome:
     """Converts one object: `object.xml`, `manifest.json`, `meshes/`, and the report.
 
-    The object stands on a ground plane, free to move unless it is `fixed`; the halves of a sliceable one lie beside it.
+    The object stands on a ground plane, free to move unless it is `fixed`; halves of a sliceable one lie next to it.
     Masses are the URDF's own. Without any, the object weighs its bounding box times a density: the category's where the
     URDF lies in a dataset, else a general one (`link_inertials`).
 
@@ -173,7 +173,7 @@ def _halves(dataset: Dataset | None, whole: BuiltModel, options: ConvertOptions)
 
 
 def _beside(low: np.ndarray, high: np.ndarray, halves: dict[str, Assembly]) -> dict[str, np.ndarray]:
-    """Poses (4x4) at rest on the ground in a row along +y, beside the object whose box is `low` to `high`."""
+    """Poses (4x4) at rest on the ground in a row along +y, next to the object whose box is `low` to `high`."""
     places, edge = {}, high[1]
     for name, assembly in halves.items():
         pose = resting_pose(assembly)
@@ -194,7 +194,7 @@ def _write(
     fixed: bool,
     assisted_grasp: bool,
 ) -> tuple[ModelBuilder, Manifest, mujoco.MjModel]:
-    """Writes `object.xml`: the object on a ground plane, its halves beside it, all at rest."""
+    """Writes `object.xml`: the object on a ground plane, its halves next to it, all at rest."""
     colours = options.colours == "category"
     builder = ModelBuilder(source.model, folder, category_colours=colours, assets=options.assets)
     name, assemblies = source.model, {name: model.assembly for name, model in built.items()}

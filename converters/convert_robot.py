@@ -1,4 +1,4 @@
-"""`convert_robot`: a robot's URDF as MJCF, and beside it what MJCF does not keep of it: motors' limits, fixed links.
+"""`convert_robot`: a robot's URDF as MJCF, and next to it what MJCF does not keep of it: motors' limits, fixed links.
 
 convert_robot("my_robot.urdf", "my_robot")      # my_robot/object.xml, meshes/, robot.json
 """
@@ -9,14 +9,14 @@ import os
 
 from .base.description import ROBOT_CATEGORY
 from .base.options import ConvertOptions, under_limits
-from .base.outcome import Outcome
+from .base.outcome import ConversionOutcome
 from .conversion import convert_object
 
 
 @under_limits
 def convert_robot(
     urdf: str | os.PathLike, out: str | os.PathLike, *, name: str | None = None, options: ConvertOptions | None = None
-) -> Outcome:
+) -> ConversionOutcome:
     """Converts a robot as `convert_object` converts an object of category "agent", and writes `robot.json`.
 
     Args:

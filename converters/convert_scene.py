@@ -21,7 +21,7 @@ from .base.process_pool import TaskPool
 from .base.transforms import quat_from_rotation
 from .bodies.assembly import has_own_look
 from .bodies.placements import Placement, complete_parts, make_halves, place_instances
-from .finish import Outcome, finish, version_record
+from .finish import ConversionOutcome, finish, version_record
 from .hulls.pieces import HullOptions
 from .mjcf.manifest_entries import room_entries, task_entry, vec3
 from .mjcf.model_builder import ModelBuilder, write_model
@@ -42,7 +42,7 @@ def convert_scene(
     *,
     urdf: str | os.PathLike | None = None,
     options: ConvertOptions | None = None,
-) -> Outcome:
+) -> ConversionOutcome:
     """Converts a scene: `scene.xml`, `manifest.json`, `meshes/`, `rooms.npz`, and the report.
 
     Args:

@@ -16,7 +16,7 @@ from ig2mj.scene.manifest import Manifest, check_manifest, save_manifest
 
 from .base.description import RoomMaps
 from .base.options import ConvertOptions
-from .base.outcome import CheckResult, Outcome
+from .base.outcome import CheckResult, ConversionOutcome
 from .bodies.joint_rules import openable_ends
 from .checks.run import run_checks
 from .checks.still import SourceBox
@@ -52,7 +52,7 @@ def finish(
     warnings: Sequence[str] = (),
     skipped: Sequence[str] = (),
     rooms: RoomMaps | None = None,
-) -> Outcome:
+) -> ConversionOutcome:
     """Writes `manifest.json`, runs the checks, writes the report.
 
     Args:
@@ -98,7 +98,7 @@ def finish(
         if options.renderer is not None and facts["pictures"] != RENDERED:
             provisional.append(facts["pictures"])
     written = hashlib.sha256((folder / "manifest.json").read_bytes()).hexdigest()
-    return Outcome(
+    return ConversionOutcome(
         len(manifest.objects),
         list(skipped),
         checks if options.report else [],

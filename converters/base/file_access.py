@@ -165,9 +165,9 @@ def package_root(folder: pathlib.Path) -> pathlib.Path | None:
 
 
 def find_package(folder: pathlib.Path, package: str) -> pathlib.Path | None:
-    """The folder that `package://<package>/` means, seen from a folder inside it or beside it.
+    """The folder that `package://<package>/` means, seen from a folder inside it or next to it.
 
-    First a folder of that name beside the URDF, as Bullet has it. Then walking up: a folder with a package.xml of that
+    First a folder of that name next to the URDF, as Bullet has it. Then walking up: a folder with a package.xml of that
     name, a folder of that name, or a neighbour of that name with a package.xml.
     """
     if inputs.is_folder(folder / package):

@@ -14,7 +14,7 @@ from .read_limits import ReadLimits, limits_of
 
 
 class Renderer(Protocol):
-    """What draws pictures: `ig2mj.viewer.offscreen.render`, handed in because the converter may not import it.
+    """What draws images: `ig2mj.viewer.offscreen.render`, handed in because the converter may not import it.
 
     `camera` is given as an `ig2mj.viewer.offscreen.FreeView`.
     """
@@ -54,7 +54,7 @@ class ConvertOptions:
       mesh_root, package_path: of an object: a folder below which its meshes may lie, although it is not above the URDF;
         folders in which packages (`package://`) are looked for first.
       limits: how much the readers take from one input.
-      renderer, view: what draws the report's pictures (see `report.write_report`).
+      renderer, view: what draws the report's images (see `report.write_report`).
     """
 
     seed: int = 0

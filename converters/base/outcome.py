@@ -32,7 +32,7 @@ class CheckResult:
 
 
 @dataclasses.dataclass
-class Outcome:
+class ConversionOutcome:
     """What a conversion did.
 
     Attributes:
@@ -63,7 +63,7 @@ class Outcome:
         return json.dumps(dataclasses.asdict(self), default=lambda value: value.tolist())
 
     @classmethod
-    def from_json(cls, text: str) -> Outcome:
+    def from_json(cls, text: str) -> ConversionOutcome:
         """Raises ValueError, KeyError or TypeError for text that `to_json` did not write."""
         fields = json.loads(text)
         return cls(**{**fields, "checks": [CheckResult(**check) for check in fields["checks"]]})

@@ -18,7 +18,7 @@ MARK = "manifest.json"
 
 @contextlib.contextmanager
 def replaced_folder(out: str | os.PathLike) -> Iterator[pathlib.Path]:
-    """A temporary folder beside `out` that takes its place when the block ends well, and vanishes when it does not.
+    """A temporary folder next to `out` that takes its place when the block ends well, and vanishes when it does not.
 
     A run that is killed leaves the old output or none, and at worst a hidden folder that the next run removes: at once
     where it can know that the run is dead, else when it has given no sign of life for two minutes

@@ -27,7 +27,7 @@ from typing import Any
 from .cache_folder import cache_folder, prune
 from .inputs import Record
 from .options import ConvertOptions
-from .outcome import Outcome
+from .outcome import ConversionOutcome
 from .output import MARK, replaced_folder
 
 LIMIT = 2 * 2**30
@@ -43,7 +43,7 @@ PACKAGES = (
 """Distributions whose version may change what comes out."""
 
 SOURCES = ("ig2mj_converters", "ig2mj.knowledge", "ig2mj.scene", "ig2mj.sensors", "ig2mj.viewer")
-"""Packages of this project whose files decide what comes out (sensors and viewer draw the report's pictures)."""
+"""Packages of this project whose files decide what comes out (sensors and viewer draw the report's images)."""
 
 _DAMAGED = (
     OSError, ValueError, KeyError, TypeError, AttributeError, EOFError, RecursionError, NotImplementedError,
@@ -75,8 +75,8 @@ def key_of(request: Mapping[str, Any], options: ConvertOptions) -> str:
     return hashlib.sha256(json.dumps(known, sort_keys=True).encode()).hexdigest()
 
 
-def fetch(key: str, out: str | os.PathLike) -> Outcome | None:
-    """Puts an entry's output in place of `out`, and beside it the files that it shares with others.
+def fetch(key: str, out: str | os.PathLike) -> ConversionOutcome | None:
+    """Puts an entry's output in place of `out`, and next to it the files that it shares with others.
 
     Returns:
       None: there is no entry, its input has changed, or it is damaged.
@@ -92,7 +92,7 @@ def fetch(key: str, out: str | os.PathLike) -> Outcome | None:
             facts = json.loads(archive.read(_FACTS))
             if facts["key"] != key or not Record(facts["inputs"]).holds_still():
                 return None
-            outcome = Outcome.from_json(facts["outcome"])
+            outcome = ConversionOutcome.from_json(facts["outcome"])
             names = [name for name in archive.namelist() if name != _FACTS and not name.startswith(_SHARED)]
             shared = {name: archive.read(f"{_SHARED}{k}") for k, name in enumerate(outcome.shared)}
             with replaced_folder(out) as folder:
@@ -108,7 +108,7 @@ def fetch(key: str, out: str | os.PathLike) -> Outcome | None:
     return outcome
 
 
-def store(key: str, record: Record, outcome: Outcome, out: str | os.PathLike) -> None:
+def store(key: str, record: Record, outcome: ConversionOutcome, out: str | os.PathLike) -> None:
     """Keeps a finished output. A folder that cannot be written is no error: the work is done again next time."""
     path, folder = _path(key), pathlib.Path(out)
     facts = {"key": key, "inputs": record.answers, "outcome": outcome.to_json()}

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..base.description import Inertial, Joint, ObjectModel, PackedImage, Shape
 from ..base.transforms import apply
-from ..hulls.pieces import Piece
+from ..hulls.pieces import HullPiece
 from .joint_limits import clamp, is_locked, motion
 
 #: A body without mass cannot move in MuJoCo: the least mass (kg) and the least radius of gyration (m) we give one.
@@ -59,7 +59,7 @@ class BodyPlan:
     pose: np.ndarray
     joint: Joint | None
     links: list[str]
-    collisions: list[Piece]
+    collisions: list[HullPiece]
     visuals: list[VisualPart]
     inertial: Inertial
     com: np.ndarray
@@ -99,7 +99,7 @@ class Assembly:
 def assemble(
     model: ObjectModel,
     scale: np.ndarray,
-    pieces: Mapping[str, Sequence[Piece]],
+    pieces: Mapping[str, Sequence[HullPiece]],
     inertials: Mapping[str, Inertial],
     *,
     igibson_visuals: bool = True,
@@ -130,7 +130,7 @@ class _Planner:
     def __init__(
         self,
         model: ObjectModel,
-        pieces: Mapping[str, Sequence[Piece]],
+        pieces: Mapping[str, Sequence[HullPiece]],
         inertials: Mapping[str, Inertial],
         igibson_visuals: bool,
     ):
@@ -281,7 +281,7 @@ def _poses_at_zero(model: ObjectModel) -> dict[str, np.ndarray]:
     return poses
 
 
-def _moved(piece: Piece, at: np.ndarray) -> Piece:
+def _moved(piece: HullPiece, at: np.ndarray) -> HullPiece:
     """A piece of a merged link in the body's frame; the vertices are in that frame whatever the piece's own pose."""
     if np.array_equal(at, np.eye(4)):
         return piece

@@ -11,7 +11,7 @@ import trimesh
 from ..base.description import Inertial, Link, ObjectModel
 from .joint_limits import is_locked
 from .kinematics import link_poses, model_bounds, shape_bounds
-from .solids import Solid, combine, hull_volume, joined, shape_solids, signed_volume
+from .solids import SolidMoments, combine, hull_volume, joined, shape_solids, signed_volume
 
 MassRule = Literal["dataset", "object", "robot"]
 """What the inertials of a URDF count for.
@@ -277,8 +277,8 @@ def _box_tensor(link: Link, to_inertial: np.ndarray) -> np.ndarray:
     return np.diag(squares.sum() - squares) / 12
 
 
-def _ball() -> Solid:
-    return Solid(4 / 3 * np.pi * MIN_RADIUS**3, np.zeros(3), np.eye(3) * MIN_RADIUS**2 / 5)
+def _ball() -> SolidMoments:
+    return SolidMoments(4 / 3 * np.pi * MIN_RADIUS**3, np.zeros(3), np.eye(3) * MIN_RADIUS**2 / 5)
 
 
 def _give_least_mass(model: ObjectModel, bodies: Mapping[str, Sequence[str]], inertials: dict[str, Inertial]) -> None:

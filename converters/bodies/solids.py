@@ -17,7 +17,7 @@ THIN = 1e-3  # m: thickness a flat mesh is given
 
 
 @dataclasses.dataclass
-class Solid:
+class SolidMoments:
     """volume m^3, centre [3] m, covariance [3, 3] m^2: the mean of (x - centre)(x - centre)^T over the volume."""
 
     volume: float
@@ -61,7 +61,7 @@ def hull_volume(mesh: Mesh) -> float:
     return 0.0 if hull is None else signed_volume(hull)
 
 
-def shape_solids(shape: Shape) -> list[Solid]:
+def shape_solids(shape: Shape) -> list[SolidMoments]:
     """Solids of a baked shape (scale 1) in its link's frame.
 
     A mesh gives one hull per `o`/`g` group; without groups itself if it is watertight, else its hull. A flat mesh
@@ -72,10 +72,10 @@ def shape_solids(shape: Shape) -> list[Solid]:
         placed = [Mesh(apply(shape.pose, m.vertices), m.faces) for m in shape.meshes]
         return [_mesh_solid(m, hull=shape.grouped) for m in placed]
     volume, spread = _primitive(shape)
-    return [Solid(volume, shape.pose[:3, 3].copy(), rotation @ np.diag(spread) @ rotation.T)]
+    return [SolidMoments(volume, shape.pose[:3, 3].copy(), rotation @ np.diag(spread) @ rotation.T)]
 
 
-def combine(solids: Sequence[Solid]) -> Solid | None:
+def combine(solids: Sequence[SolidMoments]) -> SolidMoments | None:
     """All solids as one of even density, overlaps counted twice; None for no volume."""
     volume = sum(s.volume for s in solids)
     if volume <= 0:
@@ -85,7 +85,7 @@ def combine(solids: Sequence[Solid]) -> Solid | None:
     for s in solids:
         arm = s.centre - centre
         covariance += s.volume / volume * (s.covariance + np.outer(arm, arm))
-    return Solid(volume, centre, covariance)
+    return SolidMoments(volume, centre, covariance)
 
 
 def _primitive(shape: Shape) -> tuple[float, list[float]]:
@@ -106,17 +106,17 @@ def _primitive(shape: Shape) -> tuple[float, list[float]]:
     return tube + ball, [across, across, along]
 
 
-def _mesh_solid(mesh: Mesh, hull: bool) -> Solid:
+def _mesh_solid(mesh: Mesh, hull: bool) -> SolidMoments:
     body = None if hull else joined([mesh])
     if body is None or not body.is_watertight or signed_volume(body) <= 0:
         body = _hull(mesh.vertices)
     if body is None:
         return _plate(mesh)
     centre = np.asarray(body.center_mass)
-    return Solid(float(body.volume), centre, covariance_of(np.asarray(body.moment_inertia)) / body.volume)
+    return SolidMoments(float(body.volume), centre, covariance_of(np.asarray(body.moment_inertia)) / body.volume)
 
 
-def _plate(mesh: Mesh) -> Solid:
+def _plate(mesh: Mesh) -> SolidMoments:
     """A flat or broken mesh as a plate: its surface, `THIN` thick."""
     corners = mesh.vertices[mesh.faces]
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
@@ -127,7 +127,7 @@ def _plate(mesh: Mesh) -> Solid:
     # A triangle's second moment: (sum of corner products + 9 x mean product) / 12.
     second = (np.einsum("fki,fkj->fij", arms, arms) + 9 * np.einsum("fi,fj->fij", middle, middle)) / 12
     covariance = np.einsum("f,fij->ij", area, second) / total + THIN**2 / 12 * np.eye(3)
-    return Solid(total * THIN, centre, covariance)
+    return SolidMoments(total * THIN, centre, covariance)
 
 
 def _hull(points: np.ndarray) -> trimesh.Trimesh | None:

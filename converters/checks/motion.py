@@ -25,7 +25,7 @@ GENTLE = 10.0
 """N or N m that push a joint beyond its own dry friction and what its inertia takes."""
 SWEPT = 0.97
 """This share of the range counts as all of it."""
-APART = 100.0
+SPREAD = 100.0
 """Metres between objects while their joints are swept."""
 FRACTIONS = (0.0, 0.33, 0.66, 1.0)
 """Where in their ranges all joints of an object are looked at together for contact among its own parts."""
@@ -111,7 +111,7 @@ class _Isolated:
         self.home = self.model.qpos0.copy()
         for place, owner in enumerate(self.owners):
             for piece, body in enumerate(index.roots[owner]):
-                where = np.array([APART * place, APART * piece, APART])
+                where = np.array([SPREAD * place, SPREAD * piece, SPREAD])
                 self.model.body_pos[body] = where
                 joint = self.model.body_jntadr[body]
                 if joint >= 0 and self.model.jnt_type[joint] == int(mujoco.mjtJoint.mjJNT_FREE):

@@ -14,7 +14,7 @@ from . import coacd_process
 from . import piece_cache as cache
 from .budget import Budgeted, Merged, keep_to_budget
 from .convex import Hull, clip_to, hull_of, solid_hull, union_mesh, union_volume
-from .mesh_parts import Part, decimate, signed_volume
+from .mesh_parts import MeshComponent, decimate, signed_volume
 from .openings import Openings
 from .pieces import HullOptions, PieceSource
 from .rectilinear import boxes_of
@@ -59,7 +59,7 @@ class CutTask:
     effort: the first step of `LADDER` to try. seconds: of processor time for it. coarse: make its mesh coarser first.
     """
 
-    part: Part
+    part: MeshComponent
     options: HullOptions
     effort: int = 0
     seconds: float = 60.0
@@ -67,7 +67,7 @@ class CutTask:
 
 
 @dataclasses.dataclass
-class Cut:
+class HullCut:
     """Convex pieces of one part, where they are from, and what to tell the user.
 
     stopped: time or a signal ended a finer try: the pieces may be better on another day, so they are not to be kept.
@@ -86,15 +86,15 @@ def effort_for(share: float) -> int:
     return 0 if share >= FINE_FROM else 1 if share >= MIDDLE_FROM else 2
 
 
-def cut_part(task: CutTask) -> Cut:
+def cut_part(task: CutTask) -> HullCut:
     """Cuts a part whose own hull is a bad fit. No piece reaches beyond the part's hull."""
     started = time.perf_counter()
     part = task.part
     boxes = boxes_of(part.vertices, part.faces, part.volume) if part.closed and not part.hollow else None
     if part.hollow:
-        cut = Cut(sheet_hulls(part, task.options.min_thickness), "sheet", [])
+        cut = HullCut(sheet_hulls(part, task.options.min_thickness), "sheet", [])
     elif boxes:
-        cut = Cut(boxes, "boxes", [])
+        cut = HullCut(boxes, "boxes", [])
     else:
         cut = _coacd(part, task)
     cut.hulls = [h for hull in cut.hulls if (h := clip_to(hull, part.hull)) is not None]
@@ -105,7 +105,7 @@ def cut_part(task: CutTask) -> Cut:
 def recut_to_budget(
     found: Sequence[Convex], others: Sequence[Hull], options: HullOptions, warnings: list[str]
 ) -> list[Convex]:
-    """The pieces within the budget: merged, or all cut up anew where merging fills too much.
+    """The pieces within the budget: merged, or all cut up again where merging fills too much.
 
     Args:
       others: pieces of the link that stay as they are; they count.
@@ -169,7 +169,7 @@ def _recut(hulls: list[Hull], others: Sequence[Hull], most: int, options: HullOp
     return Budgeted([Merged(h, (i,)) for i, h in enumerate(pieces)], abs(error), is_open, len(hulls))
 
 
-def sheet_hulls(part: Part, thickness: float) -> list[Hull]:
+def sheet_hulls(part: MeshComponent, thickness: float) -> list[Hull]:
     """The sides of a surface without thickness, each made so thick to its inner side: hollow containers stay hollow.
 
     Flat sides are one hull where they are convex; other faces are one each.
@@ -192,7 +192,7 @@ def sheet_hulls(part: Part, thickness: float) -> list[Hull]:
     return [h for h in found if h is not None]
 
 
-def _coacd(part: Part, task: CutTask) -> Cut:
+def _coacd(part: MeshComponent, task: CutTask) -> HullCut:
     options = task.options
     effort = (
         task.effort if part.closed else max(task.effort, 1)
@@ -206,7 +206,7 @@ def _coacd(part: Part, task: CutTask) -> Cut:
         if known is not None:
             facts, arrays = known
             hulls = [hull_of(arrays[f"piece_{i}"]) for i in range(int(facts["count"]))]
-            return Cut([h for h in hulls if h is not None], "coacd", list(facts["warnings"]))
+            return HullCut([h for h in hulls if h is not None], "coacd", list(facts["warnings"]))
     cut = _ladder(part, task, effort)
     if cut.source == "coacd" and options.cache and not cut.warnings:
         arrays = {f"piece_{i}": h.vertices for i, h in enumerate(cut.hulls)}
@@ -214,7 +214,7 @@ def _coacd(part: Part, task: CutTask) -> Cut:
     return cut
 
 
-def _ladder(part: Part, task: CutTask, effort: int) -> Cut:
+def _ladder(part: MeshComponent, task: CutTask, effort: int) -> HullCut:
     """Tries settings from `effort` on: coarser ones where they fail, a finer one where the pieces enclose too much."""
     options = task.options
     vertices, faces = coarse_mesh(part) if task.coarse else decimate(part.vertices, part.faces, MOST_FACES)
@@ -236,12 +236,12 @@ def _ladder(part: Part, task: CutTask, effort: int) -> Cut:
                 hulls = min(hulls, finer, key=lambda h: _excess(h, part))
             except coacd_process.DecompositionError:
                 pass  # what there is will do
-        return Cut(hulls, "coacd", warnings, stopped)
+        return HullCut(hulls, "coacd", warnings, stopped)
     warnings.append(f"a single hull approximates a concave shape ({_times(part)})")
-    return Cut([part.hull], "fallback", warnings, stopped)
+    return HullCut([part.hull], "fallback", warnings, stopped)
 
 
-def coarse_mesh(part: Part) -> tuple[np.ndarray, np.ndarray]:
+def coarse_mesh(part: MeshComponent) -> tuple[np.ndarray, np.ndarray]:
     """The part's vertices and faces, of about `COARSE_FACES` faces or fewer.
 
     Edge collapse by quadrics alone keeps slivers, of which meshes out of CAD programs consist, so that a closed mesh is
@@ -268,7 +268,7 @@ def _settings(step: int, options: HullOptions) -> dict[str, Any]:
 
 
 def _try(
-    part: Part, vertices: np.ndarray, faces: np.ndarray, step: int, seconds: float, options: HullOptions
+    part: MeshComponent, vertices: np.ndarray, faces: np.ndarray, step: int, seconds: float, options: HullOptions
 ) -> list[Hull]:
     """CoACD's pieces, clipped to the part's hull: it inflates a mesh that it has to rebuild as voxels."""
     points = coacd_process.run_coacd(
@@ -281,12 +281,12 @@ def _try(
     return hulls
 
 
-def _excess(hulls: Sequence[Hull], part: Part) -> float:
+def _excess(hulls: Sequence[Hull], part: MeshComponent) -> float:
     """By how much the pieces enclose more than the part, relative."""
     return union_volume(hulls) / part.volume - 1.0 if part.volume > 0 else 0.0
 
 
-def _times(part: Part) -> str:
+def _times(part: MeshComponent) -> str:
     return f"{part.hull.volume / part.volume:.1f} times its volume" if part.volume > 0 else "it encloses nothing"
 
 

@@ -25,16 +25,16 @@ from .budget import drop_contained
 from .convex import Hull, distance_outside, hull_of, reduce_vertices, solid_hull, union_volume
 from .decompose import COARSE_FACES, COARSE_TOLERANCES, CutTask, cut_part, effort_for, recut_to_budget
 from .fitting import fit_primitive, primitive_hull
-from .pieces import HullOptions, LinkHulls, Piece, PieceSource
+from .pieces import HullOptions, HullPiece, LinkHulls, PieceSource
 from .shapes import Concave, Convex, ShapeParts, label_of, primitive_piece, take_apart
 
-__all__ = ["HullOptions", "LinkHulls", "LinkPieces", "Piece", "decompose_link", "decompose_links", "scaled_pieces"]
+__all__ = ["HullOptions", "HullPiece", "LinkHulls", "LinkPieces", "decompose_link", "decompose_links", "scaled_pieces"]
 
 OUTSIDE = 5e-4
 """Metres that a piece may reach beyond the convex hull of its link's source meshes,"""
 OUTSIDE_SHARE = 1e-3
 """and this share of that hull's diagonal. Recognised cylinders and spheres go round the facets of their source, and a
-round convex body with too many vertices is replaced by one of the same volume and box (see `Piece.fit_error`)."""
+round convex body with too many vertices is replaced by one of the same volume and box (see `HullPiece.fit_error`)."""
 CUT = ("boxes", "sheet", "coacd", "merged", "recut")
 """Sources of pieces that are a part of something larger."""
 
@@ -274,12 +274,12 @@ def _mapped(piece: Convex, linear: np.ndarray, options: HullOptions) -> Convex |
     return None if hull is None else Convex(hull, piece.source)
 
 
-def _finish(found: Convex, bounds: Hull | None, options: HullOptions) -> Piece:
+def _finish(found: Convex, bounds: Hull | None, options: HullOptions) -> HullPiece:
     hull = found.hull
     if options.primitives:
         fit = fit_primitive(hull)
         if fit is not None and (fit.kind != "box" or _within(primitive_hull("box", fit.size, fit.pose), bounds)):
-            return Piece(
+            return HullPiece(
                 fit.kind, hull.vertices, hull.faces, fit.pose, fit.size, found.source, fit.volume, fit.distance,
                 fit.volume_error,
             )  # fmt: skip
@@ -289,7 +289,7 @@ def _finish(found: Convex, bounds: Hull | None, options: HullOptions) -> Piece:
     away = 0.0
     if small is not hull:
         away = max(distance_outside(hull.vertices, small), distance_outside(small.vertices, hull))
-    return Piece(
+    return HullPiece(
         "hull", small.vertices, small.faces, source=found.source, volume=small.volume, fit_error=away,
         volume_error=small.volume / hull.volume - 1,
     )  # fmt: skip
@@ -302,11 +302,11 @@ def _within(hull: Hull | None, bounds: Hull | None) -> bool:
     return bool(bounds.contains(hull.vertices, OUTSIDE + OUTSIDE_SHARE * bounds.diagonal).all())
 
 
-def _hull(piece: Piece) -> Hull | None:
+def _hull(piece: HullPiece) -> Hull | None:
     return solid_hull(piece.vertices, 1e-3)[0]
 
 
-def _union_of(pieces: list[Piece]) -> float:
+def _union_of(pieces: list[HullPiece]) -> float:
     """m3 of what is emitted. Round primitives count by their polyhedra, each made good for what it lacks."""
     hulls = [primitive_hull(p.kind, p.size, p.pose) if p.kind != "hull" else _hull(p) for p in pieces]
     lost = sum(p.volume - h.volume for p, h in zip(pieces, hulls, strict=True) if h is not None and p.kind != "hull")

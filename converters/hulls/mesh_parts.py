@@ -32,7 +32,7 @@ OPEN_SHARE = 0.03
 
 
 @dataclasses.dataclass
-class Part:
+class MeshComponent:
     """A connected part of a mesh.
 
     vertices [n, 3], faces [m, 3] wound outward; its hull; the m3 it encloses; closed: watertight; hollow: a sheet
@@ -72,7 +72,7 @@ def clean(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return vertices, faces[np.sort(once)]
 
 
-def parts(vertices: np.ndarray, faces: np.ndarray) -> list[Part]:
+def parts(vertices: np.ndarray, faces: np.ndarray) -> list[MeshComponent]:
     """The connected parts of a cleaned mesh, largest hull first; flat ones are left out.
 
     Parts are split where more than two faces meet, so two boxes that share an edge are two parts. A part inside
@@ -129,7 +129,7 @@ def _labels(faces: np.ndarray) -> np.ndarray:
     return scipy.sparse.csgraph.connected_components(graph, directed=False)[1]
 
 
-def _part(mesh: trimesh.Trimesh, hull: Hull, closed: bool, volume: float, others: list[Hull]) -> Part:
+def _part(mesh: trimesh.Trimesh, hull: Hull, closed: bool, volume: float, others: list[Hull]) -> MeshComponent:
     rings = [] if closed else _holes(mesh)
     hollow = any(_opens_up(np.asarray(mesh.vertices)[ring], hull, others) for ring in rings)
     if rings and not hollow:
@@ -139,7 +139,7 @@ def _part(mesh: trimesh.Trimesh, hull: Hull, closed: bool, volume: float, others
     vertices, faces = np.asarray(mesh.vertices), np.asarray(mesh.faces)
     if not closed or not 0 < volume <= hull.volume * 1.001:
         volume = hull.volume * float(np.mean(winding(points_in(hull), vertices[faces]) > 0.5))
-    return Part(vertices, faces, hull, volume, closed, hollow)
+    return MeshComponent(vertices, faces, hull, volume, closed, hollow)
 
 
 def _holes(mesh: trimesh.Trimesh) -> list[list[int]]:
@@ -196,7 +196,7 @@ def _opens_up(ring: np.ndarray, hull: Hull, others: list[Hull]) -> bool:
     return not any(other.contains(middle, 0.02 * hull.diagonal).any() for other in others)
 
 
-def enclosed_volume(solid: list[Part], whole: Hull) -> float:
+def enclosed_volume(solid: list[MeshComponent], whole: Hull) -> float:
     """m3 of the union of the parts, whose common hull is `whole`: exact where they are closed, else by sampling."""
     if len(solid) == 1:
         return solid[0].volume

@@ -70,7 +70,7 @@ class HullOptions:
 
 
 @dataclasses.dataclass
-class Piece:
+class HullPiece:
     """One convex collision geom, in the link frame, metres.
 
     Attributes:
@@ -84,7 +84,7 @@ class Piece:
       source: where it came from. "primitive": the source said so; "group": one `o`/`g` group; "hull": the whole
         mesh's hull; "component": a connected part's hull; "boxes": an exact cut into boxes; "sheet": a side of a
         container without thickness; "coacd"; "fallback": one hull because decomposition failed; "merged": by the
-        budget; "recut": the whole link cut up anew, because merging would have filled too much.
+        budget; "recut": the whole link cut up again, because merging would have filled too much.
       volume: of the geom that is emitted, m3.
       fit_error: greatest distance between the surface of the geom and the hull it stands for before any reduction,
         metres.
@@ -120,7 +120,7 @@ class LinkHulls:
       seconds: it took (of the first run, if cached). cached: it came from the cache.
     """
 
-    pieces: list[Piece] = dataclasses.field(default_factory=list)
+    pieces: list[HullPiece] = dataclasses.field(default_factory=list)
     before: int = 0
     volume_before: float = 0.0
     volume: float = 0.0

@@ -16,8 +16,8 @@ import numpy as np
 from ..base.description import Mesh, Shape
 from .convex import Hull, solid_hull
 from .fitting import primitive_hull, primitive_volume
-from .mesh_parts import Part, clean, decimate, enclosed_volume, hull_stands_for, is_thin_shell, parts
-from .pieces import HullOptions, Piece, PieceSource
+from .mesh_parts import MeshComponent, clean, decimate, enclosed_volume, hull_stands_for, is_thin_shell, parts
+from .pieces import HullOptions, HullPiece, PieceSource
 
 GROUP_RATIO = 1.3
 """A group whose hull has more than this many times its mesh's volume is not a convex piece, whatever the file says."""
@@ -42,7 +42,7 @@ class Convex:
 class Concave:
     """A part that must be cut up, and the shape it belongs to, for warnings."""
 
-    part: Part
+    part: MeshComponent
     label: str
 
 
@@ -91,7 +91,7 @@ def take_apart(shape: Shape, label: str, options: HullOptions) -> ShapeParts:
     return out
 
 
-def primitive_piece(shape: Shape, label: str, warnings: list[str]) -> Piece | None:
+def primitive_piece(shape: Shape, label: str, warnings: list[str]) -> HullPiece | None:
     """The piece of a primitive shape; None, and a warning, for one that cannot be used."""
     size = np.array(shape.size, float)
     scale = np.array(shape.scale, float)
@@ -112,7 +112,7 @@ def primitive_piece(shape: Shape, label: str, warnings: list[str]) -> Piece | No
         return None
     kind: Any = shape.kind
     volume = primitive_volume(shape.kind, sizes)
-    return Piece(kind, hull.vertices, hull.faces, shape.pose.copy(), sizes, "primitive", volume)
+    return HullPiece(kind, hull.vertices, hull.faces, shape.pose.copy(), sizes, "primitive", volume)
 
 
 def placed(mesh: Mesh, shape: Shape) -> Mesh:
@@ -198,7 +198,7 @@ def _take_soup(meshes: list[Mesh], label: str, options: HullOptions, out: ShapeP
         out.items.append(Concave(part, label))
 
 
-def _fewer(solid: list[Part]) -> list[Part]:
+def _fewer(solid: list[MeshComponent]) -> list[MeshComponent]:
     """At most MOST_PARTS parts; the small rest is joined, as hulls, to the nearest of the large."""
     if len(solid) <= MOST_PARTS:
         return solid

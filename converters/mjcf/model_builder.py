@@ -13,7 +13,7 @@ from ..base.naming import NamePool
 from .mesh_store import MeshStore
 from .textures import TextureStore
 
-#: Names of the folders beside scene.xml.
+#: Names of the folders next to scene.xml.
 MESH_FOLDER, TEXTURE_FOLDER = "meshes", "textures"
 #: Geom groups: the viewer shows 0 to 2 and hides the others until their number is pressed.
 VISUAL_GROUP, COLLISION_GROUP, HIDDEN_GROUP = 0, 3, 4

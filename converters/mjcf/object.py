@@ -15,7 +15,7 @@ from ..base.transforms import pose_from, quat_from_rotation
 from ..bodies.assembly import Assembly, BodyPlan, VisualPart
 from ..bodies.joint_limits import clamp, is_locked, joint_range, mujoco_type, unit_axis
 from ..bodies.joint_rules import ARMATURE, DAMPING, friction, reach
-from ..hulls.pieces import Piece
+from ..hulls.pieces import HullPiece
 from .colours import Rgba, category_colour
 from .model_builder import FRICTION, HIDDEN_GROUP, ROLLING_FRICTION, ModelBuilder
 
@@ -148,7 +148,7 @@ class _ObjectWriter:
             elif piece is not None:
                 self._add_piece(body, piece, plan.name, f"{name}/visual_{i}", visual=True)
 
-    def _add_piece(self, body: mujoco.MjsBody, piece: Piece, link: str, name: str, *, visual: bool) -> None:
+    def _add_piece(self, body: mujoco.MjsBody, piece: HullPiece, link: str, name: str, *, visual: bool) -> None:
         geom = body.add_geom(self._builder.visual_class if visual else self._builder.collision_class)
         geom.name, geom.rgba = name, self._colour
         if piece.kind == "hull":

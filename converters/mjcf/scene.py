@@ -136,7 +136,7 @@ def _saved_poses(placement: Placement, assembly: Assembly) -> list[np.ndarray]:
 
 
 def _with_extra_roots(assembly: Assembly, base: np.ndarray) -> list[np.ndarray]:
-    """The base's pose and those of the split-off bodies at their default places beside it."""
+    """The base's pose and those of the split-off bodies at their default places next to it."""
     return [base @ assembly.bodies[index].pose for index in assembly.roots]
 
 

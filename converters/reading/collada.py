@@ -22,8 +22,8 @@ from lxml import etree  # pyright: ignore[reportAttributeAccessIssue]  it has no
 from ..base.read_limits import check_limit
 from ..base.xml_reader import Element, decode_xml, parse_number, parse_strictly, strip_namespace
 from .collada_looks import ColladaLooks
-from .geometry_parts import Y_UP, Geometry, MeshContent, MeshSource, Placed
-from .looks import Look
+from .geometry_parts import Y_UP, Geometry, MeshContent, MeshSource, PlacedGeometry
+from .looks import SurfaceLook
 from .mesh_limits import MeshError
 
 NAMESPACE = "http://www.collada.org/2005/11/COLLADASchema"
@@ -60,8 +60,8 @@ def read_collada(source: MeshSource) -> MeshContent:
             found, lost = bare, less
     placed = []
     for symbol, bound, geometry, matrix in found:
-        look = Look() if looks is None else looks.look(symbol, bindings.get(bound or "", {}))
-        placed.append(Placed(geometry, matrix, look))
+        look = SurfaceLook() if looks is None else looks.look(symbol, bindings.get(bound or "", {}))
+        placed.append(PlacedGeometry(geometry, matrix, look))
     return MeshContent(placed, turn, lost)
 
 

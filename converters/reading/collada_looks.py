@@ -6,7 +6,7 @@ import pathlib
 
 from ..base.description import Rgba
 from ..base.xml_reader import Element, parse_number
-from .looks import Look, TextureReader
+from .looks import SurfaceLook, TextureReader
 
 SHADINGS = ("constant", "lambert", "phong", "blinn")
 IMAGE_STEPS = 8
@@ -25,7 +25,7 @@ class ColladaLooks:
         self._effects = _by_id(root.iterfind("library_effects/effect"))
         self._materials = _by_id(root.iterfind("library_materials/material"))
         self._images = _by_id(root.iterfind("library_images/image"))
-        self._looks: dict[str, Look] = {}
+        self._looks: dict[str, SurfaceLook] = {}
 
     def bindings(self, instance: Element) -> dict[str, str]:
         """symbol -> id of a material, of an <instance_geometry> or <instance_controller>."""
@@ -34,16 +34,16 @@ class ColladaLooks:
             found[bound.get("symbol") or ""] = (bound.get("target") or "").removeprefix("#")
         return found
 
-    def look(self, symbol: str | None, bindings: dict[str, str]) -> Look:
+    def look(self, symbol: str | None, bindings: dict[str, str]) -> SurfaceLook:
         """The look of a primitive with this material symbol. A symbol that is not bound may itself be a material."""
         name = bindings.get(symbol or "", symbol or "")
         if not name:
-            return Look()
+            return SurfaceLook()
         if name not in self._looks:
             self._looks[name] = self._read(name)
         return self._looks[name]
 
-    def _read(self, name: str) -> Look:
+    def _read(self, name: str) -> SurfaceLook:
         material = self._materials.get(name)
         if material is None:
             return self._lost(f"material '{name}' does not exist")
@@ -58,23 +58,23 @@ class ColladaLooks:
                 return self._shaded(found, effect, name)
         return self._lost(f"effect '{url}' has no colour")
 
-    def _lost(self, text: str) -> Look:
+    def _lost(self, text: str) -> SurfaceLook:
         self._textures.warn(f"{self._file.name}: {text}: drawn without it")
-        return Look()
+        return SurfaceLook()
 
-    def _shaded(self, shading: Element, effect: Element, name: str) -> Look:
+    def _shaded(self, shading: Element, effect: Element, name: str) -> SurfaceLook:
         diffuse = shading.find("emission" if shading.tag == "constant" else "diffuse")
         if diffuse is None:
-            return Look()
+            return SurfaceLook()
         texture = diffuse.find("texture")
         if texture is not None:
             image = self._image(texture.get("texture") or "", effect)
             if image is None:
                 return self._lost(f"the image of material '{name}' does not exist")
             found = self._textures.file(image)
-            return Look() if found is None else Look(None, found)
+            return SurfaceLook() if found is None else SurfaceLook(None, found)
         colour = self._colour(diffuse, effect, name)
-        return Look(None if colour is None else (*colour[:3], self._opacity(shading, effect, name, colour[3])))
+        return SurfaceLook(None if colour is None else (*colour[:3], self._opacity(shading, effect, name, colour[3])))
 
     def _colour(self, holder: Element, effect: Element, name: str) -> Rgba | None:
         """<color>, or a <param> that names a <newparam> with one; three numbers are opaque."""

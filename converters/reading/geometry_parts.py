@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.description import Mesh, Rgba
 from ..base.file_access import FileGuard
-from .looks import Look, Texture, TextureReader, mean_vertex_colour
+from .looks import SurfaceLook, Texture, TextureReader, mean_vertex_colour
 from .mesh_limits import MeshError, check_faces, check_vertices
 
 Y_UP = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
@@ -43,12 +43,12 @@ class Geometry:
 
 
 @dataclasses.dataclass
-class Placed:
+class PlacedGeometry:
     """An instance of a geometry. matrix: 4x4 into the file's frame. look: what its material says."""
 
     geometry: Geometry
     matrix: np.ndarray
-    look: Look = dataclasses.field(default_factory=Look)
+    look: SurfaceLook = dataclasses.field(default_factory=SurfaceLook)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -74,13 +74,13 @@ class MeshContent:
       lost: what could not be read while the rest could.
     """
 
-    placed: list[Placed]
+    placed: list[PlacedGeometry]
     turn: np.ndarray = dataclasses.field(default_factory=lambda: np.eye(4))
     lost: list[str] = dataclasses.field(default_factory=list)
 
 
 def parts_of(
-    placed: Sequence[Placed], turn: np.ndarray, file: pathlib.Path, textures: TextureReader | None
+    placed: Sequence[PlacedGeometry], turn: np.ndarray, file: pathlib.Path, textures: TextureReader | None
 ) -> list[MeshPart]:
     """One part per instance, vertices merged and moved by `turn` @ its matrix; instances without faces are left out.
 
@@ -111,17 +111,17 @@ def parts_of(
     return parts
 
 
-def _look(instance: Placed, textures: TextureReader | None, file: pathlib.Path) -> Look:
+def _look(instance: PlacedGeometry, textures: TextureReader | None, file: pathlib.Path) -> SurfaceLook:
     if textures is None:
-        return Look()
+        return SurfaceLook()
     geometry, look = instance.geometry, instance.look
     if look.texture is not None and (geometry.uv is None or not np.all(np.isfinite(geometry.uv))):
         look = textures.flat(look)
-    if look == Look() and geometry.colours is not None and len(geometry.colours):
+    if look == SurfaceLook() and geometry.colours is not None and len(geometry.colours):
         rgba, vary = mean_vertex_colour(geometry.colours)
         if vary:
             textures.warn(f"{file.name} has colours per vertex: their mean is drawn")
-        look = Look(rgba)
+        look = SurfaceLook(rgba)
     return look
 
 

@@ -22,9 +22,9 @@ from ig2mj.errors import InputError
 from ..base.read_limits import check_limit, limits
 from ..base.text import without_mark
 from ..base.xml_reader import read_bytes
-from .geometry_parts import Y_UP, Geometry, MeshContent, MeshSource, Placed
+from .geometry_parts import Y_UP, Geometry, MeshContent, MeshSource, PlacedGeometry
 from .json_reader import decode_json
-from .looks import Look, Texture, TextureReader
+from .looks import SurfaceLook, Texture, TextureReader
 from .mesh_limits import MeshError, check_faces
 
 _TYPES = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
@@ -45,8 +45,8 @@ class _File:
     textures: TextureReader | None
     buffers: dict[int, bytes] = dataclasses.field(default_factory=dict)
     arrays: dict[int, np.ndarray] = dataclasses.field(default_factory=dict)
-    meshes: dict[int, list[tuple[Geometry, Look]]] = dataclasses.field(default_factory=dict)
-    looks: dict[int, Look] = dataclasses.field(default_factory=dict)
+    meshes: dict[int, list[tuple[Geometry, SurfaceLook]]] = dataclasses.field(default_factory=dict)
+    looks: dict[int, SurfaceLook] = dataclasses.field(default_factory=dict)
     spent: int = 0
 
 
@@ -111,7 +111,7 @@ def _chunks(raw: bytes, file: pathlib.Path) -> tuple[bytes, bytes | None]:
     return found[b"JSON"], found.get(b"BIN\0")
 
 
-def _placed(at: _File) -> Iterator[Placed]:
+def _placed(at: _File) -> Iterator[PlacedGeometry]:
     """Instances of the default scene's nodes, in the order of the file."""
     nodes = _list(at.tree.get("nodes"))
     scenes = _list(at.tree.get("scenes"))
@@ -135,7 +135,7 @@ def _placed(at: _File) -> Iterator[Placed]:
             for geometry, look in _mesh(at, _index(node["mesh"], _list(at.tree.get("meshes")), "mesh")):
                 faces += len(geometry.faces)
                 check_faces(faces, at.file)
-                yield Placed(geometry, matrix, look)
+                yield PlacedGeometry(geometry, matrix, look)
         below = [_index(n, nodes, "node") for n in _list(node.get("children"))]
         stack += [(n, matrix, depth + 1) for n in reversed(below)]
         check_limit("mesh_instances", len(stack), at.file, "nodes and instances", error=MeshError)
@@ -157,13 +157,13 @@ def _matrix(node: dict[str, Any]) -> np.ndarray:
     return matrix
 
 
-def _mesh(at: _File, number: int) -> list[tuple[Geometry, Look]]:
+def _mesh(at: _File, number: int) -> list[tuple[Geometry, SurfaceLook]]:
     if number not in at.meshes:
         found = []
         for primitive in _list(_dict(at.tree["meshes"][number]).get("primitives")):
             geometry = _primitive(at, _dict(primitive))
             if geometry is not None:
-                look = Look() if at.textures is None else _look(at, _dict(primitive).get("material"))
+                look = SurfaceLook() if at.textures is None else _look(at, _dict(primitive).get("material"))
                 found.append((geometry, look))
         at.meshes[number] = found
     return at.meshes[number]
@@ -298,11 +298,11 @@ def _bytes_of(at: _File, uri: str) -> bytes:
         raise _Broken(f"a data URI is broken: {e}") from e
 
 
-def _look(at: _File, number: Any) -> Look:
+def _look(at: _File, number: Any) -> SurfaceLook:
     """A material's base colour and texture; broken, it is a warning and no look."""
     assert at.textures is not None
     if number is None:
-        return Look()
+        return SurfaceLook()
     if not isinstance(number, int) or number not in at.looks:
         try:
             materials = _list(at.tree.get("materials"))
@@ -310,11 +310,11 @@ def _look(at: _File, number: Any) -> Look:
             at.looks[number] = _material(at, _dict(materials[number]))
         except _Broken as e:
             at.textures.warn(f"{at.file.name}: {e}: drawn without it")
-            return Look()
+            return SurfaceLook()
     return at.looks[number]
 
 
-def _material(at: _File, material: dict[str, Any]) -> Look:
+def _material(at: _File, material: dict[str, Any]) -> SurfaceLook:
     base = _dict(material.get("pbrMetallicRoughness"))
     factor, texture = base.get("baseColorFactor"), base.get("baseColorTexture")
     glossy = _dict(_dict(material.get("extensions")).get("KHR_materials_pbrSpecularGlossiness"))
@@ -325,7 +325,7 @@ def _material(at: _File, material: dict[str, Any]) -> Look:
         r, g, b, a = (float(v) for v in np.clip(_numbers(factor, 4, "base colour"), 0, 1))
         rgba = (r, g, b, a or 1.0)
     image = None if texture is None else _texture(at, _dict(texture))
-    return Look(rgba, image)
+    return SurfaceLook(rgba, image)
 
 
 def _texture(at: _File, reference: dict[str, Any]) -> Texture | None:

@@ -30,7 +30,7 @@ def encrypted_twin(file: pathlib.Path) -> pathlib.Path | None:
 
 
 @dataclasses.dataclass(frozen=True)
-class Look:
+class SurfaceLook:
     """rgba: flat colour; with a texture its factor. Both None: nothing said."""
 
     rgba: Rgba | None = None
@@ -77,13 +77,13 @@ class TextureReader:
             return None
         return PackedImage(name, content)
 
-    def flat(self, look: Look) -> Look:
+    def flat(self, look: SurfaceLook) -> SurfaceLook:
         """The look of what has no texture coordinates: the image's mean colour, with a warning."""
         if look.texture is None:
             return look
         text = f"{self.element}: it has no texture coordinates, and is drawn in the mean colour of"
         self.warn(f"{text} {look.texture.name}")
-        return Look(mean_colour(look.texture, look.rgba))
+        return SurfaceLook(mean_colour(look.texture, look.rgba))
 
     def warn(self, text: str) -> None:
         if text not in self.warnings:

@@ -28,9 +28,9 @@ from ..base.xml_reader import read_bytes
 from .collada import read_collada
 from .geometry_parts import MeshContent, MeshPart, MeshSource, parts_of
 from .gltf import read_gltf
-from .looks import Look, TextureReader, mean_vertex_colour
+from .looks import SurfaceLook, TextureReader, mean_vertex_colour
 from .mesh_limits import MeshError
-from .obj_files import Material, ObjFile, group_meshes, material_meshes, read_mtl, read_obj
+from .obj_files import ObjFile, ObjMaterial, group_meshes, material_meshes, read_mtl, read_obj
 from .trimesh_files import read_ply, read_stl
 
 READERS: dict[str, Callable[[MeshSource], MeshContent]] = {
@@ -123,7 +123,7 @@ def _obj_parts(obj: ObjFile, file: pathlib.Path, textures: TextureReader) -> lis
     if (count := len(np.unique(obj.material))) > limits().mesh_materials:
         textures.warn(_one_colour(file, count))
         obj = dataclasses.replace(obj, material=np.zeros_like(obj.material), materials=[""])
-    materials: dict[str, Material] = {}
+    materials: dict[str, ObjMaterial] = {}
     complete = True
     for library in obj.libraries[:MAX_LIBRARIES]:
         try:
@@ -136,15 +136,19 @@ def _obj_parts(obj: ObjFile, file: pathlib.Path, textures: TextureReader) -> lis
     images: dict[str, pathlib.Path | None] = {}
     parts = []
     for name, mesh, uv, vertices in material_meshes(obj):
-        material = materials.get(name, Material())
-        look = Look(material.rgba)
+        material = materials.get(name, ObjMaterial())
+        look = SurfaceLook(material.rgba)
         if material.texture:
             if material.texture not in images:
                 images[material.texture] = textures.file(material.texture)
             if (image := images[material.texture]) is not None:
-                look = Look(material.rgba, image) if uv is not None else textures.flat(Look(material.rgba, image))
-        if look == Look() and obj.colours is not None:
-            look = Look(_vertex_colour(obj.colours[vertices], file, textures))
+                look = (
+                    SurfaceLook(material.rgba, image)
+                    if uv is not None
+                    else textures.flat(SurfaceLook(material.rgba, image))
+                )
+        if look == SurfaceLook() and obj.colours is not None:
+            look = SurfaceLook(_vertex_colour(obj.colours[vertices], file, textures))
         parts.append(MeshPart([mesh], look.rgba, look.texture, None if uv is None else [uv]))
     if not parts:
         raise MeshError(file, "is empty: all its faces are degenerate")

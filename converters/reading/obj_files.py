@@ -236,24 +236,24 @@ def _polygon(words: list[str], vertices: int, uvs: int, file: pathlib.Path, line
 
 
 @dataclasses.dataclass
-class Material:
+class ObjMaterial:
     """One `newmtl`: diffuse colour with opacity, and the name of its diffuse texture."""
 
     rgba: tuple[float, float, float, float] | None = None
     texture: str | None = None
 
 
-def read_mtl(file: pathlib.Path) -> dict[str, Material]:
+def read_mtl(file: pathlib.Path) -> dict[str, ObjMaterial]:
     """Materials of an MTL file; statements that make no sense are passed over. Raises InputError: unreadable."""
-    materials: dict[str, Material] = {}
-    now = Material()
+    materials: dict[str, ObjMaterial] = {}
+    now = ObjMaterial()
     for line in decoded(read_bytes(file, 2**24)).split("\n"):
         words = line.split()
         if not words:
             continue
         values = [parse_number(w) for w in words[1:4]]
         if words[0] == "newmtl":
-            now = materials.setdefault(" ".join(words[1:]), Material())
+            now = materials.setdefault(" ".join(words[1:]), ObjMaterial())
         elif words[0] == "Kd" and values and None not in values:
             grey = (values * 3)[:3] if len(values) == 1 else values  # one number stands for all three
             if len(grey) == 3:

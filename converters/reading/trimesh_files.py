@@ -14,8 +14,8 @@ import trimesh
 from trimesh.resolvers import Resolver
 
 from ..base.text import without_mark
-from .geometry_parts import Geometry, MeshContent, MeshSource, Placed
-from .looks import Look
+from .geometry_parts import Geometry, MeshContent, MeshSource, PlacedGeometry
+from .looks import SurfaceLook
 from .mesh_limits import MeshError, check_faces
 
 
@@ -80,7 +80,7 @@ def _with_trimesh(raw: bytes, file_type: str, source: MeshSource) -> MeshContent
             colours = np.asarray(visual.vertex_colors, dtype=float) / 255.0
         image = None if textures is None or files.image is None else textures.file(files.image)
         found = Geometry(np.asarray(geometry.vertices), np.asarray(geometry.faces), uv, colours)
-        placed.append(Placed(found, np.eye(4), Look(None, image)))
+        placed.append(PlacedGeometry(found, np.eye(4), SurfaceLook(None, image)))
     return MeshContent(placed)
 
 

@@ -40,7 +40,7 @@ def read_urdf(
     """Reads an object's URDF and its meshes (unscaled, link frames); metadata is left empty.
 
     Args:
-      file: the URDF. If `<stem>_simplified.urdf` stands beside it, that one is read (iGibson's dataset format).
+      file: the URDF. If `<stem>_simplified.urdf` stands next to it, that one is read (iGibson's dataset format).
       category, model: what the object is called.
       root: the dataset root (dataset mode): every mesh must lie below it, absolute paths are refused.
         None (plain URDF): meshes may lie below the URDF's folder or its package's root.

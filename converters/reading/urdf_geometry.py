@@ -16,7 +16,7 @@ from ..base.file_access import FileGuard
 from ..base.transforms import read_origin
 from ..base.xml_reader import Element, local_name, number, numbers, shortened, where
 from .geometry_parts import MeshPart
-from .looks import Look, TextureReader, encrypted_twin, is_encrypted
+from .looks import SurfaceLook, TextureReader, encrypted_twin, is_encrypted
 from .mesh_files import read_collision, read_visual
 from .mesh_limits import MeshError
 from .urdf_materials import UrdfMaterials
@@ -165,10 +165,10 @@ class GeometryReader:
         return float(x), float(y), float(z)
 
 
-def _drawn(part: MeshPart, look: Look, textures: TextureReader) -> Look:
+def _drawn(part: MeshPart, look: SurfaceLook, textures: TextureReader) -> SurfaceLook:
     """What a part of a mesh file is drawn in: its own look, else the URDF's."""
     if part.rgba is not None or part.texture is not None:
-        return Look(part.rgba, part.texture)
+        return SurfaceLook(part.rgba, part.texture)
     if look.texture is not None and part.uv is None:
         return textures.flat(look)
     return look

@@ -10,7 +10,7 @@ import numpy as np
 from ..base.description import Rgba
 from ..base.file_access import FileGuard
 from ..base.xml_reader import Element, parse_number, shortened, where
-from .looks import Look, TextureReader
+from .looks import SurfaceLook, TextureReader
 
 
 class UrdfMaterials:
@@ -22,7 +22,7 @@ class UrdfMaterials:
 
     def __init__(self, robot: Element, guard: FileGuard, warnings: list[str]):
         self._guard, self._warnings = guard, warnings
-        self._named: dict[str, Look] = {}
+        self._named: dict[str, SurfaceLook] = {}
         inside = (m for link in robot.iterfind("link") for m in link.iterfind("visual/material"))
         for material in (*robot.iterfind("material"), *inside):
             name = (material.get("name") or "").strip()
@@ -30,35 +30,35 @@ class UrdfMaterials:
                 continue
             look = self._own(material)
             known = self._named.setdefault(name, look)
-            if look != known and look != Look():
-                if known == Look():
+            if look != known and look != SurfaceLook():
+                if known == SurfaceLook():
                     self._named[name] = look
                 else:
                     text = f"material '{shortened(name)}' is defined more than once: each visual keeps its own"
                     self._warn(text)
 
-    def look(self, visual: Element) -> Look:
+    def look(self, visual: Element) -> SurfaceLook:
         """The look of a <visual>: its own material's, else that of the material it names; nothing where it has none."""
         material = visual.find("material")
         if material is None:
-            return Look()
+            return SurfaceLook()
         name = (material.get("name") or "").strip()
         own = self._own(material)
-        if own != Look():
+        if own != SurfaceLook():
             return own
         if name in self._named:
             return self._named[name]
         if name:
             self._warn(f"material '{shortened(name)}' is not defined: drawn without it")
-        return Look()
+        return SurfaceLook()
 
-    def _own(self, material: Element) -> Look:
+    def _own(self, material: Element) -> SurfaceLook:
         rgba, texture = self._colour(material), material.find("texture")
         named = None if texture is None else (texture.get("filename") or "").strip()
         if not named:
-            return Look(rgba)
+            return SurfaceLook(rgba)
         reader = TextureReader(self._guard, where(material), self._guard.folder, self._warnings)
-        return Look(rgba, reader.file(named))
+        return SurfaceLook(rgba, reader.file(named))
 
     def _colour(self, material: Element) -> Rgba | None:
         """<color rgba> of a <material>, clipped to 0..1; three numbers are opaque; an alpha of 0 is drawn as 1."""

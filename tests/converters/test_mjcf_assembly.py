@@ -12,7 +12,7 @@ from ig2mj_converters.base.description import Inertial, Joint, Link, Metadata, M
 from ig2mj_converters.base.naming import NamePool, file_slug
 from ig2mj_converters.bodies.assembly import MIN_MASS, assemble, extent, merge_inertials
 from ig2mj_converters.bodies.joint_limits import joint_range
-from ig2mj_converters.hulls.pieces import Piece
+from ig2mj_converters.hulls.pieces import HullPiece
 from ig2mj_converters.mjcf.model_builder import ModelBuilder
 from ig2mj_converters.mjcf.object import add_object
 from scipy.spatial.transform import Rotation
@@ -24,9 +24,9 @@ def at(x, y, z) -> np.ndarray:
     return pose
 
 
-def hull(size=(0.1, 0.1, 0.1), centre=(0.0, 0.0, 0.0)) -> Piece:
+def hull(size=(0.1, 0.1, 0.1), centre=(0.0, 0.0, 0.0)) -> HullPiece:
     mesh = trimesh.creation.box(size, transform=at(*centre))
-    return Piece("box", np.asarray(mesh.vertices), np.asarray(mesh.faces), pose=at(*centre), size=tuple(size))
+    return HullPiece("box", np.asarray(mesh.vertices), np.asarray(mesh.faces), pose=at(*centre), size=tuple(size))
 
 
 def joint(name, kind, parent, child, xyz=(0, 0, 0), axis=(0, 0, 1), lower=0.0, upper=1.0, **more) -> Joint:

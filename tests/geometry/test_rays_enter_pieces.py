@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from ig2mj.geometry import poses, rays
-from ig2mj.geometry.hulls import point_in_piece
+from ig2mj.geometry.hulls import signed_depth
 from ig2mj.geometry.rays import capsule_interval, cylinder_interval, enters, polyhedron_interval, sphere_interval
 from ig2mj.scene.tables import PieceKind
 
@@ -46,8 +46,8 @@ def test_entries_are_mujocos_hits_without_those_from_inside(shapes, seed):
     lengths = rng.uniform(0.1, 1.0, NUM_RAYS).astype(np.float32)
     t = np.asarray(hit_pieces(origins, directions, lengths, pos, quat, shapes.kind, shapes.size, shapes.planes))
     local = poses.quat_rotate_inverse(quat[None], origins[:, None] - pos[None])
-    depth_in = np.asarray(point_in_piece(shapes.kind, shapes.size, shapes.planes, local, 1e-4))
-    depth_out = ~np.asarray(point_in_piece(shapes.kind, shapes.size, shapes.planes, local, -1e-4))
+    depth = np.asarray(signed_depth(shapes.kind, shapes.size, shapes.planes, local))
+    depth_in, depth_out = depth >= -1e-4, ~(depth >= 1e-4)
     for r in range(NUM_RAYS):
         for k in range(shapes.count):
             if depth_in[r, k] and depth_out[r, k]:

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from ig2mj.sampling.columns import CELL, ColumnMap, Window, piece_columns
-from ig2mj.scene.pieces import make_pieces
+from ig2mj.sampling.columns import CELL, ColumnMap, ColumnWindow, piece_columns
+from ig2mj.scene.convex_pieces import make_convex_pieces
 from ig2mj.scene.scene import load_scene
 from ig2mj.scene.tables import SceneTables
 
@@ -91,7 +91,7 @@ def one_geom(tables: SceneTables, kind: str, size: str) -> tuple[SceneTables, mu
     model = mujoco.MjModel.from_xml_string(
         f'<mujoco><worldbody><body><geom type="{kind}" size="{size}"/></body></worldbody></mujoco>'
     )
-    (piece,) = make_pieces(model, np.array([0]))
+    (piece,) = make_convex_pieces(model, np.array([0]))
     only = dataclasses.replace(
         tables,
         piece_geom=np.array([0]),
@@ -111,7 +111,7 @@ def test_a_level_tells_surface_owner_and_ceiling(home):
     scene, _data, columns = home
     table = scene.object_index("breakfast_table_0")
     low, high = columns.box(table)
-    middle = Window.around((low + high) / 2 - 0.05, (low + high) / 2 + 0.05)
+    middle = ColumnWindow.around((low + high) / 2 - 0.05, (low + high) / 2 + 0.05)
     others = [o for o in range(scene.tables.num_objects) if o not in (table, scene.object_index("floors"))]
     above = columns.level(middle, high[2] + 0.01, without=others)
     assert (above.owner == table).all()
@@ -139,9 +139,9 @@ def test_only_pieces_that_moved_are_computed_again(home):
 
 
 def test_windows_cover_their_boxes_and_meet_where_they_overlap():
-    window = Window.around(np.array([-0.004, 0.011]), np.array([0.021, 0.03]))
+    window = ColumnWindow.around(np.array([-0.004, 0.011]), np.array([0.021, 0.03]))
     assert (window.row, window.col, window.rows, window.cols) == (1, -1, 2, 4)
-    rows, cols, own_rows, own_cols = window.slices_in(Window(2, 0, 5, 5))
+    rows, cols, own_rows, own_cols = window.slices_in(ColumnWindow(2, 0, 5, 5))
     assert (rows, cols, own_rows, own_cols) == (slice(0, 1), slice(0, 3), slice(1, 2), slice(1, 4))
-    assert window.slices_in(Window(10, 10, 2, 2)) is None
+    assert window.slices_in(ColumnWindow(10, 10, 2, 2)) is None
     assert window.centres()[0][0] == pytest.approx(-CELL / 2)

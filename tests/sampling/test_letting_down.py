@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from ig2mj.sampling import drop
-from ig2mj.sampling.columns import CELL, Window
+from ig2mj.sampling.columns import CELL, ColumnWindow
 from ig2mj.sampling.drop import MARGIN, Balance, rest_at
 from ig2mj.sampling.many import make_sampler
 from ig2mj.sampling.possible import possible_origins
@@ -27,9 +27,9 @@ def case(query, name, support):
     half = 0.4
     shape = query.footprint(placed, np.array([np.cos(half), 0, 0, np.sin(half)]), np.zeros(2))
     low, high = query.box(bearer)
-    cells = Window.around(low[:2], high[:2])
+    cells = ColumnWindow.around(low[:2], high[:2])
     rows, cols = shape.underside.shape
-    window = Window(cells.row + shape.row, cells.col + shape.col, cells.rows + rows, cells.cols + cols)
+    window = ColumnWindow(cells.row + shape.row, cells.col + shape.col, cells.rows + rows, cells.cols + cols)
     level = query.level(window, float(high[2]) + 0.01, without=(placed,))
     every = np.arange(cells.rows * cells.cols)
     return level, shape, cells, cells.row + every // cells.cols, cells.col + every % cells.cols, (bearer,)

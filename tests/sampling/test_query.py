@@ -27,19 +27,6 @@ def test_rays_meet_the_table_from_above_and_nothing_from_the_sky(query):
     assert query.scene.object_names[hit[0]] != "floors"
 
 
-def test_penetration_at_other_poses_leaves_the_world_as_it_is(query):
-    apple, table = query.scene.object_index("apple_0"), query.scene.object_index("breakfast_table_0")
-    before = np.array(query.view.object_pos[0])
-    low, high = query.box(table)
-    inside = np.array([*(low + high)[:2] / 2, high[2] - 0.01])
-    poses = np.array([inside, [0.0, 0.0, 50.0], before[apple]])
-    deep = query.penetration_at(apple, poses, np.tile([1.0, 0.0, 0.0, 0.0], (3, 1)))
-    assert deep[0] > 0.005 and deep[1] == 0.0
-    assert np.array_equal(np.array(query.view.object_pos[0]), before)
-    with pytest.raises(ValueError, match="fixed"):
-        query.penetration_at(table, poses[:1], np.array([[1.0, 0.0, 0.0, 0.0]]))
-
-
 def test_a_probe_touches_what_is_there_and_passes_through_what_is_ignored(query):
     tables = query.scene.tables
     table = query.scene.object_index("breakfast_table_0")

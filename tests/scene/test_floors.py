@@ -10,9 +10,9 @@ import pytest
 
 import ig2mj
 import ig2mj.scene.scene as scenes
+from ig2mj.scene.convex_pieces import mesh_corners
 from ig2mj.scene.floors import DEPTH, TIME_CONSTANT, deepen_floors
 from ig2mj.scene.manifest import FORMAT_VERSION, Manifest, ObjectEntry
-from ig2mj.scene.pieces import mesh_corners
 from ig2mj.viewer.overview import home_overview
 
 HEXAGON = " ".join(

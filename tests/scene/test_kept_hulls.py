@@ -9,8 +9,8 @@ import pytest
 
 from ig2mj.process.compilation import CACHE_VARIABLE
 from ig2mj.scene import kept_hulls
+from ig2mj.scene.convex_pieces import hull_planes
 from ig2mj.scene.kept_hulls import FOLDER, hulls_of
-from ig2mj.scene.pieces import hull_planes
 
 RANDOM = np.random.default_rng(0)
 MESHES = [RANDOM.normal(size=(count, 3)) for count in (12, 40, 7)]

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import ig2mj
-from ig2mj.scene.pieces import hull_planes
+from ig2mj.scene.convex_pieces import hull_planes
 from ig2mj.scene.tables import LinkKind, PieceKind
 
 

@@ -165,7 +165,7 @@ class TurtleBotController:
         return jnp.asarray(view.agent.eye_pos)[:, self.agent], jnp.asarray(view.agent.eye_quat)[:, self.agent]
 
     def proprioception(self, view: PhysicsView, state: Float[Array, "W 0"]) -> Float[Array, "W 2"]:
-        """Speed forwards (m/s) and to the left (rad/s), reckoned from the wheels. (iGibson forgets the radius in the
+        """Speed forwards (m/s) and to the left (rad/s), computed from the wheels. (iGibson forgets the radius in the
         second one.)"""
         return wheel_odometry(view.agent.joint_vel[:, self._wheels], WHEEL_RADIUS, AXLE)
 

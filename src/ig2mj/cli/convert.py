@@ -15,7 +15,7 @@ from ig2mj.cli.common.conversion import DEFAULTS, Common, Flag, options_of
 from ig2mj.cli.convert_dataset import convert_dataset
 
 if TYPE_CHECKING:
-    from ig2mj_converters.base.outcome import Outcome
+    from ig2mj_converters.base.outcome import ConversionOutcome
 
 #: Exit status of a conversion that left models out (`--skip-missing`).
 SKIPPED = 3
@@ -141,7 +141,7 @@ def _progress(title: str) -> Iterator[Any]:
         yield lambda options: dataclasses.replace(options, progress=report)
 
 
-def _tell(outcome: Outcome, out: pathlib.Path, main_file: str, as_json: bool) -> int:
+def _tell(outcome: ConversionOutcome, out: pathlib.Path, main_file: str, as_json: bool) -> int:
     """Prints what was done and where it lies; the exit status."""
     from ig2mj.cli.common.printing import print_json
 

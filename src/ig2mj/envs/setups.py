@@ -55,7 +55,7 @@ class Control:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Setup:
+class EnvSetup:
     """See the module's text.
 
     Attributes:
@@ -83,7 +83,7 @@ def setup_activity(
     count: int | None,
     relaxed_thresholds: bool,
     control: Control,
-) -> Setup:
+) -> EnvSetup:
     """Of an activity. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
     task, body = place_robot(task, robot, drives=control.whole)
     name, control = robot if isinstance(robot, str) else robot.name, control.of(body)
@@ -91,7 +91,7 @@ def setup_activity(
     check_inside(task.name, scene)
     rules = rules_of(task, scene, relaxed_thresholds)
     controller = control.controller(body, scene)
-    return Setup(
+    return EnvSetup(
         scene,
         rules,
         lambda: pool if pool is not None else pool_of(task, split, count),
@@ -113,7 +113,7 @@ def setup_activity(
 
 def setup_navigation(
     task: NavigationTask, robot: str | TaskRobot, split: str, count: int | None, control: Control
-) -> Setup:
+) -> EnvSetup:
     """Of a navigation task. Arguments as of `ig2mj.make`; `count`: start states."""
     first = make_robot(robot) if isinstance(robot, str) else robot
     name, control = robot if isinstance(robot, str) else robot.name, control.of(first)
@@ -133,7 +133,7 @@ def setup_navigation(
         low = np.concatenate([c.action_low for c in controllers[1:]])
         high = np.concatenate([c.action_high for c in controllers[1:]])
         companions = wanderers(low.astype(np.float32), high.astype(np.float32))
-    return Setup(
+    return EnvSetup(
         scene,
         rules,
         lambda: starts.pool,
@@ -151,7 +151,7 @@ def setup_navigation(
 
 def setup_bddl(
     task: BddlTask, robot: str | TaskRobot, pool: Pool | None, split: str, count: int | None, control: Control
-) -> Setup:
+) -> EnvSetup:
     """Of an activity that BDDL defines. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
     body = make_robot(robot) if isinstance(robot, str) else robot
     if isinstance(robot, str) and not body.hand_count:
@@ -165,7 +165,7 @@ def setup_bddl(
     controller = control.controller(body, scene)
     objective = BddlObjective(task.objects_in(scene), goal, scene)
     actions = whole_actions(controller.action_names, controller.action_high)
-    return Setup(scene, rules.with_goal(goal), lambda: rows, (controller,), objective, actions)
+    return EnvSetup(scene, rules.with_goal(goal), lambda: rows, (controller,), objective, actions)
 
 
 def rules_of(task: Task, scene: Scene, relaxed_thresholds: bool = False) -> Rules:

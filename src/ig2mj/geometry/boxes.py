@@ -4,7 +4,7 @@ Tight: the smallest box around the object's pieces (`core_boxes`). iGibson's: pe
 in the link's frame, widened by Bullet's margin (`link_boxes`, made once), and then turned into the world, which makes
 it looser (`turned_boxes`; iGibson's aabb.py).
 
-`core_boxes` takes NumPy arrays, with `core_reaches` beside it for JAX; `turned_boxes` takes both and returns what it is
+`core_boxes` takes NumPy arrays, `core_reaches` JAX ones; `turned_boxes` takes both and returns what it is
 given.
 
 An object without pieces has the empty box, low = inf and high = -inf: no point is in it and its gap to any box is inf.
@@ -85,7 +85,7 @@ def core_reaches(
 ) -> Float[Array, "2 3 K W"]:
     """`core_boxes` in JAX, with worlds last: how far pieces reach against (-low) and along (high) the world's axes.
 
-    For GPUs: one kernel in which each thread goes through a piece's points, beside neighbours that read neighbouring
+    For GPUs: one kernel in which each thread goes through a piece's points, next to threads that read neighbouring
     numbers. Both sides are one maximum, since XLA stores what a minimum and a maximum share: of 585 pieces with 32
     points those were 225 kB a world. Gradients are finite, also of an upright cylinder.
     """

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Float, Int
 
 from ig2mj.geometry.poses import AnyArray, length, namespace, normalize
 from ig2mj.scene.tables import PieceKind
@@ -42,33 +42,6 @@ def signed_depth(
         [radius - length(point), radius - length(from_end), cylinder],
         polyhedron,
     )
-
-
-def point_in_piece(
-    kind: Int[AnyArray, "*#b"],
-    size: Float[AnyArray, "*#b 3"],
-    planes: Float[AnyArray, "*#b N 4"],
-    point: Float[AnyArray, "*#b 3"],
-    tolerance: float = 0.0,
-) -> Bool[AnyArray, "*b"]:
-    """Whether a point, in the piece's frame, lies in the piece or at most `tolerance` outside. False for NaN.
-
-    With a tolerance polyhedra grow by moving their faces outwards.
-    """
-    inside = signed_depth(kind, size, planes, point) >= -tolerance
-    return np.asarray(inside) if isinstance(inside, np.bool_) else inside  # NumPy's scalars are not arrays
-
-
-def support_point(
-    kind: Int[AnyArray, "*#b"],
-    size: Float[AnyArray, "*#b 3"],
-    vertices: Float[AnyArray, "*#b V 3"],
-    direction: Float[AnyArray, "*#b 3"],
-) -> Float[Array, "*b 3"]:
-    """A point of the piece that is farthest along `direction` (any length but zero), in the piece's frame."""
-    core = core_support(kind, size, vertices, direction)
-    rounding = core_radius(kind, size)[..., None]
-    return core + rounding * normalize(direction)
 
 
 def core_radius(kind: Int[AnyArray, "*#b"], size: Float[AnyArray, "*#b 3"]) -> Float[Array, "*b"]:

@@ -27,7 +27,7 @@ _LEVEL = 1e-9
 
 
 @dataclasses.dataclass(frozen=True)
-class Window:
+class ColumnWindow:
     """A rectangle of cells: first row and column of the world's grid, and how many. Cell (0, 0) touches the origin."""
 
     row: int
@@ -36,7 +36,7 @@ class Window:
     cols: int
 
     @classmethod
-    def around(cls, low: np.ndarray, high: np.ndarray, cell: float = CELL) -> Window:
+    def around(cls, low: np.ndarray, high: np.ndarray, cell: float = CELL) -> ColumnWindow:
         """The cells that a box from `low` to `high` (x, y, ..., metres) touches."""
         first = np.floor(np.asarray(low[:2], float) / cell).astype(int)
         last = np.ceil(np.asarray(high[:2], float) / cell).astype(int)
@@ -48,7 +48,7 @@ class Window:
         """x of the columns and y of the rows, metres."""
         return (self.col + np.arange(self.cols) + 0.5) * cell, (self.row + np.arange(self.rows) + 0.5) * cell
 
-    def slices_in(self, outer: Window) -> tuple[slice, slice, slice, slice] | None:
+    def slices_in(self, outer: ColumnWindow) -> tuple[slice, slice, slice, slice] | None:
         """Where this window and another overlap: rows and columns of the outer one, then of this one; None nowhere."""
         row0, row1 = max(self.row, outer.row), min(self.row + self.rows, outer.row + outer.rows)
         col0, col1 = max(self.col, outer.col), min(self.col + self.cols, outer.col + outer.cols)
@@ -66,7 +66,7 @@ class Window:
 class PieceColumns:
     """Where a piece begins and ends in each column of its window, metres; NaN where the column misses it."""
 
-    window: Window
+    window: ColumnWindow
     low: Float[np.ndarray, "R C"]
     high: Float[np.ndarray, "R C"]
 
@@ -82,7 +82,7 @@ def piece_columns(
       cell: side of a column, metres.
     """
     corners = tables.piece_vertices[piece] @ rotation.T + pos
-    window = Window.around(corners.min(0), corners.max(0), cell)
+    window = ColumnWindow.around(corners.min(0), corners.max(0), cell)
     x, y = window.centres(cell)
     x, y = x[None, :] - pos[0], y[:, None] - pos[1]
     kind, size = PieceKind(int(tables.piece_kind[piece])), tables.piece_size[piece]
@@ -158,7 +158,7 @@ class Level:
       ceiling: height of what is above, inf where there is nothing. blocked: the height is inside something.
     """
 
-    window: Window
+    window: ColumnWindow
     height: float
     surface: Float[np.ndarray, "R C"]
     owner: Int[np.ndarray, "R C"]
@@ -204,7 +204,7 @@ class ColumnMap:
             self._columns[piece] = found
         return found
 
-    def level(self, window: Window, height: float, without: Collection[int] = ()) -> Level:
+    def level(self, window: ColumnWindow, height: float, without: Collection[int] = ()) -> Level:
         """Looks up and down from a height in every column of a window.
 
         Args:
@@ -230,7 +230,7 @@ class ColumnMap:
                 ceiling[rows, cols] = np.where(lower, low, ceiling[rows, cols])
         return Level(window, height, surface, owner, ceiling, blocked)
 
-    def _near(self, window: Window, without: Collection[int]) -> list[int]:
+    def _near(self, window: ColumnWindow, without: Collection[int]) -> list[int]:
         """Pieces whose boxes overlap a window."""
         low = np.array([window.col, window.row]) * CELL
         high = np.array([window.col + window.cols, window.row + window.rows]) * CELL

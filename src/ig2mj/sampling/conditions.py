@@ -106,7 +106,7 @@ def bind(conditions: Sequence[Condition], tables: SceneTables, rng: np.random.Ge
 
 
 @dataclasses.dataclass(frozen=True)
-class Plan:
+class SamplingPlan:
     """The order of work.
 
     Attributes:
@@ -121,7 +121,7 @@ class Plan:
     states: tuple[Condition, ...]
 
 
-def order(conditions: Sequence[Condition]) -> Plan:
+def order(conditions: Sequence[Condition]) -> SamplingPlan:
     """Orders conditions by what depends on what.
 
     Raises:
@@ -146,7 +146,7 @@ def order(conditions: Sequence[Condition]) -> Plan:
         (n, tuple(sorted(where[n], key=lambda c: (not c.value, c.predicate == "on_floor")))) for n in names
     )
     rest = [c for c in conditions if not c.is_placement]
-    return Plan(
+    return SamplingPlan(
         joints=tuple(c for c in rest if c.predicate == "open"),
         placements=placements,
         states=tuple(sorted((c for c in rest if c.predicate != "open"), key=lambda c: c.predicate == "sliced")),

@@ -21,7 +21,7 @@ from jaxtyping import Float
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView
 from ig2mj.sampling.bystanders import Bystanders
-from ig2mj.sampling.columns import CELL, Window
+from ig2mj.sampling.columns import CELL, ColumnWindow
 from ig2mj.sampling.drop import Rest, origin, rest_at
 from ig2mj.sampling.footprint import Footprint
 from ig2mj.sampling.possible import possible_origins
@@ -82,7 +82,7 @@ Truth = Callable[[], bool]
 
 
 @dataclasses.dataclass(frozen=True)
-class Area:
+class PlacementArea:
     """Where an object may be put: what a rule (`on_top.py`, `inside.py`, ...) gives.
 
     Attributes:
@@ -106,7 +106,7 @@ class Area:
     holds_at_once: bool = False
 
 
-Areas = Callable[[Footprint, np.random.Generator], Iterator[Area]]
+Areas = Callable[[Footprint, np.random.Generator], Iterator[PlacementArea]]
 """A rule: areas to try for an object of a given footprint, the likely ones first; may be endless."""
 
 
@@ -202,7 +202,7 @@ class Placer:
         self.query.load(task.before)
         return False
 
-    def _try_area(self, task: _Task, quat: np.ndarray, shape: Footprint, area: Area, support: str) -> bool:
+    def _try_area(self, task: _Task, quat: np.ndarray, shape: Footprint, area: PlacementArea, support: str) -> bool:
         if not task.budget.spend():
             return False
         rest = self._candidates(task, shape, area, support)
@@ -221,11 +221,11 @@ class Placer:
             self.query.load(task.before)
         return False
 
-    def _candidates(self, task: _Task, shape: Footprint, area: Area, support: str) -> Rest:
+    def _candidates(self, task: _Task, shape: Footprint, area: PlacementArea, support: str) -> Rest:
         """Candidates that pass the tests on columns; first of a few cells drawn at random, else of many."""
-        cells = Window.around(area.low, area.high)
+        cells = ColumnWindow.around(area.low, area.high)
         rows, cols = shape.underside.shape
-        window = Window(cells.row + shape.row, cells.col + shape.col, cells.rows + rows, cells.cols + cols)
+        window = ColumnWindow(cells.row + shape.row, cells.col + shape.col, cells.rows + rows, cells.cols + cols)
         level = self.query.level(window, area.height, without=(task.object_index,))
         every = np.arange(cells.rows * cells.cols)
         if area.allowed is not None:
@@ -258,7 +258,7 @@ class Placer:
                 task.rejected["not supported"] += 1
         return Rest(*(getattr(rest, f.name)[good] for f in dataclasses.fields(Rest)))
 
-    def _let_go(self, task: _Task, pos: np.ndarray, quat: np.ndarray, area: Area, support: str) -> str:
+    def _let_go(self, task: _Task, pos: np.ndarray, quat: np.ndarray, area: PlacementArea, support: str) -> str:
         """Puts the object there and lets physics settle; the reason why that is no good, or ''."""
         query, placed = self.query, task.object_index
         exempt = task.others.touching[placed].copy()  # what lies on it may fall when it is taken away

@@ -1,8 +1,8 @@
 """`SceneQuery`: questions about one scene that need physics or collision geometry, answered by the native engine.
 
-Where are surfaces (`level`), what does a ray meet (`rays`), how deep do objects penetrate others, or would they at
-another pose (`penetration`, `penetration_at`), where does everything come to rest (`settle`)? Samplers and calibration
-ask; nothing above this package touches MuJoCo's data for them.
+Where are surfaces (`level`), what does a ray meet (`rays`), how deep do objects penetrate others
+(`penetration`), where does everything come to rest (`settle`)? Samplers and calibration ask; nothing above this package
+touches MuJoCo's data for them.
 
 Axes: W worlds, N candidates or rays, O objects.
 """
@@ -20,7 +20,7 @@ from ig2mj.engine.native.engine import NativeEngine, NativePhysics
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import PhysicsView
 from ig2mj.process import entry_point
-from ig2mj.sampling.columns import ColumnMap, Level, Window
+from ig2mj.sampling.columns import ColumnMap, ColumnWindow, Level
 from ig2mj.sampling.footprint import Footprint, footprint
 from ig2mj.sampling.overlap import Overlaps
 from ig2mj.sampling.probe import Probe, cast_rays
@@ -66,7 +66,7 @@ class SceneQuery:
         """Goes back to a state that `save` gave, also after a step in which the world was lost."""
         self.physics = self.engine.load(self.engine.current(self.physics), snapshot)
 
-    def level(self, window: Window, height: float, without: Collection[int] = ()) -> Level:
+    def level(self, window: ColumnWindow, height: float, without: Collection[int] = ()) -> Level:
         """What a window of vertical columns looks like from a height; see `ColumnMap.level`."""
         self._update_map()
         return self._map.level(window, height, without)
@@ -125,28 +125,6 @@ class SceneQuery:
     ) -> tuple[Int[np.ndarray, "K"], Float[np.ndarray, "K 3"], Float[np.ndarray, "K 4"]]:
         """What goes along when joints move; see `Overlaps.carried`."""
         return self._overlaps.carried(np.array(self._data.qpos), mask, target)
-
-    def penetration_at(
-        self, object_index: int, pos: Float[np.ndarray, "N 3"], quat: Float[np.ndarray, "N 4"]
-    ) -> Float[np.ndarray, "N"]:
-        """How deep a movable object would stand in others if its main body were at each of these poses, metres.
-
-        World frame, w-x-y-z. The world stays as it is.
-
-        Raises:
-          ValueError: the object is fixed.
-        """
-        model = self.scene.model
-        joint = int(model.body_jntadr[self.scene.tables.object_root[object_index]])
-        if joint < 0 or model.jnt_type[joint] != mujoco.mjtJoint.mjJNT_FREE:
-            raise ValueError(f"'{self.scene.object_names[object_index]}' is fixed")
-        address = int(model.jnt_qposadr[joint])
-        qpos = np.array(self._data.qpos)
-        found = np.zeros(len(pos))
-        for n, (place, turn) in enumerate(zip(pos, quat, strict=True)):
-            qpos[address : address + 3], qpos[address + 3 : address + 7] = place, turn
-            found[n] = self._overlaps.deepest(qpos)[object_index]
-        return found
 
     def rays(
         self, origin: Float[np.ndarray, "3"], directions: Float[np.ndarray, "N 3"]

@@ -2,7 +2,7 @@
 
 Joints first (those of an object that is to be placed, once it stands), then placements from supports to what they bear,
 then states that need no place. What is settled is kept; where an object finds no place, the one before it is placed
-anew. At the end everything is checked together: all conditions hold, everything sleeps, no object penetrates another.
+again. At the end everything is checked together: all conditions hold, everything sleeps, no object penetrates another.
 """
 
 from __future__ import annotations

@@ -9,8 +9,8 @@ import numpy as np
 
 from ig2mj.errors import ManifestError
 from ig2mj.scene.agent_tables import agent_columns
+from ig2mj.scene.convex_pieces import make_convex_pieces
 from ig2mj.scene.manifest import Manifest, ObjectEntry
-from ig2mj.scene.pieces import make_pieces
 from ig2mj.scene.rooms import Rooms
 from ig2mj.scene.tables import LinkKind, SceneTables
 
@@ -169,7 +169,7 @@ def _piece_columns(model: mujoco.MjModel, geom_object: np.ndarray, file: object)
     collides = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
     geoms = np.flatnonzero(collides & (geom_object >= 0))
     try:
-        pieces = make_pieces(model, geoms)
+        pieces = make_convex_pieces(model, geoms)
     except ValueError as e:
         raise ManifestError(
             file,

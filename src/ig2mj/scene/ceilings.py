@@ -1,7 +1,7 @@
 """The solid ceiling of a home: one box over its walls that nobody sees, so that nothing flies out over them.
 
 Homes are converted with ceilings that everything passes. This one belongs to the compiled model only
-(`scene/unseen.py`). `docs/notes/lost.md`.
+(`scene/invisible_colliders.py`). `docs/notes/lost.md`.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float
 
 from ig2mj.scene.floors import DEPTH, building_parts, rotation_of
+from ig2mj.scene.invisible_colliders import add_invisible_colliders
 from ig2mj.scene.manifest import Manifest, ObjectEntry
-from ig2mj.scene.unseen import add_unseen
 
 CEILING = "solid_ceiling"
 """Name of its body."""
@@ -50,7 +50,7 @@ def add_ceiling(spec: mujoco.MjSpec, manifest: Manifest) -> None:
         if _meet(low, high, corners.min(0)[:2], corners.max(0)[:2]):
             top = max(top, corners[:, 2].max() + CLEARANCE)
     box = np.array([[*low, top], [*high, top + DEPTH]])
-    add_unseen(spec, CEILING, [box], walls[0].geom)
+    add_invisible_colliders(spec, CEILING, [box], walls[0].geom)
 
 
 def corners_of(spec: mujoco.MjSpec, entry: ObjectEntry) -> Float[np.ndarray, "8 3"]:

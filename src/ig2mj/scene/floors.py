@@ -16,8 +16,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from ig2mj.scene.convex_pieces import mesh_corners
 from ig2mj.scene.manifest import Manifest
-from ig2mj.scene.pieces import mesh_corners
 
 DEPTH = 1.0
 """Metres from a floor's surface to its underside, at least, where no room is below it."""

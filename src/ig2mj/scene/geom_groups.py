@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 VISIBLE_GROUPS = (0, 1, 2)
-"""Groups that pictures and sensors show unless asked otherwise, as in MuJoCo's viewer."""
+"""Groups that images and sensors show unless asked otherwise, as in MuJoCo's viewer."""
 
 COLLISION_GROUP = 3
 """What collides and is drawn by other geoms, or not at all."""

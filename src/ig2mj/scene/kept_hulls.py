@@ -30,7 +30,7 @@ def hulls_of(meshes: Sequence[np.ndarray], make: Callable[[np.ndarray], Hull], s
 
     Args:
       meshes: points [n, 3] of each.
-      source: the file with `make`; with another text hulls are made anew, and so they are with other versions of SciPy
+      source: the file with `make`; with another text hulls are made again, and so they are with other versions of SciPy
         and NumPy.
     """
     if not meshes:

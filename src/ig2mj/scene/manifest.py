@@ -1,6 +1,6 @@
 """`manifest.json`: everything about a scene that MJCF cannot say. Schema, reading, writing.
 
-The manifest stands beside `scene.xml`. Names in it are names of MJCF elements. Quaternions are w, x, y, z; lengths
+The manifest stands next to `scene.xml`. Names in it are names of MJCF elements. Quaternions are w, x, y, z; lengths
 metres; masses kilograms; joint positions radians or metres.
 """
 

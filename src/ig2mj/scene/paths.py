@@ -16,7 +16,7 @@ SHIPPED_HOMES = next(
     (folder for folder in (_HERE.parents[3] / "scenes_mjcf", _HERE.parents[2] / "ig2mj_scenes") if folder.is_dir()),
     _HERE.parents[2] / "ig2mj_scenes",
 )
-"""Homes that come with the project: the folder of a checkout, or the one beside an installed package. `load_scene`
+"""Homes that come with the project: the folder of a checkout, or the one next to an installed package. `load_scene`
 finds them by their bare names."""
 
 _FIX = "give the folder that `ig2mj convert` wrote"

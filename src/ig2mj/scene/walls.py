@@ -16,8 +16,8 @@ from jaxtyping import Float
 
 from ig2mj.scene.ceilings import corners_of
 from ig2mj.scene.floors import DEPTH, LEVEL, TIME_CONSTANT, BuildingPart, building_parts, rotation_of
+from ig2mj.scene.invisible_colliders import add_invisible_colliders
 from ig2mj.scene.manifest import Manifest, ObjectEntry
-from ig2mj.scene.unseen import add_unseen
 
 THIN = 0.5
 """Metres: walls are no thicker. A box that is thicker both ways is a pillar."""
@@ -54,7 +54,7 @@ def deepen_walls(spec: mujoco.MjSpec, manifest: Manifest) -> None:
         if not any(_opens_into(spec, entry, pane, axis, side) for entry in manifest.objects if entry.joints)
     ]
     if pattern is not None and panes:
-        add_unseen(spec, PANES, panes, pattern)
+        add_invisible_colliders(spec, PANES, panes, pattern)
 
 
 def _deepened(part: BuildingPart, kept_free: list[Box], added: dict[tuple[int, int], list[Box]]) -> Box | None:

@@ -1,7 +1,7 @@
 """`mixed_pool`: many start states from some, for training: every object lies where it does in one row of a pool, turned
 as it is in another.
 
-Who is trained on some thousand start states with pictures learns them by heart. Sampling more takes minutes of all
+Who is trained on some thousand start states with images learns them by heart. Sampling more takes minutes of all
 processors, a mixture a second, and a row of it holds only where the task's objects are. What an object does not show is
 what it rests on: mixed are tasks whose objects all lie on one level thing, where nothing but their places differs.
 
@@ -24,7 +24,7 @@ from ig2mj.scene.scene import Scene
 from ig2mj.tasks.task import Task
 from ig2mj.worlds.pool import Pool
 
-APART = 0.005
+SEPARATION = 0.005
 """m: objects whose boxes are nearer to each other than this are not put there."""
 
 MOST_TRIES = 50
@@ -134,7 +134,7 @@ Box = tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 3 3"], Float[np.ndarr
 
 
 def _meet(one: Box, other: Box) -> Bool[np.ndarray, "N"]:
-    """Whether two boxes are nearer than `APART`, seen from above.
+    """Whether two boxes are nearer than `SEPARATION`, seen from above.
 
     Two convex outlines are apart where one of their sides has the other wholly beyond it; of boxes any edge may be a
     side.
@@ -149,5 +149,5 @@ def _meet(one: Box, other: Box) -> Bool[np.ndarray, "N"]:
                 for _, box_matrix, half in (one, other)
             )
             gap = np.abs((offset * side).sum(-1)) - reach
-            apart |= (size > 1e-3) & (gap > APART * size)
+            apart |= (size > 1e-3) & (gap > SEPARATION * size)
     return ~apart

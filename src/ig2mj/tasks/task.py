@@ -9,25 +9,18 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Collection, Mapping
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol, runtime_checkable
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
 from ig2mj.agents.registry import make_robot
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.tasks.points import Hand, Point
 
-if TYPE_CHECKING:
-    from ig2mj.tasks.experts.motion import Wish
-    from ig2mj.tasks.experts.sight import Sight
-
 HORIZON = 200
 """Agent steps of 1/10 s in an episode: 20 s (paper, appendix A.3)."""
 
 GROUND = ("floors", "carpet", "mat", "rug")
 """Categories that count as the floor: a robot that touches them has not run into anything."""
-
-Plan = Callable[["Sight"], "list[Wish]"]
-"""Of an expert: from what it sees to what each acting hand should do now."""
 
 Vector3 = tuple[float, float, float]
 
@@ -148,8 +141,8 @@ class Task:
       robots: name of each robot that it is made for, and how it takes part (others: `place_robot`).
       horizon: agent steps until an episode is truncated. grasping: mode unless another is asked for.
       physical: what is different with "physical" grasping; None: nothing.
-      expert: what each acting hand should do now, a function of this module's file that is pure and batched
-        (`ig2mj.tasks.experts`); None: the task has no scripted expert.
+      expert: from a `tasks.experts.sight.ExpertView` to a list of one `tasks.experts.motion.HandMotion` for each acting
+        hand: what it should do now. Pure and batched. None: the task has no scripted expert.
     """
 
     name: str
@@ -169,7 +162,7 @@ class Task:
     grasping: str = "mitten"
     # Not in the text that recordings know a task by: where it applies, it shows in `objects` and `near`.
     physical: Physical | None = dataclasses.field(default=None, repr=False)
-    expert: Plan | None = dataclasses.field(default=None, repr=False)
+    expert: Callable[..., Any] | None = dataclasses.field(default=None, repr=False)
     depth_range: ClassVar[float] = 3.0
     """m from the camera within which everything lies that matters: an arm's reach and the furniture around it."""
 

@@ -19,7 +19,7 @@ FINGER_HALF, FINGER_Y = (0.032, 0.0065, 0.0125), 0.0085
 
 
 @dataclasses.dataclass(frozen=True)
-class Look:
+class FetchMaterials:
     """Names of materials."""
 
     white: str
@@ -28,7 +28,7 @@ class Look:
     dark: str
 
     @classmethod
-    def of(cls, spec: mujoco.MjSpec, name: str) -> Look:
+    def of(cls, spec: mujoco.MjSpec, name: str) -> FetchMaterials:
         return cls(
             material(spec, f"{name}/white", (0.93, 0.93, 0.94), 0.7, 0.5),
             material(spec, f"{name}/grey", (0.36, 0.36, 0.38), 0.5, 0.4),
@@ -37,12 +37,12 @@ class Look:
         )
 
 
-def draw_link(body: mujoco.MjsBody, link: str, look: Look) -> None:
+def draw_link(body: mujoco.MjsBody, link: str, look: FetchMaterials) -> None:
     """Adds a link's collision and visual geoms to its body."""
     DRAWINGS[link](body, look)
 
 
-def _base(body: mujoco.MjsBody, look: Look) -> None:
+def _base(body: mujoco.MjsBody, look: FetchMaterials) -> None:
     collision(body, CYLINDER, (0.275,), 0, (0, 0, 0.06), end=(0, 0, 0.35), friction=0.25)
     collision(body, BOX, (0.105, 0.155, 0.20), 0, (-0.155, 0, 0.56), friction=0.25)
     visual(body, CYLINDER, (0.268,), look.grey, (0, 0, 0.035), end=(0, 0, 0.19))
@@ -57,12 +57,12 @@ def _base(body: mujoco.MjsBody, look: Look) -> None:
     visual(body, CYLINDER, (0.020,), look.blue, (-0.125, 0.215, 0.34), end=(-0.125, 0.215, 0.372))
 
 
-def _wheel(body: mujoco.MjsBody, look: Look) -> None:
+def _wheel(body: mujoco.MjsBody, look: FetchMaterials) -> None:
     visual(body, CYLINDER, (0.0605,), look.dark, (0, -0.02, 0), end=(0, 0.02, 0))
     visual(body, CYLINDER, (0.035,), look.blue, (0, -0.022, 0), end=(0, 0.022, 0))
 
 
-def _torso(body: mujoco.MjsBody, look: Look) -> None:
+def _torso(body: mujoco.MjsBody, look: FetchMaterials) -> None:
     collision(body, BOX, (0.095, 0.14, 0.17), 0, (0.0, 0, 0.43), friction=0.25)
     visual(body, BOX, (0.075, 0.115, 0.21), look.dark, (-0.03, 0, 0.14))  # bellows
     visual(body, BOX, (0.085, 0.125, 0.13), look.white, (0.0, 0, 0.42))
@@ -73,7 +73,7 @@ def _torso(body: mujoco.MjsBody, look: Look) -> None:
     visual(body, BOX, (0.055, 0.05, 0.03), look.white, (0.03, 0, 0.56))
 
 
-def _head_pan(body: mujoco.MjsBody, look: Look) -> None:
+def _head_pan(body: mujoco.MjsBody, look: FetchMaterials) -> None:
     collision(body, BOX, (0.11, 0.125, 0.06), 0, (0.07, 0, 0.06), friction=0.25)
     visual(body, CYLINDER, (0.06,), look.grey, (0.0, 0, 0.0), end=(0.0, 0, 0.035))
     visual(body, ELLIPSOID, (0.115, 0.105, 0.045), look.grey, (0.055, 0, 0.045))
@@ -81,7 +81,7 @@ def _head_pan(body: mujoco.MjsBody, look: Look) -> None:
         visual(body, CAPSULE, (0.026,), look.grey, (0.06, 0.095 * side, 0.045), end=(0.1425, 0.115 * side, 0.058))
 
 
-def _head_tilt(body: mujoco.MjsBody, look: Look) -> None:
+def _head_tilt(body: mujoco.MjsBody, look: FetchMaterials) -> None:
     visual(body, CAPSULE, (0.036,), look.blue, (0, -0.078, 0.0), end=(0, 0.078, 0.0))
     visual(body, BOX, (0.018, 0.09, 0.018), look.dark, (0.033, 0, 0.0225))
     for y in (-0.045, 0.02, 0.045):
@@ -91,7 +91,7 @@ def _head_tilt(body: mujoco.MjsBody, look: Look) -> None:
 def _tube(radius: float, length: float, colour: str, from_x: float = 0.0):
     """An arm link along x: a tube with a rounded joint at its beginning."""
 
-    def draw(body: mujoco.MjsBody, look: Look) -> None:
+    def draw(body: mujoco.MjsBody, look: FetchMaterials) -> None:
         collision(body, CAPSULE, (radius,), 0, (from_x, 0, 0), end=(length - radius, 0, 0), friction=0.5)
         visual(body, CAPSULE, (radius,), getattr(look, colour), (from_x, 0, 0), end=(length - radius, 0, 0))
 
@@ -101,7 +101,7 @@ def _tube(radius: float, length: float, colour: str, from_x: float = 0.0):
 def _elbow(radius: float, length: float, colour: str):
     """An arm link along x that turns about y: a disc across, then a tube."""
 
-    def draw(body: mujoco.MjsBody, look: Look) -> None:
+    def draw(body: mujoco.MjsBody, look: FetchMaterials) -> None:
         own = getattr(look, colour)
         collision(body, CAPSULE, (radius,), 0, (0, 0, 0), end=(length - radius, 0, 0), friction=0.5)
         visual(body, CYLINDER, (radius * 1.08,), own, (0, -radius * 1.02, 0), end=(0, radius * 1.02, 0))
@@ -111,18 +111,18 @@ def _elbow(radius: float, length: float, colour: str):
     return draw
 
 
-def _shoulder_pan(body: mujoco.MjsBody, look: Look) -> None:
+def _shoulder_pan(body: mujoco.MjsBody, look: FetchMaterials) -> None:
     collision(body, CAPSULE, (0.065,), 0, (0, 0, 0.045), end=(0.117, 0, 0.06), friction=0.5)
     visual(body, CYLINDER, (0.078,), look.white, (0, 0, 0.0), end=(0, 0, 0.075))
     visual(body, ELLIPSOID, (0.078, 0.078, 0.025), look.white, (0, 0, 0.075))
     visual(body, CAPSULE, (0.055,), look.white, (0, 0, 0.045), end=(0.09, 0, 0.06))
 
 
-def _wrist_roll(body: mujoco.MjsBody, look: Look) -> None:
+def _wrist_roll(body: mujoco.MjsBody, look: FetchMaterials) -> None:
     visual(body, CYLINDER, (0.036,), look.white, (-0.01, 0, 0), end=(0.03, 0, 0))
 
 
-def _gripper(body: mujoco.MjsBody, look: Look) -> None:
+def _gripper(body: mujoco.MjsBody, look: FetchMaterials) -> None:
     collision(body, BOX, (0.045, 0.06, 0.035), 0, (-0.085, 0, 0), friction=0.5)
     visual(body, BOX, (0.035, 0.058, 0.030), look.dark, (-0.080, 0, 0))
     visual(body, ELLIPSOID, (0.055, 0.062, 0.036), look.grey, (-0.098, 0, 0))
@@ -131,7 +131,7 @@ def _gripper(body: mujoco.MjsBody, look: Look) -> None:
 
 
 def _finger(sign: float):
-    def draw(body: mujoco.MjsBody, look: Look) -> None:
+    def draw(body: mujoco.MjsBody, look: FetchMaterials) -> None:
         middle = -sign * FINGER_Y
         collision(body, BOX, FINGER_HALF, 0, (0, middle, 0), friction=FINGER_FRICTION)
         visual(body, BOX, FINGER_HALF, look.grey, (0, middle, 0))

@@ -14,7 +14,7 @@ from ig2mj.agents.kinematics import Chain
 
 
 @dataclasses.dataclass(frozen=True)
-class Joint:
+class FetchJoint:
     """A joint and the link it moves.
 
     Attributes:
@@ -63,40 +63,41 @@ _HEAD = {"slides": False, "velocity": 1.57, "damping": 0.1}
 
 # fmt: off
 JOINTS = (
-    Joint("r_wheel_joint", "r_wheel_link", "base_link", (0.0012914, -0.18738, 0.055325), **_WHEEL),
-    Joint("l_wheel_joint", "l_wheel_link", "base_link", (0.0012914, 0.18738, 0.055325), **_WHEEL),
-    Joint("torso_lift_joint", "torso_lift_link", "base_link", (-0.086875, 0.0, 0.37743), "z", True, 0.0, 0.38615,
+    FetchJoint("r_wheel_joint", "r_wheel_link", "base_link", (0.0012914, -0.18738, 0.055325), **_WHEEL),
+    FetchJoint("l_wheel_joint", "l_wheel_link", "base_link", (0.0012914, 0.18738, 0.055325), **_WHEEL),
+    FetchJoint("torso_lift_joint", "torso_lift_link", "base_link", (-0.086875, 0.0, 0.37743), "z", True, 0.0, 0.38615,
           450.0, 0.1, 100.0, 10.7796, (-0.0013, -0.0009, 0.2935),
           (0.3354, 0.0, -0.0162, 0.3354, -0.0006, 0.0954), 30.0),
-    Joint("head_pan_joint", "head_pan_link", "torso_lift_link", (0.053125, 0.0, 0.603001), "z",
+    FetchJoint("head_pan_joint", "head_pan_link", "torso_lift_link", (0.053125, 0.0, 0.603001), "z",
           lower=-1.57, upper=1.57, effort=0.32, mass=2.2556, com=(0.0321, 0.0161, 0.0390),
           inertia=(0.0129, 0.0002, 0.0007, 0.0095, 0.0, 0.0184), moved=0.05, **_HEAD),
-    Joint("head_tilt_joint", "head_tilt_link", "head_pan_link", (0.14253, 0.0, 0.057999), "y",
+    FetchJoint("head_tilt_joint", "head_tilt_link", "head_pan_link", (0.14253, 0.0, 0.057999), "y",
           lower=-0.76, upper=1.45, effort=0.68, mass=0.9087, com=(0.0081, 0.0025, 0.0113),
           inertia=(0.0061, 0.0, 0.0002, 0.0014, -0.0001, 0.0061), moved=0.05, **_HEAD),
-    Joint("shoulder_pan_joint", "shoulder_pan_link", "torso_lift_link", (0.119525, 0.0, 0.34858), "z", False,
+    FetchJoint("shoulder_pan_joint", "shoulder_pan_link", "torso_lift_link", (0.119525, 0.0, 0.34858), "z", False,
           -1.6056, 1.6056, 33.82, 1.256, 1.0, 2.5587, (0.0927, -0.0056, 0.0564),
           (0.0043, -0.0001, 0.001, 0.0087, -0.0001, 0.0087), 2.5),
-    Joint("shoulder_lift_joint", "shoulder_lift_link", "shoulder_pan_link", (0.117, 0.0, 0.06), "y", False,
+    FetchJoint("shoulder_lift_joint", "shoulder_lift_link", "shoulder_pan_link", (0.117, 0.0, 0.06), "y", False,
           -1.221, 1.518, 131.76, 1.454, 1.0, 2.6615, (0.1432, 0.0072, -0.0001),
           (0.0028, -0.0021, 0.0, 0.0111, 0.0, 0.0112), 2.5),
-    Joint("upperarm_roll_joint", "upperarm_roll_link", "shoulder_lift_link", (0.219, 0.0, 0.0), "x", False,
+    FetchJoint("upperarm_roll_joint", "upperarm_roll_link", "shoulder_lift_link", (0.219, 0.0, 0.0), "x", False,
           0.0, 0.0, 76.94, 1.571, 5.0, 2.3311, (0.1165, 0.0014, 0.0),
           (0.0019, -0.0001, 0.0, 0.0045, 0.0, 0.0047), 0.8),
-    Joint("elbow_flex_joint", "elbow_flex_link", "upperarm_roll_link", (0.133, 0.0, 0.0), "y", False,
+    FetchJoint("elbow_flex_joint", "elbow_flex_link", "upperarm_roll_link", (0.133, 0.0, 0.0), "y", False,
           -2.251, 2.251, 66.18, 1.521, 1.0, 2.1299, (0.1279, 0.0073, 0.0),
           (0.0024, -0.0016, 0.0, 0.0082, 0.0, 0.0084), 0.9),
-    Joint("forearm_roll_joint", "forearm_roll_link", "elbow_flex_link", (0.197, 0.0, 0.0), "x", False,
+    FetchJoint("forearm_roll_joint", "forearm_roll_link", "elbow_flex_link", (0.197, 0.0, 0.0), "x", False,
           0.0, 0.0, 29.35, 1.571, 5.0, 1.6563, (0.1097, -0.0266, 0.0),
           (0.0016, -0.0003, 0.0, 0.003, 0.0, 0.0035), 0.2),
-    Joint("wrist_flex_joint", "wrist_flex_link", "forearm_roll_link", (0.1245, 0.0, 0.0), "y", False,
+    FetchJoint("wrist_flex_joint", "wrist_flex_link", "forearm_roll_link", (0.1245, 0.0, 0.0), "y", False,
           -2.16, 2.16, 25.7, 2.268, 1.0, 1.725, (0.0882, 0.0009, -0.0001),
           (0.0018, -0.0001, 0.0, 0.0042, 0.0, 0.0042), 0.25),
-    Joint("wrist_roll_joint", "wrist_roll_link", "wrist_flex_link", (0.1385, 0.0, 0.0), "x", False,
+    FetchJoint("wrist_roll_joint", "wrist_roll_link", "wrist_flex_link", (0.1385, 0.0, 0.0), "x", False,
           0.0, 0.0, 7.36, 2.268, 5.0, 0.1354, (0.0095, 0.0004, -0.0002),
           (0.0001, 0.0, 0.0, 0.0001, 0.0, 0.0001), 0.05),
-    Joint("r_gripper_finger_joint", "r_gripper_finger_link", "gripper_link", (0.0, 0.015425, 0.0), "y", **_FINGER),
-    Joint("l_gripper_finger_joint", "l_gripper_finger_link", "gripper_link", (0.0, -0.015425, 0.0), "-y", **_FINGER),
+    FetchJoint("r_gripper_finger_joint", "r_gripper_finger_link", "gripper_link", (0.0, 0.015425, 0.0), "y", **_FINGER),
+    FetchJoint("l_gripper_finger_joint", "l_gripper_finger_link", "gripper_link", (0.0, -0.015425, 0.0), "-y",
+          **_FINGER),
 )
 # fmt: on
 """(The maker gives its fingers one axis of inertia only; theirs here are those of their shape.)"""
@@ -115,7 +116,7 @@ WHEELS, TRUNK, CAMERA_JOINTS, ARM, FINGERS = [0, 1], [2], [3, 4], [5, 6, 7, 8, 9
 CHAIN_JOINTS = TRUNK + ARM
 
 
-def _limits(joint: Joint) -> tuple[float, float]:
+def _limits(joint: FetchJoint) -> tuple[float, float]:
     return (joint.lower, joint.upper) if joint.lower < joint.upper else (-np.inf, np.inf)
 
 

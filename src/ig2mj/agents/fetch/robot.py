@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD
-from ig2mj.agents.fetch.appearance import Look, draw_link
+from ig2mj.agents.fetch.appearance import FetchMaterials, draw_link
 from ig2mj.agents.fetch.controller import FetchController
 from ig2mj.agents.fetch.figures import (
     ARM_POSES,
@@ -24,7 +24,7 @@ from ig2mj.agents.fetch.figures import (
     JOINTS,
     STIFFNESS,
     TORSO,
-    Joint,
+    FetchJoint,
     start_positions,
 )
 from ig2mj.agents.fetch.proprioception import LISTS
@@ -122,7 +122,7 @@ class Fetch(TaskRobot):
         if not self.pinned:
             base.add_freejoint(name=f"{self.name}/free")
         set_inertia(base, *_joined(BASE, TORSO))
-        look = Look.of(spec, self.name)
+        look = FetchMaterials.of(spec, self.name)
         draw_link(base, "base_link", look)
         for x, y in CASTERS:
             collision(base, GEOM.mjGEOM_SPHERE, (0.03,), 0, (x, y, 0.0245), frictionless=True)
@@ -152,7 +152,7 @@ class Fetch(TaskRobot):
         )
 
     def _add_link(
-        self, spec: mujoco.MjSpec, parent: mujoco.MjsBody, joint: Joint, q: float, look: Look
+        self, spec: mujoco.MjSpec, parent: mujoco.MjsBody, joint: FetchJoint, q: float, look: FetchMaterials
     ) -> mujoco.MjsBody:
         """The link at joint position `q`, which is the joint's reference; its servo."""
         kind, turned = mujoco.mjtJoint, np.array([1.0, 0.0, 0.0, 0.0])

@@ -31,7 +31,7 @@ from ig2mj.geometry.poses import length
 from ig2mj.scene.tables import SceneTables
 
 LEASH = 0.15
-"""rad or m, beside the way of two actions at full speed, that a servo's target may be ahead of its joint: a blocked arm
+"""rad or m, on top of two actions at full speed, that a servo's target may be ahead of its joint: a blocked arm
 does not push ever harder."""
 
 
@@ -166,7 +166,7 @@ class UrdfController:
         return jnp.asarray(view.agent.eye_pos)[:, self.agent], jnp.asarray(view.agent.eye_quat)[:, self.agent]
 
     def proprioception(self, view: PhysicsView, state: UrdfState) -> Float[Array, "W m"]:
-        """Speeds of the base reckoned from the wheels (m/s, rad/s); positions and velocities of arm and gripper; 1 with
+        """Speeds of the base computed from the wheels (m/s, rad/s); positions and velocities of arm and gripper; 1 with
         something in the hand, else -1."""
         agent, moving = view.agent, np.concatenate([self._arm, self._fingers])
         q, speed = jnp.asarray(agent.joint_pos), jnp.asarray(agent.joint_vel)

@@ -1,4 +1,4 @@
-"""`Description`: what `robot.json` says of a converted robot beside its MJCF (`ig2mj_converters.convert_robot`)."""
+"""`Description`: what `robot.json` says of a converted robot next to its MJCF (`ig2mj_converters.convert_robot`)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MAX_EFFORT, MAX_SPEED, MAX_WHEEL_SPEED = 100.0, 1.0, 15.0
 """N m or N, and rad/s or m/s, where the URDF gives none; rad/s of a joint without limits: iGibson's."""
 
 
-class JointEntry(msgspec.Struct, frozen=True):
+class RobotJoint(msgspec.Struct, frozen=True):
     """A joint that moves. parent, child: links; type: revolute, continuous, prismatic or floating.
 
     effort: N m or N. velocity: rad/s or m/s; 0 where the URDF gives none. mimics: the joint that it follows.
@@ -56,7 +56,7 @@ class Description(msgspec.Struct, frozen=True):
     format_version: int
     name: str
     base: str
-    joints: list[JointEntry]
+    joints: list[RobotJoint]
     frames: dict[str, FrameEntry]
 
     @classmethod
@@ -76,6 +76,6 @@ class Description(msgspec.Struct, frozen=True):
             name = above
         return name
 
-    def joint(self, name: str) -> JointEntry:
+    def joint(self, name: str) -> RobotJoint:
         """The joint of this name."""
         return next(joint for joint in self.joints if joint.name == name)

@@ -37,7 +37,7 @@ import tomllib
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from ig2mj.agents.urdf.description import Description, JointEntry
+from ig2mj.agents.urdf.description import Description, RobotJoint
 from ig2mj.errors import InputError, UnknownNameError
 from ig2mj.files.content import decode_json, read_text
 
@@ -240,13 +240,13 @@ def _words(name: str) -> set[str]:
     return {word.lower() for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])", name)}
 
 
-def _grips(joint: JointEntry) -> bool:
+def _grips(joint: RobotJoint) -> bool:
     """It opens and closes a gripper, and does not turn without end."""
     return joint.type != "continuous" and (_named(joint.name, GRIPS) or _named(joint.child, GRIPS))
 
 
 def _several(
-    robot: Description, free: Sequence[JointEntry], given: Mapping[str, Any], where: str
+    robot: Description, free: Sequence[RobotJoint], given: Mapping[str, Any], where: str
 ) -> tuple[Gripper, ...]:
     """Grippers given as such, or found on different hands; none where there is just one, or joints are given."""
     if "grippers" in given:
@@ -275,7 +275,7 @@ def hand_of(robot: Description, joint: str, gripper: Collection[str]) -> str:
     return link
 
 
-def _wheels(joints: Sequence[JointEntry]) -> list[str]:
+def _wheels(joints: Sequence[RobotJoint]) -> list[str]:
     """The driven wheels on the left, then those on the right, where there are as many."""
     rolling = [j.name for j in joints if j.type == "continuous" and "wheel" in j.name.lower()]
     rolling = [name for name in rolling if not _named(name, PASSIVE)]

@@ -8,7 +8,7 @@ import numpy as np
 
 from ig2mj.predicates.base import ANY_ROOM
 from ig2mj.sampling.footprint import Footprint
-from ig2mj.sampling.placement import Area, Areas
+from ig2mj.sampling.placement import Areas, PlacementArea
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.rules import on_floor, on_top
 
@@ -24,7 +24,7 @@ def areas(query: SceneQuery, placed: int, avoided: int) -> Areas:
     furniture = [int(o) for o in np.flatnonzero(fixed) if o != avoided and (tables.piece_object == o).any()]
     floor = on_floor.areas(query, placed, ANY_ROOM)
 
-    def elsewhere(shape: Footprint, rng: np.random.Generator) -> Iterator[Area]:
+    def elsewhere(shape: Footprint, rng: np.random.Generator) -> Iterator[PlacementArea]:
         for support in rng.permutation(furniture)[:FURNITURE]:
             yield from on_top.areas(query, placed, int(support))(shape, rng)
         yield from floor(shape, rng)

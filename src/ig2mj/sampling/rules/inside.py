@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ig2mj.sampling.footprint import Footprint
-from ig2mj.sampling.placement import Area, Areas
+from ig2mj.sampling.placement import Areas, PlacementArea
 from ig2mj.sampling.query import SceneQuery
 
 HEIGHTS = 6
@@ -17,11 +17,11 @@ HEIGHTS = 6
 def areas(query: SceneQuery, _: int, container: int) -> Areas:
     """The rule for putting something into `container`."""
 
-    def inside(shape: Footprint, rng: np.random.Generator) -> Iterator[Area]:
+    def inside(shape: Footprint, rng: np.random.Generator) -> Iterator[PlacementArea]:
         low, high = query.box(container)
         layer = (np.arange(HEIGHTS) + rng.uniform(size=HEIGHTS)) / HEIGHTS
         for part in rng.permutation(layer):
-            yield Area(
+            yield PlacementArea(
                 low[:2],
                 high[:2],
                 float(low[2] + part * (high[2] - low[2])),

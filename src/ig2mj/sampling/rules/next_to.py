@@ -8,7 +8,7 @@ import numpy as np
 
 from ig2mj.sampling.columns import CELL
 from ig2mj.sampling.footprint import Footprint
-from ig2mj.sampling.placement import Area, Areas
+from ig2mj.sampling.placement import Areas, PlacementArea
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.states.relations.nearness import SHARE_OF_SIZE
 
@@ -26,7 +26,7 @@ def beside(query: SceneQuery, neighbour: int, limit: float | None) -> Areas:
     tables = query.scene.tables
     supports = tuple(int(o) for o in np.flatnonzero(~tables.object_parked) if o != neighbour)
 
-    def strip(shape: Footprint, rng: np.random.Generator) -> Iterator[Area]:
+    def strip(shape: Footprint, rng: np.random.Generator) -> Iterator[PlacementArea]:
         low, high = query.box(neighbour)
         rows, cols = shape.underside.shape
         near = limit
@@ -42,6 +42,6 @@ def beside(query: SceneQuery, neighbour: int, limit: float | None) -> Areas:
 
         reach = near + max(rows, cols) * CELL
         for height in (low[2] + STEP, low[2] - STEP, high[2] + STEP):
-            yield Area(low[:2] - reach, high[:2] + reach, float(height), supports, allowed)
+            yield PlacementArea(low[:2] - reach, high[:2] + reach, float(height), supports, allowed)
 
     return strip

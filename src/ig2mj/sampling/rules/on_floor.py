@@ -10,7 +10,7 @@ import numpy as np
 from ig2mj.predicates.base import ANY_ROOM
 from ig2mj.sampling.columns import CELL
 from ig2mj.sampling.footprint import Footprint
-from ig2mj.sampling.placement import Area, Areas
+from ig2mj.sampling.placement import Areas, PlacementArea
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.scene.tables import SceneTables
 
@@ -62,13 +62,13 @@ def areas(query: SceneQuery, _: int, room: int) -> Areas:
     def allowed(row: np.ndarray, col: np.ndarray) -> np.ndarray:
         return _in_room(tables, row, col, room)
 
-    def on_floor(shape: Footprint, rng: np.random.Generator) -> Iterator[Area]:
+    def on_floor(shape: Footprint, rng: np.random.Generator) -> Iterator[PlacementArea]:
         if not len(points) or not supports.objects:
             return
         for centre in points[rng.choice(len(points), PATCHES)]:
-            yield Area(centre - PATCH, centre + PATCH, supports.height, supports.objects, allowed)
+            yield PlacementArea(centre - PATCH, centre + PATCH, supports.height, supports.objects, allowed)
         if (np.ptp(points, axis=0) <= LARGEST).all():
-            yield Area(points.min(0), points.max(0), supports.height, supports.objects, allowed)
+            yield PlacementArea(points.min(0), points.max(0), supports.height, supports.objects, allowed)
 
     return on_floor
 
@@ -77,10 +77,10 @@ def within(areas: Areas, query: SceneQuery, room: int) -> Areas:
     """Another rule's areas, but only where the object's origin is in `room` (an index, or `ANY_ROOM`)."""
     tables = query.scene.tables
 
-    def narrowed(shape: Footprint, rng: np.random.Generator) -> Iterator[Area]:
+    def narrowed(shape: Footprint, rng: np.random.Generator) -> Iterator[PlacementArea]:
         for area in areas(shape, rng):
 
-            def allowed(row: np.ndarray, col: np.ndarray, area: Area = area) -> np.ndarray:
+            def allowed(row: np.ndarray, col: np.ndarray, area: PlacementArea = area) -> np.ndarray:
                 here = _in_room(tables, row, col, room)
                 return here if area.allowed is None else here & area.allowed(row, col)
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ig2mj.sampling.footprint import Footprint
-from ig2mj.sampling.placement import Area, Areas
+from ig2mj.sampling.placement import Areas, PlacementArea
 from ig2mj.sampling.query import SceneQuery
 
 ABOVE = 0.01
@@ -17,8 +17,8 @@ ABOVE = 0.01
 def areas(query: SceneQuery, _: int, support: int) -> Areas:
     """The rule for putting something on `support`."""
 
-    def on_top(shape: Footprint, rng: np.random.Generator) -> Iterator[Area]:
+    def on_top(shape: Footprint, rng: np.random.Generator) -> Iterator[PlacementArea]:
         low, high = query.box(support)
-        yield Area(low[:2], high[:2], high[2] + ABOVE, (support,))
+        yield PlacementArea(low[:2], high[:2], high[2] + ABOVE, (support,))
 
     return on_top

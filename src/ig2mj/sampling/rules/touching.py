@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ig2mj.sampling.footprint import Footprint
-from ig2mj.sampling.placement import Area, Areas
+from ig2mj.sampling.placement import Areas, PlacementArea
 from ig2mj.sampling.query import SceneQuery
 from ig2mj.sampling.rules import inside, next_to, on_top
 
@@ -19,10 +19,10 @@ def areas(query: SceneQuery, placed: int, other: int) -> Areas:
     """The rule for putting something against `other`."""
     above, within, beside = on_top.areas(query, placed, other), inside.areas(query, placed, other), next_to.beside
 
-    def against(shape: Footprint, rng: np.random.Generator) -> Iterator[Area]:
+    def against(shape: Footprint, rng: np.random.Generator) -> Iterator[PlacementArea]:
         yield from above(shape, rng)
         for area in beside(query, other, GAP)(shape, rng):
-            yield Area(area.low, area.high, area.height, area.supports, area.allowed, push_towards=other)
+            yield PlacementArea(area.low, area.high, area.height, area.supports, area.allowed, push_towards=other)
         yield from within(shape, rng)
 
     return against

@@ -13,9 +13,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from ig2mj.geometry.poses import quat_rotate
-from ig2mj.tasks.experts.motion import Wish, over, where, wish
+from ig2mj.tasks.experts.motion import HandMotion, hand_motion, over, where
 from ig2mj.tasks.experts.reaching import take_at
-from ig2mj.tasks.experts.sight import Sight
+from ig2mj.tasks.experts.sight import ExpertView
 from ig2mj.tasks.points import At, Hand
 from ig2mj.tasks.task import BIMANUAL_WEIGHTS, BOTH, Acts, Near, Task
 
@@ -31,7 +31,7 @@ CLEARANCE = 0.05
 """m between cauldron and table on the way."""
 
 
-def plan(see: Sight) -> list[Wish]:
+def plan(see: ExpertView) -> list[HandMotion]:
     """Both hands, the left one first."""
     pot, (low, high) = see.com(POT), see.box(POT)
     table_low, table_high = see.box(TABLE)
@@ -39,12 +39,12 @@ def plan(see: Sight) -> list[Wish]:
     stands = table_high[:, 2] + pot[:, 2] - low[:, 2]  # of its centre of mass
     place = jnp.clip(pot[:, :2], table_low[:, :2] + INSIDE, table_high[:, :2] - INSIDE)
     goal = jnp.concatenate([place, stands[:, None] - 0.02], axis=1)
-    lift = wish(over(pot, goal, stands + CLEARANCE), close=True)
+    lift = hand_motion(over(pot, goal, stands + CLEARANCE), close=True)
     wishes = []
     for hand, side in ((0, SIDE), (1, -SIDE)):
         left = quat_rotate(see.base_quat(), jnp.asarray(np.array([0.0, side, 0.0], np.float32)))
         rim = jnp.concatenate([(0.5 * (low + high) + left)[:, :2], high[:, 2:]], axis=1)
-        wait = wish(jnp.zeros_like(pot), close=True)
+        wait = hand_motion(jnp.zeros_like(pot), close=True)
         alone = where(see.holds(POT, hand), wait, take_at(see, rim, hand))
         wishes.append(where(both, lift, alone))
     return wishes

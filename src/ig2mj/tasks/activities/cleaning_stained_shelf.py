@@ -18,10 +18,10 @@ from ig2mj.engine.view import Array
 from ig2mj.geometry.poses import length
 from ig2mj.states.definitions import stain
 from ig2mj.states.particles import world_normals, world_positions
-from ig2mj.tasks.experts.motion import Wish, levelled, over, where, wish
+from ig2mj.tasks.experts.motion import HandMotion, hand_motion, levelled, over, where
 from ig2mj.tasks.experts.pushing import draw
 from ig2mj.tasks.experts.reaching import take
-from ig2mj.tasks.experts.sight import Sight
+from ig2mj.tasks.experts.sight import ExpertView
 from ig2mj.tasks.points import At, Hand, NearestStain
 from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, Acts, Task
 
@@ -44,7 +44,7 @@ AT_WALL, LATER = 0.035, 1.0
 the board's end, where the towel's corner meets the wall before the stain is under it, and half of all will do."""
 
 
-def plan(see: Sight) -> list[Wish]:
+def plan(see: ExpertView) -> list[HandMotion]:
     """One hand."""
     towel, (low, high) = see.com(TOWEL), see.box(TOWEL)
     if see.physical:
@@ -55,10 +55,10 @@ def plan(see: Sight) -> list[Wish]:
     nearest_to_wall = wall + 0.5 * (high - low)[:, 1]  # with its edge at the wall the towel covers stains there, too
     goal = jnp.stack([dirt[:, 0], jnp.maximum(dirt[:, 1], nearest_to_wall), board - PRESS], axis=1)
     move = over(underside, goal, board + LIFT, near=WITHIN, blend=BLEND)
-    return [where(see.holds(TOWEL), wish(move, levelled(see.quat(TOWEL)), close=True), take(see, TOWEL))]
+    return [where(see.holds(TOWEL), hand_motion(move, levelled(see.quat(TOWEL)), close=True), take(see, TOWEL))]
 
 
-def _nearest(see: Sight, towel: Float[Array, "W 3"]) -> Float[Array, "W 3"]:
+def _nearest(see: ExpertView, towel: Float[Array, "W 3"]) -> Float[Array, "W 3"]:
     """The stain on the board's top that is nearest to the towel; the towel itself where there is none."""
     row = stain.row_of(see.model, see.scene.object_index(SHELF))
     pos = world_positions(see.states.stain, see.view)[:, row]

@@ -7,10 +7,10 @@ counter onto the stove.
 
 from __future__ import annotations
 
-from ig2mj.tasks.experts.motion import Wish, over, where, wish
+from ig2mj.tasks.experts.motion import HandMotion, hand_motion, over, where
 from ig2mj.tasks.experts.pushing import draw
 from ig2mj.tasks.experts.reaching import take
-from ig2mj.tasks.experts.sight import Sight
+from ig2mj.tasks.experts.sight import ExpertView
 from ig2mj.tasks.points import At, Hand, Heat
 from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, Acts, Near, Task
 
@@ -23,12 +23,12 @@ CARRY = 0.05
 """m higher on the way."""
 
 
-def plan(see: Sight) -> list[Wish]:
+def plan(see: ExpertView) -> list[HandMotion]:
     """One hand."""
     if see.physical:
         return [draw(see, MEAT, see.goal(Heat(STOVE)))]
     over_burner = see.goal(Heat(STOVE), ABOVE)
-    carry = wish(over(see.com(MEAT), over_burner, over_burner[:, 2] + CARRY), close=True)
+    carry = hand_motion(over(see.com(MEAT), over_burner, over_burner[:, 2] + CARRY), close=True)
     return [where(see.holds(MEAT), carry, take(see, MEAT))]
 
 

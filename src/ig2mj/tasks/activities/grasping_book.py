@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import jax.numpy as jnp
 
-from ig2mj.tasks.experts.motion import Wish, where, wish
+from ig2mj.tasks.experts.motion import HandMotion, hand_motion, where
 from ig2mj.tasks.experts.pushing import draw
 from ig2mj.tasks.experts.reaching import take
-from ig2mj.tasks.experts.sight import Sight
+from ig2mj.tasks.experts.sight import ExpertView
 from ig2mj.tasks.points import At, Hand
 from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, Acts, Near, Task
 
@@ -27,16 +27,16 @@ BEYOND = 0.06
 """m beyond the table's edge that the notebook's middle is drawn to."""
 
 
-def plan(see: Sight) -> list[Wish]:
+def plan(see: ExpertView) -> list[HandMotion]:
     """One hand: to the notebook, and up; or over the table's edge on its left or right."""
     (book,) = see.objects
     if see.physical:
         return [_off_the_table(see, book)]
     up = jnp.zeros_like(see.hand_pos()).at[:, 2].set(0.1)
-    return [where(see.holds(book), wish(up, close=True), take(see, book))]
+    return [where(see.holds(book), hand_motion(up, close=True), take(see, book))]
 
 
-def _off_the_table(see: Sight, book: str) -> Wish:
+def _off_the_table(see: ExpertView, book: str) -> HandMotion:
     low, high = see.box(book)
     edge_low, edge_high = see.box(TABLE)
     middle, side = 0.5 * (low + high), 0.5 * (edge_low + edge_high)[:, 1]

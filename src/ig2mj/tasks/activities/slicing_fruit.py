@@ -17,9 +17,9 @@ from ig2mj.engine.view import Array
 from ig2mj.geometry.poses import length, quat_rotate
 from ig2mj.scene.tables import LinkKind
 from ig2mj.tasks.experts.gripping import grip_from_above
-from ig2mj.tasks.experts.motion import Wish, horizontal, over, where, wish
+from ig2mj.tasks.experts.motion import HandMotion, hand_motion, horizontal, over, where
 from ig2mj.tasks.experts.reaching import far_out, take_thin
-from ig2mj.tasks.experts.sight import Sight
+from ig2mj.tasks.experts.sight import ExpertView
 from ig2mj.tasks.points import At, Hand
 from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, Acts, Near, Physical, Task
 
@@ -47,7 +47,7 @@ PRESS = {False: 0.08, True: 0.03}
 step, so that on the fruit it presses with all force; the gripper of an arm would push the fruit away."""
 
 SLOWLY, WITHIN = 0.012, 0.11
-"""m that an arm comes down onto the handle in a step, and from it within which it is so slow. What it holds is reckoned
+"""m that an arm comes down onto the handle in a step, and from it within which it is so slow. What it holds is computed
 from where its hand was at the end of the step that took it (`ig2mj.learn.occlusion`): at full speed 0.5 cm off in the
 median and 1.7 cm in a tenth of the episodes."""
 
@@ -57,15 +57,15 @@ full speed, and who learned from that hardly turned."""
 
 CUTS, ABOUT, BESIDE, LATER = -0.05, (-0.03, 0.05), 0.012, 0.008
 """Of a knife that stands: m from the middle of the edge to the point that cuts, near the handle, so that what presses
-on it hardly tips the knife between two fingers; how far from there any other point will do; m beside the edge within
+on it hardly tips the knife between two fingers; how far from there any other point will do; m next to the edge within
 which it comes down, and farther out over which it begins to."""
 
 
-def plan(see: Sight) -> list[Wish]:
+def plan(see: ExpertView) -> list[HandMotion]:
     """One hand."""
     done = jnp.asarray(see.states.sliced)[:, see.scene.object_index(FRUIT)]
-    still = wish(jnp.zeros_like(see.pos(KNIFE)), close=True)
-    if see.physical and see.two_fingers:  # (the humanoid's fingers close too far beside the handle)
+    still = hand_motion(jnp.zeros_like(see.pos(KNIFE)), close=True)
+    if see.physical and see.two_fingers:  # (the humanoid's fingers close too far next to the handle)
         return [where(done, still, _grip_and_press(see))]
     quat = see.quat(KNIFE)
     handle = see.pos(KNIFE) + quat_rotate(quat, jnp.asarray(HANDLE, jnp.float32))
@@ -81,13 +81,13 @@ def plan(see: Sight) -> list[Wish]:
     if see.on_arm:
         turn += far_out(see, goal)
         slow = jnp.where(length(see.grip() - handle) < WITHIN, -SLOWLY, -jnp.inf)
-        take = Wish(jnp.asarray(take.move).at[:, 2].max(slow), far_out(see, handle), take.close)
+        take = HandMotion(jnp.asarray(take.move).at[:, 2].max(slow), far_out(see, handle), take.close)
     exact = EXACT[see.on_arm]
-    cut = wish(over(blade, goal, top + CLEARANCE, near=exact, blend=exact), turn, close=True)
+    cut = hand_motion(over(blade, goal, top + CLEARANCE, near=exact, blend=exact), turn, close=True)
     return [where(done, still, where(see.holds(KNIFE), cut, take))]
 
 
-def _grip_and_press(see: Sight) -> Wish:
+def _grip_and_press(see: ExpertView) -> HandMotion:
     """With a knife that stands on its handle, edge down."""
     along = quat_rotate(see.quat(KNIFE), jnp.asarray(ALONG, jnp.float32))
     up = quat_rotate(see.quat(KNIFE), jnp.array([0.0, 0.0, 1.0]))
@@ -96,7 +96,7 @@ def _grip_and_press(see: Sight) -> Wish:
     blade = see.link(KNIFE, LinkKind.SLICER) + CUTS * along
     blade += jnp.clip(jnp.sum((goal - blade) * along, axis=1, keepdims=True), *ABOUT) * along
     move = over(blade, goal, high[:, 2] + CLEARANCE, near=BESIDE, blend=LATER)
-    press = wish(move, horizontal(along) + jnp.cross(up, np.array([0.0, 0.0, 1.0], np.float32)), close=True)
+    press = hand_motion(move, horizontal(along) + jnp.cross(up, np.array([0.0, 0.0, 1.0], np.float32)), close=True)
     return grip_from_above(see, KNIFE, along, press)
 
 
@@ -108,7 +108,7 @@ def _edge_down(edge: Float[Array, "W 3"]) -> tuple[Float[Array, "W 3"], Float[Ar
     return axis / jnp.maximum(length(axis), 1e-6)[:, None] * left[:, None], left
 
 
-NEAR = (
+ON_NEAR_SIDE = (
     Near("apple_0", (2.15, -0.1, 0.85), most=0.95),
     Near("carving_knife_0", (2.15, -0.1, 0.85), most=0.95),
 )
@@ -119,20 +119,20 @@ SLICING_FRUIT = Task(
     home="birch",
     objects=("apple", "carving_knife"),
     start=("(on_top apple_0 coffee_table_0)", "(on_top carving_knife_0 coffee_table_0)"),
-    near=NEAR,
+    near=ON_NEAR_SIDE,
     flat=("carving_knife_0",),
     goal="(sliced apple_0)",
     objects_of_interest=("carving_knife_0", "apple_0"),
     distances=((Hand(0), At("carving_knife_0")), (At("carving_knife_0"), At("apple_0"))),
     robots={
-        # 5 cm nearer, the camera loses one apple in seven, which lies below its picture or beside it.
+        # 5 cm nearer, the camera loses one apple in seven, which lies below its image or next to it.
         "humanoid": Acts((2.24, -0.03, 0.55), hands=RIGHT, weights=HUMANOID_WEIGHTS),
-        # At the usual 0.45 rad most of the low table before it is below its picture.
+        # At the usual 0.45 rad most of the low table before it is below its image.
         "fetch": Acts((2.28, -0.12, 0.015), yaw=-15.0, camera_tilt=1.0),
     },
     physical=Physical(
         tuple((f"apple/apple_{apple:02d}", f"carving_knife/carving_knife_{4 + apple:02d}") for apple in range(3)),
-        near=NEAR,
+        near=ON_NEAR_SIDE,
     ),
     expert=plan,
 )

@@ -18,9 +18,9 @@ from jaxtyping import Float
 from ig2mj.engine.view import Array
 from ig2mj.geometry.poses import length
 from ig2mj.tasks.experts.gripping import grip_standing
-from ig2mj.tasks.experts.motion import RISE, Wish, around, levelled, outward, where, wish
+from ig2mj.tasks.experts.motion import RISE, HandMotion, around, hand_motion, levelled, outward, where
 from ig2mj.tasks.experts.reaching import take, take_at
-from ig2mj.tasks.experts.sight import Sight
+from ig2mj.tasks.experts.sight import ExpertView
 from ig2mj.tasks.points import WATER_BELOW, At, Hand, Water
 from ig2mj.tasks.task import HUMANOID_WEIGHTS, RIGHT, Acts, Near, Physical, Task
 
@@ -36,7 +36,7 @@ class Way:
       ahead: of the towel's middle in front of the opening, so that the hand is not below the spout.
       run_up: in front of that where the towel comes down to the height at which it is slid in.
       carry: above that height on the way there.
-      clear: in front of the run-up while it is more than `narrow` beside it: the fridge stands there.
+      clear: in front of the run-up while it is more than `narrow` next to it: the fridge stands there.
       outside: from the middle of the robot's body that the towel passes it.
       straight: it goes straight to the run-up, and gives way to the robot's own body only where it meets it; else it
         swings around the robot.
@@ -66,7 +66,7 @@ EDGE = 0.1
 """m from the towel's middle towards the robot at which the gripper of an arm takes it."""
 
 
-def plan(see: Sight) -> list[Wish]:
+def plan(see: ExpertView) -> list[HandMotion]:
     """One hand. The tap's front is where the robot stands: +y in its home."""
     if see.physical and see.two_fingers:  # (the humanoid's fingers push a roll out of the hand)
         return [grip_standing(see, TOWEL, _below_spout(see, ROLLED))]
@@ -76,10 +76,10 @@ def plan(see: Sight) -> list[Wish]:
     if see.on_arm:
         turn += outward(see.hand_quat(), see.grip() - see.base_pos())
         get = take_at(see, _near_edge(see))
-    return [where(see.holds(TOWEL), wish(move, turn, close=True), get)]
+    return [where(see.holds(TOWEL), hand_motion(move, turn, close=True), get)]
 
 
-def _below_spout(see: Sight, way: Way) -> Float[Array, "W 3"]:
+def _below_spout(see: ExpertView, way: Way) -> Float[Array, "W 3"]:
     """The displacement that brings a towel in hand below the spout."""
     opening = see.goal(Water(SINK), WATER_BELOW)
     towel, (_, high) = see.com(TOWEL), see.box(TOWEL)
@@ -97,7 +97,7 @@ def _below_spout(see: Sight, way: Way) -> Float[Array, "W 3"]:
     return around(towel, move, see.base_pos(), way.outside)
 
 
-def _near_edge(see: Sight) -> Float[Array, "W 3"]:
+def _near_edge(see: ExpertView) -> Float[Array, "W 3"]:
     """A point of the towel's upper side, nearer to the robot than its middle: what sticks out lengthens the arm."""
     low, high = see.box(TOWEL)
     middle = jnp.asarray(0.5 * (low + high)).at[:, 2].set(high[:, 2])

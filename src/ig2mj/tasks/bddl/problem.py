@@ -17,7 +17,7 @@ from collections.abc import Collection, Iterable, Mapping
 
 from ig2mj.predicates import logic
 from ig2mj.predicates.logic import Atom, Expression, Not
-from ig2mj.tasks.bddl.syntax import BddlError, Group, Tree, Word, error, read_tree
+from ig2mj.tasks.bddl.syntax import BddlError, SyntaxGroup, Tree, Word, error, read_tree
 
 IN_ROOM = "inroom"
 
@@ -88,10 +88,10 @@ class _Reader:
         self.predicates: Mapping[str, int] = {}
         self.domain = ""
 
-    def problem(self, tree: Group) -> Problem:
+    def problem(self, tree: SyntaxGroup) -> Problem:
         if not tree.parts or not _is(tree.parts[0], "define"):
             raise self.error(tree, "a definition begins with (define")
-        sections: dict[str, Group] = {}
+        sections: dict[str, SyntaxGroup] = {}
         for part in tree.parts[1:]:
             if isinstance(part, Word) and self.tolerates(part, "stands between the sections: ignored"):
                 continue
@@ -128,7 +128,7 @@ class _Reader:
         name = self.only_word(sections["problem"])
         return Problem(name, self.domain, self.objects, rooms, tuple(init), parts, self.file, tuple(self.remarks))
 
-    def read_objects(self, section: Group) -> None:
+    def read_objects(self, section: SyntaxGroup) -> None:
         waiting: list[Word] = []
         words = iter(section.parts[1:])
         for part in words:
@@ -190,12 +190,12 @@ class _Reader:
                 return logic.ForNPairs(count, first, second, body)
         return self.atom(tree, head, parts, bound, top)
 
-    def wants(self, tree: Group, count: int, form: str) -> None:
+    def wants(self, tree: SyntaxGroup, count: int, form: str) -> None:
         """Checks how many parts follow the first word."""
         if len(tree.parts) - 1 != count:
             raise self.error(tree, f"expects {form}, has {len(tree.parts) - 1} parts")
 
-    def atom(self, tree: Group, head: Word, parts: tuple[Tree, ...], bound: Collection[str], top: bool) -> Atom:
+    def atom(self, tree: SyntaxGroup, head: Word, parts: tuple[Tree, ...], bound: Collection[str], top: bool) -> Atom:
         if head.text not in self.predicates:
             raise self.error(head, f"is not a predicate of domain {self.domain}{_near(head.text, self.predicates)}")
         if len(parts) != (wanted := self.predicates[head.text]):
@@ -220,19 +220,19 @@ class _Reader:
 
     def binding(self, tree: Tree) -> tuple[str, str]:
         match tree:
-            case Group((Word(variable), Word("-"), Word(group) as synset)) if variable.startswith("?"):
+            case SyntaxGroup((Word(variable), Word("-"), Word(group) as synset)) if variable.startswith("?"):
                 if group not in self.objects:
                     raise self.error(synset, f"is not a synset of :objects{_near(group, self.objects)}")
                 return variable, group
         raise self.error(tree, "is not a variable with its synset", "write (?x - SYNSET)")
 
     def count(self, tree: Tree) -> int:
-        word = tree.parts[0] if isinstance(tree, Group) and len(tree.parts) == 1 else tree
+        word = tree.parts[0] if isinstance(tree, SyntaxGroup) and len(tree.parts) == 1 else tree
         if not isinstance(word, Word) or not word.text.isdecimal():
             raise self.error(tree, "is not a whole number")
         return int(word.text)
 
-    def only_word(self, section: Group) -> str:
+    def only_word(self, section: SyntaxGroup) -> str:
         match section.parts:
             case (_, Word(text)):
                 return text

@@ -27,31 +27,31 @@ class Word:
 
 
 @dataclasses.dataclass(frozen=True)
-class Group:
+class SyntaxGroup:
     """What stands between two brackets; `line`: of the opening one."""
 
     parts: tuple[Tree, ...]
     line: int
 
 
-Tree: TypeAlias = Word | Group
+Tree: TypeAlias = Word | SyntaxGroup
 
 
 def error(file: str, at: Tree, problem: str, fix: str = "") -> BddlError:
     """The error that names a place: its line, and its word (of a group: the first)."""
     first = at
-    while isinstance(first, Group) and first.parts:
+    while isinstance(first, SyntaxGroup) and first.parts:
         first = first.parts[0]
     word = first.text if isinstance(first, Word) else "()"
     shown = word if at is first else f"({word}"
     return BddlError(file, problem, element=f"line {at.line}: '{shown}'", fix=fix)
 
 
-def read_tree(text: str, file: str) -> Group:
+def read_tree(text: str, file: str) -> SyntaxGroup:
     """The one group that the text is. Comments run from a semicolon to the end of the line.
 
     Raises:
-      BddlError: brackets that do not match, something beside the group, or no group at all.
+      BddlError: brackets that do not match, something next to the group, or no group at all.
     """
     line = 1
     found: list[Tree] = []
@@ -74,7 +74,7 @@ def read_tree(text: str, file: str) -> Group:
             if not open_groups:
                 raise error(file, word, "closes a bracket that was not opened")
             opening, inner = open_groups.pop()
-            (open_groups[-1][1] if open_groups else found).append(Group(tuple(inner), opening.line))
+            (open_groups[-1][1] if open_groups else found).append(SyntaxGroup(tuple(inner), opening.line))
         elif not open_groups:
             raise error(file, word, "stands outside of brackets", "a definition begins with (define")
         else:
@@ -83,5 +83,5 @@ def read_tree(text: str, file: str) -> Group:
         raise error(file, open_groups[-1][0], "is never closed", "add a ')'")
     if not found:
         raise BddlError(file, "is empty", fix="a definition begins with (define")
-    assert isinstance(found[0], Group)
+    assert isinstance(found[0], SyntaxGroup)
     return found[0]

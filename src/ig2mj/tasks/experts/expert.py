@@ -20,8 +20,8 @@ from ig2mj.scene.scene import Scene
 from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.actions import TURN_SPEED
-from ig2mj.tasks.experts.motion import Wish
-from ig2mj.tasks.experts.sight import Belief, Sight
+from ig2mj.tasks.experts.motion import HandMotion
+from ig2mj.tasks.experts.sight import Belief, ExpertView
 from ig2mj.tasks.task import Task, role_of
 
 TURN_STEP = TURN_SPEED * ACTION_PERIOD
@@ -67,7 +67,7 @@ class Expert:
           beliefs: where it takes objects to be, in the frame of the robot's base; None: where they are.
         """
         base = jnp.asarray(view.agent.base_quat)[:, 0]
-        see = Sight(
+        see = ExpertView(
             view,
             states,
             self._scene,
@@ -80,15 +80,16 @@ class Expert:
             {name: _of_the_world(base, belief) for name, belief in (beliefs or {}).items()},
         )
         return jnp.concatenate(
-            [self._action(base, wish, hand) for wish, hand in zip(self._plan(see), self._controls, strict=True)], axis=1
+            [self._action(base, motion, hand) for motion, hand in zip(self._plan(see), self._controls, strict=True)],
+            axis=1,
         )
 
-    def _action(self, base: Float[Array, "W 4"], wish: Wish, hand: HandControl) -> Float[Array, "W k"]:
+    def _action(self, base: Float[Array, "W 4"], motion: HandMotion, hand: HandControl) -> Float[Array, "W k"]:
         """Of one hand: in the base's frame, slowed down evenly where a number would be beyond 1."""
-        parts = [_limited(quat_rotate_inverse(base, wish.move) / (hand.speed * ACTION_PERIOD))]
-        parts.append(_limited(quat_rotate_inverse(base, wish.turn) / TURN_STEP))
+        parts = [_limited(quat_rotate_inverse(base, motion.move) / (hand.speed * ACTION_PERIOD))]
+        parts.append(_limited(quat_rotate_inverse(base, motion.turn) / TURN_STEP))
         if self.grasping != "mitten":
-            parts.append(jnp.where(wish.close, -hand.opens, hand.opens)[:, None])
+            parts.append(jnp.where(motion.close, -hand.opens, hand.opens)[:, None])
         return jnp.concatenate(parts, axis=1)
 
 

@@ -15,8 +15,8 @@ from ig2mj.geometry.poses import (
     quat_rotate,
     quat_to_rotation_vector,
 )
-from ig2mj.tasks.experts.motion import Wish, over, pointing, where, wish
-from ig2mj.tasks.experts.sight import Sight
+from ig2mj.tasks.experts.motion import HandMotion, hand_motion, over, pointing, where
+from ig2mj.tasks.experts.sight import ExpertView
 
 DEEP, BACK = 0.05, -0.004
 """m below the upper end of what stands at which fingers take it, and from its axis towards the wrist. (What fingers
@@ -32,14 +32,14 @@ CLEARANCE = 0.06
 """m above the upper end at which the open gripper comes over it."""
 
 EXACT, BLEND = 0.015, 0.03
-"""m beside the axis within which the gripper goes straight down, and over which it comes to do so. The fingers have as
-much on either side of a towel; whoever learns from pictures, and waits to be nearer, hovers above it for ever."""
+"""m next to the axis within which the gripper goes straight down, and over which it comes to do so. The fingers have as
+much on either side of a towel; whoever learns from images, and waits to be nearer, hovers above it for ever."""
 
 EASE = 0.6
 """Share of the way to it that the gripper goes in an action; the arm lags, and with all of it swings to and fro."""
 
 CLOSING, BETWEEN = 0.02, 0.045
-"""m from where it is taken within which fingers close, and beside the axis within which they hold it."""
+"""m from where it is taken within which fingers close, and next to the axis within which they hold it."""
 
 SQUEEZED = 3.0
 """N of each of two fingers from which on it is held."""
@@ -54,7 +54,7 @@ AT, AWAY = 0.012, 0.15
 AHEAD, LEFT, UP = np.eye(3, dtype=np.float32)
 
 
-def grip_standing(see: Sight, name: str, carry: Float[Array, "W 3"]) -> Wish:
+def grip_standing(see: ExpertView, name: str, carry: Float[Array, "W 3"]) -> HandMotion:
     """What Fetch's gripper does to an object that stands on end, and is narrower than it opens: from above, a finger on
     either side.
 
@@ -72,14 +72,14 @@ def grip_standing(see: Sight, name: str, carry: Float[Array, "W 3"]) -> Wish:
     ready = length(grip - place) < CLOSING
     held = (see.squeeze(name) > SQUEEZED) & (beside < BETWEEN) & (along > 0) & (along < half)
     way = over(grip, place, place[:, 2] + DEEP + CLEARANCE, EXACT, BLEND)
-    get = wish(EASE * way, pointing(quat, ahead, PITCH))
-    close = wish(jnp.zeros_like(place), close=True)
+    get = hand_motion(EASE * way, pointing(quat, ahead, PITCH))
+    close = hand_motion(jnp.zeros_like(place), close=True)
     gently = carry * jnp.minimum(1.0, CARRIED / jnp.maximum(jnp.abs(carry).max(axis=1, keepdims=True), 1e-9))
-    move = wish(gently, pointing(quat, see.grip() - see.base_pos(), PITCH), close=True)
+    move = hand_motion(gently, pointing(quat, see.grip() - see.base_pos(), PITCH), close=True)
     return where(held, move, where(ready, close, get))
 
 
-def grip_from_above(see: Sight, name: str, along: Float[Array, "W 3"], carry: Wish) -> Wish:
+def grip_from_above(see: ExpertView, name: str, along: Float[Array, "W 3"], carry: HandMotion) -> HandMotion:
     """What Fetch's gripper does to something long on a table that is narrower than it opens: pointing down, a finger on
     either side of its centre of mass, so that it does not tip between them.
 
@@ -96,14 +96,14 @@ def grip_from_above(see: Sight, name: str, along: Float[Array, "W 3"], carry: Wi
     wanted = matrix_to_quat(jnp.stack([down, across, jnp.cross(down, across)], axis=-1))
     turn = quat_to_rotation_vector(quat_multiply(wanted, quat_conjugate(quat)))
     goal = jnp.where((length(turn) < ALIGNED)[:, None], place, place + ABOVE * UP)
-    get = wish(EASE * over(grip, goal, place[:, 2] + ABOVE, EXACT, BLEND), turn)
-    close = wish(jnp.zeros_like(place), close=True)
+    get = hand_motion(EASE * over(grip, goal, place[:, 2] + ABOVE, EXACT, BLEND), turn)
+    close = hand_motion(jnp.zeros_like(place), close=True)
     ready = (length((place - grip)[:, :2]) < AT) & (jnp.abs((place - grip)[:, 2]) < AT)
     held = (see.squeeze(name) > SQUEEZED) & (length(see.com(name) - grip) < AWAY)
     return where(held, carry, where(ready, close, get))
 
 
-def _standing(see: Sight, name: str) -> tuple[Float[Array, "W 3"], Float[Array, "W"]]:
+def _standing(see: ExpertView, name: str) -> tuple[Float[Array, "W 3"], Float[Array, "W"]]:
     """An object's own z axis or its opposite, whichever points up, and half the object's height, m."""
     low, high = see.box(name)
     axis = quat_rotate(see.quat(name), UP)

@@ -19,7 +19,7 @@ from ig2mj.geometry.poses import (
     quat_to_rotation_vector,
 )
 
-NEAR, BLEND = 0.03, 0.06
+DESCENT, BLEND = 0.03, 0.06
 """m: horizontal distance to a goal within which a hand goes straight down, and over which it comes down to that."""
 
 RISE = 0.06
@@ -27,7 +27,7 @@ RISE = 0.06
 
 
 @struct.dataclass
-class Wish:
+class HandMotion:
     """What one hand should do now; world frame.
 
     Attributes:
@@ -40,16 +40,18 @@ class Wish:
     close: Bool[Array, "W"]
 
 
-def wish(move: Float[Array, "W 3"], turn: Float[Array, "W 3"] | None = None, close: Array | bool = False) -> Wish:
-    """A wish; without a turn the hand keeps its orientation."""
-    return Wish(move, jnp.zeros_like(move) if turn is None else turn, jnp.broadcast_to(close, move.shape[:1]))
+def hand_motion(
+    move: Float[Array, "W 3"], turn: Float[Array, "W 3"] | None = None, close: Array | bool = False
+) -> HandMotion:
+    """What a hand should do; without a turn the hand keeps its orientation."""
+    return HandMotion(move, jnp.zeros_like(move) if turn is None else turn, jnp.broadcast_to(close, move.shape[:1]))
 
 
 def over(
     pos: Float[Array, "W 3"],
     goal: Float[Array, "W 3"],
     height: Float[Array, "W"] | float,
-    near: float = NEAR,
+    near: float = DESCENT,
     blend: float = BLEND,
 ) -> Float[Array, "W 3"]:
     """From `pos` to `goal`: up to `height` first, then across, at last straight to the goal.
@@ -128,10 +130,12 @@ def pointing(quat: Float[Array, "W 4"], direction: Float[Array, "W 3"], pitch: f
     return quat_to_rotation_vector(quat_multiply(wanted, quat_conjugate(quat)))
 
 
-def where(condition: Bool[Array, "W"], then: Wish, otherwise: Wish) -> Wish:
-    """One wish where the condition holds, else the other."""
+def where(condition: Bool[Array, "W"], then: HandMotion, otherwise: HandMotion) -> HandMotion:
+    """One motion where the condition holds, else the other."""
 
     def pick(a: Array, b: Array) -> Array:
         return jnp.where(condition.reshape(-1, *[1] * (a.ndim - 1)), a, b)
 
-    return Wish(pick(then.move, otherwise.move), pick(then.turn, otherwise.turn), pick(then.close, otherwise.close))
+    return HandMotion(
+        pick(then.move, otherwise.move), pick(then.turn, otherwise.turn), pick(then.close, otherwise.close)
+    )

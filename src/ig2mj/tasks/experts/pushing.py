@@ -8,15 +8,15 @@ from jaxtyping import Float
 
 from ig2mj.engine.view import Array
 from ig2mj.geometry.poses import length
-from ig2mj.tasks.experts.motion import Wish, where, wish
+from ig2mj.tasks.experts.motion import HandMotion, hand_motion, where
 from ig2mj.tasks.experts.reaching import far_out, take_at
-from ig2mj.tasks.experts.sight import Sight
+from ig2mj.tasks.experts.sight import ExpertView
 
 PRESS, SINK = 10.0, 0.02
 """N with which it is pressed down, and m that the hand goes down for it in an action where there is no force yet."""
 
 ON_IT, ABOVE = 0.06, 0.06
-"""m beside and above the point to press on within which a hand that touches the object draws it."""
+"""m next to and above the point to press on within which a hand that touches the object draws it."""
 
 SPEED = 0.03
 """m in an action."""
@@ -24,7 +24,7 @@ SPEED = 0.03
 FLAT = np.array([1.0, 1.0, 0.0], np.float32)
 
 
-def draw(see: Sight, name: str, goal: Float[Array, "W 3"], behind: float = 0.0, hand: int = 0) -> Wish:
+def draw(see: ExpertView, name: str, goal: Float[Array, "W 3"], behind: float = 0.0, hand: int = 0) -> HandMotion:
     """Draws an object's middle horizontally towards a goal.
 
     Args:
@@ -41,5 +41,5 @@ def draw(see: Sight, name: str, goal: Float[Array, "W 3"], behind: float = 0.0, 
     down = SINK * jnp.clip(1.0 - see.pressed(name) / PRESS, -1.0, 1.0)
     step = jnp.minimum(SPEED, length(way))[:, None] * ahead
     turn = far_out(see, place, hand) if see.controls[hand].on_arm else None
-    along = wish(step.at[:, 2].set(-down), turn, close=True)
-    return where(on_it, along, Wish(take_at(see, place, hand).move, along.turn, along.close))
+    along = hand_motion(step.at[:, 2].set(-down), turn, close=True)
+    return where(on_it, along, HandMotion(take_at(see, place, hand).move, along.turn, along.close))

@@ -8,8 +8,8 @@ from jaxtyping import Float
 
 from ig2mj.engine.view import Array
 from ig2mj.geometry.poses import length
-from ig2mj.tasks.experts.motion import Wish, outward, over, wish
-from ig2mj.tasks.experts.sight import Sight
+from ig2mj.tasks.experts.motion import HandMotion, hand_motion, outward, over
+from ig2mj.tasks.experts.sight import ExpertView
 
 CLEARANCE = 0.12
 """m above an object's top at which a hand comes over it."""
@@ -28,28 +28,28 @@ AGAIN = 0.03
 
 UP = np.array([0.0, 0.0, 1.0], np.float32)
 
-FAR, BLEND = 0.62, 0.1
+REACH, BLEND = 0.62, 0.1
 """m from the robot's middle beyond which the gripper of an arm turns outwards, and over which it comes to do so."""
 
 ASIDE = 0.8
 """rad that it may then point aside: turned wholly outwards over a low table, the elbow comes down onto its edge."""
 
 
-def take(see: Sight, name: str, hand: int = 0) -> Wish:
+def take(see: ExpertView, name: str, hand: int = 0) -> HandMotion:
     """From above onto the middle of an object, until it is touched."""
     low, high = see.box(name)
     middle, top = 0.5 * (low + high), high[:, 2:]
     return take_at(see, jnp.concatenate([middle[:, :2], jnp.maximum(top, middle[:, 2:] + BELOW)], axis=1), hand)
 
 
-def take_at(see: Sight, place: Float[Array, "W 3"], hand: int = 0) -> Wish:
+def take_at(see: ExpertView, place: Float[Array, "W 3"], hand: int = 0) -> HandMotion:
     """From above onto a point of an object's surface, until it is touched; the hand closes when it is near."""
     down = jnp.array([0.0, 0.0, BELOW], jnp.float32)
     grip = see.grip(hand)
-    return wish(over(grip, place - down, place[:, 2] + CLEARANCE), close=length(grip - place) < CLOSING)
+    return hand_motion(over(grip, place - down, place[:, 2] + CLEARANCE), close=length(grip - place) < CLOSING)
 
 
-def take_thin(see: Sight, place: Float[Array, "W 3"], hand: int = 0) -> Wish:
+def take_thin(see: ExpertView, place: Float[Array, "W 3"], hand: int = 0) -> HandMotion:
     """As `take_at`, of something thin: fingers close late, and open again when they missed it. (What a mitten only has
     to touch it takes as anything else.)"""
     if see.grasping == "mitten":
@@ -57,13 +57,13 @@ def take_thin(see: Sight, place: Float[Array, "W 3"], hand: int = 0) -> Wish:
     grip = see.grip(hand)
     move, near = over(grip, place - THIN * UP, place[:, 2] + CLEARANCE), length(grip - place) < CLOSE_TO
     missed = near & (see.closed(hand) > see.controls[hand].closed_empty)
-    return wish(jnp.where(missed[:, None], AGAIN * UP, move), close=near & ~missed)
+    return hand_motion(jnp.where(missed[:, None], AGAIN * UP, move), close=near & ~missed)
 
 
-def far_out(see: Sight, goal: Float[Array, "W 3"], hand: int = 0) -> Float[Array, "W 3"]:
+def far_out(see: ExpertView, goal: Float[Array, "W 3"], hand: int = 0) -> Float[Array, "W 3"]:
     """The rotation vector by which a gripper comes to point away from the robot, where its goal is far from it."""
     away = jnp.asarray(goal) - see.base_pos()
-    near = 1.0 - jnp.clip((length(away[:, :2]) - FAR) / BLEND, 0.0, 1.0)
+    near = 1.0 - jnp.clip((length(away[:, :2]) - REACH) / BLEND, 0.0, 1.0)
     turn = outward(see.hand_quat(hand), see.grip(hand) - see.base_pos())
     allowed = (ASIDE + (jnp.pi - ASIDE) * near)[:, None]
     return turn - jnp.clip(turn, -allowed, allowed)

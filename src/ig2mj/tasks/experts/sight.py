@@ -37,7 +37,7 @@ class Belief:
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Sight:
+class ExpertView:
     """All worlds of a scene as they are now, or as they are believed to be; positions in the world frame, m.
 
     Attributes:

@@ -23,7 +23,7 @@ from ig2mj.predicates.compile import GoalStatus
 from ig2mj.scene.scene import Scene
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.navigation.floor import look_up
-from ig2mj.tasks.navigation.starts import Starts
+from ig2mj.tasks.navigation.starts import NavigationStarts
 from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.task import GROUND
 
@@ -61,7 +61,7 @@ class Measures:
 class NavigationObjective:
     """See the module's text and `ig2mj.tasks.objective.Objective`."""
 
-    def __init__(self, task: NavigationTask, scene: Scene, starts: Starts):
+    def __init__(self, task: NavigationTask, scene: Scene, starts: NavigationStarts):
         """`starts`: of this task in this scene."""
         self._task, self._floor, tables = task, starts.floor, scene.tables
         self._goals, self._fields, self._shortest = starts.goals, starts.fields, starts.shortest

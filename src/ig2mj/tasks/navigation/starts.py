@@ -48,12 +48,12 @@ TRIES = 100
 YAWS = 4
 """Directions in which a robot is tried in every cell; it can stand where it can in one of them."""
 
-APART = 0.8
+ROBOT_SEPARATION = 0.8
 """m between robots at the start, and from loose objects to the robot."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Starts:
+class NavigationStarts:
     """What episodes begin with.
 
     Attributes:
@@ -70,7 +70,7 @@ class Starts:
 
 def make_starts(
     task: NavigationTask, bare: Scene, scene: Scene, states: ExtendedStates, split: str, count: int | None = None
-) -> Starts:
+) -> NavigationStarts:
     """Start states of a task, the same for the same split.
 
     Args:
@@ -121,7 +121,7 @@ def make_starts(
     physics = _snapshots(base, rows, places, engine)
     one = jax.tree.map(np.asarray, states)
     worn = jax.tree.map(lambda a: np.broadcast_to(a[0], (count, *a.shape[1:])), one)
-    return Starts(Pool(physics, worn), floor, goals.astype(np.float32), fields, shortest.astype(np.float32))
+    return NavigationStarts(Pool(physics, worn), floor, goals.astype(np.float32), fields, shortest.astype(np.float32))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -143,7 +143,7 @@ def _place(
         cell = int(rng.integers(len(cells)))
         xy = floor.centres(cells[cell][None])[0]
         pose = float(xy[0]), float(xy[1]), float(rng.uniform(-np.pi, np.pi))
-        if len(taken) and np.linalg.norm(taken - xy, axis=1).min() < APART:
+        if len(taken) and np.linalg.norm(taken - xy, axis=1).min() < ROBOT_SEPARATION:
             continue
         if places.stands(len(others), pose):
             return _Placed(cell, pose)
@@ -285,7 +285,7 @@ class _Households:
         for addition in self._scene.additions:
             for _ in range(TRIES):
                 xy = floor.centres(cells[rng.integers(len(cells), size=1)])[0]
-                if np.linalg.norm(taken - xy, axis=1).min() >= APART:
+                if np.linalg.norm(taken - xy, axis=1).min() >= ROBOT_SEPARATION:
                     break
             else:
                 raise EngineError(f"{task.name}: no free floor is left for '{addition.name}'")

@@ -1,6 +1,6 @@
 """Static boxes that only physics knows: no objects, and transparent in the group of what collides.
 
-So tables, predicates and maps do not know them, and neither pictures nor rays meet them, which leave out what is
+So tables, predicates and maps do not know them, and neither images nor rays meet them, which leave out what is
 transparent.
 """
 
@@ -14,7 +14,9 @@ from ig2mj.scene.floors import TIME_CONSTANT
 from ig2mj.scene.geom_groups import COLLISION_GROUP
 
 
-def add_unseen(spec: mujoco.MjSpec, name: str, boxes: list[Float[np.ndarray, "2 3"]], like: mujoco.MjsGeom) -> None:
+def add_invisible_colliders(
+    spec: mujoco.MjSpec, name: str, boxes: list[Float[np.ndarray, "2 3"]], like: mujoco.MjsGeom
+) -> None:
     """Adds a body of this name with boxes of these low and high corners (world frame).
 
     Args:

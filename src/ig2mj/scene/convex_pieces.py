@@ -28,7 +28,7 @@ SUPPORTED = {
 
 
 @dataclasses.dataclass(frozen=True)
-class Piece:
+class ConvexPiece:
     """One convex piece in its own frame.
 
     planes [n, 4]: half-spaces (nx, ny, nz, d) with n.x <= d, unit normals; empty for round primitives.
@@ -82,7 +82,7 @@ def _box_piece(half: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return planes, signs * half
 
 
-def make_pieces(model: mujoco.MjModel, geoms: np.ndarray) -> list[Piece]:
+def make_convex_pieces(model: mujoco.MjModel, geoms: np.ndarray) -> list[ConvexPiece]:
     """Pieces of the given geoms [K], in their order.
 
     Raises:
@@ -109,5 +109,5 @@ def make_pieces(model: mujoco.MjModel, geoms: np.ndarray) -> list[Piece]:
             planes, vertices = _box_piece(half)
             if kind != PieceKind.POLYHEDRON:
                 planes = np.zeros((0, 4))
-        pieces.append(Piece(kind, planes, vertices))
+        pieces.append(ConvexPiece(kind, planes, vertices))
     return pieces
