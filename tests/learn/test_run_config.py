@@ -17,10 +17,13 @@ from ig2mj.envs.observations import Space
 from ig2mj.envs.registry import find_task
 from ig2mj.errors import Ig2mjError, InputError, UnknownNameError
 from ig2mj.learn import algorithms
+from ig2mj.learn.bc import BCConfig
+from ig2mj.learn.dagger import DaggerConfig
 from ig2mj.learn.occlusion import OcclusionConfig
 from ig2mj.learn.occlusion.projection import CameraProjection
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.policies import Policy, flat
+from ig2mj.learn.ppo import PPOConfig
 from ig2mj.learn.run_config import RunSettings, read_run_file, settings_of
 from ig2mj.learn.sac import SACConfig
 from ig2mj.learn.shipped import CHECKOUT
@@ -141,3 +144,10 @@ def test_algorithms_know_nothing_of_learning_under_occlusion_nor_of_experts():
         )
     ]
     assert not wrong
+
+
+def test_the_guide_has_every_setting():
+    page = (CHECKOUT.parent / "docs" / "guide" / "learning.md").read_text()
+    configs = RunSettings(), OcclusionConfig(), SACConfig(), PPOConfig(), DaggerConfig(), BCConfig()
+    names = {field.name for config in configs for field in dataclasses.fields(config)}
+    assert not {name for name in names if f"`{name}`" not in page}

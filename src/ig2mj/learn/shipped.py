@@ -1,6 +1,6 @@
 """Policies that ship with the project: found by name, and installed from runs with a model card.
 
-They lie in `policies/` of a checkout, and beside the installed package in a wheel. A policy's name is that of its task;
+They are in `policies/` of a checkout, and next to the installed package in a wheel. A policy's name is that of its task;
 what is not the task's usual robot, way of grasping or observation is added to it ("CookingMeat-fetch-state").
 """
 
@@ -111,7 +111,7 @@ def add_policy(
     ):
         if bytes_ > most:
             beside.unlink()
-            fix = "train smaller networks: --set actor=128,128"
+            fix = "train smaller networks: --set actor_layers=128,128"
             raise InputError(
                 file, f"would make {bytes_ / 1e6:.2f} MB, and {what} may have {most / 1e6:.1f} MB", fix=fix
             )
@@ -159,7 +159,7 @@ def model_card(name: str, policy: Policy) -> str:
     depends, found = card["depends"], card["evaluation"]
     sees = ", ".join(policy.observations)
     if depends["picture"]:
-        sees += f"; pictures averaged down to {depends['picture'][0]}x{depends['picture'][1]}"
+        sees += f"; images averaged down to {depends['picture'][0]}x{depends['picture'][1]}"
     rate = (
         f"{found['success_rate']:.1%} of {found['episodes']:,} held-out episodes, each from another start state "
         f"({found['success_low']:.1%} to {found['success_high']:.1%} with 95 % confidence)"
@@ -175,10 +175,10 @@ def model_card(name: str, policy: Policy) -> str:
         "thresholds": thresholds,
         "start states": found.get("start_states"),
         "mean return": f"{found['mean_return']:.3f}",
-        "evaluated on": f"the {found['engine']} engine, {'drawn actions' if found['drawn'] else 'mean actions'}",
+        "evaluated on": f"the {found['engine']} engine, {'sampled actions' if found['drawn'] else 'deterministic actions'}",
         "command": f"`{card.get('command', '')}`",
         "algorithm": card.get("algorithm"),
-        "helped by": helped or ("demonstrations" if card.get("demonstration_steps") else "nobody"),
+        "help": helped or ("demonstrations" if card.get("demonstration_steps") else "none"),
         "seed": card.get("seed"),
         "minutes of training": card.get("minutes"),
         "seconds of compilation before": None if card.get("compile_s") is None else round(card["compile_s"]),
@@ -193,5 +193,7 @@ def model_card(name: str, policy: Policy) -> str:
         "It is for this task, robot, way of grasping and observation alone, and refused for others. It was trained and "
         "evaluated in one simulated home, with the same objects at other places; it has not been tried on a real robot."
     )
-    evaluate = f"    ig2mj evaluate {name}" + " --stochastic" * found["drawn"]
-    return "\n".join([*lines, "", evaluate, f"    ig2mj view --policy {name}", "", limits, ""])
+    commands = [f"    ig2mj evaluate {name}" + " --stochastic" * found["drawn"], f"    ig2mj view --policy {name}"]
+    if any((folder / f"{name}.toml").is_file() for folder in (CHECKOUT, INSTALLED)):
+        commands.append(f"    ig2mj train --config {name}")
+    return "\n".join([*lines, "", *commands, "", limits, ""])
