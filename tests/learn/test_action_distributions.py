@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from ig2mj.learn.action_distributions import drawn, label_loss, mode, sample_with_log_prob
+from ig2mj.learn.action_distributions import label_loss, mode, sample, sample_with_log_prob
 
 
 def learnt(labels, choices: int):
@@ -37,14 +37,14 @@ def test_a_choice_learns_what_lies_between_its_values(label):
 
 def test_a_choice_is_drawn_as_often_as_it_is_likely():
     head = jnp.log(jnp.broadcast_to(jnp.array([0.2, 0.7, 0.1]), (20_000, 2, 3)))
-    found = np.asarray(drawn(head, jnp.zeros((20_000, 2)), jax.random.PRNGKey(0)))
+    found = np.asarray(sample(head, jnp.zeros((20_000, 2)), jax.random.PRNGKey(0)))
     shares = [(found == value).mean(0) for value in (-1, 0, 1)]
     np.testing.assert_allclose(shares, [[0.2] * 2, [0.7] * 2, [0.1] * 2], atol=0.015)
 
 
 def test_a_gaussian_is_drawn_around_its_middle():
     head, log_std = jnp.full((20_000, 1), 0.3), jnp.full((20_000, 1), jnp.log(0.1))
-    found = np.arctanh(np.asarray(drawn(head, log_std, jax.random.PRNGKey(0)), float))
+    found = np.arctanh(np.asarray(sample(head, log_std, jax.random.PRNGKey(0)), float))
     assert abs(found.mean() - 0.3) < 0.005 and abs(found.std() - 0.1) < 0.005
     np.testing.assert_allclose(mode(head), np.tanh(0.3), rtol=1e-5)
 

@@ -7,14 +7,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax.sharding import PartitionSpec as P
 
-from ig2mj.learn.nonempty_leaves import nonempty_specs, restored, shards_of, solid
+from ig2mj.learn.nonempty_leaves import nonempty, nonempty_specs, restored, shards_of
 
 TREE = {"a": jnp.ones((4, 3)), "b": (jnp.zeros((4, 0)), jnp.arange(2)), "c": jnp.zeros((0,), jnp.uint8)}
 SPECS = {"a": P("d"), "b": (P("d"), P()), "c": P()}
 
 
 def test_a_tree_comes_back_whole():
-    leaves = solid(TREE)
+    leaves = nonempty(TREE)
     assert [a.shape for a in leaves] == [(4, 3), (2,)]
     again = restored(TREE, [a + 1 for a in leaves])
     assert jax.tree.structure(again) == jax.tree.structure(TREE)

@@ -69,7 +69,7 @@ def test_a_run_becomes_a_policy_that_is_found_by_name(run, monkeypatch):
     assert loaded.weights_digest == made().weights_digest
     assert "somewhere" not in loaded.card["command"] and "--demos meat.h5" in loaded.card["command"]
     page = file.with_suffix(".md").read_text()
-    assert "98.7% of 1,000 held-out episodes" in page and "helped by | nobody" in page
+    assert "98.7% of 1,000 held-out episodes" in page and "help | none" in page
     monkeypatch.setattr(shipped, "shipped", lambda: {"CookingMeat-state": file})
     assert shipped.find_policy("CookingMeat-state") == file
     assert shipped.find_policy("ig2mj/CookingMeat-state-v0") == file

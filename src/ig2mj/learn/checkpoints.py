@@ -105,12 +105,12 @@ class Checkpoints:
         """Of one checkpoint. Raises InputError."""
         file = self.folder / str(number) / "meta.json"
         found = read_json(file, kind=dict)
-        if found.get("format") != FORMAT_VERSION:
-            raise OldCheckpoint(
-                file, "is a checkpoint of another version", fix="ig2mj 0.1.0 continues runs of version 0.1"
-            )
         if not isinstance(found.get("depends"), dict):
             raise InputError(file, "does not say what it is of", element="depends")
+        if "format" not in found:
+            raise OldCheckpoint(file, "is a checkpoint of version 0.1", fix="ig2mj 0.1.0 continues that run")
+        if found["format"] != FORMAT_VERSION:
+            raise OldCheckpoint(file, f"has format {found['format']}, and {FORMAT_VERSION} can be read")
         return found
 
     def newest(self, like: Any, depends: Mapping[str, Any]) -> tuple[Any, dict[str, Any]] | None:

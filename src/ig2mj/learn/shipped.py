@@ -1,7 +1,7 @@
 """Policies that ship with the project: found by name, and installed from runs with a model card.
 
-They are in `policies/` of a checkout, and next to the installed package in a wheel. A policy's name is that of its task;
-what is not the task's usual robot, way of grasping or observation is added to it ("CookingMeat-fetch-state").
+They are in `policies/` of a checkout, and next to the installed package in a wheel. A policy's name is its task's; what
+is not the task's usual robot, way of grasping or observation is added to it ("CookingMeat-fetch-state").
 """
 
 from __future__ import annotations
@@ -175,7 +175,7 @@ def model_card(name: str, policy: Policy) -> str:
         "thresholds": thresholds,
         "start states": found.get("start_states"),
         "mean return": f"{found['mean_return']:.3f}",
-        "evaluated on": f"the {found['engine']} engine, {'sampled actions' if found['drawn'] else 'deterministic actions'}",
+        "evaluated on": f"the {found['engine']} engine, {'sampled' if found['drawn'] else 'deterministic'} actions",
         "command": f"`{card.get('command', '')}`",
         "algorithm": card.get("algorithm"),
         "help": helped or ("demonstrations" if card.get("demonstration_steps") else "none"),

@@ -45,7 +45,7 @@ from ig2mj.learn.collect import Seen, Transition
 from ig2mj.learn.iteration import AXIS, ManyDevices
 from ig2mj.learn.perception import Perception
 from ig2mj.learn.sac import SAC, SACConfig
-from ig2mj.learn.nonempty_leaves import solid, nonempty_specs
+from ig2mj.learn.nonempty_leaves import nonempty, nonempty_specs
 
 @dataclasses.dataclass
 class Space:
@@ -72,7 +72,7 @@ mesh, whole, each = many._mesh, P(), P(AXIS)
 program = many._program(learner, memory, rollout, sums)
 leaves = []
 for tree, specs in ((learner, whole), (memory, many._memory_specs), (rollout, P(None, AXIS)), (sums, each)):
-    leaves.append([placed(a, spec, mesh) for a, spec in zip(solid(tree), nonempty_specs(tree, specs))])
+    leaves.append([placed(a, spec, mesh) for a, spec in zip(nonempty(tree), nonempty_specs(tree, specs))])
 rest = [placed(jax.ShapeDtypeStruct(s, t), spec, mesh) for s, t, spec in
         (((2, 2), jnp.float32, each), ((2,), jnp.uint32, whole), ((), jnp.bool_, whole))]
 program.lower(*leaves, *rest).compile()
