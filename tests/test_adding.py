@@ -14,7 +14,10 @@ import pytest
 import ig2mj
 from ig2mj.agents import registry
 from ig2mj.agents.fetch import Fetch
+from ig2mj.envs.setups import Control, able_robots, setup_activity
 from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.tasks.experts import Expert
+from ig2mj.tasks.registry import TASKS, load_task
 
 FILES = {
     "A predicate": "ig2mj/predicates/definitions/raised.py",
@@ -76,6 +79,7 @@ import numpy as np
 import ig2mj
 from ig2mj.engine.registry import make_engine
 from ig2mj.envs.registry import find_task, list_envs
+from ig2mj.envs.setups import able_robots
 from ig2mj.errors import EngineError
 from ig2mj.sensors.base import SensorOptions
 from ig2mj.sensors.suite import SensorSuite
@@ -104,6 +108,7 @@ told["clearance"] = float(np.asarray(readings["clearance"])[0, 0])
 
 task = find_task("ClearingTable")
 told["listed"] = list_envs()[0]
+told["able"] = {name: able_robots(find_task(name)) for name in ("PointNavigation", "Reaching", "ClearingTable")}
 placed, humanoid = place_robot(task, "humanoid")
 birch = ig2mj.load_scene(task.home, agents=[humanoid])
 model = StateModel.of_manifest(birch.tables, birch.manifest)
@@ -173,6 +178,11 @@ def test_a_robot_is_one_file_and_one_line(told):
     """It is known by name without being loaded, it drives, and an activity refuses it for the lack of hands."""
     assert told["names before loading"][1:] == [True, False]
     assert told["driven"] > 0.1
+    assert told["able"] == {
+        "PointNavigation": ["turtlebot", "fetch", "trolley"],
+        "Reaching": ["fetch"],
+        "ClearingTable": ["humanoid", "fetch"],
+    }
     assert "robot 'trolley' has no hand: it cannot do ClearingTable" in told["no hand"]
 
 
@@ -204,6 +214,19 @@ def test_a_registered_robot_is_made_by_its_name(monkeypatch):
         registry.make_robot("mime")
 
 
+def test_a_registered_robot_takes_the_place_of_the_listed_one_that_stands_lowest(monkeypatch):
+    """Its base is on the floor where Fetch's would be, it acts with its first hand, and it has an expert."""
+    monkeypatch.setattr(registry, "ROBOTS", dict(registry.ROBOTS))
+    registry.register("mine", lambda: Fetch(name="mine"))
+    task = load_task("GraspingBook")
+    setup = setup_activity(task, "mine", "assisted", None, "train", None, False, Control())
+    place = setup.scene.start_data().xpos[setup.scene.tables.agent_body[0]]
+    assert place == pytest.approx([2.3, 0.0, Fetch().stands], abs=0.02)
+    assert setup.actions.names[-1] == "gripper" and setup.actions.size == 7
+    assert able_robots(task) == ["humanoid", "fetch", "mine"]
+    Expert(task, "mine", setup.scene, setup.rules.model, "assisted")
+
+
 def test_what_is_registered_must_be_a_robot(monkeypatch):
     monkeypatch.setattr(registry, "ROBOTS", dict(registry.ROBOTS))
     with pytest.raises(EngineError, match="register its class or a function"):
@@ -214,8 +237,6 @@ def test_what_is_registered_must_be_a_robot(monkeypatch):
 
 
 def test_every_robot_and_task_of_the_registries_can_be_loaded():
-    from ig2mj.tasks.registry import TASKS, load_task
-
     assert [load_task(name).name for name in TASKS] == list(TASKS)
     assert [registry.make_robot(name).name for name in registry.ROBOTS] == list(registry.ROBOTS)
 

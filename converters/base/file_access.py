@@ -1,7 +1,7 @@
-"""Which files an URDF may make the converter read.
+"""Which files a URDF may make the converter read.
 
-A file name inside an URDF, MTL, DAE or glTF is a stranger's wish. `FileGuard` turns it into a path and refuses what
-lies outside the allowed folders, after following symbolic links.
+A file name inside a URDF, MTL, DAE or glTF is untrusted input. `FileGuard` resolves it and refuses paths outside the
+allowed folders, after following symbolic links.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import urllib.parse
 from collections.abc import Sequence
 
 from ig2mj.errors import InputError
+from ig2mj.files.inside import OutsideError
 
 from . import inputs
 from .xml_reader import read_xml, shortened
@@ -21,10 +22,6 @@ PACKAGE_SEARCH_DEPTH = 8  # how many folders above an URDF are looked at for its
 _SCHEME = re.compile(r"([A-Za-z][A-Za-z0-9+.-]+)://")
 _FIND = re.compile(r"(?:file://)?\$\(\s*find\s+([^()]+?)\s*\)/*")
 """A package's folder as xacro and roslaunch write it."""
-
-
-class OutsideError(InputError):
-    """A file name points outside the folders that may be read."""
 
 
 class FileGuard:

@@ -1,6 +1,6 @@
 """What a conversion looked at: which files it read, which it found absent, which folders it listed.
 
-Every reader asks the disk through this file, so that a `Record` tells later, without converting, whether the same
+Every reader asks the disk through this file, so that a `Record` shows later, without a conversion, whether the same
 conversion would see the same things again (see `output_cache`). Outside a `recording` block nothing is kept.
 """
 

@@ -11,7 +11,7 @@ _UNSAFE = re.compile(r"[^A-Za-z0-9_-]+")
 def file_slug(text: str, limit: int = 60) -> str:
     """A name any file system takes: ASCII letters, digits, `_` and `-`, at most `limit` characters, never empty.
 
-    Different texts may give the same slug: whoever writes files adds a content hash.
+    Different texts may give the same slug: code that writes files adds a content hash.
     """
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode()
     return _UNSAFE.sub("_", plain).strip("_")[:limit] or "unnamed"

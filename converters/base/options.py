@@ -13,7 +13,7 @@ from ig2mj.callbacks import ProgressCallback, no_progress
 from .read_limits import ReadLimits, limits_of
 
 
-class Renderer(Protocol):
+class ReportRenderer(Protocol):
     """What draws images: `ig2mj.viewer.offscreen.render`, handed in because the converter may not import it.
 
     `camera` is given as an `ig2mj.viewer.offscreen.FreeView`.
@@ -45,11 +45,11 @@ class ConvertOptions:
         its volume's error under 15 % and its openings open (see `HullOptions`).
       bullet_inertia: inertia of the bounding box, as Bullet computes it, instead of the hulls'.
       colours: of visuals without a texture: the source's, or household ones by category. "auto": the source's, unless
-        every object of a scene is of one flat colour, which tells of the modelling program and not of the objects.
+        every object of a scene is of one flat colour, which comes from the modelling program.
       assets: folder that gets `meshes/` and `textures/`, relative to the output's, so that many scenes can share them.
       keep_hovering: start loose objects exactly where the source has them, even in mid-air.
       jobs: processes. cache: use the caches of decompositions and of finished outputs.
-      report: write report.json and report.html. timed: they tell how long each stage took, which is never the same.
+      report: write report.json and report.html. timed: they contain the duration of each stage.
       strict: take warnings for errors, and leave no output.
       mesh_root, package_path: of an object: a folder below which its meshes may lie, although it is not above the URDF;
         folders in which packages (`package://`) are looked for first.
@@ -79,7 +79,7 @@ class ConvertOptions:
     mesh_root: pathlib.Path | None = None
     package_path: tuple[pathlib.Path, ...] = ()
     limits: ReadLimits = dataclasses.field(default_factory=ReadLimits)
-    renderer: Renderer | None = None
+    renderer: ReportRenderer | None = None
     view: Callable[..., Any] | None = None
     progress: ProgressCallback = no_progress
 

@@ -1,4 +1,4 @@
-"""What a conversion tells when it is done. Imports nothing heavy: a conversion out of the cache needs no more."""
+"""Result of a conversion. Imports nothing heavy: a conversion out of the cache needs no more."""
 
 from __future__ import annotations
 

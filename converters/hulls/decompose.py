@@ -68,7 +68,7 @@ class CutTask:
 
 @dataclasses.dataclass
 class HullCut:
-    """Convex pieces of one part, where they are from, and what to tell the user.
+    """Convex pieces of one part, their source, and warnings for the user.
 
     stopped: time or a signal ended a finer try: the pieces may be better on another day, so they are not to be kept.
     seconds: it took.

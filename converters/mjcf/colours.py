@@ -9,7 +9,7 @@ from ..base.description import ROBOT_CATEGORY
 
 Rgba = tuple[float, float, float, float]
 
-#: Word in a category's name -> colour; the first that matches wins. Plain household colours, chosen to be told apart.
+#: Word in a category's name -> colour; the first that matches wins. Distinguishable household colours.
 _BY_WORD: tuple[tuple[tuple[str, ...], Rgba], ...] = (
     ((ROBOT_CATEGORY,), (0.70, 0.70, 0.70, 1.0)),
     (("walls",), (0.93, 0.91, 0.87, 1.0)),
@@ -34,7 +34,7 @@ _BY_WORD: tuple[tuple[tuple[str, ...], Rgba], ...] = (
 
 
 def category_colour(category: str) -> Rgba:
-    """A category's colour: a household one where the name tells, else a muted hue that depends on the name only."""
+    """A category's colour: a household one if the name matches, else a muted hue that depends on the name only."""
     words = category.lower().removeprefix("half_")
     for names, colour in _BY_WORD:
         if any(name in words for name in names):

@@ -15,7 +15,7 @@ import numpy as np
 from ig2mj.scene.manifest import Manifest, ObjectEntry
 
 from ..base.description import RoomMaps
-from ..base.options import Renderer
+from ..base.options import ReportRenderer
 from ..base.outcome import CheckResult
 from ..hulls.pieces import LinkHulls
 from ..mjcf.model_index import ModelIndex, index_model
@@ -28,7 +28,7 @@ RENDERED = "rendered"
 
 @dataclasses.dataclass
 class ReportInput:
-    """Everything the report tells that is not in the model and the manifest.
+    """Everything in the report that is not in the model and the manifest.
 
     Attributes:
       kind: "scene" or "object".
@@ -57,7 +57,7 @@ def write_report(
     model: mujoco.MjModel,
     manifest: Manifest,
     given: ReportInput,
-    renderer: Renderer | None = None,
+    renderer: ReportRenderer | None = None,
     view: Callable[..., Any] | None = None,
 ) -> dict[str, Any]:
     """Writes `report.json` and the self-contained `report.html` into `folder`; returns what is in `report.json`.

@@ -9,13 +9,13 @@ import pytest
 from ig2mj.engine.registry import make_engine
 from ig2mj.scene.scene import load_scene
 from ig2mj.tasks.activities import ACTIVITIES
-from ig2mj.tasks.reward import Lift, Measures, Reward
+from ig2mj.tasks.reward import ActivityMeasures, Lift, Reward
 from ig2mj.tasks.task import place_robot
 from ig2mj.worlds.rules import Rules
 
 
 def measures(literals=0.0, distances=(1.0, 2.0), held=False, stains=0.0):
-    return Measures(
+    return ActivityMeasures(
         jnp.array([literals], jnp.float32),
         jnp.array([distances], jnp.float32),
         jnp.array([held]),

@@ -44,7 +44,7 @@ class HandReading:
 
 
 ControllerState = Any
-"""What a controller remembers from step to step: a pytree of arrays that begin with the world axis."""
+"""State of a controller between steps: a pytree of arrays whose first axis is the worlds."""
 
 
 @runtime_checkable
@@ -92,16 +92,16 @@ class Controller(Protocol):
         ...
 
     def lag(self, view: PhysicsView, state: ControllerState) -> Float[Array, "W H"]:
-        """m by which each hand is behind where it is pulled to: what it holds, or what it runs into, is too much."""
+        """Tracking error of each hand in metres; a large value means an overload or an obstacle."""
         ...
 
     def eye(self, view: PhysicsView, state: ControllerState) -> tuple[Float[Array, "W 3"], Float[Array, "W 4"]]:
-        """Pose of the agent's camera in the world (MuJoCo's camera axes). Engines know the compiled camera only; an
-        agent that moves its eye without joints (`moves_eye`) says here where it is, and the core puts it into views."""
+        """Pose of the agent's camera in the world (MuJoCo's camera axes). Engines know the compiled camera only. If
+        an agent moves its camera without joints (`moves_eye`), the core puts this pose into views."""
         ...
 
     def proprioception(self, view: PhysicsView, state: ControllerState) -> Float[Array, "W m"]:
-        """What the agent feels of itself."""
+        """Proprioception of the agent."""
         ...
 
 

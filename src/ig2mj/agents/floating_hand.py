@@ -33,13 +33,13 @@ FINGER_TORQUE = 3.0
 """Newton metres of each finger joint (iGibson's behavior_robot.py)."""
 
 FINGER_CLOSED, THUMB_CLOSED = 1.2, 0.6
-"""Radians at which fingers and thumb are closed; open is 0 (same section)."""
+"""Radians at which fingers and thumb are closed; open is 0 (iGibson's behavior_robot.py)."""
 
 FRICTION = 2.5
-"""Sliding friction of palm and fingers (same section)."""
+"""Sliding friction of palm and fingers (iGibson's behavior_robot.py)."""
 
 PALM_MASS, SEGMENT_MASS = 1.0, 0.1
-"""Kilograms (same section)."""
+"""Kilograms (iGibson's behavior_robot.py)."""
 
 CONTACT_GAP = 0.003
 """Metres, as on every collision geom of a scene."""

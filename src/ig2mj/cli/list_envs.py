@@ -18,6 +18,7 @@ def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
     from ig2mj.cli.common.printing import make_table, stdout_console
     from ig2mj.envs.names import NAMESPACE, VERSION
     from ig2mj.envs.registry import TASKS
+    from ig2mj.envs.setups import able_robots
 
     if json:
         rows = [
@@ -25,7 +26,7 @@ def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
                 "name": t.name,
                 "id": f"{NAMESPACE}/{t.name}-v{VERSION}",
                 "home": t.home,
-                "robots": list(t.robots),
+                "robots": able_robots(t),
                 "goal": t.goal,
                 "summary": t.summary,
             }
@@ -33,6 +34,6 @@ def run(json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False) -> int:
         ]
         print(form.dumps(rows))
         return 0
-    rows = [(t.name, t.home, ", ".join(t.robots), t.summary) for t in TASKS.values()]
+    rows = [(t.name, t.home, ", ".join(able_robots(t)), t.summary) for t in TASKS.values()]
     stdout_console().print(make_table("environments", ("name", "home", "robots", "task"), rows))
     return 0

@@ -66,7 +66,7 @@ def run(
       set: settings of the algorithm and of the run, e.g. utd_ratio=16 actor_layers=128,128 engine=native
         image_size=64; docs/guide/learning.md lists them.
       algo: sac (the default), ppo, bc (from --demos alone), or dagger (a scripted expert labels what the policy does).
-      robot: humanoid, fetch or turtlebot; default: the task's first robot.
+      robot: {robots}; default: the task's first robot.
       grasping: mitten (a hand holds what it touches first), assisted, sticky or physical; default: the task's.
       obs: state (the default: proprioception and privileged state) or rgbd (proprioception and images, as in the
         paper).

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 from collections.abc import Callable
 
 import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD, Controller, Robot
-from ig2mj.agents.registry import make_robot
+from ig2mj.agents.registry import ROBOTS, make_robot
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.agents.turtlebot import TurtleBot
 from ig2mj.envs.environment import Companions
@@ -19,14 +20,14 @@ from ig2mj.tasks.activity_objective import ActivityObjective
 from ig2mj.tasks.bddl.goal import conditions
 from ig2mj.tasks.bddl.objective import BddlObjective
 from ig2mj.tasks.bddl.task import BddlTask, activity_pool, standing_place
-from ig2mj.tasks.homes import check_inside
+from ig2mj.tasks.homes import AnyTask, check_inside
 from ig2mj.tasks.navigation.companions import wanderers
 from ig2mj.tasks.navigation.objective import NavigationObjective
 from ig2mj.tasks.navigation.starts import make_starts
 from ig2mj.tasks.navigation.task import NavigationTask
 from ig2mj.tasks.objective import Objective
 from ig2mj.tasks.pools import pool_of
-from ig2mj.tasks.task import Task, place_robot
+from ig2mj.tasks.task import Task, place_robot, role_of
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.rules import Rules
 
@@ -74,6 +75,33 @@ class EnvSetup:
     companions: Companions | None = None
 
 
+def check_able(task: AnyTask, name: str, body: TaskRobot) -> None:
+    """Whether a robot has the drive and the hands that a task takes.
+
+    Raises:
+      EngineError: it has not.
+    """
+    if isinstance(task, Task):
+        role_of(task, name, body)
+        return
+    others = f"({', '.join(task.robots)} can)"
+    if isinstance(task, NavigationTask) and not body.drives:
+        raise EngineError(f"robot '{name}' does not drive: it cannot do {task.name} {others}")
+    if not body.hand_count and not (isinstance(task, NavigationTask) and task.goal == "point"):
+        raise EngineError(f"robot '{name}' has no hand: it cannot do {task.name} {others}")
+
+
+def able_robots(task: AnyTask) -> list[str]:
+    """Names of the robots of the registry that can do a task; those that it is made for first."""
+    able = list(task.robots)
+    for name in ROBOTS:
+        if name not in able:
+            with contextlib.suppress(EngineError):
+                check_able(task, name, make_robot(name))
+                able.append(name)
+    return able
+
+
 def setup_activity(
     task: Task,
     robot: str | TaskRobot,
@@ -117,10 +145,7 @@ def setup_navigation(
     """Of a navigation task. Arguments as of `ig2mj.make`; `count`: start states."""
     first = make_robot(robot) if isinstance(robot, str) else robot
     name, control = robot if isinstance(robot, str) else robot.name, control.of(first)
-    if not first.drives:
-        raise EngineError(f"robot '{name}' does not drive: it cannot do {task.name} ({', '.join(task.robots)} can)")
-    if task.goal != "point" and not first.hand_count:
-        raise EngineError(f"robot '{name}' has no hand: it cannot do {task.name} ({', '.join(task.robots)} can)")
+    check_able(task, name, first)
     others = [TurtleBot(name=f"other_{k}") for k in range(task.others)]
     robots: list[Robot] = [first, *others]
     scene = load_scene(task.home, agents=robots, objects=task.objects)
@@ -154,8 +179,8 @@ def setup_bddl(
 ) -> EnvSetup:
     """Of an activity that BDDL defines. Arguments as of `ig2mj.make`; `count`: rows of the pool."""
     body = make_robot(robot) if isinstance(robot, str) else robot
-    if isinstance(robot, str) and not body.hand_count:
-        raise EngineError(f"robot '{robot}' has no hand: it cannot do {task.name} ({', '.join(task.robots)} can)")
+    if isinstance(robot, str):
+        check_able(task, robot, body)
     rows = pool if pool is not None else activity_pool(task, split, count)
     x, y = standing_place(task, rows)
     body = body.at(x, y, 0.0)

@@ -42,7 +42,7 @@ OVERLAP = 1e-6
 
 FLAT = 1e-6
 """Six times a tetrahedron's volume over its size cubed, and twice a triangle's area over its size squared, below which
-float32 cannot tell inside from outside."""
+float32 cannot distinguish inside from outside."""
 
 EDGES = np.array([(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)])
 FACES = np.array([(0, 1, 2), (0, 1, 3), (0, 2, 3), (1, 2, 3)])

@@ -1,4 +1,4 @@
-"""Points against convex pieces: containment, signed distance, support points. Metres.
+"""Points against convex pieces: signed distance, support points of their cores. Metres.
 
 Pieces are described as in `SceneTables.piece_*`, in their own frames: capsules and cylinders along z, `size` is
 MuJoCo's geom_size, half-spaces (n, d) with n.x <= d. Distances between two pieces are in `ig2mj.geometry.gjk`.

@@ -1,5 +1,5 @@
-"""The pieces of many objects in one layout, so that the object that rays are held against may be chosen by a number
-that is not known while tracing: one compiled program serves every object.
+"""The pieces of many objects in one layout, so that a traced index can select the object that rays are tested against:
+one compiled program serves every object.
 
 Pieces are sorted by kind and number of half-spaces, as in `ig2mj.geometry.targets`, and within these by object. An
 object's pieces of one sort are then a slice, as long as the longest of all objects.

@@ -1,9 +1,8 @@
-"""Everything that a change to the world shall not move, compared with an unchanged copy of the world.
+"""Objects that a change to the world must not move, compared with an unchanged copy of the world.
 
-A placement, or a door that is opened, must shove nothing. What moves by itself meanwhile - an apple that still rolls, a
-cup that a robot carries - is no reason to refuse it. Both are told apart by a copy of the world without the change,
-stepped as often. The copy is stepped only where something has moved at all, and its trajectory is shared by all changes
-that are tried from the same state.
+A placement, or a door that is opened, must push nothing away. Objects that move by themselves (an apple that still
+rolls, a cup that a robot carries) do not count. A copy of the world without the change, stepped as often, distinguishes
+the two. It is stepped only if something has moved, and all changes tried from one state share its trajectory.
 
 Axes: O objects, J openable joints, B bodies of agents.
 """

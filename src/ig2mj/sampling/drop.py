@@ -1,4 +1,4 @@
-"""Where an object comes to lie when it is let down straight onto the surfaces of a level, and whether it stays there.
+"""Where an object comes to rest when it is lowered vertically onto the surfaces of a level, and whether it stays there.
 
 An object that goes down vertically stops where the gap between its underside and the surfaces first closes. That gives
 the height for any shape of object and of surface, from a book on a table to an apple in a bowl. Then:

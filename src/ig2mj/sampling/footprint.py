@@ -1,7 +1,7 @@
-"""What an object looks like from below and from above in a given orientation, on the grid of `columns`.
+"""Height profiles of an object from below and from above in a given orientation, on the grid of `columns`.
 
-The underside decides at which height the object comes to lie when it is let down onto a surface, the topside whether
-it fits below what hangs over it.
+The underside determines the height at which a lowered object rests on a surface, the top side whether it fits below
+obstacles.
 
 Axes: M rows and N columns of the object's own window.
 """

@@ -1,7 +1,7 @@
-"""Doors, drawers and lids in other positions: what rests on them goes along, and nothing else may be shoved.
+"""Doors, drawers and lids in other positions: objects that rest on them move along, and no other object may be moved.
 
-The checks are those of a placement (`ig2mj.sampling.placement`): what moves by itself is no reason, everything is at
-rest, and nothing stands deeper in anything than it did.
+The checks are those of a placement (`ig2mj.sampling.placement`): motion that the change does not cause is ignored,
+everything comes to rest, and no penetration grows.
 """
 
 from __future__ import annotations

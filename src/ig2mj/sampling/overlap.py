@@ -1,6 +1,5 @@
-"""How deep objects stand in others, in given positions: what random placing must check and physics would tear apart.
-
-And which objects rest on which links: those go along when a drawer is opened.
+"""Penetration depths of objects in given positions, which random placement must check, and which objects rest on which
+links: those move along when a drawer is opened.
 """
 
 from __future__ import annotations

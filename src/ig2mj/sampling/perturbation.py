@@ -1,7 +1,7 @@
 """Random disturbance of a scene: loose objects are lifted, shifted, turned and let go. Pure JAX, all worlds at once.
 
 For pools of settled initial states, and for measuring how much of the scene wakes at once. It keeps rooms as they are
-furnished; placing objects by predicates is another matter.
+furnished; `ig2mj.sampling.many` places objects by predicates.
 """
 
 from __future__ import annotations

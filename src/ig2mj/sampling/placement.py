@@ -1,7 +1,7 @@
 """Placing one object: candidates from a rule, tried until one is free, settles, and makes the predicate true.
 
-What iGibson only hopes for is checked: that the object is supported, that it stands in nothing, that the predicate
-holds after physics has had its say, and that everything is at rest then. Every rejection is counted under its reason.
+Beyond iGibson, it checks that the object is supported and penetrates nothing, that the predicate holds after physics
+has run, and that everything is then at rest. Every rejection is counted under its reason.
 
 Axes: N candidates.
 """

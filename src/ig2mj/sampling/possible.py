@@ -1,8 +1,8 @@
-"""Where an object could be let down at all, for every cell of an area at once: the search for a large one begins so.
+"""Where an object could be placed at all, for every cell of an area at once: the first step for large objects.
 
-A pool finds its place in a garage in a few hundred of a hundred thousand cells, and letting it down costs thousands of
-comparisons in each. The conditions here are necessary, not sufficient, and each is a correlation of two masks (cells of
-the level where something is wrong, cells of the object that mind), done by FFT.
+A pool fits in a garage in a few hundred of a hundred thousand cells, and testing one cell costs thousands of
+comparisons. The conditions here are necessary, not sufficient. Each is a correlation of two masks (bad cells of the
+level, affected cells of the object), computed by FFT.
 
 Axes: M rows and N columns of cells for the object's origin.
 """

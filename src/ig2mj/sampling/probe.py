@@ -1,7 +1,7 @@
-"""`Probe`: a settled scene with a box in it that can be put anywhere, to ask what it touches and what it sees.
+"""`Probe`: a settled scene with a movable box, for contact and visibility queries at arbitrary positions.
 
-The box is no part of the scene: it is compiled in behind everything else, so that numbers of bodies and geoms are the
-scene's. Nothing sleeps, and nothing is ever stepped.
+The box is compiled in after everything else, so that ids of bodies and geoms are the scene's. Nothing sleeps, and
+nothing is ever stepped.
 
 Axes: N places or rays.
 """

@@ -1,9 +1,8 @@
 """One initial state that fulfils a set of conditions: objects are placed one after another, with backtracking.
 
-Joints first (those of an object that is to be placed, once it stands), then placements from supports to what they bear,
-then states that need no place. What is settled is kept; where an object finds no place, the one before it is placed
-again. At the end everything is checked together: all conditions hold, everything sleeps, no object penetrates another.
-"""
+Order: joints (those of an object that is to be placed, once it stands), placements from supports to the objects on
+them, then states without a placement. If an object finds no position, the sampler backtracks to the one before it. At
+the end all conditions are checked together: they hold, everything sleeps, no object penetrates another."""
 
 from __future__ import annotations
 
@@ -30,10 +29,10 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates, Swap
 
 SHARE = 3
-"""An object may use up one part in so many of what is left of the row's budget before the one before it is moved."""
+"""An object may spend 1/SHARE of the remaining budget of the row before the sampler backtracks to the one before it."""
 
 OPENINGS = 12
-"""Positions drawn for an object's joints until it rests with them: a lid that is half open may fall shut."""
+"""Positions sampled for an object's joints until it stays at rest: a half-open lid may fall shut."""
 
 
 @dataclasses.dataclass(frozen=True)

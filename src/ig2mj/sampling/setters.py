@@ -1,6 +1,6 @@
 """Setting states and predicates of one object by name, as the paper samples them (table A.5): those without placement.
 
-Changes of states are done here; what physics has to follow with (teleports of slicing, joints of doors) is handed back.
+State changes are made here; the physics changes that follow (teleports of slicing, joints of doors) are returned.
 """
 
 from __future__ import annotations

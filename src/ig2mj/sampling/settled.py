@@ -1,6 +1,6 @@
-"""Settled initial states in numbers: a scene is disturbed at random and stepped until it rests, many times over.
+"""Settled initial states in bulk: a scene is disturbed at random and stepped until it is at rest, many times.
 
-Native engine only: it puts to sleep what rests, and what sleeps costs nothing in a batch.
+Native engine only: it puts resting objects to sleep, and sleeping objects cost nothing in a batch.
 """
 
 from __future__ import annotations

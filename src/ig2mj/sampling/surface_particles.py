@@ -1,4 +1,4 @@
-"""Places for dust and stains on an object's surface, drawn on the host.
+"""Positions for dust and stains on an object's surface, sampled on the host.
 
 Points are spread evenly by area over the outside of the collision pieces of all bodies of the object, where the surface
 does not face down by more than 45 degrees below the horizontal: iGibson's limit of 135 degrees to the vertical

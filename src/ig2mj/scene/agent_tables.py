@@ -106,7 +106,7 @@ def _agent_of_actuators(model: mujoco.MjModel, body_agent: np.ndarray) -> np.nda
 
 
 def _moved_body(model: mujoco.MjModel, actuator: int) -> int:
-    """A body that the actuator acts on; 0, the world, where that cannot be told."""
+    """A body that the actuator acts on; 0, the world, if unknown."""
     kind, target = mujoco.mjtTrn(int(model.actuator_trntype[actuator])), int(model.actuator_trnid[actuator, 0])
     if kind in (mujoco.mjtTrn.mjTRN_JOINT, mujoco.mjtTrn.mjTRN_JOINTINPARENT):
         return int(model.jnt_bodyid[target])

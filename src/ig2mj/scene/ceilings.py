@@ -1,6 +1,6 @@
-"""The solid ceiling of a home: one box over its walls that nobody sees, so that nothing flies out over them.
+"""The solid ceiling of a home: one invisible box on its walls, so that no object leaves the home over them.
 
-Homes are converted with ceilings that everything passes. This one belongs to the compiled model only
+Converted ceilings have no collision geometry. This one belongs to the compiled model only
 (`scene/invisible_colliders.py`). `docs/notes/lost.md`.
 """
 

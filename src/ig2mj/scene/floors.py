@@ -1,4 +1,4 @@
-"""Floors as physics has them: a metre deep, however thin they were drawn, and giving way for longer than other things.
+"""Collision geometry of floors: one metre deep, however thin the visual is, with softer contacts than other objects.
 
 Contacts push a body out of a solid on the nearest side. What is dropped from shoulder height, at an angle, reaches
 several centimetres into the floor before it is pushed; where the floor is thin, part of it is then nearer to the
@@ -106,7 +106,7 @@ def building_parts(spec: mujoco.MjSpec, manifest: Manifest, category: str) -> It
 
 
 def _compiled(spec: mujoco.MjSpec) -> tuple[mujoco.MjSpec, mujoco.MjModel]:
-    """A copy of the scene, compiled: only that tells where the corners of meshes are."""
+    """A compiled copy of the scene: needed for the positions of mesh corners."""
     copy = spec.copy()
     return copy, copy.compile()
 

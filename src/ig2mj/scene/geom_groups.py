@@ -1,4 +1,4 @@
-"""MuJoCo's geom groups, as converted homes and robots use them: 0 to 2 are what is seen, 3 is what collides."""
+"""MuJoCo's geom groups, as converted homes and robots use them: groups 0 to 2 are visual, group 3 collides."""
 
 from __future__ import annotations
 

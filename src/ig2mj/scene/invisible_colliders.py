@@ -1,7 +1,6 @@
-"""Static boxes that only physics knows: no objects, and transparent in the group of what collides.
+"""Static boxes that exist in physics only: transparent geoms of the collision group that belong to no object.
 
-So tables, predicates and maps do not know them, and neither images nor rays meet them, which leave out what is
-transparent.
+Tables, predicates and maps do not contain them, and images and rays skip transparent geoms.
 """
 
 from __future__ import annotations

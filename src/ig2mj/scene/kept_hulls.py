@@ -1,6 +1,7 @@
-"""Hulls of a household's meshes, kept from one process to the next.
+"""Cache of convex hulls of a household's meshes on disk.
 
-They depend on the meshes alone, and SciPy, which makes them, takes 0.2 s to import: most of what loading a home takes.
+Hulls depend on the meshes alone, and importing SciPy, which computes them, takes 0.2 s: most of the time of loading a
+home.
 """
 
 from __future__ import annotations

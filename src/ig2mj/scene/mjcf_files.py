@@ -1,4 +1,4 @@
-"""`read_mjcf`: the elements of an MJCF file that a stranger may have made, before MuJoCo sees it.
+"""`read_mjcf`: the elements of an untrusted MJCF file, checked before MuJoCo reads it.
 
 Refused are document types (and with them entities), encodings other than UTF-8, files that are too large or nested too
 deeply, and paths that leave the scene's folder: of `<include>`, `<model>`, meshes, textures, height fields, skins and

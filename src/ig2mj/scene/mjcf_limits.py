@@ -1,4 +1,4 @@
-"""What an MJCF file asks of MuJoCo, counted before MuJoCo reads it: one element can ask for all memory there is.
+"""Limits on an MJCF file, checked before MuJoCo reads it: a single element can request all available memory.
 
 Counted are elements (those inside a `<replicate>` as often as it repeats them, instances of composites and flexes too)
 and cells: of height fields, built-in textures, user data and user sensors, all together, and pixels of each image file.

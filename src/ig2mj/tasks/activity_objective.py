@@ -14,7 +14,7 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.particles import NUM_PARTICLES
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.points import locator
-from ig2mj.tasks.reward import TERMS, Measures, Reward
+from ig2mj.tasks.reward import TERMS, ActivityMeasures, Reward
 from ig2mj.tasks.task import Task
 
 DEGREES = 100.0
@@ -40,19 +40,19 @@ class ActivityObjective:
         states: ExtendedStates,
         status: GoalStatus,
         row: Int[Array, "W"] | None,
-        before: Measures | None = None,
-    ) -> Measures:
+        before: ActivityMeasures | None = None,
+    ) -> ActivityMeasures:
         return self.reward.measure(view, states, status, before)
 
-    def rewards(self, before: Measures, now: Measures) -> dict[str, Float[Array, "W"]]:
+    def rewards(self, before: ActivityMeasures, now: ActivityMeasures) -> dict[str, Float[Array, "W"]]:
         return self.reward.terms(before, now)
 
-    def ended(self, now: Measures, status: GoalStatus) -> tuple[Bool[Array, "W"], Bool[Array, "W"]]:
+    def ended(self, now: ActivityMeasures, status: GoalStatus) -> tuple[Bool[Array, "W"], Bool[Array, "W"]]:
         """Success ends an episode; there is no failure."""
         holds = jnp.asarray(status.holds)
         return holds, jnp.zeros_like(holds)
 
-    def info(self, view: PhysicsView, now: Measures, status: GoalStatus) -> dict[str, Array]:
+    def info(self, view: PhysicsView, now: ActivityMeasures, status: GoalStatus) -> dict[str, Array]:
         by_all, success = self.reward.holding(view).all(1), jnp.asarray(status.holds)
         found = {
             "success_in_hand": success & by_all,
@@ -71,7 +71,7 @@ class ActivityObjective:
         self,
         view: PhysicsView,
         states: ExtendedStates,
-        now: Measures,
+        now: ActivityMeasures,
         status: GoalStatus,
         time_left: Float[Array, "W"],
     ) -> dict[str, Float[Array, "W n"]]:

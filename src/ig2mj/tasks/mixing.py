@@ -1,7 +1,7 @@
 """`mixed_pool`: many start states from some, for training: every object lies where it does in one row of a pool, turned
 as it is in another.
 
-Who is trained on some thousand start states with images learns them by heart. Sampling more takes minutes of all
+A policy trained on a few thousand start states with images memorises them. Sampling more takes minutes of all
 processors, a mixture a second, and a row of it holds only where the task's objects are. What an object does not show is
 what it rests on: mixed are tasks whose objects all lie on one level thing, where nothing but their places differs.
 

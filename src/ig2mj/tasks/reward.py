@@ -46,7 +46,7 @@ class Lift:
 
 
 @struct.dataclass
-class Measures:
+class ActivityMeasures:
     """What the potential is made of, in every world.
 
     Attributes:
@@ -77,8 +77,8 @@ class Reward:
         self._stain_row = None if task.stains_of is None else stain.row_of(model, scene.object_index(task.stains_of))
 
     def measure(
-        self, view: PhysicsView, states: ExtendedStates, status: GoalStatus, before: Measures | None = None
-    ) -> Measures:
+        self, view: PhysicsView, states: ExtendedStates, status: GoalStatus, before: ActivityMeasures | None = None
+    ) -> ActivityMeasures:
         """The measures now.
 
         Args:
@@ -96,7 +96,7 @@ class Reward:
             stains = jnp.asarray(states.stain.alive)[:, self._stain_row].sum(-1).astype(jnp.float32)
         held = self.holding(view)
         lift = None if len(self.hands) < 2 else self._lift(view, held, None if before is None else before.lift)
-        return Measures(share * count, jnp.stack(distances, axis=-1), jnp.any(held, axis=1), stains, lift)
+        return ActivityMeasures(share * count, jnp.stack(distances, axis=-1), jnp.any(held, axis=1), stains, lift)
 
     def _lift(self, view: PhysicsView, held: Bool[Array, "W H"], before: Lift | None) -> Lift:
         """How the first object left the floor; `before` is of the step before, None at the start of episodes."""
@@ -111,7 +111,7 @@ class Reward:
         """Which acting hands hold the first object."""
         return jnp.asarray(view.held)[:, self.hands, self._first]
 
-    def terms(self, before: Measures, now: Measures) -> dict[str, Float[Array, "W"]]:
+    def terms(self, before: ActivityMeasures, now: ActivityMeasures) -> dict[str, Float[Array, "W"]]:
         """The step's reward by `TERMS`, with weights; their sum is the reward."""
         w = self._weights
         return {
@@ -121,7 +121,7 @@ class Reward:
             "stains": -w.stain * (now.stains - before.stains),
         }
 
-    def _approach(self, before: Measures, now: Measures) -> Float[Array, "W"]:
+    def _approach(self, before: ActivityMeasures, now: ActivityMeasures) -> Float[Array, "W"]:
         """How much the distance that counts has grown, m."""
         change = now.distances - before.distances
         if not self._weights.staged:

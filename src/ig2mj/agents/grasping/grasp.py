@@ -189,7 +189,7 @@ class Grasping:
 
     def idle(self, view: PhysicsView, state: GraspState) -> bool:
         """On the host: nothing is held, no hand waits and none touches anything, so that `update` would change nothing
-        whatever the hands are told. In most steps of a world it is so, and to look costs far less than a program."""
+        whatever the hands are commanded. True in most steps; the check costs far less than a program."""
         if (np.asarray(state.body) != NOTHING).any() or (np.asarray(state.window) == WAITS).any():
             return False
         pressed, touching = np.asarray(view.agent.finger_force), np.asarray(view.agent.touching)

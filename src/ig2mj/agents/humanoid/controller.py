@@ -57,9 +57,9 @@ from ig2mj.geometry.poses import (
 from ig2mj.scene.tables import SceneTables
 
 MAX_SPEED, MAX_TURN_RATE = 6.0, 10.0
-"""m/s along each axis and rad/s at which a hand is sent to its target; the former is what hand and body can be told to
-go in 1/10 s together. A hand that something held back, far behind its target, would otherwise rush there when it comes
-free, and throw what it holds or hits out of the house."""
+"""m/s along each axis and rad/s: largest speeds of a hand towards its target. The first is the sum of the largest
+commands of hand and body in 1/10 s. Without the limit a blocked hand that comes free far behind its target would rush
+there, and throw what it holds or hits out of the house."""
 
 REACH_SLACK = 0.001
 """m by which a target may be out of reach before it is brought back."""

@@ -52,8 +52,8 @@ from where its hand was at the end of the step that took it (`ig2mj.learn.occlus
 median and 1.7 cm in a tenth of the episodes."""
 
 GENTLY = 1 / 3
-"""Share of the turn that is left that is made at once. With all of it the hand, which gives way, turned to and fro at
-full speed, and who learned from that hardly turned."""
+"""Share of the turn that is left that is made at once. With all of it the compliant hand oscillates at full
+speed, and a policy that learns from that hardly turns."""
 
 CUTS, ABOUT, BESIDE, LATER = -0.05, (-0.03, 0.05), 0.012, 0.008
 """Of a knife that stands: m from the middle of the edge to the point that cuts, near the handle, so that what presses

@@ -65,5 +65,5 @@ def kinds(name: str, behavior_1k: bool = False) -> Kinds:
 
 
 def _ordered(name: str, found: tuple[str, ...]) -> tuple[str, ...]:
-    """The synset's own categories first, halves last: nobody who asks for an apple means half of one."""
+    """The synset's own categories first, halves last: an apple does not mean half of one."""
     return tuple(sorted(found, key=lambda c: (c.startswith("half_"), synset(c) != name, c)))

@@ -1,9 +1,9 @@
-"""Scripted experts: one for each of the six activities. They show that a task can be done, and label any state.
+"""Scripted experts of activities, whose plans are in `tasks/activities`. They show that a task can be done, and label
+states.
 
-An expert is a pure, batched function of what the world is like now. It remembers nothing: which part of the task comes
-next follows from what is held and where things are. So it may be asked in any state, also in those that another policy
-has come to.
-"""
+An expert is a pure, batched function of the present state of the world. It remembers nothing: which part of the task
+comes next follows from what is held and where things are. So it can label any state, including states that another
+policy has reached."""
 
 from __future__ import annotations
 

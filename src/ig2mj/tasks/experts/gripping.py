@@ -33,7 +33,8 @@ CLEARANCE = 0.06
 
 EXACT, BLEND = 0.015, 0.03
 """m next to the axis within which the gripper goes straight down, and over which it comes to do so. The fingers have as
-much on either side of a towel; whoever learns from images, and waits to be nearer, hovers above it for ever."""
+much on either side of a towel; a policy that learns from images, and waits until it is nearer, hovers above it for
+ever."""
 
 EASE = 0.6
 """Share of the way to it that the gripper goes in an action; the arm lags, and with all of it swings to and fro."""

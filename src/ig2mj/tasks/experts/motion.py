@@ -1,4 +1,4 @@
-"""How hands move: displacements towards goals that keep above what stands around, without any memory.
+"""How hands move: memoryless displacements towards goals that stay above surrounding objects.
 
 Axes: W worlds.
 """

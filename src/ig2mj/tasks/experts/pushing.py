@@ -1,4 +1,4 @@
-"""Moving an object over what it lies on where nothing sticks: closed fingers press on it, and draw it along."""
+"""Sliding an object over its support without a grasp: closed fingers press on it and drag it along."""
 
 from __future__ import annotations
 

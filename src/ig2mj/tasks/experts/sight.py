@@ -1,4 +1,4 @@
-"""What a scripted expert sees of a scene: positions of hands and objects by name, and what is held.
+"""What a scripted expert reads of a scene: poses of hands and objects by name, and which objects are held.
 
 Axes: W worlds.
 """
@@ -26,10 +26,11 @@ from ig2mj.tasks.points import Located, Point, locator
 
 @struct.dataclass
 class Belief:
-    """How wrong somebody is about where an object is.
+    """Error of an estimated object pose.
 
     Attributes:
-      move: from the object's origin to where it is believed to be, m. turn: what turns it as it is believed to lie.
+      move: from the object's origin to its estimated position, m. turn: rotation from its orientation to the estimated
+        one.
     """
 
     move: Float[Array, "W 3"]
@@ -38,13 +39,13 @@ class Belief:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ExpertView:
-    """All worlds of a scene as they are now, or as they are believed to be; positions in the world frame, m.
+    """All worlds of a scene in their present or an estimated state; positions in the world frame, m.
 
     Attributes:
       controls: of the acting hands. objects: names of what the task is about, the first object first.
       hands: numbers of the acting hands among all hands of the scene.
       grips: [H, 3] grasp point of every hand in the hand's frame. grasping: the mode.
-      beliefs: of objects by name, world frame; the others are seen where they are.
+      beliefs: estimates of objects by name, world frame; other objects are read exactly.
     """
 
     view: PhysicsView

@@ -35,7 +35,7 @@ BESIDE = 0.003
 
 
 @struct.dataclass
-class Measures:
+class NavigationMeasures:
     """Of every world.
 
     Attributes:
@@ -103,8 +103,8 @@ class NavigationObjective:
         states: ExtendedStates,
         status: GoalStatus,
         row: Int[Array, "W"] | None,
-        before: Measures | None = None,
-    ) -> Measures:
+        before: NavigationMeasures | None = None,
+    ) -> NavigationMeasures:
         row = jnp.asarray(row if before is None else before.row)
         base = jnp.asarray(view.agent.base_pos)[:, 0]
         pos, goal = base[:, :2], jnp.asarray(self._goals)[row]
@@ -126,17 +126,19 @@ class NavigationObjective:
             start = now if self._task.goal == "close" else jnp.asarray(self._shortest)[row]
             now = jnp.where(jnp.isfinite(now), now, start)
             nothing = zero.astype(bool)
-            return Measures(row, now, ahead, nothing, nothing, nothing, start, pos, zero.astype(jnp.float32), zero)
+            return NavigationMeasures(
+                row, now, ahead, nothing, nothing, nothing, start, pos, zero.astype(jnp.float32), zero
+            )
         now = jnp.where(jnp.isfinite(now), now, before.potential)
         travelled = before.travelled + length(pos - before.pos)
         collisions = before.collisions + hit.astype(jnp.int32)
-        return Measures(row, now, ahead, reached, hit, fallen, before.start, pos, travelled, collisions)
+        return NavigationMeasures(row, now, ahead, reached, hit, fallen, before.start, pos, travelled, collisions)
 
-    def goal(self, now: Measures) -> Float[Array, "W 3"] | None:
+    def goal(self, now: NavigationMeasures) -> Float[Array, "W 3"] | None:
         """Where the goal is, world frame, m; None where furniture is to be closed."""
         return None if self._task.goal == "close" else jnp.asarray(self._goals)[now.row]
 
-    def rewards(self, before: Measures, now: Measures) -> dict[str, Float[Array, "W"]]:
+    def rewards(self, before: NavigationMeasures, now: NavigationMeasures) -> dict[str, Float[Array, "W"]]:
         task = self._task
         terms = {
             "potential": task.potential_weight * (before.potential - now.potential),
@@ -145,13 +147,13 @@ class NavigationObjective:
         }
         return {name: terms[name] for name in self.terms}
 
-    def ended(self, now: Measures, status: GoalStatus) -> tuple[Bool[Array, "W"], Bool[Array, "W"]]:
+    def ended(self, now: NavigationMeasures, status: GoalStatus) -> tuple[Bool[Array, "W"], Bool[Array, "W"]]:
         """Success at the goal; failure after too many collisions, or below the floor. Closing furniture has no
         success: its episodes go on, so that what was closed must stay closed."""
         success = now.reached if self._task.goal != "close" else jnp.zeros_like(now.reached)
         return success, ~success & (now.fallen | (now.collisions > self._task.max_collisions))
 
-    def info(self, view: PhysicsView, now: Measures, status: GoalStatus) -> dict[str, Array]:
+    def info(self, view: PhysicsView, now: NavigationMeasures, status: GoalStatus) -> dict[str, Array]:
         """ "spl": success weighted by the length of the way (Anderson et al. 2018), for tasks of going to a point."""
         progress = jnp.where(now.reached, 1.0, 1.0 - now.potential / jnp.maximum(now.start, 1e-6))
         found = {"goal_progress": jnp.clip(progress, 0.0, 1.0), "collisions": now.collisions, "reached": now.reached}
@@ -163,7 +165,7 @@ class NavigationObjective:
         self,
         view: PhysicsView,
         states: ExtendedStates,
-        now: Measures,
+        now: NavigationMeasures,
         status: GoalStatus,
         time_left: Float[Array, "W"],
     ) -> dict[str, Float[Array, "W n"]]:
