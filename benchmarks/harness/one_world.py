@@ -36,7 +36,7 @@ class OneWorld:
     def step(self, ctrl: np.ndarray | None = None) -> None:
         """Physics, view, states and goal; ctrl [nu]. Waits for the results, as a user of one world does."""
         before = self.states
-        self.physics, self.view, self.states, self.status = self._advance(
+        self.physics, self.view, self.states, self.status, _ = self._advance(
             self.physics, before, None if ctrl is None else ctrl[None]
         )
         if self.states is not before:

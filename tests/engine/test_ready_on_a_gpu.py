@@ -109,7 +109,7 @@ def test_programs_are_compiled_while_kernels_are_loaded(engine, held, monkeypatc
     compiled.clear()
     core._step.trace(core.start(1), None)
     assert not set(compiled) & {*PROGRAMS, "jaxpr step_fn"}, "the calls find what was compiled"
-    assert engine.awaited() is None and batch.number.shape == (2,)
+    assert engine.pending_reset_program() is None and batch.number.shape == (2,)
 
 
 PROGRAMS = ("backend jit(_start_all)", "backend jit(start_fn)", "backend jit(step_fn)")

@@ -203,7 +203,7 @@ def test_programs_on_a_second_device_see_the_same(scene, model):
     with jax.default_device(devices[0]):
         engine = WarpEngine(scene, 2)
         camera = BatchCamera(engine, model, ["front"], width=WIDTH, height=HEIGHT, particles=0)
-        camera.serve(devices)
+        camera.prepare_devices(devices)
         physics, states = engine.reset(), initial_states(model, 2)
     seen = []
     for device in devices:

@@ -20,7 +20,6 @@ import weakref
 from collections.abc import Collection, Mapping
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Int
@@ -83,8 +82,7 @@ class RecordedEnvironment(Environment):
         """As `Environment.step_autoreset`."""
         after = self.step(state, action)
         kept = {name: getattr(after, name) for name in ("obs", "reward", "terminated", "truncated", "info")}
-        if self.pure:
-            kept = jax.tree.map(jnp.copy, kept)  # the reset donates its buffers
+        kept = self.core.engine.copied(kept)  # the reset consumes the state
         done = np.asarray(after.done)
         new = self.reset(after, done) if done.any() else after
         info = {**kept.pop("info"), "final_obs": kept.pop("obs")}
@@ -162,9 +160,7 @@ class RecordedEnvironment(Environment):
         said = (self.devices[name] for name in self._device_names)
         steps = [state.reward, state.terminated, state.truncated, state.info["success"], *terms, *said]
         label = [] if self.label is None else [np.array(self.label, np.float32)]
-        if self.pure:
-            steps = [np.array(array) for array in steps]
-        self.writer.add(*self._frame(state), [action, *label, *steps])
+        self.writer.add(*self._frame(state), [action, *label, *self.core.engine.kept(steps)])
         terminated, truncated = np.asarray(state.terminated), np.asarray(state.truncated)
         if self._past_success:
             self._succeeded |= np.asarray(state.info["success"])

@@ -16,7 +16,6 @@ from flax import struct
 from jaxtyping import Bool, Int, UInt
 
 from ig2mj.engine.base import Engine
-from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment, EnvState
@@ -68,18 +67,14 @@ class FrameRows:
         """`worlds`: those that are wanted. `like`: any state."""
         self._engine, self._worlds = engine, list(worlds)
         names = names_of(frame_of(engine, like))
-        cuts = engine.pieces.cuts if isinstance(engine, NativeEngine) else []
+        cuts = engine.frame_cuts
         self.own, self.batched = dict(zip(names, cuts, strict=False)), names[len(cuts) :]
 
     def __call__(self, state: EnvState) -> tuple[list[list[np.ndarray]], list[Any]]:
         """Pieces of each wanted world, and arrays of all worlds; nobody changes them any more. Where a step uses up the
         arrays of the one before, they are copied."""
-        physics, engine = state.batch.world.physics, self._engine
-        besides = jax.tree.leaves(_besides_physics(state))
-        if isinstance(engine, NativeEngine):
-            worlds = engine.worlds(physics)
-            return [engine.pieces(worlds[world]) for world in self._worlds], besides
-        return [], [np.array(leaf) for leaf in (*jax.tree.leaves(engine.snapshot(physics)), *besides)]
+        own, batched = self._engine.frame(state.batch.world.physics, self._worlds)
+        return own, [*batched, *self._engine.kept(jax.tree.leaves(_besides_physics(state)))]
 
     def rows(self, state: EnvState) -> list[list[np.ndarray]]:
         """The same, as all arrays of each wanted world."""

@@ -1,14 +1,16 @@
-"""The `Engine` protocol: what every physics engine offers to the parts above it, and the data it takes and gives.
+"""The `Engine` protocol: what every physics engine offers to the parts above it, and the data it takes and returns.
 
-Nothing above this package asks which engine it has. Two things differ between engines, and both are stated by
-attributes:
+Nothing above this package asks which engine it has (`tests/test_one_stepping_core.py`). Engines differ in two ways:
 
-- `pure` engines (MJX) have a `Physics` that is a pytree; all methods but `export` may be called under `jax.jit`,
-  `lax.scan` and sharding, and return new pytrees. The native engine (C MuJoCo) changes its worlds in place: `step`,
-  `write` and `load` return a new handle on them, and every later use of an older handle raises StaleStateError. Code
-  that always goes on with the returned physics, and never uses the old one again, is right for both. `fork` gives an
-  independent copy on both.
-- `num_worlds` is fixed when the engine is made.
+- *What physics is.* MJX engines have a `Physics` that is a pytree; `reset`, `step`, `view`, `write`, `load`, `health`
+  and `snapshot` can be traced and return new pytrees. The native engine (C MuJoCo) changes its worlds in place: `step`,
+  `write` and `load` return a new handle, and every later use of an older handle raises StaleStateError. Code that
+  always continues with the returned physics is correct for both. `fork` returns an independent copy.
+- *How functions run.* MJX engines run a whole control step as one compiled program. Next to the native engine the same
+  functions run in Python, and their pure parts are compiled. The parts above say what a function is (`compile`,
+  `program`) and write branches and loops with `when_any` and `repeat`; the engine decides the rest.
+
+`num_worlds` is fixed when the engine is made.
 
 Axes: W worlds, O objects, H hands, B bodies, U units (see `ig2mj.engine.layout`), E equality constraints, nq, nv, nu,
 na as in MuJoCo.
@@ -16,7 +18,7 @@ na as in MuJoCo.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, Protocol, runtime_checkable
 
 import mujoco
@@ -25,7 +27,7 @@ from flax import struct
 from jaxtyping import Bool, Float
 
 from ig2mj.engine.health import Health
-from ig2mj.engine.model_fields import ModelFields
+from ig2mj.engine.model_fields import MOVING, ModelFields, given
 from ig2mj.engine.saved import SavedPhysics
 from ig2mj.engine.snapshot import Snapshot
 from ig2mj.engine.view import Array, PhysicsView
@@ -110,6 +112,12 @@ class Write:
     model_fields: ModelFields | None = None
     ignored_contacts: Bool[Array, "W H O"] | None = None
 
+    @property
+    def moves_nothing(self) -> bool:
+        """Only constraints, ignored contacts and fields that no position depends on are written."""
+        teleports = self.object_mask is not None or self.qpos_mask is not None
+        return not teleports and {*MOVING[1:]}.isdisjoint(given(self.model_fields))
+
 
 @runtime_checkable
 class Engine(Protocol):
@@ -117,16 +125,25 @@ class Engine(Protocol):
 
     Attributes:
       name: "native", "warp" or "jax".
-      pure: the methods are pure functions that JAX can trace (see the module's text).
+      pure: a control step can be part of a compiled program of the caller's (see the module's text). For refusals, by
+        `check_pure`; to run a function use `compile` and `program`.
+      live: `to_mujoco` returns the structures that the engine steps, not copies.
+      tracks_changes: while nothing changes, views hold the same arrays, so that `is` tells what can be skipped.
+      renderer: what makes images of its worlds, a key of `ig2mj.sensors.suite.CAMERAS`; "" where nothing does.
       num_worlds: W.
       scene, tables: what is simulated, and its constants.
       substeps, timestep: a control step is `substeps` physics steps of `timestep` seconds.
       cannot_ignore: why this engine refuses `Write.ignored_contacts`, which all grasping but "physical" needs; ""
         where it does not.
+      frame_cuts: where the leaves of a `Snapshot` are in the arrays that `frame` gives of each world
+        (`ig2mj.engine.native.recorded.Cut`); empty where it gives none of single worlds.
     """
 
     name: str
     pure: bool
+    live: bool
+    tracks_changes: bool
+    renderer: str
     num_worlds: int
     scene: Scene
     tables: SceneTables
@@ -136,14 +153,83 @@ class Engine(Protocol):
     @property
     def cannot_ignore(self) -> str: ...
 
-    def serve(self, devices: Sequence[Any]) -> None:
-        """Makes ready for programs on other devices of this process, before they run: memory on each."""
+    @property
+    def frame_cuts(self) -> Sequence[Any]: ...
+
+    # How functions run.
+
+    def compile(self, function: Callable[..., Any], shortcut: Callable[..., Any] | None = None) -> Callable[..., Any]:
+        """A pure function of pytrees of arrays (views, states), to be called alone or in functions of `program`.
+
+        Args:
+          shortcut: a function of the same arguments on NumPy arrays that returns the result in the frequent case, at a
+            fraction of the cost, and None otherwise. Not used where values are not known, in a traced program.
+        """
         ...
 
-    def awaited(self) -> Traced | None:
-        """The program of `reset` before it runs for the first time, where something else is compiled or loaded for it
-        meanwhile: whoever calls it has time to compile programs, this one too. None: it would wait for nothing."""
+    def program(
+        self, function: Callable[..., Any], check: Callable[[Any], None] | None = None, **options: Any
+    ) -> Callable[..., Any]:
+        """A function that uses physics: steps, writes, views. One compiled program where physics can be traced.
+
+        Args:
+          check: called with the first argument before each call. options: of `jax.jit`, such as `donate_argnums`.
+        """
         ...
+
+    def when_any(self, mask: Bool[Array, "W"], act: Callable[..., Any], *operands: Any, cheap: bool = False) -> Any:
+        """`act(*operands)` if any world is masked, else the operands (a single one as itself).
+
+        Args:
+          act: changes nothing of a world that is not masked.
+          cheap: a compiled program is to call `act` always, since a branch would cost more.
+        """
+        ...
+
+    def repeat(self, body: Callable[[Any], tuple[Any, Any]], carry: Any, length: int) -> tuple[Any, Any]:
+        """Calls `body(carry) -> (carry, result)` `length` times, at least once; the last carry and the last result."""
+        ...
+
+    def constants(self, tree: Any) -> Any:
+        """Arrays as functions of this engine read them fastest: NumPy's, or on the device in single precision."""
+        ...
+
+    def kept(self, tree: Any) -> Any:
+        """Arrays of a result that no later step changes or uses up."""
+        ...
+
+    def kept_row(self, tree: Any, world: int) -> tuple[Any, int]:
+        """`kept` for one world of a pytree of arrays [W, ...]: a pytree of some worlds, and the world's row in it."""
+        ...
+
+    def copied(self, tree: Any) -> Any:
+        """An independent copy of a pytree that may hold physics, such as a batch. Not traced."""
+        ...
+
+    def with_eyes(self, view: PhysicsView, poses: Callable[[], tuple[Array, Array]]) -> PhysicsView:
+        """The view with other poses of the agents' cameras: `poses` returns [W, A, 3] m and [W, A, 4] w-x-y-z."""
+        ...
+
+    def write_with_view(
+        self, physics: Physics, write: Write, before: PhysicsView, worlds: Bool[Array, "W"] | None = None
+    ) -> tuple[Physics, PhysicsView]:
+        """`write`, and the view after it.
+
+        Args:
+          before: view of `physics`. worlds: those that are written to; the others keep their view. None: all.
+        """
+        ...
+
+    def prepare_devices(self, devices: Sequence[Any]) -> None:
+        """Allocates memory on other devices of this process, before programs run there."""
+        ...
+
+    def pending_reset_program(self) -> Traced | None:
+        """The traced program of `reset` while kernels are still being compiled or loaded in the background, so that
+        the caller can compile programs meanwhile; else None."""
+        ...
+
+    # Physics.
 
     def reset(self) -> Physics:
         """All worlds at the scene's initial state (its first keyframe, else its zero pose), everything awake.
@@ -241,16 +327,36 @@ class Engine(Protocol):
         ...
 
     def restored(self, saved: SavedPhysics) -> Physics:
-        """New worlds that go on from saved ones, of this engine or of another one. Not traced.
+        """New worlds that continue from saved ones, of this engine or of another one. Not traced.
 
         Raises:
           EngineError: they are of another scene, of other agents or of another number of worlds.
         """
         ...
 
+    def restored_view(self, physics: Physics, saved: SavedPhysics) -> PhysicsView:
+        """The view of restored physics: the saved one, to the bit, forces included."""
+        ...
+
+    def frame(self, physics: Physics, worlds: Sequence[int]) -> tuple[list[list[np.ndarray]], list[np.ndarray]]:
+        """All of physics for a recording, in arrays that nobody changes.
+
+        Returns:
+          Arrays of each given world, cut by `frame_cuts`; and the leaves of a `Snapshot` of all worlds. One of the two
+          is empty.
+        """
+        ...
+
     def to_mujoco(self, physics: Physics, world: int) -> tuple[mujoco.MjModel, mujoco.MjData]:
         """One world as MuJoCo's own structures, kinematics up to date, for viewers and renderers; never traced.
 
-        The native engine hands out its live ones: forces put on them act in the next step. Others hand out copies.
+        Live engines (`live`) return those that they step: forces put on them act in the next step. Others return
+        copies.
         """
         ...
+
+
+def check_pure(engine: Engine, error: Exception) -> None:
+    """Raises the error where a control step of the engine cannot be part of a compiled program of the caller's."""
+    if not engine.pure:
+        raise error

@@ -9,7 +9,7 @@ from typing import Any
 
 from ig2mj.engine.base import Engine
 from ig2mj.errors import UnknownNameError
-from ig2mj.process import entry_point
+from ig2mj.process import entry_point, run_programs_inline
 from ig2mj.process.gc_pause import GC_PAUSED
 from ig2mj.process.imports import find_devices, import_mjx
 from ig2mj.scene.scene import Scene
@@ -20,6 +20,20 @@ ENGINES = {
     "jax": "ig2mj.engine.mjx.jax_engine:JaxEngine",
 }
 """Name: module and class."""
+
+
+def choose_engine(engine: str | Engine | None) -> str | Engine:
+    """The engine that is asked for; None: "warp" where JAX has a GPU, else "native".
+
+    To be called before JAX is first used: options of the process that suit the engine are set where it can be native.
+    """
+    if engine in (None, "native"):
+        run_programs_inline()
+    if engine is None:
+        import jax
+
+        return "warp" if jax.default_backend() == "gpu" else "native"
+    return engine
 
 
 @entry_point

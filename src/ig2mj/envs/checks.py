@@ -10,6 +10,7 @@ import numpy as np
 from jax.core import Tracer
 from jaxtyping import Float
 
+from ig2mj.engine.base import check_pure
 from ig2mj.engine.view import Array
 from ig2mj.envs.state import EnvState
 from ig2mj.errors import ActionError
@@ -33,8 +34,9 @@ def checked_action(env: Environment, action: Array) -> Float[Array, "W n"]:
       ActionError: it is traced on the native engine, has another shape, is not of numbers, or is NumPy's and has some
         that are not finite.
     """
-    if not env.pure and isinstance(action, Tracer):
-        raise ActionError("the native engine steps outside of compiled programs: call step without jit, vmap or scan")
+    if isinstance(action, Tracer):
+        outside = "the native engine steps outside of compiled programs: call step without jit, vmap or scan"
+        check_pure(env.core.engine, ActionError(outside))
     wanted = (env.num_worlds, *env.action_space.shape)
     if np.shape(action) != wanted:
         raise ActionError(f"an action of {env.task.name} has shape {wanted}, not {np.shape(action)}")

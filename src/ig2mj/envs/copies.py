@@ -7,10 +7,6 @@ import os
 import typing
 from typing import Any
 
-import jax
-import numpy as np
-
-from ig2mj.engine.saved import copied
 from ig2mj.envs.state import EnvState
 from ig2mj.envs.state_files import load_state, save_state
 from ig2mj.worlds.core import Core
@@ -32,12 +28,8 @@ class StateCopies:
         Raises:
           StaleStateError: the state is stale.
         """
-        if self.core.engine.pure:
-            self.check(state)
-            return copied(state)
-        batch = self.core.fork(state.batch)
-        parts = {field.name: getattr(state, field.name) for field in dataclasses.fields(state) if field.name != "batch"}
-        return EnvState(batch=batch, **jax.tree.map(lambda a: np.copy(a) if isinstance(a, np.ndarray) else a, parts))
+        self.check(state)
+        return self.core.engine.copied(state)
 
     def save(self, state: EnvState, file: str | os.PathLike) -> None:
         """Writes all worlds of a state to an `.npz` file (arrays only, no pickle), for `load`.

@@ -5,14 +5,13 @@
     state = env.step(state, action)              # action: [W, n], -1..1
     state = env.reset(state, state.terminated | state.truncated)
 
-An agent step is 1/10 s unless `make` is given another period: three control steps of the core, the action held in
-all of them. What the core can compile is compiled, and so is this: on a pure engine `step_fn` and `reset_fn` may be
-part of a program of your own. Do not reuse a state that was passed to `step` or `reset`: continue with the one that is
-returned. Using it again raises StaleStateError, on every engine; `fork` copies a state first, to branch. Inside a
-compiled program of your own states are values, and may be used again; one that your program donates is gone.
+An agent step is 1/10 s unless `make` is given another period: three control steps of the core with one action. Where
+`pure` is true, `step_fn` and `reset_fn` may be part of a compiled program of yours. `step` and `reset` consume the
+state they are given: continue with the one that is returned. A consumed state raises StaleStateError on every engine;
+`fork` copies a state, to branch. Inside a compiled program of yours states are values and may be used again.
 
 Success ends an episode, and so does what a task calls failure (`terminated`). The horizon truncates it, and so do
-guards, since results of a world with numbers that are not finite are meaningless (`ig2mj.worlds.guards`).
+guards, since the results of a world with non-finite numbers are meaningless (`ig2mj.worlds.guards`).
 
 Axes: W worlds, n numbers of an action.
 """
@@ -23,7 +22,6 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
@@ -31,25 +29,23 @@ from jaxtyping import Bool, Float, Int, UInt
 
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.engine.base import Physics
-from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.engine.view import Array
 from ig2mj.envs.checks import checked_action, checked_state
 from ig2mj.envs.config import Configured, EnvConfig
 from ig2mj.envs.copies import StateCopies
 from ig2mj.envs.images import StateImages
 from ig2mj.envs.observations import Observer, Space, chosen
-from ig2mj.envs.state import EnvState, Seen
+from ig2mj.envs.state import EnvState, Seen, StepContext
 from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.process import entry_point
-from ig2mj.process.gc_pause import GC_PAUSED, Compiled, compile_together
+from ig2mj.process.gc_pause import GC_PAUSED, compile_together
 from ig2mj.scene.scene import Scene
-from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.actions import ActionMap
 from ig2mj.tasks.objective import Measures, Objective
 from ig2mj.tasks.task import TaskLike
 from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.core import Core
-from ig2mj.worlds.lazy.of_view import OfView
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import Seed, Seeds, as_seed, pick_rows
 from ig2mj.worlds.starts import checked_mask
@@ -110,24 +106,23 @@ class Environment(StateCopies, StateImages, Configured):
         self.period, self._substeps = period, round(period / step)
         if self._substeps < 1 or abs(self._substeps * step - period) > 1e-6:
             raise EngineError(f"an agent step of {period:g} s is not a whole number of control steps of {step:g} s")
-        self._clean = jax.jit(self._clean_fn)
-        self._rows = jax.jit(lambda key: pick_rows(key, core.starts.pool.size))
-        compiled = jax.jit if core.engine.pure else OfView
-        self._see, self._see_first = compiled(self._after_step), compiled(self._after_reset)
-        if core.engine.pure:
-            self._step = Compiled(self.step_fn, self.check, donate_argnums=0)
-            self._reset = Compiled(self.reset_fn, self.check, donate_argnums=0)
-            self._autoreset = Compiled(self.step_autoreset_fn, self.check, donate_argnums=0)
-            self._start: Any = Compiled(self._start_fn, donate_argnums=0)
-            self._load = Compiled(self._load_fn, donate_argnums=0)
-            self._resume = Compiled(self._begun, self.core.check)
-        else:
-            self._step, self._reset, self._start = self.step_fn, self.reset_fn, self._start_fn
-            self._autoreset, self._load, self._resume = self.step_autoreset_fn, self._load_fn, self._begun
+        engine = core.engine
+        self._clean = engine.compile(self._clean_fn)
+        self._rows = engine.compile(self._rows_fn)
+        self._evaluate, self._evaluate_first = (
+            engine.compile(self._evaluate_fn),
+            engine.compile(self._evaluate_first_fn),
+        )
+        self._step = engine.program(self.step_fn, self.check, donate_argnums=0)
+        self._reset = engine.program(self.reset_fn, self.check, donate_argnums=0)
+        self._autoreset = engine.program(self.step_autoreset_fn, self.check, donate_argnums=0)
+        self._start = engine.program(self._start_fn, donate_argnums=0)
+        self._load = engine.program(self._load_fn, donate_argnums=0)
+        self._resume = engine.program(self._begun, core.check)
 
     @property
     def pure(self) -> bool:
-        """`step_fn`, `step_autoreset_fn` and `reset_fn` may be part of a compiled program."""
+        """`step_fn`, `step_autoreset_fn` and `reset_fn` may be part of a compiled program of the caller's."""
         return self.core.engine.pure
 
     @property
@@ -135,10 +130,10 @@ class Environment(StateCopies, StateImages, Configured):
         """The compiled model of the home with its robots, as MuJoCo and MJX-based libraries take it."""
         return self.scene.model
 
-    def serve(self, devices: Sequence[Any]) -> None:
-        """Makes ready for programs on other devices of this process, before they are compiled."""
-        self.core.engine.serve(devices)
-        self._observer.serve(devices)
+    def prepare_devices(self, devices: Sequence[Any]) -> None:
+        """Allocates memory on other devices of this process, before programs for them are compiled."""
+        self.core.engine.prepare_devices(devices)
+        self._observer.prepare_devices(devices)
 
     @property
     def action_space(self) -> Space:
@@ -174,18 +169,8 @@ class Environment(StateCopies, StateImages, Configured):
         """`step`, neither checked nor compiled."""
         world = state.batch.world
         robots, bad = self._clean(action, world.key, world.step)
-        batch, status = self.core.hold_fn(state.batch, robots, self._substeps)
-        world = batch.world
-        seen = self._see(
-            world.view,
-            world.states,
-            status,
-            batch.controllers,
-            batch.flags,
-            world.step,
-            state.measures,
-            bad,
-        )
+        batch, status = self.core.repeat_action_fn(state.batch, robots, self._substeps)
+        seen = self._evaluate(StepContext.of(batch), status, state.measures, bad)
         return self._state(batch, seen, state.bad_actions + bad, state)
 
     def step_autoreset(self, state: EnvState, action: Array) -> EnvState:
@@ -200,11 +185,7 @@ class Environment(StateCopies, StateImages, Configured):
     def step_autoreset_fn(self, state: EnvState, action: Float[Array, "W n"]) -> EnvState:
         """`step_autoreset`, neither checked nor compiled."""
         after = self.step_fn(state, action)
-        done = after.done
-        if self.core.engine.pure:
-            new = jax.lax.cond(done.any(), self.reset_fn, lambda same, mask: same, after, done)
-        else:
-            new = self.reset_fn(after, done) if np.asarray(done).any() else after
+        new = self.core.engine.when_any(after.done, lambda same: self.reset_fn(same, same.done), after)
         info = {**after.info, "final_obs": after.obs}
         return dataclasses.replace(
             new, reward=after.reward, terminated=after.terminated, truncated=after.truncated, info=info
@@ -229,7 +210,7 @@ class Environment(StateCopies, StateImages, Configured):
         if mask is not None:
             raise EngineError("a mask resets worlds of a state: reset(state, mask); a seed starts all of them")
         number = as_seed(seed, self.num_worlds)
-        if (physics := self.core.engine.awaited()) is not None:
+        if (physics := self.core.engine.pending_reset_program()) is not None:
             compile_together([self._start.traced(physics.returned, number), physics])
         with GC_PAUSED:
             return self._start(self.core.engine.reset(), number)
@@ -284,13 +265,12 @@ class Environment(StateCopies, StateImages, Configured):
         before: EnvState | None,
         rows: Int[Array, "W"] | None = None,
     ) -> EnvState:
-        """After a reset of the masked worlds, to these rows of the pool; None: those that were drawn for them. The
+        """After a reset of the masked worlds, to these rows of the pool; None: those that were sampled for them. The
         other worlds are as before."""
-        world = batch.world
         old = None if before is None else Seen(**{f.name: getattr(before, f.name) for f in dataclasses.fields(Seen)})
         if rows is None:
-            rows = self._rows(world.key)
-        seen = self._see_first(world.view, world.states, batch.controllers, world.step, rows, mask, old)
+            rows = self._rows(batch.world.key)
+        seen = self._evaluate_first(StepContext.of(batch), rows, mask, old)
         count = jnp.zeros(self.num_worlds, jnp.int32) if before is None else before.bad_actions
         return self._state(batch, seen, count, before, mask)
 
@@ -318,76 +298,68 @@ class Environment(StateCopies, StateImages, Configured):
             robots = jnp.concatenate([robots, others], axis=1)
         return robots, (~fine).sum(1).astype(jnp.int32)
 
-    def _after_step(
-        self,
-        view: PhysicsView,
-        states: ExtendedStates,
-        status: GoalStatus,
-        controllers: tuple[Any, ...],
-        flags: Int[Array, "W"],
-        control_steps: Int[Array, "W"],
-        before: Measures,
-        bad: Int[Array, "W"],
-    ) -> Seen:
-        now = self.objective.measure(view, states, status, None, before)
-        sound = flags == 0
+    def _rows_fn(self, key: UInt[Array, "W 2"]) -> Int[Array, "W"]:
+        return pick_rows(key, self.core.starts.pool.size)
+
+    def _evaluate_fn(self, context: StepContext, status: GoalStatus, before: Measures, bad: Int[Array, "W"]) -> Seen:
+        """What follows from a step: reward, ends of episodes, observations that need no images.
+
+        Args:
+          status: of the task's goal. before: measures of the last step. bad: numbers of the action that were not
+            finite.
+        """
+        now = self.objective.measure(context.view, context.states, status, None, before)
+        sound = context.flags == 0
         terms = {
             name: jnp.where(sound, jnp.nan_to_num(term), 0.0)
             for name, term in self.objective.rewards(before, now).items()
         }
         success, failure = self.objective.ended(now, status)
-        success, steps = success & sound, control_steps // self._substeps
+        success, steps = success & sound, context.control_steps // self._substeps
         terminated = success | (failure & sound)
         truncated = ~terminated & (~sound | (steps >= self.task.horizon))
-        return self._seen(
-            view, states, status, controllers, steps, now, terms, success, terminated, truncated, flags, bad
-        )
+        info = {"success": success, "steps": steps, "bad_actions": bad, "flags": context.flags}
+        return self._seen(context, status, now, terms, terminated, truncated, info)
 
-    def _after_reset(
-        self,
-        view: PhysicsView,
-        states: ExtendedStates,
-        controllers: tuple[Any, ...],
-        control_steps: Int[Array, "W"],
-        rows: Int[Array, "W"],
-        mask: Bool[Array, "W"],
-        before: Seen | None,
+    def _evaluate_first_fn(
+        self, context: StepContext, rows: Int[Array, "W"], mask: Bool[Array, "W"], before: Seen | None
     ) -> Seen:
+        """The same at the start of episodes in the masked worlds; the others keep `before`.
+
+        Args:
+          rows: of the pool, with which the episodes begin.
+        """
+        view, states = context.view, context.states
         status = self._goal.status(states, view) if self._goal is not None else GoalStatus.empty(self.num_worlds)
         now = self.objective.measure(view, states, status, rows)
         zero = jnp.zeros(self.num_worlds, jnp.int32)
         none, terms = zero.astype(bool), {name: zero.astype(jnp.float32) for name in self.objective.terms}
-        steps = control_steps // self._substeps
-        new = self._seen(view, states, status, controllers, steps, now, terms, none, none, none, zero, zero)
+        steps = context.control_steps // self._substeps
+        info = {"success": none, "steps": steps, "bad_actions": zero, "flags": zero}
+        new = self._seen(context, status, now, terms, none, none, info)
         if before is None:
             return new
         return chosen(mask, new, dataclasses.replace(before, obs={name: before.obs[name] for name in new.obs}))
 
     def _seen(
         self,
-        view: PhysicsView,
-        states: ExtendedStates,
+        context: StepContext,
         status: GoalStatus,
-        controllers: tuple[Any, ...],
-        steps: Int[Array, "W"],
         measures: Measures,
         terms: Mapping[str, Array],
-        success: Bool[Array, "W"],
         terminated: Bool[Array, "W"],
         truncated: Bool[Array, "W"],
-        flags: Int[Array, "W"],
-        bad: Int[Array, "W"],
+        info: Mapping[str, Array],
     ) -> Seen:
+        """Observations and `info`. `terms`: of the reward. `info`: "success", "steps", "bad_actions", "flags"."""
         info = {
-            "success": success,
-            **self.objective.info(view, measures, status),
-            "steps": steps,
-            "bad_actions": bad,
-            "flags": flags,
+            "success": info["success"],
+            **self.objective.info(context.view, measures, status),
+            **{name: info[name] for name in ("steps", "bad_actions", "flags")},
             **{f"reward/{name}": term for name, term in terms.items()},
         }
-        time_left = 1.0 - steps.astype(jnp.float32) / self.task.horizon
-        obs = self._observer.vectors(view, states, controllers[0], measures, status, time_left)
+        time_left = 1.0 - info["steps"].astype(jnp.float32) / self.task.horizon
+        obs = self._observer.vectors(context, measures, status, time_left)
         total = jnp.stack([terms[name] for name in self.objective.terms]).sum(0)
         return Seen(obs, total, terminated, truncated, info, measures, status)
 

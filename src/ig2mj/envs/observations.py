@@ -19,13 +19,14 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ig2mj.engine.view import Array, PhysicsView
+from ig2mj.engine.view import Array
+from ig2mj.envs.state import StepContext
 from ig2mj.errors import UnknownNameError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.sensors.base import Memory, Space
 from ig2mj.sensors.registry import SENSORS
 from ig2mj.sensors.suite import SensorSuite
-from ig2mj.states.world import ExtendedStates, WorldState
+from ig2mj.states.world import WorldState
 from ig2mj.tasks.objective import Measures, Objective
 from ig2mj.worlds.random_streams import step_keys
 
@@ -59,22 +60,21 @@ class Observer:
         self.spaces, self.sensor_options = {name: every[name] for name in names}, sensors.options
         self._keys = jax.jit(step_keys)
 
-    def serve(self, devices: Sequence[Any]) -> None:
-        """See `SensorSuite.serve`."""
-        self._sensors.serve(devices)
+    def prepare_devices(self, devices: Sequence[Any]) -> None:
+        """See `SensorSuite.prepare_devices`."""
+        self._sensors.prepare_devices(devices)
 
     def vectors(
         self,
-        view: PhysicsView,
-        states: ExtendedStates,
-        controller_state: Any,
+        context: StepContext,
         measures: Measures,
         status: GoalStatus,
         time_left: Float[Array, "W"],
     ) -> dict[str, Array]:
-        """The observations that need neither images nor rays; numbers that are not finite are 0. Pure. See
+        """The observations that need neither images nor rays; non-finite numbers are 0. Pure. See
         `Objective.observe`."""
-        found = self._sensors.feel_fn(view, states, controller_state)
+        view, states = context.view, context.states
+        found = self._sensors.feel_fn(view, states, context.controllers[0])
         made = self._objective.observe(view, states, measures, status, time_left)
         found |= {name: array for name, array in made.items() if name in self._names}
         return {name: jnp.nan_to_num(jnp.asarray(a, jnp.float32), posinf=0.0, neginf=0.0) for name, a in found.items()}

@@ -13,20 +13,18 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any, Unpack, overload
 
-import jax
-
 from ig2mj.agents.base import ACTION_PERIOD
 from ig2mj.agents.grasping import MODES, Grasping
 from ig2mj.agents.task_robot import TaskRobot
 from ig2mj.engine.base import whole_number
-from ig2mj.engine.registry import check_options, make_engine
+from ig2mj.engine.registry import check_options, choose_engine, make_engine
 from ig2mj.envs.config import VECTORS, EnvConfig, Overrides, default_of
 from ig2mj.envs.environment import Environment
 from ig2mj.envs.names import NAMES, NAMESPACE, activity_name, short_name
 from ig2mj.envs.observations import Observer, check_names
 from ig2mj.envs.setups import Control, setup_activity, setup_bddl, setup_navigation
 from ig2mj.errors import EngineError, UnknownNameError
-from ig2mj.process import entry_point, run_programs_inline
+from ig2mj.process import entry_point
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.tasks.bddl.task import BddlTask, bddl_task
 from ig2mj.tasks.homes import AnyTask, in_home
@@ -162,9 +160,7 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
     whole_number("augment_starts", config.augment_starts, least=0)
     if config.augment_starts and not isinstance(task, Task):
         raise EngineError(f"augment_starts for {task.name}: only start states of the paper's activities are augmented")
-    if config.engine in (None, "native"):
-        run_programs_inline()
-    engine = config.engine or ("warp" if jax.default_backend() == "gpu" else "native")
+    engine = choose_engine(config.engine)
     check_options(f"make with the {engine} engine", config.engine_options, engine, EnvConfig)
     task = dataclasses.replace(task, horizon=_horizon(task, config))
     control = Control(config.whole_actions, config.period)
@@ -183,7 +179,8 @@ def _make(task: AnyTask, config: EnvConfig) -> Environment:
         starts = mixed_pool(task, scene, starts, config.augment_starts)
     physics = make_engine(engine, scene, config.worlds, **config.engine_options)
     hands = None if mode == "physical" else Grasping(scene, mode, setup.mittens)
-    core = Core(physics, rules, starts, controllers, hands, hand_resets=config.whole_actions or None)
+    every_number = config.whole_actions or isinstance(task, BddlTask)  # of the action; some ask hands back
+    core = Core(physics, rules, starts, controllers, hands, hand_resets=every_number)
     settings = config.sensors
     if config.image_size is not None:
         settings = dataclasses.replace(settings, width=config.image_size, height=config.image_size)

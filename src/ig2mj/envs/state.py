@@ -10,9 +10,10 @@ from typing import Any
 from flax import struct
 from jaxtyping import Bool, Float, Int
 
-from ig2mj.engine.view import Array, length
+from ig2mj.engine.view import Array, PhysicsView, length
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.sensors.base import Memory
+from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.objective import Measures
 from ig2mj.worlds.batch import Batch
 
@@ -62,6 +63,28 @@ class EnvState:
         obs = self.obs.items() if isinstance(self.obs, dict) else ()
         shapes = (f"{name} {getattr(a, 'dtype', '?')}{list(getattr(a, 'shape', ()))}" for name, a in obs)
         return f"EnvState({length(self.reward)} worlds{stale}; obs: {', '.join(shapes)})"
+
+
+@struct.dataclass
+class StepContext:
+    """What rewards, ends of episodes and observations of a step are computed from.
+
+    Attributes:
+      view, states: of the worlds. controllers: states of the robots' controllers. flags: `guards.Flag` of each world.
+      control_steps: of the episode, so far.
+    """
+
+    view: PhysicsView
+    states: ExtendedStates
+    controllers: tuple[Any, ...]
+    flags: Int[Array, "W"]
+    control_steps: Int[Array, "W"]
+
+    @classmethod
+    def of(cls, batch: Batch) -> StepContext:
+        """Of the worlds of a batch."""
+        world = batch.world
+        return cls(world.view, world.states, batch.controllers, batch.flags, world.step)
 
 
 @struct.dataclass

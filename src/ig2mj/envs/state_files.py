@@ -14,7 +14,6 @@ import os
 from typing import TYPE_CHECKING, Any
 
 import jax
-import jax.numpy as jnp
 import mujoco
 import numpy as np
 from flax import struct
@@ -118,15 +117,13 @@ def _saved(env: Environment, state: EnvState) -> _Saved:
 def _state_of(env: Environment, saved: _Saved) -> EnvState:
     core = env.core
     physics = core.engine.restored(saved.physics)
-    view = core.engine.view(physics)
-    if core.engine.pure:  # another program than the step's would round its numbers otherwise
-        view = saved.physics.view
-        saved, view = jax.tree.map(jnp.asarray, (saved, view))
-    parts = dict(saved.batch)
+    view = core.engine.restored_view(physics, saved.physics)
+    states, batch, state = core.engine.constants((saved.states, saved.batch, saved.state))
+    parts = dict(batch)
     clocks = {name: parts.pop(name) for name in _OF_WORLD}
-    view = core.eyes.seen(view, parts["controllers"])
-    world = WorldState(physics=physics, view=view, states=saved.states, **clocks)
-    return EnvState(batch=Batch(world=world, **parts), **saved.state)
+    view = core.cameras.placed(view, parts["controllers"])
+    world = WorldState(physics=physics, view=view, states=states, **clocks)
+    return EnvState(batch=Batch(world=world, **parts), **state)
 
 
 def _fit(env: Environment) -> dict[str, Any]:

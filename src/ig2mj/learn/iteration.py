@@ -166,7 +166,7 @@ class ManyDevices:
         batch = getattr(algorithm.config, "batch", 0)
         if batch % len(devices):
             raise EngineError(f"a batch of {batch} samples cannot be shared by {len(devices)} devices: --set batch=...")
-        env.serve(own)
+        env.prepare_devices(own)
         self._env, self._algorithm, self._devices, self._team = env, algorithm, own, team or Team()
         self._first, self._count = list(devices).index(own[0]), len(devices)
         self.num_worlds = env.num_worlds * self._count

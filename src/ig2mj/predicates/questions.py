@@ -23,8 +23,8 @@ from ig2mj.engine.view import SCHEMA, Array, PhysicsView, assemble, axis_sizes, 
 from ig2mj.predicates.base import Context, Predicate
 from ig2mj.predicates.literals import Literals
 from ig2mj.predicates.registry import find
-from ig2mj.predicates.tracing import inputs_that_matter
 from ig2mj.process.gc_pause import GC_PAUSED
+from ig2mj.process.tracing import inputs_that_matter
 from ig2mj.states.initial import initial_states
 from ig2mj.states.model import StateModel
 from ig2mj.states.relations.asked import AskedRelations, PieceTables

@@ -24,8 +24,7 @@ from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 
 from ig2mj.engine.base import Engine
-from ig2mj.engine.mjx.engine import MjxEngine, MjxPhysics
-from ig2mj.engine.mjx.physics import own_device
+from ig2mj.engine.mjx.physics import MjxPhysics, own_device
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.engine.warp.patches import graphs_kept, pins
 from ig2mj.errors import EngineError, UnknownNameError
@@ -97,7 +96,7 @@ class BatchCamera:
         Raises:
           EngineError: not the Warp engine, or nothing is to be made. UnknownNameError: no such camera.
         """
-        if not isinstance(engine, MjxEngine) or engine.name != "warp":
+        if engine.renderer != "ray caster":
             raise EngineError(f"the {engine.name} engine has no batched cameras (take the warp engine)")
         check_request(cameras, rays, (rgb, depth, segmentation), width, height, rows)
         self.engine, self.model = engine, model
@@ -132,11 +131,11 @@ class BatchCamera:
         self._served = [str(wp.get_device())]
         self._make_context()
 
-    def serve(self, devices: Sequence[Any]) -> None:
-        """Makes ready for programs on other devices of this process, too; before they are compiled.
+    def prepare_devices(self, devices: Sequence[Any]) -> None:
+        """Allocates memory on other devices of this process, before programs for them are compiled.
 
-        The ray caster keeps its tree and its pictures in memory of its own on each device. Without this, only programs
-        on the first device find them.
+        The ray caster keeps its tree and its images in memory of its own on each device. Without this, only programs on
+        the first device find them.
         """
         names = list(dict.fromkeys(str(wp.device_from_jax(device)) for device in devices))
         if names != self._served:

@@ -65,6 +65,10 @@ class Images:
 class Camera(Protocol):
     """`BatchCamera` or `NativeCamera`."""
 
+    def prepare_devices(self, devices: Sequence[Any]) -> None:
+        """Allocates memory on other devices of this process, before programs for them are compiled."""
+        ...
+
     def __call__(
         self,
         physics: Any,

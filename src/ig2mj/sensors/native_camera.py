@@ -18,7 +18,6 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from ig2mj.engine.base import Engine
-from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError
 from ig2mj.geometry.frustum import spheres_in_view
@@ -57,7 +56,7 @@ class NativeCamera:
         Raises:
           EngineError: not the native engine, or nothing is to be made. UnknownNameError: no such camera.
         """
-        if not isinstance(engine, NativeEngine):
+        if engine.renderer != "opengl":
             raise EngineError(f"the {engine.name} engine's worlds are not rendered by MuJoCo")
         check_request(cameras, rays, (rgb, depth, segmentation), width, height, rows)
         self._rows = slice(*rows) if rows is not None else slice(None)
@@ -73,7 +72,7 @@ class NativeCamera:
         self._plain = mean_colours(self._drawn, np.arange(self._drawn.ngeom))
         self._material, self._group = self._drawn.geom_matid.copy(), self._drawn.geom_group.copy()
         self._canvas: Canvas | None = None
-        self._look = jax.jit(self._look_fn)
+        self._look = engine.compile(self._look_fn)
 
     def __call__(
         self,
@@ -93,7 +92,7 @@ class NativeCamera:
         rays = {p.name: np.full((count, len(p.directions)), np.inf, np.float32) for p in self._patterns}
         slots = None
         if self.cameras:
-            tint, slots = jax.tree.map(np.asarray, self._look(states, view.body_pos, view.body_quat))
+            tint, slots = jax.tree.map(np.asarray, self._look(states, view))
         for w in range(count) if drawn is None else np.flatnonzero(np.asarray(drawn)).tolist():
             live, data = self.engine.to_mujoco(physics, w)
             for colours, own in ((self._drawn.geom_rgba, live.geom_rgba), (self._drawn.mat_rgba, live.mat_rgba)):
@@ -127,10 +126,11 @@ class NativeCamera:
             self._canvas.close()
             self._canvas = None
 
-    def _look_fn(self, states: ExtendedStates, body_pos: Any, body_quat: Any) -> tuple[Any, Slots]:
-        """Tints of objects, and particles. Of the view only bodies are read; the rest is not made for this."""
-        view = object.__new__(PhysicsView)
-        view.__dict__.update(body_pos=body_pos, body_quat=body_quat)
+    def prepare_devices(self, devices: Sequence[Any]) -> None:
+        """Nothing: OpenGL renders on its own device."""
+
+    def _look_fn(self, states: ExtendedStates, view: PhysicsView) -> tuple[Any, Slots]:
+        """Tints of objects, and particles."""
         return tints(self.model, states), fill_slots(self.model, states, view, self.slots)
 
     def _tint(self, tint: Int[np.ndarray, "O"]) -> None:

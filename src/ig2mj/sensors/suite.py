@@ -3,18 +3,18 @@
     sensors = SensorSuite(engine, scene, rules.model, controller, ["rgb", "depth", "scan"])
     readings, memory = sensors.read(physics, view, states, controller_state)
 
-One camera is made for all of them, which draws what they need and nothing else. On a pure engine `read_fn` may be part
-of a compiled program.
+All of them share one camera, which renders what they need and nothing else. Where the engine's physics can be traced,
+`read_fn` may be part of a compiled program.
 
 Axes: W worlds.
 """
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Sequence
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 from jaxtyping import Bool, UInt32
 
@@ -31,6 +31,12 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.world import ExtendedStates
 
 Readings = dict[str, Array]
+
+CAMERAS = {
+    "opengl": "ig2mj.sensors.native_camera:NativeCamera",
+    "ray caster": "ig2mj.sensors.batch_camera:BatchCamera",
+}
+"""By `Engine.renderer`: module and class of what makes images. A module is imported where images are made."""
 
 
 @entry_point
@@ -68,7 +74,6 @@ class SensorSuite:
         self.spaces: dict[str, Space] = {s.name: s.space(self._setup) for s in self._sensors}
         self._felt = [s for s in self._sensors if not s.looks]
         self._seen = [s for s in self._sensors if s.looks]
-        self._pure = engine.pure
         self._patterns = {}
         for sensor in self._seen:
             if sensor.rays is not None:
@@ -78,9 +83,9 @@ class SensorSuite:
             _ = self._setup.laser  # raises where there is none
         self._camera = self._make_camera(engine) if self._seen else None
         self._remembers = any(s.remembers for s in self._seen)
-        self._poses, self._finish = jax.jit(self._poses_fn), jax.jit(self._finish_fn)
-        self._feel, self._remember = jax.jit(self.feel_fn), jax.jit(self._memory)
-        self._whole = jax.jit(self.read_fn) if engine.pure else self._stages
+        self._poses, self._finish = engine.compile(self._poses_fn), engine.compile(self._finish_fn)
+        self._feel, self._remember = engine.compile(self.feel_fn), engine.compile(self._memory)
+        self._whole = engine.program(self.read_fn)
 
     def _make_camera(self, engine: Engine) -> Camera:
         wanted = frozenset().union(*(s.pictures for s in self._seen))
@@ -95,20 +100,17 @@ class SensorSuite:
             **{name: name in wanted for name in ("rgb", "depth", "segmentation")},
         }
         cameras = [self._setup.camera] if wanted else []
-        if engine.name == "native":
-            from ig2mj.sensors.native_camera import NativeCamera
+        if engine.renderer not in CAMERAS:
+            raise EngineError(
+                f"the {engine.name} engine neither renders images nor casts rays (take 'native' or 'warp')"
+            )
+        module, kind = CAMERAS[engine.renderer].split(":")
+        return getattr(importlib.import_module(module), kind)(engine, self._setup.model, cameras, **settings)
 
-            return NativeCamera(engine, self._setup.model, cameras, **settings)
-        if engine.name == "warp":
-            from ig2mj.sensors.batch_camera import BatchCamera  # MJX-Warp is only loaded where pictures are made
-
-            return BatchCamera(engine, self._setup.model, cameras, **settings)
-        raise EngineError(f"the {engine.name} engine neither renders images nor casts rays (take 'native' or 'warp')")
-
-    def serve(self, devices: Sequence[Any]) -> None:
-        """Makes ready for programs on other devices of this process, before they are compiled (`BatchCamera.serve`)."""
-        if self._camera is not None and self._pure:
-            self._camera.serve(devices)  # type: ignore[attr-defined]  pure cameras are batched ones
+    def prepare_devices(self, devices: Sequence[Any]) -> None:
+        """Allocates memory of cameras on other devices of this process, before programs for them are compiled."""
+        if self._camera is not None:
+            self._camera.prepare_devices(devices)
 
     @property
     def noisy(self) -> bool:
@@ -154,7 +156,8 @@ class SensorSuite:
     ) -> tuple[Readings, Memory | None]:
         """`read`, not compiled."""
         seen, memory = self.look_fn(physics, view, states, controller, memory, keys)
-        return self._ordered({**self.feel_fn(view, states, controller), **seen}), memory
+        felt = self._feel(view, states, controller) if self._felt else {}
+        return {name: {**felt, **seen}[name] for name in self.spaces}, memory
 
     def feel_fn(self, view: PhysicsView, states: ExtendedStates, controller: Any) -> Readings:
         """Readings of the sensors that need the view only. Pure on every engine, not compiled."""
@@ -171,30 +174,16 @@ class SensorSuite:
         keys: UInt32[Array, "W 2"] | None = None,
         drawn: Bool[Array, "W"] | None = None,
     ) -> tuple[Readings, Memory | None]:
-        """Readings of the sensors that need pictures or rays; see `read`. On a pure engine not compiled.
+        """Readings of the sensors that need images or rays; see `read`.
 
         Args:
           drawn: the worlds whose readings matter; None: all.
         """
         if self._camera is None:
             return {}, None
-        if self._pure:
-            eye, poses = self._poses_fn(view, controller)
-            images = self._camera(physics, view, states, poses, drawn)
-            return self._finish_fn(view, states, controller, eye, images, memory, keys)
         eye, poses = self._poses(view, controller)
         images = self._camera(physics, view, states, poses, drawn)
         return self._finish(view, states, controller, eye, images, memory, keys)
-
-    def _stages(self, *arguments: Any) -> tuple[Readings, Memory | None]:
-        """`read` on an engine whose pictures cannot be part of a program."""
-        seen, memory = self.look_fn(*arguments)
-        _, view, states, controller, *_ = arguments
-        felt = self._feel(view, states, controller) if self._felt else {}
-        return self._ordered({**felt, **seen}), memory
-
-    def _ordered(self, readings: Readings) -> Readings:
-        return {name: readings[name] for name in self.spaces}
 
     # Memory.
 

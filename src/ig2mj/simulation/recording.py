@@ -23,7 +23,6 @@ from ig2mj.demos.reader import Recording, Run
 from ig2mj.demos.replay import Replayed
 from ig2mj.demos.writer import FLUSH, FORMAT_VERSION, RunWriter
 from ig2mj.engine.base import Physics
-from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.errors import EngineError, InputError
 from ig2mj.process import entry_point
 from ig2mj.simulation.saving import SavedWorld, put_world
@@ -73,7 +72,7 @@ class SimulationRecorder:
         if simulation._recorder is not None:
             raise EngineError("this simulation is being recorded; close that recording first")
         self._simulation, self._engine = simulation, simulation.engine
-        names, cuts = _names(simulation), _cuts(simulation)
+        names, cuts = _names(simulation), simulation.engine.frame_cuts
         own, batched = dict(zip(names, cuts, strict=False)), names[len(cuts) :]
         self.writer = RunWriter(file, _origin(simulation), own, batched, [])
         # Controllers are input: robots set theirs before they step.
@@ -110,11 +109,8 @@ class SimulationRecorder:
         return [*(piece for own in frame[0] for piece in own), *(frame[1][k] for k in self._compared)]
 
     def _frame(self, physics: Physics, states: Any, steps: int) -> list[Any]:
-        engine = self._engine
-        besides = jax.tree.leaves(_besides(self._simulation, states, steps))
-        if isinstance(engine, NativeEngine):
-            return [[engine.pieces(engine.worlds(physics)[0])], besides]
-        return [[], [np.array(leaf) for leaf in (*jax.tree.leaves(engine.snapshot(physics)), *besides)]]
+        own, batched = self._engine.frame(physics, [0])
+        return [own, [*batched, *self._engine.kept(jax.tree.leaves(_besides(self._simulation, states, steps)))]]
 
 
 def _besides(simulation: Simulation, states: Any, steps: int) -> tuple[Any, ...]:
@@ -132,10 +128,6 @@ def _world(simulation: Simulation) -> SavedWorld:
 
 def _names(simulation: Simulation) -> list[str]:
     return names_of(_world(simulation))
-
-
-def _cuts(simulation: Simulation) -> list[Any]:
-    return simulation.engine.pieces.cuts if isinstance(simulation.engine, NativeEngine) else []
 
 
 def _leaves(simulation: Simulation) -> list[np.ndarray]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ig2mj.agents.base import ACTION_PERIOD
-from ig2mj.engine.base import Physics, Write
+from ig2mj.engine.base import Write
 from ig2mj.engine.view import PhysicsView
 from ig2mj.errors import ActionError, EngineError
 from ig2mj.process import entry_point
@@ -90,11 +90,6 @@ class RobotsOfWorld:
             view = self._simulation.step(np.asarray(ctrl, np.float64)[0], self._steps)
         return view
 
-    def grasp(self, physics: Physics, view: PhysicsView) -> tuple[Physics, PhysicsView]:
-        """Physics and view after hands took hold or let go."""
-        physics, after, self.held = self._core.grasp(physics, view, self.held, self.controllers)
-        return physics, view if after is view else self._core.eyes.seen(after, self.controllers)
-
     @property
     def holding(self) -> dict[str, str | None]:
         """Object that each hand holds by a constraint, by the name of the hand's body."""
@@ -108,7 +103,7 @@ class RobotsOfWorld:
 
 def remembered(simulation: Simulation) -> tuple[Any, ...]:
     """What the controllers of a simulation remember, where its view depends on that; else nothing."""
-    if not simulation.scene.agents or not simulation.core.eyes.moving:
+    if not simulation.scene.agents or not simulation.core.cameras.moving:
         return ()
     return simulation.core.controls.first() if simulation._robots is None else simulation._robots.controllers
 

@@ -128,7 +128,7 @@ class Simulation(OwnWorld, Recorded):
     def view(self) -> PhysicsView:
         """Everything that states and predicates know of physics; world axis of length 1."""
         view = self.engine.view(self.physics)
-        return self.core.eyes.seen(view, remembered(self)) if self.scene.agents else view
+        return self.core.cameras.placed(view, remembered(self)) if self.scene.agents else view
 
     @property
     def model(self) -> mujoco.MjModel:
@@ -217,15 +217,15 @@ class Simulation(OwnWorld, Recorded):
             )
         row, view = None if row is None else row[None], self.view
         advance, physics, states, done = self.core.advance, self.physics, self._states_or_none, 0
-        controllers = remembered(self)
         robots = self.robots if self._grasping is not None else None
+        controllers, grasps = (remembered(self), None) if robots is None else (robots.controllers, robots.held)
         if (recorder := self._recorder) is not None:
             recorder.begin()
         try:
             for done in range(1, count + 1):
-                physics, view, states, _ = advance(physics, states, row, controllers)
+                physics, view, states, _, grasps = advance(physics, states, row, controllers, grasps)
                 if robots is not None:
-                    physics, view = robots.grasp(physics, view)
+                    robots.held = grasps
                 row = None
                 if recorder is not None:
                     recorder.add(physics, states, self._steps + done)

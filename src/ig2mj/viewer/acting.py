@@ -40,7 +40,7 @@ class ActingWorld:
         Raises:
           EngineError: the environment has several worlds or another engine.
         """
-        if env.num_worlds != 1 or env.pure:
+        if env.num_worlds != 1 or not env.core.engine.live:
             raise EngineError("the viewer shows one world of the native engine")
         self.scene, self._env, self._act = env.scene, env, act
         self._row, self.successes, self.episodes = first, 0, 0

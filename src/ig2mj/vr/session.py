@@ -98,7 +98,12 @@ class Session:
         Raises:
           InputError: the recording cannot be written. EngineError: the environment is not one for a person.
         """
-        if env.num_worlds != 1 or env.robot != "humanoid" or env.action_space.shape != (28,) or env.core.engine.pure:
+        if (
+            env.num_worlds != 1
+            or env.robot != "humanoid"
+            or env.action_space.shape != (28,)
+            or not env.core.engine.live
+        ):
             raise EngineError("a person drives one humanoid of the native engine (`vr.session.person_environment`)")
         self.env = env
         if record_to is not None:

@@ -87,8 +87,8 @@ class Recorded:
             facts.append(("reward", f"{float(run.rows('steps/reward/total', self.frame - 1, self.frame)[0]):.3g}"))
         if self.frame == self.frames - 1:
             facts.append(("episode", "success" if run.attributes.get("success") else "over"))
-        time, pure = float(np.asarray(now.time)[run.world]), self._replayer.env.core.engine.pure
-        return shot_of(now.view, now.states, run.world, time, pure, facts=tuple(facts), jump=jump, period=self.period)
+        time, engine = float(np.asarray(now.time)[run.world]), self._replayer.env.core.engine
+        return shot_of(engine, now.view, now.states, run.world, time, facts=tuple(facts), jump=jump, period=self.period)
 
     def mujoco(self, world: int) -> tuple[mujoco.MjModel, mujoco.MjData] | None:
         return None

@@ -6,10 +6,10 @@ import dataclasses
 import threading
 from typing import Any
 
-import jax
 import numpy as np
 from jaxtyping import Float
 
+from ig2mj.engine.base import Engine
 from ig2mj.engine.view import PhysicsView
 from ig2mj.states.world import ExtendedStates
 
@@ -44,17 +44,10 @@ class Shot:
         return np.asarray(self.view.body_quat)[self.row]
 
 
-def shot_of(view: PhysicsView, states: ExtendedStates, world: int, time: float, pure: bool, **more: Any) -> Shot:
-    """A shot of a world of a batch.
-
-    Args:
-      pure: the engine's arrays live on a device, where the next step may use them up: what is needed is fetched now.
-        Else views and states are arrays that nobody changes.
-    """
-    if pure:
-        view, states = jax.tree.map(lambda a: np.asarray(a[world : world + 1]), (view, states))
-        world = 0
-    return Shot(view, states, world, time, **more)
+def shot_of(engine: Engine, view: PhysicsView, states: ExtendedStates, world: int, time: float, **more: Any) -> Shot:
+    """A shot of a world of a batch of the engine, in arrays that outlive its next step."""
+    (view, states), row = engine.kept_row((view, states), world)
+    return Shot(view, states, row, time, **more)
 
 
 class Mailbox:

@@ -84,8 +84,8 @@ def rules_of(core: Core) -> Any:
 
 
 def live(engine: Engine, physics: Any, world: int) -> tuple[mujoco.MjModel, mujoco.MjData] | None:
-    """See `Source.mujoco`: only C MuJoCo's structures are live."""
-    return None if engine.pure else engine.to_mujoco(physics, world)
+    """See `Source.mujoco`."""
+    return engine.to_mujoco(physics, world) if engine.live else None
 
 
 class Home:
@@ -130,7 +130,7 @@ class Home:
     def shot(self, world: int, jump: bool = False) -> Shot:
         now, engine = self._batch.world, self._core.engine
         time = float(np.asarray(engine.time(now.physics))[world])
-        return shot_of(now.view, now.states, world, time, engine.pure, jump=jump, period=self.period)
+        return shot_of(engine, now.view, now.states, world, time, jump=jump, period=self.period)
 
     def mujoco(self, world: int) -> tuple[mujoco.MjModel, mujoco.MjData] | None:
         return live(self._core.engine, self._batch.world.physics, world)
@@ -179,8 +179,8 @@ class Acting:
         elif bool(np.asarray(state.truncated)[world]) or bool(np.asarray(state.terminated)[world]):
             facts.append(("episode", "over"))
         time = float(np.asarray(now.time)[world])
-        jump, pure = jump or bool(self._began[world]), self.env.core.engine.pure
-        return shot_of(now.view, now.states, world, time, pure, facts=tuple(facts), jump=jump, period=self.period)
+        jump, engine = jump or bool(self._began[world]), self.env.core.engine
+        return shot_of(engine, now.view, now.states, world, time, facts=tuple(facts), jump=jump, period=self.period)
 
     def mujoco(self, world: int) -> tuple[mujoco.MjModel, mujoco.MjData] | None:
         return live(self.env.core.engine, self._state.batch.world.physics, world)

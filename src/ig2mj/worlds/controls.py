@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
@@ -16,7 +15,6 @@ from jaxtyping import Float
 from ig2mj.agents.base import Controller
 from ig2mj.engine.base import Engine
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.worlds.lazy.of_view import OfView
 
 
 class Controls:
@@ -30,7 +28,7 @@ class Controls:
         self.low = np.concatenate([np.zeros(0), *(c.action_low for c in controllers)])
         self.high = np.concatenate([np.zeros(0), *(c.action_high for c in controllers)])
         self._controllers, self._worlds = tuple(controllers), engine.num_worlds
-        self._act = jax.jit(self._acted) if engine.pure else OfView(self._acted)
+        self._act = engine.compile(self._acted)
 
     def first(self) -> tuple[Any, ...]:
         """What the controllers remember at the start."""

@@ -5,15 +5,13 @@
     batch, status = core.step(batch)
     batch = core.reset(batch, status.holds)
 
-A control step is, in this order: the robots' controllers, physics, the view of it, extended states and the goal, what
-slicing moves, what hands take hold of and let go of, guards, clocks. It is the same for every engine. On a pure engine
-(see `ig2mj.engine.base`) the methods are compiled; on the native one they work on the engine's worlds in place, and
-states are only computed where something can have changed (`ig2mj.worlds.incremental`). Either way a batch that was
-given to `step`, `reset`, `rollout`, `write` or `load` is used up: go on with the one that is returned. A batch that was
-used up raises StaleStateError; `fork` copies one first.
+A control step is, in this order: the robots' controllers, physics, its view, extended states and the goal, what slicing
+moves, what hands take hold of and let go of, guards, clocks. It is the same function for every engine; the engine
+decides how functions run (`ig2mj.engine.base`). `step`, `reset`, `rollout`, `write` and `load` consume the batch they
+are given: continue with the one that is returned. A consumed batch raises StaleStateError; `fork` copies one first.
 
 `step_fn`, `reset_fn` and `start_fn` are the same functions, not compiled: call them inside your own `jax.jit` or
-`lax.scan` on a pure engine, or directly on any.
+`lax.scan` where the engine's physics can be traced, or directly on any engine.
 
 The faces are `Worlds` (a batch, by names), `DebugWorlds` (watched), `ShardedWorlds` (several devices) and
 `ig2mj.Simulation` (one world).
@@ -25,7 +23,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -40,16 +38,15 @@ from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import LostWorldError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.process import entry_point
-from ig2mj.process.gc_pause import GC_PAUSED, Compiled, compile_together
+from ig2mj.process.gc_pause import GC_PAUSED, compile_together
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
 from ig2mj.worlds import guards
+from ig2mj.worlds.agent_cameras import AgentCameras
 from ig2mj.worlds.batch import Batch
-from ig2mj.worlds.branches import call, cond_any, forked
 from ig2mj.worlds.controls import Controls
-from ig2mj.worlds.eyes import Eyes
 from ig2mj.worlds.hand_resets import HandResets
-from ig2mj.worlds.hands import Hands
-from ig2mj.worlds.incremental import IncrementalRules
+from ig2mj.worlds.hands import Hands, Held
+from ig2mj.worlds.incremental import rules_step
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import Seeds
 from ig2mj.worlds.rules import Outcome, Rules, States
@@ -59,15 +56,24 @@ Policy = Callable[[Batch, Any], tuple[Float[Array, "W n"] | None, Any]]
 """The next step's action (or controls) from the batch and a carry, and the new carry. Pure."""
 
 
+class Advanced(NamedTuple):
+    """What a control step leaves: physics, its view, states, what the goal says, and what hands hold."""
+
+    physics: Physics
+    view: PhysicsView
+    states: States
+    status: GoalStatus
+    grasps: Held
+
+
 @entry_point
 class Core:
     """Start, step and reset of the worlds of one engine.
 
     Attributes:
-      advance: see `advance_fn`. hands: what they hold. grasp: `hands.act`, compiled where that helps. eyes: where they
-        are in views.
-      engine: physics. rules: states and goal. controllers: of the scene's robots. controls: what they make of actions.
-      grasping: how their hands hold. starts: what episodes start from.
+      engine: physics. rules: states and goal. controllers: of the scene's robots. controls: from actions to MuJoCo's
+        controls. hands: what they hold. hand_resets: hands that are asked back. cameras: of the robots, in views.
+      grasping: how hands hold. starts: what episodes start from. advance: see `advance_fn`.
     """
 
     def __init__(
@@ -77,7 +83,7 @@ class Core:
         pool: Pool | None = None,
         controllers: Sequence[Controller] = (),
         grasping: Grasping | None = None,
-        hand_resets: bool | None = None,
+        hand_resets: bool = False,
     ):
         """Binds an engine to the rules of its scene.
 
@@ -87,37 +93,26 @@ class Core:
           controllers: one for each robot of the scene, in the order of its actuators; actions go through them. Without
             any, an action is MuJoCo's controls.
           grasping: how hands take hold of objects; None: by friction alone.
-          hand_resets: hands that are asked back jump where they are out of reach; None: not on a pure engine, whose
-            programs it makes larger.
+          hand_resets: hands that an action asks back are teleported where they are out of reach; makes compiled
+            programs larger.
         """
         self.engine, self.rules, self.controllers = engine, rules, tuple(controllers)
         self.grasping, self.hands = grasping, Hands(engine, grasping, self.controllers)
-        self.eyes = Eyes(engine, self.controllers)
-        resets = not engine.pure if hand_resets is None else hand_resets
-        self.hand_resets = HandResets(engine, self.controllers, resets)
+        self.cameras = AgentCameras(engine, self.controllers)
+        self.hand_resets = HandResets(engine, self.controllers, hand_resets)
         self.controls = Controls(engine, self.controllers)
         self.starts = Starts(engine, rules.initial if rules is not None else None, pool)
         self._physics_step = engine.step  # a world at rest steps in under 2 us: even looking up a name counts
-        seconds = engine.substeps * engine.timestep
-        self._count = guards.counter(lambda: self.starts.floor, seconds, engine.pure)
-        self._chosen = jax.jit(chosen)
-        if engine.pure:
-            self.advance, self.grasp = Compiled(self.advance_fn), jax.jit(self.hands.act)
-            self._step: Any = Compiled(self.step_fn, self.check, donate_argnums=0)
-            self._reset = Compiled(self.reset_fn, self.check, donate_argnums=0)
-            self._rollout = Compiled(self._scanned, self.check, static_argnums=(2, 3), donate_argnums=(0, 1))
-            self._begin: Any = Compiled(self.start_fn, donate_argnums=0)
-            self._write = Compiled(self.write_fn, self.check, donate_argnums=0)
-            self._load = Compiled(self.load_fn, self.check, donate_argnums=0)
-            self._react = rules.step if rules is not None else self._no_rules
-            self._if_any, self._index = cond_any, jnp.asarray
-        else:
-            self.advance, self.grasp = self.advance_fn, self.hands.act
-            self._step, self._reset = self.step_fn, self.reset_fn
-            self._rollout, self._begin = self._looped, self.start_fn
-            self._write, self._load = self.write_fn, self.load_fn
-            self._react = IncrementalRules.of(rules, engine).step if rules is not None else self._no_rules
-            self._if_any, self._index = call, np.asarray
+        self._count = guards.counter(engine, lambda: self.starts.floor, engine.substeps * engine.timestep)
+        self._chosen = engine.compile(chosen)
+        self.advance = engine.program(self.advance_fn)
+        self._step = engine.program(self.step_fn, self.check, donate_argnums=0)
+        self._reset = engine.program(self.reset_fn, self.check, donate_argnums=0)
+        self._rollout = engine.program(self._rollout_fn, self.check, static_argnums=(2, 3), donate_argnums=(0, 1))
+        self._begin = engine.program(self.start_fn, donate_argnums=0)
+        self._write = engine.program(self.write_fn, self.check, donate_argnums=0)
+        self._load = engine.program(self.load_fn, self.check, donate_argnums=0)
+        self._rules_step = self._no_rules if rules is None else rules_step(rules, engine)
         self._no_status = GoalStatus.empty(engine.num_worlds)
 
     # A control step.
@@ -127,7 +122,7 @@ class Core:
 
         Args:
           action: of the robots, clipped to the limits of `controls`; without controllers, MuJoCo's controls
-            [W, nu]. None: what was asked of the actuators last stays.
+            [W, nu]. None: the previous controls are kept.
 
         Returns:
           The batch after the step, and what the goal says of it: of the states after it, and of the view before slicing
@@ -141,51 +136,35 @@ class Core:
             batch, action = self._acted(batch, action)
         return self._control_step(batch, action)
 
-    def hold_fn(self, batch: Batch, action: Float[Array, "W n"], steps: int) -> tuple[Batch, GoalStatus]:
-        """`steps` control steps of one action, not compiled: controllers act once, what they ask for stays.
-
-        On a pure engine this is a loop of the program, which calls a physics step in 4 places; written out, a program
-        calls it in 4 times `steps`, and MJX keeps a CUDA graph of each.
-        """
+    def repeat_action_fn(self, batch: Batch, action: Float[Array, "W n"], steps: int) -> tuple[Batch, GoalStatus]:
+        """`steps` control steps of one action, not compiled: controllers act once, and their controls are kept."""
         if self.controllers:
             batch, action = self._acted(batch, action)
-        if not self.engine.pure:
-            batch, status = self._control_step(batch, action)
-            for _ in range(steps - 1):
-                batch, status = self._control_step(batch, None)
-            return batch, status
-
-        def body(batch: Batch, _: None) -> tuple[Batch, list[Array]]:
-            batch, status = self._control_step(batch, action)
-            return batch, [status.holds, status.fraction, status.literals]
-
-        batch, each = jax.lax.scan(body, batch, None, steps)
-        return batch, GoalStatus(*(field[-1] for field in each))
+        return self.engine.repeat(lambda batch: self._control_step(batch, action), batch, steps)
 
     def _acted(self, batch: Batch, action: Float[Array, "W n"]) -> tuple[Batch, Float[Array, "W nu"]]:
-        """What controllers make of an action."""
+        """The controllers' controls for an action."""
         world = batch.world
         ctrl, controllers = self.controls.act(action, world.view, batch.controllers)
         physics = self.hand_resets.act(world.physics, world.view, action, controllers)
-        return dataclasses.replace(
-            batch, world=dataclasses.replace(world, physics=physics), controllers=controllers
-        ), ctrl
+        world = dataclasses.replace(world, physics=physics)
+        return dataclasses.replace(batch, world=world, controllers=controllers), ctrl
 
     def _control_step(self, batch: Batch, ctrl: Float[Array, "W nu"] | None) -> tuple[Batch, GoalStatus]:
-        """One control step of MuJoCo's controls."""
+        """One control step of MuJoCo's controls: `advance_fn`, guards and clocks."""
         world, controllers = batch.world, batch.controllers
         try:
             physics, view = self._physics_step(world.physics, ctrl)
         except LostWorldError:  # the other worlds were stepped; guards flag this one
             physics, view = world.physics, self.engine.view(world.physics)
-        physics, view, states, status = self._reacted(physics, view, world.states, controllers)
-        physics, after, grasps = self.hands.act(physics, view, batch.grasps, controllers)
-        if after is not view:
-            view = self.eyes.seen(after, controllers)
+        after = self._after_physics(physics, view, world.states, controllers, batch.grasps)
         clocks = (world.step, world.time, batch.flags, batch.troubles)
-        step, time, flags, troubles = self._count(*clocks, self.engine.health(physics), view.object_com)
-        world = WorldState(physics=physics, view=view, states=states, key=world.key, step=step, time=time)
-        return dataclasses.replace(batch, world=world, grasps=grasps, flags=flags, troubles=troubles), status
+        step, time, flags, troubles = self._count(*clocks, self.engine.health(after.physics), after.view.object_com)
+        world = WorldState(
+            physics=after.physics, view=after.view, states=after.states, key=world.key, step=step, time=time
+        )
+        batch = dataclasses.replace(batch, world=world, grasps=after.grasps, flags=flags, troubles=troubles)
+        return batch, after.status
 
     def advance_fn(
         self,
@@ -193,38 +172,48 @@ class Core:
         states: States,
         ctrl: Float[Array, "W nu"] | None = None,
         controllers: tuple[Any, ...] = (),
-    ) -> tuple[Physics, PhysicsView, States, GoalStatus]:
-        """What of a step is not about episodes: physics, its view, the states and the goal after one control step.
+        grasps: Held = None,
+    ) -> Advanced:
+        """One control step without clocks, guards and episodes, for callers that keep physics and states themselves.
 
-        `advance` is the same, compiled where that helps: for those who keep these four themselves, as `Simulation`
-        does. Of its arguments only physics is used up.
+        `advance` is the same, compiled where the engine compiles steps. Only `physics` is consumed.
 
         Args:
-          ctrl: MuJoCo's controls; None keeps the last ones.
-          controllers: what the robots' controllers remember, which may be where their eyes are; none: eyes are where
-            they were compiled.
+          ctrl: MuJoCo's controls; None keeps the previous ones.
+          controllers: states of the robots' controllers, on which camera poses and grasps may depend; (): cameras are
+            where they were compiled.
+          grasps: what hands hold; None: no hand takes hold of anything.
 
         Raises:
           LostWorldError: (native engine) a world is not finite any more, which `step` only flags.
         """
         physics, view = self._physics_step(physics, ctrl)
-        return self._reacted(physics, view, states, controllers)
+        return self._after_physics(physics, view, states, controllers, grasps)
 
-    def _reacted(
+    def _after_physics(
+        self, physics: Physics, view: PhysicsView, states: States, controllers: tuple[Any, ...], grasps: Held
+    ) -> Advanced:
+        """The rest of a control step: states and goal, what slicing moves, grasps."""
+        view = self.cameras.placed(view, controllers)
+        physics, view, states, status = self._apply_rules(physics, view, states, controllers)
+        physics, after, grasps = self.hands.act(physics, view, grasps, controllers)
+        if after is not view:
+            view = self.cameras.placed(after, controllers)
+        return Advanced(physics, view, states, status, grasps)
+
+    def _apply_rules(
         self, physics: Physics, view: PhysicsView, states: States, controllers: tuple[Any, ...]
     ) -> tuple[Physics, PhysicsView, States, GoalStatus]:
-        """The rest of `advance_fn`, after physics."""
-        view = self.eyes.seen(view, controllers)
-        states, swap, status = self._react(states, view)
+        states, swap, status = self._rules_step(states, view)
         if swap is not None:
             physics, view = self.teleport(physics, view, swap)
-            view = self.eyes.seen(view, controllers)
+            view = self.cameras.placed(view, controllers)
         return physics, view, states, status
 
     def prepare(self, physics: Physics, states: States) -> None:
-        """Compiles what the first step needs, without taking it, where the two can be told apart: natively."""
-        if not self.engine.pure:
-            self._react(states, self.engine.view(physics))
+        """Compiles the rules' programs before the first step where they are programs of their own."""
+        if self.engine.tracks_changes:
+            self._rules_step(states, self.engine.view(physics))
 
     def teleport(self, physics: Physics, view: PhysicsView, swap: Swap) -> tuple[Physics, PhysicsView]:
         """Physics and view after what slicing moves; worlds where it moves nothing keep their view."""
@@ -232,14 +221,12 @@ class Core:
         rules, cut = self.rules, jnp.asarray(swap.mask).any(1)
 
         def act(physics: Physics, view: PhysicsView) -> tuple[Physics, PhysicsView]:
-            physics = self.engine.write(physics, rules.teleports(swap, view))
-            now = self.engine.view(physics)
-            return physics, now if self.engine.num_worlds == 1 else chosen(cut, now, view)
+            return self.engine.write_with_view(physics, rules.teleports(swap, view), view, cut)
 
-        return self._if_any(cut, act, physics, view)
+        return self.engine.when_any(cut, act, physics, view)
 
     def rollout(self, batch: Batch, carry: Any, policy: Policy, length: int) -> tuple[Batch, Any]:
-        """`length` control steps, on a pure engine without leaving the device.
+        """`length` control steps, without leaving the device where the engine compiles steps.
 
         Args:
           policy: gives each step's action. The same function object each time, or it is compiled again.
@@ -250,19 +237,13 @@ class Core:
     def _no_rules(self, states: States, view: PhysicsView) -> Outcome:
         return Outcome(states, None, self._no_status)
 
-    def _scanned(self, batch: Batch, carry: Any, policy: Policy, length: int) -> tuple[Batch, Any]:
-        def body(state: tuple[Batch, Any], _: None) -> tuple[tuple[Batch, Any], None]:
+    def _rollout_fn(self, batch: Batch, carry: Any, policy: Policy, length: int) -> tuple[Batch, Any]:
+        def body(state: tuple[Batch, Any]) -> tuple[tuple[Batch, Any], None]:
             batch, carry = state
             action, carry = policy(batch, carry)
             return (self.step_fn(batch, action)[0], carry), None
 
-        return jax.lax.scan(body, (batch, carry), None, length)[0]
-
-    def _looped(self, batch: Batch, carry: Any, policy: Policy, length: int) -> tuple[Batch, Any]:
-        for _ in range(length):
-            action, carry = policy(batch, carry)
-            batch, _ = self.step_fn(batch, action)
-        return batch, carry
+        return self.engine.repeat(body, (batch, carry), length)[0]
 
     # Episodes.
 
@@ -276,7 +257,7 @@ class Core:
         Raises:
           EngineError: kernels of the engine could not be compiled.
         """
-        if (reset := self.engine.awaited()) is not None:
+        if (reset := self.engine.pending_reset_program()) is not None:
             shape = (self.engine.num_worlds, len(self.controls.low))
             action = jax.ShapeDtypeStruct(shape, jnp.float32) if self.controllers else None
             begin = self._begin.traced(reset.returned, seed, first)
@@ -293,7 +274,7 @@ class Core:
         nothing = jnp.zeros(count, jnp.int32)
         world = WorldState(
             physics=physics,
-            view=self.eyes.seen(self.engine.view(physics), self.controls.first()),
+            view=self.cameras.placed(self.engine.view(physics), self.controls.first()),
             states=self.starts.pool.rows(np.zeros(count, int)).states,
             key=jnp.zeros((count, 2), jnp.uint32),
             step=nothing,
@@ -319,13 +300,13 @@ class Core:
         """`reset`, not compiled."""
         world = batch.world
         episode, key, row = self.starts.draw(batch.seed, batch.number, batch.episode, mask)
-        rows = self.starts.pool.rows(self._index(row))
+        rows = self.starts.pool.rows(row)
         physics = self.engine.load(world.physics, rows.physics, mask)
         zero = jnp.zeros_like(world.step), jnp.zeros_like(world.time)
         started = (rows.states, key, *zero, self.controls.first(), self.hands.read(physics))
         going = (world.states, world.key, world.step, world.time, batch.controllers, batch.grasps)
         states, key, step, time, controllers, grasps = self._chosen(mask, started, going)
-        view = self.eyes.seen(self.engine.view(physics), controllers)
+        view = self.cameras.placed(self.engine.view(physics), controllers)
         world = WorldState(physics=physics, view=view, states=states, key=key, step=step, time=time)
         flags = jnp.where(mask, 0, batch.flags)
         return dataclasses.replace(
@@ -376,7 +357,7 @@ class Core:
         return dataclasses.replace(self._with(batch, loaded, states), grasps=grasps)
 
     def _with(self, batch: Batch, physics: Physics, states: ExtendedStates) -> Batch:
-        view = self.eyes.seen(self.engine.view(physics), batch.controllers)
+        view = self.cameras.placed(self.engine.view(physics), batch.controllers)
         world = dataclasses.replace(batch.world, physics=physics, view=view, states=states)
         return dataclasses.replace(batch, world=world)
 
@@ -387,7 +368,7 @@ class Core:
     def fork(self, batch: Batch) -> Batch:
         """An independent copy, which goes on as the batch does; not for compiled programs. Raises StaleStateError."""
         self.check(batch)
-        return forked(self.engine, batch)
+        return self.engine.copied(batch)
 
     # What went wrong.
 

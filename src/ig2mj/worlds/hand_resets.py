@@ -1,10 +1,10 @@
-"""`HandResets`: hands that are asked back while they are out of their arm's reach come back at once.
+"""`HandResets`: a hand beyond its arm's reach is teleported back when the action asks for it.
 
-A hand that something blocks stays behind when the body goes on, and may never come back by its own force. iGibson's
-reset of a hand teleports it to where it is pulled (iGibson's behavior_robot.py). So it is here for hands
-beyond their reach; nearer ones are pulled back, since a hand that jumps could land inside something.
+A hand that an obstacle blocks stays behind when the body moves on, and its own force may never bring it back. As in
+iGibson (behavior_robot.py), a reset teleports the hand to its target. Here that happens only beyond the arm's reach:
+nearer hands are pulled back, since a hand that jumps could land inside something.
 
-Axes: W worlds, n numbers of an action, K hands of a robot.
+Axes: W worlds, n numbers of an action, K hands of a robot, nq coordinates.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol, runtime_checkable
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -20,7 +19,6 @@ from jaxtyping import Bool, Float, Int
 from ig2mj.agents.base import Controller
 from ig2mj.engine.base import Engine, Physics, Write
 from ig2mj.engine.view import Array, PhysicsView
-from ig2mj.worlds.lazy.of_view import OfView
 
 
 @runtime_checkable
@@ -41,10 +39,10 @@ class WithHandResets(Protocol):
 
 
 class HandResets:
-    """Of an engine's worlds. `act` may be part of a compiled program on a pure engine."""
+    """Of an engine's worlds. `act` may be part of a compiled program."""
 
     def __init__(self, engine: Engine, controllers: Sequence[Controller], enabled: bool):
-        """`enabled`: on a pure engine a write more in every program that steps; so only where hands may be reset."""
+        """`enabled`: adds a write to every compiled program that steps; for actions that can ask a hand back."""
         self._engine, self._parts = engine, []
         numbers, address, first = [np.zeros(0, int)], [np.zeros((0, 3), int)], 0
         for number, controller in enumerate(controllers):
@@ -54,7 +52,7 @@ class HandResets:
                 address.append(controller.hand_qposadr)
             first += controller.action_size
         self._numbers, self._address = np.concatenate(numbers), np.concatenate(address)
-        self._find = OfView(self._found)
+        self._find = engine.compile(self._found, self._none_asked)
 
     def act(self, physics: Physics, view: PhysicsView, action: Float[Array, "W n"], states: tuple[Any, ...]) -> Physics:
         """Physics with such hands where they are pulled to.
@@ -64,26 +62,26 @@ class HandResets:
         """
         if not self._parts:
             return physics
-        worlds, length = action.shape[0], self._engine.scene.model.nq
-        if self._engine.pure:
-            jumps, target = self._found(view, action, states)
-            mask, pos = jnp.zeros((worlds, length), bool), jnp.zeros((worlds, length), jnp.float32)
-            mask = mask.at[:, self._address].set(jnp.broadcast_to(jumps[..., None], target.shape))
-            write = Write(qpos_mask=mask, qpos=pos.at[:, self._address].set(target))
-            return jax.lax.cond(jumps.any(), lambda p: self._engine.write(p, write), lambda p: p, physics)
-        if not (np.asarray(action)[:, self._numbers] > 0).any():
-            return physics
-        jumps, target = self._find(view, action, states)
-        if not jumps.any():
-            return physics
-        mask, pos = np.zeros((worlds, length), bool), np.zeros((worlds, length), np.float32)
-        mask[:, self._address], pos[:, self._address] = jumps[..., None], target
-        return self._engine.write(physics, Write(qpos_mask=mask, qpos=pos))
+        jumps, mask, pos = self._find(view, action, states)
+
+        def put_back(physics: Physics) -> Physics:
+            return self._engine.write(physics, Write(qpos_mask=mask, qpos=pos))
+
+        return self._engine.when_any(jumps, put_back, physics)
+
+    def _none_asked(self, view: PhysicsView, action: Float[Array, "W n"], states: tuple[Any, ...]) -> tuple | None:
+        """What `_found` returns where no action asks a hand back."""
+        asked = np.asarray(action)[:, self._numbers] > 0
+        return None if asked.any() else (asked, None, None)
 
     def _found(
         self, view: PhysicsView, action: Float[Array, "W n"], states: tuple[Any, ...]
-    ) -> tuple[Bool[Array, "W K"], Float[Array, "W K 3"]]:
-        """Which hands of all robots jump, and where to."""
+    ) -> tuple[Bool[Array, "W K"], Bool[Array, "W nq"], Float[Array, "W nq"]]:
+        """Which hands of all robots jump, and the coordinates that put them at their targets."""
         found = [controller.out_of_reach(view, states[number]) for number, controller in self._parts]
         beyond, target = (jnp.concatenate(parts, axis=1) for parts in zip(*found, strict=True))
-        return beyond & (jnp.asarray(action)[:, self._numbers] > 0), target
+        jumps = beyond & (jnp.asarray(action)[:, self._numbers] > 0)
+        shape = jumps.shape[0], self._engine.scene.model.nq
+        mask, pos = jnp.zeros(shape, bool), jnp.zeros(shape, jnp.float32)
+        mask = mask.at[:, self._address].set(jnp.broadcast_to(jumps[..., None], target.shape))
+        return jumps, mask, pos.at[:, self._address].set(target)

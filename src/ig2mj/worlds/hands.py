@@ -5,11 +5,9 @@ Axes: W worlds.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool
@@ -17,9 +15,8 @@ from jaxtyping import Bool
 from ig2mj.agents.base import Controller
 from ig2mj.agents.grasping import Grasping, GraspState
 from ig2mj.engine.base import Engine, Physics, Write
-from ig2mj.engine.view import OF_CONSTRAINTS, Array, PhysicsView, read_field, replace_fields
+from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
-from ig2mj.worlds.lazy.of_view import OfView
 from ig2mj.worlds.starts import chosen
 
 Held = GraspState | None
@@ -36,7 +33,7 @@ def check_grasping(engine: Engine, grasping: Grasping | None) -> None:
 
 
 class Hands:
-    """The hands of an engine's worlds. `act` and `read` may be part of a compiled program on a pure engine."""
+    """The hands of an engine's worlds. `act` and `read` may be part of a compiled program."""
 
     def __init__(self, engine: Engine, grasping: Grasping | None, controllers: Sequence[Controller]):
         """Binds a rule of grasping to an engine and to the controllers that ask hands to close.
@@ -47,37 +44,31 @@ class Hands:
         check_grasping(engine, grasping)
         self._engine, self._grasping, self._controllers = engine, grasping, tuple(controllers)
         self._holds = grasping is not None and grasping.active
-        self._update = jax.jit(self._updated) if engine.pure else OfView(self._updated)
+        self._nothing = np.zeros(engine.num_worlds, bool)
+        self._update = engine.compile(self._updated, self._idle)
         if grasping is not None:
-            self._constraints, self._read = jax.jit(grasping.write), jax.jit(grasping.read)
-            self._ended, self._loaded = jax.jit(grasping.ended), jax.jit(grasping.loaded)
+            self._constraints, self._read = engine.compile(grasping.write), engine.compile(grasping.read)
+            self._ended, self._loaded = engine.compile(grasping.ended), engine.compile(grasping.loaded)
 
     def act(
         self, physics: Physics, view: PhysicsView, held: Held, controllers: tuple[Any, ...]
     ) -> tuple[Physics, PhysicsView, Held]:
-        """Physics and view after hands took hold or let go, as after every control step. Uses up `physics`."""
+        """Physics, view and grasps after hands took hold or let go. Consumes `physics`."""
         if not self._holds or held is None:
             return physics, view, held
         assert self._grasping is not None
-        if not self._engine.pure and self._grasping.idle(view, held):
-            return physics, view, held
         after, changed = self._update(view, held, controllers)
-        if not self._engine.pure:
-            if np.asarray(changed).any():
-                physics = self._engine.write(physics, self._exact(self._constraints(after)))
-            return physics, self._engine.view(physics), after
-        physics = self._engine.write(physics, self._constraints(after))
-        now = self._engine.view(physics)  # what is not read of it is never computed
-        return physics, replace_fields(view, {name: read_field(now, name) for name in OF_CONSTRAINTS}), after
 
-    def _exact(self, write: Write) -> Write:
-        """The same write in double precision: constraints that nobody holds by keep the compiled numbers. Rounded ones
-        would be written in all worlds as soon as one hand of one world takes hold."""
-        assert self._grasping is not None and write.model_fields is not None
-        compiled = np.asarray(self._grasping.scene.model.eq_data[:, :12])
-        data = np.asarray(write.model_fields.eq_data)
-        exact = np.where(data == compiled.astype(np.float32), compiled, data)
-        return dataclasses.replace(write, model_fields=dataclasses.replace(write.model_fields, eq_data=exact))
+        def constrain(physics: Physics, view: PhysicsView) -> tuple[Physics, PhysicsView]:
+            return self._engine.write_with_view(physics, self._constraints(after), view)
+
+        physics, view = self._engine.when_any(changed, constrain, physics, view, cheap=True)
+        return physics, view, after
+
+    def _idle(self, view: PhysicsView, held: GraspState, controllers: tuple[Any, ...]) -> tuple | None:
+        """What `_updated` returns where no hand can hold or let go of anything."""
+        assert self._grasping is not None
+        return (held, self._nothing) if self._grasping.idle(view, held) else None
 
     def read(self, physics: Physics) -> Held:
         """What hands hold in worlds by themselves: the constraints that are on."""
@@ -112,7 +103,7 @@ class Hands:
     def _updated(
         self, view: PhysicsView, held: GraspState, controllers: tuple[Any, ...]
     ) -> tuple[GraspState, Bool[Array, "W"]]:
-        """What hands hold after a step, and in which worlds that is another than before."""
+        """What hands hold after a step, and the worlds in which that has changed."""
         assert self._grasping is not None
         each = list(zip(self._controllers, controllers, strict=True))
         grip = jnp.concatenate([c.grip(state) for c, state in each], axis=1)

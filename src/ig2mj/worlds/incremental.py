@@ -21,6 +21,7 @@ Axes: W worlds, O objects, S heat sources, L literals.
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import jax
@@ -29,6 +30,7 @@ import numpy as np
 from jaxtyping import Bool
 
 from ig2mj.engine.base import Engine
+from ig2mj.engine.native.execution import HostFunction
 from ig2mj.engine.view import Array, PhysicsView, but_agents
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus
 from ig2mj.predicates.questions import Questions
@@ -38,7 +40,6 @@ from ig2mj.states.model import StateModel
 from ig2mj.states.relations.plan import RelationPlan
 from ig2mj.states.update import HEAT_FIELDS, events, heat, queries
 from ig2mj.states.world import ExtendedStates, Swap
-from ig2mj.worlds.lazy.of_view import OfView
 from ig2mj.worlds.rules import Outcome, Rules
 
 FINGERS = "agent.finger_pos"
@@ -48,6 +49,11 @@ MANY = 24
 
 SCENES = 8
 """Scenes, and goals, whose programs are kept: those stepped last."""
+
+
+def rules_step(rules: Rules, engine: Engine) -> Callable[[ExtendedStates, PhysicsView], Outcome]:
+    """What steps the rules next to an engine: incrementally where its views tell what changed, else `Rules.step`."""
+    return IncrementalRules.of(rules, engine).step if engine.tracks_changes else rules.step
 
 
 class IncrementalRules:
@@ -135,7 +141,7 @@ class _StatePrograms:
 
     def __init__(self, model: StateModel, num_worlds: int):
         self.model, self._plan = model, RelationPlan.build(model, queries(model))
-        self._step, self._heat = OfView(self._step_fn), OfView(self._heat_fn)
+        self._step, self._heat = HostFunction(self._step_fn), HostFunction(self._heat_fn)
         self._changed: list[int] = []  # leaves of the states that a step can change; known once it was traced
 
     @staticmethod
@@ -199,7 +205,7 @@ class _Goal:
         self._questions: Questions | None = None
         if goal is not None and num_worlds == 1 and len(set(goal.queries)) > MANY:
             self._questions = Questions.of(goal.model)
-        self._status = OfView(self._status_fn)
+        self._status = HostFunction(self._status_fn)
 
     @staticmethod
     @functools.lru_cache(maxsize=SCENES)

@@ -22,6 +22,7 @@ from flax import struct
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Bool, Float
 
+from ig2mj.engine.base import check_pure
 from ig2mj.engine.view import Array
 from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import GoalStatus
@@ -55,7 +56,7 @@ class ShardedWorlds:
           devices: of this process; None: all of `jax.local_devices()`.
 
         Raises:
-          EngineError: the worlds do not divide evenly, or the engine is not pure.
+          EngineError: the worlds do not divide evenly, or the engine's steps cannot be compiled.
         """
         self.devices = list(devices) if devices is not None else jax.local_devices()
         hosts = jax.process_count()
@@ -64,9 +65,9 @@ class ShardedWorlds:
             raise EngineError(f"{num_worlds} worlds cannot be shared by {count} devices (take a multiple of {count})")
         self.num_worlds, self.part = num_worlds, num_worlds // count
         self.local = make(self.part)
-        if not self.local.engine.pure:
-            raise EngineError(f"the {self.local.engine.name} engine has no devices to share worlds over")
-        self.local.engine.serve(self.devices)
+        engine = self.local.engine
+        check_pure(engine, EngineError(f"the {engine.name} engine has no devices to share worlds over"))
+        engine.prepare_devices(self.devices)
         self._first = jax.process_index() * len(self.devices) * self.part
         self._sharding = NamedSharding(Mesh(np.array(self.devices), (AXIS,)), PartitionSpec(AXIS))
         self._threads = ThreadPoolExecutor(len(self.devices), "ig2mj-device")

@@ -38,7 +38,7 @@ class Starts:
                 "`ig2mj sample` or `ig2mj sample-task`)"
             )
         self._engine, self._initial, self._given = engine, initial, pool
-        self._draw = jax.jit(_draw, static_argnums=4)
+        self._draw = engine.compile(self._draw_fn)
 
     @functools.cached_property
     def pool(self) -> Pool:
@@ -46,10 +46,7 @@ class Starts:
         pool = self._given
         if pool is None:
             pool = Pool(physics=jax.tree.map(lambda a: a[None], self._scene[0]), states=self._initial)
-        if not self._engine.pure:
-            return jax.tree.map(np.asarray, pool)
-        with jax.ensure_compile_time_eval():  # may be asked for first while a step is traced
-            return jax.device_put(jax.tree.map(_single_precision, pool))
+        return self._engine.constants(pool)
 
     @functools.cached_property
     def floor(self) -> Float[np.ndarray, "O"]:
@@ -65,7 +62,14 @@ class Starts:
         self, seed: Seeds, number: Int[Array, "W"], episode: Int[Array, "W"], mask: Bool[Array, "W"]
     ) -> tuple[Int[Array, "W"], UInt[Array, "W 2"], Int[Array, "W"]]:
         """Episodes after a reset of the masked worlds, their keys, and the row of the pool that each begins with."""
-        return self._draw(seed, number, episode, mask, self.pool.size)
+        return self._draw(seed, number, episode, mask)
+
+    def _draw_fn(
+        self, seed: Seeds, number: Int[Array, "W"], episode: Int[Array, "W"], mask: Bool[Array, "W"]
+    ) -> tuple[Int[Array, "W"], UInt[Array, "W 2"], Int[Array, "W"]]:
+        episode = jnp.where(mask, episode + 1, episode)
+        key = episode_keys(seed, number, episode)
+        return episode, key, pick_rows(key, self.pool.size)
 
 
 def checked_mask(mask: Any, num_worlds: int) -> Bool[Array, "W"]:
@@ -93,16 +97,3 @@ def chosen(mask: Bool[Array, "W"], these: Any, others: Any) -> Any:
         return jnp.where(mask.reshape((-1,) + (1,) * (other.ndim - 1)), this, other)
 
     return jax.tree.map(choose, these, others)
-
-
-def _draw(
-    seed: Seeds, number: Int[Array, "W"], episode: Int[Array, "W"], mask: Bool[Array, "W"], rows: int
-) -> tuple[Int[Array, "W"], UInt[Array, "W 2"], Int[Array, "W"]]:
-    episode = jnp.where(mask, episode + 1, episode)
-    key = episode_keys(seed, number, episode)
-    return episode, key, pick_rows(key, rows)
-
-
-def _single_precision(array: Array) -> np.ndarray:
-    values = np.asarray(array)
-    return values.astype(np.float32) if values.dtype == np.float64 else values

@@ -14,9 +14,10 @@ from ig2mj.worlds.core import Core
 
 
 def watch_physics(core: Core, watch: Callable[[], AbstractContextManager[Any]]) -> None:
-    """Has every physics step of a core on the native engine taken inside a context; a second call replaces the first.
+    """Takes every physics step of a core inside a context; a second call replaces the first.
 
-    The core itself has no such hook: a world at rest steps in microseconds, of which even an empty one would be a part.
+    Meaningful next to an engine whose steps run in Python (`Engine.program`). The core itself has no such hook: a world
+    at rest steps in two microseconds, and an empty context takes a part of one.
     """
 
     def watched(physics: Physics, ctrl: Float[Array, "W nu"] | None = None) -> tuple[Physics, PhysicsView]:

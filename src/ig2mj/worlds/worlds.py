@@ -13,17 +13,16 @@ from __future__ import annotations
 import os
 from typing import Any
 
-import jax
 from jaxtyping import Bool, Float
 
 from ig2mj.agents.base import Controller, Robot
 from ig2mj.agents.grasping import Grasping
 from ig2mj.engine.base import Engine
-from ig2mj.engine.registry import check_options, make_engine
+from ig2mj.engine.registry import check_options, choose_engine, make_engine
 from ig2mj.engine.view import Array
 from ig2mj.predicates.compile import CompiledExpression, GoalStatus
 from ig2mj.predicates.logic import Expression
-from ig2mj.process import entry_point, run_programs_inline
+from ig2mj.process import entry_point
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.states.model import DEFAULTS
 from ig2mj.states.options import StateOptions
@@ -73,11 +72,8 @@ class Worlds:
           Others: as
           `load_scene` and `compile_expression`.
         """
-        if engine in (None, "native"):
-            run_programs_inline()
+        engine = choose_engine(engine)
         self.scene = scene if isinstance(scene, Scene) else load_scene(scene)
-        if engine is None:
-            engine = "warp" if jax.default_backend() == "gpu" else "native"
         check_options("Worlds", options, engine, Worlds)
         if isinstance(engine, str):
             engine = make_engine(engine, self.scene, num_worlds, **options)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+from collections.abc import Sequence
 
 import jax
 import jax.numpy as jnp
@@ -64,3 +65,11 @@ class MjxCopies(abc.ABC):
             overflow=jnp.asarray(saved.overflow),
             wrong_controls=jnp.asarray(saved.wrong_controls),
         )
+
+    def restored_view(self, physics: MjxPhysics, saved: SavedPhysics) -> PhysicsView:
+        """See `Engine.restored_view`. A program that computed it would not be the step's, and round otherwise."""
+        return jax.tree.map(jnp.asarray, saved.view)
+
+    def frame(self, physics: MjxPhysics, worlds: Sequence[int]) -> tuple[list[list[np.ndarray]], list[np.ndarray]]:
+        """See `Engine.frame`."""
+        return [], [np.array(leaf) for leaf in jax.tree.leaves(self.snapshot(physics))]

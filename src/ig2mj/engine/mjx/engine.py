@@ -25,6 +25,7 @@ from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.mjx.contacts import Contacts, larger_forces, no_forces, touching_units, without_ignored
 from ig2mj.engine.mjx.copying import MjxCopies
+from ig2mj.engine.mjx.execution import TracedExecution
 from ig2mj.engine.mjx.physics import STATE_FIELDS, MjxPhysics, all_units, fresh, mujoco_of, uncommitted
 from ig2mj.engine.mjx.view import Moved, ViewPlan, make_view, plan_view
 from ig2mj.engine.mjx.writing import after_release, apply_write, reaches, trees_joined, with_islands
@@ -41,15 +42,17 @@ from ig2mj.scene.scene import Scene
 
 
 @entry_point
-class MjxEngine(MjxCopies, abc.ABC):
+class MjxEngine(TracedExecution, MjxCopies, abc.ABC):
     """The `Engine` protocol on MJX; subclasses choose the implementation. See `ig2mj.engine.base`.
 
     Contacts of the view are those of the last physics step, of positions 1/120 s before the poses, as in iGibson.
     """
 
     name: str
-    pure = True
+    pure, live, tracks_changes = True, False, False
+    renderer = ""
     cannot_ignore: str = ""
+    frame_cuts: Sequence[Any] = ()
     unrolled = True
     """Substeps are written out one after the other: no copies at a loop's border, but as often compiled."""
 
@@ -137,10 +140,10 @@ class MjxEngine(MjxCopies, abc.ABC):
     # The protocol.
 
     @abc.abstractmethod
-    def serve(self, devices: Sequence[Any]) -> None: ...
+    def prepare_devices(self, devices: Sequence[Any]) -> None: ...
 
     @abc.abstractmethod
-    def awaited(self) -> Traced | None: ...
+    def pending_reset_program(self) -> Traced | None: ...
 
     def reset(self) -> MjxPhysics:
         """All worlds at the initial state."""
@@ -245,8 +248,7 @@ class MjxEngine(MjxCopies, abc.ABC):
             link_force=jnp.where(changed[:, None, None], 0.0, physics.link_force),
             finger_force=jnp.where(changed[:, None, None], 0.0, physics.finger_force),
         )
-        moves = write.object_mask is not None or write.qpos_mask is not None or not {*MOVING[1:]}.isdisjoint(written)
-        return jax.lax.cond(changed.any(), self._refresh, lambda p: p, physics) if moves else physics
+        return physics if write.moves_nothing else jax.lax.cond(changed.any(), self._refresh, lambda p: p, physics)
 
     def snapshot(self, physics: MjxPhysics) -> Snapshot:
         """All worlds as a snapshot with the world axis."""

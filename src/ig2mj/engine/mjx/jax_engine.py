@@ -37,11 +37,11 @@ class JaxEngine(MjxEngine):
     name = "jax"
     unrolled = False  # a step's program is large: compile it once
 
-    def serve(self, devices: Sequence[Any]) -> None:
-        """Nothing: a program finds its own memory."""
+    def prepare_devices(self, devices: Sequence[Any]) -> None:
+        """Nothing: a program allocates its own memory."""
 
-    def awaited(self) -> None:
-        """See `Engine.awaited`."""
+    def pending_reset_program(self) -> None:
+        """See `Engine.pending_reset_program`."""
 
     def _host_model(self, model: mujoco.MjModel) -> mujoco.MjModel:
         own = super()._host_model(model)

@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 
 from ig2mj.engine.native.contacts import KnownForces
-from ig2mj.engine.native.lost import why_lost
+from ig2mj.engine.native.nonfinite import why_lost
 from ig2mj.engine.native.one_world import World
 from ig2mj.engine.native.view_rows import FIELDS
 from ig2mj.engine.snapshot import FULLY_AWAKE, Snapshot

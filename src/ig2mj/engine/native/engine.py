@@ -31,11 +31,12 @@ from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
 from ig2mj.engine.model_fields import check_names, check_written, given
 from ig2mj.engine.native.contacts import ForcePlan
+from ig2mj.engine.native.execution import HostExecution
 from ig2mj.engine.native.later import RAW, LaterPlan
 from ig2mj.engine.native.model_slot import ModelSlot
 from ig2mj.engine.native.one_world import Statics, World
 from ig2mj.engine.native.physics import LiveWorlds, NativePhysics
-from ig2mj.engine.native.recorded import Pieces
+from ig2mj.engine.native.recorded import Cut, Pieces
 from ig2mj.engine.native.view_rows import FIELDS, Changed, PoseRows
 from ig2mj.engine.native.writing import apply_write
 from ig2mj.engine.object_boxes import make_box_table
@@ -48,7 +49,7 @@ from ig2mj.process import prepare_jax, prepare_mujoco
 from ig2mj.scene.scene import Scene
 
 
-class NativeEngine:
+class NativeEngine(HostExecution):
     """C MuJoCo behind the `Engine` protocol (see `ig2mj.engine.base`).
 
     Views hold float32 numpy arrays that nobody changes afterwards. Where nothing changed since the last view, the same
@@ -56,7 +57,8 @@ class NativeEngine:
     """
 
     name = "native"
-    pure = False
+    pure, live, tracks_changes = False, True, True
+    renderer = "opengl"
 
     def __init__(
         self,
@@ -131,8 +133,8 @@ class NativeEngine:
         """See `Engine.cannot_ignore`."""
         return self._statics.layers.full
 
-    def awaited(self) -> None:
-        """See `Engine.awaited`."""
+    def pending_reset_program(self) -> None:
+        """See `Engine.pending_reset_program`."""
 
     def reset(self) -> NativePhysics:
         """New worlds at the scene's initial state: its first keyframe, else the zero pose; everything awake."""
@@ -215,6 +217,8 @@ class NativeEngine:
         values = {field.name: getattr(write, field.name) for field in dataclasses.fields(Write)}
         values |= {"model_fields": None} | given(write.model_fields)
         rows = {name: np.asarray(value) for name, value in values.items() if value is not None}
+        if "eq_data" in rows:
+            rows["eq_data"] = self._in_double_precision(rows["eq_data"])
 
         def apply(world: World) -> int:
             if world.lost:
@@ -224,7 +228,13 @@ class NativeEngine:
         live.update(self._run(live, apply))
         return live.changed()
 
-    def serve(self, devices: Sequence[Any]) -> None:
+    def _in_double_precision(self, eq_data: np.ndarray) -> np.ndarray:
+        """Parameters of constraints [W, E, n] with the compiled numbers where they equal their float32 values.
+        Otherwise a write for one hand of one world would change the constraints of all."""
+        compiled = self._slots[0].own("eq_data")
+        return np.where(eq_data == compiled.astype(np.float32), compiled, eq_data)
+
+    def prepare_devices(self, devices: Sequence[Any]) -> None:
         """Nothing: worlds are on the processor."""
 
     def health(self, physics: NativePhysics) -> Health:
@@ -254,9 +264,18 @@ class NativeEngine:
         return self._live(physics).worlds[world].save()
 
     @functools.cached_property
-    def pieces(self) -> Pieces:
-        """Takes worlds (`worlds(physics)[w]`) as `export` does, in a fraction of its time, for recordings."""
+    def _pieces(self) -> Pieces:
         return Pieces(self._slots[0].model, self.layout, self._statics.own_fields)
+
+    @property
+    def frame_cuts(self) -> list[Cut]:
+        """See `Engine.frame_cuts`."""
+        return self._pieces.cuts
+
+    def frame(self, physics: NativePhysics, worlds: Sequence[int]) -> tuple[list[list[np.ndarray]], list[np.ndarray]]:
+        """See `Engine.frame`: as `export`, in a fraction of its time."""
+        every = self._live(physics).worlds
+        return [self._pieces(every[world]) for world in worlds], []
 
     def load(self, physics: NativePhysics, snapshot: Snapshot, mask: Bool[Array, "W"] | None = None) -> NativePhysics:
         """Replaces worlds in place; see `Engine.load`. Raises EngineError where the snapshot is of another scene."""
@@ -299,6 +318,10 @@ class NativeEngine:
         """See `Engine.restored`. It goes on bit for bit as the saved physics; of a world that is lost only the poses
         are kept."""
         return self._restored(saved).current()
+
+    def restored_view(self, physics: NativePhysics, saved: SavedPhysics) -> PhysicsView:
+        """See `Engine.restored_view`: part of the restored worlds."""
+        return self.view(physics)
 
     def _restored(self, saved: SavedPhysics) -> LiveWorlds:
         fitted(saved.snapshot, self._start, self.num_worlds, self.scene.name)

@@ -14,8 +14,8 @@ from ig2mj.engine.layout import ModelLayout
 from ig2mj.engine.model_fields import ModelFields, given
 from ig2mj.engine.native.contacts import FINGER, LINK, NOTHING_MET, ForcePlan, Met, StepContacts, touching_units
 from ig2mj.engine.native.later import RAW, AgentContacts, LaterPlan, agents_touching, of_owners
-from ig2mj.engine.native.lost import why_lost
 from ig2mj.engine.native.model_slot import ModelSlot
+from ig2mj.engine.native.nonfinite import why_lost
 from ig2mj.engine.native.sleep import restore_sleep, wake_trees
 from ig2mj.engine.native.view_rows import Changed, PosePlan, PoseRows
 from ig2mj.engine.snapshot import AXIS, Snapshot, closed_circles, make_snapshot

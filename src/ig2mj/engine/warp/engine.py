@@ -51,6 +51,7 @@ class WarpEngine(MjxEngine):
     """
 
     name = "warp"
+    renderer = "ray caster"
 
     def __init__(
         self,
@@ -78,7 +79,7 @@ class WarpEngine(MjxEngine):
             again wherever its buffers have other addresses, "WARP_STAGED" copies them to addresses that stay. None:
             MJX's choice, which is "WARP" on a GPU.
           compile_beforehand: on a GPU all kernels of a step are compiled and loaded, side by side. "meanwhile": this
-            begins now, and `reset` waits for the end, so that programs can be compiled in the same time (`awaited`);
+            begins now, and `reset` waits for the end; programs can be compiled meanwhile (`pending_reset_program`);
             True: it is waited for here; False: the first step does it, one after the other.
           print_overflow: let Warp print a line per overflowing world and step. The flags are kept in any case.
 
@@ -114,7 +115,7 @@ class WarpEngine(MjxEngine):
             self._launches = self.launches(counter)
         own = self.own_kernels and table.runs("scratch")
         self._scratch = counter.block(self.num_worlds) if own else 0
-        self.serve([gpu])
+        self.prepare_devices([gpu])
         if compile_beforehand:
             self.loading = kernels.load_meanwhile(self._launches, device)
         if compile_beforehand is True:
@@ -125,8 +126,8 @@ class WarpEngine(MjxEngine):
         if self.loading is not None:
             kernels.loaded(self.loading, self.scene.name)
 
-    def awaited(self) -> Traced | None:
-        """See `Engine.awaited`."""
+    def pending_reset_program(self) -> Traced | None:
+        """See `Engine.pending_reset_program`."""
         if self.loading is None or self._has_begun:
             return None
         return self._first.traced(self._template, self._initial)
@@ -141,8 +142,8 @@ class WarpEngine(MjxEngine):
         self._has_begun = True
         return super().reset()
 
-    def serve(self, devices: Sequence[Any]) -> None:
-        """See `Engine.serve`: takes the memory that steps need (`ig2mj.engine.warp.patches.scratch`)."""
+    def prepare_devices(self, devices: Sequence[Any]) -> None:
+        """See `Engine.prepare_devices`: takes the memory that steps need (`ig2mj.engine.warp.patches.scratch`)."""
         for device in devices if self._scratch else ():
             scratch.reserve(wp.device_from_jax(device), self._scratch)
 

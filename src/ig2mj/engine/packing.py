@@ -1,8 +1,8 @@
 """`PackedFunction`: a pure function of arrays, compiled so that it takes just those on which its results depend.
 
-Every array that goes into a compiled function from the host, or comes out of it, costs one to four microseconds, as
-much as the work itself where there is one world. So small arrays go in and come out as one vector of each dtype, which
-are put together and taken apart on the host: results are NumPy arrays that nobody may write to.
+Each array that enters a compiled function from the host, or leaves it, costs one to four microseconds: as much as the
+work itself for one world. So small arrays are packed into one vector for each dtype before the call and unpacked after
+it, on the host. Results are read-only NumPy arrays.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ import numpy as np
 from jax.extend.core import ClosedJaxpr, jaxpr_as_fun
 
 from ig2mj.engine.view import Array
-from ig2mj.predicates.tracing import inputs_that_matter
 from ig2mj.process.one_kernel import OneKernel
+from ig2mj.process.tracing import inputs_that_matter
 
 LARGEST = 1 << 14
 """Numbers of an array that is worth a copy."""

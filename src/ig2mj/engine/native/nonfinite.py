@@ -1,4 +1,4 @@
-"""What of a world is not finite any more."""
+"""Describes the non-finite state of a world."""
 
 from __future__ import annotations
 

@@ -1,1 +1,0 @@
-"""Extended states stepped from the host, doing no more than the change of the world asks for."""
