@@ -106,7 +106,7 @@ def test_faces_begin_new_episodes_after_a_step_that_did_not_return(env, actions,
         face = make()
         face.reset(seed=0)
         with monkeypatch.context() as patch:
-            patch.setattr(env, "_see", interrupted)
+            patch.setattr(env, "_evaluate", interrupted)
             with pytest.raises(KeyboardInterrupt):
                 face.step(actions[0])
         with pytest.raises(StaleStateError):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import typing
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -20,6 +21,14 @@ ENGINES = {
     "jax": "ig2mj.engine.mjx.jax_engine:JaxEngine",
 }
 """Name: module and class."""
+
+
+@typing.overload
+def choose_engine(engine: str | None) -> str: ...
+
+
+@typing.overload
+def choose_engine(engine: str | Engine | None) -> str | Engine: ...
 
 
 def choose_engine(engine: str | Engine | None) -> str | Engine:

@@ -72,16 +72,16 @@ class HandResets:
     def _none_asked(self, view: PhysicsView, action: Float[Array, "W n"], states: tuple[Any, ...]) -> tuple | None:
         """What `_found` returns where no action asks a hand back."""
         asked = np.asarray(action)[:, self._numbers] > 0
-        return None if asked.any() else (asked, None, None)
+        return None if asked.any() else (asked.any(1), None, None)
 
     def _found(
         self, view: PhysicsView, action: Float[Array, "W n"], states: tuple[Any, ...]
-    ) -> tuple[Bool[Array, "W K"], Bool[Array, "W nq"], Float[Array, "W nq"]]:
-        """Which hands of all robots jump, and the coordinates that put them at their targets."""
+    ) -> tuple[Bool[Array, "W"], Bool[Array, "W nq"], Float[Array, "W nq"]]:
+        """Worlds in which a hand of any robot jumps, and the coordinates that put those hands at their targets."""
         found = [controller.out_of_reach(view, states[number]) for number, controller in self._parts]
         beyond, target = (jnp.concatenate(parts, axis=1) for parts in zip(*found, strict=True))
         jumps = beyond & (jnp.asarray(action)[:, self._numbers] > 0)
-        shape = jumps.shape[0], self._engine.scene.model.nq
-        mask, pos = jnp.zeros(shape, bool), jnp.zeros(shape, jnp.float32)
-        mask = mask.at[:, self._address].set(jnp.broadcast_to(jumps[..., None], target.shape))
-        return jumps, mask, pos.at[:, self._address].set(target)
+        source = np.full(self._engine.scene.model.nq, -1)  # the number of a target that a coordinate becomes
+        source[self._address.ravel()] = np.arange(self._address.size)
+        mask = jnp.broadcast_to(jumps[..., None], target.shape).reshape(len(jumps), -1)[:, source] & (source >= 0)
+        return jumps.any(1), mask, target.reshape(len(jumps), -1)[:, source]

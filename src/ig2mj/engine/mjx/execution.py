@@ -35,7 +35,7 @@ class TracedExecution:
         """See `Engine.when_any`: a branch of the program."""
         if cheap:
             return act(*operands)
-        return jax.lax.cond(mask.any(), act, lambda *same: same if len(same) > 1 else same[0], *operands)
+        return jax.lax.cond(mask.any(), act, lambda *same: _unpacked(same), *operands)
 
     def repeat(self, body: Callable[[Any], tuple[Any, Any]], carry: Any, length: int) -> tuple[Any, Any]:
         """See `Engine.repeat`: a loop of the program. Written out, a program would call a physics step `length` times
@@ -84,6 +84,11 @@ class TracedExecution:
         return physics, jax.tree.map(
             lambda new, old: jnp.where(chosen.reshape((-1,) + (1,) * (old.ndim - 1)), new, old), now, before
         )
+
+
+def _unpacked(operands: tuple[Any, ...]) -> Any:
+    one, *more = operands
+    return operands if more else one
 
 
 def _single_precision(array: Array) -> np.ndarray:

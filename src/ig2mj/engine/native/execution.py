@@ -38,7 +38,8 @@ class HostExecution:
         """See `Engine.when_any`."""
         if np.asarray(mask).any():
             return act(*operands)
-        return operands if len(operands) > 1 else operands[0]
+        one, *more = operands
+        return operands if more else one
 
     def repeat(self, body: Callable[[Any], tuple[Any, Any]], carry: Any, length: int) -> tuple[Any, Any]:
         """See `Engine.repeat`."""
@@ -105,7 +106,7 @@ class HostFunction:
         """Traces nothing yet. Arguments as of `Engine.compile`."""
         self._function, self._shortcut = function, shortcut
         self._name = getattr(function, "__name__", "function").strip("_")
-        self._programs: dict[Any, _Program] = {}  # by structure of the arguments
+        self._programs: dict[Any, _Program] = {}  # by structure and shapes of the arguments
 
     def __call__(self, *arguments: Any) -> Any:
         if self._shortcut is not None:
@@ -113,9 +114,10 @@ class HostFunction:
             if found is not None:
                 return found
         leaves, structure = jax.tree.flatten(arguments, is_leaf=_is_view)
-        program = self._programs.get(structure)
+        key = structure, *[leaf.__class__ if _is_view(leaf) else getattr(leaf, "shape", ()) for leaf in leaves]
+        program = self._programs.get(key)
         if program is None:
-            program = self._programs[structure] = self._trace(leaves, structure)
+            program = self._programs[key] = self._trace(leaves, structure)
         taken = [leaves[i] if read is None else read(leaves[i]) for i, read in program.takes]
         return jax.tree.unflatten(program.structure, program.function(taken))
 
