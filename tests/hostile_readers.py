@@ -591,7 +591,7 @@ def saved_worlds(folder: pathlib.Path) -> Reader:
     world.save(folder / "saved.npz")
     valid = (folder / "saved.npz").read_bytes()
 
-    return Reader(file_reader(folder / "read.npz", lambda file: world.restore(file)), valid, npz_or_bytes)
+    return Reader(file_reader(folder / "read.npz", lambda file: world.load(file)), valid, npz_or_bytes)
 
 
 def dumps(folder: pathlib.Path) -> Reader:

@@ -57,7 +57,7 @@ class OfOneWorld:
         self.world.save(self.folder / f"{name}.npz")
 
     def restore(self, name):
-        self.world.restore(self.folder / f"{name}.npz")
+        self.world.load(self.folder / f"{name}.npz")
 
     def seen(self):
         return _seen(self.world.view, self.world.states)

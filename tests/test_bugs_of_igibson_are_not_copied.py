@@ -45,7 +45,7 @@ def test_predicates_of_a_restored_world_are_those_of_its_own_state(world, tmp_pa
     world.set_object_pose("box", (-1.0, 0.5, 0.05))
     world.step()
     assert not world.predicate("on_top", "box", "table")
-    world.restore(tmp_path / "before.npz")
+    world.load(tmp_path / "before.npz")
     assert world.predicate("on_top", "box", "table")
 
 

@@ -125,7 +125,7 @@ def test_a_restored_world_goes_on_bitwise_the_same(tiny_home, tmp_path):
     outcomes = []
     for threads in (1, 2):
         again = ig2mj.Simulation(tiny_home, NativeEngine(tiny_home, threads=threads))
-        again.restore(tmp_path / "world.npz")
+        again.load(tmp_path / "world.npz")
         again.step(count=12)
         again.set_state("frozen", "apple", True)  # draws at random
         outcomes.append(again)
@@ -183,9 +183,9 @@ def test_a_file_of_another_scene_is_refused(world, tmp_path):
     world.save(tmp_path / "world.npz")
     (tmp_path / "no.npz").write_bytes(b"nothing")
     with pytest.raises(InputError):
-        world.restore(tmp_path / "no.npz")
+        world.load(tmp_path / "no.npz")
     with pytest.raises(InputError):
-        world.restore(tmp_path / "absent.npz")
+        world.load(tmp_path / "absent.npz")
 
 
 @pytest.mark.parametrize(
@@ -208,7 +208,7 @@ def test_a_file_with_numbers_that_no_world_has_is_refused(world, tmp_path, name,
         arrays = dict(archive)
     np.savez(file, **(arrays | {name: change(arrays[name])}))
     with pytest.raises(InputError, match=f"{re.escape(name)}: .*{says}"):
-        world.restore(file)
+        world.load(file)
 
 
 def test_physics_alone_has_no_states(tiny_home):

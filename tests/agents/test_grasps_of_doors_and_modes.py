@@ -89,7 +89,7 @@ def test_grasps_are_saved_restored_and_reset(at_cabinet, tmp_path):
     assert world.held == [None, None]
     world.act(times=2)
     assert not world.view.held.any()
-    world.simulation.restore(tmp_path / "held.npz")
+    world.simulation.load(tmp_path / "held.npz")
     assert world.held[1] == "cabinet"
     world.act(times=3, right_hand_x=-0.03)
     assert world.simulation.joint("cabinet_drawer_slide") == pytest.approx(place, abs=1e-6)

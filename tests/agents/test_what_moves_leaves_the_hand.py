@@ -57,7 +57,7 @@ def apple_in_hand(request, tiny_home_folder, file_of_grasp):
 @pytest.fixture
 def holding(apple_in_hand) -> GraspingWorld:
     world, file = apple_in_hand
-    world.simulation.restore(file)
+    world.simulation.load(file)
     assert world.held == [None, "apple"]
     return world
 
@@ -134,16 +134,16 @@ def test_what_is_sampled_elsewhere_is_let_go_and_the_robot_stays_where_it_is(hol
 
 def test_a_reset_empties_the_hand_and_a_restored_world_brings_its_grasp(apple_in_hand):
     world, file = apple_in_hand
-    world.simulation.restore(file)
+    world.simulation.load(file)
     world.simulation.reset()
     assert world.held == [None, None] and grasp_constraints(world) == 0
     empty = file.with_name("empty.npz")
     world.simulation.save(empty)
-    world.simulation.restore(file)
+    world.simulation.load(file)
     assert world.held == [None, "apple"] and grasp_constraints(world) == 1
     world.act(times=2)
     assert world.held == [None, "apple"] and speed(world, "apple") < 0.1
-    world.simulation.restore(empty)
+    world.simulation.load(empty)
     assert world.held == [None, None] and grasp_constraints(world) == 0
     world.act()
     assert np.isfinite(world.simulation.data.qvel).all() and speed(world, "apple") < 0.1

@@ -153,7 +153,7 @@ def test_a_file_of_another_environment_names_the_pair_and_the_fix(env, file, tmp
         ("robot", "fetch", r"robot = 'fetch', here 'humanoid' \(make it with robot="),
         ("worlds", 4, r"worlds = '4', here '2' \(make it with worlds="),
         ("layout", "other", "have changed since"),
-        ("version", 0, "is not a state of an environment of format 1"),
+        ("version", 0, "holds no environment state of format 1"),
         ("kind", "pool", "is not a state"),
     ):
         write(tmp_path / "other.npz", {**header, name: value}, arrays)

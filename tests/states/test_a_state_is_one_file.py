@@ -43,7 +43,7 @@ told["after the cut"] = world.state("age")
 world.save(folder + "/saved.npz")
 world.set_state("age", "apple", 50)
 told["set"] = world.state("age", "apple")
-world.restore(folder + "/saved.npz")
+world.load(folder + "/saved.npz")
 told["restored"] = world.state("age", "apple")
 
 model = StateModel.of_manifest(scene.tables, scene.manifest)

@@ -9,24 +9,17 @@ Axis: W worlds.
 from __future__ import annotations
 
 import dataclasses
-import hashlib
 import os
 from typing import TYPE_CHECKING, Any
 
-import jax
-import mujoco
 import numpy as np
 from flax import struct
 
 from ig2mj.engine.saved import SavedPhysics
-from ig2mj.engine.snapshot import FULLY_AWAKE
 from ig2mj.envs.state import EnvState
-from ig2mj.errors import InputError
-from ig2mj.scene.scene import Scene
-from ig2mj.states.world import ExtendedStates, WorldState
+from ig2mj.states.world import ExtendedStates
 from ig2mj.worlds.archive import load_exactly, read_header, save_tree
-from ig2mj.worlds.batch import Batch
-from ig2mj.worlds.guards import Flag
+from ig2mj.worlds.batch_files import check_fit, check_numbers, layout_of, restored_batch, saved_batch
 
 if TYPE_CHECKING:
     from ig2mj.envs.environment import Environment
@@ -53,8 +46,7 @@ _FIT = {
 
 @struct.dataclass
 class _Saved:
-    """What a file holds: everything of an `EnvState`, with physics in arrays. `batch`: fields of `Batch` that are
-    arrays, and of its `WorldState`."""
+    """What a file holds: a `SavedBatch`, and the other fields of an `EnvState`."""
 
     physics: SavedPhysics
     states: ExtendedStates
@@ -62,8 +54,6 @@ class _Saved:
     state: dict[str, Any]
 
 
-_OF_WORLD = ("key", "step", "time")
-_OF_BATCH = tuple(field.name for field in dataclasses.fields(Batch) if field.name != "world")
 _OF_STATE = tuple(field.name for field in dataclasses.fields(EnvState) if field.name != "batch")
 
 
@@ -83,47 +73,19 @@ def load_state(env: Environment, file: str | os.PathLike) -> EnvState:
     Raises:
       InputError: the file is missing or damaged, or does not fit the environment.
     """
-    _check_fit(file, read_header(file), _fit(env))
+    check_fit(file, read_header(file), _fit(env), _FIT, (KIND, FORMAT_VERSION), "another environment")
     like = _saved(env, env.reset(0))
     more = {f"state.info.{FINAL}.{name}": array for name, array in like.state["obs"].items()}
     saved, extra = load_exactly(file, like, more)
-    _check_numbers(file, env, saved)
+    check_numbers(file, env.scene, saved, _observed(env, saved))
     if extra:
         saved.state["info"][FINAL] = {name: extra[f"state.info.{FINAL}.{name}"] for name in like.state["obs"]}
-    return _state_of(env, saved)
-
-
-def _check_fit(file: str | os.PathLike, header: dict[str, Any], own: dict[str, Any]) -> None:
-    if header.get("kind") != KIND or header.get("version") != FORMAT_VERSION:
-        raise InputError(
-            file, f"is not a state of an environment of format {FORMAT_VERSION}", fix="write it by env.save"
-        )
-    for name, fix in _FIT.items():
-        if header.get(name) != own[name]:
-            said = "" if name == "layout" else f": {name} = {str(header.get(name))[:200]!r}, here {str(own[name])!r}"
-            raise InputError(file, f"is of another environment{said}", fix=fix)
+    return EnvState(batch=restored_batch(env.core, saved), **env.core.engine.constants(saved.state))
 
 
 def _saved(env: Environment, state: EnvState) -> _Saved:
-    batch, world = state.batch, state.batch.world
-    return _Saved(
-        physics=env.core.engine.saved(world.physics),
-        states=world.states,
-        batch={name: getattr(batch, name) for name in _OF_BATCH} | {n: getattr(world, n) for n in _OF_WORLD},
-        state={name: getattr(state, name) for name in _OF_STATE},
-    )
-
-
-def _state_of(env: Environment, saved: _Saved) -> EnvState:
-    core = env.core
-    physics = core.engine.restored(saved.physics)
-    view = core.engine.restored_view(physics, saved.physics)
-    states, batch, state = core.engine.constants((saved.states, saved.batch, saved.state))
-    parts = dict(batch)
-    clocks = {name: parts.pop(name) for name in _OF_WORLD}
-    view = core.cameras.placed(view, parts["controllers"])
-    world = WorldState(physics=physics, view=view, states=states, **clocks)
-    return EnvState(batch=Batch(world=world, **parts), **state)
+    batch = saved_batch(env.core, state.batch)
+    return _Saved(batch.physics, batch.states, batch.batch, {name: getattr(state, name) for name in _OF_STATE})
 
 
 def _fit(env: Environment) -> dict[str, Any]:
@@ -136,41 +98,14 @@ def _fit(env: Environment) -> dict[str, Any]:
         "worlds": env.num_worlds,
         "observations": {name: [*space.shape] for name, space in env.observation_spaces.items()},
         "period": round(env.period, 9),
-        "layout": _layout(env.scene),
+        "layout": layout_of(env.scene),
     }
 
 
-def _layout(scene: Scene) -> str:
-    """Tells apart scenes in which a number of a state belongs to something else; not those that look otherwise."""
-    model = scene.model
-    names = [[model.body(b).name for b in range(model.nbody)], [model.joint(j).name for j in range(model.njnt)]]
-    names += [[model.actuator(a).name for a in range(model.nu)], [model.equality(e).name for e in range(model.neq)]]
-    names += [list(scene.object_names)]
-    return hashlib.sha256(repr(names).encode()).hexdigest()[:16]
-
-
-def _check_numbers(file: str | os.PathLike, env: Environment, saved: _Saved) -> None:
-    """Raises InputError where a number is none that a state can have. Worlds that are flagged as not finite may be."""
-    flags = np.asarray(saved.batch["flags"])
-    lost = (flags & int(Flag.NOT_FINITE)) != 0
-    for keys, leaf in jax.tree_util.tree_flatten_with_path(saved)[0]:
-        array = np.asarray(leaf)
-        name = jax.tree_util.keystr(keys, simple=True, separator=".")
-        if array.dtype.kind != "f" or not array.size:
-            continue
-        rows = array[~lost] if array.ndim and len(array) == len(lost) else array
-        if np.isnan(rows).any() or (name.startswith("physics.") and not (np.abs(rows) < mujoco.mjMAXVAL).all()):
-            raise InputError(file, "holds numbers that are not finite", element=name)
-    asleep = np.asarray(saved.physics.snapshot.tree_asleep)
-    known = {
-        "physics.snapshot.tree_asleep": (asleep >= FULLY_AWAKE) & (asleep < max(env.scene.model.ntree, 1)),
-        "batch.flags": (flags >= 0) & (flags < 2 * max(Flag)),
-        **{f"states.{n}.body": getattr(saved.states, n).body < env.scene.model.nbody for n in ("dust", "stain")},
-        **{f"batch.{name}": np.asarray(saved.batch[name]) >= 0 for name in ("step", "number", "episode", "time")},
+def _observed(env: Environment, saved: _Saved) -> dict[str, Any]:
+    """Whether observations are in their ranges, by the name of the array."""
+    seen = {name: np.asarray(saved.state["obs"][name]) for name in env.observation_spaces}
+    return {
+        f"state.obs.{name}": (seen[name] >= space.low) & (seen[name] <= space.high)
+        for name, space in env.observation_spaces.items()
     }
-    for name, space in env.observation_spaces.items():
-        seen = np.asarray(saved.state["obs"][name])
-        known[f"state.obs.{name}"] = (seen >= space.low) & (seen <= space.high)
-    for name, fine in known.items():
-        if not np.all(fine):
-            raise InputError(file, "holds numbers that are out of range", element=name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -33,6 +34,12 @@ class RobotsOfWorld:
         self._steps = max(1, round(ACTION_PERIOD / (engine.substeps * engine.timestep)))
         self.controllers: tuple[Any, ...] = self._core.controls.first()
         self.held: Held = self._core.hands.read(simulation.physics)
+
+    def of(self, simulation: Simulation) -> RobotsOfWorld:
+        """The same robots in a copy of the simulation."""
+        new = copy.copy(self)
+        new._simulation = simulation
+        return new
 
     @property
     def action_names(self) -> tuple[str, ...]:

@@ -10,6 +10,7 @@ A core with a single world steps it (`ig2mj.worlds.core`); everything here only 
 
 from __future__ import annotations
 
+import copy
 import functools
 import os
 from typing import Any
@@ -30,6 +31,7 @@ from ig2mj.predicates.literals import object_index
 from ig2mj.predicates.logic import Atom, Expression
 from ig2mj.predicates.registry import find, find_state
 from ig2mj.process import entry_point, run_programs_inline
+from ig2mj.process.deprecation import warn_renamed
 from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.setters import lacks, set_by_name
@@ -193,6 +195,19 @@ class Simulation(OwnWorld, Recorded):
     def prepare(self) -> None:
         """Compiles what the first step needs, without taking it."""
         self.core.prepare(self.physics, self._states_or_none)
+
+    def start(self, seed: int = 0) -> PhysicsView:
+        """The scene's initial state, with another seed of what `set_state` samples at random."""
+        self._seed = seed
+        return self.reset()
+
+    def fork(self) -> Simulation:
+        """An independent simulation of the same world, which continues as this one does."""
+        new = copy.copy(self)
+        new._recorder, new.last_sampling = None, dict(self.last_sampling)
+        new.physics = self.engine.fork(self.physics)
+        new._robots = None if self._robots is None else self._robots.of(new)
+        return new
 
     def reset(self) -> PhysicsView:
         """Back to the scene's initial state."""
@@ -372,9 +387,14 @@ class Simulation(OwnWorld, Recorded):
         """Writes the whole world, physics and states, to one `.npz` (arrays only, no pickle). Raises InputError."""
         save_world(everything(self), path, self.scene, self.engine.name)
 
-    def restore(self, path: str | os.PathLike) -> PhysicsView:
+    def load(self, path: str | os.PathLike) -> PhysicsView:
         """Goes back to a world that `save` wrote, of this scene. Raises InputError."""
         return put_world(self, load_world(path, everything(self), self.scene))
+
+    def restore(self, path: str | os.PathLike) -> PhysicsView:
+        """Deprecated: `load`."""
+        warn_renamed("Simulation.restore", "Simulation.load")
+        return self.load(path)
 
     # Images.
 

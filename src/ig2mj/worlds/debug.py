@@ -5,12 +5,14 @@ from __future__ import annotations
 import os
 import pathlib
 import weakref
+from collections.abc import Callable
 from typing import Any, Protocol, runtime_checkable
 
 import mujoco
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
+from ig2mj.engine.base import Write
 from ig2mj.engine.health import Usage
 from ig2mj.engine.saved import copied
 from ig2mj.engine.snapshot import Snapshot
@@ -22,13 +24,15 @@ from ig2mj.process import entry_point
 from ig2mj.scene.scene import Scene
 from ig2mj.worlds import guards
 from ig2mj.worlds.batch import Batch
-from ig2mj.worlds.core import Core
+from ig2mj.worlds.core import Core, Policy
+from ig2mj.worlds.face import Face
+from ig2mj.worlds.random_streams import Seeds
 from ig2mj.worlds.recorder import LENGTH, Recording, frames_of, record, save_dump, start_recording
 
 
 @entry_point
-class DebugWorlds:
-    """A core stepped under watch. Slower: it waits for the device in every step, and copies every world's state.
+class DebugWorlds(Face):
+    """A core whose every step is checked. Slower: each step waits for the device and copies every world's state.
 
     Attributes:
       core: what is watched. batch: as the last step left it, also one that raised.
@@ -41,9 +45,15 @@ class DebugWorlds:
         # Of each branch its last batch and its recording; the one that was stepped last comes first.
         self._branches: list[tuple[weakref.ref[Batch], Recording]] = []
 
-    def start(self, seed: int = 0) -> Batch:
-        """All worlds at the start of episode 0, and an empty recording."""
-        batch = self.core.start(seed)
+    def start(self, seed: Seeds = 0) -> Batch:
+        """All worlds at the start of their first episode, and an empty recording."""
+        return self._begin(self.core.start(seed))
+
+    def load(self, file: str | os.PathLike) -> Batch:
+        """The batch that `save` wrote, and an empty recording; see `Face.load`."""
+        return self._begin(super().load(file))
+
+    def _begin(self, batch: Batch) -> Batch:
         self._branches = [(weakref.ref(batch), start_recording(self.core.engine, batch, self.length))]
         return batch
 
@@ -64,12 +74,27 @@ class DebugWorlds:
             raise EngineError(self._report(batch, int(flagged[0]), recording))
         return batch, status
 
-    def reset(self, batch: Batch, mask: Array) -> Batch:
-        """See `Core.reset`."""
+    def rollout(self, batch: Batch, carry: Any, policy: Policy, length: int) -> tuple[Batch, Any]:
+        """See `Face.rollout`; each step is checked as `step` does. Raises EngineError."""
+        for _ in range(length):
+            action, carry = policy(batch, carry)
+            batch, _ = self.step(batch, action)
+        return batch, carry
+
+    def reset(self, batch: Batch, mask: Bool[Array, "W"]) -> Batch:
+        """See `Face.reset`."""
+        return self._changed(batch, lambda: self.core.reset(batch, mask))
+
+    def write(self, batch: Batch, write: Write) -> Batch:
+        """See `Face.write`."""
+        return self._changed(batch, lambda: self.core.write(batch, write))
+
+    def _changed(self, batch: Batch, change: Callable[[], Batch]) -> Batch:
+        """The batch after a change; its branch goes on."""
         branch = self._branch_of(batch)
-        batch = self.core.reset(batch, mask)
-        self._branches[branch] = weakref.ref(batch), self._branches[branch][1]
-        return batch
+        after = change()
+        self._branches[branch] = weakref.ref(after), self._branches[branch][1]
+        return after
 
     def fork(self, batch: Batch) -> Batch:
         """An independent copy, with a recording of its own; see `Core.fork`."""

@@ -1,4 +1,4 @@
-"""Worlds shared out over devices: one process, or several hosts under `jax.distributed`.
+"""Worlds distributed over devices: one process, or several hosts under `jax.distributed`.
 
 Each device runs its own program on its own part of the worlds, from a thread of its own, and nothing is sent between
 devices; what is asked for is put together as one JAX array sharded over the world axis. A world's random streams belong
@@ -11,6 +11,7 @@ the compiler, and as no world talks to another it does the same work.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -22,12 +23,13 @@ from flax import struct
 from jax.sharding import Mesh, NamedSharding, PartitionSpec
 from jaxtyping import Bool, Float
 
-from ig2mj.engine.base import check_pure
+from ig2mj.engine.base import Engine, Write, check_pure
 from ig2mj.engine.view import Array
 from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import GoalStatus
 from ig2mj.process import entry_point
 from ig2mj.worlds.batch import Batch
+from ig2mj.worlds.batch_files import load_parts, restored_batch, save_parts
 from ig2mj.worlds.core import Core, Policy
 
 AXIS = "worlds"
@@ -45,7 +47,7 @@ class Shards:
 
 @entry_point
 class ShardedWorlds:
-    """The functions of a core, over several devices. They use up the shards they are given."""
+    """The verbs of `Face`, over several devices; a batch is `Shards`, which verbs consume."""
 
     def __init__(self, make: Callable[[int], Core], num_worlds: int, devices: Sequence[Any] | None = None):
         """Shares worlds out.
@@ -73,46 +75,76 @@ class ShardedWorlds:
         self._threads = ThreadPoolExecutor(len(self.devices), "ig2mj-device")
         _ = self.local.starts.pool, self.local.starts.floor  # made here, once, and not on every device's thread
 
+    @property
+    def engine(self) -> Engine:
+        """The engine of one device's part."""
+        return self.local.engine
+
     def start(self, seed: int = 0) -> Shards:
-        """All worlds at the start of episode 0."""
+        """All worlds at the start of their first episode."""
         return Shards(
             tuple(self._each(lambda k: self.local.start(jnp.int32(seed), jnp.int32(self._first + k * self.part))))
         )
 
-    def step(self, shards: Shards, action: Float[Array, "W n"] | None = None) -> tuple[Shards, GoalStatus]:
+    def step(self, batch: Shards, action: Float[Array, "W n"] | None = None) -> tuple[Shards, GoalStatus]:
         """One control step of every world, and what the goal says, over all worlds of this process.
 
         Args:
           action: of all worlds of this process (see `Core.step`), or None to keep what was asked last.
         """
         local = [None] * len(self.devices) if action is None else self._split(action)
-        done = self._each(lambda k: self.local.step(shards.parts[k], local[k]))
-        return Shards(tuple(batch for batch, _ in done)), self._joined([status for _, status in done])
+        done = self._each(lambda k: self.local.step(batch.parts[k], local[k]))
+        return Shards(tuple(part for part, _ in done)), self._joined([status for _, status in done])
 
-    def rollout(self, shards: Shards, carries: Sequence[Any], policy: Policy, length: int) -> tuple[Shards, list[Any]]:
+    def rollout(self, batch: Shards, carry: Sequence[Any], policy: Policy, length: int) -> tuple[Shards, list[Any]]:
         """`length` control steps without leaving the devices; see `Core.rollout`.
 
         Args:
-          carries: one per device.
+          carry: one per device.
         """
-        done = self._each(lambda k: self.local.rollout(shards.parts[k], carries[k], policy, length))
-        return Shards(tuple(batch for batch, _ in done)), [carry for _, carry in done]
+        done = self._each(lambda k: self.local.rollout(batch.parts[k], carry[k], policy, length))
+        return Shards(tuple(part for part, _ in done)), [carried for _, carried in done]
 
-    def reset(self, shards: Shards, mask: Bool[Array, "W"]) -> Shards:
+    def reset(self, batch: Shards, mask: Bool[Array, "W"]) -> Shards:
         """New episodes in the masked worlds of this process."""
         local = self._split(mask)
-        return Shards(tuple(self._each(lambda k: self.local.reset(shards.parts[k], local[k]))))
+        return Shards(tuple(self._each(lambda k: self.local.reset(batch.parts[k], local[k]))))
 
-    def fork(self, shards: Shards) -> Shards:
+    def write(self, batch: Shards, write: Write) -> Shards:
+        """Moves objects and joints, or switches grasps, without passing time, in all worlds of this process."""
+        leaves, structure = jax.tree.flatten(write)
+        parts = [self._split(leaf) for leaf in leaves]
+        local = [jax.tree.unflatten(structure, [part[k] for part in parts]) for k in range(len(self.devices))]
+        return Shards(tuple(self._each(lambda k: self.local.write(batch.parts[k], local[k]))))
+
+    def fork(self, batch: Shards) -> Shards:
         """An independent copy, each part on its device. Raises StaleStateError."""
-        return Shards(tuple(self._each(lambda k: self.local.fork(shards.parts[k]))))
+        return Shards(tuple(self._each(lambda k: self.local.fork(batch.parts[k]))))
 
-    def gather(self, shards: Shards, read: Callable[[Batch], Any]) -> Any:
+    def save(self, batch: Shards, file: str | os.PathLike) -> None:
+        """Writes all worlds of this process to an `.npz` file, for `load` or for a core of as many worlds.
+
+        Raises:
+          StaleStateError: the batch was consumed. InputError: the file cannot be written.
+        """
+        save_parts(self.local, batch.parts, file)
+
+    def load(self, file: str | os.PathLike) -> Shards:
+        """The worlds that `save` wrote. Raises InputError, as `Face.load`."""
+        saved = load_parts(self.local, len(self.devices), file)
+        return Shards(tuple(self._each(lambda k: restored_batch(self.local, saved[k]))))
+
+    def metrics(self, batch: Shards) -> dict[str, int]:
+        """Of all worlds of this process; see `Face.metrics`."""
+        each = [self.local.metrics(part) for part in batch.parts]
+        return {name: sum(one[name] for one in each) for name in each[0]}
+
+    def gather(self, batch: Shards, read: Callable[[Batch], Any]) -> Any:
         """What `read` takes of every part, as arrays over this process's worlds, sharded over its devices.
 
         `read` gives arrays that begin with the world axis, e.g. `lambda b: b.world.view.object_com`.
         """
-        return self._joined([read(part) for part in shards.parts])
+        return self._joined([read(part) for part in batch.parts])
 
     def place(self, array: Array) -> jax.Array:
         """Puts an array over this process's worlds onto its devices."""

@@ -13,33 +13,29 @@ from __future__ import annotations
 import os
 from typing import Any
 
-from jaxtyping import Bool, Float
-
 from ig2mj.agents.base import Controller, Robot
 from ig2mj.agents.grasping import Grasping
 from ig2mj.engine.base import Engine
 from ig2mj.engine.registry import check_options, choose_engine, make_engine
-from ig2mj.engine.view import Array
-from ig2mj.predicates.compile import CompiledExpression, GoalStatus
+from ig2mj.predicates.compile import CompiledExpression
 from ig2mj.predicates.logic import Expression
 from ig2mj.process import entry_point
 from ig2mj.scene.scene import Scene, load_scene
 from ig2mj.states.model import DEFAULTS
 from ig2mj.states.options import StateOptions
-from ig2mj.worlds.batch import Batch
 from ig2mj.worlds.core import Core
+from ig2mj.worlds.face import Face
 from ig2mj.worlds.hands import check_grasping
 from ig2mj.worlds.pool import Pool
-from ig2mj.worlds.random_streams import Seeds
 from ig2mj.worlds.rules import Rules
 
 
 @entry_point
-class Worlds:
-    """Many worlds of a home; a core with a scene.
+class Worlds(Face):
+    """Many worlds of a home: a core with a scene. Its verbs are those of `Face`.
 
     Attributes:
-      scene: the household. core: what steps it, with `step_fn`, `reset_fn` and `rollout` for programs of your own.
+      scene: the household. core: what steps it, with `step_fn` and `reset_fn` for programs of your own.
     """
 
     def __init__(
@@ -80,31 +76,6 @@ class Worlds:
         rules = Rules.of_scene(self.scene, states).with_goal(goal)
         controllers = controllers_of(self.scene, engine.substeps * engine.timestep)
         self.core = Core(engine, rules, pool, controllers, grasping_of(engine, grasping), True)
-
-    @property
-    def engine(self) -> Engine:
-        """What steps physics."""
-        return self.core.engine
-
-    def start(self, seed: Seeds = 0) -> Batch:
-        """All worlds at the start of their first episode; `seed` of everything random, or [W] of each world."""
-        return self.core.start(seed)
-
-    def step(self, batch: Batch, action: Float[Array, "W n"] | None = None) -> tuple[Batch, GoalStatus]:
-        """One control step of every world, and what the goal says of it; see `Core.step`. Uses up the batch."""
-        return self.core.step(batch, action)
-
-    def reset(self, batch: Batch, mask: Bool[Array, "W"]) -> Batch:
-        """Starts a new episode in the masked worlds, from a random row of the pool. Uses up the batch."""
-        return self.core.reset(batch, mask)
-
-    def fork(self, batch: Batch) -> Batch:
-        """An independent copy of a batch, for planners and branches; see `Core.fork`."""
-        return self.core.fork(batch)
-
-    def metrics(self, batch: Batch) -> dict[str, int]:
-        """Episodes begun, and how often worlds were flagged, by `guards.Flag`. On the host."""
-        return self.core.metrics(batch)
 
 
 def controllers_of(scene: Scene, period: float) -> list[Controller]:
