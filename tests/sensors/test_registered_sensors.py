@@ -60,6 +60,7 @@ def test_a_robot_without_a_laser_has_no_scan(tiny_home_folder):
 def test_other_engines_feel_but_do_not_look(tiny_home_folder, monkeypatch):
     world = Perceiving(tiny_home_folder, ROBOTS["turtlebot"])
     monkeypatch.setattr(world.engine, "name", "jax")
+    monkeypatch.setattr(world.engine, "renderer", "")
     with pytest.raises(EngineError, match="the jax engine neither renders images nor casts rays"):
         world.suite("rgb")
     assert world.see("bump")["bump"].tolist() == [[0.0]]

@@ -83,7 +83,7 @@ def collect(
                 played.writer.close()
         with Recording(whole) as recording:
             runs = [run for run in recording.runs if run.attributes.get("success") is True][:episodes]
-            compact = env.core.engine.name == "native"
+            compact = env.core.engine.reproducible
             about = {"noise": noise, "disturbed": disturbed, FAILED: failed}
             write_runs([(recording, runs)], file, compact, **about)
     return {"kept": len(runs), "failed": failed}

@@ -128,6 +128,7 @@ class Engine(Protocol):
       pure: a control step can be part of a compiled program of the caller's (see the module's text). For refusals, by
         `check_pure`; to run a function use `compile` and `program`.
       live: `to_mujoco` returns the structures that the engine steps, not copies.
+      reproducible: the same actions from the same state give the same bits, on any machine of the same kind.
       tracks_changes: while nothing changes, views hold the same arrays, so that `is` tells what can be skipped.
       renderer: what makes images of its worlds, a key of `ig2mj.sensors.suite.CAMERAS`; "" where nothing does.
       num_worlds: W.
@@ -142,6 +143,7 @@ class Engine(Protocol):
     name: str
     pure: bool
     live: bool
+    reproducible: bool
     tracks_changes: bool
     renderer: str
     num_worlds: int

@@ -49,7 +49,8 @@ class MjxEngine(TracedExecution, MjxCopies, abc.ABC):
     """
 
     name: str
-    pure, live, tracks_changes = True, False, False
+    pure = True
+    live = reproducible = tracks_changes = False
     renderer = ""
     cannot_ignore: str = ""
     frame_cuts: Sequence[Any] = ()

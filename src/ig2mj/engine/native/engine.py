@@ -57,7 +57,8 @@ class NativeEngine(HostExecution):
     """
 
     name = "native"
-    pure, live, tracks_changes = False, True, True
+    pure = False
+    live = reproducible = tracks_changes = True
     renderer = "opengl"
 
     def __init__(
