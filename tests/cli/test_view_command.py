@@ -54,7 +54,7 @@ def test_a_free_view_stands_where_it_was_put_and_looks_where_it_was_told(tiny_ho
     ("options", "says"),
     [
         (["--camera", "top", "--from", "0", "0", "1", "--at", "0", "0", "0"], "either --camera or"),
-        (["--from", "0", "0", "1"], "belong together"),
+        (["--from", "0", "0", "1"], "must be given together"),
         (["--from", "0", "0", "1", "--at", "0", "0", "1"], "same point"),
         (["--from", "nan", "0", "1", "--at", "0", "0", "0"], "finite"),
         (["--seconds", "-1"], "not negative"),
@@ -73,7 +73,7 @@ def test_contradictions_are_one_line_and_status_2(can_draw, tiny_home_folder, tm
 
 @pytest.mark.parametrize(
     ("file", "says"),
-    [("a.doc", "not an image format"), ("none/a.png", "does not exist"), ("a", "not a picture format")],
+    [("a.doc", "not an image format"), ("none/a.png", "does not exist"), ("a", "not an image format")],
 )
 def test_a_picture_file_that_cannot_be_written_is_told_before_loading(tiny_home_folder, tmp_path, capsys, file, says):
     assert cli.call(["view", str(tiny_home_folder), "--image", str(tmp_path / file)]) == 2

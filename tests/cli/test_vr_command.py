@@ -16,7 +16,7 @@ from ig2mj.vr import server
         (["--poses", "visit.h5"], "--poses FILE needs --device recorded"),
         (["--seconds", "nan"], "--seconds must be finite"),
         (["--row", "-2"], "not negative"),
-        (["--device", "openxr", "--token", "auto"], "belong to --device page"),
+        (["--device", "openxr", "--token", "auto"], "need --device page"),
         (["--host", "0.0.0.0"], "needs --token"),
         (["--port", "70000"], "--port 70000"),
         (["--certificate", "nothing.pem"], "nothing.pem"),

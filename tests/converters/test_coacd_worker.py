@@ -54,7 +54,7 @@ def test_a_hanging_worker_is_stopped_and_one_hull_stands_in(monkeypatch):
     assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before < 5  # three tries of one second
     assert result.method == "fallback" and result.after == 1
     assert any("took longer than 1 s of processor time" in w for w in result.warnings)
-    assert any("one hull" in w for w in result.warnings)
+    assert any("a single hull" in w for w in result.warnings)
 
 
 def test_a_worker_that_sleeps_for_ever_is_stopped_too(monkeypatch):

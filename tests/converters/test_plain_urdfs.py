@@ -147,7 +147,7 @@ def test_a_placeholder_inertia_is_computed_from_the_shape(tmp_path, capsys):
     a_box(tmp_path)
     file = urdf(tmp_path, LINK.format("a", "a.obj", "").replace("<collision>", PLACEHOLDER + "<collision>"))
     assert convert(file, tmp_path / "out") == 0
-    assert "a mass 3.2 m away" in capsys.readouterr().out
+    assert "radius of gyration 3.2 m for a 0.24 m link" in capsys.readouterr().out
     text = (tmp_path / "out" / "object.xml").read_text()
     assert 'mass="0.1"' in text and 'diaginertia="1 1 1"' not in text
 

@@ -114,7 +114,7 @@ def test_a_pool_outlives_a_change_of_looks_and_of_the_homes_name_and_not_one_of_
     with pytest.raises(InputError, match="is a pool of scene 'tiny_home'"):
         load_pool(file, load_scene(home))
     manifest.write_text(manifest.read_text().replace('"renamed_home"', '"tiny_home"', 1))
-    with pytest.raises(InputError, match="when the physics of 'tiny_home' differed"):
+    with pytest.raises(InputError, match="another version of the physics of 'tiny_home'"):
         load_pool(file, load_scene(home))
 
 

@@ -185,7 +185,7 @@ def test_an_objects_inertial_is_thrown_away_within_a_dataset():
     for s in (0.5, 1.0, 1.5, 2.0):
         found, warnings = inertials(model_of(link), s=s, rule="dataset")
         assert found["a"].mass == pytest.approx(100 * s**3)
-        assert any("1.06 kg) are not used" in w for w in warnings)
+        assert any("mass of 1.06 kg is replaced" in w for w in warnings)
         assert inertials(model_of(link), s=s)[0]["a"].mass == 1.056, "a single object keeps it"
     assert inertials(model_of(link, bbox=None), rule="dataset")[0]["a"].mass == 1.056, "without a box it counts"
     meant = model_of(link)
@@ -232,7 +232,7 @@ def test_a_placeholder_inertia_is_found_with_a_mesh_scale(scale):
     shape.scale = scale
     found, warnings = inertials(model_of(Link("a", [shape], inertial=Inertial(1.0, np.eye(3))), bbox=None))
     assert found["a"].inertia == pytest.approx(np.diag([0.13, 0.10, 0.05]) / 12)
-    assert any("mass 1 m away" in w for w in warnings)
+    assert any("radius of gyration 1 m" in w for w in warnings)
 
 
 def test_an_inertia_of_a_whole_robot_on_a_small_link_is_kept():
