@@ -1,4 +1,4 @@
-"""`ig2mj activity sample` and `show --pool`: initial states of an activity, and what is still to be done in one."""
+"""`ig2mj activity sample` and `show --pool`: initial states of an activity, and what is false in one of them."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def _tell(done: SampledStart, binding: Binding, file: pathlib.Path, as_json: boo
 def show_row(
     binding: Binding, pool: pathlib.Path, row: int, image: pathlib.Path | None, scene: str | None, json: bool
 ) -> bool:
-    """Tells what is still false in a row of a pool of the activity; whether that is nothing.
+    """Prints which goal conditions are false in a row of a pool; whether the goal holds.
 
     Raises:
       InputError: the pool is of another scene, or of another activity's objects. Ig2mjError: it has no such row.

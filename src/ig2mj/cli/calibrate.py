@@ -72,7 +72,7 @@ def run(
 
 
 def _with_hand(scene: pathlib.Path, hand: bool):
-    """The scene, with a hand where it reaches most, and what it reaches; without one where it reaches nothing."""
+    """The scene with a hand where it reaches most objects, and what it reaches; without a hand if it reaches none."""
     from ig2mj.cli.common.hand import with_hand
     from ig2mj.errors import EngineError
     from ig2mj.scene.scene import load_scene
@@ -88,7 +88,7 @@ def _with_hand(scene: pathlib.Path, hand: bool):
 
 
 def _with_robot(scene: pathlib.Path, robot: str):
-    """The scene with a robot on the free place from which a hand reaches most; where there is none, at its start."""
+    """The scene with a robot at the free position where a hand reaches most objects, else at the robot's own start."""
     from ig2mj.agents.registry import make_robot
     from ig2mj.calibration.reach import find_reach
     from ig2mj.errors import EngineError
@@ -104,7 +104,7 @@ def _with_robot(scene: pathlib.Path, robot: str):
 
 
 def _table(title: str, profile, model):
-    """What a world needed in a step: more than the first two numbers rarely; and what the buffers hold."""
+    """Buffer use of a world in a step (quantiles, maximum), and the sizes of the buffers."""
     from rich.table import Table
 
     from ig2mj.engine.warp.profile import default_profile

@@ -142,7 +142,7 @@ def _progress(title: str) -> Iterator[Any]:
 
 
 def _tell(outcome: ConversionOutcome, out: pathlib.Path, main_file: str, as_json: bool) -> int:
-    """Prints what was done and where it lies; the exit status."""
+    """Prints what was written and where; the exit status."""
     from ig2mj.cli.common.printing import print_json
 
     failed = [check for check in outcome.checks if not check.passed]

@@ -1,4 +1,4 @@
-"""`ig2mj convert dataset`: all scenes and all objects of a dataset, each a job of work of its own."""
+"""`ig2mj convert dataset`: all scenes and all objects of a dataset, one job each."""
 
 from __future__ import annotations
 
@@ -105,10 +105,10 @@ def names_of(root: str) -> list[str]:
 
 
 def digest_of(root: str) -> str:
-    """Of the names of all scenes and objects and the sizes of their URDFs: that another machine sees the dataset.
+    """Digest of the names of all scenes and objects and the sizes of their URDFs, to compare datasets of machines.
 
     Raises:
-      InputError: it is not there.
+      InputError: the dataset does not exist.
     """
     from ig2mj.errors import InputError
 
@@ -156,7 +156,7 @@ def packed_folder(folder: pathlib.Path) -> bytes:
 
 
 def put_folder(target: pathlib.Path, packed: bytes) -> None:
-    """Unpacks a folder next to its place, and puts it there when it is complete. Raises OSError."""
+    """Unpacks a folder under a temporary name, and renames it when it is complete. Raises OSError."""
     target.parent.mkdir(parents=True, exist_ok=True)
     beside = unfinished(target)
     try:

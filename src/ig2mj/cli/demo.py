@@ -1,4 +1,4 @@
-"""`ig2mj demo`: the small home from its URDF source to a running scene, a fish that cooks in it, a robot that cooks."""
+"""`ig2mj demo`: converts the small home, simulates it, cooks a fish in it, and lets a robot cook."""
 
 from __future__ import annotations
 
@@ -83,7 +83,7 @@ def _convert(console: Console, step: Step, name: str, dataset: pathlib.Path, sce
 
 
 def _look(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Path) -> None:
-    """Runs the home for two seconds, tells what stands where, takes images."""
+    """Simulates the home for two seconds, lists its objects, renders images."""
     from ig2mj.cli.common.printing import make_table
     from ig2mj.showcase import first_home
 
@@ -103,7 +103,7 @@ def _look(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Pat
 
 
 def _cook(console: Console, step: Step, scene: pathlib.Path, folder: pathlib.Path) -> int:
-    """Cooks; leaves table, plot, images and video; number of objects that were to happen and did not."""
+    """Cooks; writes table, plot, images and video; number of expected events that did not happen."""
     from ig2mj.process.settings import GL_INSTALL_HINT
     from ig2mj.showcase import cooking
     from ig2mj.showcase.cooking_images import KitchenCameras, MomentSheet

@@ -1,4 +1,4 @@
-"""`ig2mj doctor`: what this machine can run, and the one line that fixes each thing that is missing."""
+"""`ig2mj doctor`: what this machine can run, and a command that fixes each missing part."""
 
 from __future__ import annotations
 

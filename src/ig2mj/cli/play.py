@@ -52,7 +52,7 @@ def run(
         return 0
     from ig2mj.agents.registry import ROBOTS
     from ig2mj.cli.common.files import check_output
-    from ig2mj.cli.robot_urdf import check_layout, own_robot
+    from ig2mj.cli.common.robot_urdf import check_layout, own_robot
     from ig2mj.envs.registry import find_task, make
     from ig2mj.errors import UnknownNameError
     from ig2mj.tasks.navigation.task import NavigationTask

@@ -1,4 +1,4 @@
-"""`ig2mj predicates SCENE [EXPRESSION]`: what holds in a scene, or whether an expression does and what is missing."""
+"""`ig2mj predicates SCENE [EXPRESSION]`: predicates that are true in a scene, or why an expression is false."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def run(
     strict: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
     json: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False,
 ) -> int:
-    """Show which predicates are true of a scene, or whether an expression holds and what is missing.
+    """Show which predicates are true in a scene, or whether an expression holds and why not.
 
     Without EXPRESSION: every unary predicate, and on_top, inside and on_floor of objects that touch or contain each
     other. With one, the exit status is 0 if it holds and 1 if it does not. Example: '(and (cooked fish_0) (forall (?p
@@ -82,7 +82,7 @@ def _print_json(world: Simulation, found: dict) -> None:
 
 
 def _holding(world: Simulation) -> list[Atom]:
-    """Atoms that hold, among those worth asking."""
+    """Atoms that are true, among the candidates."""
     import numpy as np
 
     from ig2mj.predicates import And, atom

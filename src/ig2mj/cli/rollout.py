@@ -1,4 +1,4 @@
-"""`ig2mj rollout ENV`: plays episodes of an environment, and tells how they ended."""
+"""`ig2mj rollout ENV`: plays episodes of an environment, and reports how they ended."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def run(
     import numpy as np
 
     from ig2mj.cli.common.files import check_output, check_video
-    from ig2mj.cli.robot_urdf import check_layout, own_robot
+    from ig2mj.cli.common.robot_urdf import check_layout, own_robot
     from ig2mj.envs.registry import VECTORS, make
     from ig2mj.envs.rollout import play
     from ig2mj.errors import Ig2mjError, UnknownNameError
@@ -186,7 +186,7 @@ def policy_named(name: str) -> Policy:
 
 
 def who_acts(agent: str, policy: Policy | None, env: Environment, seed: int) -> Act:
-    """Who acts. Raises UnknownNameError: the task has no expert. InputError: the policy is for something else."""
+    """The agent as a function. Raises UnknownNameError: the task has no expert. InputError: the policy does not fit."""
     import numpy as np
 
     if policy is not None:

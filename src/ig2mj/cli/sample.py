@@ -1,4 +1,4 @@
-"""`ig2mj sample SCENE CONDITION ...`: samples initial states that fulfil conditions, or disturbs a scene at random."""
+"""`ig2mj sample SCENE CONDITION ...`: samples initial states in which conditions hold, or disturbed ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`ig2mj sample-task TASK`: samples an environment's start states, and keeps them in the cache."""
+"""`ig2mj sample-task TASK`: samples an environment's start states into the cache."""
 
 from __future__ import annotations
 
@@ -64,7 +64,7 @@ def run(
 
 
 def _keep(wanted: list[tuple[Task, str]], count: int, jobs: int, force: bool, out: pathlib.Path | None) -> int:
-    """Samples the pools that are not there, side by side; 1 where rows of one differ from those that ship."""
+    """Samples missing pools in parallel; 1 if rows of one differ from those that ship."""
     import concurrent.futures
     import contextlib
 

@@ -75,7 +75,7 @@ def run(
         return
     if scene is None:
         raise Ig2mjError("name a scene, or a policy with --policy (`ig2mj homes list` names homes)")
-    from ig2mj.cli.robot_urdf import check_layout
+    from ig2mj.cli.common.robot_urdf import check_layout
 
     check_layout(robot_urdf, robot_layout)
     if robot_urdf is not None and (dump is not None or pool is not None):
@@ -216,14 +216,14 @@ def _page_through(scene, pool, row, image, camera, eye, target, size, collision)
 
 
 def _with_robot(scene: pathlib.Path, urdf: pathlib.Path | None, layout: pathlib.Path | None, at: Vec3) -> Scene:
-    """The scene, with a robot of one's own where there is one."""
+    """The scene, with the robot of a URDF if one is given."""
     import math
 
     from ig2mj.scene.scene import load_scene
 
     if urdf is None:
         return load_scene(scene)
-    from ig2mj.cli.robot_urdf import own_robot
+    from ig2mj.cli.common.robot_urdf import own_robot
 
     return load_scene(scene, agents=[own_robot(urdf, layout).at(at[0], at[1], math.radians(at[2]))])
 

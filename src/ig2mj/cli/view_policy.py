@@ -1,4 +1,4 @@
-"""`ig2mj view --policy NAME`: a trained policy at work, in MuJoCo's window or as a video."""
+"""`ig2mj view --policy NAME`: shows a trained policy, in MuJoCo's window or as a video."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ def _repeat(env, poses: pathlib.Path, common: dict) -> int:
 
 
 def _play(session: Session, seconds: float, timing: bool, rate) -> None:
-    """Runs a session until it is over; tells about its timing from another thread."""
+    """Runs a session until it ends; prints its timing from another thread."""
     import sys
     import threading
 

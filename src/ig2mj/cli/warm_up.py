@@ -1,4 +1,4 @@
-"""`ig2mj warm-up WHAT`: everything compiled that a batch of worlds needs, to be kept and taken elsewhere."""
+"""`ig2mj warm-up WHAT`: compiles ahead of time what a batch of worlds needs, for this or another machine."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ class Batch:
     engine: str | None
 
     def make(self, pool_size: int | None = None) -> Worlds | Environment:
-        """Raises Ig2mjError where a home is given what belongs to environments."""
+        """Raises Ig2mjError: a home with options of environments."""
         import ig2mj
         from ig2mj.envs.names import NAMES, NAMESPACE, activity_name, short_name
         from ig2mj.envs.registry import VECTORS
@@ -105,7 +105,7 @@ MOST_WORLDS = 64
 
 
 def _ahead(batch: Batch, architecture: int) -> dict[str, float]:
-    """Seconds of finding and of compiling the kernels for a GPU that this machine need not have."""
+    """Seconds of tracing and of compiling the kernels for a GPU architecture; needs no GPU."""
     import time
 
     from ig2mj.engine.warp import ahead
@@ -129,7 +129,7 @@ def _ahead(batch: Batch, architecture: int) -> dict[str, float]:
 
 
 def _timed(batch: Batch) -> dict[str, float]:
-    """Seconds of making the worlds, starting them, and their first step."""
+    """Seconds of creating the worlds, of the reset and of the first step."""
     import time
 
     import jax

@@ -1,14 +1,14 @@
-"""Faces for NumPy and PyTorch: many worlds, without Gymnasium.
+"""Interfaces for NumPy and PyTorch: many worlds, without Gymnasium.
 
     env = TorchEnv(ig2mj.make("CookingMeat", worlds=4096))
     obs, info = env.reset(seed=0)
     obs, reward, terminated, truncated, info = env.step(action)     # tensors on the environment's device
 
 With `autoreset` (the default) a world that is done begins its next episode in the same step: its observation is the new
-episode's, and what was seen last is in `info["final_obs"]`. Without it, stepping a world that is done is an error.
+episode's, and the last observation is `info["final_obs"]`. Without it, stepping a world that is done is an error.
 
-PyTorch is not a dependency of ig2mj. Tensors are handed over on the device (DLPack) and copied once there, because the
-environment gives the memory of a state back at the next step.
+PyTorch is not a dependency of ig2mj. Tensors are exchanged on the device (DLPack) and copied once there, because
+the next step reuses the buffers of a state.
 
 Axes: W worlds, n numbers of an action.
 """
@@ -101,7 +101,7 @@ class NumpyEnv:
 
 @entry_point
 class TorchEnv(NumpyEnv):
-    """The same with PyTorch's tensors."""
+    """`NumpyEnv` with PyTorch's tensors."""
 
     def __init__(self, env: Environment, autoreset: bool = True):
         """Raises ModuleNotFoundError: PyTorch is not installed."""

@@ -1,12 +1,12 @@
-"""Brax's face: for trainers that are written for Brax's or Playground's environments, on engines that are pure.
+"""Brax's interface, for trainers of Brax's or Playground's environments; needs a pure engine (warp or jax).
 
     env = BraxEnv(ig2mj.make("CookingMeat", worlds=4096, engine="warp"))
     state = env.reset(jax.random.PRNGKey(0))
     state = jax.jit(env.step)(state, action)
 
-It needs no Brax: trainers only look at the members. It is a batch already and begins new episodes by itself, so nothing
-of Brax's may be wrapped around it (`wrap_env=False`). The wrappers of Brax and Playground would go back to each world's
-first state for ever; here every episode begins with a row of the pool, chosen by a key of seed, world and episode.
+Brax need not be installed: trainers use the members only. The environment is batched and resets itself, so none of
+Brax's wrappers may be used (`wrap_env=False`). Those of Brax and Playground return to each world's first state in every
+episode; here each episode begins with a row of the pool, chosen by a key of seed, world and episode.
 
 Observations are `state` (all vectors but the privileged one), `privileged_state`, and `pixels/NAME` for images.
 
@@ -53,7 +53,7 @@ class BraxState:
 
 @runtime_checkable
 class PureEnv(Protocol):
-    """What is asked of an environment; `ig2mj.envs.Environment` has it."""
+    """Members that an environment must have; `ig2mj.envs.Environment` has them."""
 
     num_worlds: int
     period: float
@@ -77,7 +77,7 @@ class BraxEnv:
     """See the module's text. Attributes: env: the environment underneath."""
 
     def __init__(self, env: PureEnv):
-        """Raises EngineError: the engine is not pure, so that no program could be compiled around it."""
+        """Raises EngineError: the engine is not pure, so it cannot be part of a compiled program."""
         if not env.pure:
             raise EngineError(
                 "Brax's trainers compile the environment, which the native engine does not allow (take engine='warp' "
@@ -124,8 +124,8 @@ class BraxEnv:
         return self
 
     def reset(self, rng: Array) -> BraxState:
-        """First episodes of all worlds. `rng`: a key, or as of Brax's wrappers one for each world, of which the first
-        counts: the worlds' own streams come from it."""
+        """First episodes of all worlds. `rng`: a key, or one for each world as Brax's wrappers give; the
+        first one seeds the random streams of all worlds."""
         rng = jnp.asarray(rng)
         keys = rng if jnp.issubdtype(rng.dtype, jax.dtypes.prng_key) else rng.reshape(-1, rng.shape[-1])
         key = keys[0] if keys.ndim else keys

@@ -1,4 +1,4 @@
-"""What an environment does about copies of its states: forks, and files."""
+"""Copies of an environment's states: forks, and files."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ class StateCopies:
         self.core.check(state.batch)
 
     def fork(self, state: EnvState) -> EnvState:
-        """An independent copy of a state, for planners and branches: `state` stays valid, and both go on alike where
-        they are given the same actions. Not for compiled programs, in which states are values anyway.
+        """An independent copy of a state, for planners and branches: `state` stays valid, and both give the same
+        results for the same actions. Not for compiled programs, in which states are values.
 
         Raises:
           StaleStateError: the state is stale.
@@ -40,7 +40,7 @@ class StateCopies:
         save_state(typing.cast(Any, self), state, file)
 
     def load(self, file: str | os.PathLike) -> EnvState:
-        """The state that `save` wrote, which goes on as it would have; to be loaded on any machine and engine.
+        """The state that `save` wrote, on any machine and engine; it continues as the saved one would have.
 
         Raises:
           InputError: the file is missing or damaged, or of another scene, task, robot, way of grasping, observations or

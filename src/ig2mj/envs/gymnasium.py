@@ -1,7 +1,7 @@
-"""Gymnasium's face: `gymnasium.make("ig2mj/CookingMeat-v0")` and `gymnasium.make_vec(...)`.
+"""Gymnasium's interface: `gymnasium.make("ig2mj/CookingMeat-v0")` and `gymnasium.make_vec(...)`.
 
-Environments are known to Gymnasium once ig2mj is imported, before Gymnasium or after. Gymnasium imports it for a name
-with a module before it: `gymnasium.make("ig2mj:ig2mj/CookingMeat-v0")`. Keyword arguments go to `ig2mj.make`: `robot=`,
+Environments are registered once ig2mj is imported, before Gymnasium or after. Gymnasium imports a module that the name
+begins with: `gymnasium.make("ig2mj:ig2mj/CookingMeat-v0")`. Keyword arguments go to `ig2mj.make`: `robot=`,
 `grasping=`, `engine=`, `observations=`, ...
 
 With `render_mode="rgb_array"`, `render()` gives an image of the world from next to the robot (of each world, for a
@@ -13,7 +13,7 @@ The vector environment has the three autoreset modes: `autoreset_mode="same_step
 Gymnasium's `vectorization_mode="async"` needs `vector_kwargs={"context": "spawn"}`: JAX does not run in processes that
 were forked. The vector environment is faster, since its worlds are one batch.
 
-All arrays are new in every step, never buffers that are used again.
+All arrays are new in every step; no buffer is reused.
 """
 
 from __future__ import annotations

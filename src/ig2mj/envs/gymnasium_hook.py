@@ -1,4 +1,4 @@
-"""Environments are made known to Gymnasium wherever both are imported, in whichever order.
+"""Registers environments with Gymnasium when both packages are imported, in any order.
 
 Gymnasium's registry is filled by imports of packages; since its version 1.0 it reads no entry points of packages.
 """
@@ -27,7 +27,7 @@ def register_now_or_later() -> None:
 
 
 class _Finder(importlib.abc.MetaPathFinder):
-    """Finds Gymnasium as others find it, with a loader that also registers. It is for one import."""
+    """Finds Gymnasium by the other finders, with a loader that also registers; serves one import."""
 
     def find_spec(self, fullname: str, path: Any = None, target: Any = None) -> importlib.machinery.ModuleSpec | None:
         if fullname != GYMNASIUM:

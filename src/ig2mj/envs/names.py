@@ -19,7 +19,7 @@ _ACTIVITY = re.compile(rf"(?:{NAMESPACE}/)?activity/(?P<name>[^/]+?)(?:-v(?P<ver
 
 
 def short_name(name: str) -> str | None:
-    """CookingMeat of CookingMeat, ig2mj/CookingMeat and ig2mj/CookingMeat-v0; None where there is no such one."""
+    """ "CookingMeat" for CookingMeat, ig2mj/CookingMeat and ig2mj/CookingMeat-v0; None for unknown names."""
     match = _NAME.fullmatch(name)
     if match is None or match["name"] not in NAMES or int(match["version"] or VERSION) != VERSION:
         return None
@@ -39,7 +39,7 @@ def refuse_path(name: str, file: object, element: str) -> None:
 
 
 def register(gymnasium: Any) -> None:
-    """Makes all environments known to Gymnasium (the module); may be called twice. Imports nothing."""
+    """Registers all environments with Gymnasium (the module); may be called twice. Imports nothing."""
     face = "ig2mj.envs.gymnasium"
     for name in NAMES:
         full = f"{NAMESPACE}/{name}-v{VERSION}"

@@ -1,12 +1,12 @@
-"""What an agent of a task observes, by name: any sensor, and what the task itself tells.
+"""Observations of an agent, by name: those of sensors, and those of the task.
 
-| name | what | shape |
+| name | content | shape |
 |---|---|---|
 | `rgb`, `depth`, `scan`, ... | any sensor of `ig2mj.sensors.registry.SENSORS` (docs/guide/sensors.md) | the sensor's |
 | `privileged_state` | ground truth, in the frame of the robot's base (`Objective.vectors`) | [p] |
 | others of the task | such as iGibson's `task_obs` of navigation (`Objective.vectors`) | [n] |
 
-Every array has the world axis W before that.
+Every array begins with the world axis W.
 """
 
 from __future__ import annotations

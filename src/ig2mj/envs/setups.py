@@ -1,4 +1,4 @@
-"""What an environment of each kind of task is made of: household with robots, start states, objective, actions."""
+"""Parts of an environment by kind of task: home with robots, start states, objective, actions."""
 
 from __future__ import annotations
 
@@ -61,8 +61,8 @@ class EnvSetup:
 
     Attributes:
       scene: with its robots; the first is the one that acts. rules: with the task's goal, if it has one.
-      pool: gives the start states, which may take minutes. controllers: of all robots. mittens: what mittens stick to.
-      companions: see `Environment`.
+      pool: gives the start states, which may take minutes. controllers: of all robots. mittens: objects that mitten
+        grasping holds. companions: see `Environment`.
     """
 
     scene: Scene

@@ -1,4 +1,4 @@
-"""What an environment is made of that changes: `EnvState`.
+"""`EnvState`: everything of an environment that changes from step to step.
 
 Axis: W worlds.
 """
@@ -30,9 +30,9 @@ class EnvState:
         goal's literals), "held" (the first object is in an acting hand), "success_in_hand" (success while the first
         object is in all acting hands); where two hands act also "held_by_all" (all of them hold it), "off_floor"
         (it touches no floor) and "lifted_by_all" (success, and all of them held it when it last left the floor).
-      measures: what the reward is made of, for the next step's difference. status: of the task's goal.
-      bad_actions: numbers that were not finite and were taken for 0, since the first reset.
-      memory: what sensors know of the last reading; None where none of them asks.
+      measures: values that rewards are differences of. status: of the task's goal.
+      bad_actions: non-finite numbers of actions that were replaced by 0, since the first reset.
+      memory: what sensors keep of the last reading; None if no sensor needs it.
     """
 
     batch: Batch
@@ -89,7 +89,7 @@ class StepContext:
 
 @struct.dataclass
 class Seen:
-    """What is computed after physics, in one program."""
+    """Results of a step that are computed after physics, in one program."""
 
     obs: dict[str, Array]
     reward: Float[Array, "W"]

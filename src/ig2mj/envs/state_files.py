@@ -1,7 +1,7 @@
 """Files of an environment's state: all its worlds in one `.npz` (arrays only, no pickle).
 
-A file is read only where it fits the environment: what it is of is in its header, which is read first, and every array
-must have the shape and the kind of number that the environment's own states have.
+A file must fit the environment: its header, which is read first, names scene, task and settings, and every array must
+have the shape and dtype that states of the environment have.
 
 Axis: W worlds.
 """
@@ -89,7 +89,7 @@ def _saved(env: Environment, state: EnvState) -> _Saved:
 
 
 def _fit(env: Environment) -> dict[str, Any]:
-    """What a file of the environment says of itself."""
+    """Header of a file of the environment."""
     return {
         "scene": env.scene.name,
         "task": env.task.name,

@@ -38,7 +38,7 @@ def renamed_options_of(function: Callable[..., Any]) -> Mapping[str, str]:
 
 
 def with_new_names(function: Callable[..., Any], prog: str, args: Sequence[str]) -> list[str]:
-    """The command line with the names of today. Prints one line on stderr for each old one."""
+    """The command line with current names. Prints one line on stderr for each old one."""
     renamed = renamed_options_of(function)
     out, settings = list[str](), list[str]()
     waiting = list(args)
@@ -63,7 +63,7 @@ def with_new_names(function: Callable[..., Any], prog: str, args: Sequence[str])
 
 
 def new_subcommand(command: str, name: str, renamed: Mapping[str, str]) -> str:
-    """The name of today of a sub-command. Prints one line on stderr where the old one was typed."""
+    """The current name of a sub-command. Prints one line on stderr where the old one was typed."""
     if name not in renamed:
         return name
     _warn(f"ig2mj {command}", name, renamed[name])

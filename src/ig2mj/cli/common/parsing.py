@@ -21,9 +21,9 @@ def parse_and_call(function: Callable[..., Any], prog: str, args: Sequence[str])
 
 
 def _with_quiet_defaults(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The same function, but its help says no "(default: None)", "(default: )" or "(default: False)".
+    """The same function, whose help omits "(default: None)", "(default: )" and "(default: False)".
 
-    A plain wrapper would not do: tyro looks through `functools.wraps`.
+    This is no plain wrapper, since tyro looks through `functools.wraps`.
     """
     hints = typing.get_type_hints(function, include_extras=True)
     signature = inspect.signature(function)

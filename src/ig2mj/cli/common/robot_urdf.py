@@ -1,4 +1,4 @@
-"""What `--robot-urdf FILE` and `--robot-layout FILE` mean on every command that takes them."""
+"""The options `--robot-urdf FILE` and `--robot-layout FILE` of several commands."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def own_robot(urdf: pathlib.Path, layout: pathlib.Path | None, robot: str | None
     """The robot of a URDF; converted on first use, and again when the file or its meshes have changed.
 
     Args:
-      layout: which joints do what; None: found. robot: what `--robot` says, which has to say nothing.
+      layout: assigns the joints; None: guessed from their names. robot: value of `--robot`, which must be None.
 
     Raises:
       Ig2mjError: there is a `--robot`, too. InputError, UnknownNameError: as the converter and `UrdfRobot.load`.
