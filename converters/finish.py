@@ -135,5 +135,5 @@ def _source_boxes(built: Mapping[str, BuiltModel]) -> dict[str, SourceBox]:
 def _object_warnings(name: str, built: BuiltModel, builder: ModelBuilder) -> list[str]:
     lines = [*built.assembly.warnings, *openable_ends(built.assembly)[1], *builder.warnings.get(name, [])]
     if built.encrypted:
-        lines.append("visuals are encrypted: the collision hulls are drawn instead")
+        lines.append("visuals are encrypted: the collision hulls are shown instead")
     return list(dict.fromkeys(lines))

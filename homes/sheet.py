@@ -1,7 +1,7 @@
 """A contact sheet: pictures of models side by side, to see what was built. Uses MuJoCo's C renderer.
 
 Models are drawn straight from the builder (no converter), each in a tile of its own, from the front right above; with
-`opened` every joint stands at its limit; with `collision` the collision hulls are drawn instead of the visuals.
+`opened` every joint stands at its limit; with `collision` the collision hulls are shown instead of the visuals.
 """
 
 from __future__ import annotations

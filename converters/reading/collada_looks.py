@@ -59,7 +59,7 @@ class ColladaLooks:
         return self._lost(f"effect '{url}' has no colour")
 
     def _lost(self, text: str) -> SurfaceLook:
-        self._textures.warn(f"{self._file.name}: {text}: drawn without it")
+        self._textures.warn(f"{self._file.name}: {text}: rendered without it")
         return SurfaceLook()
 
     def _shaded(self, shading: Element, effect: Element, name: str) -> SurfaceLook:

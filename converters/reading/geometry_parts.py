@@ -120,7 +120,7 @@ def _look(instance: PlacedGeometry, textures: TextureReader | None, file: pathli
     if look == SurfaceLook() and geometry.colours is not None and len(geometry.colours):
         rgba, vary = mean_vertex_colour(geometry.colours)
         if vary:
-            textures.warn(f"{file.name} has colours per vertex: their mean is drawn")
+            textures.warn(f"{file.name} has colours per vertex: their mean colour is used")
         look = SurfaceLook(rgba)
     return look
 

@@ -309,7 +309,7 @@ def _look(at: _File, number: Any) -> SurfaceLook:
             number = _index(number, materials, "material")
             at.looks[number] = _material(at, _dict(materials[number]))
         except _Broken as e:
-            at.textures.warn(f"{at.file.name}: {e}: drawn without it")
+            at.textures.warn(f"{at.file.name}: {e}: rendered without it")
             return SurfaceLook()
     return at.looks[number]
 
@@ -353,7 +353,7 @@ def _dict(value: Any) -> dict[str, Any]:
     if value is None:
         return {}
     if not isinstance(value, dict):
-        raise _Broken(f"{str(value)[:40]!r} stands in an object's place")
+        raise _Broken(f"{str(value)[:40]!r} is not an object")
     return value
 
 
@@ -361,7 +361,7 @@ def _list(value: Any) -> list[Any]:
     if value is None:
         return []
     if not isinstance(value, list):
-        raise _Broken(f"{str(value)[:40]!r} stands in a list's place")
+        raise _Broken(f"{str(value)[:40]!r} is not a list")
     return value
 
 

@@ -158,7 +158,7 @@ def _obj_parts(obj: ObjFile, file: pathlib.Path, textures: TextureReader) -> lis
 def _vertex_colour(colours: np.ndarray, file: pathlib.Path, textures: TextureReader) -> Rgba:
     rgba, vary = mean_vertex_colour(colours)
     if vary:
-        textures.warn(f"{file.name} has colours per vertex: their mean is drawn")
+        textures.warn(f"{file.name} has colours per vertex: their mean colour is used")
     return rgba
 
 

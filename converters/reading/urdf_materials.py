@@ -49,7 +49,7 @@ class UrdfMaterials:
         if name in self._named:
             return self._named[name]
         if name:
-            self._warn(f"material '{shortened(name)}' is not defined: drawn without it")
+            self._warn(f"material '{shortened(name)}' is not defined: rendered without it")
         return SurfaceLook()
 
     def _own(self, material: Element) -> SurfaceLook:
@@ -68,7 +68,7 @@ class UrdfMaterials:
         text = colour.get("rgba") or colour.get("rgb") or ""
         values = [parse_number(word.removesuffix(",")) for word in text.split()]
         if len(values) not in (3, 4) or None in values:
-            self._warn(f"{where(colour)}: rgba='{shortened(text, 40)}' is not 3 or 4 numbers: drawn without it")
+            self._warn(f"{where(colour)}: rgba='{shortened(text, 40)}' is not 3 or 4 numbers: rendered without it")
             return None
         r, g, b, a = (float(v) for v in np.append(np.clip(np.array(values, dtype=float), 0, 1), 1.0)[:4])
         return r, g, b, a or 1.0

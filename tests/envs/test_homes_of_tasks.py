@@ -53,7 +53,7 @@ def test_an_activity_of_the_paper_needs_its_furniture_where_it_is():
     assert in_home(COOKING, COOKING.home) == COOKING
     with pytest.raises(EngineError, match=r"'small_home': it has no bottom_cabinet_1"):
         in_home(COOKING, "small_home")
-    with pytest.raises(EngineError, match=r"stands \d+\.\d m from where it is in 'birch'"):
+    with pytest.raises(EngineError, match=r"is \d+\.\d m from its position in 'birch'"):
         in_home(COOKING, "elm")
 
 

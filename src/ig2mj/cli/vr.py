@@ -128,8 +128,8 @@ def _play(session: Session, seconds: float, timing: bool, rate) -> None:
     def tell() -> None:
         while not stop.wait(2.0):
             drawn = rate()
-            pictures = "" if drawn is None else f"   pictures {drawn.pictures:.0f}/s, slowest {drawn.slowest:.0f} ms"
-            print(f"{session.timing.line()}{pictures}", file=sys.stderr, flush=True)
+            images = "" if drawn is None else f"   images {drawn.pictures:.0f}/s, slowest {drawn.slowest:.0f} ms"
+            print(f"{session.timing.line()}{images}", file=sys.stderr, flush=True)
 
     if timing:
         threading.Thread(target=tell, daemon=True).start()

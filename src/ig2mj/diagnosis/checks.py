@@ -209,7 +209,7 @@ def tool_checks() -> list[Check]:
         found, fix = ffmpeg_program(), ""
     except Ig2mjError:
         found, fix = "none", pip_install_extra("demo")
-    return [*checks, Check("tools", "ffmpeg (films)", not fix, found, fix=fix)]
+    return [*checks, Check("tools", "ffmpeg (videos)", not fix, found, fix=fix)]
 
 
 def cache_checks(warp: dict[str, Any]) -> list[Check]:

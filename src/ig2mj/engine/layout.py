@@ -183,7 +183,7 @@ def _scene_sizes(model: mujoco.MjModel, tables: SceneTables, equality_body: np.n
     }
     for name, agents in axes.items():
         if (np.diff(agents.astype(int)) < 0).any():
-            raise EngineError(f"{name} of agents stands before that of objects: scene.xml must have its agents last")
+            raise EngineError(f"{name} of agents comes before that of objects: scene.xml must have its agents last")
     return {name: int((~agents).sum()) for name, agents in axes.items()}
 
 

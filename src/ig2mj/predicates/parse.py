@@ -47,7 +47,7 @@ def parse(source: str, name: str = "expression") -> Expression:
     tree, rest = _tree(tokens, 0, name, 0)
     if rest != len(tokens):
         raise ExpressionError(
-            name, "goes on after its end", element=f"'{tokens[rest]}'", fix="join parts with (and ...)"
+            name, "has text after its end", element=f"'{tokens[rest]}'", fix="join parts with (and ...)"
         )
     return _expression(tree, name)
 

@@ -68,8 +68,8 @@ def _check_furniture(task: Task, folder: pathlib.Path) -> None:
         apart = float(np.linalg.norm(here - there))
         if apart > ELSEWHERE:
             raise EngineError(
-                f"{task.name} cannot be done in '{other.name}': its {name} stands {apart:.1f} m from where it is in "
-                f"'{own.name}', for which the activity's positions are made ({hint})"
+                f"{task.name} cannot be done in '{other.name}': its {name} is {apart:.1f} m from its position in "
+                f"'{own.name}', which the activity needs ({hint})"
             )
 
 

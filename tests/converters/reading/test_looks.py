@@ -224,7 +224,7 @@ def test_vertex_colours_of_an_obj_are_drawn_in_their_mean(folder):
     text = "v 0 0 0 1 0 0\nv 1 0 0 1 0 0\nv 0 1 0 0.7 0 0\nf 1 2 3\n"
     part, warnings = visual_of(folder.write("v.obj", text))
     assert part.rgba == pytest.approx((0.9, 0, 0, 1))
-    assert "v.obj has colours per vertex: their mean is drawn" in warnings[0]
+    assert "v.obj has colours per vertex: their mean colour is used" in warnings[0]
 
 
 def test_materials_that_no_mtl_defines_are_a_warning(folder, make):

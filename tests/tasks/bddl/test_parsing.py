@@ -82,7 +82,7 @@ def test_the_forms_of_goals(goal, expected):
         ("(stained plate.n.04_1)", "(stained plate.n.04_1 rag.n.01_1)", 8, r"\(stained", "takes 1 arguments, has 2"),
         ("(stained plate.n.04_1)", "(stained (dusty plate.n.04_1))", 8, r"\(dusty", "is not an object"),
         ("(stained plate.n.04_1)", "(stained plate.n.04_1", 1, r"\(", "is never closed"),
-        ("?sink.n.01_1))))", "?sink.n.01_1)))))", 14, r"\)", "stands after the end"),
+        ("?sink.n.01_1))))", "?sink.n.01_1)))))", 14, r"\)", "is after the end"),
         ("(not (stained ?plate.n.04))", "(not (stained ?dish))", 13, r"\?dish", "is not a variable of a quantifier"),
         ("(?plate.n.04 - plate.n.04)", "(?plate.n.04 - dish.n.01)", 13, "dish.n.01", "is not a synset of :objects"),
         ("(?plate.n.04 - plate.n.04)", "(plate.n.04 - plate.n.04)", 13, r"\(plate.n.04", "is not a variable"),
@@ -94,7 +94,7 @@ def test_the_forms_of_goals(goal, expected):
         ("- sink.n.01", "- - sink.n.01", 5, "-", "is not followed by a synset"),
         ("(define", "(defined", 1, r"\(defined", r"begins with \(define"),
         ("(:goal\n", "(:goal (dusty rag.n.01_1)\n", 11, r"\(:goal", "takes one condition"),
-        ("(inside ?plate", "(inroom ?plate", 14, "inroom", "stands in :init only"),
+        ("(inside ?plate", "(inroom ?plate", 14, "inroom", "is allowed in :init only"),
     ],
 )
 def test_errors_name_line_and_word(old, new, line, word, telling):

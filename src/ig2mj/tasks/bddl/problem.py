@@ -201,7 +201,7 @@ class _Reader:
         if len(parts) != (wanted := self.predicates[head.text]):
             raise self.error(tree, f"takes {wanted} arguments, has {len(parts)}")
         if head.text == IN_ROOM and not top:
-            raise self.error(head, "stands in :init only")
+            raise self.error(head, "is allowed in :init only")
         arguments = []
         for number, part in enumerate(parts):
             if not isinstance(part, Word):

@@ -65,7 +65,7 @@ def read_tree(text: str, file: str) -> SyntaxGroup:
         word = Word(token.lower(), line)
         parts = open_groups[-1][1] if open_groups else found
         if found and not open_groups:
-            raise error(file, word, "stands after the end", "remove it, or the bracket that closes too early")
+            raise error(file, word, "is after the end", "remove it, or the bracket that closes too early")
         if token == "(":
             if len(open_groups) == MAX_DEPTH:
                 raise error(file, word, f"is nested deeper than {MAX_DEPTH}")
@@ -76,7 +76,7 @@ def read_tree(text: str, file: str) -> SyntaxGroup:
             opening, inner = open_groups.pop()
             (open_groups[-1][1] if open_groups else found).append(SyntaxGroup(tuple(inner), opening.line))
         elif not open_groups:
-            raise error(file, word, "stands outside of brackets", "a definition begins with (define")
+            raise error(file, word, "is outside of brackets", "a definition begins with (define")
         else:
             parts.append(word)
     if open_groups:

@@ -121,4 +121,4 @@ def run_headset(env: Environment, common: dict[str, Any], seconds: float = 0.0, 
 
 def _tell(session: Session, loop: HeadsetLoop, stop: threading.Event) -> None:
     while not stop.wait(2.0):
-        print(f"{session.timing.line()}   pictures {loop.rate:.0f}/s", file=sys.stderr, flush=True)
+        print(f"{session.timing.line()}   images {loop.rate:.0f}/s", file=sys.stderr, flush=True)
