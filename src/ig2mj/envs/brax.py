@@ -26,6 +26,7 @@ from flax import struct
 from jaxtyping import Float
 
 from ig2mj.engine.view import Array
+from ig2mj.envs.state import metrics_of
 from ig2mj.errors import EngineError
 from ig2mj.process import entry_point
 from ig2mj.worlds.random_streams import as_seed
@@ -164,4 +165,4 @@ class BraxEnv:
         return found | {f"pixels/{name}": state.obs[name] for name in self._pictures}
 
     def _metrics(self, state: Any) -> dict[str, Array]:
-        return {name: jnp.asarray(array, np.float32) for name, array in state.metrics.items()}
+        return {name: jnp.asarray(array, np.float32) for name, array in metrics_of(state.info).items()}

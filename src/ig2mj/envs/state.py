@@ -5,6 +5,7 @@ Axis: W worlds.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 from flax import struct
@@ -16,6 +17,11 @@ from ig2mj.sensors.base import Memory
 from ig2mj.states.world import ExtendedStates
 from ig2mj.tasks.objective import Measures
 from ig2mj.worlds.batch import Batch
+
+
+def metrics_of(info: Mapping[str, Array]) -> dict[str, Array]:
+    """The entries of `EnvState.info` that `EnvState.metrics` has."""
+    return {name: array for name, array in info.items() if name.startswith("reward/") or name == "success"}
 
 
 @struct.dataclass
@@ -54,7 +60,7 @@ class EnvState:
     @property
     def metrics(self) -> dict[str, Array]:
         """Of `info` what trainers log: "success", and each reward term as "reward/...", [W]."""
-        return {name: array for name, array in self.info.items() if name.startswith("reward/") or name == "success"}
+        return metrics_of(self.info)
 
     def __repr__(self) -> str:
         """Shapes only: nothing is read, so that it is quick and works for a stale state."""
