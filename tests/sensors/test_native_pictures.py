@@ -66,7 +66,7 @@ def test_only_worlds_that_matter_are_drawn(world):
     suite = world.suite("rgb", "depth", **SIZE)
     given = world.physics, world.engine.view(world.physics), world.states, world.state
     whole, _ = suite.look_fn(*given)
-    half, _ = suite.look_fn(*given, drawn=np.array([False, True]))
+    half, _ = suite.look_fn(*given, rendered=np.array([False, True]))
     for name in ("rgb", "depth"):
         assert np.asarray(whole[name][0]).any() and not np.asarray(half[name][0]).any()
         np.testing.assert_array_equal(half[name][1], whole[name][1])

@@ -97,7 +97,7 @@ class Write:
       ignored_contacts: contacts between a hand's bodies (its palm and its fingers) and an object are dropped after the
         narrow phase, from now on, until it is written again: they give neither forces nor touch, and wake nothing.
         Contacts of all other pairs stay exactly as they were. What is ignored no more is touched again from the next
-        step on (natively at once).
+        step on (on the native engine at once).
 
     A write of constraints (`eq_active`, `eq_data`) and `ignored_contacts` alone moves nothing, and MJX engines do it
     without a forward pass.
@@ -197,7 +197,7 @@ class Engine(Protocol):
         ...
 
     def kept(self, tree: Any) -> Any:
-        """Arrays of a result that no later step changes or uses up."""
+        """Arrays of a result that no later step changes or consumes."""
         ...
 
     def kept_row(self, tree: Any, world: int) -> tuple[Any, int]:
@@ -303,7 +303,7 @@ class Engine(Protocol):
         ...
 
     def check(self, physics: Physics) -> None:
-        """Raises StaleStateError: the physics was used up by a later step, reset, write or load, in place or since its
+        """Raises StaleStateError: the physics was consumed by a later step, reset, write or load, in place or since its
         arrays were donated to a program. All methods that take physics raise it as well. Nothing while tracing."""
         ...
 
@@ -316,7 +316,7 @@ class Engine(Protocol):
         """An independent copy, which goes on as the original would. The original stays valid. Not traced.
 
         Raises:
-          StaleStateError: the physics was used up.
+          StaleStateError: the physics was consumed.
         """
         ...
 
@@ -324,7 +324,7 @@ class Engine(Protocol):
         """All worlds in NumPy arrays that share no memory with the engine; see `restored`. Not traced.
 
         Raises:
-          StaleStateError: the physics was used up.
+          StaleStateError: the physics was consumed.
         """
         ...
 

@@ -34,7 +34,7 @@ from ig2mj.envs.checks import checked_action, checked_state
 from ig2mj.envs.config import Configured, EnvConfig
 from ig2mj.envs.copies import StateCopies
 from ig2mj.envs.images import StateImages
-from ig2mj.envs.observations import Observer, Space, chosen
+from ig2mj.envs.observations import Observer, Space
 from ig2mj.envs.state import EnvState, Seen, StepContext
 from ig2mj.errors import EngineError
 from ig2mj.predicates.compile import GoalStatus
@@ -44,7 +44,7 @@ from ig2mj.scene.scene import Scene
 from ig2mj.tasks.actions import ActionMap
 from ig2mj.tasks.objective import Measures, Objective
 from ig2mj.tasks.task import TaskLike
-from ig2mj.worlds.batch import Batch
+from ig2mj.worlds.batch import Batch, select_worlds
 from ig2mj.worlds.core import Core
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import Seed, Seeds, as_seed, pick_rows
@@ -279,8 +279,8 @@ class Environment(StateCopies, StateImages, Configured):
     ) -> EnvState:
         """A state with its images. `begun`: worlds that were reset since `before`; the others keep its images."""
         last = None if before is None else (before.obs, before.memory)
-        pictures, memory = self._observer.pictures(batch.world, batch.controllers[0], last, begun)
-        obs = {name: {**seen.obs, **pictures}[name] for name in self.observation_spaces}
+        images, memory = self._observer.images(batch.world, batch.controllers[0], last, begun)
+        obs = {name: {**seen.obs, **images}[name] for name in self.observation_spaces}
         of_step = (seen.reward, seen.terminated, seen.truncated, seen.info, seen.measures, seen.status)
         return EnvState(batch, obs, *of_step, bad.astype(jnp.int32), memory)
 
@@ -339,7 +339,7 @@ class Environment(StateCopies, StateImages, Configured):
         new = self._seen(context, status, now, terms, none, none, info)
         if before is None:
             return new
-        return chosen(mask, new, dataclasses.replace(before, obs={name: before.obs[name] for name in new.obs}))
+        return select_worlds(mask, new, dataclasses.replace(before, obs={name: before.obs[name] for name in new.obs}))
 
     def _seen(
         self,

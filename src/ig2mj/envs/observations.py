@@ -28,6 +28,7 @@ from ig2mj.sensors.registry import SENSORS
 from ig2mj.sensors.suite import SensorSuite
 from ig2mj.states.world import WorldState
 from ig2mj.tasks.objective import Measures, Objective
+from ig2mj.worlds.batch import select_worlds
 from ig2mj.worlds.random_streams import step_keys
 
 __all__ = ["Observer", "Space", "check_names"]
@@ -79,7 +80,7 @@ class Observer:
         found |= {name: array for name, array in made.items() if name in self._names}
         return {name: jnp.nan_to_num(jnp.asarray(a, jnp.float32), posinf=0.0, neginf=0.0) for name, a in found.items()}
 
-    def pictures(
+    def images(
         self,
         world: WorldState,
         controller_state: Any,
@@ -96,21 +97,13 @@ class Observer:
             return {}, None
         memory = None if last is None else last[1]
         if begun is not None:
-            memory = chosen(begun, self._sensors.memory(world.view, controller_state), memory)
+            memory = select_worlds(begun, self._sensors.memory(world.view, controller_state), memory)
         keys = self._keys(world.key, world.step) if self._sensors.noisy else None
         before = None if begun is None or last is None else last[0]
-        drawn = None if before is None else begun
+        rendered = None if before is None else begun
         found, memory = self._sensors.look_fn(
-            world.physics, world.view, world.states, controller_state, memory, keys, drawn
+            world.physics, world.view, world.states, controller_state, memory, keys, rendered
         )
         if begun is not None and before is not None:
-            found = chosen(begun, found, {name: before[name] for name in found})
+            found = select_worlds(begun, found, {name: before[name] for name in found})
         return found, memory
-
-
-def chosen(mask: Bool[Array, "W"], new: Any, old: Any) -> Any:
-    """The new arrays of a pytree in masked worlds; all of them where there are no old ones."""
-    if old is None:
-        return new
-    mask = jnp.asarray(mask)
-    return jax.tree.map(lambda a, b: jnp.where(mask.reshape(-1, *[1] * (a.ndim - 1)), a, b), new, old)

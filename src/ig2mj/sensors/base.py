@@ -17,6 +17,7 @@ from jaxtyping import Float, UInt32
 from ig2mj.agents.base import Controller
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError, UnknownNameError
+from ig2mj.process.deprecation import warn_renamed
 from ig2mj.scene.scene import Scene
 from ig2mj.sensors.images import Images, Pose, RayPattern
 from ig2mj.states.model import StateModel
@@ -38,7 +39,7 @@ class SensorOptions:
     """Settings of all sensors; the defaults are the paper's camera and iGibson's laser.
 
     Attributes:
-      width, height: pixels of all pictures.
+      width, height: pixels of all images.
       depth_low, depth_high: m; depths outside read 0.
       depth_noise_rate, scan_noise_rate: probability that a reading drops out: depths become 0, a scan's rays 1.
       scan_rays: of the laser scan, over `scan_angle` degrees. scan_near, scan_far: m, its range.
@@ -46,10 +47,10 @@ class SensorOptions:
       footprint: m, radius of the robot in the occupancy grid.
       lidar_beams: of the lidar, from 15 degrees below its horizon to 15 above. lidar_columns: rays of a beam in a
         quarter turn. lidar_near, lidar_far: m, its range; nearer is the robot's own head.
-      particles: the most particles of dust, stains and water that a picture shows.
-      rows: of all pictures the first row that is made and the first below those; the others are as if nothing were
+      particles: the most particles of dust, stains and water that an image shows.
+      rows: of all images the first row that is made and the first below those; the others are as if nothing were
         there. For those who look at no others: on a GPU they cost nothing then. None: all.
-      shadows: whether pictures have them; they cost six times the rest natively, twice on a GPU.
+      shadows: whether images have them; they cost six times the rest natively, twice on a GPU.
     """
 
     width: int = 128
@@ -141,7 +142,7 @@ class Setup:
 
 @struct.dataclass
 class Memory:
-    """What was where at the last reading: what flow is reckoned from. World frame."""
+    """What was where at the last reading: from which flow is computed. World frame."""
 
     eye_pos: Float[Array, "W 3"]
     eye_quat: Float[Array, "W 4"]
@@ -178,7 +179,7 @@ class Sensor:
     Attributes:
       name: of the observation. summary: one line. frame: that its numbers are in.
       space: of its readings. read: makes them, [W, ...]; pure.
-      pictures: what it needs of "rgb", "depth" and "segmentation".
+      images: what it needs of "rgb", "depth" and "segmentation".
       rays: the pattern it needs, if any. ray_pose: where that pattern is.
       remembers: it needs `Percept.before`.
     """
@@ -188,12 +189,18 @@ class Sensor:
     frame: str
     space: Callable[[Setup], Space]
     read: Read
-    pictures: frozenset[str] = frozenset()
+    images: frozenset[str] = frozenset()
     rays: Callable[[Setup], RayPattern] | None = None
     ray_pose: Callable[[Setup, PhysicsView, Pose | None], Pose] | None = None
     remembers: bool = False
 
     @property
+    def pictures(self) -> frozenset[str]:
+        """Deprecated: `images`."""
+        warn_renamed("Sensor.pictures", "Sensor.images")
+        return self.images
+
+    @property
     def looks(self) -> bool:
-        """It needs the engine itself, not only the view: pictures or rays."""
-        return bool(self.pictures) or self.rays is not None
+        """It needs the engine itself, not only the view: images or rays."""
+        return bool(self.images) or self.rays is not None

@@ -52,7 +52,7 @@ _KEPT: weakref.WeakKeyDictionary[Engine, list[Any]] = weakref.WeakKeyDictionary(
 
 
 class BatchCamera:
-    """A pure function from worlds to pictures, for the Warp engine. Cameras ride on their bodies ("fixed" mode), at the
+    """A pure function from worlds to images, for the Warp engine. Cameras ride on their bodies ("fixed" mode), at the
     poses of each world's `ModelFields`, but for those whose poses are given with each call."""
 
     def __init__(
@@ -90,7 +90,7 @@ class BatchCamera:
           merge_meshes: cast rays against one mesh for all that never moves and one for each rigid part that does
             (`ig2mj.sensors.merged_meshes`; a quarter less time); what is invisible in the compiled scene then is in
             every world. Scenes with flexes or height fields are not merged.
-          rows: of each picture the first that is made and the first below those; the others are as if nothing were
+          rows: of each image the first that is made and the first below those; the others are as if nothing were
             there, and cost nothing. None: all.
 
         Raises:
@@ -185,20 +185,20 @@ class BatchCamera:
         view: PhysicsView,
         states: ExtendedStates,
         eyes: Mapping[str, Pose] | None = None,
-        drawn: Bool[Array, "W"] | None = None,
+        rendered: Bool[Array, "W"] | None = None,
     ) -> Images:
-        """Pictures of the present state of every world. Pure: to be jitted, alone or with a step.
+        """Images of the present state of every world. Pure: to be jitted, alone or with a step.
 
         Args:
           eyes: poses in the world of cameras that do not ride on their bodies, by name: what `Controller.eye` of an
             agent gives that moves its eye without joints. Poses of all ray patterns, by their names.
-          drawn: the worlds that matter; None: all. See `images.Camera`.
+          rendered: the worlds that matter; None: all. See `images.Camera`.
 
         Raises:
           UnknownNameError: there is no such camera.
         """
         slots = fill_slots(self.model, states, view, self.slots)
-        moved = self._moved(physics, slots, eyes or {}, drawn)
+        moved = self._moved(physics, slots, eyes or {}, rendered)
         look = self._look(physics, states, slots)
 
         def cast(data: Any, look: dict[str, Array]) -> tuple[Array, Array, Array]:
@@ -224,11 +224,11 @@ class BatchCamera:
 
     @property
     def _pixels(self) -> int:
-        """Of all pictures of a world, as far as they are made."""
+        """Of all images of a world, as far as they are made."""
         return len(self.cameras) * self.width * self._lines
 
-    def _for_each(self, of_pictures: bool, of_rays: bool) -> list[bool]:
-        return [of_pictures] * len(self.cameras) + [of_rays] * len(self._sectors)
+    def _for_each(self, of_images: bool, of_rays: bool) -> list[bool]:
+        return [of_images] * len(self.cameras) + [of_rays] * len(self._sectors)
 
     def _distances(self, depth: Float[Array, "W n"]) -> Mapping[str, Float[Array, "W N"]]:
         """Along the rays of each pattern, from the depths of all sectors."""
@@ -250,13 +250,13 @@ class BatchCamera:
         order = (np.arange(len(self.cameras))[:, None] * pixels + tiles).ravel()
         for context in contexts:
             for rays in (context.ray, context.ray_offset):
-                if len(rays) >= len(order):  # behind those of pictures are those of patterns
+                if len(rays) >= len(order):  # behind those of images are those of patterns
                     old = rays.numpy()
                     rays.assign(np.concatenate([old[order], old[len(order) :]]))
         return True
 
     def _rows(self, pixels: Array, nothing: int = 0) -> Array:
-        """Pictures [W, C, Y, X] of what the rays saw, in the order in which they are cast. `nothing`: in other rows."""
+        """Images [W, C, Y, X] of what the rays saw, in the order in which they are cast. `nothing`: in other rows."""
         shape = (self.engine.num_worlds, len(self.cameras))
         if self._tiled:
             pixels = pixels.reshape(*shape, self._lines // TILE, self.width // TILE, TILE, TILE).swapaxes(3, 4)
@@ -266,7 +266,7 @@ class BatchCamera:
         return jnp.pad(seen, ((0, 0), (0, 0), (top, self.height - bottom), (0, 0)), constant_values=nothing)
 
     def _check_addresses(self) -> None:
-        """Pictures, and then rays, lie one after the other in the ray caster's buffers."""
+        """Images, and then rays, lie one after the other in the ray caster's buffers."""
         context = self._context
         sizes = np.array([self.width * self._lines] * len(self.cameras) + [len(s.rays) for s in self._sectors])
         made = [np.array(self._for_each(w, r)) for w, r in zip(self._wants, (False, True, False), strict=True)]
@@ -285,7 +285,7 @@ class BatchCamera:
         self._light_in_body = (host.light_bodyid, _f32(host.light_pos), _f32(host.light_dir))
 
     def _moved(
-        self, physics: MjxPhysics, slots: Slots, eyes: Mapping[str, Pose], drawn: Bool[Array, "W"] | None
+        self, physics: MjxPhysics, slots: Slots, eyes: Mapping[str, Pose], rendered: Bool[Array, "W"] | None
     ) -> Any:
         """Render data [W] with everything where physics has it, and cameras out of the way where nothing is drawn."""
         data, worlds = physics.data, self.engine.num_worlds
@@ -299,8 +299,8 @@ class BatchCamera:
         for name, (eye_pos, eye_quat) in {**of_cameras, **of_sectors}.items():
             camera = _camera_id(self._host, name)
             camera_pos, camera_quat = camera_pos.at[:, camera].set(eye_pos), camera_quat.at[:, camera].set(eye_quat)
-        if drawn is not None:
-            there = jnp.asarray(drawn)[:, None, None]
+        if rendered is not None:
+            there = jnp.asarray(rendered)[:, None, None]
             camera_pos = jnp.where(there, camera_pos, jnp.asarray(ABOVE))
             camera_quat = jnp.where(there, camera_quat, jnp.asarray(UPWARDS))
         body, pos, direction = self._light_in_body

@@ -1,4 +1,4 @@
-"""An OpenGL context of a model for small pictures in quick succession: colour, depth and geom ids of one camera."""
+"""An OpenGL context of a model for small images in quick succession: colour, depth and geom ids of one camera."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ class Canvas:
         mujoco.mjr_readPixels(colour, depth, self._rect, self._context)
 
     def _geoms(self, ids: np.ndarray) -> np.ndarray:
-        """Geom ids of a picture of segmentation colours, 1 + the place in the scene in three bytes."""
+        """Geom ids of an image of segmentation colours, 1 + the place in the scene in three bytes."""
         place = ids.astype(np.int32) @ np.array([1, 1 << 8, 1 << 16], np.int32)
         of_places = np.full(self._scene.ngeom + 1, NOTHING, np.int32)
         for geom in self._scene.geoms[: self._scene.ngeom]:

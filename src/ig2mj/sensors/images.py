@@ -43,7 +43,7 @@ class RayPattern:
 
 @struct.dataclass
 class Images:
-    """Pictures of all worlds; what was not requested is None.
+    """Images of all worlds; what was not requested is None.
 
     Attributes:
       rgb: 0..255, row 0 on top. depth: metres along the optical axis, 0 where nothing is hit.
@@ -75,9 +75,9 @@ class Camera(Protocol):
         view: PhysicsView,
         states: ExtendedStates,
         eyes: Mapping[str, Pose] | None = None,
-        drawn: Bool[Array, "W"] | None = None,
+        rendered: Bool[Array, "W"] | None = None,
     ) -> Images:
-        """Pictures of the present state of every world. `drawn`: the worlds that matter; those of the others cost next
+        """Images of the present state of every world. `rendered`: the worlds that matter; those of the others cost next
         to nothing, and mean nothing. None: all."""
         ...
 

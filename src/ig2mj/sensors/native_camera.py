@@ -1,4 +1,5 @@
-"""`NativeCamera`: what `BatchCamera` delivers, natively: pictures by MuJoCo's renderer, rays by `mj_multiRay`.
+"""`NativeCamera`: what `BatchCamera` delivers, on the native engine: images by MuJoCo's renderer, rays by
+`mj_multiRay`.
 
 Colour and depth are one pass of OpenGL, segmentation is another. Shadows, reflections, multisampling and the sky are
 off, as in the ray caster: with OpenGL in software shadows alone cost six times what everything else does.
@@ -32,7 +33,7 @@ from ig2mj.states.world import ExtendedStates
 
 
 class NativeCamera:
-    """Pictures and rays of worlds of the native engine; arguments and results as of `BatchCamera`, in NumPy."""
+    """Images and rays of worlds of the native engine; arguments and results as of `BatchCamera`, in NumPy."""
 
     def __init__(
         self,
@@ -51,7 +52,7 @@ class NativeCamera:
         rays: Sequence[RayPattern] = (),
         rows: tuple[int, int] | None = None,
     ):
-        """See `BatchCamera`. OpenGL is started by the first picture; rays need none.
+        """See `BatchCamera`. OpenGL is started by the first image; rays need none.
 
         Raises:
           EngineError: not the native engine, or nothing is to be made. UnknownNameError: no such camera.
@@ -80,9 +81,9 @@ class NativeCamera:
         view: PhysicsView,
         states: ExtendedStates,
         eyes: Mapping[str, Pose] | None = None,
-        drawn: Bool[Array, "W"] | None = None,
+        rendered: Bool[Array, "W"] | None = None,
     ) -> Images:
-        """Pictures of the present state of every world; see `BatchCamera`."""
+        """Images of the present state of every world; see `BatchCamera`."""
         eyes = {name: (np.asarray(pos), np.asarray(quat)) for name, (pos, quat) in (eyes or {}).items()}
         count, (rgb, depth, segmentation) = self.engine.num_worlds, self._wants
         shape = (count, len(self.cameras), self.height, self.width)
@@ -93,7 +94,7 @@ class NativeCamera:
         slots = None
         if self.cameras:
             tint, slots = jax.tree.map(np.asarray, self._look(states, view))
-        for w in range(count) if drawn is None else np.flatnonzero(np.asarray(drawn)).tolist():
+        for w in range(count) if rendered is None else np.flatnonzero(np.asarray(rendered)).tolist():
             live, data = self.engine.to_mujoco(physics, w)
             for colours, own in ((self._drawn.geom_rgba, live.geom_rgba), (self._drawn.mat_rgba, live.mat_rgba)):
                 colours[:] = own
@@ -121,7 +122,7 @@ class NativeCamera:
         )
 
     def close(self) -> None:
-        """Frees the OpenGL context; the next picture makes a new one."""
+        """Frees the OpenGL context; the next image makes a new one."""
         if self._canvas is not None:
             self._canvas.close()
             self._canvas = None
@@ -160,7 +161,7 @@ class NativeCamera:
         return self._canvas.draw(*self._wants)
 
     def _in_view(self, data: mujoco.MjData, camera: int) -> Bool[np.ndarray, "G"]:
-        """Geoms that may be in view: others are not drawn, which saves most of a picture's time where OpenGL runs in
+        """Geoms that may be in view: others are not drawn, which saves most of an image's time where OpenGL runs in
         software."""
         if self._shadows:
             return np.ones(self._drawn.ngeom, bool)

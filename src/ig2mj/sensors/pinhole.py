@@ -28,6 +28,6 @@ def points(setup: Setup, depth: Float[Array, "W Y X"]) -> Float[Array, "W Y X 3"
 
 
 def normalized_coordinates(setup: Setup, points: Float[Array, "*b 3"]) -> Float[Array, "*b 2"]:
-    """Where points of the camera's frame appear: -1 to 1 from left to right and from bottom to top of the picture."""
+    """Where points of the camera's frame appear: -1 to 1 from left to right and from bottom to top of the image."""
     ahead = jnp.maximum(-points[..., 2:], 1e-6)
     return points[..., :2] / (ahead * jnp.asarray(setup.slopes, jnp.float32))

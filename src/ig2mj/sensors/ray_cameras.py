@@ -1,7 +1,7 @@
 """Rays in any direction from cameras of the ray caster: a pattern is cut into sectors of a quarter turn, and each
 sector is a camera one pixel high whose rays are those of the pattern.
 
-So all rays, and the pictures, are cast by one program over one hierarchy of boxes. MuJoCo Warp keeps the rays of its
+So all rays, and the images, are cast by one program over one hierarchy of boxes. MuJoCo Warp keeps the rays of its
 cameras in an array of the render context and reports depths along the optical axis; within a sector the cosine between
 ray and axis is known and is at least 0.5 for rays up to 45 degrees above or below the horizon.
 
@@ -87,7 +87,7 @@ def set_rays(context: Any, sectors: Sequence[Sector], first: int) -> None:
     cameras.
 
     Args:
-      first: how many rays the pictures have, which come before them.
+      first: how many rays the images have, which come before them.
     """
     for own in context._contexts.values():
         rays, offsets = own.ray.numpy(), own.ray_offset.numpy()
@@ -106,11 +106,11 @@ def set_rays(context: Any, sectors: Sequence[Sector], first: int) -> None:
 def set_rows(
     context: Any, host: mujoco.MjModel, cameras: Sequence[int], size: tuple[int, int], rows: tuple[int, int]
 ) -> None:
-    """Lets the cameras of a render context, made with so few lines, show these rows of a larger picture.
+    """Lets the cameras of a render context, made with so few lines, show these rows of a larger image.
 
     Args:
       cameras: ids in the model, in the order of the context, which has their rays first.
-      size: width and height of the whole picture, pixels. rows: the first, and the first below those.
+      size: width and height of the whole image, pixels. rows: the first, and the first below those.
     """
     (width, height), znear = size, float(host.vis.map.znear * host.stat.extent)
     for own in context._contexts.values():

@@ -1,4 +1,4 @@
-"""The scene as cameras see it: a model of its own that nothing moves in, so that pictures cost physics nothing.
+"""The scene as cameras see it: a model of its own that nothing moves in, so that images cost physics nothing.
 
 It has the scene's bodies, geoms, cameras, lights and materials with the scene's ids, no joints, and behind the last
 geom a number of free *slots*: small ellipsoids that become particles.
@@ -26,7 +26,7 @@ def make_render_model(scene: Scene, slots: int, cameras: Sequence[str] = ()) -> 
     """Compiles the render model; geom ids from `scene.model.ngeom` on are the slots.
 
     Args:
-      cameras: names of cameras that are added behind the scene's own, for poses that are given with each picture.
+      cameras: names of cameras that are added behind the scene's own, for poses that are given with each image.
 
     Raises:
       EngineError: the scene on disk is no longer the one that was loaded.

@@ -66,7 +66,7 @@ class SensorSuite:
 
         Raises:
           UnknownNameError: no such sensor. EngineError: the robot lacks what a sensor needs, or the engine cannot make
-            pictures (only "native" and "warp" can).
+            images (only "native" and "warp" can).
         """
         self._sensors = [find_sensor(name) for name in ((names,) if isinstance(names, str) else names)]
         self.options = options or SensorOptions()
@@ -88,7 +88,7 @@ class SensorSuite:
         self._whole = engine.program(self.read_fn)
 
     def _make_camera(self, engine: Engine) -> Camera:
-        wanted = frozenset().union(*(s.pictures for s in self._seen))
+        wanted = frozenset().union(*(s.images for s in self._seen))
         options = self._setup.options
         settings: dict[str, Any] = {
             "width": options.width,
@@ -119,7 +119,7 @@ class SensorSuite:
 
     @property
     def looks(self) -> bool:
-        """Some sensor needs pictures or rays; the others are read from the view alone (`feel_fn`)."""
+        """Some sensor needs images or rays; the others are read from the view alone (`feel_fn`)."""
         return self._camera is not None
 
     # Readings.
@@ -172,17 +172,17 @@ class SensorSuite:
         controller: Any,
         memory: Memory | None = None,
         keys: UInt32[Array, "W 2"] | None = None,
-        drawn: Bool[Array, "W"] | None = None,
+        rendered: Bool[Array, "W"] | None = None,
     ) -> tuple[Readings, Memory | None]:
         """Readings of the sensors that need images or rays; see `read`.
 
         Args:
-          drawn: the worlds whose readings matter; None: all.
+          rendered: the worlds whose readings matter; None: all.
         """
         if self._camera is None:
             return {}, None
         eye, poses = self._poses(view, controller)
-        images = self._camera(physics, view, states, poses, drawn)
+        images = self._camera(physics, view, states, poses, rendered)
         return self._finish(view, states, controller, eye, images, memory, keys)
 
     # Memory.
@@ -201,7 +201,7 @@ class SensorSuite:
         if self._setup.scene.manifest.agents[self._setup.agent].camera:
             pos, quat = self._setup.controller.eye(view, controller)
             eye = (jnp.asarray(pos), jnp.asarray(quat))
-            if any(s.pictures for s in self._seen):
+            if any(s.images for s in self._seen):
                 poses[self._setup.camera] = eye
         for name, (_, pose) in self._patterns.items():
             poses[name] = pose(self._setup, view, eye)
@@ -217,7 +217,7 @@ class SensorSuite:
         memory: Memory | None,
         keys: UInt32[Array, "W 2"] | None,
     ) -> tuple[Readings, Memory | None]:
-        """Readings from pictures."""
+        """Readings from images."""
         now = self._memory(view, controller) if self._remembers else None
         before = now if memory is None else memory
         percept = Percept(view, states, controller, eye, images, before, keys)

@@ -36,7 +36,7 @@ from ig2mj.sampling.conditions import Condition
 from ig2mj.sampling.placement import Budget
 from ig2mj.sampling.setters import lacks, set_by_name
 from ig2mj.scene.scene import Scene, load_scene
-from ig2mj.simulation import pictures
+from ig2mj.simulation import images
 from ig2mj.simulation.own_world import OwnWorld
 from ig2mj.simulation.placing import Vector, joint_address, write_of_joint, write_of_pose
 from ig2mj.simulation.recording import Recorded
@@ -405,7 +405,7 @@ class Simulation(OwnWorld, Recorded):
           camera: a camera's name or number, an `ig2mj.viewer.offscreen.FreeView`, or None for an overview.
           options: see `ig2mj.viewer.offscreen.render`.
         """
-        return pictures.render(self, camera, width, height, **options)
+        return images.render(self, camera, width, height, **options)
 
     def launch_viewer(self, **options: Any) -> None:
         """Opens MuJoCo's viewer on this world and steps it until the window is closed.
@@ -416,4 +416,4 @@ class Simulation(OwnWorld, Recorded):
         Raises:
           MissingDependencyError: there is no display.
         """
-        pictures.launch_viewer(self, **options)
+        images.launch_viewer(self, **options)

@@ -7,8 +7,10 @@ from __future__ import annotations
 
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 from flax import struct
-from jaxtyping import Int
+from jaxtyping import Bool, Int
 
 from ig2mj.agents.grasping import GraspState
 from ig2mj.engine.view import Array, counted, length
@@ -39,3 +41,11 @@ class Batch:
 
     def __repr__(self) -> str:
         return counted(self, worlds=length(self.number))
+
+
+def select_worlds(mask: Bool[Array, "W"], new: Any, old: Any) -> Any:
+    """`new` in the masked worlds, `old` elsewhere; pytrees of arrays [W, ...]. All of `new` where `old` is None."""
+    if old is None:
+        return new
+    mask = jnp.asarray(mask)
+    return jax.tree.map(lambda a, b: jnp.where(mask.reshape((-1,) + (1,) * (jnp.ndim(b) - 1)), a, b), new, old)

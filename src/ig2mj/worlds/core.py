@@ -42,7 +42,7 @@ from ig2mj.process.gc_pause import GC_PAUSED, compile_together
 from ig2mj.states.world import ExtendedStates, Swap, WorldState
 from ig2mj.worlds import guards
 from ig2mj.worlds.agent_cameras import AgentCameras
-from ig2mj.worlds.batch import Batch
+from ig2mj.worlds.batch import Batch, select_worlds
 from ig2mj.worlds.controls import Controls
 from ig2mj.worlds.hand_resets import HandResets
 from ig2mj.worlds.hands import Hands, Held
@@ -50,7 +50,7 @@ from ig2mj.worlds.incremental import rules_step
 from ig2mj.worlds.pool import Pool
 from ig2mj.worlds.random_streams import Seeds
 from ig2mj.worlds.rules import Outcome, Rules, States
-from ig2mj.worlds.starts import Starts, checked_mask, chosen
+from ig2mj.worlds.starts import Starts, checked_mask
 
 Policy = Callable[[Batch, Any], tuple[Float[Array, "W n"] | None, Any]]
 """The next step's action (or controls) from the batch and a carry, and the new carry. Pure."""
@@ -104,7 +104,7 @@ class Core:
         self.starts = Starts(engine, rules.initial if rules is not None else None, pool)
         self._physics_step = engine.step  # a world at rest steps in under 2 us: even looking up a name counts
         self._count = guards.counter(engine, lambda: self.starts.floor, engine.substeps * engine.timestep)
-        self._chosen = engine.compile(chosen)
+        self._select = engine.compile(select_worlds)
         self.advance = engine.program(self.advance_fn)
         self._step = engine.program(self.step_fn, self.check, donate_argnums=0)
         self._reset = engine.program(self.reset_fn, self.check, donate_argnums=0)
@@ -230,7 +230,7 @@ class Core:
 
         Args:
           policy: gives each step's action. The same function object each time, or it is compiled again.
-          carry: what the policy remembers; used up, as the batch is.
+          carry: what the policy remembers; consumed, as the batch is.
         """
         return self._rollout(batch, carry, policy, length)
 
@@ -305,7 +305,7 @@ class Core:
         zero = jnp.zeros_like(world.step), jnp.zeros_like(world.time)
         started = (rows.states, key, *zero, self.controls.first(), self.hands.read(physics))
         going = (world.states, world.key, world.step, world.time, batch.controllers, batch.grasps)
-        states, key, step, time, controllers, grasps = self._chosen(mask, started, going)
+        states, key, step, time, controllers, grasps = self._select(mask, started, going)
         view = self.cameras.placed(self.engine.view(physics), controllers)
         world = WorldState(physics=physics, view=view, states=states, key=key, step=step, time=time)
         flags = jnp.where(mask, 0, batch.flags)
@@ -351,7 +351,7 @@ class Core:
         if states is None:
             states = world.states
         elif mask is not None:
-            states = self._chosen(mask, states, world.states)
+            states = self._select(mask, states, world.states)
         loaded = self.engine.load(world.physics, physics, mask)
         grasps = self.hands.after_load(loaded, batch.grasps, mask)
         return dataclasses.replace(self._with(batch, loaded, states), grasps=grasps)
@@ -362,7 +362,7 @@ class Core:
         return dataclasses.replace(batch, world=world)
 
     def check(self, batch: Batch) -> None:
-        """Raises StaleStateError: the batch was used up. Nothing while tracing."""
+        """Raises StaleStateError: the batch was consumed. Nothing while tracing."""
         self.engine.check(batch.world.physics)
 
     def fork(self, batch: Batch) -> Batch:

@@ -17,7 +17,7 @@ from ig2mj.agents.grasping import Grasping, GraspState
 from ig2mj.engine.base import Engine, Physics, Write
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
-from ig2mj.worlds.starts import chosen
+from ig2mj.worlds.batch import select_worlds
 
 Held = GraspState | None
 """What hands hold; None where they hold by friction alone."""
@@ -98,7 +98,7 @@ class Hands:
         if not self._holds or held is None:
             return self.read(physics)
         found = self._loaded(held, self.read(physics))
-        return found if mask is None else chosen(jnp.asarray(mask), found, held)
+        return found if mask is None else select_worlds(jnp.asarray(mask), found, held)
 
     def _updated(
         self, view: PhysicsView, held: GraspState, controllers: tuple[Any, ...]

@@ -88,12 +88,3 @@ def checked_mask(mask: Any, num_worlds: int) -> Bool[Array, "W"]:
             raise ActionError(f"a mask of worlds is true or false for each, not of {mask.dtype}: {mask}")
         mask = mask.astype(bool)
     return mask
-
-
-def chosen(mask: Bool[Array, "W"], these: Any, others: Any) -> Any:
-    """`these` in the masked worlds, `others` elsewhere; pytrees of arrays over worlds."""
-
-    def choose(this: Array, other: Array) -> Array:
-        return jnp.where(mask.reshape((-1,) + (1,) * (other.ndim - 1)), this, other)
-
-    return jax.tree.map(choose, these, others)

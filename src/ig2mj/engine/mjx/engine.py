@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 
-from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Write, check_arguments
+from ig2mj.engine.base import Write
 from ig2mj.engine.controls import check_shape, clip
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
@@ -29,20 +29,21 @@ from ig2mj.engine.mjx.execution import TracedExecution
 from ig2mj.engine.mjx.physics import STATE_FIELDS, MjxPhysics, all_units, fresh, mujoco_of, uncommitted
 from ig2mj.engine.mjx.view import Moved, ViewPlan, make_view, plan_view
 from ig2mj.engine.mjx.writing import after_release, apply_write, reaches, trees_joined, with_islands
-from ig2mj.engine.model_fields import MOVING, ModelFields, check_names, check_written, given, merged, own_fields
+from ig2mj.engine.model_fields import MOVING, ModelFields, check_written, given, merged, own_fields
 from ig2mj.engine.native.engine import NativeEngine
 from ig2mj.engine.native.sleep import FULLY_AWAKE
+from ig2mj.engine.scene_engine import SceneEngine
 from ig2mj.engine.snapshot import Snapshot, fitted, make_snapshot
 from ig2mj.engine.speed_limits import SpeedLimits
 from ig2mj.engine.view import Array, PhysicsView
 from ig2mj.errors import EngineError
-from ig2mj.process import entry_point, prepare_jax
+from ig2mj.process import entry_point
 from ig2mj.process.gc_pause import Compiled, Traced
 from ig2mj.scene.scene import Scene
 
 
 @entry_point
-class MjxEngine(TracedExecution, MjxCopies, abc.ABC):
+class MjxEngine(TracedExecution, MjxCopies, SceneEngine, abc.ABC):
     """The `Engine` protocol on MJX; subclasses choose the implementation. See `ig2mj.engine.base`.
 
     Contacts of the view are those of the last physics step, of positions 1/120 s before the poses, as in iGibson.
@@ -62,38 +63,25 @@ class MjxEngine(TracedExecution, MjxCopies, abc.ABC):
         scene: Scene,
         num_worlds: int = 1,
         *,
-        substeps: int = SUBSTEPS,
-        timestep: float = PHYSICS_TIMESTEP,
-        touch_tolerance: float = TOUCH_TOLERANCE,
-        boxes: str = "tight",
-        model_fields: Sequence[str] = (),
         initial: Snapshot | None = None,
+        **options: Any,
     ):
         """Makes an engine.
 
         Args:
-          scene: shared by all worlds.
-          num_worlds: W.
-          substeps, timestep: physics steps in a control step, and their length in seconds.
-          touch_tolerance: metres.
-          boxes: rule of the view's world boxes, "tight" or "igibson".
-          model_fields: fields of the model that may differ per world (`ig2mj.engine.model_fields`).
+          scene, num_worlds, options: see `SceneEngine`.
           initial: where `reset` starts every world, without the world axis; None: the scene's initial state.
 
         Raises:
           EngineError: an argument is out of range, or MJX cannot run the scene.
         """
-        check_arguments(boxes, num_worlds, substeps, timestep)
-        prepare_jax()
-        self.scene, self.tables, self.num_worlds = scene, scene.tables, num_worlds
-        self.substeps, self.timestep, self.boxes = substeps, timestep, boxes
-        self.touch_tolerance, self.model_fields = touch_tolerance, check_names(model_fields)
+        super().__init__(scene, num_worlds, **options)
         self.host_model = self._host_model(scene.model)
         self.layout: ModelLayout = make_layout(self.host_model, self.tables)
-        self.plan: ViewPlan = plan_view(self.host_model, self.tables, self.layout, boxes)
+        self.plan: ViewPlan = plan_view(self.host_model, self.tables, self.layout, self.boxes)
         # C MuJoCo's start: all engines begin alike, and MJX need not compile a forward pass.
-        ways = {"timestep": timestep, "touch_tolerance": touch_tolerance, "boxes": boxes, "model_fields": model_fields}
-        self._initial, self._first_view = NativeEngine(scene, **ways).first_world(initial)
+        same = {name: getattr(self, name) for name in ("timestep", "touch_tolerance", "boxes", "model_fields")}
+        self._initial, self._first_view = NativeEngine(scene, **same).first_world(initial)
         self._speed_limits = SpeedLimits(self.host_model, self.tables.body_agent)
         self._pyramidal = self.host_model.opt.cone == mujoco.mjtCone.mjCONE_PYRAMIDAL
         try:

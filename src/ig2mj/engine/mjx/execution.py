@@ -49,7 +49,7 @@ class TracedExecution:
             return jax.device_put(jax.tree.map(_single_precision, tree))
 
     def kept(self, tree: Any) -> Any:
-        """See `Engine.kept`: fetched to the host, since a step may use up the arrays that it is given."""
+        """See `Engine.kept`: fetched to the host, since a step may consume the arrays that it is given."""
         return jax.tree.map(np.array, tree)
 
     def kept_row(self, tree: Any, world: int) -> tuple[Any, int]:

@@ -24,12 +24,12 @@ import mujoco
 import numpy as np
 from jaxtyping import Bool, Float
 
-from ig2mj.engine.base import PHYSICS_TIMESTEP, SUBSTEPS, TOUCH_TOLERANCE, Write, check_arguments, whole_number
+from ig2mj.engine.base import Write, whole_number
 from ig2mj.engine.contact_filter import BitLayers
 from ig2mj.engine.controls import check_shape
 from ig2mj.engine.health import Health
 from ig2mj.engine.layout import ModelLayout, make_layout
-from ig2mj.engine.model_fields import check_names, check_written, given
+from ig2mj.engine.model_fields import check_written, given
 from ig2mj.engine.native.contacts import ForcePlan
 from ig2mj.engine.native.execution import HostExecution
 from ig2mj.engine.native.later import RAW, LaterPlan
@@ -41,15 +41,16 @@ from ig2mj.engine.native.view_rows import FIELDS, Changed, PoseRows
 from ig2mj.engine.native.writing import apply_write
 from ig2mj.engine.object_boxes import make_box_table
 from ig2mj.engine.saved import SavedPhysics
+from ig2mj.engine.scene_engine import SceneEngine
 from ig2mj.engine.snapshot import Snapshot, fitted
 from ig2mj.engine.speed_limits import SpeedLimits
 from ig2mj.engine.view import SCHEMA, Array, PhysicsView, axis_sizes
 from ig2mj.errors import EngineError, LostWorldError
-from ig2mj.process import prepare_jax, prepare_mujoco
+from ig2mj.process import prepare_mujoco
 from ig2mj.scene.scene import Scene
 
 
-class NativeEngine(HostExecution):
+class NativeEngine(HostExecution, SceneEngine):
     """C MuJoCo behind the `Engine` protocol (see `ig2mj.engine.base`).
 
     Views hold float32 numpy arrays that nobody changes afterwards. Where nothing changed since the last view, the same
@@ -66,23 +67,14 @@ class NativeEngine(HostExecution):
         scene: Scene,
         num_worlds: int = 1,
         *,
-        substeps: int = SUBSTEPS,
-        timestep: float = PHYSICS_TIMESTEP,
-        touch_tolerance: float = TOUCH_TOLERANCE,
-        boxes: str = "tight",
-        model_fields: Sequence[str] = (),
         threads: int | None = None,
         incremental: bool = True,
+        **options: Any,
     ):
         """Makes an engine.
 
         Args:
-          scene: shared by all worlds.
-          num_worlds: W.
-          substeps, timestep: physics steps in a control step, and their length in seconds.
-          touch_tolerance: metres; contacts farther apart than the geoms' `gap` are never seen.
-          boxes: rule of the view's world boxes, "tight" or "igibson".
-          model_fields: fields of the model that may differ per world (`ig2mj.engine.model_fields`).
+          scene, num_worlds, options: see `SceneEngine`.
           threads: how many to step worlds on; None: one per processor, and no more than worlds.
           incremental: work that cannot change anything is skipped, in physics and in the states of the worlds that are
             stepped with this engine (`ig2mj.worlds.incremental`). Results are the same to the bit.
@@ -90,15 +82,13 @@ class NativeEngine(HostExecution):
         Raises:
           EngineError: an argument is out of range.
         """
-        check_arguments(boxes, num_worlds, substeps, timestep)
-        prepare_jax()
+        super().__init__(scene, num_worlds, **options)
         prepare_mujoco()
         if threads is not None:
             whole_number("threads", threads)
-        self.scene, self.tables, self.num_worlds = scene, scene.tables, num_worlds
-        self.substeps, self.timestep, self.boxes, self.incremental = substeps, timestep, boxes, incremental
+        self.incremental = incremental
         self.threads = min(threads or os.cpu_count() or 1, num_worlds)
-        self._slots = [ModelSlot(_engine_model(scene.model, timestep)) for _ in range(self.threads)]
+        self._slots = [ModelSlot(_engine_model(scene.model, self.timestep)) for _ in range(self.threads)]
         model = self._slots[0].model
         self.layout: ModelLayout = make_layout(model, self.tables)
         self._statics = Statics(
@@ -107,10 +97,10 @@ class NativeEngine(HostExecution):
             poses=PoseRows(
                 self.tables,
                 self.layout,
-                make_box_table(boxes, model, self.tables, self.layout),
+                make_box_table(self.boxes, model, self.tables, self.layout),
                 np.asarray(model.body_treeid, int),
             ),
-            later=LaterPlan.build(model, self.tables, self.layout, touch_tolerance),
+            later=LaterPlan.build(model, self.tables, self.layout, self.touch_tolerance),
             has_agents=len(self.tables.agent_names) > 0,
             layers=BitLayers(model, self.tables),
             forces=ForcePlan.build(
@@ -120,9 +110,9 @@ class NativeEngine(HostExecution):
                 (len(self.tables.finger_body), len(self.tables.graspable_body)),
             ),
             speed_limits=SpeedLimits(model, self.tables.body_agent),
-            tolerance=touch_tolerance,
-            own_fields=check_names(model_fields),
-            substeps=range(substeps),
+            tolerance=self.touch_tolerance,
+            own_fields=self.model_fields,
+            substeps=range(self.substeps),
             incremental=incremental,
         )
         self._free_dofs = self.layout.object_linear_dofs

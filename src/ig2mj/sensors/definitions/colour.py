@@ -1,4 +1,4 @@
-"""`rgb`: the picture of the agent's camera."""
+"""`rgb`: the image of the agent's camera."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ from ig2mj.sensors.labels import looked_up
 from ig2mj.sensors.pinhole import normalized_coordinates, points
 
 MOST = 2.0
-"""Range of optical flow: from one edge of the picture to the other."""
+"""Range of optical flow: from one edge of the image to the other."""
 
 
 def _points(setup: Setup, percept: Percept) -> tuple[Float[Array, "W Y X 3"], Float[Array, "W Y X 3"]]:
@@ -45,7 +45,7 @@ def _where_seen(percept: Percept, flow: Float[Array, "W Y X d"]) -> Float[Array,
 
 
 def _optical(setup: Setup, percept: Percept) -> Float[Array, "W Y X 2"]:
-    """Change of the normalized coordinates: (1, 0) is half the picture's width to the right, (0, 1) half up."""
+    """Change of the normalized coordinates: (1, 0) is half the image's width to the right, (0, 1) half up."""
     now, earlier = _points(setup, percept)
     flow = normalized_coordinates(setup, now) - normalized_coordinates(setup, earlier)
     return jnp.clip(_where_seen(percept, flow), -MOST, MOST)
@@ -63,7 +63,7 @@ def _space(channels: int, most: float):
 
 _NEEDS = frozenset({"depth", "segmentation"})
 OPTICAL_FLOW = Sensor(
-    "optical_flow", "motion since the last reading, halves of the picture", "picture (x right, y up)",
+    "optical_flow", "motion since the last reading, halves of the image", "image (x right, y up)",
     _space(2, MOST), _optical, _NEEDS, remembers=True,
 )  # fmt: skip
 SCENE_FLOW = Sensor(

@@ -1,6 +1,6 @@
 """`lidar`: sixteen beams all around the agent's camera.
 
-iGibson takes the nearest pixels of four rendered pictures; here the rays themselves are cast. It drops points that are
+iGibson takes the nearest pixels of four rendered images; here the rays themselves are cast. It drops points that are
 not there; here they are zeros, so that all worlds have the same shape.
 """
 

@@ -2,7 +2,7 @@
 
 On a plane the inverse of depth is an affine function of the pixel's place, so that its differences between pixels give
 the normal exactly. Differences are taken between pixels of one geom only, and on the side where they change less, which
-keeps them off the edges of boxes. Both engines' pictures give the same normals; those are of faces, not smoothed.
+keeps them off the edges of boxes. Both engines' images give the same normals; those are of faces, not smoothed.
 """
 
 from __future__ import annotations
