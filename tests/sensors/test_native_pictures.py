@@ -79,7 +79,7 @@ def test_rows_that_nobody_looks_at_show_nothing(world):
         assert whole[name][:, 20:].any()
         np.testing.assert_array_equal(part[name][:, 6:20], whole[name][:, 6:20])
         assert not part[name][:, :6].any() and not part[name][:, 20:].any()
-    with pytest.raises(EngineError, match="there are none"):
+    with pytest.raises(EngineError, match="are empty for images of 24 rows"):
         world.see("rgb", **SIZE, rows=(10, 25))
 
 
