@@ -15,7 +15,7 @@ FILE = re.compile(r"`([\w./-]+/[\w.-]+\.(?:py|json|toml|yaml|slurm))`")
 
 @pytest.mark.parametrize("page", PAGES, ids=[p.relative_to(ROOT).as_posix() for p in PAGES])
 def test_files_of_a_page_exist(page):
-    """A path is from the repository's root, from src/, src/ig2mj/ or converters/; words in capitals are placeholders."""
+    """A path is from the root, src/, src/ig2mj/ or converters/; words in capitals are placeholders."""
     found = FILE.findall(page.read_text(encoding="utf-8"))
     named = {name for name in found if not re.search(r"[A-Z]{4}|misc/|meta/", name)}
     assert not sorted(name for name in named if not any((folder / name).is_file() for folder in FOLDERS))
