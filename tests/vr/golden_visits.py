@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from ig2mj.agents.humanoid.frames import MAX_MOVE, MAX_TURN
 from ig2mj.demos import Recording
 from ig2mj.vr.frames import SHAPES, Pose, from_arrays
-from ig2mj.vr.mapping import Robot
+from ig2mj.vr.mapping import HumanoidPose
 
 LENGTH = 40
 """Frames of a part."""
@@ -38,7 +38,7 @@ def load(file: pathlib.Path) -> list[list[tuple]]:
             frame = from_arrays({name: np.asarray(found[name][k]) for name in SHAPES})
             body, eye, hands = found["body"][k], found["eye"][k], found["robot_hands"][k]
             left, right = found["robot_triggers"][k].tolist()
-            robot = Robot(_pose(body), _pose(eye), (_pose(hands[0]), _pose(hands[1])), (left, right))
+            robot = HumanoidPose(_pose(body), _pose(eye), (_pose(hands[0]), _pose(hands[1])), (left, right))
             part.append((frame, robot, found["action"][k] * SCALE.astype(float)))
         parts.append(part)
     return parts

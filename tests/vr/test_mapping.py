@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from ig2mj.agents.humanoid.frames import BODY_Z, EYE_POS, HAND_POS, HAND_QUAT, MAX_MOVE, MAX_TURN, PALM_CENTER, mirrored
 from ig2mj.vr.frames import SHAPES, Gaze, Hand, PlayArea, Pose, PoseFrame, from_arrays, to_arrays
-from ig2mj.vr.mapping import Memory, Robot, action_of, heading
+from ig2mj.vr.mapping import HumanoidPose, Memory, action_of, heading
 from ig2mj.vr.play_area import HEIGHTS, brought_to, moved
 from ig2mj.vr.xr_axes import grip_of_hand, hand_from_grip, head_from_xr, to_xr
 
@@ -23,20 +23,20 @@ def rest(hand: int) -> Pose:
     return Pose(HAND_POS[hand], HAND_QUAT[hand])
 
 
-def robot(body: Pose | None = None, **changes) -> Robot:
+def robot(body: Pose | None = None, **changes) -> HumanoidPose:
     """At rest, its body at (1, 2, 0.55), turned left by 90 degrees."""
     body = body or Pose.of((1.0, 2.0, 0.55), turned(z=90))
-    made = Robot(body, Pose.of(EYE_POS, STILL), (rest(0), rest(1)), (0.0, 0.0))
+    made = HumanoidPose(body, Pose.of(EYE_POS, STILL), (rest(0), rest(1)), (0.0, 0.0))
     return dataclasses.replace(made, **changes)
 
 
-def frame_at_rest(of: Robot, **changes) -> PoseFrame:
+def frame_at_rest(of: HumanoidPose, **changes) -> PoseFrame:
     """What devices say whose person is where the robot is."""
     head, hands = of.body * of.eye, tuple(Hand(of.body * hand) for hand in of.hands)
     return dataclasses.replace(PoseFrame(0.0, head, hands), **changes)
 
 
-def carried_out(of: Robot, action: np.ndarray) -> Robot:
+def carried_out(of: HumanoidPose, action: np.ndarray) -> HumanoidPose:
     """What the controller makes of an action, with a body that gets where it is sent."""
 
     def step(pose: Pose, six: np.ndarray) -> Pose:
@@ -44,7 +44,9 @@ def carried_out(of: Robot, action: np.ndarray) -> Robot:
 
     body = of.body * Pose.of(action[:3], Rotation.from_euler("xyz", action[3:6]))
     hands = (step(of.hands[0], action[12:18]), step(of.hands[1], action[20:26]))
-    return Robot(body, step(of.eye, action[6:12]), hands, (of.triggers[0] + action[18], of.triggers[1] + action[26]))
+    return HumanoidPose(
+        body, step(of.eye, action[6:12]), hands, (of.triggers[0] + action[18], of.triggers[1] + action[26])
+    )
 
 
 def apart(a: Pose, b: Pose) -> tuple[float, float]:
@@ -279,7 +281,7 @@ def test_a_hand_can_move_both_ways():
 
 @pytest.mark.parametrize("hand", [0, 1])
 def test_a_pulled_trigger_closes_and_a_released_one_opens(hand):
-    def trigger(value: float, of: Robot) -> float:
+    def trigger(value: float, of: HumanoidPose) -> float:
         hands = [Hand(), Hand()]
         hands[hand] = Hand(trigger=value)
         return float(action_of(PoseFrame(0.0, None, (hands[0], hands[1])), of, Memory())[0][18 + 8 * hand])

@@ -38,7 +38,7 @@ LEVEL = 0.05
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class Robot:
+class HumanoidPose:
     """The humanoid as it is: pose of its body in the world; targets of eye and hands in the body's frame; triggers."""
 
     body: Pose
@@ -64,7 +64,7 @@ class Memory:
     took_hold: int = 0
 
 
-def robot_of(view: PhysicsView, state: HumanoidState, world: int = 0, agent: int = 0) -> Robot:
+def robot_of(view: PhysicsView, state: HumanoidState, world: int = 0, agent: int = 0) -> HumanoidPose:
     """One humanoid of a view, with what its controller remembers."""
 
     def pose(pos: object, quat: object) -> Pose:
@@ -73,7 +73,7 @@ def robot_of(view: PhysicsView, state: HumanoidState, world: int = 0, agent: int
 
     hands = [pose(np.asarray(state.hand_pos)[world, k], np.asarray(state.hand_quat)[world, k]) for k in range(2)]
     triggers = np.asarray(state.trigger, np.float64)[world]
-    return Robot(
+    return HumanoidPose(
         pose(np.asarray(view.agent.base_pos)[world, agent], np.asarray(view.agent.base_quat)[world, agent]),
         pose(np.asarray(state.eye_pos)[world], np.asarray(state.eye_quat)[world]),
         (hands[0], hands[1]),
@@ -81,7 +81,7 @@ def robot_of(view: PhysicsView, state: HumanoidState, world: int = 0, agent: int
     )
 
 
-def action_of(frame: PoseFrame | None, robot: Robot, memory: Memory) -> tuple[Float[np.ndarray, "28"], Memory]:
+def action_of(frame: PoseFrame | None, robot: HumanoidPose, memory: Memory) -> tuple[Float[np.ndarray, "28"], Memory]:
     """The humanoid's action, in metres, radians and shares, and what to remember. Pure.
 
     Args:
