@@ -34,6 +34,7 @@ from benchmarks.soak.energy import Energy, EnergyWatch
 from benchmarks.soak.watch import FLAGS, Seen, Watch
 from benchmarks.speed.batch import device
 from ig2mj.agents.base import ACTION_PERIOD
+from ig2mj.agents.registry import make_robot
 from ig2mj.engine.view import Array
 from ig2mj.envs.environment import Environment
 from ig2mj.states.definitions.sliced import in_use
@@ -107,14 +108,15 @@ def scales(env: Environment) -> Float[np.ndarray, "n"]:
     action, share = env.action_map, PERIOD / ACTION_PERIOD
     turns = ("roll", "pitch", "yaw", "rx", "ry", "rz", "turn_left")
     grips = ("trigger", "gripper", "reset")
+    displaces = make_robot(env.robot).hand_controls[0].displaces
     largest = []
     for name, scale in zip(action.names, action.scale, strict=True):
         if name.endswith(grips):
             largest.append(1.0 if name.endswith("gripper") else 1.0 / scale)
             continue
         speed = TURN_SPEED if name.endswith(turns) else SPEED
-        # Of the humanoid: metres and radians an action. Fetch's numbers are velocities already.
-        largest.append(share * speed * ACTION_PERIOD / scale if env.robot == "humanoid" else 1.0)
+        # Metres and radians an action, or velocities already.
+        largest.append(share * speed * ACTION_PERIOD / scale if displaces else 1.0)
     return np.minimum(np.array(largest, np.float32), 1.0)
 
 

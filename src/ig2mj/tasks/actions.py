@@ -21,8 +21,8 @@ from ig2mj.agents.task_robot import HandControl
 from ig2mj.engine.view import Array
 from ig2mj.errors import EngineError
 
-TURN_SPEED = 0.5
-"""rad/s of a hand at 1 (paper, appendix A.3)."""
+SPEED, TURN_SPEED = 0.5, 0.5
+"""m/s and rad/s of a hand at 1 (paper, appendix A.3)."""
 
 DRIVE = ("forward", "turn_left")
 """Numbers of a controller's action that drive a robot."""
