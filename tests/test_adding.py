@@ -8,6 +8,7 @@ import pathlib
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
 
 import pytest
 
@@ -204,8 +205,17 @@ def test_a_mesh_format_is_one_file_and_one_line(told):
     assert told["faces"] == [4]
 
 
-def test_a_registered_robot_is_made_by_its_name(monkeypatch):
-    monkeypatch.setattr(registry, "ROBOTS", dict(registry.ROBOTS))
+@pytest.fixture
+def registered() -> Iterator[None]:
+    """What a test registers is forgotten after it."""
+    before = dict(registry.ROBOTS)
+    yield
+    registry.ROBOTS.clear()
+    registry.ROBOTS.update(before)
+
+
+@pytest.mark.usefixtures("registered")
+def test_a_registered_robot_is_made_by_its_name():
     registry.register("mine", lambda: Fetch(name="mine"))
     assert registry.make_robot("mine").name == "mine"
     with pytest.raises(EngineError, match="already registered"):
@@ -214,9 +224,9 @@ def test_a_registered_robot_is_made_by_its_name(monkeypatch):
         registry.make_robot("mime")
 
 
-def test_a_registered_robot_takes_the_place_of_the_listed_one_that_stands_lowest(monkeypatch):
+@pytest.mark.usefixtures("registered")
+def test_a_registered_robot_takes_the_place_of_the_listed_one_that_stands_lowest():
     """Its base is on the floor where Fetch's would be, it acts with its first hand, and it has an expert."""
-    monkeypatch.setattr(registry, "ROBOTS", dict(registry.ROBOTS))
     registry.register("mine", lambda: Fetch(name="mine"))
     task = load_task("GraspingBook")
     setup = setup_activity(task, "mine", "assisted", None, "train", None, False, Control())
@@ -227,8 +237,8 @@ def test_a_registered_robot_takes_the_place_of_the_listed_one_that_stands_lowest
     Expert(task, "mine", setup.scene, setup.rules.model, "assisted")
 
 
-def test_what_is_registered_must_be_a_robot(monkeypatch):
-    monkeypatch.setattr(registry, "ROBOTS", dict(registry.ROBOTS))
+@pytest.mark.usefixtures("registered")
+def test_what_is_registered_must_be_a_robot():
     with pytest.raises(EngineError, match="register its class or a function"):
         registry.register("mine", 7)
     registry.register("mine", lambda: 7)
