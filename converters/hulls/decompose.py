@@ -16,7 +16,7 @@ from .budget import Budgeted, Merged, keep_to_budget
 from .convex import Hull, clip_to, hull_of, solid_hull, union_mesh, union_volume
 from .mesh_parts import MeshComponent, decimate, signed_volume
 from .openings import Openings
-from .pieces import HullOptions, PieceSource
+from .pieces import HullOptions, HullPieceSource
 from .rectilinear import boxes_of
 from .shapes import Convex
 
@@ -75,7 +75,7 @@ class HullCut:
     """
 
     hulls: list[Hull]
-    source: PieceSource
+    source: HullPieceSource
     warnings: list[str]
     stopped: bool = False
     seconds: float = 0.0
@@ -119,7 +119,7 @@ def recut_to_budget(
     few = max(options.few_hulls - len(others), 1)
     reference = _inside_of_sheets(found)
     best = keep_to_budget(hulls, others, few, most, options.max_volume_error, reference)
-    source: PieceSource = "merged"
+    source: HullPieceSource = "merged"
     if best.needed > len(best.pieces) and reference is None and most > few:  # fewer than few is the user's own wish
         anew = _recut(hulls, others, most, options)
         if anew is not None and (anew.open, -anew.volume_error) > (best.open, -best.volume_error):

@@ -25,7 +25,7 @@ from .budget import drop_contained
 from .convex import Hull, distance_outside, hull_of, reduce_vertices, solid_hull, union_volume
 from .decompose import COARSE_FACES, COARSE_TOLERANCES, CutTask, cut_part, effort_for, recut_to_budget
 from .fitting import fit_primitive, primitive_hull
-from .pieces import HullOptions, HullPiece, LinkHulls, PieceSource
+from .pieces import HullOptions, HullPiece, HullPieceSource, LinkHulls
 from .shapes import Concave, Convex, ShapeParts, label_of, primitive_piece, take_apart
 
 __all__ = ["HullOptions", "HullPiece", "LinkHulls", "LinkPieces", "decompose_link", "decompose_links", "scaled_pieces"]
@@ -350,7 +350,7 @@ def _load(key: str) -> LinkPieces | None:
     facts, arrays = known
     pieces = []
     for i, piece in enumerate(facts["pieces"]):
-        source: PieceSource = piece["source"]
+        source: HullPieceSource = piece["source"]
         hull = Hull(arrays[f"{i}.vertices"], arrays[f"{i}.faces"], arrays[f"{i}.planes"], piece["volume"])
         pieces.append(Convex(hull, source, arrays.get(f"{i}.flat")))
     return LinkPieces(pieces, arrays["corners"], cached=True, **{name: facts[name] for name in _FACTS})

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..base.options import ConvertOptions
 
-PieceKind = Literal["box", "cylinder", "sphere", "capsule", "hull"]
-PieceSource = Literal[
+HullPieceKind = Literal["box", "cylinder", "sphere", "capsule", "hull"]
+HullPieceSource = Literal[
     "primitive", "group", "hull", "component", "boxes", "sheet", "coacd", "fallback", "merged", "recut"
 ]
 
@@ -91,12 +91,12 @@ class HullPiece:
       volume_error: relative change of volume by primitive fit and vertex reduction (signed; + is bigger).
     """
 
-    kind: PieceKind
+    kind: HullPieceKind
     vertices: np.ndarray
     faces: np.ndarray
     pose: np.ndarray = dataclasses.field(default_factory=lambda: np.eye(4))
     size: tuple[float, ...] = ()
-    source: PieceSource = "hull"
+    source: HullPieceSource = "hull"
     volume: float = 0.0
     fit_error: float = 0.0
     volume_error: float = 0.0

@@ -17,7 +17,7 @@ from ..base.description import Mesh, Shape
 from .convex import Hull, solid_hull
 from .fitting import primitive_hull, primitive_volume
 from .mesh_parts import MeshComponent, clean, decimate, enclosed_volume, hull_stands_for, is_thin_shell, parts
-from .pieces import HullOptions, HullPiece, PieceSource
+from .pieces import HullOptions, HullPiece, HullPieceSource
 
 GROUP_RATIO = 1.3
 """A group whose hull has more than this many times its mesh's volume is not a convex piece, whatever the file says."""
@@ -34,7 +34,7 @@ class Convex:
     """A convex piece before any budget. flat: the points [n, 3] of a flat one, whose hull is those points thickened."""
 
     hull: Hull
-    source: PieceSource
+    source: HullPieceSource
     flat: np.ndarray | None = None
 
 

@@ -63,7 +63,7 @@ class ColumnWindow:
 
 
 @dataclasses.dataclass(frozen=True)
-class PieceColumns:
+class ConvexPieceColumns:
     """Where a piece begins and ends in each column of its window, metres; NaN where the column misses it."""
 
     window: ColumnWindow
@@ -73,7 +73,7 @@ class PieceColumns:
 
 def piece_columns(
     tables: SceneTables, piece: int, pos: Float[np.ndarray, "3"], rotation: Float[np.ndarray, "3 3"], cell: float = CELL
-) -> PieceColumns:
+) -> ConvexPieceColumns:
     """Columns of one piece.
 
     Args:
@@ -100,7 +100,7 @@ def piece_columns(
                     ball = _sphere(end * size[1] * rotation[:, 2], size[0], x, y)
                     low, high = np.fmin(low, ball[0]), np.fmax(high, ball[1])
         hit = low < high
-    return PieceColumns(window, np.where(hit, low + pos[2], np.nan), np.where(hit, high + pos[2], np.nan))
+    return ConvexPieceColumns(window, np.where(hit, low + pos[2], np.nan), np.where(hit, high + pos[2], np.nan))
 
 
 def _polyhedron(
@@ -176,7 +176,7 @@ class ColumnMap:
         self._rotation = np.zeros((len(tables.piece_geom), 3, 3))
         self._low = np.zeros((len(tables.piece_geom), 3))
         self._high = np.zeros((len(tables.piece_geom), 3))
-        self._columns: dict[int, PieceColumns] = {}
+        self._columns: dict[int, ConvexPieceColumns] = {}
         self._local = matrices_on_host(tables.piece_quat)
 
     def update(self, body_pos: Float[np.ndarray, "B 3"], body_rotation: Float[np.ndarray, "B 3 3"]) -> None:
@@ -196,7 +196,7 @@ class ColumnMap:
         mine = self.tables.piece_object == object_index
         return self._low[mine].min(0), self._high[mine].max(0)
 
-    def of_piece(self, piece: int) -> PieceColumns:
+    def of_piece(self, piece: int) -> ConvexPieceColumns:
         """A piece's columns, computed at the first call after it moved."""
         found = self._columns.get(piece)
         if found is None:
