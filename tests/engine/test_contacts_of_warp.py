@@ -8,8 +8,9 @@ import pytest
 from mujoco.mjx.third_party import mujoco_warp
 from mujoco.mjx.third_party.mujoco_warp._src import collision_driver
 
+from ig2mj.engine.contact_filter import DROPPED_DISTANCE
 from ig2mj.engine.warp.patches import awake_kernels, pins
-from ig2mj.engine.warp.patches.contacts import FAR, mend_contacts
+from ig2mj.engine.warp.patches.contacts import mend_contacts
 
 pytestmark = pytest.mark.skipif(bool(pins.obstacles()), reason=f"our kernels do not fit: {pins.obstacles()}")
 
@@ -47,7 +48,7 @@ def _things_on_a_floor(tilt: float):
 def _slanted(worlds) -> int:
     """Worlds with a contact whose normal is not the floor's."""
     count = int(worlds.nacon.numpy()[0])
-    counts = worlds.contact.dist.numpy()[:count] < 0.5 * FAR
+    counts = worlds.contact.dist.numpy()[:count] < 0.5 * DROPPED_DISTANCE
     normal = worlds.contact.frame.numpy()[:count].reshape(count, 9)[:, :3]
     return len(np.unique(worlds.contact.worldid.numpy()[:count][counts & (np.abs(normal[:, 2]) < 0.99)]))
 
@@ -63,7 +64,7 @@ def test_a_floors_contacts_point_up(kernel_device, tilt: float):
     assert _slanted(worlds) == 0
     count = int(worlds.nacon.numpy()[0])
     world, dist = worlds.contact.worldid.numpy()[:count], worlds.contact.dist.numpy()[:count]
-    sound = dist < 0.5 * FAR
+    sound = dist < 0.5 * DROPPED_DISTANCE
     assert len(np.unique(world[sound])) == WORLDS, "every thing lies on the floor"
     reach = np.linalg.norm(worlds.contact.pos.numpy()[:count] - qpos[world, :3], axis=1)
     assert reach[sound].max() < np.linalg.norm(HALF) + 0.01
@@ -89,7 +90,7 @@ def test_what_lies_outside_either_geom_is_dropped_and_the_rest_is_kept(kernel_de
     worlds.nacon.fill_(count)
     mend_contacts(put, worlds)
     dist = worlds.contact.dist.numpy()
-    assert (dist[:count] == FAR).tolist() == stray
+    assert (dist[:count] == DROPPED_DISTANCE).tolist() == stray
     assert (dist[count:] == np.float32(-0.0021)).all(), "rows past the count are not looked at"
 
 

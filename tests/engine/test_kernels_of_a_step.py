@@ -105,7 +105,7 @@ def test_an_engine_loads_the_kernels_of_its_scene_and_its_first_step_no_others(m
 
     monkeypatch.setattr(wp.Module, "load", load)
     engine = WarpEngine(load_scene("small_home"), 2)
-    assert engine.load_kernels(workers=2) > 40
+    assert kernels.load(engine.launches(), workers=2) > 40
     loaded.clear()
     engine.step(engine.reset())
     assert not loaded

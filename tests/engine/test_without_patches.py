@@ -13,8 +13,8 @@ from mujoco.mjx.warp import forward
 
 import ig2mj
 from ig2mj.engine.base import Write
+from ig2mj.engine.contact_filter import DROPPED_DISTANCE
 from ig2mj.engine.warp import ignored_contacts, patches
-from ig2mj.engine.warp.patches.contacts import FAR
 from ig2mj.testing import api_test
 
 ACTIVITIES = [
@@ -56,7 +56,7 @@ def test_exactly_the_ignored_pairs_of_each_world_are_dropped(kernel_device):
             hand, thing = GEOM_HAND[one], GEOM_OBJECT[other]
             expected[row] |= hand >= 0 and thing >= 0 and ignored[w, hand, thing]
     assert 20 < expected.sum() < 150
-    assert np.array_equal(dist.numpy() == FAR, expected)
+    assert np.array_equal(dist.numpy() == DROPPED_DISTANCE, expected)
     assert np.array_equal((geom.numpy() == -1).all(1), expected)
 
 

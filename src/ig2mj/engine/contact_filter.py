@@ -14,6 +14,9 @@ from jaxtyping import Bool, Int
 from ig2mj.errors import EngineError
 from ig2mj.scene.tables import SceneTables
 
+DROPPED_DISTANCE = 1000.0
+"""Metres: the distance written into a dropped contact of MJX, so that it gives neither force nor touch."""
+
 MOST_BITS = 31
 """Of an integer of MuJoCo's that stays positive."""
 

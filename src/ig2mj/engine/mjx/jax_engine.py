@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int
 from mujoco import mjx
 from mujoco.mjx._src import collision_driver
 
-from ig2mj.engine.contact_filter import geom_hands
+from ig2mj.engine.contact_filter import DROPPED_DISTANCE, geom_hands
 from ig2mj.engine.mjx.contacts import Contacts, jax_contacts
 from ig2mj.engine.mjx.engine import MjxEngine
 from ig2mj.engine.mjx.physics import own_device
@@ -25,9 +25,6 @@ from ig2mj.engine.native.sleep import FULLY_AWAKE
 from ig2mj.engine.view import Array
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 from ig2mj.process import entry_point
-
-FAR = 1000.0
-"""Metres: the distance written into a dropped contact, so that it gives neither force nor touch."""
 
 
 @entry_point
@@ -110,7 +107,7 @@ def _without_ignored(model: mjx.Model, data: mjx.Data) -> mjx.Data:
     for side in (0, 1):
         own, other = hand[:, side], thing[:, 1 - side]
         dropped |= (own >= 0) & (other >= 0) & pairs.ignored[jnp.maximum(own, 0), jnp.maximum(other, 0)]
-    return data.tree_replace({"_impl.contact.dist": jnp.where(dropped, FAR, contact.dist)})
+    return data.tree_replace({"_impl.contact.dist": jnp.where(dropped, DROPPED_DISTANCE, contact.dist)})
 
 
 _collision.add({(collision_driver, "collision"): _without_ignored})

@@ -147,14 +147,6 @@ class WarpEngine(MjxEngine):
         for device in devices if self._scratch else ():
             scratch.reserve(wp.device_from_jax(device), self._scratch)
 
-    def load_kernels(self, workers: int | None = None) -> int:
-        """Compiles and loads the kernels of a step side by side; how many modules they are.
-
-        Args:
-          workers: threads; None: one for each processor of this process.
-        """
-        return kernels.load(self._launches or self.launches(), workers=workers)
-
     def launches(self, counter: scratch.Counter | None = None) -> list[kernels.Launch]:
         """The kernels of a step, of a forward pass and of the contact filter. `counter`: see `launches_of_step`."""
         warns = int(self.model.opt._impl.warn_overflow)

@@ -17,7 +17,7 @@ import numpy as np
 import warp as wp
 from mujoco.mjx.warp import forward
 
-from ig2mj.engine.warp.patches.contacts import FAR
+from ig2mj.engine.contact_filter import DROPPED_DISTANCE
 
 
 def encode(geom_hand: np.ndarray, geom_object: np.ndarray, num_objects: int) -> np.ndarray:
@@ -47,7 +47,7 @@ def _drop(
                 place = int(wp.max(one, other)) - 1 - int(wp.min(one, other)) - 1
                 world = worldid[contact] % ignored.shape[0]
                 if ignored[world, place] > 0.0:
-                    dist[contact] = wp.static(FAR)  # no constraint and no touch
+                    dist[contact] = wp.static(DROPPED_DISTANCE)  # no constraint and no touch
                     geom[contact] = wp.vec2i(-1, -1)  # and wakes nothing
 
 

@@ -20,6 +20,8 @@ from typing import Any, no_type_check
 import mujoco
 import warp as wp
 
+from ig2mj.engine.contact_filter import DROPPED_DISTANCE
+
 TOLERANCE = 0.002
 """Metres that a contact may lie outside a geom's bounding box, in addition to half its distance."""
 
@@ -29,9 +31,6 @@ box than the second, and further from its edges than the third."""
 
 UPRIGHT = 0.999
 """Cosine between a contact's normal and the face's above which the normal is kept."""
-
-FAR = 1000.0
-"""Metres: the distance written into a dropped contact, so that it gives neither force nor touch."""
 
 PLANE, HEIGHT_FIELD = int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD)
 BOX = int(mujoco.mjtGeom.mjGEOM_BOX)
@@ -93,7 +92,7 @@ def _mend(
                     if wp.length(found) > 0.5:
                         face = found * (1.0 - 2.0 * float(side))  # normals point from the first geom to the second
         if stray:
-            dist[contact] = wp.static(FAR)
+            dist[contact] = wp.static(DROPPED_DISTANCE)
         elif wp.length(face) > 0.5 and wp.dot(face, normal) < wp.static(UPRIGHT):
             other = wp.vec3(1.0, 0.0, 0.0)
             if wp.abs(face[0]) > 0.5:
