@@ -79,6 +79,7 @@ def _init_hessian(
         hessian[world, i, j] = value
 
 
+@no_type_check
 def substitute(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any]) -> Launch | None:
     """The kernel of few threads in place of one of `ROWS`, or of the one that begins the Hessian."""
     if kernel is compact_solver._init_hessian_kernel():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import ModuleType
-from typing import Any
+from typing import Any, no_type_check
 
 from ig2mj.engine.warp.patches.scope import ScopedReplacement
 
@@ -11,6 +11,7 @@ KERNELS = ScopedReplacement()
 """Our functions in place of MuJoCo Warp's; filled when they are found to fit (`ig2mj.engine.warp.patches.fit`)."""
 
 
+@no_type_check
 def original(module: ModuleType, name: str) -> Any:
     """MuJoCo Warp's own function of a replaced name."""
     return KERNELS.original(module, name)

@@ -92,6 +92,7 @@ def _guarded_by_kernel() -> dict[wp.Kernel, wp.Kernel]:
     }
 
 
+@no_type_check
 def substitute(kernel: wp.Kernel, dim: Any, inputs: Sequence[Any]) -> Launch | None:
     """The guarded kernel with its inputs, in a step that skips resting bodies."""
     flags, awake = getattr(_here, "flags", None), getattr(_here, "awake", None)

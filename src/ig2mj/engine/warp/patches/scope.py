@@ -12,7 +12,7 @@ import functools
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from types import ModuleType
-from typing import Any
+from typing import Any, no_type_check
 
 Place = tuple[ModuleType | type, str]
 """A module or a class, and the name of a function in it."""
@@ -35,6 +35,7 @@ class ScopedReplacement:
             self._own |= own
 
     @property
+    @no_type_check
     def active(self) -> bool:
         """Whether this thread's calls go to our functions."""
         return getattr(self._here, "active", False)
@@ -51,6 +52,7 @@ class ScopedReplacement:
             self._here.active = before
             self._take_back()
 
+    @no_type_check
     def original(self, holder: ModuleType | type, name: str) -> Any:
         """The function that stands in the library under this name, in a module or a class."""
         place = (holder, name)
@@ -78,6 +80,7 @@ class ScopedReplacement:
 
     def _chooser(self, own: Callable[..., Any], original: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(original)
+        @no_type_check
         def choose(*args: Any, **kwargs: Any) -> Any:
             return (own if self.active else original)(*args, **kwargs)
 
