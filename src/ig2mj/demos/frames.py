@@ -1,4 +1,4 @@
-"""`Frame`: everything of a world that goes on changing, and what each number of it belongs to.
+"""`Frame`: the complete state of worlds, and what each of its numbers belongs to.
 
 Axes: W worlds, L literals of the goal.
 """
@@ -25,12 +25,12 @@ from ig2mj.states.world import ExtendedStates
 
 @struct.dataclass
 class Frame:
-    """All worlds at one instant; every array begins with the world axis.
+    """State of all worlds at one instant; the world axis is the first of every array.
 
     Attributes:
-      physics, states: of the worlds. controllers: what the robots' controllers remember. grasps: what hands hold.
-      measures: what the task's reward is made of. goal: truth of each literal of the goal.
-      key: of the episode's random numbers. step: control steps since its start. flags: `ig2mj.worlds.guards.Flag`.
+      physics, states: of the worlds. controllers: state of the robots' controllers. grasps: what hands hold.
+      measures: quantities of the task's reward. goal: truth of each literal of the goal.
+      key: random key of the episode. step: control steps since its start. flags: `ig2mj.worlds.guards.Flag`.
     """
 
     physics: Snapshot
@@ -45,7 +45,7 @@ class Frame:
 
 
 def frame_of(engine: Engine, state: EnvState) -> Frame:
-    """What is recorded of an environment's state; arrays are still where the engine has them."""
+    """The frame of an environment's state; arrays stay on the engine's device."""
     return Frame(engine.snapshot(state.batch.world.physics), *_besides_physics(state))
 
 
@@ -59,12 +59,12 @@ class FrameRows:
     """Frames of an environment as arrays on the host, for `RunWriter`.
 
     Attributes:
-      own: names and places of the arrays that each world hands in for itself; batched: names of those that come with a
-        world axis. Together they are `names_of(frame_of(...))`, in its order.
+      own: names and places of the arrays that each world gives separately; batched: names of those with a world axis.
+        Together they are `names_of(frame_of(...))`, in its order.
     """
 
     def __init__(self, engine: Engine, worlds: Sequence[int], like: EnvState):
-        """`worlds`: those that are wanted. `like`: any state."""
+        """`worlds`: indices of the recorded worlds. `like`: any state."""
         self._engine, self._worlds = engine, list(worlds)
         names = names_of(frame_of(engine, like))
         cuts = engine.frame_cuts
@@ -87,15 +87,17 @@ class FrameRows:
 
 
 def resumed(env: Environment, frame: Frame, rows: Int[np.ndarray, "W"], used: EnvState | None = None) -> EnvState:
-    """An environment's state that goes on from a frame of all its worlds, as if it had never stopped.
+    """An environment's state that continues from a frame of all its worlds, as if it had never stopped.
 
     Args:
       rows: of the pool, with which the worlds' episodes began.
-      used: a state that came of this, and that nobody steps any more: its worlds are put there, which takes a fraction
-        of the time of new ones.
+      used: a state of this environment that is no longer stepped. Its worlds are reused, which takes a fraction of the
+        time of new ones.
     """
     batch = env.core.start() if used is None else used.batch
-    batch = dataclasses.replace(batch, controllers=jax.tree.map(jnp.asarray, frame.controllers))  # the view has eyes
+    batch = dataclasses.replace(
+        batch, controllers=jax.tree.map(jnp.asarray, frame.controllers)
+    )  # the view depends on camera poses
     batch = env.core.load(batch, frame.physics, jax.tree.map(jnp.asarray, frame.states))
     seconds = jnp.float32(env.core.engine.substeps * env.core.engine.timestep)
     step = jnp.asarray(frame.step)
@@ -117,7 +119,7 @@ def names_of(tree: Any) -> list[str]:
 
 
 class Labels:
-    """What a number of a frame's array belongs to, for people: an object, a joint, a hand."""
+    """Names what a number of a frame belongs to: an object, a joint, a hand."""
 
     def __init__(self, scene: Scene):
         """Reads names from the compiled model."""
@@ -137,7 +139,7 @@ class Labels:
         self._hands = [model.body(int(b)).name for b in scene.tables.hand_body]
 
     def __call__(self, field: str, index: tuple[int, ...], shape: tuple[int, ...]) -> str:
-        """Of the number at `index` of a field of one world, which has `shape`; "" where it is nobody's."""
+        """Name for the number at `index` of a field of one world with this `shape`; "" without one."""
         name, first = field.rpartition("/")[2], index[0] if index else 0
         if field.startswith("physics/") and name in self._whole:
             names = self._whole[name]

@@ -1,4 +1,4 @@
-"""Where a person looked: rays that an eye tracker measured, and statistics of what rays meet.
+"""Gaze of a person: rays of an eye tracker, and statistics of the objects that rays meet.
 
 Axis: T steps of a run.
 """
@@ -37,7 +37,7 @@ class Rays:
 
 
 def measured_rays(run: Run) -> Rays | None:
-    """The gaze that was measured in a run; None where the eyes were never tracked.
+    """The measured gaze of a run; None if the eyes were never tracked.
 
     Raises:
       InputError: an array is broken.
@@ -60,10 +60,10 @@ def measured_rays(run: Run) -> Rays | None:
 
 
 def statistics(met: list[str | None], axis: list[np.ndarray], seconds: float, measured: bool) -> dict[str, Any]:
-    """Of the object that each frame's ray met.
+    """Statistics of the object that each frame's ray meets.
 
     Args:
-      met: names; None where the eyes were not tracked, which counts in `tracked` alone. axis: [3] of each frame,
+      met: names of objects; None where the eyes were not tracked, which counts in `tracked` only. axis: [3] per frame,
         ignored where `met` is None.
       seconds: of a frame.
     """

@@ -1,14 +1,14 @@
-"""iGibson's HDF5 logs: written from recordings, one file a run, and read back, whoever wrote them.
+"""iGibson's HDF5 logs: written from recordings, one file per run, and read, also those of iGibson.
 
-    frame_data [N, 4]                           frame; durations that nobody measured: -1
+    frame_data [N, 4]                           frame; durations, which are not measured: -1
     physics_data/<id>/position [N, 3], orientation [N, 4] (x-y-z-w), joint_state [N, joints]
     goal_status/satisfied, unsatisfied [N, goals]
-    agent_actions/vr_robot [N, 28]              what the humanoid did; action/robot of other robots
-    action/ig2mj                                what the environment was given
+    agent_actions/vr_robot [N, 28]              actions of the humanoid; action/robot for other robots
+    action/ig2mj                                actions of the environment
     attributes "/metadata/..."                  physics_timestep, render_timestep, atus_activity, scene_id, ...
 
-All numbers are float64, what is not there -1. A row is the world after a step, with the action of that step, as in
-iGibson 2.0's `IGLogWriter`. Numbers of bodies are those of our objects, agents behind them; positions are those of main
+All numbers are float64; missing ones are -1. A row is the world after a step, with the action of that step, as in
+iGibson 2.0's `IGLogWriter`. Body ids are object indices, followed by the agents; positions are those of main
 bodies' frames, where iGibson has centres of mass. `ig2mj demos replay` needs the recording itself.
 
 Axis: N steps.
@@ -52,7 +52,7 @@ _KINDS = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
 
 @dataclasses.dataclass(frozen=True)
 class IGibsonLog:
-    """A log that was read.
+    """The content of a log.
 
     Attributes:
       metadata: without "/metadata/". names: of bodies, by their numbers; the number where the log has none.
@@ -82,7 +82,7 @@ def export_igibson(
       success_only, incomplete: see `ig2mj.demos.selection.chosen_runs`.
 
     Returns:
-      What came of the replay.
+      Result of the replay.
 
     Raises:
       InputError: as of `observe`; or the folder is there.

@@ -1,4 +1,4 @@
-"""Exporting recordings to LeRobot's dataset format, version 3.0, with observations made anew by a replay.
+"""Exporting recordings to LeRobot's dataset format, version 3.0, with observations computed by a replay.
 
     meta/info.json, stats.json, ig2mj.json, tasks.parquet, episodes/chunk-000/file-000.parquet
     data/chunk-000/file-000.parquet                      one row a step
@@ -65,7 +65,7 @@ def export_lerobot(
       codec: of the videos, as PyAV names it. success_only, incomplete: see `ig2mj.demos.selection.chosen_runs`.
 
     Returns:
-      What came of the replay.
+      Result of the replay.
 
     Raises:
       MissingDependencyError: pyarrow or av is not installed. InputError: as of `observe`; or the folder is there; or

@@ -1,7 +1,7 @@
-"""Hashes of a compiled model with its robots: of what determines physics, and of what cameras see.
+"""Hashes of a compiled model with its robots: of everything that determines physics, and of everything visible.
 
 Numbers count to single precision, since the last digits of what MuJoCo derives depend on the processor. Names do not
-count: neither physics nor images know them.
+count: neither physics nor images depend on them.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""`observe`: recordings replayed, run by run, with the observations of every frame: what exports are made of.
+"""`observe`: replays recordings and collects the observations of every frame, run by run, for exports and learning.
 
 Axis: T steps of a run.
 """
@@ -21,22 +21,22 @@ from ig2mj.sensors.base import SensorOptions
 from ig2mj.sensors.registry import SENSORS
 
 Write = Callable[[int, Run, dict[str, np.ndarray]], None]
-"""Called with a run's number among those that are exported, the run, and its observations [T + 1, ...] by name."""
+"""Called with the index of a run among the selected ones, the run, and its observations [T + 1, ...] by name."""
 
 
 def observe(replayer: Replayer, write: Write, exact: bool = True, runs: Sequence[Run] | None = None) -> Replayed:
-    """Replays runs, and hands each one over when its last frame was seen.
+    """Replays runs and passes each one on after its last frame.
 
-    Runs of several worlds are replayed beside each other, so they do not come in their order.
+    Runs of several worlds are replayed side by side, so they do not arrive in their order.
 
     Args:
-      exact: compare every byte, and refuse observations that the recorded environment would not have made. Without it,
-        what comes out is taken as it comes.
+      exact: compare every byte, and refuse observations that the recorded environment would not have made; else
+        differences are ignored.
       runs: which; None: all complete ones (`ig2mj.demos.selection`).
 
     Raises:
-      InputError: the recording is broken, has no such run, does not come out the same by action, cannot be replayed by
-        state, or its observations would be others here.
+      InputError: the recording is broken, has no such run, differs when replayed by action, cannot be replayed by
+        state, or its observations would differ on this machine.
     """
     runs = some_runs(replayer.recording) if runs is None else runs
     if exact:
@@ -62,7 +62,7 @@ def observe(replayer: Replayer, write: Write, exact: bool = True, runs: Sequence
 
 
 def refuse_differences(replayer: Replayer, done: Replayed) -> None:
-    """Raises InputError: a run did not come out the same."""
+    """Raises InputError for the first run that differs."""
     if not done.differences:
         return
     run = next(run for run in replayer.recording.runs if run.name == done.differences[0].run)
@@ -74,13 +74,12 @@ def refuse_differences(replayer: Replayer, done: Replayed) -> None:
 
 
 def check_observations(replayer: Replayer) -> None:
-    """What is observed here must be what the recorded environment observed.
+    """Checks that observations on this machine are those of the recorded environment.
 
-    Of what cameras and rays see, that is checked of observations that the recorded environment made; the settings of
-    others are free.
+    Of cameras and rays, the settings of recorded observations are compared; those of others are free.
 
     Raises:
-      InputError: it names what is another here.
+      InputError: names what differs.
     """
     recording, env, here = replayer.recording, replayer.env, replayer.here
     names = [name for name in OBSERVED if name != "task_hash" or recording.version != WHOLE_HASHES]
@@ -108,7 +107,7 @@ def _other_settings(replayer: Replayer) -> list[str]:
 
 
 def made_again(env: Environment) -> dict[str, Any]:
-    """Arguments of `ig2mj.make` that make an environment with the same observations again, as JSON has them."""
+    """Arguments of `ig2mj.make`, for JSON, that make an environment with the same observations."""
     return {
         **{name: value for name, value in env.made_with.items() if is_plain(value)},
         "robot": env.robot,

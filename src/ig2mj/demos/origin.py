@@ -1,8 +1,8 @@
-"""What a recording belongs to: hashes of physics, task and pool, what observations depend on, versions, the machine.
+"""Origin of a recording: hashes of physics, task and pool, settings of observations, versions, the machine.
 
 A recording is bound to what determines physics (`model_hash`, `scene_hash`) and to the values that define the task
-(`task_hash`). Looks, names, and the package's version do not count; what a step of the package does is covered by the
-version of the format. Recordings of format 2 have hashes of every byte in their place, which are compared as such.
+(`task_hash`). Looks, names and the package's version do not count; the version of the format covers changes of a step.
+Recordings of format 2 have hashes of every byte instead, which are compared as such.
 """
 
 from __future__ import annotations
@@ -34,20 +34,20 @@ BINDING = (
     *("mujoco", "scene_hash", "model_hash", "task_hash", "robot", "grasping", "engine"),
     *("horizon", "period", "substeps", "timestep"),
 )
-"""With another one of these nothing can be expected to come out the same."""
+"""If one of these differs, a replay by action cannot give the same result."""
 
 LOOSE = ("jax", "architecture", "processor", "processor_features")
-"""With another one of these it mostly does; mathematical functions choose their instructions by processor."""
+"""If one of these differs, it mostly does: mathematical functions choose their instructions by processor."""
 
 OBSERVED = ("scene_hash", "model_hash", "task_hash", "robot", "grasping", "horizon", "period")
-"""With another one of these an observation of the same state can be another."""
+"""If one of these differs, observations of the same state can differ."""
 
 WHOLE_HASHES = 2
-"""Version of the format whose hashes are of every byte."""
+"""Version of the format with hashes of every byte."""
 
 
 def origin_of(env: Environment, version: int = FORMAT_VERSION) -> dict[str, Any]:
-    """Of an environment, for the attributes of a file. `version`: of the format, which decides about the hashes."""
+    """Origin of an environment, for the attributes of a file. `version`: of the format, which determines the hashes."""
     engine, made = env.core.engine, env.made_with
     own = {
         "task": env.task.name,
@@ -77,7 +77,7 @@ def _task_of(env: Environment) -> tuple[TaskLike, str, tuple[str, ...]]:
 
 
 def origin_of_scene(scene: Scene, version: int = FORMAT_VERSION) -> dict[str, Any]:
-    """Of a household with its robots. `version`: see `origin_of`."""
+    """Origin of a scene with its robots. `version`: see `origin_of`."""
     whole = version == WHOLE_HASHES
     additions = [a.wanted for a in scene.additions]
     return {
@@ -91,7 +91,7 @@ def origin_of_scene(scene: Scene, version: int = FORMAT_VERSION) -> dict[str, An
 
 
 def origin_of_machine() -> dict[str, Any]:
-    """Of programs and processor."""
+    """Versions of programs, and the processor."""
     model, features = _processor()
     return {
         "mujoco": mujoco.__version__,
@@ -104,7 +104,7 @@ def origin_of_machine() -> dict[str, Any]:
 
 
 def pool_hash(pool: Pool) -> str:
-    """Of start states."""
+    """Hash of start states."""
     hashed = hashlib.blake2b(digest_size=16)
     for leaf in jax.tree.leaves(pool):
         hashed.update(np.ascontiguousarray(leaf).data)
@@ -112,7 +112,7 @@ def pool_hash(pool: Pool) -> str:
 
 
 def differences(recorded: Mapping[str, Any], here: Mapping[str, Any], names: tuple[str, ...]) -> list[str]:
-    """What is another here, each with the exact pair, for people. What the recording does not say is not compared."""
+    """Attributes that differ, as text with both values. Attributes that the recording lacks are not compared."""
     return [
         f"{name} was {recorded.get(name)!s}, and is {here.get(name)!s} here"
         for name in names
@@ -121,7 +121,7 @@ def differences(recorded: Mapping[str, Any], here: Mapping[str, Any], names: tup
 
 
 def is_plain(value: object) -> bool:
-    """Whether JSON can hold it."""
+    """Whether JSON can represent the value."""
     return isinstance(value, str | int | float | bool | None) or (
         isinstance(value, list | tuple) and all(map(is_plain, value))
     )
@@ -138,7 +138,7 @@ def _hash(content: Any) -> str:
 
 
 def _processor() -> tuple[str, str]:
-    """Model name, and a hash of what the processor can do."""
+    """Model name of the processor, and a hash of its instruction sets."""
     found: dict[str, str] = {}
     try:
         for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():

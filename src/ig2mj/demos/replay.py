@@ -1,12 +1,11 @@
 """Replaying recordings of environments: by their actions, bit for bit, or by their states.
 
-By action a run is put at its first frame and every action is taken again. On the native engine every byte of every
-frame comes out the same, with any number of threads and in another process: each world is stepped by one thread from
-start to end, a snapshot has all that MuJoCo goes on from (sleep and warm start among it), and random numbers belong to
-the episode's key. A run is replayed at the row of the batch at which it was recorded, in a batch of the same size,
-since compiled programs may treat rows differently.
+By action, a run starts at its first frame and repeats every action. On the native engine all bytes of all frames are
+reproduced, with any number of threads and in another process: one thread steps a world, a snapshot has the complete
+state of MuJoCo (including sleep and warm start), and random numbers come from the episode's key. A run is replayed at
+its row of the batch, in a batch of the same size, since compiled programs may treat rows differently.
 
-By state every frame is loaded as it was written: exact on any machine, to look at and to observe with other sensors.
+By state, every frame is loaded as it was written. That is exact on any machine, for viewing and for other sensors.
 
 Axes: W worlds.
 """
@@ -46,10 +45,10 @@ from ig2mj.tasks.task import Task
 MODES = ("action", "state")
 
 MOST_WORLDS = 65536
-"""Of a recording: more are taken for a file that was tampered with."""
+"""Largest number of worlds of a recording; a larger one is taken for a damaged or hostile file."""
 
 MOST_PIXELS = 16384
-"""Along an edge of an image, or rays of a sensor, for the same reason."""
+"""Largest number of pixels along an edge of an image, or of rays of a sensor, for the same reason."""
 
 _NAMED_BY = {
     "environment": "task",
@@ -64,17 +63,17 @@ _NAMED_BY = {
 FIX_ENV = "make the environment yourself, and hand it over: `Replayer(recording, env=...)`"
 
 Watch = Callable[[EnvState, dict[int, Run], int], None]
-"""Called with the environment's state, the run of each world that is replayed, and the number of the frame. The next
-frame uses the state up: what shall be kept is copied."""
+"""Called with the environment's state, the run of each replayed world, and the index of the frame. The state is
+invalidated by the next frame; copy what you keep."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Replayed:
-    """What came of a replay.
+    """Result of a replay.
 
     Attributes:
-      runs, frames: how many were replayed. differences: the first of each run that was not the same.
-      warnings: what is another here than where it was recorded.
+      runs, frames: numbers of replayed runs and frames. differences: the first one of each run that differs.
+      warnings: what differs between this machine and that of the recording.
     """
 
     runs: int
@@ -88,7 +87,8 @@ class Replayer:
     """Replays the runs of a file in one environment.
 
     Attributes:
-      env: it. here: what a recording of it would say of itself (`ig2mj.demos.origin`). warnings: see `Replayed`.
+      env: the environment. here: attributes that a recording of it would have (`ig2mj.demos.origin`). warnings: see
+        `Replayed`.
     """
 
     def __init__(
@@ -103,10 +103,10 @@ class Replayer:
 
         Args:
           by: one of `MODES`. env: the environment, where `ig2mj.make` cannot make it: a task of one's own.
-          observations, options: of the environment; others than recorded change what is seen, not what happens.
+          observations, options: of the environment; they may change observations, not the course of events.
 
         Raises:
-          InputError: the file is broken; or, by action, something that the outcome hangs on is another here.
+          InputError: the file is broken; or, by action, something that determines the outcome differs on this machine.
         """
         self.recording, self.by = recording, by
         if not any(name.startswith("frames/") for name in recording.columns):
@@ -164,7 +164,7 @@ class Replayer:
         """The environment at a frame of a run as it was written; every world stands where that one did.
 
         Args:
-          used: an earlier state that nobody steps any more; its worlds are put there.
+          used: an earlier state that is no longer stepped; its worlds are reused.
 
         Raises:
           InputError: an array of the file is broken.
@@ -173,7 +173,7 @@ class Replayer:
         return self._put({run.world: rows if frame else self._start(rows, run)}, {run.world: run}, used)
 
     def rounds(self, runs: Sequence[Run]) -> Iterator[dict[int, Run]]:
-        """Runs that are replayed beside each other, by their worlds."""
+        """Runs that are replayed side by side, by their worlds."""
         queues: dict[int, list[Run]] = {}
         for run in runs:
             if run.frames:
@@ -240,7 +240,7 @@ class Replayer:
         return rows
 
     def _put(self, rows: dict[int, list[np.ndarray]], now: dict[int, Run], used: EnvState | None = None) -> EnvState:
-        """The environment at these frames; worlds that are not replayed stand where the first does."""
+        """The environment at these frames; worlds without a run are copies of the first."""
         some = next(iter(rows.values()))
         each = [rows.get(world, some) for world in range(self.env.num_worlds)]
         frame: Frame = jax.tree.unflatten(self._tree, stacked(each))
@@ -286,8 +286,8 @@ def replay(file: str | os.PathLike, by: str = "action", check: bool = True, **op
 def _environment(recording: Recording, observations: str | Sequence[str], options: dict[str, Any]) -> Environment:
     """The environment that a file was recorded in.
 
-    Runs begin at frames of their own. Of a pool only navigation's tasks need more, which is where to go; to sample
-    hundreds of an activity's start states would take minutes.
+    Runs start at recorded frames, so activities need a pool of one row, and no minutes of sampling. Navigation tasks
+    need the whole pool, which holds the goals.
     """
     made = current_names(recording.value("made_with", dict))
     if recording.header.get("not_made_with", "[]") != "[]":

@@ -24,13 +24,13 @@ from ig2mj.files.content import decode_struct
 from ig2mj.files.hdf5 import Hdf5File
 
 TOLD = "told"
-"""Attribute of a job's file: what came of the replay, as JSON."""
+"""Attribute of a job's file: the result of the replay as JSON."""
 
 FORMAT = "ig2mj observations"
 """Of files of observations."""
 
 RECORDING = "recording"
-"""Name of the recording among the bytes that jobs share, where they run on other machines."""
+"""Name of the recording in `JobSet.shared`, where jobs run on other machines."""
 
 
 class _Told(msgspec.Struct):
@@ -43,7 +43,7 @@ class _Told(msgspec.Struct):
 
 
 def replay_jobs(recording: Recording, settings: Mapping[str, Any]) -> list[Job]:
-    """Pieces of a replay. `settings`: the arguments of `replay_job` but `runs` and `shared`."""
+    """Jobs of a replay. `settings`: the arguments of `replay_job` but `runs` and `shared`."""
     layers: list[list[str]] = []
     depth: dict[int, int] = {}
     for run in recording.runs:
@@ -66,7 +66,7 @@ def replay_job(
     runs: list[str],
     shared: Mapping[str, bytes] | None = None,
 ) -> bytes:
-    """Replays some runs; an HDF5 file with what came of it, and the observations that were asked for.
+    """Replays some runs; the bytes of an HDF5 file with the result and the requested observations.
 
     Args:
       sensors: names of observations. starts: arguments of `shared_pool`. The others: of `Replayer`.
@@ -98,7 +98,7 @@ class Observing:
 
     @classmethod
     def into(cls, file: pathlib.Path, names: Sequence[str], recording: Recording) -> Observing:
-        """With a new file of its own, which has the same bytes as one that `join_replays` puts together."""
+        """Writes to a new file with the same bytes as one of `join_replays`."""
         import h5py
 
         found = cls(h5py.File(_beside(file, "frames"), "w"), names)
@@ -106,7 +106,7 @@ class Observing:
         return found
 
     def see(self, state: EnvState, runs: Mapping[int, Run], frame: int) -> None:
-        """Writes a frame of each run that goes on."""
+        """Writes a frame of each current run."""
         for world, run in runs.items():
             for name in self._names:
                 row, path = np.asarray(state.obs[name])[world], f"{run.name}/{name}"
@@ -117,14 +117,14 @@ class Observing:
                 self._opened[path][frame] = row
 
     def discard(self) -> None:
-        """Closes the file, and removes one of its own: the replay was broken off."""
+        """Closes the file of an interrupted replay, and removes it unless the caller opened it."""
         self._opened.close()
         if self._file is not None:
             _beside(self._file, "frames").unlink(missing_ok=True)
             self._file = None
 
     def close(self) -> None:
-        """Closes the file. One of its own is copied run by run: how its frames came is not to be seen in it."""
+        """Closes the file. Its own file is copied run by run, so that its bytes do not depend on the order."""
         import h5py
 
         self._opened.close()
@@ -139,8 +139,11 @@ class Observing:
 
 
 def join_replays(parts: Iterable[bytes], out: pathlib.Path | None) -> dict[str, Any]:
-    """What came of all jobs; with `out` their observations in one file. Raises OSError, and InputError:
-    a part is broken, or takes anything from another file."""
+    """Joins the results of all jobs; with `out`, their observations in one file.
+
+    Raises:
+      OSError. InputError: a part is broken, or refers to another file.
+    """
     import h5py
 
     found: dict[str, Any] = {"runs": 0, "frames": 0, "differences": [], "warnings": []}

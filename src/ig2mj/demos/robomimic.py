@@ -1,4 +1,4 @@
-"""Exporting recordings to robomimic's HDF5, with observations made anew by a replay.
+"""Exporting recordings to robomimic's HDF5, with observations computed by a replay.
 
     /data                 attributes: total, env_args (JSON)
         /demo_0           attribute: num_samples
@@ -7,8 +7,8 @@
         /success          those that succeeded      /complete      those that terminated or were truncated
         /train /valid     nine in ten, and the rest
 
-`states` are the frames' `qpos` and `qvel`, for people; thin recordings have none. What a world goes on from is in the
-recording. Of `env_args`, `env_kwargs` are what `ig2mj.make` takes to make an environment with these observations.
+`states` are `qpos` and `qvel` of the frames, for inspection; compact recordings have none. The complete state of a
+world is in the recording. `env_kwargs` in `env_args` are the arguments of `ig2mj.make` for these observations.
 
 Axis: T steps of a run.
 """
@@ -45,7 +45,7 @@ def export_robomimic(
       success_only, incomplete: see `ig2mj.demos.selection.chosen_runs`.
 
     Returns:
-      What came of the replay.
+      Result of the replay.
 
     Raises:
       InputError: as of `observe`; or the file cannot be written.

@@ -1,4 +1,4 @@
-"""`chosen_runs`: which runs of a recording exports and metrics are made of."""
+"""`chosen_runs`: selects the runs of a recording for exports and metrics."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ def chosen_runs(recording: Recording, success_only: bool = False, incomplete: bo
     """Runs with at least one step, in the order of their beginning.
 
     Args:
-      success_only: only those that succeeded. incomplete: also those that neither terminated nor were truncated.
+      success_only: successful runs only. incomplete: also runs that neither terminated nor were truncated.
 
     Raises:
       InputError: the recording is broken.
@@ -24,7 +24,7 @@ def chosen_runs(recording: Recording, success_only: bool = False, incomplete: bo
 
 
 def left_out(recording: Recording, chosen: Sequence[Run]) -> str:
-    """What was not chosen, for people: "2 incomplete and 1 unsuccessful runs"; "" where all were."""
+    """The omitted runs as text: "2 incomplete and 1 unsuccessful runs"; "" for none."""
     taken = {run.name for run in chosen}
     others = [run for run in recording.runs if run.frames > 1 and run.name not in taken]
     cut = sum(not run.complete for run in others)
@@ -34,12 +34,12 @@ def left_out(recording: Recording, chosen: Sequence[Run]) -> str:
 
 
 def advice(recording: Recording, success_only: bool, incomplete: bool) -> str:
-    """The option with which a recording of which nothing was chosen has runs, or ""."""
+    """The option that selects runs of a recording without selected ones; "" without one."""
     return INCOMPLETE if not incomplete and chosen_runs(recording, success_only, True) else ""
 
 
 def some_runs(recording: Recording, success_only: bool = False, incomplete: bool = False) -> list[Run]:
-    """The same for what must have a run. Raises InputError: there is none."""
+    """As `chosen_runs`. Raises InputError: there is none."""
     runs = chosen_runs(recording, success_only, incomplete)
     if not runs:
         others = left_out(recording, runs)

@@ -1,6 +1,6 @@
-"""Demonstrations that ship: episodes of the scripted experts, disturbed and recovered from, for each activity.
+"""Demonstrations that ship: episodes of the scripted experts, with disturbances and recoveries, for each activity.
 
-They hold actions and the first and last frame of each run (`ig2mj.demos.compact`), and replay bit for bit.
+The recordings are compact (`ig2mj.demos.compact`): actions, labels, and the first and last frame of each run.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ ENDING = ".h5"
 
 
 def folder() -> pathlib.Path:
-    """Where they are: in a checkout, or installed."""
+    """The folder of the demonstrations, in a checkout or installed."""
     return CHECKOUT if CHECKOUT.is_dir() else INSTALLED
 
 
 def shipped() -> list[str]:
-    """Names of those that ship."""
+    """Names of the demonstrations that ship."""
     return sorted(file.stem for file in folder().glob(f"*{ENDING}"))
 
 
 def find_recording(name: str | os.PathLike) -> pathlib.Path:
-    """The file of this name, or of demonstrations that ship. Raises UnknownNameError: there is neither."""
+    """The file of this name, or that of demonstrations that ship. Raises UnknownNameError: there is neither."""
     path = pathlib.Path(name)
     if path.exists() or path.suffix or len(path.parts) > 1:
         return path

@@ -1,7 +1,7 @@
-"""`task_hash`: of the values that define a task, by their names.
+"""`task_hash`: hash of the values that define a task, by their names.
 
 Names of classes do not count, nor do names of task and home, the task's sentence, and values that are a field's
-default. Names of objects count as places among the scene's objects, so that renaming an object changes nothing.
+default. Names of objects count as indices of the scene's objects, so renaming an object changes nothing.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def task_hash(task: TaskLike, robot: str = "", objects: Sequence[str] = ()) -> s
     """Hash of a task.
 
     Args:
-      robot: that takes part; where the task knows it, what it says of other robots does not count.
+      robot: the robot in use; values of the task for other robots do not count.
       objects: names of the scene's objects, in the order of the O axis.
     """
     places = {name: f"#{place}" for place, name in enumerate(objects)}

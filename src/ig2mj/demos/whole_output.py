@@ -1,4 +1,4 @@
-"""`whole_output`: a file or a folder that is complete or not there."""
+"""`whole_output`: writes a file or a folder that is complete or absent."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from ig2mj.files.unfinished import unfinished as hidden_name
 
 @contextlib.contextmanager
 def whole_output(path: str | os.PathLike, folder: bool = False) -> Iterator[pathlib.Path]:
-    """A place next to `path` to write to, which gets its name when the block is left without an error.
+    """A path next to `path` to write to, which is renamed to it at the end of the block.
 
-    Whatever ends the block otherwise, an interrupt among it, removes what was written. A file of that name is replaced.
+    If the block raises, or is interrupted, what was written is removed. An existing file is replaced.
 
     Args:
-      folder: it is a folder, which is made; there must be none of that name yet.
+      folder: the output is a folder, which must not exist yet.
 
     Raises:
-      InputError: the folder is there already, or nothing can be written there.
+      InputError: the folder exists, or the path cannot be written to.
     """
     place = pathlib.Path(path)
     if folder and (place.exists() or place.is_symlink()):

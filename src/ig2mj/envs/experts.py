@@ -9,6 +9,7 @@ Pure: it may be part of a compiled program, and asked in any state (`ig2mj.tasks
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import jax
 from jaxtyping import Float
@@ -40,5 +41,10 @@ def expert_of(env: Environment) -> Callable[..., Float[Array, "W n"]]:
     Raises:
       UnknownNameError: the task has no expert. EngineError: the robot lacks hands that tasks move.
     """
-    acts = jax.jit(make_expert(env))
+    expert = make_expert(env)
+
+    def expert_fn(view: Any, states: Any, beliefs: Any) -> Any:
+        return expert(view, states, beliefs)
+
+    acts = jax.jit(expert_fn)
     return lambda state, beliefs=None: acts(state.batch.world.view, state.batch.world.states, beliefs)

@@ -1,7 +1,7 @@
-"""First use: what is compiled once per machine is kept, and long waits are reported.
+"""First use: programs that are compiled once per machine are cached, and long compilations are reported.
 
-Two compilers work before the first step. Warp compiles about 80 modules of physics kernels (minutes), and keeps them in
-its own folder under the user's cache. XLA compiles the step; its programs are kept below ig2mj's cache folder, unless
+Two compilers run before the first step. Warp compiles about 80 modules of physics kernels (minutes) and caches them in
+its own folder under the user's cache. XLA compiles the step; its programs are cached below ig2mj's cache folder, unless
 JAX was given a folder already. `ig2mj doctor` lists the folders; IG2MJ_CACHE_DIR moves both.
 """
 
@@ -22,13 +22,13 @@ from ig2mj.process.waiting import WAITING, Work
 CACHE_VARIABLE = "IG2MJ_CACHE_DIR"
 
 MODULES = 80
-"""About the number of Warp modules that a home's step needs."""
+"""Approximate number of Warp modules that a home's step needs."""
 
 MIN_COMPILE_SECONDS = 0.1
-"""Seconds. Programs that XLA compiles faster than this are not kept."""
+"""Seconds. Programs that XLA compiles faster are not cached."""
 
 XLA_EVENT = "/jax/core/compile/backend_compile_duration"
-"""JAX's event: a scalar where a compilation (or a look into the cache) begins, a duration where it ends."""
+"""JAX's event: a scalar at the start of a compilation or cache look-up, a duration at its end."""
 
 _REPORTING = "_ig2mj_reports_compilation"
 
@@ -40,7 +40,7 @@ def cache_folder() -> pathlib.Path:
 
 @functools.cache
 def report_xla_compilation() -> None:
-    """From now on this process reports on stderr that XLA compiles a program, where that takes long."""
+    """Makes this process report long compilations of XLA on stderr."""
     import jax.monitoring
 
     begun: dict[tuple[int, str], Work] = {}
@@ -60,18 +60,22 @@ def report_xla_compilation() -> None:
 
 
 PROGRAMS = {
-    "events_step": "the rules of states and events",
-    "facts_step": "the predicates of the goal",
-    "rest_step": "the rules of states where nothing moves",
-    "heat_steps": "the rules of temperatures",
+    "rules_fn": "the rules of states",
+    "heat_fn": "the rules of temperatures",
+    "status_fn": "the status of a goal",
+    "run": "a predicate's question",
     "evaluate_fn": "rewards and observations",
     "evaluate_first_fn": "observations after a reset",
+    "chosen": "the choice of worlds to reset",
+    "draw_fn": "the draw of start states",
+    "rows_fn": "the reset of worlds",
     "acted": "the robots' controllers",
     "updated": "the grasps of hands",
+    "read": "the grasps of hands",
     "poses_fn": "the poses of cameras",
     "finish_fn": "the sensors' readings of images",
-    "run": "a predicate's question",
-    "status": "a goal",
+    "read_fn": "the sensors",
+    "look_fn": "the looks of states for cameras",
     "start_all": "the start of physics in all worlds",
     "start_fn": "the start of all worlds",
     "load_fn": "the start of all worlds from saved states",
@@ -81,30 +85,28 @@ PROGRAMS = {
     "reset_fn": "the reset of worlds",
     "several_fn": "several steps of all worlds under a policy",
     "rollout_fn": "a rollout of all worlds",
+    "expert_fn": "an expert",
     "choose": "a policy",
     "whole": "an iteration of training",
     "collect": "a rollout of training",
-    "learn": "what an iteration of training learns",
-    "learn_fn": "what a step of training learns",
-    "looked": "the first training of an encoder",
-    "read_fn": "the sensors",
-    "look_fn": "the looks of states for cameras",
+    "learn": "the updates of a training iteration",
+    "learn_fn": "an update of training",
     "one_round": "a measurement of buffers",
 }
-"""What our programs do, by the names of the functions that JAX compiles, without underscores before them."""
+"""Descriptions of programs, by the names of the functions that JAX compiles, without leading underscores."""
 
 
 def xla_text(program: str) -> str:
-    """The line about a program of XLA, e.g. "jit(whole)"."""
+    """The message for a program of XLA, e.g. "jit(whole)"."""
     name = program.removeprefix("jit(").removesuffix(")").lstrip("_")
     what = PROGRAMS.get(name) or (f"a program ({name})" if name.isidentifier() else "a program")
     return f"compiling {what}, once per machine, scene and number of worlds"
 
 
 def report_warp_compilation() -> None:
-    """From now on this process reports on stderr that Warp compiles kernels, instead of Warp's own lines on stdout.
+    """Makes this process report Warp's compilations on stderr, in place of Warp's own lines on stdout.
 
-    Once per process; without effect where Warp has no such function inside.
+    Once per process; without effect if this version of Warp has no such internal function.
     """
     import warp as wp
 
@@ -126,5 +128,5 @@ def report_warp_compilation() -> None:
 
 
 def kernels_text(number: int) -> str:
-    """The line about the module of that number, from 1."""
+    """The message for the module of this number, from 1."""
     return f"compiling physics kernels {number}/{max(MODULES, number)}, once per machine"

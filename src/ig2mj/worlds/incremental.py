@@ -141,7 +141,7 @@ class _StatePrograms:
 
     def __init__(self, model: StateModel, num_worlds: int):
         self.model, self._plan = model, RelationPlan.build(model, queries(model))
-        self._step, self._heat = HostFunction(self._step_fn), HostFunction(self._heat_fn)
+        self._step, self._heat = HostFunction(self._rules_fn), HostFunction(self._heat_fn)
         self._changed: list[int] = []  # leaves of the states that a step can change; known once it was traced
 
     @staticmethod
@@ -169,7 +169,7 @@ class _StatePrograms:
         made, same = self._heat(view, states, acts)
         return states.replace(**dict(zip(HEAT_FIELDS, made, strict=True))), bool(same)
 
-    def _step_fn(self, view: PhysicsView, states: ExtendedStates) -> tuple[Any, ...]:
+    def _rules_fn(self, view: PhysicsView, states: ExtendedStates) -> tuple[Any, ...]:
         after, swap, acts = events(self.model, states, view, self._plan.evaluate(view))
         new = heat(self.model, after, acts, view.touching)
         quiet, same = _are_same(states, after), _are_same(after, new)
