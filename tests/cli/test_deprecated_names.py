@@ -5,8 +5,10 @@ from __future__ import annotations
 import importlib
 import sys
 import types
+from typing import Annotated
 
 import pytest
+import tyro
 
 from ig2mj import cli
 from ig2mj.cli.common.deprecated import renamed_options, renamed_options_of
@@ -53,11 +55,12 @@ def test_an_old_option_with_an_underscore_is_found_too(probe, capsys):
         (["--mixed", "4"], ("starts=4",)),
         (["--mixed=4", "--set", "lr=1", "batch=2"], ("starts=4", "lr=1", "batch=2")),
         (["--set", "lr=1", "--fast", "--seed", "3"], ("fast=true", "lr=1")),
+        (["--fast", "NAME"], ("fast=true",)),
     ],
 )
 def test_an_old_option_may_become_a_setting(probe, capsys, words, settings):
-    @renamed_options({"--mixed": "--set starts=", "--fast": "--set fast="})
-    def run(set: tuple[str, ...] = (), seed: int = 0) -> None:
+    @renamed_options({"--mixed": "--set starts=", "--fast": "--set fast=true"})
+    def run(name: Annotated[str, tyro.conf.Positional] = "", set: tuple[str, ...] = (), seed: int = 0) -> None:
         print(set)
 
     probe.run = run

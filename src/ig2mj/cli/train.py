@@ -30,10 +30,10 @@ SIDE = 128
         "--pixels": "--set image_size=",
         "--rows": "--set image_rows=",
         "--engine": "--set engine=",
-        "--expert": "--set expert=",
-        "--save-buffer": "--set save_buffer=",
+        "--expert": "--set expert=true",
+        "--save-buffer": "--set save_buffer=true",
         "--programs": "--set programs=",
-        "--paper-rl": "--set relaxed_thresholds=",
+        "--paper-rl": "--set relaxed_thresholds=true",
         "--pool-size": "--set pool_size=",
         "--mixed": "--set augment_starts=",
     }

@@ -5,9 +5,10 @@ A function of the command line names the options that were renamed:
     @renamed_options({"--drawn": "--stochastic", "--mixed": "--set augment_starts="})
     def run(stochastic: bool = False, set: tuple[str, ...] = ()) -> int: ...
 
-An option that became a setting is written "--set NAME=": `--mixed 4` is then `--set augment_starts=4`, and one without
-a value `--set NAME=true`. A module names sub-commands that were renamed in `RENAMED = {"pictures": "images"}`, next to
-its `SUBCOMMANDS`. Help and completion list the new names only; each old name that is typed prints one line on stderr.
+An option that became a setting is written "--set NAME=" if it has a value (`--mixed 4` is then
+`--set augment_starts=4`), and "--set NAME=true" if it is a flag. A module names sub-commands that were renamed in
+`RENAMED = {"pictures": "images"}`, next to its `SUBCOMMANDS`. Help lists the new names only; each old name
+that is typed prints one line on stderr.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ _SET = "--set "
 
 
 def renamed_options(names: Mapping[str, str]) -> Callable[[F], F]:
-    """Marks a function of the command line: old option -> new option, or "--set NAME=". See the module's text."""
+    """Marks a function of the command line: old option -> new option or setting. See the module's text."""
 
     def mark(function: F) -> F:
         setattr(function, _ATTRIBUTE, dict(names))
@@ -53,12 +54,13 @@ def with_new_names(function: Callable[..., Any], prog: str, args: Sequence[str])
         if not new.startswith(_SET):
             out.append(new + equals + value)
             continue
-        if not equals:
-            value = waiting.pop(0) if waiting and not waiting[0].startswith("--") else "true"
+        if new.endswith("=") and not equals and waiting:
+            value = waiting.pop(0)
         settings.append(new.removeprefix(_SET) + value)
     if settings:
-        at = out.index(_SET.strip()) if _SET.strip() in out else len(out)
-        out[at : at + 1] = [_SET.strip(), *settings]
+        word = _SET.strip()
+        at = len(out) - 1 - out[::-1].index(word) if word in out else len(out)
+        out[at : at + 1] = [word, *settings]
     return out
 
 
@@ -71,4 +73,5 @@ def new_subcommand(command: str, name: str, renamed: Mapping[str, str]) -> str:
 
 
 def _warn(prog: str, old: str, new: str) -> None:
+    new += "VALUE" * new.endswith("=")
     print(f"{prog}: '{old}' is now '{new}'; the old name will be removed in the next release", file=sys.stderr)
