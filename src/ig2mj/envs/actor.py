@@ -84,7 +84,7 @@ class Actor:
         Args:
           remembers: m. seed: of the keys.
           parameters: last argument of `choose`, a pytree; None: it takes none. What differs between policies belongs
-            here: with other constants physics would be compiled anew.
+            here: with other constants physics would be compiled again.
         """
         self._env, self._choose = env, jax.jit(choose)
         self._more = () if parameters is None else (parameters,)

@@ -6,17 +6,21 @@
 
 | file | what |
 |---|---|
-| `perception` | what networks see of an environment's observations |
-| `networks`, `moments`, `replay` | actors and critics; running means and scales; past steps on the device |
+| `algorithms` | settings by name, and how an algorithm's parts are put together |
 | `sac`, `ppo`, `bc`, `dagger` | the algorithms |
-| `collect` | steps of an environment under a policy: one scan on a pure engine, a loop on the native one |
-| `iteration` | a rollout and what is learned from it, on one device or on several |
-| `solid` | trees of arrays as programs over several devices can take them |
-| `train`, `checkpoints`, `log` | the loop around an algorithm; what survives a kill; CSV and TensorBoard |
-| `labels`, `demos` | what should be done in a state; demonstrations as HDF5 |
-| `guidance` | an expert that begins episodes and corrects an actor, ever less |
-| `policies`, `shipped`, `evaluate` | policy files, those that ship with the project, and how good they are |
-| `memory` | how many worlds fit into a device |
+| `protocols` | an encoder, a memory, an adviser: what algorithms may be extended by |
+| `networks`, `convolution`, `action_distributions` | actors and critics |
+| `perception`, `privileged_targets` | what networks see of observations, and what they predict |
+| `running_stats`, `adam` | means and scales; the optimizer |
+| `replay`, `imitation_buffer`, `imitation` | buffers on the device; an actor that learns labels |
+| `guidance` | an expert that begins episodes and labels states, less and less |
+| `collect`, `iteration`, `train` | steps under a policy; a rollout and what is learned from it; the loop |
+| `checkpoints`, `log`, `progress`, `best` | what survives a kill; reports; which policy is kept |
+| `settings`, `run_config` | settings by name; a run as a TOML file |
+| `policies`, `policy_checks`, `shipped`, `evaluate`, `warm_start` | policy files, those that ship, how good they are |
+| `device_memory`, `nonempty_leaves` | how many worlds fit; trees for programs over several devices |
+| `demos` | demonstrations as networks see them |
+| `occlusion` | objects that hands and arms hide; no algorithm imports it |
 """
 
 from ig2mj.process.public_names import offer_modules

@@ -1,7 +1,7 @@
-"""Adam over one long list of numbers, with gradients that are averaged over the devices.
+"""Adam over one flat vector, with gradients that are averaged over the devices.
 
-All arrays of a gradient become one before anything else is done with them. One exchange between the devices and one
-kernel of a GPU then serve what would be one for every layer, on one device as on several.
+All arrays of a gradient are concatenated first, so that one exchange between devices and one kernel replace one for
+every layer.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Which of a run's policies `policy.npz` is: the one whose training episodes succeeded most surely.
+"""Which of a run's policies `policy.npz` is: the one with the highest lower bound of its training success.
 
-The last one is often the best, but not where learning breaks down late, nor where a run is stopped in a dip. The
-success that counts is the one that reports show: of the last episodes, without those that an expert had a part in. Of
-it the lower limit of the 95 % confidence interval is compared: all of four early episodes are less than 74 of 100.
+The last one is often the best, but not where learning collapses late or a run is stopped in a dip. Success is what
+reports show: of the last episodes, without those that an expert had a part in. The lower limits of the 95 % confidence
+intervals are compared, so that 4 of 4 early episodes count less than 74 of 100.
 """
 
 from __future__ import annotations

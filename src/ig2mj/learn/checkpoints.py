@@ -84,16 +84,16 @@ class Checkpoints:
         """
         self.folder.mkdir(parents=True, exist_ok=True)
         target = self.folder / str(number)
-        beside = unfinished(target)
-        beside.mkdir()
-        with Heartbeat(beside / SIGN):
+        partial = unfinished(target)
+        partial.mkdir()
+        with Heartbeat(partial / SIGN):
             with _checkpointer() as writer:
-                writer.save(beside / "arrays", _full(_leaves(tree)))
+                writer.save(partial / "arrays", _full(_leaves(tree)))
             text = json.dumps({"format": FORMAT_VERSION, **meta}, indent=1)
-            (beside / "meta.json").write_text(text, encoding="utf-8")
+            (partial / "meta.json").write_text(text, encoding="utf-8")
         if target.exists():
             shutil.rmtree(target)
-        beside.replace(target)
+        partial.replace(target)
         for old in self.numbers()[:-KEPT]:
             shutil.rmtree(self.folder / str(old), ignore_errors=True)
         for left in self.folder.glob(".*"):  # of a process that was killed while it wrote
@@ -148,7 +148,7 @@ class Checkpoints:
 
 
 def _checkpointer() -> Any:
-    """Orbax's, for this process alone: it would wait for the others of `jax.distributed`, who do not come."""
+    """Orbax's, for this process alone: by default it waits for all processes of `jax.distributed`."""
     import orbax.checkpoint as ocp
 
     own = jax.process_index()
@@ -221,7 +221,7 @@ def _leaves(tree: Any) -> dict[str, np.ndarray]:
 
 
 def _full(leaves: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Without arrays that have no number, such as pictures of a run without any: orbax refuses them."""
+    """Without empty arrays, such as images of a run without any: orbax refuses them."""
     return {name: array for name, array in leaves.items() if array.size}
 
 

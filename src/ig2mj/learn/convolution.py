@@ -1,7 +1,7 @@
 """Convolutions of 3x3 pixels that are quick on processors, too.
 
 XLA's convolutions for processors are quick in a program's outermost part only: in a loop, where all updates are, the
-same gradients take 50 times as long. There a convolution is nine shifted pictures side by side and one product of
+same gradients take 50 times as long. There a convolution is nine shifted images next to each other and one product of
 matrices. For GPUs it stays XLA's own. A program has those of what it is compiled for, whatever compiles it.
 
 Axes: B samples, h and w rows and columns of the input, p and q of the output, c and f channels of input and output.
@@ -36,7 +36,7 @@ def by_xla(inputs: Float[Array, "B h w c"], kernel: Float[Array, "3 3 c f"], str
 def by_product(
     inputs: Float[Array, "B h w c"], kernel: Float[Array, "3 3 c f"], stride: int
 ) -> Float[Array, "B p q f"]:
-    """The same as shifted pictures and a product of matrices."""
+    """The same as shifted images and a product of matrices."""
     pads, spans = [], []
     for size in inputs.shape[1:3]:
         last = (-(-size // stride) - 1) * stride

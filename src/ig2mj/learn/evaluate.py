@@ -140,7 +140,7 @@ def _player(
     split: str,
     pool_size: int | None,
 ) -> tuple[Environment, Actor]:
-    """What is played, and who acts: the same in all jobs of an evaluation, so that each is compiled once.
+    """The environment and its agent, the same in all jobs of an evaluation, so that they are compiled once.
 
     Args:
       content: of the policy's file. The others: of `evaluate_job`.

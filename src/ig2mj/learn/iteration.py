@@ -259,10 +259,10 @@ class ManyDevices:
         """As `OneDevice.__call__`; `losses["clock"]` is the largest of all processes' clocks."""
         play_key, learn_key = jax.random.split(key)
         plays, rollouts, sums, spent = self.play(learner, plays, play_key)
-        learner, buffer, sums, losses, told = self.learn(
+        learner, buffer, sums, losses, latest = self.learn(
             learner, buffer, rollouts, sums, np.asarray(learn_key), progress, ready, clock
         )
-        losses = {**floats(losses), "clock": told}
+        losses = {**floats(losses), "clock": latest}
         return learner, buffer, plays, floats(sums), losses, spent
 
     def play(self, learner: Any, plays: list[Play], key: Array) -> tuple[list[Play], list[Any], list[Any], float]:
@@ -312,10 +312,10 @@ class ManyDevices:
         if self._learn is None:
             self._learn = self._program(*jax.eval_shape(lambda *trees: trees, *trees))
         leaves = [nonempty(tree) for tree in trees]
-        learnt, kept, total, losses, told = self._learn(*leaves, times, key, np.bool_(ready))
+        learnt, kept, total, losses, latest = self._learn(*leaves, times, key, np.bool_(ready))
         learner, buffer = restored(learner, learnt), restored(buffer, kept)
-        total, losses, told = jax.device_get((total, losses, told))
-        return learner, buffer, total, losses, float(told)
+        total, losses, latest = jax.device_get((total, losses, latest))
+        return learner, buffer, total, losses, float(latest)
 
     def _compiled(self, learner: Any, plays: list[Play], keys: np.ndarray) -> list[Callable[..., Any]]:
         """The program that plays, for every device of this process: traced in turn, compiled side by side."""

@@ -27,7 +27,7 @@ class Log:
         """
         Args:
           run: the folder; None: only the terminal. tensorboard: also for TensorBoard, where tensorboardX is installed.
-          quiet: nothing on the terminal. minutes: of the run, to be told with how long it has taken.
+          quiet: nothing on the terminal. minutes: of the run, for the lines on the terminal.
         """
         self._folder = None if run is None else pathlib.Path(run)
         self._quiet, self._board, self._minutes = quiet, None, minutes
@@ -42,7 +42,7 @@ class Log:
                     self._board = SummaryWriter(str(self._folder), flush_secs=10)
 
     def forget_after(self, seconds: float) -> None:
-        """Drops rows that a resumed run will write anew: those after its checkpoint."""
+        """Drops the rows after a checkpoint, which a resumed run writes again."""
         file = self._file
         if file is None or not file.exists():
             return
@@ -94,7 +94,7 @@ def _number(value: float | int | None) -> str:
 def _line(v: Mapping[str, Any], minutes: float | None = None) -> str:
     """Before an episode has ended, losses stand in place of return and success."""
 
-    def told(name: str, form: str) -> str:
+    def text(name: str, form: str) -> str:
         return "-" if v.get(name) is None else format(v[name], form)
 
     whole = "" if minutes is None else f" of {60 * minutes:.0f}"
@@ -104,7 +104,7 @@ def _line(v: Mapping[str, Any], minutes: float | None = None) -> str:
     else:  # no environment is stepped
         parts.append(f"{v['env_steps']:,} updates")
     if v.get("success") is not None:
-        parts.append(f"return {told('return', '.3f')}  success {told('success', '.1%')}")
+        parts.append(f"return {text('return', '.3f')}  success {text('success', '.1%')}")
     else:
         losses = [name for name, value in v.items() if "loss" in name and value is not None][:LOSSES]
         parts += [f"{name} {v[name]:.4g}" for name in losses] or ["no episode has ended yet"]
@@ -112,5 +112,5 @@ def _line(v: Mapping[str, Any], minutes: float | None = None) -> str:
         parts.append(f"{v['steps_per_second']:,.0f} steps/s")
     parts.append(f"{v['updates_per_second']:,.0f} updates/s")
     if v.get("learner_share") is not None:
-        parts.append(f"learner {told('learner_share', '.0%')}  simulator {told('simulator_share', '.0%')}")
+        parts.append(f"learner {text('learner_share', '.0%')}  simulator {text('simulator_share', '.0%')}")
     return "  ".join(parts)

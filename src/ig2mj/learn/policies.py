@@ -43,7 +43,7 @@ FORMAT_VERSION = 1
 CARD = "card.json"
 
 HIDDEN = ("hidden_mean", "hidden_deviation")
-"""Names in a file of the scales of what is guessed."""
+"""Names in a file of the scales of the privileged numbers that are predicted."""
 
 
 def world_of(env: Any) -> dict[str, Any]:
@@ -140,14 +140,14 @@ class Policy:
         """Writes it. Raises OSError."""
         half = {f"weights/{name}": np.asarray(w, np.float16) for name, w in self.weights.items()}
         path = pathlib.Path(file)
-        beside = unfinished(path)
-        with beside.open("wb") as f:
+        partial = unfinished(path)
+        with partial.open("wb") as f:
             card = np.frombuffer(json.dumps(self.card).encode(), np.uint8)
             scales = {"mean": self.mean, "deviation": self.deviation}
             if self.hidden is not None:
                 scales |= dict(zip(HIDDEN, self.hidden, strict=True))
             np.savez_compressed(f, **{CARD: card, **scales, **half})  # pyright: ignore[reportArgumentType]
-        beside.replace(path)
+        partial.replace(path)
 
     @classmethod
     def load(cls, file: str | os.PathLike) -> Policy:

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 EPISODES = (100, 500)
-"""Return and success are told of so many of the last episodes: of as many as there are worlds, within these limits."""
+"""Return and success are of so many of the last episodes: of as many as there are worlds, within these limits."""
 
 
 @dataclasses.dataclass

@@ -1,6 +1,6 @@
 """`Replay`: the last steps of all worlds, on the device, and samples of it over n steps.
 
-A ring of T steps of W worlds. What was seen after a step is kept beside what was seen before it: where an episode was
+A ring of T steps of W worlds. The observation after a step is kept next to the one before it: where an episode was
 cut off, the two neighbours in the ring are of different episodes, and the value of the last state is still needed.
 
 Axes: T steps, W worlds, B samples, n numbers of an action, v of a vector, q bytes of a image.

@@ -100,22 +100,22 @@ def add_policy(
     target = folder / f"{name or usual_name(policy)}.npz"
     if not folder.is_dir():
         raise InputError(folder, "there is no such folder", fix="policies are added in a checkout of the project")
-    beside = target.with_suffix(".new")
+    new_file = target.with_suffix(".new")
     ready = dataclasses.replace(policy, card=card)
-    ready.save(beside)
-    size = beside.stat().st_size
+    ready.save(new_file)
+    size = new_file.stat().st_size
     others = sum(f.stat().st_size for f in folder.glob("*.npz") if f != target)
     for bytes_, most, what in (
         (size, MOST_BYTES, "a policy"),
         (size + others, MOST_BYTES_OF_ALL, "all policies together"),
     ):
         if bytes_ > most:
-            beside.unlink()
+            new_file.unlink()
             fix = "train smaller networks: --set actor_layers=128,128"
             raise InputError(
                 file, f"would make {bytes_ / 1e6:.2f} MB, and {what} may have {most / 1e6:.1f} MB", fix=fix
             )
-    beside.replace(target)
+    new_file.replace(target)
     target.with_suffix(".md").write_text(model_card(target.stem, ready), encoding="utf-8")
     return target
 

@@ -5,7 +5,7 @@ for. On the native engine the same loop calls the compiled policy, the environme
 
 The clock of a run is wall time without the first iteration, which is stated as `compile_s`; a resumed run goes on with
 the clock of its checkpoint. The first iterations only play (`warm_up`): what they take is the simulator's share later
-on, since inside one program the two cannot be told apart; with two programs both are measured.
+on, since inside one program the two cannot be separated; with two programs both are measured.
 """
 
 from __future__ import annotations
@@ -181,7 +181,7 @@ class _Training:
         for done in itertools.count():
             began = time.monotonic()
             play, sums, losses, spent = self._iterate(play, done >= self.waiting)
-            told = losses.pop("clock")
+            clock = losses.pop("clock")
             now = time.monotonic()
             took = now - began
             if done == 0:
@@ -199,8 +199,8 @@ class _Training:
             if done:
                 window.steps, window.updates = window.steps + sums["steps"], window.updates + updates
             window.losses = losses
-            told = self.clock if team.count == 1 else told
-            stopped = self._stopped(window, told)
+            clock = self.clock if team.count == 1 else clock
+            stopped = self._stopped(window, clock)
             now = time.monotonic()
             if now - logged >= run.log_every or stopped:
                 counters = {"seconds": self.clock, "iteration": self.iteration, "env_steps": self.env_steps}
@@ -208,9 +208,9 @@ class _Training:
                 self.log.row(row)
                 counted = window.counted()
                 logged, window = now, window.next(now)
-            if told - saved >= run.checkpoint_every or stopped:
+            if clock - saved >= run.checkpoint_every or stopped:
                 self._save()
-                saved = told
+                saved = clock
                 if team.first:
                     kept(self.learner, {"seconds": self.clock, "env_steps": self.env_steps, "counted": counted, **row})
                 team.barrier(f"saved {self.iteration}")
